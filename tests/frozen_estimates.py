@@ -218,7 +218,7 @@ CALIBRATION = tuple(
 
 
 def calibrated(case: str) -> dict:
-    """A fit with data kept aside that do not depend on how folds are dealt."""
+    """A fit with held-out data that do not depend on how folds are dealt."""
     work, prior = case.split(", ")
     options = {"folds": 0, **PRIORS[prior]}
     if work == "ur10":

@@ -221,10 +221,10 @@ def test_contacts_with_a_known_length_determine_the_shape(contacts):
     wrong = KnownDistance("point:0", "point:1", 1.01 * apart)
     long = fit(s.nominal, [PointContact(q, labels), wrong], prior=None, **ALONE)
     assert long.model.table.r[3] == pytest.approx(1.01 * s.real.table.r[3], rel=1e-9)
-    with pytest.raises(InvalidValueError, match=r"know no length.*known_lengths"):
+    with pytest.raises(InvalidValueError, match=r"contain no length.*known_lengths"):
         fit(s.nominal, PointContact(q, labels))
     for name in ("r1", "alpha3", "b0"):  # zero is no length, and neither is an angle
-        with pytest.raises(InvalidValueError, match="know no length"):
+        with pytest.raises(InvalidValueError, match="contain no length"):
             fit(s.nominal, PointContact(q, labels), known_lengths=[name])
 
 

@@ -180,7 +180,7 @@ def test_the_wrong_one_of_two_distances_is_named(seed):
     assert touched.blocks not in result.solution.fit.outliers
     # without anything else either may be wrong
     (note,) = notes_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))
-    assert "one of these" in note
+    assert "is wrong" in note
     assert "point:0 to point:1" in note
     assert "point:0 to point:2" in note
 
@@ -289,8 +289,8 @@ FACTORS = [
     (1e-3, "as if metres had been converted as millimetres"),
 ]  # fmt: skip
 TENFOLD = [
-    (10.0, "0.5 m is ten times too long: a slip of a decimal, or mm for cm"),
-    (0.1, "0.005 m is ten times too short: a slip of a decimal, or cm for mm"),
+    (10.0, "0.5 m is ten times too long: a misplaced decimal point, or mm for cm"),
+    (0.1, "0.005 m is ten times too short: a misplaced decimal point, or cm for mm"),
 ]
 
 
@@ -477,7 +477,7 @@ def test_joints_beside_the_chain_are_named_where_their_columns_are_missing(tmp_p
     hand = rm.RobotModel.from_table(DHTable.from_rows([*rows, finger]), tip=6)
     file = tmp_path / "hole.csv"
     np.savetxt(file, q, delimiter=",")
-    sentence = "All 7 joints of the model count: .*tip_link"
+    sentence = "all 7 joints of the model are needed: .*tip_link"
     with pytest.raises(InvalidValueError, match=sentence) as caught:
         read_measurements(file, "point_contact", hand)
     assert f"{hand.table.joint_names[-1]} do not move the tool" in str(caught.value)

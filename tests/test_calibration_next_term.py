@@ -120,7 +120,7 @@ def test_the_term_brings_on_fresh_data_what_it_promises(kind):
         scene, measured, result = fitted(seed, kind)
         text = note(result)
         if kind != "backlash":
-            assert text.startswith("Not geometry")
+            assert text.startswith("The residuals depend on the posture")
         promise = named(text)
         if promise is None:
             continue
@@ -140,13 +140,15 @@ def test_the_term_brings_on_fresh_data_what_it_promises(kind):
 
 
 def test_backlash_is_not_geometry():
-    assert sum("Not geometry" in note(fitted(seed, "backlash")[2]) for seed in range(6)) >= 5
+    assert (
+        sum("no geometric parameter" in note(fitted(seed, "backlash")[2]) for seed in range(6)) >= 5
+    )
 
 
 def test_without_masses_they_are_asked_for():
     for seed in range(3):
         text = note(fitted(seed, "compliance", False)[2])
-        assert "Not geometry" in text
+        assert "no geometric parameter" in text
         assert "Give the model masses (with_inertia) to try joint compliance." in text
         assert "compliance='joints'" not in text
 

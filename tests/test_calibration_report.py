@@ -126,7 +126,7 @@ def test_what_is_not_estimated_is_listed_with_its_reason(contacts):
 
 
 def test_kinds_noise_and_ranges(contacts):
-    kinds, ranges = tables(contacts, "What was measured")
+    kinds, ranges = tables(contacts, "Measurements")
     assert [row[1] for row in cells(kinds).values()] == [
         "Position",
         "PointContact",
@@ -137,7 +137,7 @@ def test_kinds_noise_and_ranges(contacts):
     (noise,) = tables(contacts, "Noise")
     assert "stated" in noise.columns[4][1]
     assert "estimated" in noise.columns[4][1]
-    assert "No measurements were kept aside" in report(contacts)
+    assert "No measurements were held out" in report(contacts)
 
 
 def test_lines_fit_in_a_hundred_columns(poses, contacts):
@@ -146,7 +146,7 @@ def test_lines_fit_in_a_hundred_columns(poses, contacts):
         assert text == report(result)
         assert max(map(len, text.splitlines())) <= 100
         assert "nan" not in text
-        for title in ("Outcome", "Noise", "Base and tool", "How far to trust it"):
+        for title in ("Outcome", "Noise", "Base and tool", "Quality of the fit"):
             assert f"\n{title}\n{'-' * len(title)}\n" in text
 
 

@@ -114,8 +114,8 @@ def places():
 def test_the_report_says_what_was_kept_aside(places):
     text = " ".join(report(places).split())
     assert places.validation.folds.fits == 4
-    assert "4 folds: whole places (4) kept aside." in text
-    assert "Held out: whole places (4) kept aside." in text
+    assert "4 folds: whole places (4) held out." in text
+    assert "Held out: whole places (4) held out." in text
     assert not any("place" in note and "only" in note for note in places.notes)
     arm = Arm(2)
     found = fit(arm.nominal, markers(arm)[0], prior=PRIOR)
@@ -149,7 +149,7 @@ def test_nothing_to_keep_aside_is_said():
     found = fit(arm.nominal, measured, prior=PRIOR)
     assert found.validation.folds is None
     assert found.validation.held_out is None
-    assert any(note.startswith("Nothing can be kept aside") for note in found.notes)
+    assert any(note.startswith("No measurements can be held out") for note in found.notes)
 
 
 def test_a_point_that_is_touched_once_is_no_place():

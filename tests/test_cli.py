@@ -408,7 +408,7 @@ def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path)
              "--parameters", "b7", "d7", "r7", "d3", "r4", "--folds", 0]  # fmt: skip
     code, _, err = run(*words)
     assert code == 2
-    assert "know no length" in err
+    assert "contain no length" in err
     code, _, err = run(*words, "--known-distance", "a", "b", "zero")
     assert code == 2
     assert "--known-distance: expected 1 finite number" in err

@@ -25,7 +25,7 @@ with warnings.catch_warnings(record=True) as found:
     T = rm.dgm(model, q)
     assert np.abs(T[0] - rm.dgm(model, q[0])).max() < 1e-12
     K = rm.kinetic_energy(model, q, q)
-print(len([w for w in found if "Compiled functions are not kept" in str(w.message)]))
+print(len([w for w in found if "Compiled functions are not cached" in str(w.message)]))
 """
 
 
@@ -121,7 +121,7 @@ def test_a_full_disk_costs_one_warning(folder, monkeypatch):
 
     monkeypatch.setattr(_cache.Path, "write_bytes", full)
     x, y = np.arange(3.0), np.empty(3)
-    with pytest.warns(RobotModelsWarning, match="not kept.*No space"):
+    with pytest.warns(RobotModelsWarning, match="not cached.*No space"):
         kernel()(x, y)
     kernel()(x, y)  # warnings are errors here: the second one is silent
     assert y[2] == 4.0

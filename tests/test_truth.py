@@ -73,7 +73,7 @@ def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
     assert max(rms(true_errors(real, real, Q))) < 1e-13
     assert rms(true_errors(real.model, real, Q))[2] > 1e-4
     apart = np.linalg.norm((cal.calibrated_pose(real, Q) - rm.dgm(arm, Q))[:, :3, 3], axis=1)
-    assert np.allclose(true_errors(arm, real, Q).as_it_stands.position, apart, atol=1e-15)
+    assert np.allclose(true_errors(arm, real, Q).as_given.position, apart, atol=1e-15)
 
 
 def test_a_planar_robot_and_a_slide_have_base_and_tool_that_are_not_told_apart():
@@ -92,10 +92,10 @@ def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):
     found = cal.fit(arm, cal.Position(Q, rm.dgm(real, Q)[:, :3, 3]), folds=0, held_out=0.0)
     assert rms(true_errors(found, real, Q + 0.3))[0] < 1e-9
     elbow = true_errors(arm, real, Q, frame=3)
-    assert elbow.as_it_stands.position == pytest.approx(
+    assert elbow.as_given.position == pytest.approx(
         np.full(60, 1e-3)
     )  # frame 3 is d3 behind frame 2
-    assert np.isnan(elbow.as_it_stands.angle).all()
+    assert np.isnan(elbow.as_given.angle).all()
 
 
 def test_mistakes_are_told(arm):

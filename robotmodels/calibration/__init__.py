@@ -1,4 +1,4 @@
-"""Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
+"""Geometric calibration from measurements or contacts (section 1.4)."""
 
 from ..obstacles import Box, Sphere
 from .candidates import candidate_parameters

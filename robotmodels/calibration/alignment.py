@@ -30,12 +30,12 @@ from .solve import ROUGH, first_scales, solve
 from .validation import Errors, errors_of
 
 _NEAR = 0.2
-"""Largest mean residual, in lengths of the robot, that a fit is started from as it is."""
+"""Mean residual, in lengths of the robot, above which base and tool are aligned first."""
 _ALIKE = 1.0 + 2.0 * np.cos(0.5)
-"""Least mean trace of the rotations from nominal to measured poses for the same."""
+"""Mean trace of the rotations from nominal to measured poses below which they are too."""
 _STEPS = 50
 _ROUNDING = 1e-13
-"""Step relative to the size of the work, from which on further ones are rounding."""
+"""Relative step at which Gauss-Newton has converged."""
 
 
 def best_motion(points: Array, targets: Array) -> Array:
@@ -123,15 +123,15 @@ def _kabsch_alignment(
 
 
 class TrueErrors(NamedTuple):
-    """Position errors as the robot stands, with its base, and with base and tool's point fitted."""
+    """Position errors: as given, with the base fitted, and with base and tool point fitted."""
 
-    as_it_stands: Errors
+    as_given: Errors
     base_fitted: Errors
     base_and_tool_fitted: Errors
 
 
 def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> TrueErrors:
-    """Position errors of a robot against the one that it stands for (absolute accuracy).
+    """Absolute accuracy: position errors of a robot model against the real robot.
 
     ``robot``: a model, a calibrated robot or the result of a fit; ``q``: three or more readings
     (N, n), other ones than those of the fit; ``frame``: the end, None is the tool.
@@ -145,7 +145,7 @@ def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> Tru
     readings = np.atleast_2d(as_vector(q, model.n, "q")).reshape(-1, model.n)
     if len(readings) < 3:
         raise InvalidValueError(
-            f"q: expected three configurations or more to place a base by, got {len(readings)}."
+            f"q: expected three configurations or more to fit a base, got {len(readings)}."
         )
     T, goal = _poses(robot, readings, frame), _poses(real, readings, frame)[:, :3, 3]
     p = T[:, :3, 3]

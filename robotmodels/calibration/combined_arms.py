@@ -29,8 +29,8 @@ def combine_arms(
 ) -> RobotModel:
     """One robot with the arms of two: its joints are those of the first, then of the second.
 
-    The second stands on a fixed frame ``b_base`` of the first one's table, whose parameters are its
-    place. Ends are called ``a_tool`` and ``b_tool``, frames and joints keep their names behind
+    The base of the second is a fixed frame ``b_base`` of the common table, whose parameters give
+    its pose. Ends are called ``a_tool`` and ``b_tool``, frames and joints keep their names behind
     ``a_`` and ``b_``. The tool of the whole is that of the first robot.
 
     Parameters
@@ -75,7 +75,7 @@ def combine_arms(
     stand = base_parameters_of(se3.inverse(model_a.base) @ place)
     rows = [stand.elements]
     if not np.array_equal(stand.turn, np.eye(4)):
-        # a base that is upright as the other: the constant turn is a frame of its own
+        # z_0 nearly parallel to the other: the constant quarter turn is a separate frame
         rows.insert(0, base_parameters_of(se3.rotation("x", -np.pi / 2)).elements)
     table = _table(model_a.table, model_b.table, rows, (a, b))
     shift = model_a.f + len(rows)

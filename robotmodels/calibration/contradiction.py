@@ -51,7 +51,7 @@ def contradictions(
     numbers = [k for k, m in enumerate(measurements) if isinstance(m, KnownDistance)]
     rival = ""
     if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0], ()):
-        # where they alone give the scale, the first of them does
+        # if they alone determine the scale, the first one is taken as correct
         first, *numbers = numbers
         rival = _named(measurements[first])  # type: ignore[arg-type]
     if not numbers:
@@ -83,7 +83,7 @@ def contradictions(
             f"{abs(mean) / math.hypot(size, error):.0f} standard errors). Check {its} and the "
             f"standard deviation of {1e3 * size * math.sqrt(many):.2g} mm."
         )
-        note += f" It or {rival}: one of these." if rival else ""
+        note += f" Either this distance or {rival} is wrong." if rival else ""
         found.append(Contradiction(tuple(int(firsts[numbers[k]]) for k in group), note))
     return found
 
@@ -91,7 +91,7 @@ def contradictions(
 def _wrong_groups(
     shift: Array, covariance: Array, sigma: Array, lengths: Sequence[float]
 ) -> list[list[int]]:
-    """Distances that are wrong, those of one length together where their mean is.
+    """Groups of wrong distances; equal lengths are one group if only their mean is wrong.
 
     Shapes: shift, sigma (K,); covariance (K, K).
     """
@@ -173,10 +173,10 @@ def _named(m: KnownDistance) -> str:
 def with_outliers(
     solution: Solution, contradicted: list[Contradiction], given: ParameterPrior | None
 ) -> Solution:
-    """The fit with its outliers; known distances are none unless they are contradicted."""
-    # Contacts leave the scale open, so that they shrink to nothing in a fit without the distance
-    # that alone gives it. An outlier bends the noise, the widths of the prior and the weights of a
-    # fit, so that all are judged again by a fit without those listed.
+    """The fit with its outliers; a known distance is one only if it is contradicted."""
+    # Contacts leave the scale open, so that they shrink to zero size in a fit without the distance
+    # that alone gives it. An outlier distorts the noise, the widths of the prior and the weights of
+    # a fit, so that all are judged again by a fit without those listed.
     problem, fit = solution.problem, solution.fit
     if fit.loss is not Loss.SQUARES:
         return solution
@@ -204,7 +204,7 @@ def with_outliers(
 def _rows_without(
     solution: Solution, outliers: NDArray[np.int64], given: ParameterPrior | None
 ) -> tuple[Array, Array, float] | None:
-    """Orthonormal rows and residuals of all blocks by a fit without some, and its freedom.
+    """Orthonormal rows and residuals of all blocks by a fit without some; degrees of freedom.
 
     None where too little is left.
     """

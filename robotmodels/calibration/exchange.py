@@ -145,7 +145,7 @@ def moved_configurations(
     count, m, n = groups.shape
     lower, upper = np.tile(model.lower, m), np.tile(model.upper, m)
     sigma = np.tile(model.table.sigma[model.table.joint_rows], m)
-    # a stroke without limits would grow for ever, as longer levers are always better
+    # without limits strokes would grow without bound, as longer levers are always better
     endless = (sigma == PRISMATIC) & ~(np.isfinite(lower) & np.isfinite(upper))
     value, total = float(index_of(information(rows), criterion)), _MOVE_SWEEPS * count
     for sweep in range(_MOVE_SWEEPS):

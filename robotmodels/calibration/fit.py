@@ -70,10 +70,10 @@ def fit(
     """Estimate the geometric parameters of a robot, also called kinematic calibration.
 
     Parameters that the measurements do not determine stay nominal or are regrouped into others;
-    the result lists them. All measurements take part in the estimate; the errors on data kept
-    aside come from further fits without them. Where the residuals depend on the posture in a way
+    the result lists them. All measurements take part in the estimate; the errors on held-out
+    data come from further fits without them. Where the residuals depend on the posture in a way
     that no parameter explains, a note says so and, with folds, names the term to try next (joint
-    compliance, gear eccentricity, gains) and what it gains on data kept aside.
+    compliance, gear eccentricity, gains) and what it gains on held-out data.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def fit(
         Share of the places or postures that one more fit is tested on (0 for none), or
         measurements for that, which never take part.
     rng : numpy.random.Generator or int, optional
-        For the folds; default the same each time.
+        For the folds; default a fixed seed.
     progress : callable, optional
         ``progress(done, total, task)`` after each fit.
 
@@ -185,9 +185,13 @@ def fit(
     last = last._replace(splits=last.splits[:1])
     fits = len(parts.splits)
     if folds and blocks < 2 * folds:
-        notes.append(f"{blocks} measurements are too few for {folds} folds: none were made.")
+        notes.append(
+            f"{blocks} measurements are too few for {folds} folds: no cross-validation was made."
+        )
     elif (folds or share) and not (parts.splits or last.splits):
-        notes.append("Nothing can be kept aside: each object is measured in one posture alone.")
+        notes.append(
+            "No measurements can be held out: each object is measured in only one posture."
+        )
     trials_to_fit = len(structure.indicated) if structure and fits else 0
     step = _Steps(progress, 1 + fits + len(last.splits) + trials_to_fit * (1 + fits))
     step("all measurements")
@@ -197,7 +201,7 @@ def fit(
     if test:
         in_test = errors_on(solution, test)
     elif last.splits:
-        in_test = cross_validated(solution, last, nominal, partial(step, "measurements kept aside"))
+        in_test = cross_validated(solution, last, nominal, partial(step, "held-out measurements"))
     if structure is not None:
         trials = []
         if in_folds is not None:

@@ -44,14 +44,14 @@ class Reason(Enum):
     Examples
     --------
     >>> Reason.GAUGE.value
-    'the place of the robot is not measured: it stays as it is'
+    'the base pose is not measured: it keeps its nominal value'
     """
 
     NO_EFFECT = "it does not change what is measured"
-    REGROUPED = "it acts like a combination of others and is regrouped into them"
-    GAUGE = "the place of the robot is not measured: it stays as it is"
+    REGROUPED = "its effect is a combination of those of others, into which it is regrouped"
+    GAUGE = "the base pose is not measured: it keeps its nominal value"
     KNOWN = "it is known and fixed"
-    NOISE = "its effect is smaller than the noise: it stays as it is"
+    NOISE = "its effect is smaller than the noise: it keeps its nominal value"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +144,7 @@ class IdentifiableParameters(Rebuilt):
         if self.count:
             sums = [_sum_text(self.regrouping[name]) for name in self.names]
             lines[0] += ":"
-            lines.append(boxed([("parameter", list(self.names)), ("stands for", sums)]))
+            lines.append(boxed([("parameter", list(self.names)), ("combination", sums)]))
         headings = {
             Reason.NO_EFFECT: "Not identifiable",
             Reason.REGROUPED: "Only in combination",
@@ -159,7 +159,7 @@ class IdentifiableParameters(Rebuilt):
             lines.append(f"{heading} ({reason.value}):")
             if reason is Reason.REGROUPED:
                 lines += [
-                    f"  {name} acts like {_sum_text(terms) or 'the unknown fixtures'}"
+                    f"  {name} has the effect of {_sum_text(terms) or 'the unknown fixtures'}"
                     for name, terms in self.regrouped_into.items()
                 ]
             else:
@@ -399,7 +399,7 @@ def all_corrections(
 
 
 def _angle_basis(W: Array, dependent: float, unit: Array) -> ColumnBasis:
-    """Columns are compared by angles: a metre and a radian have no common length."""
+    """Independent columns by their angles, since metres and radians have no common scale."""
     length = np.linalg.norm(W * unit, axis=0)
     longest = length.max(initial=0.0) or 1.0
     size = np.where(length > _EMPTY * longest, length, longest)

@@ -28,7 +28,7 @@ SAMPLES = 32  # configurations at which calibrated and nominal poses are compare
 NEAR_SINGULAR = 3.0  # differences of these poses up to which a singular value may hide postures
 CALIBRATED_ONLY = "of the calibrated robot only"
 MERGE = 1e-6
-"""Postures closer than this are one [rad, m], as in `igm`."""
+"""Postures closer than this are merged [rad, m], as in `igm`."""
 
 
 class CorrectionStatus(Outcome):
@@ -36,7 +36,10 @@ class CorrectionStatus(Outcome):
 
     ARRIVED = 0, "It converges to a posture of the calibrated robot."
     MERGED = 1, "It converges to the same posture as another nominal one before it."
-    VANISHED = 2, "Newton steps from it do not meet the pose: the calibrated robot lacks it."
+    VANISHED = (
+        2,
+        "Newton refinement from it fails: the calibrated robot has no such posture.",
+    )
     OUTSIDE_LIMITS = 3, "It converges to a posture outside the joint limits."
     NO_READING = 4, "It converges to a posture that no readings of the joints lead to."
     NO_POSTURE = 5, "The nominal robot has no more postures for the pose."
@@ -131,7 +134,7 @@ def corrected_igm(
 
     The closed form of the nominal table (at the calibrated base and tool) gives its postures;
     Newton's method refines each on the calibrated table and in the readings. Poses where that may
-    miss a posture (one vanished or met another, the Jacobian is nearly singular, the nominal arm
+    miss a posture (one vanished or was merged, the Jacobian is nearly singular, the nominal arm
     has fewer postures than it can have, or no closed form) are solved by `igm` of the calibrated
     table as well.
 
@@ -154,8 +157,8 @@ def corrected_igm(
     tolerance : float
         Largest pose error of a solution, metres and radians.
     complete : bool
-        False leaves the calibrated table's own inverse model out: quicker, but postures that only
-        the calibrated robot has are not found.
+        False skips the inverse geometric model of the calibrated table: faster, but postures that
+        only the calibrated robot has are not found.
 
     Returns
     -------
@@ -169,7 +172,7 @@ def corrected_igm(
 
     Notes
     -----
-    A redundant arm keeps the choice the nominal model makes: the same joints read as in
+    For a redundant arm the free joints are those of the nominal model and keep the readings of
     ``q_ref``. Postures at the choice of the calibrated table's own inverse model are added
     (``free_joints``).
 
@@ -328,7 +331,7 @@ def _merged(
     reading = _turned(newton, every.q, reading, aim, limits)
     residual, kept = every.residual, every.met & ~merged
     if newton.bends:
-        # a gain makes a turn of a joint no whole turn of its reading, which bends otherwise
+        # with gains, a whole turn of a joint is no whole turn of its reading: bending differs
         rows, held = kept & readable, every.free | newton.locked
         reading, size = newton.refined_readings(targets, reading, rows, held, rows)
         residual = np.where(rows, size, residual)

@@ -17,8 +17,8 @@ _TURNS = 30.0
 _TOLERANCE = 0.02
 """Tolerance beyond a limit, rad or m and relative to the range."""
 _MOST = 0.6
-"""Fraction of the readings of a joint beyond its limits from which they are refused: more than that
-of a symmetric range where a limit is at zero, as in simulated data that ignore limits."""
+"""Share of readings beyond a limit above which they are refused; simulated readings over a
+symmetric range have a share of 0.5 where a limit is at zero."""
 
 
 def expected_joints_text(model: RobotModel) -> str:
@@ -30,8 +30,9 @@ def expected_joints_text(model: RobotModel) -> str:
     if not idle:
         return ""
     return (
-        f" All {model.n} joints of the model count: {', '.join(names)}. {', '.join(idle)} do not "
-        "move the tool. Read the robot with tip_link='LINK' to leave them out."
+        f" Readings of all {model.n} joints of the model are needed: {', '.join(names)}. "
+        f"{', '.join(idle)} do not move the tool; read the robot with tip_link='LINK' to leave "
+        "them out."
     )
 
 

@@ -36,8 +36,8 @@ _SLIPS = {
 }
 """Ratio of stated to true lengths, by their unit and the unit that was assumed."""
 _TENFOLD = {
-    ("millimetres", "centimetres"): "ten times too long: a slip of a decimal, or mm for cm",
-    ("centimetres", "millimetres"): "ten times too short: a slip of a decimal, or cm for mm",
+    ("millimetres", "centimetres"): "ten times too long: a misplaced decimal point, or mm for cm",
+    ("centimetres", "millimetres"): "ten times too short: a misplaced decimal point, or cm for mm",
 }
 """Sentences on a known distance that is ten times too long or too short."""
 _NEAR = 0.15
@@ -91,13 +91,13 @@ def unit_error_of_positions(nominal: Array, measured: Array) -> UnitError | None
 
 
 def unit_error_of_spread(model: RobotModel, frame: Frame, spread: float) -> UnitError | None:
-    """By the reach of the robot, where measured lengths do not follow the nominal ones."""
+    """Unit error by measured spread over reach, for lengths not proportional to nominal ones."""
     ratio = spread / characteristic_length(model, frame)
     return UnitError("millimetres", "metres", ratio) if ratio > _SPREAD else None
 
 
 def _unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
-    """By the ratio of the lengths of the same movements, if it is one."""
+    """Unit error by the ratio of measured to nominal displacements, if they are proportional."""
     size = float((nominal * nominal).sum())
     ratio = float((nominal * measured).sum()) / size if size > 0.0 else 0.0
     left = float(np.linalg.norm(measured - ratio * nominal))
@@ -105,7 +105,7 @@ def _unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
 
 
 def _unit_error_of_pivot(p: Array, length: Array) -> UnitError | None:
-    """By ``|p - c|^2 = s length^2``, which is linear in c, c.c and s."""
+    """Unit error of lengths from a pivot, by ``|p - c|^2 = s length^2``, linear in c, c.c, s."""
     if len(p) < _FEW:
         return None
     x = p - p.mean(axis=0)
@@ -179,7 +179,7 @@ def _check_spread(model: RobotModel, m: Pose | Position, where: str) -> None:
     if 0.0 < spread < expected / _STILL:
         raise InvalidValueError(
             f"{where}: positions are spread over {spread:.3g} m, but those of the robot over "
-            f"{expected:.3g} m: these look like the same position all the time, or like "
+            f"{expected:.3g} m: the positions seem to be constant, or in "
             "kilometres. Pass metres."
         )
 

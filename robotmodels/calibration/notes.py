@@ -24,12 +24,12 @@ _FAR = 50.0
 _IMPLAUSIBLE = 0.02
 """Noise that is estimated, relative to the robot or in rad, that no measurement of a robot has."""
 _OTHER_LENGTH, _OTHER_ANGLE = 0.1, 0.35
-"""Corrections beyond which it is another robot, in sizes of the robot and rad."""
+"""Corrections that are implausibly large, in sizes of the robot and rad."""
 _NO_GAIN = 0.98
 _LISTED = 10
 _FEW = 0.5
 _CONFUSED = 50.0
-"""Standard error, in that of the parameter if it were alone, beyond which others hide it."""
+"""Ratio of the standard error to that with all others known, from which a note is given."""
 
 
 def notes_before(problem: Problem) -> tuple[str, ...]:
@@ -114,7 +114,7 @@ def notes_after(
     if problem.rows - unknowns < _FEW * unknowns:
         notes.append(
             f"{problem.rows - unknowns} rows more than the {unknowns} unknowns: too few to know "
-            "the noise well, so standard errors are uncertain and intervals too short. Measure "
+            "the noise well, so standard errors are uncertain and intervals too narrow. Measure "
             "more configurations."
         )
     if len(fit.outliers):
@@ -133,7 +133,7 @@ def notes_after(
 
 
 def notes_of_errors(solution: Solution, validation: Validation) -> tuple[str, ...]:
-    """Notes that come first: implausible residuals, and no gain on data kept aside."""
+    """Notes that come first: implausible residuals, and no gain on held-out data."""
     notes = implausible(solution)
     found = []
     for unit, word in (("m", "position"), ("rad", "angle")):
@@ -149,7 +149,7 @@ def notes_of_errors(solution: Solution, validation: Validation) -> tuple[str, ..
             found.append(f"{word} error ({', '.join(changes)} {printed_unit(unit)}, rms)")
     if found:
         notes.append(
-            f"Calibration does not lower the {' and the '.join(found)} on data kept aside. The "
+            f"Calibration does not lower the {' and the '.join(found)} on held-out data. The "
             "noise or the number of measurements does not support this many parameters: fewer "
             f"parameters, a {'narrower ' if _has_prior(solution) else ''}prior, or more data."
         )
@@ -186,14 +186,14 @@ def _unlikely_noise(solution: Solution) -> list[str]:
         if states_noise(m) and size > _FAR:
             notes.append(
                 f"{m.name}: residuals are {size:.3g} times the stated standard deviations. Look "
-                "for a slip of units (mm for m, degrees for rad), a wrong frame, or readings that "
-                "do not belong to their measurements."
+                "for an error of units (mm for m, degrees for rad), a wrong frame, or readings "
+                "that do not belong to their measurements."
             )
     return notes
 
 
 def _unlikely_corrections(solution: Solution) -> list[str]:
-    """Parameters of the table that would be another robot's."""
+    """Notes on implausibly large corrections of the table."""
     parameters = solution.problem.parameters
     limit = {True: _OTHER_LENGTH * parameters.table.size, False: _OTHER_ANGLE}
     far = [
@@ -206,7 +206,7 @@ def _unlikely_corrections(solution: Solution) -> list[str]:
     if not far:
         return []
     return [
-        f"{', '.join(far)}: corrections that no robot needs. Look for a slip of units (mm for m, "
+        f"{', '.join(far)}: corrections that no robot needs. Look for an error of units (mm for m, "
         "degrees for rad), joints in another order or with another sign or zero, rotations the "
         "other way round; or the data do not determine these parameters."
     ]

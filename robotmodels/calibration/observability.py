@@ -17,7 +17,7 @@ _RANK_TOLERANCE = 1e-14
 
 
 class Criterion(Enum):
-    """The index to make large; the value is its formula."""
+    """The index to maximise; the value is its formula."""
 
     O1 = "(s_1 ... s_L)^(1/L) / sqrt(m)"
     O2 = "s_L / s_1"

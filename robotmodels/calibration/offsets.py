@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .result import CalibrationResult
 
 STEPS = 50
-DEPENDENT = 1e-9  # singular values beside the largest below which offsets are dependent
+_RANK_TOLERANCE = 1e-9  # singular values beside the largest below which offsets are dependent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +169,9 @@ def joint_offsets(
     for _ in range(STEPS):
         J = reading_jacobian(robot, commanded + offset)
         W = weight[:, None] * pose_error_slope(J, error[:, 3:]) * unit
-        step, _, rank, _ = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), DEPENDENT)
+        step, _, rank, _ = np.linalg.lstsq(
+            W.reshape(-1, n), (weight * error).ravel(), _RANK_TOLERANCE
+        )
         trial, after = errors(offset + unit * step)
         if not after < cost:
             break  # only rounding is left

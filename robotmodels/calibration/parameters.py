@@ -20,7 +20,7 @@ class ErrorLaw(Enum):
     """How the error of an element depends on the configuration: ``error = parameter * factor``.
 
     The value is the prefix of the names; constant errors are named by their element. A new law is
-    a row here.
+    a new member.
     """
 
     unit: str
@@ -46,7 +46,7 @@ class ErrorLaw(Enum):
 
 
 class Compliance(Enum):
-    """Elements that yield under gravity, in proportion to its load there.
+    """Elements that deflect under gravity, in proportion to their gravity load.
 
     Examples
     --------
@@ -56,14 +56,14 @@ class Compliance(Enum):
 
     NONE = "nothing"
     JOINTS = "joints about their axes"
-    LINKS = "joints, links about alpha and beta, and the mount, each for itself"
+    LINKS = "joints, links about alpha and beta, and the mount, one each"
     ISOTROPIC = "joints and mount, the same about all axes"
     UNIFORM = "one for all joints and one for the mount, the same about all axes"
 
 
 @dataclass(frozen=True, slots=True)
 class GeometricParameter:
-    """One parameter: the error of an element of a row, times the factor of its law."""
+    """One parameter; times the factor of its law it is the error of an element of a row."""
 
     row: int
     """Row of the extended table: 0 the base, 1 to f the frames, then the ends."""

@@ -15,13 +15,13 @@ from .measurements import Measurement
 from .parameters import ErrorLaw, GeometricParameter, GeometricParameters
 from .problem import Problem, problem_of
 
-_ANOTHER_ROBOT = 3.0
+_WRONG_ZEROS = 3.0
 """Increase of the prior's angles from which zeros or signs of joints may be wrong."""
 _LENGTH = 1e-3
 """Prior standard deviation of lengths of robots of 1 m and more, m."""
 _SHARED = 0.1
-"""Corrections of others in their prior standard deviations, per one of a regrouped parameter, from
-which the regrouped parameter shares corrections with them."""
+"""Least ratio of a kept parameter's correction to that of a regrouped one with the same effect,
+both in prior standard deviations, for which the regrouped one is estimated too."""
 _CONTRADICTED = 2.5
 """Rms of corrections over their prior standard deviations from which the prior is widened."""
 
@@ -42,12 +42,12 @@ class ParameterPrior(Rebuilt):
         N), and of errors in sine and cosine (rad). By default such an error may move its joint as
         far as a constant one (``angle``, ``length``) at the largest reading or load measured.
     named : mapping of str to float
-        Standard deviations of single parameters, before the others.
+        Standard deviations of single parameters, which override the others.
     strength : float or None
         Factor on the information; None chooses it by cross-validation.
     truncated : bool
-        Whether parameters that base and tool can replace stay nominal (the default), or share
-        corrections with them as parameters do that act like combinations of others of the table.
+        True: parameters whose effect base and tool can reproduce keep their nominal values. False:
+        they share corrections with base and tool.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def note_of_prior(
     if given is None or used is None or given is used:
         return ()
     check = ""
-    if used.angle > _ANOTHER_ROBOT * given.angle:
+    if used.angle > _WRONG_ZEROS * given.angle:
         check = " Check the zeros and signs of the joints."
     if distances and (used.length or 0.0) > (given.length or 0.0):
         check += " Check the known distances."

@@ -191,7 +191,7 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
 
 
 def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
-    """The problem with readings moved to satisfy the constraints exactly, to judge ranks."""
+    """The problem with readings moved to satisfy the constraints exactly, for rank decisions."""
     parameters = problem.parameters
     moved = [
         satisfied_measurement(parameters, m, xi, fixtures[problem.columns(m)])

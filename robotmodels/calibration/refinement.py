@@ -21,7 +21,7 @@ STEPS = 15  # in the joint variables
 READING_STEPS = 20
 HALVINGS = 6
 LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
-DEPENDENT = 1e-10  # singular values beside the largest that count as zero
+_RANK_TOLERANCE = 1e-10  # singular values beside the largest that count as zero
 ROUNDED = 1e-14  # pose error that is rounding
 
 Flags = NDArray[np.bool_]
@@ -107,7 +107,7 @@ class Refinement:
     def refine(
         self, targets: Array, starts: Array, present: Flags, held: Flags, wanted: Array
     ) -> Postures:
-        """Refine candidates until they meet their poses; held joints read the wanted values.
+        """Newton refinement of candidates to their poses; held joints keep the readings ``wanted``.
 
         Shapes: targets (N, 4, 4); starts, held, wanted (N, C, n); present (N, C).
         """
@@ -205,7 +205,7 @@ class Refinement:
         weight = np.repeat([1.0 / self.length, 1.0], 3)[:, None]
         free = np.where(held, 0.0, self.unit)
         A, e = (weight * A)[:, self.mask] * free[:, None, :], (weight * e)[:, self.mask]
-        step = (np.linalg.pinv(A, DEPENDENT) @ e)[..., 0]
+        step = (np.linalg.pinv(A, _RANK_TOLERANCE) @ e)[..., 0]
         largest = np.abs(step).max(axis=-1, initial=0.0)
         step *= np.minimum(1.0, LONGEST / np.maximum(largest, LONGEST))[:, None]
         return np.asarray(step * free, np.float64)

@@ -38,7 +38,7 @@ _LISTED = 12
 
 
 def report(result: CalibrationResult) -> str:
-    """All of a calibration as text of 100 columns.
+    """Report on a calibration as text of 100 columns.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         text += f"{in_unit(validation.nominal.rms[unit], unit)} -> {in_unit(rms, unit)} "
         text += printed_unit(unit)
         if unit in kept_aside:
-            text += f"; on data kept aside {in_unit(kept_aside[unit], unit)} {printed_unit(unit)}"
+            text += f"; on held-out data {in_unit(kept_aside[unit], unit)} {printed_unit(unit)}"
         sentences.append(f"{text}.")
     if not implausible(result.solution):
         tool = result.other_tool
@@ -148,7 +148,7 @@ def _measurements(result: CalibrationResult) -> ReportSection:
     views = [view.q for m in measurements for view in m.views]
     if views:
         body += ["Readings of the joints:", _ranges(result, np.concatenate(views))]
-    return ReportSection("What was measured", tuple(body))
+    return ReportSection("Measurements", tuple(body))
 
 
 def files_sentence(measurement: Measurement) -> str:
@@ -187,9 +187,9 @@ def _errors(result: CalibrationResult) -> ReportSection:
             name = f"{held.fits} folds" if name == "folds" else name
             named += [(f"{name}, before", held.nominal), (f"{name}, after", held)]
             if held.description:
-                sentences.append(f"{name.capitalize()}: {held.description} kept aside.")
+                sentences.append(f"{name.capitalize()}: {held.description} held out.")
     if validation.folds is None and validation.held_out is None:
-        sentences.append("No measurements were kept aside: errors elsewhere are not known.")
+        sentences.append("No measurements were held out: the prediction error is unknown.")
     units = tuple(validation.in_sample.count)
     headings = [""]
     for unit in units:
@@ -258,7 +258,7 @@ def _parameters(result: CalibrationResult) -> ReportSection:
         body.append(
             f"Fixtures: {len(result.fixtures)} coordinates of "
             f"{len({name.rsplit('.', 1)[0] for name in result.fixtures})} points, planes or "
-            "targets were estimated along (result.fixtures)."
+            "targets were estimated too (result.fixtures)."
         )
     return ReportSection("Parameters", tuple(body))
 
@@ -287,7 +287,7 @@ def _left_out(result: CalibrationResult) -> ReportSection:
     body += [f"{listed}: {why.value}." for why, listed in names.items() if listed]
     if found.regrouped_into:
         body.append(
-            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) acts like:"
+            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has the effect of:"
         )
     for name, terms in found.regrouped_into.items():
         words = (f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9)
@@ -319,7 +319,7 @@ def _trust(result: CalibrationResult) -> ReportSection:
         body.append(table_of(("", "with", "correlation"), rows))
     else:
         body.append(f"No two estimates are correlated by more than {_STRONG}.")
-    return ReportSection("How far to trust it", tuple(body))
+    return ReportSection("Quality of the fit", tuple(body))
 
 
 def _outliers(result: CalibrationResult) -> ReportSection:

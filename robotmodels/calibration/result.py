@@ -23,7 +23,7 @@ _BY_PRIOR = 0.7
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CalibrationResult(Rebuilt):
-    """A calibrated robot, and what is needed to judge it.
+    """Result of a calibration: the calibrated robot, standard errors and validation.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class CalibrationResult(Rebuilt):
 
     @property
     def robot(self) -> CalibratedRobot:
-        """The calibrated robot, with what a table cannot hold."""
+        """The calibrated robot, with its configuration-dependent errors."""
         return calibrated_model(self.parameters, self.corrections)
 
     @property

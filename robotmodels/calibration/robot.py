@@ -1,4 +1,4 @@
-"""The calibrated robot: a model with the constant corrections, and the laws that no table holds."""
+"""The calibrated robot: a model with the constant corrections, and error laws."""
 
 from __future__ import annotations
 
@@ -120,8 +120,8 @@ def joint_errors_of(parameters: GeometricParameters, corrections: ArrayLike) -> 
         for row, element, source in entry.actions:
             if element is not JOINT_VARIABLE[table.sigma[row]] or table.joint[source] < 0:
                 raise InvalidValueError(
-                    f"{entry.name}: a law of the readings acts on the variable of a joint, and "
-                    f"reads one; this one acts on {element.word} of {table.row_name(row)}."
+                    f"{entry.name}: expected a law from the reading of a joint to the variable of "
+                    f"a joint; this one changes {element.word} of {table.row_name(row)}."
                 )
         if xi[k] != 0.0:
             chosen.append(k)
@@ -241,7 +241,7 @@ class CalibratedRobot(Rebuilt):
         return next((e for e in self.ends if frame in names and e.frame in names), None)
 
     def with_tool_at(self, frame: Frame) -> Self:
-        """The same robot whose tool is another measured end, so that inverse models serve it."""
+        """The same robot whose tool is another measured end, for `corrected_igm`."""
         end = self.end(frame)
         if end is None or end.parent < 1:
             known = [e.frame for e in self.ends if e.parent >= 1]

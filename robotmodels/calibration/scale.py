@@ -1,4 +1,4 @@
-"""Whether measurements determine the scale: contacts hold for a robot shrunk to nothing as well."""
+"""Scale of the robot: whether measurements determine it (contacts alone do not)."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
         and 0 < entry.row <= p.model.f
         and _scale_is_kept(problem, R, [*rest, entry.name], distances)
     ]
-    known = "These measurements know no length"
-    problem_text = f"{known}: a robot shrunk to nothing would satisfy them."
+    known = "These measurements contain no length"
+    problem_text = f"{known}: a robot scaled to zero size would satisfy them."
     if named:
         problem_text = (
-            f"{known}, and {', '.join(named)} cannot give it here: other parameters act alike, "
-            "and the robot would shrink with them."
+            f"{known}, and fixing {', '.join(named)} does not determine the scale: other "
+            "parameters have the same effect."
         )
     raise InvalidValueError(
         f"{problem_text} Measure a distance (KnownDistance, Distance), or name a parameter whose "

@@ -65,7 +65,7 @@ class SelectedConfigurations(Rebuilt):
     parameters : GeometricParameters
         p parameters that the candidates identify.
     criterion : Criterion
-        The index that was made large.
+        The index that was maximised.
     observability : Observability
         Of the selected set. Columns are scaled by the root mean square of their lengths over all
         candidates, rows by the standard errors of the measurement.
@@ -140,10 +140,10 @@ class SelectedConfigurations(Rebuilt):
         count = self.enough(gain)
         if count is not None:
             return (
-                f"From {count} on each further one lowers the expected error of the parameters by "
-                f"less than {100.0 * gain:g} %."
+                f"From {count} configurations on, each further one lowers the expected error of "
+                f"the parameters by less than {100.0 * gain:g} %."
             )
-        last = f"{100.0 * self.gains[-1]:.2g} %" if len(self.gains) else "an unknown part"
+        last = f"{100.0 * self.gains[-1]:.2g} %" if len(self.gains) else "an unknown share"
         return (
             f"{self.count} are not yet enough for a gain below {100.0 * gain:g} %: the last "
             f"one still lowers the expected error by {last}."
@@ -211,7 +211,7 @@ def select_configurations(
     known_lengths : iterable of str
         Parameters that are known; contacts need one.
     criterion : Criterion
-        Observability index to make large; default O1, the determinant.
+        Observability index to maximise; default O1, the determinant.
     sigma : float or array_like, shape (k,), optional
         Standard errors of the rows of a measurement, m or rad; default 0.1 mm, and the angle that
         turns the end by as much at the robot's reach.
@@ -293,9 +293,9 @@ def select_configurations(
         })  # fmt: skip
     if len(pool) < count:
         raise InvalidValueError(
-            f"count: {count} were asked for, but only {len(pool)} candidates are within the "
-            f"limits, clear of obstacles and meet. {' '.join(notes)} Draw more (drawn), or ask "
-            "for fewer."
+            f"count: expected at most {len(pool)}, the number of usable candidates (within the "
+            "limits, clear of obstacles, contacts satisfied), got "
+            f"{count}. {' '.join(notes)} Draw more (drawn)."
         )
     ranked = groups_of(pool[np.sort(rng.permutation(len(pool))[:_RANKED])])
     measured = measurement_of(parameters, kind, ranked, frame=frame)

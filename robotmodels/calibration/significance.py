@@ -14,7 +14,6 @@ from ..kinematics.lengths import spread_configurations
 from ..model import RobotModel
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
 from .measurements import Measurement
-from .offsets import DEPENDENT
 from .prior import largest_factors
 from .problem import guessed_fixtures, problem_of, stacked
 from .solve import Solution
@@ -33,9 +32,9 @@ _STILL = 0.02
 def check_enough(
     identifiable: IdentifiableParameters,
     measured: Sequence[Measurement],
-    known_lengths: Iterable[str] = (),
-    known: Iterable[str] = (),
-    dependent: float = DEPENDENT,
+    known_lengths: Iterable[str],
+    known: Iterable[str],
+    dependent: float,
 ) -> None:
     """Refuse fewer rows than unknowns."""
     problem = problem_of(identifiable.kept, measured)

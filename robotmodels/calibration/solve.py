@@ -101,8 +101,8 @@ def solve(
     if not (scales or from_scales or prior is None) and (
         problem.rows >= 1.5 * (problem.P + problem.F)
     ):
-        # beside a prior, noise that explains everything would be an estimate too: it is the larger
-        # of two, and an estimate that begins with too little noise ends at the smaller
+        # with a prior the noise has two solutions; the larger one explains all residuals as noise,
+        # and a small initial value leads to the smaller one
         current = tuple(read_only(_SMALL * scale) for scale in current)
     for _ in range(_ROUNDS):
         fit = fit_nonlinear(

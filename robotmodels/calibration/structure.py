@@ -46,7 +46,7 @@ _ROUNDING = 1e-8
 _DEPENDENT = 1e-4
 """Sine of the angle to the columns of the fit below which a column is one of them."""
 _SURE = 3.0
-"""Standard errors by which the mean square of errors on data kept aside must fall."""
+"""Standard errors by which the mean square of errors on held-out data must fall."""
 _GAIN = 0.02
 """Smallest relative decrease of the mean square."""
 
@@ -233,7 +233,7 @@ def _harmonics(q: Array) -> Array:
 
 
 class Trial(NamedTuple):
-    """A fit with one more family, judged on data kept aside.
+    """A fit with one more family, judged on held-out data.
 
     ``gain``: relative decrease of their mean square; ``helps``: whether it is significant;
     ``explains_all``: whether the residuals of this fit show no structure.
@@ -306,12 +306,11 @@ def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Er
     """Note on residual structure and the recommended term."""
     p = f"p {'<=' if structure.p <= _LEAST_P else '='} {structure.p:.2g}"
     text = [
-        f"Not geometry: the residuals depend on the posture ({p}), and no parameter of the table "
-        "explains it."
+        f"The residuals depend on the posture ({p}), and no geometric parameter explains it."
         if structure.is_complete
         else f"The residuals depend on the posture ({p}), and no estimated parameter explains it; "
         "parameters of the table that were left out may be the cause.",
-        "Standard errors assume independent residuals and are too short.",
+        "Standard errors assume independent residuals and are too small.",
     ]
     helpful = [trial for trial in trials if trial.helps]
     is_explained = bool(helpful) and helpful[0].explains_all
@@ -324,10 +323,10 @@ def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Er
             for t in helpful
         ]
         text.append(
-            f"Try {helpful[0].family.word} next. Rms error on data kept aside: {'; '.join(found)}."
+            f"Try {helpful[0].family.word} next. Rms error on held-out data: {'; '.join(found)}."
         )
         if not is_explained:
-            text.append(f"With {helpful[0].family.word} they still depend on the posture.")
+            text.append(f"With {helpful[0].family.word} the residuals still depend on the posture.")
     if not structure.parameters.model.inertia.values.any():
         text.append("Give the model masses (with_inertia) to try joint compliance.")
     if (trials or not structure.indicated) and not is_explained:

@@ -280,7 +280,7 @@ def partition(
             fold, whole = assigned, place >= 0
     elif count and (place >= 0).all():
         note = (
-            f"Measured at {count} place{'s'[: count > 1]} only: the errors on data kept aside are "
+            f"Measured at {count} place{'s'[: count > 1]} only: the errors on held-out data are "
             "of other postures there, and may be larger at another place. Measure at three or "
             f"more places, over {near:.2g} m apart."
         )

@@ -19,7 +19,7 @@ from .solve import states_noise
 from .validation import Errors, HeldOutErrors
 
 _FORMAT = 2
-"""Raised when the meaning or the name of an entry changes."""
+"""Increased when the meaning or the name of an entry changes."""
 _COLUMNS = (
     *("names", "antecedent", "sigma"),
     *("gamma", "b", "beta", "alpha", "d", "theta", "r"),
@@ -242,7 +242,7 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
         measured = [end.frame for end in robot.ends if isinstance(end.frame, str)]
         text = urdf_in_place(robot.model.parts, measured)
         if K is not None and K.is_invertible:
-            notes.append("The transmission is in model: the joints of the text are the table's.")
+            notes.append("The transmission is in model: joints of the URDF are the table's.")
     if notes:
         warnings.warn(
             f"Not in the URDF: {' '.join(notes)} Keep the calibrated robot (pickle) to keep them.",

@@ -50,7 +50,7 @@ def add_command(commands: Any) -> None:
         usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
         "[options]",
         description="Geometric calibration: estimate the parameters that measurements tell, with "
-        "their deviations, the errors before and after, and on measurements kept aside.",
+        "their deviations, the errors before and after, and on held-out measurements.",
         epilog=ending(_EXAMPLES, "the fit has not converged"),
     )
     add_source(parser, option=True)
@@ -207,7 +207,7 @@ def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
         write_result(result, folder / "calibrated.urdf")
         return names + with_extra(page, lambda: html_report(result, page))
 
-    head = text.split("What was measured", 1)[0]
+    head = text.split("\nMeasurements\n", 1)[0]
     head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
     head += tested
     return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)

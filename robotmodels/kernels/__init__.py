@@ -1,6 +1,6 @@
 """Compiled recursions on plain arrays, in the order of the table.
 
-This floor knows no robot object: a kernel takes the arrays of a `Chain`, one sample per row of
+Kernels use no robot objects: a kernel takes the arrays of a `Chain`, one sample per row of
 ``q (N, n)``, and writes into an array that its caller allocated. Kernels release the GIL, run on
 one thread and check nothing: shapes, types and finiteness are the caller's to guarantee
 (C-contiguous float64 and int64).

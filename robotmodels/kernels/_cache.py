@@ -48,7 +48,7 @@ def cache_folder() -> Path | None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         _check_owner(folder)
     except (OSError, RuntimeError) as error:
-        _warn(f"there is no folder for them ({error})")
+        _warn(f"the cache folder cannot be used ({error})")
         return None
     return folder
 
@@ -82,13 +82,13 @@ def _check_owner(folder: Path) -> None:
         return
     status = folder.stat()
     if status.st_uid not in (os.getuid(), 0) or status.st_mode & 0o022:
-        raise PermissionError(f"others than its user may write in {folder}")
+        raise PermissionError(f"other users can write to {folder}")
 
 
 @cache
 def _warn(reason: str) -> None:
     warnings.warn(
-        f"Compiled functions are not kept: {reason}. Each process compiles its own, which takes "
+        f"Compiled functions are not cached: {reason}. Each process compiles its own, which takes "
         "some seconds; results are the same. Set NUMBA_CACHE_DIR to a folder of your own.",
         RobotModelsWarning,
         stacklevel=2,
@@ -102,7 +102,7 @@ def cache_of(function: Any) -> FunctionCache | None:
 
 
 class _Implementation(CompileResultCacheImpl):
-    """What numba keeps of a compilation, without its choice of a folder."""
+    """Serialisation of a compilation by numba, without its choice of a folder."""
 
     def __init__(self) -> None:
         pass

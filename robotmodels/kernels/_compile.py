@@ -1,4 +1,4 @@
-"""How this package compiles, and the types of its kernels' arguments.
+"""Decorator that compiles kernels, and the types of their arguments.
 
 Inputs are declared read-only: numba then takes frozen and writable arrays alike with one
 compilation, where it would otherwise compile a kernel again for every mixture of the two.
@@ -48,7 +48,7 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
     """Decorator: compile a kernel for its declared signature at the first call.
 
     Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
-    makes it part of their text, where a call would pass many arrays.
+    puts its code into its callers.
     """
 
     def decorate(function: Any) -> Any:
@@ -85,7 +85,7 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
 
 
 class _Notice(event.Listener):
-    """One line on standard error once compilation has taken a while, where a person reads it."""
+    """One line on standard error once compilation takes long, in terminals and notebooks."""
 
     text = (
         "robotmodels: compiling for this machine, once for each kind of computation (5 to 30 s). "
@@ -104,7 +104,7 @@ class _Notice(event.Listener):
             self.started = now
         self.depth += 1
         if self.seconds + now - self.started > self.after and self.text:
-            if _is_read(sys.stderr):
+            if _is_interactive(sys.stderr):
                 sys.stderr.write(f"{self.text}\n")
                 sys.stderr.flush()
             self.text = ""
@@ -116,8 +116,8 @@ class _Notice(event.Listener):
             self.seconds += time.monotonic() - self.started
 
 
-def _is_read(stream: Any) -> bool:
-    """Whether a person reads it: a terminal or a notebook."""
+def _is_interactive(stream: Any) -> bool:
+    """Whether it is a terminal or in a notebook."""
     return stream is not None and (stream.isatty() or "ipykernel" in sys.modules)
 
 

@@ -1,6 +1,6 @@
-"""The recursions along the chain: positions, velocities and accelerations out, wrenches in.
+"""Forward recursion along the chain (poses, velocities, accelerations), and wrenches of links.
 
-The forward half is in link axes (seed book section 1.5.2.2; for
+All is in link axes (seed book section 1.5.2.2; for
 trees, W. Khalil and J.-F. Kleinfinger 1987). R, P are the rotation and position of frame j in its
 antecedent a; names that end in a belong to the antecedent.
 """
@@ -120,7 +120,7 @@ def link_acceleration(
 
 
 @compiled()
-def link_place(chain: Chain, k: int, q: Floats, i: int) -> tuple[Matrix, Vector]:
+def link_pose(chain: Chain, k: int, q: Floats, i: int) -> tuple[Matrix, Vector]:
     """Rotation and position of link k in its antecedent, of sample i."""
     return link_transform(
         chain.sigma[k],
@@ -131,7 +131,7 @@ def link_place(chain: Chain, k: int, q: Floats, i: int) -> tuple[Matrix, Vector]
 
 
 @compiled()
-def carry_place(
+def carry_pose(
     chain: Chain, k: int, Rj: Matrix, Pj: Vector, R: Floats, p: Floats
 ) -> tuple[Matrix, Vector]:
     """Place of link k in the frame of row 0, from that of its antecedent; kept in row k + 1."""
@@ -192,8 +192,8 @@ def carry_acceleration(
 
 
 @compiled()
-def base_against_gravity(chain: Chain, gravity: Floats, u: Floats) -> None:
-    """Acceleration of the base, row 0: accelerated against gravity it loads links as gravity."""
+def base_acceleration(chain: Chain, gravity: Floats, u: Floats) -> None:
+    """Acceleration -g of the base, in row 0, which replaces gravity."""
     g = transpose_times(whole_matrix(chain.base_rotation), whole_vector(gravity))
     put_vector(u, 0, (-g[0], -g[1], -g[2]))
 

@@ -12,7 +12,7 @@ import numpy as np
 from . import Chain
 from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, compiled
 from ._inertia import inertia_of, join_antecedent
-from ._motion import base_against_gravity, carry_acceleration, coordinate, link_place, link_wrench
+from ._motion import base_acceleration, carry_acceleration, coordinate, link_pose, link_wrench
 from ._vectors import add, cross, matrix, put_matrix, put_vector, times, vector
 from .mass import POSITIVE, solve_in_place
 
@@ -53,7 +53,7 @@ def bias_and_mass(
     f = chain.antecedent.shape[0]
     P, w, dw, u, force, moment = links[0], links[1], links[2], links[3], links[4], links[5]
     for k in range(f):
-        Rj, Pj = link_place(chain, k, q, 0)
+        Rj, Pj = link_pose(chain, k, q, 0)
         wj, dwj, Uj, uj = carry_acceleration(
             chain.sigma[k],
             chain.antecedent[k],
@@ -192,7 +192,7 @@ def follow_references(
     rest = np.zeros((1, n))
     taken = np.empty((1, n))
     slopes = np.empty((2, 4, n))
-    base_against_gravity(chain, gravity, links[3])
+    base_acceleration(chain, gravity, links[3])
     ticks = int(state[4, 0])
     for i in range(N):
         for part in range(substeps):

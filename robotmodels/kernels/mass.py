@@ -25,7 +25,7 @@ import numpy as np
 from . import Chain
 from ._compile import CHAIN, INT, MATRIX, NOTHING, OUT2, OUT3, VECTOR, Floats, compiled
 from ._inertia import Moments, inertia_of, inertia_times, join_antecedent
-from ._motion import carry_velocity, link_place
+from ._motion import carry_velocity, link_pose
 from ._vectors import (
     Matrix,
     Vector,
@@ -72,7 +72,7 @@ def mass_matrices(
             for column in range(n):
                 out[i, row, column] = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             put_matrix(R, k + 1, Rj)
             put_vector(P, k + 1, Pj)
             for x in range(10):
@@ -153,7 +153,7 @@ def coriolis_matrices(
             for column in range(n):
                 out[i, row, column] = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             wj, vj = carry_velocity(chain, k, v, i, Rj, Pj, omega, speed)
             J, MS, M = inertia_of(pi, k)
             pj, Dj = body_factor(J, MS, M, wj, vj)

@@ -25,7 +25,7 @@ from ._compile import (
     Ints,
     compiled,
 )
-from ._motion import carry_place, coordinate, link_place, link_transform
+from ._motion import carry_pose, coordinate, link_pose, link_transform
 from ._vectors import (
     Matrix,
     Vector,
@@ -118,8 +118,8 @@ def link_poses(
     put_vector(p, 0, whole_vector(chain.base_position))
     for i in range(q.shape[0]):
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
-            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            Rj, Pj = link_pose(chain, k, q, i)
+            Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             put_pose(out[i, k], Rk, pk)
 
 
@@ -156,7 +156,7 @@ def jacobians(
         R, p = base, origin
         for s in range(path.shape[0]):
             k = path[s] - 1
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             p = add(p, times(R, Pj))
             R = product(R, Rj)
             put_vector(z, s, (R[2], R[5], R[8]))
@@ -205,7 +205,7 @@ def jacobian_rates(
         w, dp = zero, zero
         for s in range(path.shape[0]):
             k = path[s] - 1
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             arm = times(R, Pj)
             p = add(p, arm)
             dp = add(dp, cross(w, arm))
@@ -278,7 +278,7 @@ def accelerations(
                 R = product(R, E)
                 break
             k = path[s] - 1
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             arm = times(R, Pj)
             du = add(du, add(cross(dw, arm), cross(w, cross(w, arm))))
             u = add(u, cross(w, arm))

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import Chain
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT2, STACK, VECTOR, Floats, Ints, compiled
-from ._motion import base_against_gravity, carry_acceleration, coordinate, link_place
+from ._motion import base_acceleration, carry_acceleration, coordinate, link_pose
 from ._vectors import (
     Matrix,
     Vector,
@@ -115,10 +115,10 @@ def regressor_gradients(
     down_ = np.empty((f, f, 3))
     turn_ = np.empty((f, f, 3))
     g = np.empty(10)
-    base_against_gravity(chain, gravity, u)
+    base_acceleration(chain, gravity, u)
     for i in range(q.shape[0]):
         for k in range(f):
-            R, P = link_place(chain, k, q, i)
+            R, P = link_pose(chain, k, q, i)
             carry_acceleration(
                 chain.sigma[k],
                 chain.antecedent[k],

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from . import Chain
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
 from ._motion import (
-    base_against_gravity,
+    base_acceleration,
     carry_acceleration,
-    carry_place,
+    carry_pose,
     carry_velocity,
     coordinate,
-    link_place,
+    link_pose,
 )
 from ._vectors import (
     Matrix,
@@ -56,10 +56,10 @@ Ten = tuple[float, float, float, float, float, float, float, float, float, float
 
 @compiled()
 def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector) -> Ten:
-    """Power on the motion of the wrenches that unit parameters need to accelerate.
+    """Power, on the motion [t; z], of the wrench that each unit parameter requires.
 
     In link axes, U of `rotation_acceleration`, u acceleration of the origin: M: [u; 0], MX MY MZ:
-    [U_k; e_k x u], XX..ZZ: [0; column of J dw + w x J w], whose entries are found again in U.
+    [U_k; e_k x u], XX..ZZ: [0; column of J dw + w x J w], whose entries are those of U.
     """
     pull = transpose_times(U, t)
     turn = cross(u, z)
@@ -82,7 +82,7 @@ def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Ve
 def wanted_wrench_columns(
     t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector, wanted: int
 ) -> Ten:
-    """Those of `wrench_columns` that the bits of ``wanted`` ask for, and zero in others' place."""
+    """`wrench_columns` for the bits of ``wanted``; zero for the others."""
     if wanted & INERTIA:
         if wanted & (MOMENTS | MASS):
             return wrench_columns(t, z, w, dw, U, u)
@@ -98,9 +98,10 @@ def wanted_wrench_columns(
 
 @compiled()
 def wanted_of_links(place: Ints, antecedent: Ints, wanted: Ints, needed: Bools) -> None:
-    """What is wanted of each link, and whether it or a link outboard of it matters at all.
+    """Requested kinds of parameters of each link, and whether it or a descendant has any.
 
-    ``place (10 f,)`` as in the kernels; ``wanted (f,)`` bits and ``needed (f,)`` are written.
+    ``place (10 f,)``: column of each parameter in ``out``, -1 if not requested;
+    ``wanted (f,)`` bits and ``needed (f,)`` are written.
     """
     for k in range(antecedent.shape[0] - 1, -1, -1):
         bits = 0
@@ -115,7 +116,7 @@ def wanted_of_links(place: Ints, antecedent: Ints, wanted: Ints, needed: Bools) 
 
 @compiled()
 def momentum_columns(t: Vector, z: Vector, w: Vector, v: Vector) -> Ten:
-    """Product of the motion with the momenta that unit parameters give a link of twist [v; w].
+    """Product of the motion [t; z] with the momentum of each unit parameter at twist [v; w].
 
     M: [v; 0], MX MY MZ: [w x e_k; e_k x v], XX..ZZ: [0; column of J w].
     """
@@ -162,7 +163,7 @@ def torque_regressors(
     u = np.empty((f + 1, 3))
     put_matrix(R, 0, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))
     put_vector(p, 0, (0.0, 0.0, 0.0))
-    base_against_gravity(chain, gravity, u)
+    base_acceleration(chain, gravity, u)
     nothing = (0.0, 0.0, 0.0)
     wanted = np.zeros(f, dtype=np.int64)
     needed = np.zeros(f, dtype=np.bool_)
@@ -174,7 +175,7 @@ def torque_regressors(
         for k in range(f):
             if not needed[k]:
                 continue
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             wj, dwj, Uj, uj = carry_acceleration(
                 chain.sigma[k],
                 chain.antecedent[k],
@@ -188,7 +189,7 @@ def torque_regressors(
                 U,
                 u,
             )
-            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             bits = wanted[k]
             if bits == 0:
                 continue
@@ -221,13 +222,13 @@ def power_regressors(
     U = np.zeros((f + 1, 3, 3))
     u = np.empty((f + 1, 3))
     speed = np.zeros((f + 1, 3))
-    base_against_gravity(chain, gravity, u)
+    base_acceleration(chain, gravity, u)
     for i in range(q.shape[0]):
         for column in range(out.shape[2]):
             out[i, 0, column] = 0.0
         for k in range(f):
             b = chain.antecedent[k]
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             t = transpose_times(Rj, add(vector(speed, b), cross(vector(w, b), Pj)))
             if chain.sigma[k] == 1:
                 t = (t[0], t[1], t[2] + coordinate(v, i, chain.joint[k]))
@@ -268,11 +269,11 @@ def energy_regressors(
         for column in range(out.shape[2]):
             out[i, 0, column] = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             w, u = carry_velocity(chain, k, v, i, Rj, Pj, omega, speed)
-            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             first = cross(u, w)
-            fall = transpose_times(Rk, g)
+            weight = transpose_times(Rk, g)
             columns = (
                 0.5 * w[0] * w[0],
                 w[0] * w[1],
@@ -280,9 +281,9 @@ def energy_regressors(
                 0.5 * w[1] * w[1],
                 w[1] * w[2],
                 0.5 * w[2] * w[2],
-                first[0] - fall[0],
-                first[1] - fall[1],
-                first[2] - fall[2],
+                first[0] - weight[0],
+                first[1] - weight[1],
+                first[2] - weight[2],
                 0.5 * dot(u, u) - dot(g, pk),
             )
             put_columns(out, i, 0, place, k, columns)
@@ -319,9 +320,9 @@ def momentum_regressors(
                 momentum[i, row, column] = 0.0
                 force[i, row, column] = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             w, u = carry_velocity(chain, k, v, i, Rj, Pj, omega, speed)
-            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             weight = transpose_times(Rk, g)
             inner = k + 1
             while inner > 0:
@@ -345,8 +346,8 @@ def momentum_regressors(
                         dt = turn
                     put_columns(momentum, i, row, place, k, momentum_columns(t, z, w, u))
                     rate = momentum_columns(dt, dz, w, u)
-                    fall = cross(weight, z)
-                    pull = dot(weight, t)
+                    weight_moment = cross(weight, z)
+                    weight_force = dot(weight, t)
                     put_columns(
                         force,
                         i,
@@ -360,10 +361,10 @@ def momentum_regressors(
                             rate[3],
                             rate[4],
                             rate[5],
-                            rate[6] + fall[0],
-                            rate[7] + fall[1],
-                            rate[8] + fall[2],
-                            rate[9] + pull,
+                            rate[6] + weight_moment[0],
+                            rate[7] + weight_moment[1],
+                            rate[8] + weight_moment[2],
+                            rate[9] + weight_force,
                         ),
                     )
                 inner = chain.antecedent[inner - 1]

@@ -14,12 +14,12 @@ from . import Chain
 from ._compile import CHAIN, MATRIX, NOTHING, OUT1, OUT2, VECTOR, Floats, compiled
 from ._inertia import inertia_of, inertia_times
 from ._motion import (
-    base_against_gravity,
+    base_acceleration,
     carry_acceleration,
-    carry_place,
+    carry_pose,
     carry_velocity,
     coordinate,
-    link_place,
+    link_pose,
     link_wrench,
 )
 from ._vectors import (
@@ -62,10 +62,10 @@ def joint_torques(
     u = np.empty((f + 1, 3))
     force = np.empty((f + 1, 3))
     moment = np.empty((f + 1, 3))
-    base_against_gravity(chain, gravity, u)
+    base_acceleration(chain, gravity, u)
     for i in range(q.shape[0]):
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             wj, dwj, Uj, uj = carry_acceleration(
                 chain.sigma[k],
                 chain.antecedent[k],
@@ -118,7 +118,7 @@ def kinetic_energies(
     for i in range(q.shape[0]):
         twice = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
+            Rj, Pj = link_pose(chain, k, q, i)
             wj, vj = carry_velocity(chain, k, v, i, Rj, Pj, omega, speed)
             J, MS, M = inertia_of(pi, k)
             twice += M * dot(vj, vj) + 2.0 * dot(MS, cross(vj, wj)) + dot(wj, inertia_times(J, wj))
@@ -146,8 +146,8 @@ def potential_energies(
     for i in range(q.shape[0]):
         energy = 0.0
         for k in range(f):
-            Rj, Pj = link_place(chain, k, q, i)
-            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            Rj, Pj = link_pose(chain, k, q, i)
+            Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             _, MS, M = inertia_of(pi, k)
             energy -= dot(g, add(scale(M, pk), times(Rk, MS)))
         out[i] = energy

@@ -111,7 +111,7 @@ def base_parameters(
         for name, value in (("motion", motion), ("constraint", constraint)):
             if value is not None:
                 raise InvalidValueError(
-                    f"{name}: the symbolic method knows the table alone; use method='numeric'."
+                    f"{name}: the symbolic method uses the table alone; use method='numeric'."
                 )
     aligned, notes = aligned_robot(model, angle)
     samples = None if motion is None else _samples(model, motion)

@@ -339,7 +339,7 @@ class Labelled(Measurement):
 
     @property
     def sees_base(self) -> bool:
-        """Only through targets that are known in the world."""
+        """Whether a target is known in the world."""
         return self.in_world and bool(self.known)
 
     def guess_each(self, guess: Callable[[NDArray[np.bool_]], Any]) -> Array:
@@ -386,4 +386,4 @@ class Contact(Labelled):
     @staticmethod
     @abstractmethod
     def target_at(T: Array, rng: np.random.Generator) -> Array:
-        """A known target that an end at pose T meets, the rest of it at random."""
+        """A known target that an end at pose T meets, its free coordinates random."""

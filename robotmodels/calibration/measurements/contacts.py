@@ -128,7 +128,7 @@ class PlaneContact(Contact):
     A plane is ``normal . p = offset``. The normal of an unknown plane is estimated as the rotation
     of the world's z about x and y, rad, with the offset, m. Sigma includes the flatness.
 
-    The end of a ball touches a plane beside the centre of the ball: an unknown offset includes the
+    A ball touches a plane at its radius from the centre: an unknown offset includes the
     radius as long as the plane is touched from one side; to a known one it is added.
 
     One inclined plane touched in many postures identifies as much as touched points do. With a

@@ -38,8 +38,8 @@ class LinkedFrames(Labelled):
     ``orientation=False`` they share a point only (a ball in a socket): the origin of the other
     end is fixed in this one.
 
-    Two robots are one tree by `side_by_side`. A robot linked with itself in several postures is
-    `FrameContact` or `PointContact`.
+    Two robots become one tree by `combine_arms`. For one robot that meets an object in several
+    postures use `FrameContact` or `PointContact`.
 
     Parameters
     ----------

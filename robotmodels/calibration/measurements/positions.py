@@ -236,7 +236,7 @@ class Distance(Labelled):
         if not self.offset and not (self.length > 0.0).all():
             raise InvalidValueError(
                 f"length: expected positive lengths in metres, got {self.length.min():.6g}. "
-                "Lengths that count from somewhere need offset=True."
+                "Lengths measured from an unknown zero need offset=True."
             )
         if self.pivot is None and self.known:
             raise InvalidValueError(_EITHER)
@@ -258,7 +258,7 @@ class Distance(Labelled):
 
     @property
     def knows_length(self) -> bool:
-        """It is one; with unknown offsets, if the lengths of a pivot differ."""
+        """Lengths are measured; with unknown offsets, if those of a pivot differ."""
         group = self.groups
         return not self.offset or any(np.ptp(self.length[group == g]) > 0.0 for g in set(group))
 
