@@ -287,7 +287,8 @@ def _left_out(result: CalibrationResult) -> ReportSection:
     body += [f"{listed}: {why.value}." for why, listed in names.items() if listed]
     if found.regrouped_into:
         body.append(
-            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has the effect of:"
+            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has "
+            "the effect of:"
         )
     for name, terms in found.regrouped_into.items():
         words = (f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9)
