@@ -423,8 +423,8 @@ def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path)
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--lengths", "mm"], "look like degrees. Say --angles deg"),
-        (["--angles", "deg"], "look like millimetres. Say --lengths mm"),
+        (["--lengths", "mm"], "look like degrees. Use --angles deg"),
+        (["--angles", "deg"], "look like millimetres. Use --lengths mm"),
         (["--angles", "deg", "--lengths", "mm", "--columns", "x", "y", "w"], "no column 'w'"),
         (["--angles", "deg", "--lengths", "mm", "--parameters", "d9"], "'d9' is not a parameter"),
         (["--angles", "deg", "--lengths", "mm", "--sigma", "-1"], "--sigma: expected positive"),

@@ -68,7 +68,7 @@ def failing(monkeypatch, error):
         (["excite", "--robot", "rx90", "--box", 1, 1, 1, 0, 0, 0], "--box: lower, upper"),
         (["identify", "--robot", "rx90", "--log", "a.csv", "--delimiter", ""], "one character"),
         (["identify", "--robot", "rx90", "--log", "taken.csv"], "taken.csv: the file is empty"),
-        (["calibrate", "--robot", "rx90", "--measurements", "nowhere.csv", "--kind", "pose"],
+        (["calibrate", "--robot", "rx90", "--measurements", "nowhere.csv", "--kind", "position"],
          "No such file or directory: nowhere.csv"),
         (["calibrate", "--robot", "rx90", "--measurements", "a.csv", "--kind", "place"],
          "--kind: invalid choice: 'place'"),

@@ -77,6 +77,40 @@ def test_kernels_are_compiled_at_the_first_call_for_their_declared_types(folder)
     assert second.stats.cache_hits
 
 
+@pytest.mark.parametrize("wrong", [np.arange(3), np.zeros((3, 3)), np.zeros(6)[::2]], ids=str)
+def test_the_first_call_refuses_what_later_calls_refuse(folder, wrong):
+    fresh, y = kernel(), np.empty(3)
+    for _ in range(2):
+        with pytest.raises(TypeError):
+            fresh(wrong, y)
+    frozen = np.empty(3)
+    frozen.flags.writeable = False
+    with pytest.raises(TypeError):
+        kernel()(np.zeros(3), frozen)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+def test_a_child_of_a_process_that_compiles_is_not_blocked(folder):
+    code = """
+import os, threading, time, warnings
+import numpy as np
+import robotmodels as rm
+warnings.simplefilter("ignore")  # of threads and forks
+model = rm.load("rx90")
+q = np.zeros((2, 6))
+thread = threading.Thread(target=rm.coriolis_matrix, args=(model, q, q))
+thread.start()
+time.sleep(0.3)
+child = os.fork()
+if child == 0:
+    rm.kinetic_energy(model, q, q)
+    os._exit(0)
+thread.join()
+assert os.waitpid(child, 0)[1] == 0
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
 def test_damaged_files_are_compiled_anew(tmp_path):
     assert call(NUMBA_CACHE_DIR=str(tmp_path)) == 0
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -182,7 +216,7 @@ def test_the_command_compiles_in_advance(capsys, monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert main(["compile", "--processes", "2"]) == 0
     assert re.match(
-        r"2 functions are ready, after \d+ s\. They are kept in ", capsys.readouterr().out
+        r"4 functions are ready, after \d+ s\. They are kept in ", capsys.readouterr().out
     )
     assert len(list(tmp_path.rglob("*energies*"))) >= 2
     assert main(["compile", "--processes", "0"]) == 2

@@ -1,5 +1,6 @@
 """The general six-joint inverse against printed postures, independent searches and itself."""
 
+import os
 from functools import cache
 from time import process_time
 
@@ -282,8 +283,10 @@ def test_no_root_is_missing_on_random_arms():
 
 
 @pytest.mark.slow
-def test_no_root_is_missing_on_a_thousand_random_arms():
-    found, union, missed, odd = np.sum([union_of_two(seed) for seed in range(1000, 2000)], axis=0)
+def test_no_root_is_missing_on_many_random_arms():
+    """On 200 arms, with HYPOTHESIS_PROFILE=thorough on a thousand."""
+    last = 2000 if os.environ.get("HYPOTHESIS_PROFILE") == "thorough" else 1200
+    found, union, missed, odd = np.sum([union_of_two(seed) for seed in range(1000, last)], axis=0)
     assert found == union
     assert (missed, odd) == (0, 0)
 

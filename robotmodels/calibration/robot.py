@@ -78,6 +78,10 @@ class JointErrors(Rebuilt):
         if self.is_zero:
             return q.reshape(goals.shape)
         floor = ROUNDING * (1.0 + np.abs(wanted).max(axis=-1, initial=0.0))
+        # exact for gains and couplings
+        zero = np.zeros(n)
+        start, *_ = np.linalg.lstsq(self.slope(zero), (wanted - self.actual(zero)).T, rcond=None)
+        q = start.T
         missing = wanted - self.actual(q)
         size = np.abs(missing).max(axis=-1, initial=0.0)
         for _ in range(NEWTON_STEPS):

@@ -49,8 +49,8 @@ def add_command(commands: Any) -> None:
         "calibrate",
         usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
         "[options]",
-        description="Geometric calibration: estimate the parameters that measurements tell, with "
-        "their deviations, the errors before and after, and on held-out measurements.",
+        description="Geometric calibration: estimate the parameters that measurements determine, "
+        "with their standard errors; errors before and after, and on held-out measurements.",
         epilog=ending(_EXAMPLES, "the fit has not converged"),
     )
     add_source(parser, option=True)

@@ -83,7 +83,10 @@ class NamedValues(Frozen):
             if text in self.names:
                 return self.names.index(text)
         near = ", ".join(nearest_names(name, self.names)) or "none"
-        raise InvalidValueError(f"name: {name!r} was not identified; near it: {near}.")
+        raise InvalidValueError(
+            f"name: {name!r} was not identified; near it: {near}. `names` lists the identified "
+            "parameters, `details` those that were dropped or not identifiable."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

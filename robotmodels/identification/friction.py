@@ -272,7 +272,7 @@ def _stribeck(exponent: Array) -> _Curve:
     """Stribeck friction by the drop and vs of each joint."""
 
     def curve(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
-        (drop, vs), ratio = x.T, (np.abs(v) / x[:, 1]) ** exponent
+        (drop, vs), ratio = x.T, np.minimum((np.abs(v) / x[:, 1]) ** exponent, 700.0)
         column = np.exp(-ratio) * np.sign(v)
         return W, np.stack((column, drop * column * ratio * exponent / vs), axis=2), drop * column
 

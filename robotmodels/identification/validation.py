@@ -97,32 +97,45 @@ def prediction_errors(
             f"log: none of its recordings is longer than the {2 * system.processing.edges} samples "
             "that are cut at both ends; give a longer one, or shorter edges (processing=)."
         )
-    parts = []
+    n, last = system.log.n, np.zeros((0, system.log.n))
+    own, given = np.zeros((2, 4, n))
+    squares, torque, used, products = np.zeros((4, n))
+    samples = steps = 0
     for piece in pieces:
         x, block = piece_signals(system.log, system.processing, piece, 0), system.block(piece)
         predicted = parameter_torque(system.base, system.names, values, x.q, x.v, x.a, ramp)
-        given = idm(system.model, x.q, x.v, x.a) if known else predicted
-        sides = (block.y, block.y - block.W @ values)
-        parts.append((x.tau, predicted, given, *(np.where(block.use, y, np.nan) for y in sides)))
-    tau, predicted, given, side, r = (np.concatenate(x) for x in zip(*parts, strict=True))
-    squares, none = np.nansum(r * r, axis=0), np.full(system.log.n, np.nan)
+        own += _sums(x.tau - predicted, x.tau)
+        if known:
+            given += _sums(x.tau - idm(system.model, x.q, x.v, x.a), x.tau)
+        samples, steps = samples + len(x.tau), steps + max(len(x.tau) - 2, 0)
+        r = np.where(block.use, block.y - block.W @ values, 0.0)
+        squares += (r * r).sum(axis=0)
+        torque += np.where(block.use, block.y**2, 0.0).sum(axis=0)
+        used += block.use.sum(axis=0)
+        chain = np.vstack((last, r))
+        products += (chain[1:] * chain[:-1]).sum(axis=0)
+        last = r[-1:]
+    none = np.full(n, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        filtered = (
-            np.sqrt(squares / (~np.isnan(r)).sum(axis=0)),
-            np.sqrt(squares / np.nansum(side * side, axis=0)),
-            np.nansum(r[1:] * r[:-1], axis=0) / squares,
-        )
-    found = _errors(tau - predicted, tau, filtered)
-    return found, _errors(tau - given, tau, (none, none, none)) if known else None
+        filtered = np.sqrt(squares / used), np.sqrt(squares / torque), products / squares
+        found = _errors(own, filtered, samples, steps)
+        return found, _errors(given, (none, none, none), samples, steps) if known else None
 
 
-def _errors(e: Array, tau: Array, filtered: tuple[Array, Array, Array]) -> Errors:
-    """Errors e (N, n) of torques tau (N, n), with those of the equations."""
-    squares = (e * e).mean(axis=0)
-    rough = (np.diff(e, 2, axis=0) ** 2).sum(axis=0) / (6.0 * max(len(e) - 2, 1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.sqrt(squares / (tau * tau).mean(axis=0))
-    return Errors(np.sqrt(squares), relative, e.mean(axis=0), *filtered, np.sqrt(rough), len(e))
+def _sums(e: Array, tau: Array) -> Array:
+    """Sums over samples: squared errors, errors, squared torques and second differences."""
+    rough = np.diff(e, 2, axis=0)
+    return np.array(
+        [(e * e).sum(axis=0), e.sum(axis=0), (tau * tau).sum(axis=0), (rough * rough).sum(axis=0)]
+    )
+
+
+def _errors(sums: Array, filtered: tuple[Array, Array, Array], samples: int, steps: int) -> Errors:
+    """Errors from the `_sums` of all pieces, with those of the equations."""
+    squares, total, torque, rough = sums
+    noise = np.sqrt(rough / (6.0 * max(steps, 1)))
+    relative = np.sqrt(squares / torque)
+    return Errors(np.sqrt(squares / samples), relative, total / samples, *filtered, noise, samples)
 
 
 def no_errors(n: int) -> Errors:

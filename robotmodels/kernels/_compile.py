@@ -6,6 +6,7 @@ compilation, where it would otherwise compile a kernel again for every mixture o
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from numba import njit, types
 from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
 from numpy.typing import NDArray
 
 from . import Chain
@@ -69,12 +71,15 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
         if signature:
             compile_for = kernel.compile
 
-            def compile_declared(_: Any) -> Any:
-                """Compile the declared signature, whatever the types of the first call."""
+            def compile_declared(given: Any) -> Any:
+                """Compile the declared signature, and refuse other types as later calls do."""
                 with global_compiler_lock:
                     if not kernel.signatures:
                         compile_for(*signature)
                         kernel.disable_compile()
+                declared = kernel.nopython_signatures[0].args
+                if given is not None and not _converts(given, declared):
+                    raise TypeError(f"{function.__name__}: expected {declared}, got {given}.")
                 return kernel.get_overload(*signature)
 
             kernel.compile = compile_declared
@@ -82,6 +87,14 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
         return kernel
 
     return decorate
+
+
+def _converts(given: Any, declared: Any) -> bool:
+    """Whether numba converts arguments of these types to the declared ones."""
+    return len(given) == len(declared) and all(
+        cpu_target.typing_context.can_convert(*pair) is not None
+        for pair in zip(given, declared, strict=True)
+    )
 
 
 class _Notice(event.Listener):
@@ -122,3 +135,10 @@ def _is_interactive(stream: Any) -> bool:
 
 
 event.register("numba:compile", _Notice())
+if hasattr(os, "register_at_fork"):
+    # a child must not inherit the lock of a thread that compiles and does not exist there
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )

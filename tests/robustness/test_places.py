@@ -15,7 +15,8 @@ import os, sys, warnings
 from pathlib import Path
 ALLOWED = Path(os.environ["ALLOWED"]).resolve()
 FOUND = []
-CACHES = ("__pycache__", ".cache/numba", "/dev/null", "/proc/self/task")
+CACHES = ("__pycache__", "robotmodels/robotmodels-", ".cache/robotmodels", "/dev/null",
+          "/proc/self/task")
 def allowed(path):
     if isinstance(path, int) or path is None:
         return True

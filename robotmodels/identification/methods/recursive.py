@@ -81,6 +81,8 @@ class Recursive(Method):
         R, equations, memory, count, t = np.zeros((0, b + 1)), 0.0, 0.0, 0, 0.0
         points: list[tuple[float, Array, Array]] = []
         for block in system.blocks():
+            if not len(block):  # a recording hardly longer than its edges
+                continue
             cuts = np.arange(stride - count % stride, len(block), stride)
             for part in np.split(np.arange(len(block)), cuts):
                 age = forgetting ** np.arange(len(part) - 1, -1, -1.0)
