@@ -14,7 +14,7 @@ import robotmodels as rm
 from robotmodels import calibration, se3
 from robotmodels.calibration import calibrated_model, calibrated_urdf, candidate_parameters
 from robotmodels.datasets import panda_double_socket
-from robotmodels.errors import UrdfError, UrdfWarning
+from robotmodels.errors import InvalidValueError, UrdfError, UrdfWarning
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
 
 EXACT = 1e-9
@@ -330,6 +330,16 @@ def test_coupled_fingers_and_a_table_changed_by_hand_keep_the_text(rng):
     written = calibrated_urdf(robot)
     assert '<mimic joint="hand_finger_1" multiplier="-1"/>' in written
     assert_same_poses(written, robot, rng, None, named)
+
+
+def test_a_result_is_written_as_its_robot_and_other_types_are_refused(rng):
+    model = rm.RobotModel.from_urdf(arm_text(rng), tip_link="tip")
+    q = rng.uniform(-1.5, 1.5, (40, model.n))
+    measured = calibration.Pose(q, rm.dgm(calibrated(model, rng, size=1e-3).model, q))
+    result = calibration.fit(model, measured, folds=0, held_out=0.0)
+    assert calibrated_urdf(result) == calibrated_urdf(result.robot)
+    with pytest.raises(InvalidValueError, match=r"expected a CalibratedRobot.*got RobotModel"):
+        calibrated_urdf(model)
 
 
 def test_a_table_with_other_joints_than_the_text_is_refused(rng):

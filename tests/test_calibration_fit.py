@@ -567,6 +567,7 @@ def test_mistakes_are_named(scene):
     nan[4, 2] = np.nan
     T = scene.T.copy()
     T[:, :3, 3] *= 1000.0
+    still, T_still = (np.repeat(x[:1], 12, axis=0) for x in (scene.q, scene.T))
     for error, match, call in (
         (InvalidValueError, "masses", lambda: fit(
             rm.load("stanford_arm"), Pose(np.zeros((4, 6)), T[:4]), compliance="joints")),
@@ -583,6 +584,10 @@ def test_mistakes_are_named(scene):
         (InvalidValueError, "held_out", lambda: fit(scene.nominal, measured, held_out=scene.T)),
         (InvalidValueError, "held_out", lambda: fit(scene.nominal, measured, held_out=1.5)),
         (InvalidValueError, "folds", lambda: fit(scene.nominal, measured, folds=1)),
+        (InvalidValueError, "ParameterPrior or None, got 'none'", lambda: fit(
+            scene.nominal, measured, prior="none")),
+        (InvalidValueError, "give a number for the strength", lambda: fit(
+            scene.nominal, Pose(still, T_still), prior=ParameterPrior(strength=None))),
     ):  # fmt: skip
         with pytest.raises(error, match=match):
             call()
@@ -622,6 +627,7 @@ def test_a_result_pickles_prints_and_counts_its_fits(scene):
     assert not again.solution.fit.x.flags.writeable
     assert "\n" not in repr(result)
     assert len(repr(result)) < 300
+    assert repr(result).endswith("; see report(result)>")
     assert result.reason() == result.status.sentence
     offsets = joint_offsets(result, scene.q).offset  # of the measured coordinates
     masked = joint_offsets(result.robot, scene.q, mask=[1, 1, 1, 0, 0, 0])

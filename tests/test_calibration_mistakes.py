@@ -185,6 +185,19 @@ def test_the_wrong_one_of_two_distances_is_named(seed):
     assert "point:0 to point:2" in note
 
 
+@pytest.mark.parametrize("seed", REACHED[:2])
+def test_the_prediction_of_a_wrong_distance_uses_the_other_distances(seed):
+    # without these the scale is uncertain by more than the mistake
+    arm, touched = contacts(seed, [(0.0, 0.3, 0.0), (0.2, 0.0, 0.0)])
+    known = [between(0.3007), between(0.2, 2), KnownDistance("point:1", "point:2", 0.13**0.5)]
+    (note,) = notes_of_distances(fit(arm.nominal, [touched, *known], **ALONE))
+    mean, error = prediction(note)
+    stated = int(note.split("a difference of ")[1].split()[0])
+    assert stated >= 3
+    assert abs(mean - 300.0) < 3.0 * error
+    assert stated == pytest.approx((300.7 - mean) / np.hypot(error, 0.1), abs=0.6)
+
+
 @pytest.mark.parametrize("seed", [0, 3, 7])
 def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)
@@ -204,7 +217,7 @@ def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
 
     assert not notes_of_distances(fitted([0.05] * 3))
     for length in (0.049, 0.055):
-        (note,) = notes_of_distances(fitted([length] * 3))
+        (note,) = notes_of_distances(fitted([length, length + 1e-15, length]))
         assert note.startswith(f"3 known distances of {1e3 * length:g} mm: the other measurements")
         mean, error = prediction(note)
         assert abs(mean - 50.0) < 4.0 * error < 1.5

@@ -67,11 +67,11 @@ def contradictions(
     source = "the other measurements"
     source += " and the prior" if np.isfinite(solution.fit.prior.sigma).any() else ""
     found = []
-    for group in _wrong_groups(shift, covariance, sigma, [m.length for m in known]):
+    lengths = [m.length for m in known]
+    for group, mean, deviation in _wrong_groups(shift, covariance, sigma, lengths):
         m, many = known[group[0]], len(group)
-        mean = float(shift[group].mean())
-        error = math.sqrt(covariance[np.ix_(group, group)].sum()) / many
         size = float(np.linalg.norm(sigma[group])) / many
+        error = math.sqrt(max(0.0, deviation**2 - size**2))
         digits = max(0, 1 - math.floor(math.log10(max(1e3 * error, 1e-6))))
         stated, its = f"{_named(m)}: stated {1e3 * m.length:.6g} mm, but", "the length, its points,"
         if many > 1:
@@ -80,7 +80,7 @@ def contradictions(
         note = (
             f"{stated} {source} predict {1e3 * (m.length + mean):.{digits}f} +- "
             f"{1e3 * error:.{digits}f} mm (a difference of "
-            f"{abs(mean) / math.hypot(size, error):.0f} standard errors). Check {its} and the "
+            f"{abs(mean) / deviation:.0f} standard errors). Check {its} and the "
             f"standard deviation of {1e3 * size * math.sqrt(many):.2g} mm."
         )
         note += f" Either this distance or {rival} is wrong." if rival else ""
@@ -90,16 +90,18 @@ def contradictions(
 
 def _wrong_groups(
     shift: Array, covariance: Array, sigma: Array, lengths: Sequence[float]
-) -> list[list[int]]:
+) -> list[tuple[list[int], float, float]]:
     """Groups of wrong distances; equal lengths are one group if only their mean is wrong.
 
-    Shapes: shift, sigma (K,); covariance (K, K).
+    With each its mean difference, given that the distances in no group are right, and the standard
+    deviation of it. Shapes: shift, sigma (K,); covariance (K, K).
     """
     variance = covariance + np.diag(sigma**2)
     limit = _CONTRADICTED**2
-    groups, left = [], []
-    for length in dict.fromkeys(lengths):
-        alike = [k for k, other in enumerate(lengths) if other == length]
+    groups, left, rest = [], [], [*range(len(lengths))]
+    while rest:
+        alike = [k for k in rest if math.isclose(lengths[k], lengths[rest[0]], rel_tol=1e-9)]
+        rest = [k for k in rest if k not in alike]
         mean = float(shift[alike].mean())
         apart = (shift[alike] - mean) ** 2 <= limit * variance[alike, alike]
         total = float(variance[np.ix_(alike, alike)].sum()) / len(alike) ** 2
@@ -114,7 +116,18 @@ def _wrong_groups(
         if not beyond.any():
             break
         groups.append([left.pop(int(np.argmax(np.where(beyond, alone, -1.0))))])
-    return groups
+    found = []
+    for group in groups:  # a wrong distance may have let another one appear wrong
+        kept, many = [*group, *left], len(group)
+        inverse = np.linalg.inv(variance[np.ix_(kept, kept)])[:many]
+        conditional = np.linalg.inv(inverse[:, :many])
+        mean = float((conditional @ inverse @ shift[kept]).mean())
+        total = float(conditional.sum()) / many**2
+        if mean**2 > limit * total:
+            found.append((group, mean, math.sqrt(total)))
+        else:
+            left += group
+    return found
 
 
 def _predicted_differences(

@@ -139,6 +139,8 @@ def fit(
     measured, (share, test) = as_measurements(measurements), _held_out(held_out)
     if folds and folds < 2:
         raise InvalidValueError(f"folds: expected 2 or more, or 0 for none, got {folds}.")
+    if not isinstance(prior, ParameterPrior | None):
+        raise InvalidValueError(f"prior: expected a ParameterPrior or None, got {prior!r:.60}.")
     loss = Loss.SQUARES if loss is None else chosen(Loss, loss, "loss")
     rng = np.random.default_rng(_SEED if rng is None else rng)
     known, known_lengths = as_names(known), as_names(known_lengths)

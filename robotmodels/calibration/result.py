@@ -173,5 +173,5 @@ class CalibrationResult(Rebuilt):
         return (
             f"<CalibrationResult of {self.nominal.name}: {len(self.names)} parameters, "
             f"{self.status.name.lower()}, {', '.join(errors)}; another tool about "
-            f"{self.other_tool.rms:.2g} m>"
+            f"{self.other_tool.rms:.2g} m; see report(result)>"
         )

@@ -180,7 +180,7 @@ def select_configurations(
     radius: float = 0.05,
     optimise: bool = False,
     starts: int = 3,
-    rng: np.random.Generator | None = None,
+    rng: np.random.Generator | int | None = None,
     progress: bool | Progress = False,
 ) -> SelectedConfigurations:
     """Select configurations for a calibration (optimal experiment design, exciting postures).
@@ -228,7 +228,7 @@ def select_configurations(
         obstacles, as long as that helps. Not for contacts.
     starts : int
         Sets to start from: a greedy one, the others random.
-    rng : numpy.random.Generator, optional
+    rng : numpy.random.Generator or int, optional
         Source of randomness; default a fresh one.
     progress : bool or callable
         True logs, a callable gets (done, total).
@@ -262,7 +262,7 @@ def select_configurations(
     kind = as_kind(kind)
     criterion = chosen(Criterion, criterion, "criterion")
     count, starts = _whole(count, "count"), _whole(starts, "starts")
-    rng = np.random.default_rng() if rng is None else rng
+    rng = np.random.default_rng(rng)
     report = _progress(progress)
     if optimise and kind.is_constraint:
         raise InvalidValueError(

@@ -226,6 +226,12 @@ def settled_prior(
             f"{problem.blocks}; give the strength."
         )
     parts = partition(problem.parameters.model, problem.measurements, _FOLDS, rng)
+    if not parts.splits:
+        raise InvalidValueError(
+            "strength: choosing it by cross-validation needs measurements in several postures, got "
+            "one posture for each object; give a number for the strength, or measure in more "
+            "postures."
+        )
     whole = solve(problem, loss=loss, prior=prior)
     nominal = errors_of(problem, np.zeros(problem.P))
     candidates = [replace(prior, strength=float(strength)) for strength in _STRENGTHS]

@@ -181,7 +181,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def calibrated_urdf(robot: CalibratedRobot) -> str:
+def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     """URDF text of the calibrated robot: its own URDF, calibrated in place.
 
     Of a robot read by `RobotModel.from_urdf` only the ``<origin>`` elements of joints between the
@@ -200,8 +200,8 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
 
     Parameters
     ----------
-    robot : CalibratedRobot
-        The robot.
+    robot : CalibratedRobot or CalibrationResult
+        The robot, or the result of `fit` that holds it.
 
     Returns
     -------
@@ -212,6 +212,8 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
 
     Raises
     ------
+    InvalidValueError
+        Another type.
     UrdfError
         As `to_urdf`; the robot's table has other joints than its URDF.
 
@@ -235,6 +237,13 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     >>> RobotModel.from_urdf(text).n
     2
     """
+    if isinstance(robot, CalibrationResult):
+        robot = robot.robot
+    if not isinstance(robot, CalibratedRobot):
+        raise InvalidValueError(
+            "robot: expected a CalibratedRobot, or the CalibrationResult of fit, got "
+            f"{type(robot).__name__}; to_urdf writes a RobotModel."
+        )
     notes, K = [*robot.notes], robot.model.transmission
     if robot.model.source is None:
         text = to_urdf(robot.model)
