@@ -95,6 +95,7 @@ def test_a_child_of_a_process_that_compiles_is_not_blocked(folder):
 import os, threading, time, warnings
 import numpy as np
 import robotmodels as rm
+import robotmodels.kernels.mass, robotmodels.kernels.torques
 warnings.simplefilter("ignore")  # of threads and forks
 model = rm.load("rx90")
 q = np.zeros((2, 6))
