@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..estimation.estimate import NamedValues
-from ..estimation.factor import TriangularFactors, reduced
+from ..estimation.factor import TriangularFactors, merged_all, reduced
 from ..logs import Log
 from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
@@ -24,6 +25,7 @@ from ..table_text import boxed
 from .equations import Block, Equations, equations
 from .forms import RowForm, torque_block
 from .processing import checked_processing, choose_processing
+from .reduction import Task, parts, results
 from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
@@ -66,9 +68,15 @@ class CommonEquations:
         return map(self._block, self._pieces())
 
     def reduced(self, executor: Executor | None = None) -> TriangularFactors:
-        """Triangular factors of all logs."""
-        run = map if executor is None else executor.map
-        return reduced(self.names, run(self._block, self._pieces()))
+        """Triangular factors of all logs; a task has the samples of its piece alone."""
+
+        def tasks() -> Iterator[Task]:
+            for system, M in zip(self.systems, self.maps, strict=True):
+                for part, piece in parts(system, executor is not None):
+                    own = replace(self, systems=(part,), maps=(M,))
+                    yield partial(own._factors, piece), 0.0
+
+        return merged_all(factors for factors, _ in results(tasks(), executor))
 
     def columns(self, kept: NDArray[np.int64]) -> CommonEquations:
         """The same equations in some of the unknowns."""
@@ -77,6 +85,10 @@ class CommonEquations:
 
     def _pieces(self) -> Iterator[tuple[int, Piece]]:
         return ((k, piece) for k, system in enumerate(self.systems) for piece in system.pieces())
+
+    def _factors(self, piece: Piece) -> TriangularFactors:
+        """Triangular factors of a piece of the first log."""
+        return reduced(self.names, (self._block((0, piece)),))
 
     def _block(self, number: tuple[int, Piece]) -> Block:
         k, piece = number

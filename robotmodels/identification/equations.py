@@ -23,8 +23,9 @@ _KEPT_BYTES = 2**26
 
 @dataclass(slots=True)
 class _Cache:
-    """Blocks of the first pieces of a log, in columns ``names``."""
+    """Blocks of the first pieces of a log for the robot of a base, in columns ``names``."""
 
+    base: BaseParameters
     names: tuple[str, ...]
     blocks: dict[tuple[Log, Processing, EquationForm, Piece], Block] = field(default_factory=dict)
     size: int = 0
@@ -61,7 +62,7 @@ class Equations(EquationSource):
 
     def cached(self) -> Equations:
         """The same equations with a cache of blocks."""
-        return replace(self, cache=_Cache(self.names))
+        return replace(self, cache=_Cache(self.base, self.names))
 
     def uncached(self) -> Equations:
         """The same equations without a cache."""
@@ -73,7 +74,8 @@ class Equations(EquationSource):
 
     def block(self, piece: Piece) -> Block:
         """Equations of a piece; read-only."""
-        if (cache := self.cache) is None:
+        cache = self.cache
+        if cache is None or not self._has_columns_of(cache.base):
             return FORMS[self.form](self, piece)
         key = self.log, self.processing, self.form, piece
         block = cache.blocks.get(key)
@@ -87,6 +89,11 @@ class Equations(EquationSource):
             return block
         columns = [cache.names.index(name) for name in self.names]
         return replace(block, W=np.take(block.W, columns, axis=2))
+
+    def _has_columns_of(self, base: BaseParameters) -> bool:
+        """Whether a base has the same columns: robot, drives and friction, not the regrouping."""
+        same = self.base.model is base.model and self.base.friction is base.friction
+        return same and self.base.drive == base.drive
 
     def blocks(self) -> Iterator[Block]:
         """Equations of the whole log, piece by piece."""

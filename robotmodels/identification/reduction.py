@@ -69,13 +69,12 @@ def reduce_equations(
     (8, True)
     """
     systems = (system,) if isinstance(system, Equations) else system
-    most = 2 * (os.cpu_count() or 1) + 2 if window is None else window
-    if most < 1:
+    if window is not None and window < 1:
         raise InvalidValueError(f"window: expected at least one piece at a time, got {window}.")
 
     def leaves() -> Iterator[TriangularFactors]:
         fraction = 0.0
-        for factors, fraction in _results(_tasks(systems, executor is not None), executor, most):
+        for factors, fraction in results(_tasks(systems, executor is not None), executor, window):
             yield factors
             if progress is not None and fraction > 0.0:
                 progress(fraction)
@@ -85,35 +84,42 @@ def reduce_equations(
     return merged_all(leaves())
 
 
-_Task = tuple[Callable[[], TriangularFactors], float]
+Task = tuple[Callable[[], TriangularFactors], float]
 """Work on a piece, and the fraction of all work that is done after it; 0 if it is not known."""
 
 
-def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[_Task]:
-    """One task per piece; what is sent to a worker has the samples of its piece alone."""
+def parts(system: Equations, sent: bool) -> Iterator[tuple[Equations, Piece]]:
+    """Pieces and their equations; what is sent to a worker has the samples of its piece alone."""
+    for piece in system.pieces():
+        if sent:
+            log, inner = slice_with_margin(system.log, system.processing, piece)
+            yield system.with_log(log), inner
+        else:
+            yield system, piece
+
+
+def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[Task]:
+    """One task per piece."""
     logs = len(systems) if isinstance(systems, Sized) else 0
     for k, system in enumerate(systems):
-        pieces = system.pieces()
-        for i, piece in enumerate(pieces):
-            part = system
-            if sent:
-                log, piece = slice_with_margin(system.log, system.processing, piece)
-                part = system.with_log(log)
-            fraction = (k + (i + 1) / len(pieces)) / logs if logs else 0.0
+        count = len(system.pieces())
+        for i, (part, piece) in enumerate(parts(system, sent)):
+            fraction = (k + (i + 1) / count) / logs if logs else 0.0
             yield partial(_piece_factors, part, piece), fraction
 
 
-def _results(
-    tasks: Iterable[_Task], executor: Executor | None, window: int
+def results(
+    tasks: Iterable[Task], executor: Executor | None, window: int | None = None
 ) -> Iterator[tuple[TriangularFactors, float]]:
     """Results in the order of the tasks, of which at most ``window`` are submitted at a time."""
     if executor is None:
         yield from ((task(), fraction) for task, fraction in tasks)
         return
+    most = 2 * (os.cpu_count() or 1) + 2 if window is None else window
     waiting: deque[tuple[Future[TriangularFactors], float]] = deque()
     try:
         for task, fraction in tasks:
-            if len(waiting) == window:
+            if len(waiting) == most:
                 first, done = waiting.popleft()
                 yield first.result(), done
             waiting.append((executor.submit(task), fraction))

@@ -135,10 +135,10 @@ def hausman_test(
     simulator = ClosedLoopSimulator(system, loop)
     try:
         pairs = instrument_pairs(simulator, values)
+        factors = reduced(system.names, (block for _, block in pairs()))
+        step = instrument_step(system.names, values, pairs, value_sizes(factors))
     except SimulationDivergedError:  # the last step of an estimate that did not converge
         return untested
-    factors = reduced(system.names, (block for _, block in pairs()))
-    step = instrument_step(system.names, values, pairs, value_sizes(factors))
     ls_values, inverse, _ = solved(factors, step.weights)
 
     def residuals() -> Iterator[Block]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,8 @@ from ..._arrays import Array, Frozen, as_exact
 from ...errors import InvalidValueError
 from ...estimation.covariance import CorrelatedCovariance, correlated_covariance
 from ...estimation.estimate import Estimate, EstimateStatus
-from ...estimation.factor import TriangularFactors
-from ...estimation.linear import check_count, value_sizes, weighted
+from ...estimation.factor import TriangularFactors, reduced, triangle
+from ...estimation.linear import check_count, inverse_triangle, value_sizes, weighted
 from ..equations import Block, Equations
 from ..methods.base import Covariance, Method
 from .controller import Controller
@@ -213,60 +213,52 @@ def instrument_step(
 ) -> Step:
     """Solve ``Z^T S (y - W b) = 0`` for the correction of the values, which limits rounding.
 
-    Weights S are given (m,) or those of the residuals. Least squares is the case ``Z = W``.
+    Weights S are given (m,) or those of the residuals. Least squares is the case ``Z = W``. With
+    ``Z = Q R_z`` the equations are ``Q^T W x = Q^T e``, without products that square conditions.
     """
-    from scipy.linalg import eigh
+    b = len(values)
 
-    b, total = len(values), None
-    for Z, block in pairs():
-        e = block.y - block.W @ values
-        new = [_products(Z, block, e, size, j) for j in range(e.shape[1])]
-        new = [np.array(x) for x in zip(*new, strict=True)]
-        total = new if total is None else [x + y for x, y in zip(total, new, strict=True)]
-    assert total is not None  # a log has pieces
-    sums, Ze, squares, lengths, counts = total
+    def blocks() -> Iterator[Block]:
+        for Z, block in pairs():
+            e = block.y - block.W @ values
+            W = np.concatenate((Z * size, block.W * size, e[:, :, None]), axis=2)
+            yield replace(block, W=W)
+
+    factors = reduced((*names, *names, "residual"), blocks())
+    squares, lengths = (np.array([R[:, k] @ R[:, k] for R in factors.factors]) for k in (-2, -1))
     squares = np.maximum(squares, _RESIDUAL**2 * lengths)
-    left = max(1.0 - b / max(float(counts.sum()), 1.0), 1e-3)
-    sigma = np.sqrt(squares / np.maximum(counts * left, 1e-300))
+    left = max(1.0 - b / max(factors.rows, 1), 1e-3)
+    sigma = np.sqrt(squares / np.maximum(factors.counts * left, 1e-300))
     weights = _inverse(sigma) if weights is None else weights
-    ZW, ZZ, WW = np.einsum("j,jkxy->kxy", weights**2, sums)
-    rows, columns = np.sqrt(np.diag(ZZ)), np.sqrt(np.diag(WW))
+    R, _, _ = factors.stacked(weights)
+    Rz, QW, Rw = R[:b, :b], R[:b, b : 2 * b], triangle(R[: 2 * b, b : 2 * b])
+    rows, columns = np.linalg.norm(Rz, axis=0), np.linalg.norm(Rw, axis=0)
     if not (rows * columns).all():
         missing = ", ".join(names[k] for k in np.flatnonzero(rows * columns == 0.0))
         raise InvalidValueError(
             f"log: the simulated motion does not depend on {missing}; its joints do not leave the "
             "dead band. Give a smaller dead band (processing=), or drop these parameters."
         )
-    scaled = ZW / np.outer(rows, columns)
-    condition = float(np.sqrt(np.linalg.cond(scaled)))
+    condition = float(np.max([np.linalg.cond(QW / columns), np.linalg.cond(Rz / rows)]))
     if not condition < _SINGULAR:
         raise SimulationDivergedError
-    inverse = np.linalg.inv(scaled) / np.outer(columns, rows)
-    spread = inverse @ ZZ @ inverse.T * (weights**2 @ squares) / max(counts.sum() * left, 1e-300)
-    # squared canonical correlations; rounding on the diagonals makes the products definite
-    B, C = (X / np.outer(x, x) + 1e-13 * np.eye(b) for X, x in ((ZZ, rows), (WW, columns)))
-    least = eigh(scaled.T @ np.linalg.solve(B, scaled), C, eigvals_only=True)[0]
+    inverse = np.linalg.inv(QW / columns) / columns[:, None]
+    scale = np.sqrt(weights**2 @ squares / max(factors.rows * left, 1e-300))
     return Step(
-        values=values + inverse @ (weights**2 @ Ze) * size,
-        standard_errors=np.sqrt(np.maximum(np.diag(spread), 0.0)) * size,
-        inverse=inverse * np.outer(size, size),
+        values=values + inverse @ R[:b, 2 * b] * size,
+        standard_errors=scale * np.linalg.norm(inverse, axis=1) * size,
+        inverse=inverse @ inverse_triangle(Rz).T * np.outer(size, size),
         sigma=sigma,
         weights=weights,
         squares=squares,
         condition=condition,
-        strength=float(np.sqrt(np.clip(least, 0.0, 1.0))),
+        # least canonical correlation
+        strength=min(1.0, float(np.linalg.norm(QW @ inverse_triangle(Rw), -2))),
     )
 
 
 def _inverse(sigma: Array) -> Array:
     return 1.0 / np.where(sigma > 0.0, sigma, 1.0)
-
-
-def _products(Z: Array, block: Block, e: Array, size: Array, j: int) -> tuple[Any, ...]:
-    """Products of the used instruments, columns, residuals and right sides of a group."""
-    use = block.use[:, j]
-    z, w, r, y = Z[use, j] * size, block.W[use, j] * size, e[use, j], block.y[use, j]
-    return (z.T @ w, z.T @ z, w.T @ w), z.T @ r, r @ r, y @ y, len(r)
 
 
 @dataclass(frozen=True, slots=True)
