@@ -15,7 +15,7 @@ import os, sys, warnings
 from pathlib import Path
 ALLOWED = Path(os.environ["ALLOWED"]).resolve()
 FOUND = []
-CACHES = ("__pycache__", "robotmodels/robotmodels-", ".cache/robotmodels", "/dev/null",
+CACHES = ("__pycache__", "/robotmodels-", ".cache/robotmodels", "/dev/null",
           "/proc/self/task")
 def allowed(path):
     if isinstance(path, int) or path is None:
