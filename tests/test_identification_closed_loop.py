@@ -17,6 +17,7 @@ from robotmodels.identification import (
     Instrumental,
     Log,
     OutputError,
+    Wls,
     choose_processing,
     equations,
     hausman_test,
@@ -300,6 +301,8 @@ def test_a_simulation_that_diverges_has_a_status_and_no_numbers(monkeypatch):
         assert why in found.notes[-1]
     good = Instrumental(control, truth, width=width).solve(system, factors)
     assert np.isfinite(hausman_test(system, good).p)
+    with pytest.raises(InvalidValueError, match="expected instrumental variables"):
+        hausman_test(system, Wls().solve(system, factors))
     monkeypatch.setattr(method_module, "_SINGULAR", 1.0)  # the motion of `good` is refused
     for each in (found, good):
         verdict = hausman_test(system, each)

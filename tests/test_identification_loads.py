@@ -309,6 +309,7 @@ def test_mistakes_are_named():
         (lambda: identify_payload(model, full, log, 0), "frame"),
         (lambda: identify_payload(model, full, log, changed=("mass",)), "Ia"),
         (lambda: identify_drive_gains(model, log, ()), "at least one LoadedLog"),
+        (lambda: identify_drive_gains(model, log, log), "at least one LoadedLog"),
         (lambda: identify_drive_gains(model, log, other), "sampling periods"),
         (lambda: KnownPayload(0.0), "positive mass"),
         (lambda: KnownPayload(1.0, inertia=INERTIA), "com"),

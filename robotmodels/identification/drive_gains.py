@@ -168,7 +168,7 @@ def identify_drive_gains(
     """
     check_model(model)
     bare = (unloaded,) if isinstance(unloaded, Log) else tuple(unloaded)
-    carried = (loaded,) if isinstance(loaded, LoadedLog) else tuple(loaded)
+    carried = (loaded,) if isinstance(loaded, LoadedLog | Log) else tuple(loaded)
     if not carried or not all(isinstance(each, LoadedLog) for each in carried):
         raise InvalidValueError(
             "loaded: without a known load the scale of the gains is undetermined; give at least "

@@ -122,10 +122,10 @@ def hausman_test(
 
     if not 0.0 < level < 1.0:
         raise InvalidValueError(f"level: expected a number between 0 and 1, got {level!r}.")
-    if estimate.names != system.names:
+    if estimate.names != system.names or not hasattr(estimate.details, "loop"):
         raise InvalidValueError(
-            "estimate: it has other parameters than these equations; estimate them by "
-            "Instrumental().solve(system, ...) first."
+            "estimate: expected instrumental variables on the parameters of these equations, as "
+            "Instrumental().solve(system, ...) gives them."
         )
     b, loop, values = len(system.names), estimate.details.loop, estimate.values
     none = np.full(b, np.nan)
