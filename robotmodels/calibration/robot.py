@@ -81,7 +81,7 @@ class JointErrors(Rebuilt):
         # exact for gains and couplings
         zero = np.zeros(n)
         start, *_ = np.linalg.lstsq(self.slope(zero), (wanted - self.actual(zero)).T, rcond=None)
-        q = start.T
+        q[:] = start.T
         missing = wanted - self.actual(q)
         size = np.abs(missing).max(axis=-1, initial=0.0)
         for _ in range(NEWTON_STEPS):

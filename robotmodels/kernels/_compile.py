@@ -91,9 +91,9 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
 
 def _converts(given: Any, declared: Any) -> bool:
     """Whether numba converts arguments of these types to the declared ones."""
+    context: Any = cpu_target.typing_context
     return len(given) == len(declared) and all(
-        cpu_target.typing_context.can_convert(*pair) is not None
-        for pair in zip(given, declared, strict=True)
+        context.can_convert(*pair) is not None for pair in zip(given, declared, strict=True)
     )
 
 
