@@ -154,6 +154,15 @@ def test_intervals_contain_the_truth_as_often_as_they_should(case, loss, outlier
     assert 0.92 <= np.mean(inside) <= 0.97
 
 
+def test_median_of_residuals_counts_what_parameters_take():
+    def scale(seed):
+        rng = np.random.default_rng(seed)
+        A, e = rng.normal(size=(40, 20)), rng.normal(size=40)
+        return fit_nonlinear(lambda x: (A @ x - e, A), np.zeros(20), loss="huber").scale
+
+    assert 0.9 < np.median([scale(seed) for seed in range(100)]) < 1.1
+
+
 def test_robust_covariance_is_the_formula_of_huber():
     """Variance of the influence over its squared mean slope, with the correction for P / M."""
     rng = np.random.default_rng(0)
