@@ -83,8 +83,13 @@ def better_hypotheses(
         if not np.array_equal(corrected[:3], samples[:3]):
             equations = _equations(model, corrected, cutoff, compensators)
         for correction in group:
-            better, part = equations.fit(tau @ correction.torque.T)
-            significance, count = _significance(better - likelihood), min(len(correction.joints), 2)
+            torques, count = tau @ correction.torque.T, min(len(correction.joints), 2)
+            # a fit without sign constraints is at least as good, and faster
+            part = equations.fit(torques, equations.W.shape[2], share)[1]
+            if np.log(share / part).sum() < count * _LIKELY:
+                continue
+            better, part = equations.fit(torques)
+            significance = _significance(better - likelihood)
             gain = float(np.log(share / part).sum())
             left, before = (float(x[list(correction.joints)].mean()) for x in (part, share))
             # better fits of other joints are no evidence for this correction
@@ -148,18 +153,21 @@ class _Equations(NamedTuple):
     grams: Array
     free: int
 
-    def fit(self, tau: Array) -> tuple[Array, Array]:
-        """Weighted least squares of torques (T, n).
+    def fit(
+        self, tau: Array, free: int | None = None, share: Array | float = 1.0
+    ) -> tuple[Array, Array]:
+        """Weighted least squares of torques (T, n), from initial residual variances.
 
         Returns the log-likelihood of each sample (T,) and the variance left of each torque (n,).
         """
         moments = np.einsum("jtp,tj->jp", self.W, tau)
         sizes = np.maximum(tau.var(axis=0), 1e-290)
-        e, variances = tau, sizes
-        for _ in range(_ITERATIONS):
+        limit = self.free if free is None else free
+        e, variances = tau, np.maximum(share, _FLOOR) * sizes
+        for _ in range(_ITERATIONS if free is None else 2):
             weights = 1.0 / variances
             gram = np.einsum("j,jpq->pq", weights, self.grams)
-            e = tau - (self.W @ _solved(gram, weights @ moments, self.free)).T
+            e = tau - (self.W @ _solved(gram, weights @ moments, limit)).T
             variances = np.maximum((e**2).mean(axis=0), _FLOOR * sizes)
         likelihood = -0.5 * (np.log(variances) + e**2 / variances).sum(axis=1)
         return likelihood, variances / sizes
