@@ -154,16 +154,19 @@ def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int6
     if not symbolic:
         return columns.basis.kept, columns.basis.coefficients, True
     model, drive, zero, sizes = columns.model, columns.drive, columns.tolerance, columns.sizes
-    fine, coarse, terms = (
-        regrouped(model, *rows_of_numbers(model, small), drive, small)
-        for small in (_FINEST, _COARSEST, zero)
-    )
+
+    def terms_at(small: float) -> dict[int, dict[int, float]]:
+        """Combinations where lengths and angles up to ``small`` count as zero."""
+        return regrouped(model, *rows_of_numbers(model, small), drive, small)
+
+    fine, coarse = terms_at(_FINEST), terms_at(_COARSEST)
     table = model.table
     small = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
     small = np.append(small, np.linalg.norm(model.gravity) / EARTH)
     has_rules = len(sizes) == 10 * model.f + model.n * len(drive)
     clear = has_rules and zero <= NOTHING and fine.keys() == coarse.keys()
     clear = clear and not ((small > _FINEST) & (small < _COARSEST)).any()
+    terms = fine if clear else terms_at(zero)
     kept = np.array(sorted(terms), dtype=np.int64)
     matrix = np.zeros((len(kept), len(sizes)))
     for row, number in zip(matrix, kept.tolist(), strict=True):
