@@ -89,7 +89,7 @@ def test_the_first_call_refuses_what_later_calls_refuse(folder, wrong):
         kernel()(np.zeros(3), frozen)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no fork: no child to block")
 def test_a_child_of_a_process_that_compiles_is_not_blocked(folder):
     code = """
 import os, threading, time, warnings

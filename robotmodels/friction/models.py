@@ -30,6 +30,7 @@ Automatica 30(7), 1994, section 2.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
@@ -42,8 +43,8 @@ from .protocols import FrictionSum, breakaway_torques, together
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class JointFriction(Value):
-    """Base: parameters of shape (n,) that the fields name; a subclass adds `_terms`."""
+class JointFriction(Value, ABC):
+    """Base: parameters of shape (n,) that the fields name; a subclass defines `basis`."""
 
     kinds: ClassVar[tuple[str, ...]] = ()
 
@@ -71,13 +72,9 @@ class JointFriction(Value):
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
         return breakaway_torques(self)
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
-        """Torque (..., n) per unit of each parameter of its joint; not needed beside a `basis`."""
-        raise NotImplementedError
-
+    @abstractmethod
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter of its joint, shape (..., k, n)."""
-        return np.stack(self._terms(as_vector(v, self.n, "v")), axis=-2)
 
     def torque(self, v: ArrayLike) -> Array:
         """Torque that the joints need to overcome friction, shape (..., n)."""
@@ -106,8 +103,9 @@ class ViscousFriction(JointFriction):
     def __init__(self, Fv: ArrayLike) -> None:
         self._set(Fv=Fv)
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
-        return (v,)
+    def basis(self, v: ArrayLike) -> Array:
+        """Velocities, shape (..., 1, n)."""
+        return np.stack((as_vector(v, self.n, "v"),), axis=-2)
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -126,8 +124,9 @@ class CoulombFriction(JointFriction):
     def __init__(self, Fc: ArrayLike) -> None:
         self._set(Fc=Fc)
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
-        return (np.sign(v),)
+    def basis(self, v: ArrayLike) -> Array:
+        """Signs of the velocities, shape (..., 1, n)."""
+        return np.sign(as_vector(v, self.n, "v"))[..., None, :]
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -146,8 +145,9 @@ class TorqueOffset(JointFriction):
     def __init__(self, offset: ArrayLike) -> None:
         self._set(offset=offset)
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
-        return (np.ones_like(v),)
+    def basis(self, v: ArrayLike) -> Array:
+        """Ones, shape (..., 1, n)."""
+        return np.ones_like(as_vector(v, self.n, "v"))[..., None, :]
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -173,9 +173,11 @@ class AsymmetricFriction(JointFriction):
     def __init__(self, Fvp: ArrayLike, Fcp: ArrayLike, Fvn: ArrayLike, Fcn: ArrayLike) -> None:
         self._set(Fvp=Fvp, Fcp=Fcp, Fvn=Fvn, Fcn=Fcn)
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
+    def basis(self, v: ArrayLike) -> Array:
+        """Velocity and its sign in each direction, shape (..., 4, n)."""
+        v = as_vector(v, self.n, "v")
         forth, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-        return forth, np.sign(forth), back, np.sign(back)
+        return np.stack((forth, np.sign(forth), back, np.sign(back)), axis=-2)
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -233,11 +235,13 @@ class StribeckFriction(JointFriction):
                 f"friction Fc ({self.Fc[j]:g}); exchange them if they are in the wrong order."
             )
 
-    def _terms(self, v: Array) -> tuple[Array, ...]:
+    def basis(self, v: ArrayLike) -> Array:
+        """Velocity, and the sign times the part of Fc and that of Fs, shape (..., 3, n)."""
+        v = as_vector(v, self.n, "v")
         with np.errstate(over="ignore", under="ignore"):  # zero far above vs
             fallen = np.exp(-((np.abs(v) / self.vs) ** self.exponent))
         sign = np.sign(v)
-        return v, (1.0 - fallen) * sign, fallen * sign
+        return np.stack((v, (1.0 - fallen) * sign, fallen * sign), axis=-2)
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
