@@ -159,11 +159,11 @@ def carry_velocity(
 
 @compiled(inlined=True)
 def carry_acceleration(
-    sigma: int,
-    b: int,
+    chain: Chain,
     k: int,
-    dq: float,
-    ddq: float,
+    v: Floats,
+    a: Floats,
+    i: int,
     Rj: Matrix,
     Pj: Vector,
     w: Floats,
@@ -171,13 +171,14 @@ def carry_acceleration(
     U: Floats,
     u: Floats,
 ) -> tuple[Vector, Vector, Matrix, Vector]:
-    """`link_acceleration` and U of link k from those of its antecedent b; kept in row k + 1."""
+    """`link_acceleration` and U of link k from those of its antecedent; kept in row k + 1."""
+    b, c = chain.antecedent[k], chain.joint[k]
     wj, dwj, uj = link_acceleration(
-        sigma,
+        chain.sigma[k],
         Rj,
         Pj,
-        dq,
-        ddq,
+        coordinate(v, i, c),
+        coordinate(a, i, c),
         vector(w, b),
         vector(dw, b),
         matrix(U, b),

@@ -12,7 +12,7 @@ import numpy as np
 from . import Chain
 from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, compiled
 from ._inertia import inertia_of, join_antecedent
-from ._motion import base_acceleration, carry_acceleration, coordinate, link_pose, link_wrench
+from ._motion import base_acceleration, carry_acceleration, link_pose, link_wrench
 from ._vectors import add, cross, matrix, put_matrix, put_vector, times, vector
 from .mass import POSITIVE, solve_in_place
 
@@ -54,19 +54,7 @@ def bias_and_mass(
     P, w, dw, u, force, moment = links[0], links[1], links[2], links[3], links[4], links[5]
     for k in range(f):
         Rj, Pj = link_pose(chain, k, q, 0)
-        wj, dwj, Uj, uj = carry_acceleration(
-            chain.sigma[k],
-            chain.antecedent[k],
-            k,
-            coordinate(v, 0, chain.joint[k]),
-            coordinate(rest, 0, chain.joint[k]),
-            Rj,
-            Pj,
-            w,
-            dw,
-            U,
-            u,
-        )
+        wj, dwj, Uj, uj = carry_acceleration(chain, k, v, rest, 0, Rj, Pj, w, dw, U, u)
         F, N = link_wrench(pi, k, wj, dwj, Uj, uj)
         put_matrix(R, k + 1, Rj)
         put_vector(P, k + 1, Pj)

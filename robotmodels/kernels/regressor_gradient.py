@@ -119,19 +119,7 @@ def regressor_gradients(
     for i in range(q.shape[0]):
         for k in range(f):
             R, P = link_pose(chain, k, q, i)
-            carry_acceleration(
-                chain.sigma[k],
-                chain.antecedent[k],
-                k,
-                coordinate(v, i, chain.joint[k]),
-                coordinate(a, i, chain.joint[k]),
-                R,
-                P,
-                w,
-                dw,
-                U,
-                u,
-            )
+            carry_acceleration(chain, k, v, a, i, R, P, w, dw, U, u)
             put_matrix(Rs, k, R)
             put_vector(Ps, k, P)
             unit_motions(down, turn, k, chain, R, P)

@@ -176,19 +176,7 @@ def torque_regressors(
             if not needed[k]:
                 continue
             Rj, Pj = link_pose(chain, k, q, i)
-            wj, dwj, Uj, uj = carry_acceleration(
-                chain.sigma[k],
-                chain.antecedent[k],
-                k,
-                coordinate(v, i, chain.joint[k]),
-                coordinate(a, i, chain.joint[k]),
-                Rj,
-                Pj,
-                w,
-                dw,
-                U,
-                u,
-            )
+            wj, dwj, Uj, uj = carry_acceleration(chain, k, v, a, i, Rj, Pj, w, dw, U, u)
             Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
             bits = wanted[k]
             if bits == 0:
@@ -232,19 +220,7 @@ def power_regressors(
             t = transpose_times(Rj, add(vector(speed, b), cross(vector(w, b), Pj)))
             if chain.sigma[k] == 1:
                 t = (t[0], t[1], t[2] + coordinate(v, i, chain.joint[k]))
-            wj, dwj, Uj, uj = carry_acceleration(
-                chain.sigma[k],
-                chain.antecedent[k],
-                k,
-                coordinate(v, i, chain.joint[k]),
-                coordinate(a, i, chain.joint[k]),
-                Rj,
-                Pj,
-                w,
-                dw,
-                U,
-                u,
-            )
+            wj, dwj, Uj, uj = carry_acceleration(chain, k, v, a, i, Rj, Pj, w, dw, U, u)
             put_vector(speed, k + 1, t)
             put_columns(out, i, 0, place, k, wrench_columns(t, wj, wj, dwj, Uj, uj))
 

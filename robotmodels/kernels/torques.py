@@ -18,7 +18,6 @@ from ._motion import (
     carry_acceleration,
     carry_pose,
     carry_velocity,
-    coordinate,
     link_pose,
     link_wrench,
 )
@@ -66,19 +65,7 @@ def joint_torques(
     for i in range(q.shape[0]):
         for k in range(f):
             Rj, Pj = link_pose(chain, k, q, i)
-            wj, dwj, Uj, uj = carry_acceleration(
-                chain.sigma[k],
-                chain.antecedent[k],
-                k,
-                coordinate(v, i, chain.joint[k]),
-                coordinate(a, i, chain.joint[k]),
-                Rj,
-                Pj,
-                w,
-                dw,
-                U,
-                u,
-            )
+            wj, dwj, Uj, uj = carry_acceleration(chain, k, v, a, i, Rj, Pj, w, dw, U, u)
             F, N = link_wrench(pi, k, wj, dwj, Uj, uj)
             put_matrix(R, k + 1, Rj)
             put_vector(P, k + 1, Pj)
