@@ -31,7 +31,7 @@ class Postures:
     double: NDArray[np.bool_]
     free: NDArray[np.bool_]
     family: NDArray[np.bool_]
-    moving: NDArray[np.bool_] = field(default=None)  # pyright: ignore[reportArgumentType]
+    moving: NDArray[np.bool_] = field(default=None)  # pyright: ignore[reportAssignmentType]
 
     def __post_init__(self) -> None:
         """No joint is known to move."""
