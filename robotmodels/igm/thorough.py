@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .check import checked
 from .loop import JointChain
 from .motion import jacobians, lever
-from .solver import Found, Tolerances, nothing_found
+from .solver import Found, Tolerances
 
 ASIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 """How far poses nearby are away, beside the length of the arm, and in radians."""
@@ -71,16 +72,13 @@ def _home(
     U: Array,
     tolerances: Tolerances,
 ) -> Found:
-    """Candidates brought home."""
-    from ._thorough import home_postures
-
+    """Candidates refined."""
     q = np.concatenate([part[0] for part in parts], axis=1)
     there = np.concatenate([part[1] for part in parts], axis=1)
-    found = nothing_found(len(U), min(MOST, q.shape[1]), chain.k)
-    accepted = np.array([MET, min(tolerances)])
-    home_postures(
-        np.ascontiguousarray(U), np.ascontiguousarray(chain.sigma), chain.D,
-        np.where(there[..., None], q, 0.0), there, accepted, found.q, found.valid, found.residual,
+    found = checked(
+        chain, U, np.where(there[..., None], q, 0.0), there, tolerances,
+        double=np.zeros(there.shape, np.bool_), most=min(MOST, q.shape[1]), rough=np.inf,
+        singular=True,
     )  # fmt: skip
     return found.pack(found.valid)
 
