@@ -50,8 +50,7 @@ def compiled(*signature: Any, inlined: bool = False, cached: bool = True) -> Any
     """Decorator: compile a kernel for its declared signature at the first call.
 
     Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
-    puts its code into its callers. ``cached=False`` is for those that take functions: kernels that
-    call them are kept whole.
+    puts its code into its callers, ``cached=False`` is for functions that take functions.
     """
 
     def decorate(function: Any) -> Any:
