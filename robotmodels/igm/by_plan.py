@@ -135,13 +135,14 @@ def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
 def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chain, plan = solver.chain, solver.plan
     assert plan.program is not None
+    numbers = plan.program.numbers
     slack = max(OVERSHOOT, tolerances.position / lever(chain), tolerances.orientation)
     limits = np.array([slack, ZERO, SMALL, max(ROUGH, *tolerances)])
 
     def candidates(
         poses: Array, wanted: Array
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        q, _, marks = run(plan, plan.program.numbers, poses, wanted, limits)
+        q, _, marks = run(plan, numbers, poses, wanted, limits)
         there = np.arange(q.shape[1]) < marks[:, :1]
         return q, there, free_joints(plan, marks[:, 2 : 2 + q.shape[1]], there)
 

@@ -50,4 +50,4 @@ def _(solver: ManyStarts, U: Array, references: Array, tolerances: Tolerances) -
                 most=MOST, rough=np.inf, singular=True,
             )
         )  # fmt: skip
-    return assembled(len(U), chain.k, (([n], part) for n, part in enumerate(parts)))
+    return assembled(len(U), chain.k, ((np.array([n]), part) for n, part in enumerate(parts)))

@@ -151,8 +151,9 @@ def _classified(
     from .kernels.singular import classify
 
     sigma, D, _, goals, q = _in_units(chain, U, found)
-    double, member = np.zeros((2, *found.valid.shape), np.bool_)
-    moving = np.zeros(found.valid.shape, np.int64)
+    shape = found.valid.shape
+    double, member = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+    moving = np.zeros(shape, np.int64)
     classify(
         goals, sigma, D, q, found.valid, found.family & found.valid, bits_of(found.free), double,
         member, moving,
@@ -309,7 +310,11 @@ class SelfMotions:
         if not moves.any():
             return
         joint = int(np.argmax(moves))
-        self.add_nearest(item, [end for piece in pieces for end in self.cuts(*piece, joint)], moves)
+        self.add_nearest(
+            item,
+            [end for part in pieces for end in self.cuts(part[0], part[1], part[2], joint)],
+            moves,
+        )
         # the same joints may make a curve that no motion joins with this one: a four-bar linkage
         # may be assembled in two ways
         rng, held = np.random.default_rng(0), item.held | 1 << joint

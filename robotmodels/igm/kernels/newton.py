@@ -168,11 +168,10 @@ def refined_postures(
 ) -> int:
     """Candidates ``(N, C, k)`` to distinct postures ``q (N, S, k)``, packed.
 
-    ``held (N, C)``: bits of joints that keep their value. ``source``: the candidate of a posture.
-    ``singular`` 1: postures are equal too where those between them meet the pose, and if any meets
-    it to rounding, those that only meet the tolerance are dropped. Returns how many postures found
-    no row because S was too small.
+    Bits of ``held (N, C)`` are joints that keep their value. Returns how many found no row.
     """
+    # singular 1: postures are equal too where those between them meet the pose; where one meets it
+    # to rounding, those that only meet the tolerance are dropped. source: the candidate's number
     k, S = sigma.size, q.shape[1]
     x, weights, lost = np.empty(k), np.empty(2), 0
     P, axes, e = np.empty((3, 4)), np.empty((k, 6)), np.empty(6)
