@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from math import atan2, sqrt, tan
 
-from ...kernels._compile import (
+from ..kernels._compile import (
     Floats,
     Ints,
     compiled,
 )
-from ...kernels._motion import link_transform
-from ...kernels._vectors import (
+from ..kernels._motion import link_transform
+from ..kernels._vectors import (
     Matrix,
     Vector,
     add,

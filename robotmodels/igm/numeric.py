@@ -1,30 +1,28 @@
-"""The numeric inverse geometric model: any robot, any mask, one posture a pose."""
+"""The numeric inverse geometric model: any robot, any mask, one configuration a pose."""
 
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
-from math import inf
 from operator import index
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ... import se3
-from ..._arrays import Array, as_vector, batch_rows, read_only
-from ...errors import InvalidValueError
-from ...geometry import REVOLUTE
-from ...model import RobotModel
-from ..asked import above_zero, mask_of
-from ..solutions import IGMSolutions
+from .. import se3
+from .._arrays import as_vector, batch_rows
+from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+from .asked import above_zero, mask_of
+from .loop import joint_chain
+from .pose_search import SearchSpace, SearchTask, pose_search, search_space
+from .solutions import IGMSolutions
+from .solver import Tolerances
 
 METHOD = "numeric (Levenberg-Marquardt)"
-"""What `igm_numeric` calls itself in its results."""
-
+"""Name of the method in results."""
 _SEED = 20
-# the first few starts also tell how many components of the task the arm can govern
-_FEWEST_STARTS = 8
 
 
 def igm_numeric(
@@ -130,139 +128,76 @@ def igm_numeric(
     asked = mask_of(mask)
     if mask_axes not in ("world", "tool"):
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
-    tolerance = np.array(
-        [
-            above_zero(position_tolerance, "position_tolerance"),
-            above_zero(orientation_tolerance, "orientation_tolerance"),
-        ]
+    tolerances = Tolerances(
+        above_zero(position_tolerance, "position_tolerance"),
+        above_zero(orientation_tolerance, "orientation_tolerance"),
     )
     restarts = _whole(restarts, "restarts", 0)
     iterations = _whole(iterations, "iterations", 1)
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
-    if restarts == 0 and q0 is None:  # nowhere to start from
+    if restarts == 0 and q0 is None:
         raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
-    search = _search(model, bool(limits), restarts, rng)
-    first = search.middle if q0 is None else as_vector(q0, model.n, "q0")
+    space = _search_space(model, bool(limits), restarts, rng)
+    columns, n = space.chain.columns, model.n
+    middle = np.zeros(n)
+    if limits:
+        middle[columns] = space.middle
+    first = middle if q0 is None else as_vector(q0, n, "q0")
     flat = T.reshape(*T.shape[:-2], 16)
     batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
-    if limits:
-        first = np.clip(first, model.lower, model.upper)
-    N, n = first.shape
-    closest, q, error, residual = (np.empty((N, n)), np.empty((N, n)), np.empty((N, 6)),
-                                   np.empty(N))  # fmt: skip
-    valid, inside = np.empty((2, N), dtype=np.bool_)
-    family = np.empty((N, n), dtype=np.bool_)
-    status = np.empty(N, dtype=np.int8)
-    from ._solve import solve_poses
-
-    solve_poses(
-        targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
-        model.chain, *search.tool, model.lower, model.upper, int(limits),
-        asked.astype(np.int64), int(mask_axes == "tool"), search.length, search.reach, tolerance,
-        restarts, iterations, closest, q, error, residual, valid, inside, family, status,
-    )  # fmt: skip
-    rows = (*batch, 1)
+    closest = np.clip(first, model.lower, model.upper) if limits else np.array(first)
+    U = se3.inverse(model.base) @ targets.reshape(-1, 4, 4)
+    task = SearchTask(asked, mask_axes == "tool", tolerances, restarts, iterations)
+    found = pose_search(space, task, U, closest[:, columns], q0 is not None)
+    closest[:, columns] = found.q
+    family = np.zeros(closest.shape, np.bool_)
+    family[:, columns] = found.family
+    inside = np.all((closest >= model.lower) & (closest <= model.upper), axis=1)
+    rows, valid = (*batch, 1), found.valid
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     return IGMSolutions(
-        q=q.reshape(*rows, n),
+        q=np.where(valid[:, None], closest, np.nan).reshape(*rows, n),
         valid=valid.reshape(rows),
-        residual=residual.reshape(rows),
-        within_limits=inside.reshape(rows),
+        residual=found.residual.reshape(rows),
+        within_limits=(inside & valid).reshape(rows),
         code=np.where(valid, 0, -1).reshape(rows),
         labels=("",),
-        status=status.reshape(batch),
-        double=np.zeros(rows, dtype=np.bool_),
-        free_joints=np.zeros((*rows, n), dtype=np.bool_),
+        status=found.status.reshape(batch),
+        double=np.zeros(rows, np.bool_),
+        free_joints=np.zeros((*rows, n), np.bool_),
         family_joints=family.reshape(*rows, n),
         method=METHOD,
-        periodic=search.revolute & (not limits),
+        periodic=revolute & (not limits),
         mask=asked,
-        error=error.reshape(*rows, 6),
+        error=found.error.reshape(*rows, 6),
         closest=closest.reshape(*batch, n),
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Search:
-    """What every call with a model and its limits needs: starts, their poses, lengths."""
-
-    tool: tuple[NDArray[np.int64], Array, Array]
-    """Path, rotation and position of the tool as kernels take them."""
-    revolute: NDArray[np.bool_]
-    length: float
-    """Of the path's constant links, metres."""
-    reach: float
-    """What the tool's distance from its path's first frame never exceeds, metres."""
-    middle: Array
-    """Where joints without effect stay, and mid-range."""
-    starts: Array
-    poses: Array
-
-
 # by identity: a model's hash reads all of its numbers
-_SEARCHES: dict[tuple[int, bool, int], tuple[weakref.ref[RobotModel], _Search]] = {}
+_SPACES: dict[tuple[int, bool, int], tuple[weakref.ref[RobotModel], SearchSpace]] = {}
 
 
-def _search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Search:
-    """What `_new_search` builds, kept with the model when the starts are the fixed ones."""
-    if rng is not None:
-        return _new_search(model, limits, restarts, rng)
+def _search_space(model: RobotModel, limits: bool, restarts: int, rng: Any) -> SearchSpace:
+    """Starts of a model; those of the fixed seed are kept with it."""
     key = (id(model), limits, restarts)
-    entry = _SEARCHES.get(key)
-    if entry is None or entry[0]() is not model:
-        search = _new_search(model, limits, restarts, _SEED)
-        entry = (weakref.ref(model, lambda _: _SEARCHES.pop(key, None)), search)
-        _SEARCHES[key] = entry
-    return entry[1]
-
-
-def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Search:
-    """Draw the starts and multiply out what they and the lengths need."""
-    if not isinstance(rng, np.random.Generator):
-        rng = np.random.default_rng(_whole(rng, "rng", 0))
-    table, chain, n = model.table, model.chain, model.n
-    path, E = read_only(table.path(model.tip), np.int64), model.tool
-    tool = path, read_only(E[:3, :3]), read_only(E[:3, 3])
-    revolute = read_only(table.sigma[table.joint_rows] == REVOLUTE, np.bool_)
-    joints = chain.joint[path - 1]
-    on_path = np.zeros(n, dtype=np.bool_)
-    on_path[joints[joints >= 0]] = True
-    links = np.linalg.norm(chain.position[path[1:] - 1], axis=-1).sum()
-    length = float(links + np.linalg.norm(tool[2])) or 1.0
-    strokes = np.maximum(np.abs(model.lower), np.abs(model.upper)) if limits else np.full(n, inf)
-    reach = (length + strokes[on_path & ~revolute].sum()) * (1.0 + 1e-12)
-    low, high = _ranges(model, revolute, limits, length)
-    starts = low + rng.random((max(restarts, _FEWEST_STARTS), n)) * (high - low)
-    poses = np.empty((len(starts), 4, 4))
-    from ...kernels.poses import tip_poses
-
-    tip_poses(starts, chain, *tool, poses)
-    still = np.zeros(n)
-    if limits:
-        still = np.where(on_path, 0.5 * (low + high), np.clip(still, model.lower, model.upper))
-    return _Search(
-        tool, revolute, length, float(reach), read_only(still), read_only(starts), read_only(poses)
-    )
-
-
-def _ranges(
-    model: RobotModel, revolute: NDArray[np.bool_], limits: bool, length: float
-) -> tuple[Array, Array]:
-    """Where spread starts lie: the limits, or a whole turn, or the length of the arm."""
-    span = np.where(revolute, 2.0 * np.pi, 2.0 * length)
-    lower, upper = model.lower, model.upper
-    if not limits:
-        lower = np.where(revolute, -inf, lower)
-        upper = np.where(revolute, inf, upper)
-    low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - span, -span / 2))
-    high = np.where(np.isfinite(upper), upper, low + span)
-    # more than a turn says nothing new; the one around mid-range is taken
-    wide = revolute & (high - low > span)
-    middle = 0.5 * (low + high)
-    return np.where(wide, middle - span / 2, low), np.where(wide, middle + span / 2, high)
+    entry = _SPACES.get(key)
+    if rng is None and entry is not None and entry[0]() is model:
+        return entry[1]
+    seed = _SEED if rng is None else rng
+    if not isinstance(seed, np.random.Generator):
+        seed = np.random.default_rng(_whole(seed, "rng", 0))
+    chain = joint_chain(model)
+    lower, upper = model.lower[chain.columns], model.upper[chain.columns]
+    space = search_space(chain, lower, upper, limits, restarts, seed)
+    if rng is None:
+        _SPACES[key] = weakref.ref(model, lambda _: _SPACES.pop(key, None)), space
+    return space
 
 
 def _whole(value: Any, name: str, least: int) -> int:
+    """A whole number, or an error that names the argument."""
     try:
         number = index(value)
     except TypeError:
