@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, MATRIX, OUT1, STACK, VECTOR, Floats, Ints, compiled
 from ._check import EXACT, MERGE, missing, refined, wrapped
-from ._concurrent import advance
-from ._equations import DOUBLE, NONE, TWO, type_2
-from ._wrist import wrist_postures
+from .kernels.equations import DOUBLE, NONE, TWO, type_2
+from .kernels.pieper import advance, wrist_postures
 
 ROUGH = 1e-2  # candidates that miss by more are none [m, rad]
 ALONG = 1e-6  # sine between the line and base z below which base x takes its place

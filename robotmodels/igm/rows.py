@@ -27,7 +27,7 @@ from .self_motion import Settled
 from .singular import complete
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
-from .why import search
+from .unreachable import diagnose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     columns = arm.columns[~np.isin(arm.columns, locked)]
     found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(call, found, references, columns)
-    reasons = search(
+    reasons = diagnose(
         model, task, call.solver is None, poses, references, call.limits, call.tolerances,
         rows.status,
     )  # fmt: skip

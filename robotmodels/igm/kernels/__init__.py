@@ -1,1 +1,1 @@
-"""Compiled functions of the inverse models."""
+"""Compiled loops of the inverse models."""
