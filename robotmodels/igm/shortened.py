@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from .._arrays import Array
+from .._arrays import Array, read_only
 from .loop import JointChain
 
 
+@lru_cache(maxsize=256)
 def shortened(chain: JointChain) -> tuple[Array, float]:
     """Constants with each frame slid along its axis towards its neighbours, in units of the arm.
 
@@ -30,4 +33,4 @@ def shortened(chain: JointChain) -> tuple[Array, float]:
     if unit < 1e-9:
         unit = 1.0
     D[:, :3, 3] /= unit
-    return D, unit
+    return read_only(D), unit
