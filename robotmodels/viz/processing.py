@@ -1,4 +1,4 @@
-"""Spectra of a log before and after its processing, and the criteria of its choice."""
+"""Figure of the processing of a log: spectra, cutoffs, and the criteria of their choice."""
 
 from __future__ import annotations
 
@@ -21,30 +21,25 @@ from ..identification.result import IdentificationResult
 from ..identification.signals import Processing, decimation_window, zero_phase
 from ..logs import Log
 from ..model import RobotModel
-from .figures import LIMIT_DASHES, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
-from .palette import ALERT, BAND, INK
-from .plot_decades import plain_decades
-from .plot_units import joint_names, joint_units
+from . import style
+from .over_time import joint_names, joint_units
+from .style import ALERT, BAND, DASHED, INK, PAGE, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BEFORE, _AFTER, _CURVE = line_style(1).color, line_style(0).color, line_style(4).color
 _POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
-_LONGEST = 1 << 18
-"""Largest number of samples for spectra."""
-_SEGMENTS = 2
-_KAISER = 18.0
-"""Window of the spectra; its leakage is below the noise, six decades below the motion."""
+_LONGEST = 1 << 18  # samples for spectra
+_KAISER = 18.0  # window of the spectra: its leakage is six decades below the motion
 _BINS = 240
 _CUTOFFS, _WIDTH, _HIGHEST = 16, 10.0, 0.4
-"""Cutoffs at which the effect of the noise is predicted; highest of them, in cutoffs of the
+"""Cutoffs at which the effect of the noise is predicted; the highest of them, in cutoffs of the
 equations and in sampling rates."""
-_LEAST_BIAS = 1e-6
-"""Least drawn bias, in standard errors."""
+_LEAST_BIAS = 1e-6  # standard errors
 
 
+@style.plot
 def plot_processing(
     log: Log | IdentificationResult,
     processing: Processing | None = None,
@@ -74,8 +69,7 @@ def plot_processing(
         A row for each joint: densities of position and torque, with the frequency of the motion,
         the cutoff of the positions (of their filter), the cutoff of regressor and torques (of the
         decimation) and the noise of the positions. The grey part above the cutoff is removed; the
-        title gives its root mean square, for torques also relative. Densities are averaged over
-        bins of equal width on the logarithmic axis.
+        title gives its root mean square, for torques also relative.
 
         For a result, a last row shows the criteria: the largest bias of a parameter that noise of
         the positions is predicted to cause, in standard errors of the parameter, against the lower
@@ -104,68 +98,55 @@ def plot_processing(
     >>> [axes.get_xlabel() for axes in plot_processing(log, choose_processing(log)).axes]
     ['frequency (Hz)', 'frequency (Hz)']
     """
-    log, processing, model, system = _given(log, processing, model)
+    log, chosen, model, system = _given(log, processing, model)
     part = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
     rows = slice(part.start, min(part.stop, part.start + _LONGEST))
-    if rows.stop - rows.start < 16:
+    N = rows.stop - rows.start
+    if N < 16:
         raise InvalidValueError(
-            f"log: its longest recording has {rows.stop - rows.start} samples; expected at least "
-            "16 for a spectrum."
+            f"log: its longest recording has {N} samples; expected at least 16 for a spectrum."
         )
     q, tau = np.array(log.q[rows]), np.array(log.tau[rows])
-    kept_q = (
-        q
-        if processing.cutoff is None
-        else zero_phase(q, processing.cutoff, log.dt, processing.order)
-    )
-    kept_tau = _thinned(tau, processing.decimation)
-    inner = _inner(len(q), processing)
+    filtered = q if chosen.cutoff is None else zero_phase(q, chosen.cutoff, log.dt, chosen.order)
     names = joint_names(None, log.n, model)
     units = [unit.value for unit in joint_units(None, log.n, model)]
     efforts = [{"rad": "N m", "m": "N"}.get(unit, "N m or N") for unit in units]
-    rows_of = log.n + (system is not None)
-    figure = new_figure(PAGE, 1.2 + 1.15 * rows_of, size)
-    grid = panels(figure, rows_of, 2, sharex=True)
-    sides: tuple[tuple[Array, Array, float | None, list[str]], ...] = (
-        (q, kept_q, processing.cutoff, units),
-        (tau, kept_tau, processing.torque_cutoff, efforts),
-    )
-    nyquist = 0.5 / log.dt
-    for column, (whole, kept, cutoff, of) in enumerate(sides):
+    inner = slice(min(chosen.edges, N // 4), N - min(chosen.edges, N // 4))  # without transients
+    count = log.n + (system is not None)
+    figure, grid = style.panels(PAGE, 1.2 + 1.15 * count, size, count, 2, sharex=True)
+    for column, what, whole, kept, cutoff, of in (
+        (grid[:, 0], "position", q, filtered, chosen.cutoff, units),
+        (grid[:, 1], "torque", tau, _decimated(tau, chosen.decimation), chosen.torque_cutoff,
+         efforts),
+    ):  # fmt: skip
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)
         cut, rms = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (whole - kept, whole))
         for j, name in enumerate(names):
-            axes = grid[j, column]
-            axes.loglog(f, before[:, j], color=_BEFORE, linewidth=0.9, label="as recorded")
-            axes.loglog(
-                f, after[:, j], color=_AFTER, linewidth=1.2, linestyle=(0, (5.0, 1.0)), label="kept"
-            )
+            axes = column[j]
+            axes.loglog(f, before[:, j], color=PALETTE[1], linewidth=0.9, label="as recorded")
+            dashes = (0, (5.0, 1.0))
+            axes.loglog(f, after[:, j], color=PALETTE[0], linestyle=dashes, label="kept")
             if cutoff is not None:
-                axes.axvspan(cutoff, nyquist, color=BAND, linewidth=0.0, zorder=0.4)
-            _frequencies(axes, processing)
-            if column == 0:
-                floor = _floor(f, before[:, j], nyquist)
-                if floor > 0.0:
-                    axes.axhline(floor, color=ALERT, linewidth=0.9, linestyle=(0, (1.3, 1.1)),
-                                 label="noise of the positions")  # fmt: skip
-            _limit(axes, before[:, j], after[:, j])
-            what = ("position", "torque")[column]
-            share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if column and rms[j] > 0.0 else ""
-            _over(axes, f"{name}, {what}: {cut[j]:.2g} {of[j]} rms{share} cut")
+                axes.axvspan(cutoff, 0.5 / log.dt, color=BAND, linewidth=0.0, zorder=0.4)
+            _draw_frequencies(axes, chosen)
+            high = (f > 0.25 / log.dt) & (f < 0.45 / log.dt)  # frequencies without motion
+            noise = float(np.median(before[high, j])) if high.any() else 0.0
+            if what == "position" and noise > 0.0:
+                axes.axhline(noise, color=ALERT, linewidth=0.9, linestyle=(0, (1.3, 1.1)),
+                             label="noise of the positions")  # fmt: skip
+            axes.set_ylim(*_range(before[:, j], after[:, j]))
+            relative = what == "torque" and rms[j] > 0.0
+            share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if relative else ""
+            axes.set_title(f"{name}, {what}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
             axes.set_ylabel(f"({of[j]}/√Hz)" if " or " not in of[j] else "density (1/√Hz)")
-        grid[-1, column].set_xlabel("frequency (Hz)")
+        column[-1].set_xlabel("frequency (Hz)")
     if system is not None:
-        _reasons(grid[-1], system)
+        _draw_criteria(grid[-1], system)
     for axes in grid.flat:
-        plain_decades(axes.yaxis, 4)
-        plain_decades(axes.xaxis, 6)
-    handles: dict[str, Any] = {}
-    for axes in (*grid[0], grid[-1, 0]):
-        for line in axes.get_lines():
-            handles.setdefault(str(line.get_label()), line)
-    legend_above(figure, list(handles.values()), title)
-    return figure
+        style.plain_logarithmic(axes.yaxis, 4)
+        style.plain_logarithmic(axes.xaxis)
+    return style.finished(figure, title)
 
 
 def _given(
@@ -182,75 +163,66 @@ def _given(
         raise InvalidValueError(
             f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
         )
-    if not isinstance(processing, Processing):
-        raise InvalidValueError(
-            "processing: expected a Processing of choose_processing, got "
-            f"{type(processing).__name__}."
-        )
-    if len(processing.dead_band) != log.n:
+    chosen = style.as_instance(processing, Processing, "processing", "choose_processing")
+    if len(chosen.dead_band) != log.n:
         raise ShapeError(
-            f"processing: expected one of {log.n} joints, got {len(processing.dead_band)}."
+            f"processing: expected one of {log.n} joints, got {len(chosen.dead_band)}."
         )
-    return log, processing, model, None
+    return log, chosen, model, None
 
 
-def _frequencies(axes: Axes, processing: Processing) -> None:
+def _draw_frequencies(axes: Axes, processing: Processing) -> None:
     """Lines at the frequency of the motion and at both cutoffs."""
     for frequency, dashes, label in (
-        (processing.motion, LIMIT_DASHES, "motion: 99.9 % of the velocity's power"),
+        (processing.motion, DASHED["linestyle"], "motion: 99.9 % of the velocity's power"),
         (processing.cutoff, _POSITIONS, "cutoff of the positions"),
         (processing.torque_cutoff, _TORQUES, "cutoff of regressor and torques"),
     ):
         if frequency is not None:
-            axes.axvline(frequency, color=INK, linewidth=1.1, linestyle=dashes, label=label)
+            axes.axvline(frequency, color=INK, linewidth=1.1, linestyle=dashes, label=label)  # type: ignore[arg-type]
 
 
-def _over(axes: Axes, text: str) -> None:
-    axes.set_title(text, loc="left", size=SMALL_SIZE, color=INK, pad=2.0)
-
-
-def _reasons(row: Any, system: Equations) -> None:
+def _draw_criteria(row: Any, system: Equations) -> None:
     """Bias by noise and equations for each parameter against cutoffs, with their bounds."""
     base, log, processing = system.base, system.log, system.processing
     top = _HIGHEST / log.dt
-    thinned = processing.torque_cutoff or top
-    lower = min(processing.cutoff or top, thinned)
-    lowest, highest = min(processing.motion, lower), max(min(_WIDTH * lower, top), thinned)
-    f = np.union1d(np.geomspace(lowest, highest, _CUTOFFS), (lower, thinned))
+    torque = processing.torque_cutoff or top
+    lower = min(processing.cutoff or top, torque)
+    lowest, highest = min(processing.motion, lower), max(min(_WIDTH * lower, top), torque)
+    f = np.union1d(np.geomspace(lowest, highest, _CUTOFFS), (lower, torque))
     bias = predicted_bias(base, log, lowest, highest)
     ratios = [bias(x) for x in f]
     biases = np.array([ratio.max(initial=0.0) for ratio in ratios])
     chosen = ratios[int(np.searchsorted(f, lower))]
     worst = int(np.argmax(chosen))
-    counts = [
-        equations_per_parameter(base, log, system.groups, decimation_for(x, log.dt)) for x in f
-    ]
-    count = equations_per_parameter(base, log, system.groups, processing.decimation)
-    drawn = (
-        # without noise there is no bias, and logarithmic axes have no place for it
-        (np.where(biases > 0.0, biases, np.nan), lower, max(chosen[worst], _LEAST_BIAS), MOST_BIAS),
-        (np.array(counts), thinned, count, LEAST_EQUATIONS),
-    )
+
+    def equations(decimation: int) -> float:
+        return equations_per_parameter(base, log, system.groups, decimation)
+
+    counts = np.array([equations(decimation_for(x, log.dt)) for x in f])
+    count = equations(processing.decimation)
     bounds = f"bounds: {MOST_BIAS:g} standard errors, {LEAST_EQUATIONS} equations"
-    for axes, (curve, cutoff, value, bound) in zip(row, drawn, strict=True):
-        axes.loglog(f, curve, color=_CURVE, linewidth=1.2, label="at other cutoffs")
+    for axes, curve, cutoff, value, bound in (
+        # without noise there is no bias, and logarithmic axes have no place for it
+        (row[0], np.where(biases > 0.0, biases, np.nan), lower, max(chosen[worst], _LEAST_BIAS),
+         MOST_BIAS),
+        (row[1], counts, torque, count, LEAST_EQUATIONS),
+    ):  # fmt: skip
+        axes.loglog(f, curve, color=PALETTE[4], label="at other cutoffs")
         axes.axhline(bound, color=ALERT, linewidth=0.9, linestyle=_BOUNDS, label=bounds)
-        axes.plot(
-            cutoff, value, "o", color=INK, markersize=4.0, clip_on=False, zorder=3.0, label="choice"
-        )
-        _frequencies(axes, processing)
+        axes.plot(cutoff, value, "o", color=INK, markersize=4.0, clip_on=False, label="choice")
+        _draw_frequencies(axes, processing)
         low, high = axes.get_ylim()
         axes.set_ylim(max(min(low, bound / 3.0), _LEAST_BIAS), max(high, 3.0 * bound))
-    row[0].set_xlabel("lower of both cutoffs (Hz)")
-    row[1].set_xlabel("cutoff of regressor and torques (Hz)")
-    row[0].set_ylabel("bias /\nstandard error")
-    row[1].set_ylabel("equations /\nparameter")
-    _over(row[0], f"bias by noise: {chosen[worst]:.2g} standard errors ({base.names[worst]})")
-    _over(row[1], f"about {count:.3g} equations for each parameter")
+    worst_text = f"{chosen[worst]:.2g} standard errors ({base.names[worst]})"
+    row[0].set_title(f"bias by noise: {worst_text}", loc="left")
+    row[0].set(xlabel="lower of both cutoffs (Hz)", ylabel="bias /\nstandard error")
+    row[1].set_title(f"about {count:.3g} equations for each parameter", loc="left")
+    row[1].set(xlabel="cutoff of regressor and torques (Hz)", ylabel="equations /\nparameter")
 
 
-def _thinned(tau: Array, step: int) -> Array:
-    """Signals through the decimation's low-pass, at the rate of the log."""
+def _decimated(tau: Array, step: int) -> Array:
+    """Signals through the low-pass filter of the decimation, at the rate of the log."""
     if step == 1:
         return tau
     from scipy.signal import fftconvolve
@@ -260,42 +232,23 @@ def _thinned(tau: Array, step: int) -> Array:
     return fftconvolve(tau, window[:, None], mode="same") / weights[:, None]
 
 
-def _inner(N: int, processing: Processing) -> slice:
-    """Rows without the filter transients at the ends, where enough remain."""
-    cut = min(processing.edges, N // 4)
-    return slice(cut, N - cut)
-
-
 def _density(x: Array, dt: float) -> tuple[Array, Array]:
     """Frequencies and root of the power spectral density, averaged in bins of equal ratio."""
     from scipy.signal import get_window, welch
 
-    width = max(8, len(x) // _SEGMENTS)
-    window = get_window(("kaiser", _KAISER), width)
+    window = get_window(("kaiser", _KAISER), max(8, len(x) // 2))
     f, P = welch(x, 1.0 / dt, window=window, detrend="linear", axis=0)  # type: ignore[arg-type]
     f, P = f[1:], P[1:]
     edges = np.geomspace(f[0], f[-1] * (1.0 + 1e-9), _BINS + 1)
-    place = np.searchsorted(edges, f, side="right")
-    _, first = np.unique(place, return_index=True)
-    counts = np.diff([*first, len(f)])[:, None]
-    return (
-        np.add.reduceat(f, first) / counts[:, 0],
-        np.sqrt(np.add.reduceat(P, first, axis=0) / counts),
-    )
+    _, first = np.unique(np.searchsorted(edges, f, side="right"), return_index=True)
+    counts = np.diff([*first, len(f)])
+    power = np.add.reduceat(P, first, axis=0) / counts[:, None]
+    return np.add.reduceat(f, first) / counts, np.sqrt(power)
 
 
-def _floor(f: Array, density: Array, nyquist: float) -> float:
-    """Noise density: median over frequencies without motion."""
-    high = (f > 0.5 * nyquist) & (f < 0.9 * nyquist)
-    return float(np.median(density[high])) if high.any() else 0.0
-
-
-def _limit(axes: Any, before: Array, after: Array) -> None:
-    """Lower limit of the axis, above rounding."""
+def _range(before: Array, after: Array) -> tuple[float, float]:
+    """Limits of a logarithmic axis, above rounding."""
     top = float(max(before.max(initial=0.0), after.max(initial=0.0)))
     if top <= 0.0:
-        axes.set_ylim(1e-12, 1.0)
-        return
-    least = before[before > 0.0]
-    low = max(float(least.min(initial=top)) / 3.0, 1e-12 * top)
-    axes.set_ylim(low, 3.0 * top)
+        return 1e-12, 1.0
+    return max(float(before[before > 0.0].min(initial=top)) / 3.0, 1e-12 * top), 3.0 * top
