@@ -41,9 +41,9 @@ COORDINATES = (
 )
 RATES = "tests/test_operational_coordinates.py -k (rates_of_rates or difference_of_coordinates)"
 BOUNDS = (
-    "tests/test_ikm_bounds.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
-    " tests/test_ikm_bounds.py::test_levels_under_bounds[7-sizes0]"
-    " tests/test_ikm_bounds.py::test_a_drift_that_cannot_be_held_is_met_in_part"
+    "tests/test_ikm_levels.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
+    " tests/test_ikm_levels.py::test_levels_under_bounds[7-sizes0]"
+    " tests/test_ikm_levels.py::test_a_drift_that_cannot_be_held_is_met_in_part"
 )
 LEVELS = (
     "tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[6-3]"
@@ -217,20 +217,20 @@ MUTATIONS = [
     Mutation("kernels: singular values", "rotations turn the other way", "def orthogonal_rows(",
         "B[i, c] = cosine * x - sine * y", "B[i, c] = cosine * x + sine * y",
         "tests/test_ikm.py -k decomposition"),
-    Mutation("kernels: singular values", "they are not sorted again at the end",
-        "def orthogonal_rows(", "if descending(lengths, p) >= 0:",
-        "if descending(lengths, p) >= p:", "tests/test_ikm.py -k decomposition"),
+    Mutation("kernels: singular values", "the last of them is not sorted",
+        "def orthogonal_rows(", "sort_rows(B, p, w, lengths)", "sort_rows(B, p - 1, w, lengths)",
+        "tests/test_ikm.py -k decomposition"),
     Mutation("kernels: inverse velocity", "a damped direction forgets its square",
-        "def inverse_factors(", "sigma[i] / (sigma[i] * sigma[i] + square)",
-        "sigma[i] / (sigma[i] + square)", "tests/test_ikm.py -k every_method"),
+        "def inverse_factors(", "bottom = sigma[i] * sigma[i] + square",
+        "bottom = sigma[i] + square", "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "filtered directions: 3 - 2 x becomes 3 + 2 x",
         "def inverse_factors(", "ratio * (3.0 - 2.0 * ratio)", "ratio * (3.0 + 2.0 * ratio)",
         "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "what a secondary motion does to the task is added",
-        "def solve_row(", "z[j] -= total * work[i, first + j]",
-        "z[j] += total * work[i, first + j]", "tests/test_ikm.py -k never_disturbs"),
+        "def inverse_velocities(", "z[j] -= along * work[r, j]",
+        "z[j] += along * work[r, j]", "tests/test_ikm.py -k never_disturbs"),
     Mutation("kernels: inverse velocity", "weights of joints are applied once",
-        "def inverse_velocities(", "out[i, j] = column_scale[j] * y[j]", "out[i, j] = y[j]",
+        "def inverse_velocities(", "out[i, j] = scales[M + j] * y[j]", "out[i, j] = y[j]",
         "tests/test_ikm.py -k weights_make"),
     Mutation("kinematics: statics", "a moment is carried with the lever reversed",
         "def transported_wrench(", "np.cross(P, force)", "np.cross(force, P)",
@@ -252,8 +252,8 @@ MUTATIONS = [
         "def level_velocities(\n    J: Floats", "rest[a] -= A[a, j] * x[j]",
         "rest[a] += A[a, j] * x[j]", LEVELS),
     Mutation("kernels: levels",
-        "left and right singular vectors exchanged where rows outnumber freedoms",
-        "def decomposed(W: Floats", "V[i, c] = B[i, m + c]", "V[c, i] = B[i, m + c]", LEVELS),
+        "left singular vectors as columns", "def decomposed(W: Floats", "U[i, c] = B[i, f + c]",
+        "U[c, i] = B[i, f + c]", LEVELS),
     Mutation("kernels: levels", "what fits is left in the part to be scaled",
         "# No part of the rate alone fits", "w[j] -= x[j]", "w[j] += x[j]", BOUNDS),
     # --- description -----------------------------------------------------------------------------

@@ -17,15 +17,17 @@ from identities.random_robots import (
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.dexterity import Manipulability, manipulability
-from robotmodels.kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
-from robotmodels.kinematics.ellipsoids import (
+from robotmodels.kinematics import (
+    Ellipsoid,
+    EllipsoidQuantity,
+    Manipulability,
+    ManipulabilityCriterion,
     OtherPart,
     TwistPart,
     force_ellipsoid,
+    manipulability,
     velocity_ellipsoid,
 )
-from robotmodels.kinematics.inverse.criteria.manipulability import ManipulabilityCriterion
 
 H = np.pi / 2
 PARTS = list(TwistPart)

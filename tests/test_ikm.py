@@ -14,22 +14,22 @@ from identities.random_robots import any_models, models, random_state, robot_siz
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.kernels.svd import decompositions
-from robotmodels.kinematics.inverse.bounds import JointBounds
-from robotmodels.kinematics.inverse.criteria.joint_limits import JointLimitCriterion
-from robotmodels.kinematics.inverse.ikm import ikm
-from robotmodels.kinematics.inverse.joint_task import JointTask
-from robotmodels.kinematics.inverse.methods import (
+from robotmodels.kinematics import (
     DampedInverse,
     Damping,
     FilteredInverse,
+    IKMSolution,
+    IKMStatus,
+    JointBounds,
+    JointLimitCriterion,
+    JointTask,
     PseudoInverse,
+    TwistTask,
+    dkm_second_order,
+    ikm,
+    ikm_second_order,
 )
-from robotmodels.kinematics.inverse.second_order import ikm_second_order
-from robotmodels.kinematics.inverse.solution import IKMSolution
-from robotmodels.kinematics.inverse.status import IKMStatus
-from robotmodels.kinematics.inverse.twist_task import TwistTask
 from robotmodels.kinematics.lengths import characteristic_length
-from robotmodels.kinematics.velocities import dkm_second_order
 
 REFERENCES = ("world_aligned", "local", "world")
 POSITION = [1, 1, 1, 0, 0, 0]

@@ -7,17 +7,15 @@ from identities.random_robots import models, random_state, seeds
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.kinematics.inverse.bounds import JointBounds
-from robotmodels.kinematics.inverse.criteria import (
+from robotmodels.kinematics import (
     Criterion,
+    JointBounds,
     JointLimitCriterion,
     ManipulabilityCriterion,
     NearLimitCriterion,
     ObstacleCriterion,
     PostureCriterion,
 )
-from robotmodels.kinematics.inverse.levels import level_velocities
-from robotmodels.kinematics.inverse.twist_task import TwistTask
 from robotmodels.obstacles import Box, Plane, Sphere
 
 
@@ -86,14 +84,15 @@ def test_following_a_criterion_improves_it(model, seed):
     """In the null space of a task, too: the value moves the right way, the task not at all."""
     rng = np.random.default_rng(seed)
     q, _, _ = random_state(model, rng, 1)
-    task = TwistTask(np.zeros(6), frame=int(rng.integers(1, model.f + 1)), mask=[1, 0, 0, 0, 0, 0])
+    frame = int(rng.integers(1, model.f + 1))
     for criterion, sign in smooth_criteria(model, rng):
         g = criterion.gradient(model, q)
-        level = task.level(model, q)
-        v = level_velocities([level], g).v
-        np.testing.assert_allclose(
-            np.einsum("kij,kj->ki", level.J, v), 0.0, atol=1e-12 * (1 + np.abs(g).max())
-        )
+        v = rm.ikm(
+            model, q, np.zeros(6), frame, mask=[1, 0, 0, 0, 0, 0], secondary=criterion,
+            method=rm.PseudoInverse(), joint_weights=np.ones(model.n),
+        ).v  # fmt: skip
+        done = rm.dkm(model, q, v, frame)[..., 0]
+        np.testing.assert_allclose(done, 0.0, atol=1e-12 * (1 + np.abs(g).max()))
         # the slope of the value along v is |v|^2 / gain
         slope = (np.sign(sign) * gradient_by_differences(criterion, model, q) * v).sum()
         if isinstance(criterion, ManipulabilityCriterion) and criterion.value(model, q) < 0.02:
@@ -211,10 +210,8 @@ def follow(model, q, way, duration=4.0, count=200, criterion=None, bounds=None):
         R = start[:3, :3] @ now[:3, :3].T
         turn = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
         errors.append(max(np.abs(away).max(), np.abs(turn).max()))
-        task = TwistTask(np.r_[way / duration + 5.0 * away, 5.0 * turn])
-        low, high = (None, None) if bounds is None else bounds.velocity_bounds(model, q)
-        wish = None if criterion is None else criterion.gradient(model, q)
-        q = q + step * level_velocities([task.level(model, q)], wish, low, high).v[0]
+        twist = np.r_[way / duration + 5.0 * away, 5.0 * turn]
+        q = q + step * rm.ikm(model, q, twist, secondary=criterion, limits=bounds).v
         path.append(q)
     return np.array(path), max(errors)
 
@@ -285,10 +282,7 @@ def test_an_arm_returns_to_its_posture_while_the_tool_stays():
     values = criterion.value(model, path)
     assert (np.diff(values) < 1e-12).all()
     # at the end nothing is left of the gradient in the null space
-    still = TwistTask(np.zeros(6)).level(model, path[-1])
-    v = level_velocities([still], criterion.gradient(model, path[-1])).v
-    start = level_velocities([TwistTask(np.zeros(6)).level(model, home)],
-                             criterion.gradient(model, home)).v  # fmt: skip
+    start, v = rm.ikm(model, [home, path[-1]], np.zeros(6), secondary=criterion).v
     assert np.linalg.norm(v) < 0.05 * np.linalg.norm(start)
 
 

@@ -20,23 +20,20 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
-from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
-from robotmodels.kinematics.coordinates.conversion import (
-    operational_coordinates,
-    pose_from_coordinates,
-)
-from robotmodels.kinematics.coordinates.jacobian import (
+from robotmodels.kinematics import (
+    OrientationKind,
+    continuous_coordinates,
     coordinate_jacobian,
     coordinate_jacobian_rate,
-)
-from robotmodels.kinematics.coordinates.kinds import OrientationKind, orientation_kind
-from robotmodels.kinematics.coordinates.rates import (
     coordinate_rates,
     coordinate_rates_rate,
     is_representation_singular,
+    operational_coordinates,
+    pose_from_coordinates,
     twist_from_rates,
 )
-from robotmodels.kinematics.coordinates.sequences import continuous_coordinates
+from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
+from robotmodels.kinematics.coordinates.kinds import orientation_kind
 
 EPS = np.finfo(float).eps
 THERE_AND_BACK = 3 * 2 * np.pi * EPS  # three angles up to pi, each with two roundings

@@ -8,9 +8,9 @@ from identities.random_robots import models, random_model, random_pose, random_s
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics import jacobian_rank, operational_dimension
 from robotmodels.kinematics.lengths import characteristic_length
 from robotmodels.kinematics.singular.bases import sparse_basis
-from robotmodels.kinematics.singular.rank import jacobian_rank, operational_dimension
 from robotmodels.kinematics.singular.task import singular_task, task_derivatives, task_jacobians
 
 # robot: dimension, of position, of orientation, joints, what is never produced in world axes

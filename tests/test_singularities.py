@@ -11,17 +11,18 @@ from scipy.optimize import minimize_scalar
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.singular.boundary import WorkspaceSide
-from robotmodels.kinematics.singular.classification import classify_singularity
-from robotmodels.kinematics.singular.flags import SingularityStatus, singularity_flags
-from robotmodels.kinematics.singular.motion import SelfMotionKind
-from robotmodels.kinematics.singular.nearest import (
+from robotmodels.kinematics import (
     NearestStatus,
     SearchOutcome,
+    SelfMotionKind,
+    SingularityKind,
+    SingularityStatus,
+    WorkspaceSide,
+    classify_singularity,
+    jacobian_rank,
     nearest_singularity,
+    singularity_flags,
 )
-from robotmodels.kinematics.singular.rank import jacobian_rank
-from robotmodels.kinematics.singularity_kind import SingularityKind
 
 PI = np.pi
 SHOULDER, ELBOW, WRIST, OTHER = SingularityKind

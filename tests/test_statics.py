@@ -23,8 +23,13 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
-from robotmodels.kinematics.equilibrium import StaticStatus, StaticWrench, static_wrench
-from robotmodels.kinematics.statics import static_torque, transported_wrench
+from robotmodels.kinematics import (
+    StaticStatus,
+    StaticWrench,
+    static_torque,
+    static_wrench,
+    transported_wrench,
+)
 
 REFERENCES = ("world_aligned", "local", "world")
 H = np.pi / 2
