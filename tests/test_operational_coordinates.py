@@ -32,8 +32,8 @@ from robotmodels.kinematics import (
     pose_from_coordinates,
     twist_from_rates,
 )
-from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
-from robotmodels.kinematics.coordinates.kinds import orientation_kind
+from robotmodels.kinematics.coordinates.orientations import orientation_kind
+from robotmodels.kinematics.coordinates.rates import SINGULAR
 
 EPS = np.finfo(float).eps
 THERE_AND_BACK = 3 * 2 * np.pi * EPS  # three angles up to pi, each with two roundings

@@ -10,7 +10,7 @@ from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.kinematics import jacobian_rank, operational_dimension
 from robotmodels.kinematics.lengths import characteristic_length
-from robotmodels.kinematics.singular.bases import sparse_basis
+from robotmodels.kinematics.singular.rank import sparse_basis
 from robotmodels.kinematics.singular.task import singular_task, task_derivatives, task_jacobians
 
 # robot: dimension, of position, of orientation, joints, what is never produced in world axes
