@@ -48,7 +48,7 @@ BOUNDS = (
 LEVELS = (
     "tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[6-3]"
     " tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[3-7]"
-    " tests/test_ikm_levels.py::test_the_least_motion_that_meets_all_levels"
+    " tests/test_ikm_levels.py::test_each_level_is_met_as_well_as_the_higher_ones_let_it"
 )
 RAMPS = (
     "tests/test_trajectories.py"

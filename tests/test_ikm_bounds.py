@@ -31,14 +31,6 @@ def test_without_a_step_joints_stop_at_the_limit():
     np.testing.assert_allclose(braking.velocity_bounds(model, [0.99, 1.0])[1], [0.2, 0.0])
 
 
-def test_small_steps_are_the_braking_distance():
-    model = rm.load("planar_2r")
-    for step in (1e-3, 1e-5):
-        bounds = JointBounds(lower=-1.0, upper=1.0, acceleration=2.0, step=step)
-        high = bounds.velocity_bounds(model, [0.5, -0.9])[1]
-        np.testing.assert_allclose(high, np.sqrt([2.0, 7.6]), rtol=2 * step)
-
-
 def random_command(rng, low, high):
     """Mostly at a bound, else anything between."""
     kind = rng.random(low.shape)

@@ -83,16 +83,6 @@ def test_one_level_is_the_weighted_pseudo_inverse(rng, m, n):
     assert not found.mixed.any()
 
 
-def test_rows_are_weighted(rng):
-    """Where not all can be met, rows of a larger weight are met better: weighted least squares."""
-    level = a_level(rng, 10, 5, 3)
-    weights = rng.uniform(0.1, 10.0, size=5)
-    found = least([equations(level.J, level.rate, weights=weights)])
-    for J, rate, v in zip(level.J, level.rate, found.v, strict=True):
-        expected = np.linalg.lstsq(J * weights[:, None], rate * weights)[0]
-        np.testing.assert_allclose(v, expected, atol=1e-11)
-
-
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_the_null_space_of_a_damped_level_is_exact(rng, method):
     """The secondary motion does not move the task, though that is damped."""
@@ -192,24 +182,6 @@ def test_algorithmic_singularities_are_damped(rng, gap):
     assert regular.sum() > 30
     good = np.einsum("kij,ki->kj", U[:, :, :2], found.error[1])[regular]
     assert np.abs(good).max() < 1e-11
-
-
-def test_batches_are_rows(rng):
-    levels = [a_level(rng, 12, 3, 7), a_level(rng, 12, 6, 7)]
-    z, high = rng.normal(size=(12, 7)), rng.uniform(0.1, 1.0, size=(12, 7))
-    for bounds in ((None, None), (-high, high)):
-        whole = least(levels, z, *bounds)
-        for i in range(12):
-            one = least(
-                [equations(level.J[i : i + 1], level.rate[i : i + 1]) for level in levels],
-                z[i], *(None if b is None else b[i] for b in bounds),
-            )  # fmt: skip
-            np.testing.assert_array_equal(one.v[0], whole.v[i])
-            np.testing.assert_array_equal(one.scale[0], whole.scale[i])
-            np.testing.assert_array_equal(one.limited[0], whole.limited[i])
-    empty = least([a_level(rng, 0, 3, 7)], lower=[-1.0] * 7, upper=[1.0] * 7)
-    assert empty.v.shape == (0, 7)
-    assert empty.error[0].shape == (0, 3)
 
 
 # --- bounds ------------------------------------------------------------------------------------
@@ -320,30 +292,6 @@ def test_the_least_motion_is_weighted(rng):
         assert s == pytest.approx(largest_scale(J, 0 * rate, rate, lower, upper), rel=0, abs=1e-9)
         np.testing.assert_allclose(J @ v, s * rate, atol=1e-11)
         assert optimality_error(J, v, wish, lower, upper, weights) < 1e-8
-
-
-def test_no_room_is_no_motion(rng):
-    level = equations(rng.normal(size=(5, 3, 7)), rng.normal(size=(5, 3)))
-    found = least([level, level], rng.normal(size=7), np.zeros(7), np.zeros(7))
-    np.testing.assert_array_equal(found.v, np.zeros((5, 7)))
-    np.testing.assert_array_equal(found.scale[:, 0], np.zeros(5))
-    assert found.limited.all()
-
-
-def test_a_damped_level_keeps_its_damped_direction(rng):
-    """Near a singular position the part that damping asks for is what is scaled."""
-    J = rng.normal(size=(30, 6, 7))
-    J[:, 5] = J[:, 4] + 1e-3 * rng.normal(size=(30, 7))
-    level = equations(J, rng.normal(size=(30, 6)))
-    method = DampedInverse(0.1, 0.05)
-    free = least([level], method=method)
-    held = least([level], lower=[-0.1] * 7, upper=[0.1] * 7, method=method)
-    for i in range(30):
-        s = held.scale[i, 0]
-        np.testing.assert_allclose(J[i] @ held.v[i], s * (J[i] @ free.v[i]), atol=1e-12)
-        way = np.linalg.svd(J[i])[2][:6]
-        expected = largest_scale(way, np.zeros(6), way @ free.v[i], [-0.1] * 7, [0.1] * 7)
-        assert s == pytest.approx(expected, rel=0, abs=1e-9)
 
 
 @pytest.mark.parametrize("sizes", [(3, 3), (3, 2, 2), (2, 6), (6, 3)])
@@ -581,31 +529,6 @@ def test_a_matrix_is_a_task_of_its_own(rng):
     assert not level.drift.any()
     J = rng.normal(size=(4, 2, 7))
     np.testing.assert_array_equal(LinearTask(J, np.zeros(2)).level(model, q).J, J)
-
-
-def test_accelerations_meet_tasks_of_second_order(rng):
-    """Integrated over a short time the tool's twist and the elbow change as was asked."""
-    model = rm.load("panda")
-    q, v = rng.uniform(-0.8, 0.8, size=7) + np.array([0, 0, 0, -1.5, 0, 1.5, 0]), rng.normal(size=7)
-    wanted, elbow_rate = rng.normal(size=6), 0.7
-    levels = [
-        TwistTask(wanted).level(model, q, v),
-        PositionTask([0.0, 0.0, elbow_rate], frame=4, mask=[0, 0, 1])
-        .level(model, q, v),
-    ]  # fmt: skip
-    a = least(levels).v[0]
-
-    def twist(t):
-        return rm.dkm(model, q + v * t + 0.5 * a * t * t, v + a * t)
-
-    def height(t):
-        return rm.dgm(model, q + v * t + 0.5 * a * t * t, 4)[2, 3]
-
-    h = 1e-3
-    rate = (8 * (twist(h) - twist(-h)) - (twist(2 * h) - twist(-2 * h))) / (12 * h)
-    np.testing.assert_allclose(rate, wanted, atol=1e-7)
-    second = (height(h) - 2 * height(0.0) + height(-h)) / h**2
-    np.testing.assert_allclose(second, elbow_rate, atol=1e-4)
 
 
 def test_a_rate_of_the_gradient_may_be_given(rng):
