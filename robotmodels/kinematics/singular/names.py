@@ -1,8 +1,8 @@
-"""Why an arm is singular at or near a configuration: the events of the singular sets around it.
+"""Names of the singular sets at and near a configuration, by the events that hold on them.
 
-At one configuration axes may be aligned or parallel by accident. What a singular set means is what
-happens all over it: starts beside the configuration go to the set by Newton's iteration, and what
-happens where they arrive belongs to it. The events are those that name the factors of the formulas.
+At one configuration axes may be aligned or parallel by accident. The singular set near q is sampled
+by Newton's iteration from perturbed configurations: an event that holds at all samples names the
+set. The events are those that name the factors of the formulas.
 """
 
 from __future__ import annotations
@@ -19,21 +19,26 @@ from .search import SearchSpace, normals_of, on_set, to_set
 from .task import SingularTask, task_jacobians
 
 _STARTS = 24
-_BESIDE = 0.03
+_PERTURBATION = 0.03
 _AWAY = 0.5
 _ON_SET = 1e-11
 _STEP = 1e-6
 _FLAT = 1e-4
 _TIGHT, _LOOSE = 1e-7, 1e-5
 _TAKES_PART = 1e-4
+_TWICE = 2.0
+_UNNAMED = SingularityKind.OTHER, "other: the motions of the joints depend on each other"
 _NOTHING_SPECIAL = "axes and points show nothing special, but the columns become dependent"
 
 
+Name = tuple[SingularityKind, str]
+
+
 @dataclass(frozen=True, slots=True)
-class Cause:
+class SingularSet:
     """Singular set at or near a configuration, and the geometric conditions that hold on it."""
 
-    events: tuple[tuple[SingularityKind, str], ...]
+    events: tuple[Name, ...]
     codimension: int
     weak: float
     known: bool
@@ -45,12 +50,16 @@ def arm_geometry(task: SingularTask) -> ArmGeometry:
     return ArmGeometry(task.model, task.frame, numbers, not task.mask[3:].any())
 
 
-def causes_at(task: SingularTask, q: Array, dimension: int, arm: ArmGeometry) -> tuple[Cause, ...]:
+def singular_sets(
+    task: SingularTask, q: Array, dimension: int, arm: ArmGeometry
+) -> tuple[SingularSet, ...]:
     """Singular sets at or near a configuration, the nearest first."""
     n = len(q)
     home, free = q / task.joint_scale, np.full(n, np.inf)
     space = SearchSpace(task, dimension, task.joint_scale, home, -free, free)
-    aside = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(task.moving, _BESIDE, 0.0)
+    aside = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(
+        task.moving, _PERTURBATION, 0.0
+    )
     x = to_set(space, home + aside, 25)
     away = np.linalg.norm(x - home, axis=1)
     _, weakest, G = on_set(space, x)
@@ -63,26 +72,58 @@ def causes_at(task: SingularTask, q: Array, dimension: int, arm: ArmGeometry) ->
     residual = np.stack(off, axis=1) if off else np.zeros((len(x), 0))
     # where the set is touched twice, its points are known to half of the digits
     flat = np.linalg.norm(G, axis=(1, 2)) < _FLAT
-    happening = residual <= np.where(flat, _LOOSE, _TIGHT)[:, None]
+    holding = residual <= np.where(flat, _LOOSE, _TIGHT)[:, None]
     taking = (np.abs(normals) > _TAKES_PART).any(axis=1)
-    signature = np.column_stack([codimension, happening, taking])
-    made: list[tuple[Cause, NDArray[np.bool_]]] = []
+    signature = np.column_stack([codimension, holding, taking])
+    made: list[tuple[SingularSet, NDArray[np.bool_]]] = []
     seen: set[bytes] = set()
     for i in range(len(x)):
         if (key := signature[i].tobytes()) in seen:
             continue
         seen.add(key)
-        cause = _cause(space, arm, x[i], normals[i, : codimension[i]], happening[i], G[i])
+        cause = _cause(space, arm, x[i], normals[i, : codimension[i]], holding[i], G[i])
         made.append((cause, residual[i] <= _LOOSE))
     return _minimal(arm, made)
 
 
-def _minimal(arm: ArmGeometry, made: list[tuple[Cause, NDArray[np.bool_]]]) -> tuple[Cause, ...]:
+def names_at(sets: tuple[SingularSet, ...], tolerance: float) -> tuple[Name, ...]:
+    """Kinds of the singular sets on which the configuration is, each with a sentence."""
+    here = [s for s in sets if s.known and s.weak <= _zero(tolerance)]
+    return _ordered(here or [s for s in sets if not s.known][:1]) or (_UNNAMED,)
+
+
+def names_near(
+    sets: tuple[SingularSet, ...], named: tuple[Name, ...], tolerance: float, near: float
+) -> tuple[Name, ...]:
+    """Kinds of the singular sets nearby that make a freedom weak, each with a sentence."""
+    lost = {kind for kind, _ in named}
+    away = [s for s in sets if s.weak > _zero(tolerance)]
+    nearby = [s for s in away if s.known and s.weak <= _TWICE * near]
+    # where none is that near to first order, the nearest makes it weak
+    return tuple(name for name in _ordered(nearby or away[:1]) if name[0] not in lost)
+
+
+def _ordered(sets: list[SingularSet]) -> tuple[Name, ...]:
+    """Their names, each once, from the shoulder to the wrist."""
+    order = list(SingularityKind)
+    events = dict.fromkeys(event for s in sets for event in s.events)
+    names = sorted(events, key=lambda event: order.index(event[0]))
+    return tuple((kind, f"{kind.value}: {text}") for kind, text in names)
+
+
+def _zero(tolerance: float) -> float:
+    """First-order estimates below this are zero."""
+    return max(10.0 * tolerance, 1e-7)
+
+
+def _minimal(
+    arm: ArmGeometry, made: list[tuple[SingularSet, NDArray[np.bool_]]]
+) -> tuple[SingularSet, ...]:
     """Those that are not where others meet, each once, the nearest first."""
     sentences = [event.sentence for event in arm.events]
-    found: dict[tuple[tuple[SingularityKind, str], ...], Cause] = {}
-    for cause, happening in sorted(made, key=lambda one: _specialty(one[0])):
-        here = {sentences[k] for k in np.flatnonzero(happening)}
+    found: dict[tuple[Name, ...], SingularSet] = {}
+    for cause, holding in sorted(made, key=lambda one: _specialty(one[0])):
+        here = {sentences[k] for k in np.flatnonzero(holding)}
         if cause.events in found:
             if cause.weak < found[cause.events].weak:
                 found[cause.events] = cause
@@ -91,7 +132,7 @@ def _minimal(arm: ArmGeometry, made: list[tuple[Cause, NDArray[np.bool_]]]) -> t
     return tuple(sorted(found.values(), key=lambda cause: cause.weak))
 
 
-def _specialty(cause: Cause) -> tuple[int, bool, int, float]:
+def _specialty(cause: SingularSet) -> tuple[int, bool, int, float]:
     return cause.codimension, not cause.known, -len(cause.events), cause.weak
 
 
@@ -100,16 +141,16 @@ def _cause(
     arm: ArmGeometry,
     x: Array,
     normals: Array,
-    happening: NDArray[np.bool_],
+    holding: NDArray[np.bool_],
     G: Array,
-) -> Cause:
+) -> SingularSet:
     """What makes the conditions of the set at one of its points, and how far home is from it."""
     sigma = np.linalg.svd(task_jacobians(space.task, x * space.unit), compute_uv=False)
     top = float(sigma[0]) or 1.0
-    named: list[tuple[SingularityKind, str]] = []
+    named: list[Name] = []
     distances: list[float] = []
     spanned: Array = np.zeros((0, len(x)))
-    for k in np.flatnonzero(happening):
+    for k in np.flatnonzero(holding):
         event = arm.events[k]
         D = _gradient(space, arm, event, x)
         size = float(np.linalg.norm(D, 2))
@@ -134,7 +175,7 @@ def _cause(
         distances.append(float(np.linalg.norm(others @ (space.home - x))))
     slope, away = float(np.linalg.norm(G, 2)) / top, float(np.linalg.norm(distances))
     weak = away**2 if slope < _FLAT else slope * away
-    return Cause(tuple(named), len(normals), weak, known)
+    return SingularSet(tuple(named), len(normals), weak, known)
 
 
 def _span(rows: Array, least: float) -> Array:
