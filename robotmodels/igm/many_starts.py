@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array
+from .check import checked
 from .loop import JointChain
 from .motion import random_postures
-from .solver import Found, Tolerances, nothing_found, postures
-from .thorough import MET
+from .postures import assembled
+from .solver import Found, Tolerances, postures
 
 STARTS = 300
 """Random postures from which every pose is sought."""
@@ -39,17 +40,14 @@ def prepare_many_starts(chain: JointChain) -> ManyStarts | None:
 
 @postures.register
 def _(solver: ManyStarts, U: Array, references: Array, tolerances: Tolerances) -> Found:
-    from ._thorough import home_postures
-
-    chain, N = solver.chain, len(U)
-    found = nothing_found(N, MOST, chain.k)
-    accepted = np.array([MET, min(tolerances)])
-    sigma, every = np.ascontiguousarray(chain.sigma), np.ones((1, STARTS + 1), np.bool_)
-    for n in range(N):
+    chain, parts = solver.chain, []
+    for n in range(len(U)):
         starts = np.concatenate([references[n : n + 1], solver.starts])[None]
-        row = slice(n, n + 1)
-        home_postures(
-            np.ascontiguousarray(U[row]), sigma, chain.D, starts, every, accepted,
-            found.q[row], found.valid[row], found.residual[row],
+        there = np.ones(starts.shape[:2], np.bool_)
+        parts.append(
+            checked(
+                chain, U[n : n + 1], starts, there, tolerances, double=np.zeros_like(there),
+                most=MOST, rough=np.inf, singular=True,
+            )
         )  # fmt: skip
-    return found
+    return assembled(len(U), chain.k, ((np.array([n]), part) for n, part in enumerate(parts)))

@@ -23,10 +23,10 @@ from .gather import MERGE
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled, settle_families, singular_postures
+from .self_motion import Settled
+from .singular import complete
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
-from .thorough import MET
 from .unreachable import diagnose
 
 
@@ -144,7 +144,7 @@ def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settl
     goals, there = np.ascontiguousarray(where.U), np.ones((len(U), 1), np.bool_)
     found = checked(chain, goals, (q - where.moved)[:, None], there, call.tolerances)
     found.family[...] = found.valid
-    settled = settle_families(chain, goals, found, where.references, call.tolerances)
+    settled = complete(chain, goals, found, where.references, call.tolerances)
     return put_back(chain, U, references, where, settled, components, call.tolerances)
 
 
@@ -259,7 +259,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
             turns = np.where(solver.chain.sigma == 0, np.round(way / (2.0 * np.pi)), 0.0)
             way = np.abs(way - 2.0 * np.pi * turns)
             found.free[np.any(found.free & (way > MERGE), axis=-1)] = False
-        return _of_six(solver.chain, U, found, references, tolerances)
+        return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:
         from ._moving import moving_joints
@@ -272,31 +272,6 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
     return replace(found, moving=moving)
-
-
-def _of_six(
-    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> Settled:
-    """Families settled at the reference, double roots marked."""
-    if chain.k < 6:
-        return settle_families(chain, U, found, references, tolerances)
-    double, member = singular_postures(chain, found)
-    found.double[...] |= double
-    # a double root good to half of its digits can hide that a wrist behind it is aligned
-    asked = replace(found, family=found.family | member)
-    settled = settle_families(chain, U, asked, references, tolerances)
-    # beside a family the reference may be only nearly as good as the posture itself
-    worse = _worst(settled) > np.maximum(_worst(found), MET)
-    rows = np.flatnonzero(worse)
-    if rows.size == 0:
-        return settled
-    part = settle_families(chain, U[rows], found.take(rows), references[rows], tolerances)
-    return settled.put(rows, part)
-
-
-def _worst(found: Found) -> Array:
-    """Largest error of the postures of each pose, shape (N,)."""
-    return np.where(found.valid, found.residual, 0.0).max(axis=1, initial=0.0)
 
 
 def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
