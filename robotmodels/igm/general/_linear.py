@@ -1,6 +1,6 @@
 """Compiled linear algebra of the elimination: reflections, LU factors, smallest singular vectors.
 
-Sizes are 6, 12 and 24. `_neighbour_linear` has the size 6 as a constant, which unrolls the loops.
+Sizes are 6, 12 and 24.
 """
 
 from __future__ import annotations
