@@ -131,10 +131,8 @@ def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
 
 
 @compiled(
-    NOTHING(
-        INTS, STACK, STACK, STACK, OUT3, FLAGS, VECTOR, OUT3, COUNTS, COUNTS, FLAGS, DOUBTS
-    )
-)  # fmt: skip
+    NOTHING(INTS, STACK, STACK, STACK, OUT3, FLAGS, VECTOR, OUT3, COUNTS, COUNTS, FLAGS, DOUBTS)
+)
 def refined(
     sigma: Ints,
     near: Floats,
@@ -191,9 +189,16 @@ def refined(
 
 @compiled()
 def representative(
-    data: Data, curve: curves.Curve, first: int, last: int, reference: Floats, q: Floats,
-    u: Floats, v: Floats, work: curves.Work,
-) -> int:  # fmt: skip
+    data: Data,
+    curve: curves.Curve,
+    first: int,
+    last: int,
+    reference: Floats,
+    q: Floats,
+    u: Floats,
+    v: Floats,
+    work: curves.Work,
+) -> int:
     """Point of a curve where the first joint that moves is at its reference, or next to it, into q.
 
     Returns the joint.
@@ -213,16 +218,14 @@ def representative(
         q[k], u[k] = points[nearest, k], lefts[nearest, k]
         v[k] = 1.0 if k == joint else 0.0
     if abs(least) < STRIDE:
-        q[joint] += least
+        target = q[joint] + least
+        q[joint] = target
         correct(data, q, u, v, work, FINE)
+        q[joint] = target  # rounding, as v has changed
     return joint
 
 
-@compiled(
-    NOTHING(
-        INTS, STACK, STACK, STACK, FLAGS, MATRIX, VECTOR, OUT3, COUNTS, FLAGS, MARKS
-    )
-)  # fmt: skip
+@compiled(NOTHING(INTS, STACK, STACK, STACK, FLAGS, MATRIX, VECTOR, OUT3, COUNTS, FLAGS, MARKS))
 def completed(
     sigma: Ints,
     D: Floats,

@@ -62,9 +62,9 @@ def prepare(chain: JointChain) -> Solver | None:
         prismatic = prepare_prismatic(chain)
         if prismatic is not None:
             return prismatic
-        neighbour = prepare_nominal(chain)
-        if neighbour is not None:
-            return neighbour
+        nominal = prepare_nominal(chain)
+        if nominal is not None:
+            return nominal
         general = prepare_general(chain)
         # with doubts at most poses it is slow, but all that counts is that nothing is missing
         if general is not None and (general.reliable or general.misses == general.odd == 0):

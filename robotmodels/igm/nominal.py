@@ -164,12 +164,12 @@ def _solutions(
     found, count, exact = np.zeros((N, MOST, 6)), np.zeros(N, np.int64), np.zeros(N, np.int64)
     double, free = np.zeros((N, MOST), np.bool_), np.zeros((N, MOST), np.int64)
     arrived, doubt = np.zeros_like(there), np.zeros(N, np.bool_)
-    small = min(max(NEARLY_SINGULAR * deviation, 1e-6), 0.3)
+    touch = 0.5 * min(tolerances)
+    small = min(max(NEARLY_SINGULAR * deviation, 4.0 * touch, 1e-6), 0.3)
     limits = np.array([max(REACH * deviation, 1e-7), min(JUMP * deviation, 0.2), small])
     kernels.refined(
         sigma, near, D, goals, candidates, there, limits, found, count, exact, arrived, doubt
     )
-    touch = 0.5 * min(tolerances)
     most = max(FAR * deviation, 2.0 * touch)
     widest = min(max(WIDE * np.sqrt(deviation), 1e-3), WIDEST)
     limits = np.array([small, widest, most, touch])

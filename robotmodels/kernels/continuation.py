@@ -41,18 +41,24 @@ Limits = tuple[float, float, float, float, float]
 def curve_of(rows: int, n: int) -> Curve:
     """Room for the points of a curve."""
     return (
-        np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((rows, n)),
-        np.zeros(rows), np.zeros(rows),
-    )  # fmt: skip
+        np.zeros((rows, n)),
+        np.zeros((rows, n)),
+        np.zeros((rows, n)),
+        np.zeros(rows),
+        np.zeros(rows),
+    )
 
 
 @compiled()
 def workspace(n: int) -> Work:
     """Arrays that a correction writes to."""
     return (
-        np.zeros(n), np.zeros((n, n)), np.zeros((n + 1, n + 1)), np.zeros(n + 1, np.int64),
+        np.zeros(n),
+        np.zeros((n, n)),
+        np.zeros((n + 1, n + 1)),
+        np.zeros(n + 1, np.int64),
         np.zeros(n + 1),
-    )  # fmt: skip
+    )
 
 
 @compiled()
@@ -215,9 +221,14 @@ def curves_of(residual: Any) -> Curves:
 
     @compiled(cached=False)
     def trace(
-        data: Any, periods: Floats, curve: Curve, row: int, side: int, limits: Limits,
+        data: Any,
+        periods: Floats,
+        curve: Curve,
+        row: int,
+        side: int,
+        limits: Limits,
         work: Work,
-    ) -> tuple[int, int]:  # fmt: skip
+    ) -> tuple[int, int]:
         """Continue a curve from a row upwards (side 1, along v) or downwards; last row and why.
 
         ``periods (n,)`` are 0 for unknowns without one. The point that leaves the limits is kept.
@@ -274,9 +285,17 @@ def curves_of(residual: Any) -> Curves:
 
     @compiled(cached=False)
     def zero_between(
-        data: Any, curve: Curve, low: Floats, high: Floats, row: int,
-        ends: tuple[float, float], of_slope: bool, x: Floats, work: Work, fine: float,
-    ) -> float:  # fmt: skip
+        data: Any,
+        curve: Curve,
+        low: Floats,
+        high: Floats,
+        row: int,
+        ends: tuple[float, float],
+        of_slope: bool,
+        x: Floats,
+        work: Work,
+        fine: float,
+    ) -> float:
         """Zero of ``missing`` or ``slope`` between two points of a curve into x; ``missing`` there.
 
         ``ends`` are the values at the points; by false position (Illinois), signs as in ``row``.
@@ -301,9 +320,16 @@ def curves_of(residual: Any) -> Curves:
 
     @compiled(cached=False)
     def solutions(
-        data: Any, curve: Curve, first: int, last: int, touch: float, found: Floats,
-        double: Ints, work: Work, fine: float,
-    ) -> int:  # fmt: skip
+        data: Any,
+        curve: Curve,
+        first: int,
+        last: int,
+        touch: float,
+        found: Floats,
+        double: Ints,
+        work: Work,
+        fine: float,
+    ) -> int:
         """Solutions on rows first to last of a curve into ``found (K, n)``; their number.
 
         An extremum of ``missing`` that comes within ``touch`` of zero without a change of sign is a
