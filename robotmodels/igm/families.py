@@ -14,7 +14,7 @@ from .lock import locked_chain
 from .loop import JointChain
 from .many_starts import prepare_many_starts
 from .mask import prepare_masked
-from .neighbour import prepare_neighbour
+from .nominal import prepare_nominal
 from .prismatic import prepare_prismatic
 from .redundant import prepare_redundant
 from .relations import prepare_related
@@ -62,9 +62,9 @@ def prepare(chain: JointChain) -> Solver | None:
         prismatic = prepare_prismatic(chain)
         if prismatic is not None:
             return prismatic
-        neighbour = prepare_neighbour(chain)
-        if neighbour is not None:
-            return neighbour
+        nominal = prepare_nominal(chain)
+        if nominal is not None:
+            return nominal
         elimination = prepare_elimination(chain)
         # accepted also where most poses need further forms: it is slow but complete
         if elimination is not None and elimination.missed == 0:
