@@ -13,10 +13,10 @@ import numpy as np
 
 from .. import se3
 from .._arrays import read_only
+from .chain import canonical_frames
 from .closed_form import ClosedForm, prepare_closed_form
 from .general import GeneralArm
 from .loop import JointChain
-from .shortened import shortened
 from .solver import Prepare, Solver
 
 
@@ -37,7 +37,7 @@ def _(known: GeneralArm, chain: JointChain, prepare: Prepare) -> Solver | None:
     if structured is not None:
         return structured
     # the same representations of the loop, with this chain's links
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     inverse = np.array([se3.inverse(T) for T in D])
     ways = tuple(
         replace(

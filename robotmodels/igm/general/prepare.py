@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, read_only
+from ..chain import canonical_frames
 from ..loop import JointChain
-from ..shortened import shortened
 from .gathered import Gathered
 from .representation import Representation, all_representations
 from .search import one_way, solve
@@ -23,7 +23,7 @@ def prepare_general(
     if chain.k != 6 or int(np.sum(chain.sigma == 1)) > 1:
         return None
     rng = np.random.default_rng(rng)
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     sigma = read_only(chain.sigma, np.int64)
     candidates = all_representations(sigma, D)
     few, many = _random_goals(sigma, D, 8, rng), _random_goals(sigma, D, tests, rng)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ..chain import canonical_frames
 from ..loop import JointChain
-from ..shortened import shortened
 
 __all__ = ["MemberCurve", "curves_through"]
 
@@ -30,7 +30,7 @@ def curves_through(chain: JointChain, U: Array, q: Array, most: int = 64) -> lis
     """Continuation along the curves of a family, each once. Shapes: U (4, 4), q (B, k)."""
     from ._directions import walked
 
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     sigma = np.ascontiguousarray(chain.sigma)
     lengths = np.where(sigma == 1, unit, 1.0)
     goal = U.copy()

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ..chain import canonical_frames
 from ..check import checked
 from ..loop import JointChain
-from ..shortened import shortened
 from ..solver import Found, Tolerances
 
 __all__ = ["Settled", "double_roots", "replaced", "settle_families", "singular_postures"]
@@ -61,7 +61,7 @@ def singular_postures(
     """
     from ._members import singular_postures as singular
 
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     double = np.zeros(found.valid.shape, np.bool_)
     member = np.zeros(found.valid.shape, np.bool_)
     q = np.ascontiguousarray(found.q)
@@ -138,7 +138,7 @@ def _settled(
     from ._members import settled_already
     from .family_curves import Family, settled_members
 
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     N, S, k = found.q.shape
     sigma = np.ascontiguousarray(chain.sigma)
     lengths = np.where(sigma == 1, unit, 1.0)
