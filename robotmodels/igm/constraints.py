@@ -111,7 +111,9 @@ class Constraints:
             np.concatenate([across @ J[:, :3] / self.length, rows @ J[:, 3:], linear], axis=1),
         )
 
-    def met(self, U: Array, q: Array, tolerances: tuple[float, float]) -> tuple[Array, Array]:
+    def met(
+        self, U: Array, q: Array, tolerances: tuple[float, float]
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Residuals [m or rad] and whether configurations meet the constraints, each (N,)."""
         away, turned = asked_errors(self.chain, U, q, self.components)
         related = np.abs(self.relation_errors(q)).max(axis=1, initial=0.0) <= 1e-9
@@ -131,8 +133,3 @@ def _halves(asked: tuple[bool, ...]) -> tuple[tuple[bool, ...], tuple[bool, ...]
 def in_half_open_turn(sigma: NDArray[np.int64], q: Array) -> Array:
     """Configurations with angles in (-pi, pi]."""
     return np.where(sigma == 0, np.pi - (np.pi - q) % (2.0 * np.pi), q)
-
-
-def shorter_way(sigma: NDArray[np.int64], d: Array) -> Array:
-    """Differences of configurations, angles modulo a turn in [-pi, pi]."""
-    return np.where(sigma == 0, d - 2.0 * np.pi * np.round(d / (2.0 * np.pi)), d)

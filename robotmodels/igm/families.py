@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,15 +13,16 @@ from .arm_angle import prepare_arm_angle
 from .asked import Task
 from .chain import locked_chain
 from .closed_form import prepare_closed_form
-from .constraints import WHOLE, Components, constraints, shorter_way
+from .constraints import WHOLE, Components, constraints
 from .general import GeneralArm, prepare_general
 from .loop import JointChain
 from .neighbour import prepare_neighbour
+from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
 from .relations import Related, prepare_related
 from .search import ManyStarts, prepare_many_starts
-from .solver import Found, Solver
+from .solver import Solver
 
 
 def prepare_task(chain: JointChain, task: Task) -> Solver | None:
@@ -79,7 +79,7 @@ def _of_six_joints(chain: JointChain) -> Solver | None:
 
 
 def may_miss_solutions(
-    solver: Solver, U: Array, found: Found, references: Array
+    solver: Solver, U: Array, found: Postures, references: Array
 ) -> NDArray[np.bool_]:
     """Poses at which a method has no proof that its solutions are all, (N,)."""
     if isinstance(solver, (ManyStarts, Related)):
@@ -93,8 +93,11 @@ def may_miss_solutions(
     if not isinstance(solver, Redundant):
         return np.zeros(len(U), np.bool_)
     joint, others = solver.joint, np.delete(np.arange(solver.chain.k), solver.joint)
-    rest = replace(found, q=found.q[..., others], free=found.free[..., others])
+    rest = Postures(
+        found.q[..., others], found.valid, found.residual, found.double,
+        found.free[..., others], found.family,
+    )  # fmt: skip
     out = may_miss_solutions(solver.inner, U, rest, references[:, others])
     # a search found the nearest value of the joint
-    d = shorter_way(solver.chain.sigma, found.q - references[:, None])[..., joint]
+    d = difference(solver.chain.sigma, found.q, references[:, None])[..., joint]
     return out | np.any(found.free[..., joint] & (np.abs(d) > 1e-9), axis=1)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,12 +25,12 @@ from ..se3.orientation import quaternions_of
 from .alike import prepare_alike
 from .chain import VirtualJoint, with_virtual_joints
 from .check import checked
-from .constraints import WHOLE, Components, constraints, mask_axes, shorter_way
-from .gather import MERGE, assembled, merged, rows_of
+from .constraints import WHOLE, Components, constraints, mask_axes
 from .loop import JointChain
 from .motion import jacobians, lever, random_postures, scaled, singular_rows, tool_poses
+from .postures import MERGE, Postures, assembled, difference, no_postures, side_by_side
 from .search import classified, prepare_many_starts
-from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
+from .solver import Prepare, Solver, Tolerances, postures
 from .virtual_joints import Placement, loose_placements, placements, virtual_joints
 
 KEPT = 3  # extensions kept
@@ -114,20 +113,19 @@ def prepare_reduced(
     if len(components.freed_rotations) == 2:
         return _with_one_rotation(chain, components, prepare)
     if all(components.asked):
-        whole = partial(prepare, components=components)
-        return prepare_fewer(chain, whole, structured)
+        return prepare_fewer(chain, lambda six: prepare(six, WHOLE), structured)
     longer, places = with_virtual_joints(chain, _freed_joints(chain, components, _SKEW))
     if longer.k > 6:
         return None
     inner = prepare(longer, WHOLE)
-    return inner and Masked(chain, components, inner, places, partial(prepare, components=WHOLE))
+    return inner and Masked(chain, components, inner, places, lambda six: prepare(six, WHOLE))
 
 
 # --- masks ----------------------------------------------------------------------------------------
 
 
 @postures.register
-def _(solver: Masked, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: Masked, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chain, components, parts = solver.chain, solver.components, []
     wanted = constraints(chain, components)
     for inner, rows in _inner_solvers(solver, U):
@@ -137,16 +135,12 @@ def _(solver: Masked, U: Array, references: Array, tolerances: Tolerances) -> Fo
         longer = np.zeros((len(rows), inner.chain.k))
         longer[:, solver.places] = near
         found = postures(inner, goals, longer, tolerances)
-        q, valid = found.q[..., solver.places], found.valid.copy()
-        n, s = np.nonzero(valid)
-        residual = np.full(valid.shape, np.nan)
-        residual[n, s], valid[n, s] = wanted.met(goals[n], q[n, s], tolerances)
         # a spherical joint has two ways to one configuration, and is singular where the arm is not
-        none = np.zeros_like(found.free[..., solver.places])
-        part = merged(
-            chain.sigma,
-            Found(q, valid, residual, np.zeros_like(valid), none, np.zeros_like(valid)),
-        )
+        part = no_postures(len(rows), found.q.shape[1], chain.k)
+        part.q[...] = found.q[..., solver.places]
+        n, s = np.nonzero(found.valid)
+        part.residual[n, s], part.valid[n, s] = wanted.met(goals[n], part.q[n, s], tolerances)
+        part = part.merge(chain.sigma)
         parts.append((rows, classified(wanted, goals, part, near, tolerances)))
     return assembled(len(U), chain.k, parts)
 
@@ -237,7 +231,7 @@ def _with_one_rotation(
 
 
 @postures.register
-def _(solver: OneAxis, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: OneAxis, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chain, a, aligned = solver.chain, solver.axis, is_aligned(solver, U)
     R = tool_poses(chain, np.zeros((1, chain.k)))[0, :3, :3]
     # the rotation about the axis that leaves no component of the error along it
@@ -278,27 +272,26 @@ def prepare_fewer(chain: JointChain, prepare: Prepare, structured: Prepare) -> F
 
 
 @postures.register
-def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chain, N = solver.chain, len(U)
-    gathered = nothing_found(N, 0, chain.k)
+    gathered = [no_postures(N, 0, chain.k)]
     unsure = np.ones(N, np.bool_)
     for way in solver.ways:
         rows = np.flatnonzero(unsure)
         if rows.size == 0:
             break
         part, doubtful = _of_extension(solver, way, U[rows], references[rows], tolerances)
-        gathered = _joined(gathered, rows, part)
+        gathered.append(assembled(N, chain.k, [(rows, part)]))
         # an error beyond rounding may miss a fold of this extension and not of others
         unsure[rows] = doubtful | (max(tolerances) > EXACT)
-    found = checked(
-        chain, U, gathered.q, gathered.valid, tolerances, double=np.zeros_like(gathered.valid),
-        rough=_rough(tolerances),
-    )  # fmt: skip
+    candidates = side_by_side(gathered)
+    q, there = candidates.q, candidates.valid
+    found = checked(chain, U, q, there, tolerances, rough=_rough(tolerances))
     if SAME * max(tolerances) > MERGE:
         # a pose that is met only nearly is met nearly as well beside: the best is kept
         order = np.argsort(found.residual, axis=1)
-        found = rows_of(found, (np.arange(N)[:, None], order))
-        found = merged(chain.sigma, found, SAME * max(tolerances))
+        found = found.take((np.arange(N)[:, None], order))
+        found = found.merge(chain.sigma, SAME * max(tolerances))
     return _marked(solver, U, found)
 
 
@@ -322,7 +315,7 @@ def _rough(tolerances: Tolerances) -> float:
 
 def _of_extension(
     solver: FewerJoints, way: Extension, U: Array, references: Array, tolerances: Tolerances
-) -> tuple[Found, NDArray[np.bool_]]:
+) -> tuple[Postures, NDArray[np.bool_]]:
     """Solutions of an extension with virtual joints near zero; where it is singular or has none."""
     six = np.zeros((len(U), 6))
     six[:, way.places] = references
@@ -331,21 +324,13 @@ def _of_extension(
     virtual = np.setdiff1d(np.arange(6), way.places)
     near = np.abs(np.where(found.valid[..., None], found.q[..., virtual], 0.0)).max(axis=-1)
     kept = found.valid & (near <= _rough(tolerances) * max(1.0, solver.length))
-    part = replace(found, q=found.q[..., way.places], valid=kept)
+    part = no_postures(len(U), found.q.shape[1], way.places.size)
+    part.q[...], part.valid[...] = found.q[..., way.places], kept
     singular = found.valid & (found.family | found.double | found.free.any(axis=-1))
     return part, ~kept.any(axis=1) | singular.any(axis=1)
 
 
-def _joined(gathered: Found, rows: NDArray[np.int64], part: Found) -> Found:
-    """Candidates of some poses added behind those there are."""
-    S = gathered.q.shape[1]
-    out = nothing_found(len(gathered.q), S + part.q.shape[1], gathered.q.shape[2])
-    out.q[:, :S], out.valid[:, :S] = gathered.q, gathered.valid
-    out.q[rows, S:], out.valid[rows, S:] = part.q, part.valid
-    return out
-
-
-def _marked(solver: FewerJoints, U: Array, found: Found) -> Found:
+def _marked(solver: FewerJoints, U: Array, found: Postures) -> Postures:
     """Mark double roots and members of self-motions."""
     chain = solver.chain
     n, s = np.nonzero(found.valid)
@@ -406,5 +391,5 @@ def _chosen(
 def _gives_back(solver: FewerJoints, U: Array, q: Array) -> bool:
     """Whether the configurations are among the solutions of their poses."""
     found = postures(solver, U, np.zeros_like(q), Tolerances())
-    gap = np.abs(shorter_way(solver.chain.sigma, found.q - q[:, None])).max(axis=-1)
+    gap = np.abs(difference(solver.chain.sigma, found.q, q[:, None])).max(axis=-1)
     return bool(np.all(np.where(found.valid, gap, np.inf).min(axis=1, initial=np.inf) < 1e-6))

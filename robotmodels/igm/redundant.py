@@ -15,12 +15,12 @@ import numpy as np
 from .._arrays import Array
 from .alike import prepare_alike
 from .chain import locked_chain, without_end
-from .constraints import WHOLE, Components, constraints, shorter_way
-from .gather import assembled, merged
+from .constraints import WHOLE, Components, constraints
 from .loop import JointChain
 from .motion import poses_and_jacobians, random_postures
+from .postures import Postures, assembled, difference, side_by_side
 from .search import PATH, collected, nearest_value, refined
-from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
+from .solver import Prepare, Solver, Tolerances, postures
 
 DEPENDENT = 1e-9  # singular values beside the largest that count as zero at any configuration
 SHARE = 1e-6  # part of a joint in a null direction that counts
@@ -110,13 +110,13 @@ def _(known: Redundant, chain: JointChain, prepare: Prepare) -> Solver | None:
 
 
 @postures.register
-def _(solver: Redundant, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: Redundant, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     return _solutions(solver, U, references, tolerances, searched=True)
 
 
 def _solutions(
     solver: Redundant, U: Array, references: Array, tolerances: Tolerances, searched: bool
-) -> Found:
+) -> Postures:
     """Solutions with the joints at their references, else at the nearest values if searched."""
     if solver.locked is not None:
         values = np.full(len(U), solver.locked)
@@ -156,7 +156,7 @@ def at_values(
     references: Array,
     tolerances: Tolerances,
     searched: bool = True,
-) -> Found:
+) -> Postures:
     """Solutions with the joint at a value for each pose, (N,)."""
     chain, joint = solver.chain, solver.joint
     others = np.delete(np.arange(chain.k), joint)
@@ -185,7 +185,8 @@ def at_values(
             q[..., joint] = np.pi - (np.pi - q[..., joint]) % (2.0 * np.pi)
         q[~part.valid] = np.nan
         free = np.insert(part.free, joint, False, axis=2)
-        parts.append((rows, replace(part, q=q, free=free)))
+        found = Postures(q, part.valid, part.residual, part.double, free, part.family)
+        parts.append((rows, found))
     return assembled(len(U), chain.k, parts)
 
 
@@ -199,7 +200,7 @@ def _known(solver: Redundant, value: float | None, chain: JointChain) -> Solver 
     return known[value]
 
 
-def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     """Solutions with the joint as near to its reference as it gets."""
     chain, joint, N = solver.chain, solver.joint, len(U)
     wanted = constraints(chain, solver.components)
@@ -208,7 +209,7 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     pose = np.repeat(np.arange(N), STARTS + 1)
     q = refined(wanted, U[pose], q.reshape(-1, chain.k))
     met = wanted.met(U[pose], q, PATH)[1]
-    d = np.abs(shorter_way(chain.sigma, q - references[pose]))[:, joint]
+    d = np.abs(difference(chain.sigma, q, references[pose]))[:, joint]
     order = np.lexsort((d, pose))
     order = order[met[order]]
     rank = np.arange(order.size) - np.searchsorted(pose[order], pose[order])
@@ -217,7 +218,7 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     held: list[int] = []
     for joint in free_joints(solver):
         q = nearest_value(wanted, U[pose], q, joint, references[pose, joint], held)
-        d = np.abs(shorter_way(chain.sigma, q - references[pose]))[:, joint]
+        d = np.abs(difference(chain.sigma, q, references[pose]))[:, joint]
         best = np.full(N, np.inf)
         np.minimum.at(best, pose, d)
         there = d <= best[pose] + SAME
@@ -230,13 +231,8 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     rows, first = np.unique(pose, return_index=True)
     values = q[first]
     more = at_values(solver, values[:, solver.joint], U[rows], values, tolerances, False)
-    S = members.q.shape[1]
     # at a turning point two solutions meet: those next to a member are the member
-    gap = shorter_way(chain.sigma, more.q[:, :, None] - members.q[rows][:, None])
-    near = np.abs(gap).max(axis=-1) < FOLD
-    more.valid[np.any(near, axis=-1)] = False
-    wide = nothing_found(N, S + more.q.shape[1], chain.k)
-    for name in ("q", "valid", "residual", "double", "free", "family"):
-        getattr(wide, name)[:, :S] = getattr(members, name)
-        getattr(wide, name)[rows, S:] = getattr(more, name)
-    return merged(chain.sigma, wide)
+    gap = difference(chain.sigma, more.q[:, :, None], members.q[rows][:, None])
+    more.valid[np.any(np.abs(gap).max(axis=-1) < FOLD, axis=-1)] = False
+    more = assembled(N, chain.k, [(rows, more)])
+    return side_by_side([members, more]).merge(chain.sigma)

@@ -18,12 +18,12 @@ from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 from .closed_form import ClosedForm
 from .constraints import WHOLE, Constraints
-from .gather import assembled
 from .loop import JointChain
 from .motion import jacobians, lever
+from .postures import Postures, assembled
 from .redundant import Redundant, at_values, prepare_redundant
 from .search import prepare_many_starts, solutions_from
-from .solver import Found, Prepare, Solver, Tolerances, postures
+from .solver import Prepare, Solver, Tolerances, postures
 
 GRID = 120
 """Values of the locked joint at which self-motions are sampled."""
@@ -104,7 +104,7 @@ def _sampled(chain: JointChain, prepare: Prepare) -> Redundant | None:
 
 
 @postures.register
-def _(solver: Related, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: Related, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chain, joint = solver.chain, solver.sampled.joint
     wanted, parts = solver.wanted, []
     grid = ((np.arange(GRID) + 0.5) / GRID * 2.0 - 1.0) * (

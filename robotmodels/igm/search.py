@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .constraints import Constraints, in_half_open_turn, shorter_way
-from .gather import assembled, merged
+from .constraints import Constraints, in_half_open_turn
 from .loop import JointChain
 from .motion import random_postures
-from .solver import Found, Tolerances, nothing_found, postures
+from .postures import Postures, assembled, difference, no_postures, side_by_side
+from .solver import Tolerances, postures
 
 STARTS = 200
 """Random starts of a pose."""
@@ -60,7 +60,7 @@ def prepare_many_starts(wanted: Constraints) -> ManyStarts:
 
 
 @postures.register
-def _(solver: ManyStarts, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: ManyStarts, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     chunk, parts = max(ROWS // STARTS, 1), []
     for start in range(0, len(U), chunk):
         goals, wanted = U[start : start + chunk], references[start : start + chunk]
@@ -106,11 +106,10 @@ def _damped_step(J: Array, e: Array, damping: Array) -> Array:
     """Damped steps of least length, (B, k)."""
     Jt, (_, r, k) = np.swapaxes(J, 1, 2), J.shape
     if r < k:
-        return (Jt @ np.linalg.solve(J @ Jt + damping[:, None, None] * np.eye(r), e[..., None]))[
-            ..., 0
-        ]
-    normal = Jt @ J + damping[:, None, None] * np.eye(k)
-    return np.linalg.solve(normal, Jt @ e[..., None])[..., 0]
+        step = Jt @ np.linalg.solve(J @ Jt + damping[:, None, None] * np.eye(r), e[..., None])
+    else:
+        step = np.linalg.solve(Jt @ J + damping[:, None, None] * np.eye(k), Jt @ e[..., None])
+    return np.asarray(step[..., 0], np.float64)
 
 
 def nearest_value(
@@ -180,7 +179,7 @@ def _null_projectors(wanted: Constraints, U: Array, q: Array, held: Sequence[int
 
 def collected(
     wanted: Constraints, U: Array, q: Array, pose: NDArray[np.int64], tolerances: Tolerances
-) -> Found:
+) -> Postures:
     """Configurations ``(B, k)`` of poses ``(B,)`` that meet them, merged and packed."""
     chain, N = wanted.chain, len(U)
     q = in_half_open_turn(chain.sigma, q)
@@ -189,10 +188,10 @@ def collected(
     order = order[np.lexsort((residual[order] > 1e-12, pose[order]))]
     pose, q, residual = pose[order], q[order], residual[order]
     counts = np.bincount(pose, minlength=N)
-    out = nothing_found(N, int(counts.max(initial=0)), chain.k)
+    out = no_postures(N, int(counts.max(initial=0)), chain.k)
     place = np.arange(len(pose)) - np.repeat(np.cumsum(counts) - counts, counts)
     out.q[pose, place], out.valid[pose, place], out.residual[pose, place] = q, True, residual
-    return merged(chain.sigma, out)
+    return out.merge(chain.sigma)
 
 
 def solutions_from(
@@ -202,7 +201,7 @@ def solutions_from(
     pose: NDArray[np.int64],
     references: Array,
     tolerances: Tolerances,
-) -> Found:
+) -> Postures:
     """Solutions reached from starts (B, k) of poses (B,), self-motions at their reference."""
     found = collected(wanted, U, refined(wanted, U[pose], q), pose, tolerances)
     n, s = np.nonzero(found.valid)
@@ -220,8 +219,8 @@ def solutions_from(
 
 
 def classified(
-    wanted: Constraints, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> Found:
+    wanted: Constraints, U: Array, found: Postures, references: Array, tolerances: Tolerances
+) -> Postures:
     """Double roots merged and marked; self-motions brought to their reference."""
     chain = wanted.chain
     n, s = np.nonzero(found.valid)
@@ -234,39 +233,31 @@ def classified(
         return found
     poses = np.unique(n[flat])
     others = np.setdiff1d(np.arange(len(U)), poses)
-    parts = [(others, rows_at(found, others))]
+    parts = [(others, found.take(others))]
     for i in poses:
         rows = s[(n == i) & flat]
         one = _singular_pose(
-            wanted, U[i : i + 1], rows_at(found, np.array([i])), rows, references[i], tolerances
+            wanted, U[i : i + 1], found.take(np.array([i])), rows, references[i], tolerances
         )
         parts.append((np.array([i]), one))
-    return merged(chain.sigma, assembled(len(U), chain.k, parts))
-
-
-def rows_at(found: Found, poses: NDArray[np.int64]) -> Found:
-    """Copy of some poses."""
-    return Found(
-        found.q[poses], found.valid[poses], found.residual[poses], found.double[poses],
-        found.free[poses], found.family[poses],
-    )  # fmt: skip
+    return assembled(len(U), chain.k, parts).merge(chain.sigma)
 
 
 def _singular_pose(
     wanted: Constraints,
     U: Array,
-    found: Found,
+    found: Postures,
     rows: NDArray[np.int64],
     reference: Array,
     tolerances: Tolerances,
-) -> Found:
+) -> Postures:
     """Solutions of one pose, some of whose rows are singular."""
     chain = wanted.chain
     order = rows[np.argsort(found.residual[0, rows], kind="stable")]
     for place, i in enumerate(order):
         for j in order[place + 1 :]:
             if found.valid[0, i] and found.valid[0, j]:
-                gap = shorter_way(chain.sigma, found.q[0, j] - found.q[0, i])
+                gap = difference(chain.sigma, found.q[0, j], found.q[0, i])
                 # what lies between two copies of one root meets the pose as well
                 between = wanted.met(U, (found.q[0, i] + 0.5 * gap)[None], tolerances)[1]
                 if np.abs(gap).max() < FOLD and between[0]:
@@ -281,17 +272,13 @@ def _singular_pose(
         elif _is_flat(wanted, U, found.q[0, i]):
             found.double[0, i] = True
     if not extra:
-        return merged(chain.sigma, found)
-    part = nothing_found(1, len(extra), chain.k)
+        return found.merge(chain.sigma)
+    part = no_postures(1, len(extra), chain.k)
     part.q[0], part.free[0] = in_half_open_turn(chain.sigma, np.array(extra)), np.array(marks)
     part.valid[0], part.family[0] = True, True
     part.residual[0] = wanted.met(np.repeat(U, len(extra), axis=0), part.q[0], tolerances)[0]
     part.valid[0] &= part.residual[0] <= max(tolerances)
-    names = ("q", "valid", "residual", "double", "free", "family")
-    return merged(
-        chain.sigma,
-        Found(*(np.concatenate([getattr(part, f), getattr(found, f)], axis=1) for f in names)),
-    )
+    return side_by_side([part, found]).merge(chain.sigma)
 
 
 def _is_flat(wanted: Constraints, U: Array, q: Array) -> bool:
