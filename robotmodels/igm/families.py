@@ -14,7 +14,7 @@ from .asked import Task
 from .chain import locked_chain
 from .closed_form import prepare_closed_form
 from .constraints import WHOLE, Components, constraints
-from .general import GeneralArm, prepare_general
+from .elimination import prepare_elimination
 from .loop import JointChain
 from .neighbour import prepare_neighbour
 from .postures import Postures, difference
@@ -71,10 +71,10 @@ def _of_six_joints(chain: JointChain) -> Solver | None:
     solver = prepare_closed_form(chain) or prepare_neighbour(chain)
     if solver is not None:
         return solver
-    general = prepare_general(chain)
-    # where most poses need the fallback it is slow, but complete
-    if general is not None and (general.reliable or general.misses == general.odd == 0):
-        return GeneralArm(chain, general)
+    elimination = prepare_elimination(chain)
+    # accepted also where most poses need further forms: it is slow but complete
+    if elimination is not None and elimination.missed == 0:
+        return elimination
     return prepare_many_starts(constraints(chain))
 
 

@@ -28,6 +28,7 @@ from .check import checked
 from .constraints import WHOLE, Components, constraints, mask_axes
 from .loop import JointChain
 from .motion import jacobians, lever, random_postures, scaled, singular_rows, tool_poses
+from .position import prepare_position
 from .postures import MERGE, Postures, assembled, difference, no_postures, side_by_side
 from .search import classified, prepare_many_starts
 from .solver import Prepare, Solver, Tolerances, postures
@@ -83,6 +84,7 @@ class Masked:
     inner: Solver
     places: NDArray[np.int64]
     prepare: Prepare
+    by_position: bool = False
 
     @property
     def method(self) -> str:
@@ -114,11 +116,28 @@ def prepare_reduced(
         return _with_one_rotation(chain, components, prepare)
     if all(components.asked):
         return prepare_fewer(chain, lambda six: prepare(six, WHOLE), structured)
+    if len(components.freed_rotations) == 3:
+        solver = _for_position(chain, components)
+        if solver is not None:
+            return solver
     longer, places = with_virtual_joints(chain, _freed_joints(chain, components, _SKEW))
     if longer.k > 6:
         return None
     inner = prepare(longer, WHOLE)
     return inner and Masked(chain, components, inner, places, lambda six: prepare(six, WHOLE))
+
+
+def _for_position(chain: JointChain, components: Components) -> Solver | None:
+    """Three joints for a position, among them the slides of freed translations; None for others."""
+    slides = components.freed_translations
+    if slides and components.in_tool_axes:
+        return None
+    joints = _joints(0, _world_frame(chain), slides, 1)
+    longer, places = with_virtual_joints(chain, joints)
+    inner = prepare_position(longer)
+    if inner is None or not slides:
+        return inner
+    return Masked(chain, components, inner, places, prepare_position, by_position=True)
 
 
 # --- masks ----------------------------------------------------------------------------------------
@@ -147,6 +166,8 @@ def _(solver: Masked, U: Array, references: Array, tolerances: Tolerances) -> Po
 
 @prepare_alike.register
 def _(known: Masked, chain: JointChain, prepare: Prepare) -> Solver | None:
+    if known.by_position:
+        return _for_position(chain, known.components)
     longer, _ = with_virtual_joints(chain, _freed_joints(chain, known.components, _SKEW))
     inner = prepare_alike(known.inner, longer, known.prepare)
     return inner and replace(known, chain=chain, inner=inner)
@@ -181,8 +202,7 @@ def _moves_with_the_pose(components: Components) -> bool:
 def _freed_joints(chain: JointChain, components: Components, R: Array) -> list[VirtualJoint]:
     """Virtual joints for the freed components of desired orientations R."""
     slides, turns, k = components.freed_translations, components.freed_rotations, chain.k
-    tool, world = np.array(chain.D[k]), np.eye(4)
-    world[:3, :3] = chain.base[:3, :3].T
+    tool, world = np.array(chain.D[k]), _world_frame(chain)
     if components.in_tool_axes or (len(turns) == 3 and len(slides) == 3):
         # the axes are those of the desired pose: behind the rotation that is freed
         return _joints(k, tool, turns, 0) + _joints(k, tool, slides, 1)
@@ -193,6 +213,13 @@ def _freed_joints(chain: JointChain, components: Components, R: Array) -> list[V
     if len(turns) == 1:
         return _joints(0, world, slides, 1) + _joints(0, world, turns, 0)
     return _joints(0, world, slides, 1) + _joints(k, tool, turns, 0)
+
+
+def _world_frame(chain: JointChain) -> Array:
+    """The axes of the world at the origin of R_0."""
+    world = np.eye(4)
+    world[:3, :3] = chain.base[:3, :3].T
+    return world
 
 
 def _joints(gap: int, frame: Array, axes: tuple[int, ...], sigma: int) -> list[VirtualJoint]:

@@ -27,7 +27,7 @@ from .self_motion import Settled, settle_families, singular_postures
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
-from .why import search
+from .unreachable import diagnose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         missing = may_miss_solutions(call.solver, U, found, references[:, columns])
         reached = rows.status <= IGMStatus.REACHED_FAMILY
         rows.status[missing & reached] = IGMStatus.INCOMPLETE
-    reasons = search(
+    reasons = diagnose(
         model, task, call.solver is None, poses, references, call.limits, call.tolerances,
         rows.status,
     )  # fmt: skip
