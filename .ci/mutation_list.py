@@ -561,7 +561,7 @@ MUTATIONS = [
     Mutation("igm: numeric", "whole turns lead away from the start", "def _in_range(",
         "np.rint((self.first[rows] - q) / turn)", "np.rint((q - self.first[rows]) / turn)",
         "tests/test_igm_numeric.py -k whole_turns"),
-    Mutation("igm: search", "a held joint moves", "def refined(", "J[:, :, at] = 0.0",
+    Mutation("igm: search", "a held joint moves", "def refined(wanted", "J[:, :, at] = 0.0",
         "J[:, :, at] *= 1.0", REDUNDANT + " -k planar"),
     Mutation("igm: search", "steps along a self-motion end before its turning point",
         "def nearest_value(", "longest > 1e-6", "longest > 1e-2",

@@ -15,11 +15,10 @@ from numba import types
 from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, MATRIX, OUT1, STACK, VECTOR, Floats, Ints, compiled
-from ._check import EXACT, MERGE, improved, missing, wrapped
+from ._check import EXACT, MERGE, missing, refined, wrapped
 from .kernels.equations import DOUBLE, NONE, TWO, type_2
 from .kernels.pieper import advance, wrist_postures
 
-STEPS = 12  # Gauss-Newton steps for a posture that rounding or a rounded table left beside its pose
 ROUGH = 1e-2  # candidates that miss by more are none [m, rad]
 ALONG = 1e-6  # sine between the line and base z below which base x takes its place
 STRAIGHT = 4e-7  # bend below which the elbow counts as stretched or folded: 1e-14 m or so
@@ -223,7 +222,9 @@ def arm_angle_rows(
     left, right = np.zeros((2, 3, 4)), np.zeros((2, 3, 4))
     x_shoulder, x_wrist = np.zeros((2, 3)), np.zeros((2, 3))
     free_shoulder, free_wrist = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
-    held = np.zeros(7, dtype=np.int64)
+    held, weights = np.zeros(7, dtype=np.int64), np.empty(2)
+    for i in range(2):
+        weights[i] = min(tolerances[0], tolerances[1]) / tolerances[i]
     x, e, line = np.zeros(7), np.zeros(6), np.zeros(3)
     unit = np.eye(4)
     slack_angle = max(1e-9, tolerances[1])
@@ -294,7 +295,10 @@ def arm_angle_rows(
                         held[0] = free_shoulder[i]
                         held[4] = free_wrist[j]
                         if max(way, angle) > EXACT:
-                            way, angle = improved(U, sigma, D, held, tolerances, STEPS, ROUGH, x)
+                            bits = 0
+                            for m in range(7):
+                                bits |= held[m] << m
+                            way, angle = refined(U, sigma, D, bits, 0, weights, EXACT, ROUGH, x)
                         if not (way <= tolerances[0] and angle <= tolerances[1]):
                             continue
                         for m in range(7):

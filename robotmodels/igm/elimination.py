@@ -26,7 +26,7 @@ from .check import checked
 from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
-from .self_motion import singular_postures
+from .singular import singular_postures
 from .solver import Found, Tolerances, postures
 
 MOST = 16  # solutions a six-joint arm can have at one pose

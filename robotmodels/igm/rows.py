@@ -22,11 +22,11 @@ from .families import may_miss_solutions
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
+from .postures import Postures
 from .redundant import Redundant
-from .self_motion import Settled, settle_families, singular_postures
+from .singular import complete
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
-from .thorough import MET
 from .unreachable import diagnose
 
 
@@ -117,7 +117,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     )
 
 
-def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np.int64]) -> Rows:
+def _laid_out(call: Call, found: Postures, references: Array, columns: NDArray[np.int64]) -> Rows:
     """Postures of a chain as rows of a result, in the columns of the model."""
     from ._arrange import arranged
 
@@ -138,13 +138,13 @@ def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np
     return Rows(q, valid, residual, inside, codes, status, labels, most, double, free, family)
 
 
-def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settled:
+def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Postures:
     """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
     assert call.solver is not None
     chain, there = call.solver.chain, np.ones((len(U), 1), np.bool_)
     found = checked(chain, U, q[:, None], there, call.tolerances)
     found.family[...] = found.valid
-    return settle_families(chain, U, found, references, call.tolerances)
+    return complete(chain, U, found, references, call.tolerances)
 
 
 def rows_by_plan(
@@ -215,7 +215,7 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
     )
 
 
-def _solved(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+def _solved(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
     """Postures of a chain; poses far along rails at its base are solved beside the origin."""
     task, solver = call.task, call.solver
     if solver is None or task.relations or not all(task.mask[:3]):
@@ -232,7 +232,7 @@ def _solved(call: Call, U: Array, psi: Array | None, references: Array) -> Settl
     return replace(found, q=q, residual=residual, valid=valid)
 
 
-def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
     """Postures of a chain, infinite families settled and double roots marked."""
     solver, tolerances = call.solver, call.tolerances
     if solver is None:
@@ -257,7 +257,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         found = postures(solver, U, references, tolerances)
     whole = call.task.mask == WHOLE_POSE
     if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
-        return _of_six(solver.chain, U, found, references, tolerances)
+        return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:
         from ._moving import moving_joints
@@ -270,31 +270,6 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
     return replace(found, moving=moving)
-
-
-def _of_six(
-    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> Settled:
-    """Families settled at the reference, double roots marked."""
-    if chain.k < 6:
-        return settle_families(chain, U, found, references, tolerances)
-    double, member = singular_postures(chain, found)
-    found.double[...] |= double
-    # a double root good to half of its digits can hide that a wrist behind it is aligned
-    asked = replace(found, family=found.family | member)
-    settled = settle_families(chain, U, asked, references, tolerances)
-    # beside a family the reference may be only nearly as good as the posture itself
-    worse = _worst(settled) > np.maximum(_worst(found), MET)
-    rows = np.flatnonzero(worse)
-    if rows.size == 0:
-        return settled
-    part = settle_families(chain, U[rows], found.take(rows), references[rows], tolerances)
-    return settled.put(rows, part)
-
-
-def _worst(found: Found) -> Array:
-    """Largest error of the postures of each pose, shape (N,)."""
-    return np.where(found.valid, found.residual, 0.0).max(axis=1, initial=0.0)
 
 
 def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
