@@ -1,4 +1,4 @@
-"""Names of `singular` for files that are not moved yet; curves for `relations`."""
+"""Names of `singular` for files that are not moved yet."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from ..loop import JointChain
 from ..postures import Postures
 from ..singular import complete as settle_families
 from ..singular import singular_postures
-from .member_curves import MemberCurve, curves_through
 
 __all__ = [
-    "MemberCurve",
     "Settled",
-    "curves_through",
     "double_roots",
     "replaced",
     "settle_families",
