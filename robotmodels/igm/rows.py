@@ -15,15 +15,15 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import IMPROPER, WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES, plan_kernel
-from .centred import Centred, centred, put_back
+from .chain import far_along_rails
 from .check import checked
-from .components import Components, asked_jacobians
-from .dependent import DependentJoints
-from .gather import MERGE
+from .constraints import Components, asked_jacobians, constraints
+from .families import may_miss_solutions
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled
+from .postures import Postures
+from .redundant import Redundant
 from .singular import complete
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
@@ -77,8 +77,12 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         references = references.copy()
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
-    found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
+    found = _solved(call, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(call, found, references, columns)
+    if call.solver is not None:
+        missing = may_miss_solutions(call.solver, U, found, references[:, columns])
+        reached = rows.status <= IGMStatus.REACHED_FAMILY
+        rows.status[missing & reached] = IGMStatus.INCOMPLETE
     reasons = diagnose(
         model, task, call.solver is None, poses, references, call.limits, call.tolerances,
         rows.status,
@@ -113,7 +117,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     )
 
 
-def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np.int64]) -> Rows:
+def _laid_out(call: Call, found: Postures, references: Array, columns: NDArray[np.int64]) -> Rows:
     """Postures of a chain as rows of a result, in the columns of the model."""
     from ._arrange import arranged
 
@@ -134,18 +138,13 @@ def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np
     return Rows(q, valid, residual, inside, codes, status, labels, most, double, free, family)
 
 
-def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settled:
+def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Postures:
     """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
     assert call.solver is not None
-    chain, components = call.solver.chain, Components(WHOLE_POSE, in_tool_axes=False)
-    where = centred(chain, U, references, components)
-    if where is None:
-        where = Centred(U, references, np.zeros(references.shape))
-    goals, there = np.ascontiguousarray(where.U), np.ones((len(U), 1), np.bool_)
-    found = checked(chain, goals, (q - where.moved)[:, None], there, call.tolerances)
+    chain, there = call.solver.chain, np.ones((len(U), 1), np.bool_)
+    found = checked(chain, U, q[:, None], there, call.tolerances)
     found.family[...] = found.valid
-    settled = complete(chain, goals, found, where.references, call.tolerances)
-    return put_back(chain, U, references, where, settled, components, call.tolerances)
+    return complete(chain, U, found, references, call.tolerances)
 
 
 def rows_by_plan(
@@ -216,19 +215,24 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
     )
 
 
-def _near_or_far(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
-    """Postures of a chain; slides at its ends that are far out are brought back for it."""
+def _solved(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain; poses far along rails at its base are solved beside the origin."""
     task, solver = call.task, call.solver
-    components, where = Components(task.mask, task.in_tool_axes), None
-    if solver is not None and not task.relations:
-        where = centred(solver.chain, U, references, components)
-    if solver is None or where is None:
+    if solver is None or task.relations or not all(task.mask[:3]):
         return _settled(call, U, psi, references)
-    found = _settled(call, np.ascontiguousarray(where.U), psi, where.references)
-    return put_back(solver.chain, U, references, where, found, components, call.tolerances)
+    chain = solver.chain
+    moved, poses = far_along_rails(chain, U)
+    if not moved.any():
+        return _settled(call, U, psi, references)
+    found = _settled(call, poses, psi, references - moved)
+    n, s = np.nonzero(found.valid)
+    wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
+    q, residual, valid = found.q + moved[:, None], found.residual.copy(), found.valid.copy()
+    residual[n, s], valid[n, s] = wanted.met(U[n], q[n, s], call.tolerances)
+    return replace(found, q=q, residual=residual, valid=valid)
 
 
-def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
     """Postures of a chain, infinite families settled and double roots marked."""
     solver, tolerances = call.solver, call.tolerances
     if solver is None:
@@ -252,13 +256,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
     else:
         found = postures(solver, U, references, tolerances)
     whole = call.task.mask == WHOLE_POSE
-    if solver is not None and whole and solver.chain.k <= 6:
-        if isinstance(solver, DependentJoints):
-            # at a value that was only tried the family is not settled yet
-            way = found.q - references[:, None]
-            turns = np.where(solver.chain.sigma == 0, np.round(way / (2.0 * np.pi)), 0.0)
-            way = np.abs(way - 2.0 * np.pi * turns)
-            found.free[np.any(found.free & (way > MERGE), axis=-1)] = False
+    if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
         return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:

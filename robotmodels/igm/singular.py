@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .chain import canonical_frames
 from .check import bits_of, checked
 from .loop import JointChain
 from .motion import jacobians, lever, tool_poses
 from .postures import Postures
 from .self_motions import SelfMotions
-from .shortened import shortened
 from .solver import Tolerances
 
 PERTURBED = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
@@ -157,7 +157,7 @@ def _in_units(
     chain: JointChain, U: Array, found: Postures
 ) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
     """Joint types, constants, lengths of the joints' units, poses, postures in units of the arm."""
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     lengths, goals = np.where(chain.sigma == 1, unit, 1.0), np.array(U, order="C")
     goals[:, :3, 3] /= unit
     q = _filled(found.q, found.valid) / lengths
