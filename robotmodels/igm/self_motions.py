@@ -119,7 +119,7 @@ class SelfMotions:
         null, found = self.null_space(q, held), []
         for v in _null_directions(null):
             for attempt in range(2):
-                y, error = ahead, _ = q, np.inf
+                ahead, y, error = q, q, np.inf
                 for step in (PROBE, -PROBE):
                     ahead = q + step * v
                     y, error = self.corrected(ahead, held, 1)
