@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..errors import RobotNotFoundError
 from ..geometry import DHTable, link_transforms
 from ..inertia import InertialParameters
 from ..model import RobotModel
+from ..symoro import read_par
 from .erd import ERD_ARMS, load_erd
 
 ERD_PREFIX = "erd:"
@@ -31,6 +33,8 @@ CATALOGUE: tuple[str, ...] = (
     "xarm6",
 )  # fmt: skip
 """The robots that the package describes itself: simple ones first, then by maker."""
+
+_FILES = (".urdf", ".xml", ".xacro", ".par")
 
 Rows = list[dict[str, Any]]
 
@@ -110,20 +114,21 @@ def source(name: str) -> str:
     return f"{data['title']}\n\n{data['text'].strip()}\n\nSource: {data['source']}"
 
 
-def load(name: str) -> RobotModel:
-    """Load a robot of the catalogue; also called model or robot factory elsewhere.
+def load(name: str | Path) -> RobotModel:
+    """Load a robot by its name, or from a file; also called robot factory elsewhere.
 
     Parameters
     ----------
-    name : str
-        One of `robots`, for example ``"rx90"``; or ``"erd:<name>"`` for an arm of the package
+    name : str or Path
+        One of `robots`, for example ``"rx90"``; ``"erd:<name>"`` for an arm of the package
         example-robot-data by its name there, for example ``"erd:ur5"``, or one of its arms on a
-        mobile base, for example ``"erd:pr2_left_arm"``.
+        mobile base, for example ``"erd:pr2_left_arm"``; or a file: a URDF (``.urdf``, ``.xml``) or
+        SYMORO's ``.par``. `RobotModel.from_urdf` has the options of URDF files.
 
     Returns
     -------
     RobotModel
-        The robot. `source` names the origin of its numbers.
+        The robot. `source` names the origin of the numbers of the catalogue.
 
     Raises
     ------
@@ -131,12 +136,16 @@ def load(name: str) -> RobotModel:
         The name is unknown; the nearest names are listed.
     MissingExtraError
         An ``erd:`` name, and the data of example-robot-data are not installed.
+    UrdfError, InvalidValueError, FileNotFoundError
+        A file that cannot be read as a robot.
 
     Examples
     --------
     >>> load("rx90").n
     6
     """
+    if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix in _FILES):
+        return read_par(name) if Path(name).suffix == ".par" else RobotModel.from_urdf(Path(name))
     if isinstance(name, str) and name.startswith(ERD_PREFIX):
         return load_erd(name.removeprefix(ERD_PREFIX))
     data = _data(name)
@@ -168,7 +177,7 @@ def _data(name: str) -> dict[str, Any]:
             "robot",
             name,
             robots(),
-            "All names: robots(). A URDF file is read with RobotModel.from_urdf(path).",
+            "All names: robots(). Files are known by their suffix .urdf or .par.",
         )
     return _parsed(name)
 

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
 from operator import index
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_exact, as_vector, read_only
-from ...errors import InvalidValueError, ShapeError, nearest_names
-from ...geometry import PRISMATIC
-from ...model import RobotModel, check_model
-
-if TYPE_CHECKING:
-    from ..singularity_kind import SingularityKind
-    from .singularity_explanation import SingularityFactor
+from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
+from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..geometry import PRISMATIC
+from ..kinematics import SingularityKind
+from ..model import RobotModel, check_model
+from .factor import SingularityFactor
+from .singularities import explain_singularities
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +37,7 @@ class SingularityMap(Rebuilt):
     values : ndarray, shape (na, nb)
         Entry [a, b] belongs to ``first[a]``, ``second[b]``.
     label : str
-        What the values are, such as ``"elbow: C3"``.
+        The quantity, such as ``"elbow: C3"``.
     units : tuple of str, length 3
         Units of ``first``, ``second`` and ``values``, such as ``("rad", "rad", "m^2")``; ``"1"``
         where there is none.
@@ -63,14 +60,14 @@ class SingularityMap(Rebuilt):
     units: tuple[str, str, str]
 
     def __repr__(self) -> str:
-        names, units, size = self.names, self.units, self.values.shape
-        unit = "" if units[2] == "1" else f" {units[2]}"
+        unit = "" if self.units[2] == "1" else f" {self.units[2]}"
         text = "no values"
         if self.values.size:
             text = f"{self.values.min():.4g} to {self.values.max():.4g}{unit}"
+        size = " by ".join(map(str, self.values.shape))
         return (
-            f"<SingularityMap of {self.model_name} over {names[0]} and {names[1]}, {size[0]} by "
-            f"{size[1]}: {self.label:.60} from {text}>"
+            f"<SingularityMap of {self.model_name} over {' and '.join(self.names)}, {size}: "
+            f"{self.label:.60} from {text}>"
         )
 
 
@@ -91,7 +88,7 @@ def singularity_map(
     joints : pair of int or str
         Columns of q, from 0, or names of two different joints.
     at : array_like, shape (n,), optional
-        Where the other joints stand, rad or m; default all zero.
+        Values of the other joints, rad or m; default all zero.
     samples : pair of int, optional
         Numbers of values of each joint, at least 1.
     factor : SingularityFactor or SingularityKind, optional
@@ -111,7 +108,7 @@ def singularity_map(
     ShapeError, InvalidValueError
         ``joints`` are not two different joints, ``at``, ``samples`` or ``ranges`` do not fit,
         a prismatic joint has no limits, several or no factors are of the kind, or the robot has
-        no determinant (it is redundant, say): choose a factor.
+        no determinant (it is redundant, for instance): choose a factor.
 
     References
     ----------
@@ -124,38 +121,40 @@ def singularity_map(
     >>> grid.names, float(grid.values[1, 0])
     (('joint_3', 'joint_5'), 0.0)
     """
-    from .explain_singularities import explain_singularities
-    from .singularity_explanation import SingularityFactor
-
     check_model(model)
     columns = _columns(model, joints)
     q = np.zeros(model.n) if at is None else as_vector(at, model.n, "at")
     if q.ndim != 1:
         raise ShapeError(f"at: expected one configuration ({model.n},), got shape {q.shape}.")
     counts = _counts(samples)
-    axes = [
-        np.linspace(low, high, count)
-        for (low, high), count in zip(_ranges(model, columns, ranges), counts, strict=True)
-    ]
+    limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
+    for low, high in limits:
+        if low >= high:
+            raise InvalidValueError(
+                f"ranges: expected the lower value first, got {low:g} and {high:g}."
+            )
+    axes = [np.linspace(limits[k, 0], limits[k, 1], counts[k]) for k in range(2)]
     grid = np.tile(q, (*counts, 1))
     grid[..., columns[0]] = axes[0][:, None]
     grid[..., columns[1]] = axes[1]
     if factor is None:
-        _refuse_redundant(model)
+        # more joints than six never make a square matrix: no formulas are needed to know
+        count = int(np.isin(model.table.joint_rows + 1, model.twin.frame(None).path).sum())
+        if count > 6:
+            raise InvalidValueError(
+                f"{model.name}: there is no determinant ({count} joints move the tool, the matrix "
+                "is not square); pass one of explain_singularities(model).factors as factor."
+            )
         explanation = explain_singularities(model)
-        values = explanation.determinant(grid)
-        label, unit = "determinant", explanation.unit
+        values, label, unit = explanation.determinant(grid), "determinant", explanation.unit
     else:
-        chosen = (
-            factor
-            if isinstance(factor, SingularityFactor)
-            else explain_singularities(model).factor(factor)
-        )
-        values = chosen.values(grid)
-        label, unit = f"{chosen.kind.value}: {chosen.text}", chosen.unit
+        if not isinstance(factor, SingularityFactor):
+            factor = explain_singularities(model).factor(factor)
+        values, unit = factor.values(grid), factor.unit
+        label = f"{factor.kind.value}: {factor.text}"
     rows = model.table.joint_rows[columns]
-    own = tuple("m" if model.table.sigma[row] == PRISMATIC else "rad" for row in rows)
-    names = tuple(str(model.table.names[row]) for row in rows)
+    own = ["m" if model.table.sigma[row] == PRISMATIC else "rad" for row in rows]
+    names = [str(model.table.names[row]) for row in rows]
     return SingularityMap(
         model_name=model.name,
         joints=read_only(columns, np.int64),
@@ -168,47 +167,30 @@ def singularity_map(
     )
 
 
-def _refuse_redundant(model: RobotModel) -> None:
-    """More joints than six never make a square matrix: no formulas are needed to know."""
-    count = int(np.isin(model.table.joint_rows + 1, model.twin.frame(None).path).sum())
-    if count > 6:
-        raise InvalidValueError(
-            f"{model.name}: there is no determinant ({count} joints move the tool, the matrix is "
-            "not square); pass one of explain_singularities(model).factors as factor."
-        )
-
-
 def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
     names = [str(model.table.names[row]) for row in model.table.joint_rows]
-    if (
-        isinstance(joints, str)
-        or not isinstance(joints, (Sequence, np.ndarray))
-        or len(joints) != 2
-    ):
+    if not isinstance(joints, (list, tuple, np.ndarray)) or len(joints) != 2:
         raise InvalidValueError(
             f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
         )
+    known: dict[int | str, int] = {k: k for k in range(model.n)}
+    known |= {name: k for k, name in enumerate(names)}
     columns = []
     for joint in joints:
-        if isinstance(joint, str):
-            if joint not in names:
-                near = nearest_names(joint, names) or names
-                raise InvalidValueError(
-                    f"joints: no joint is called {joint!r}; there is {', '.join(near)}."
-                )
-            columns.append(names.index(joint))
-            continue
-        try:
-            column = index(joint)
-        except TypeError:
+        if isinstance(joint, str) and joint not in names:
+            near = nearest_names(joint, names) or names
             raise InvalidValueError(
-                f"joints: expected columns of q or names of joints, got {joint!r}."
-            ) from None
-        if isinstance(joint, (bool, np.bool_)) or not 0 <= column < model.n:
-            raise InvalidValueError(
-                f"joints: columns of q run from 0 to {model.n - 1}, got {joint!r}."
+                f"joints: no joint is called {joint!r}; there is {', '.join(near)}."
             )
-        columns.append(column)
+        if (
+            isinstance(joint, bool)
+            or not isinstance(joint, (int, np.integer, str))
+            or (joint not in known)
+        ):
+            raise InvalidValueError(
+                f"joints: expected names or columns of q from 0 to {model.n - 1}, got {joint!r}."
+            )
+        columns.append(known[joint])
     if columns[0] == columns[1]:
         raise InvalidValueError(f"joints: expected two different joints, got {joints!r}.")
     return columns
@@ -216,38 +198,25 @@ def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
 
 def _counts(samples: tuple[int, int]) -> tuple[int, int]:
     try:
-        first, second = (index(count) for count in samples)
+        first, second = map(index, samples)
     except (TypeError, ValueError):
-        raise InvalidValueError(
-            f"samples: expected two whole numbers such as (121, 121), got {samples!r}."
-        ) from None
+        first, second = 0, 0
     if min(first, second) < 1:
-        raise InvalidValueError(f"samples: expected at least one value a joint, got {samples!r}.")
+        raise InvalidValueError(
+            f"samples: expected two whole numbers of at least 1, as (121, 121), got {samples!r}."
+        )
     return first, second
 
 
-def _ranges(
-    model: RobotModel, columns: list[int], ranges: ArrayLike | None
-) -> list[tuple[float, float]]:
-    if ranges is not None:
-        pairs = [(float(low), float(high)) for low, high in as_exact(ranges, (2, 2), "ranges")]
-        for low, high in pairs:
-            if low >= high:
-                raise InvalidValueError(
-                    f"ranges: expected the lower value first, got {low:g} and {high:g}."
-                )
-        return pairs
-    found = []
-    for column in columns:
-        low, high = float(model.lower[column]), float(model.upper[column])
-        row = model.table.joint_rows[column]
+def _limits(model: RobotModel, columns: list[int]) -> Array:
+    limits = np.stack([model.lower[columns], model.upper[columns]], axis=1)
+    for k, row in enumerate(model.table.joint_rows[columns]):
+        if np.isfinite(limits[k]).all():
+            continue
         if model.table.sigma[row] == PRISMATIC:
-            if not np.isfinite([low, high]).all():
-                raise InvalidValueError(
-                    f"ranges: the prismatic joint {model.table.names[row]!r} has no limits; pass "
-                    "the ranges of both joints, such as [[-3.1, 3.1], [0, 0.5]]."
-                )
-        elif not np.isfinite([low, high]).all():
-            low, high = -pi, pi
-        found.append((low, high))
-    return found
+            raise InvalidValueError(
+                f"ranges: the prismatic joint {model.table.names[row]!r} has no limits; pass "
+                "the ranges of both joints, such as [[-3.1, 3.1], [0, 0.5]]."
+            )
+        limits[k] = -np.pi, np.pi
+    return limits
