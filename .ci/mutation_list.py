@@ -50,6 +50,7 @@ LEVELS = (
     " tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[3-7]"
     " tests/test_ikm_levels.py::test_the_least_motion_that_meets_all_levels"
 )
+FIGURES, FITS, SCENES = (f"tests/test_viz_{name}.py" for name in ("figures", "fits", "scenes"))
 RAMPS = (
     "tests/test_trajectories.py"
     " -k (least_times_of_smooth or (derivatives and not cubic and not quintic))"
@@ -1104,4 +1105,50 @@ MUTATIONS = [
     Mutation("regressors: filter", "torques are those at the end of each period",
         "def filtered_torque(", "0.5 * (signal[1:] + signal[:-1])", "signal[1:]",
         "tests/test_regressors.py -k means_of_neighbours"),
+    # --- pictures --------------------------------------------------------------------------------
+    Mutation("viz: figures", "the curve of another joint is drawn", "def quantity_over_time(",
+        "motion.values[order][:, joints]", "motion.values[order][:, [j - 1 for j in joints]]",
+        f"{FIGURES} -k trajectory_is_drawn"),
+    Mutation("viz: figures", "lower limits are left out", "def lines_over_time(",
+        "limit_lines(axes, lower, names, numbers)", "pass", f"{FIGURES} -k limits_are_dashed"),
+    Mutation("viz: figures", "limits are drawn in radians where the axis is in degrees",
+        "def quantity_over_time(", "unit.factor * lower[joints]", "lower[joints]",
+        f"{FIGURES} -k limits_are_dashed"),
+    Mutation("viz: figures", "upper joint limits of a map are its lower ones",
+        "def _hatch_outside(", "k * model.upper[j]", "k * model.lower[j]",
+        f"{FIGURES} -k maps_show_limits"),
+    Mutation("viz: figures", "missing linear and angular velocity are exchanged", "def _method(",
+        "(slice(0, 3), slice(3, 6))", "(slice(3, 6), slice(0, 3))",
+        f"{FIGURES} -k inverse_velocities_are_drawn"),
+    Mutation("viz: figures", "an ellipse of a projection has the roots of its radii",
+        "def _border(", "np.where(unbounded, 0.0, r) ** 2", "np.where(unbounded, 0.0, r)",
+        f"{FIGURES} -k projections"),
+    Mutation("viz: figures", "the total torque is its inertial part", "def plot_torque_parts(",
+        "total = parts.total[:, shown]", "total = parts.inertia[:, shown]",
+        f"{FIGURES} -k torque_parts_add_up"),
+    Mutation("viz: fits", "residuals after a calibration are those before it",
+        "def plot_calibration_residuals(", '(places[1], "after"', '(places[1], "before"',
+        f"{FITS} -k residuals_are_those"),
+    Mutation("viz: fits", "true corrections count from the nominal base and tool",
+        "values = np.full(len(found.names), np.nan)", "return values - moved", "return values",
+        f"{FITS} -k known_truth"),
+    Mutation("viz: fits", "envelopes of long signals lose their upper peaks", "def _envelope(",
+        "groups.argmax(axis=1)", "groups.argmin(axis=1)", f"{FITS} -k torques_are_those"),
+    Mutation("viz: fits", "effects are weighted by the standard deviation once",
+        "def _effects(", "w * w * (R**2)", "w * (R**2)", f"{FITS} -k effects"),
+    Mutation("viz: scenes", "frames stand at the pose of the first one", "def _frames(",
+        "nodes.append(Node(path, constant[k]))", "nodes.append(Node(path, constant[0]))",
+        f"{SCENES} -k hold_the_poses"),
+    Mutation("viz: scenes", "an animation ends before its last sample", "def keyframes(times",
+        "np.linspace(0.0, times[-1], count)", "np.linspace(0.0, times[-2], count)",
+        f"{SCENES} -k plays_every_motion"),
+    Mutation("viz: scenes", "coupled joints have the other offset",
+        "def coupling(model: RobotModel) -> tuple[NDArray",
+        "q_0 - C @ q_0[independent]", "q_0 + C @ q_0[independent]", f"{SCENES} -k coupled_joints"),
+    Mutation("viz: scenes", "the camera looks along axes of the world that it does not have",
+        "def _y_upwards(", "[x, z, -y]", "[x, y, z]", f"{SCENES} -k camera"),
+    Mutation("viz: scenes", "a cut ellipsoid has the wrong width",
+        "def _ellipsoid_surface(",
+        "np.sqrt(1.0 - (along / radii[axis]) ** 2)", "np.sqrt(1.0 - along / radii[axis])",
+        f"{SCENES} -k long_ellipsoid"),
 ]

@@ -123,11 +123,7 @@ def plot_torque_parts(
 
 
 def _split(
-    model: RobotModel,
-    motion: Any,
-    wrench: ArrayLike | None,
-    drive: bool,
-    friction: Friction | None,
+    model: RobotModel, motion: Any, wrench: ArrayLike | None, drive: bool, friction: Friction | None
 ) -> tuple[Array, TorqueParts]:
     """Times and parts of the torques."""
     if isinstance(motion, Simulation):

@@ -328,10 +328,7 @@ def plot_identification_correlations(
 
 @style.plot
 def plot_excitation(
-    found: ExcitingTrajectory,
-    *,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    found: ExcitingTrajectory, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
     """Motion and torques of an exciting trajectory within their limits, and its search.
 

@@ -280,11 +280,7 @@ def _draw_conditioning(axes: Axes, x: Array, conditioning: Array) -> None:
 
 
 def _draw_event(
-    axes: Axes,
-    above: Sequence[Axes],
-    row: int,
-    kind: PathEventKind,
-    span: tuple[float, float],
+    axes: Axes, above: Sequence[Axes], row: int, kind: PathEventKind, span: tuple[float, float]
 ) -> None:
     """A bar with marked ends, and shades or lines in the panels above."""
     text, color, marker = _EVENTS[kind]
