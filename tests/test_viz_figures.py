@@ -17,7 +17,7 @@ import robotmodels as rm
 from robotmodels import se3, simulation, viz
 from robotmodels import trajectories as tr
 from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
-from robotmodels.kinematics.formulas.singularity_map import SingularityMap
+from robotmodels.symbolic import SingularityMap
 
 H = np.pi / 2
 RX90 = rm.load("rx90").with_drive(

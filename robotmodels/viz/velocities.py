@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, as_reals, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
-from ..kinematics.formulas.singularity_map import SingularityMap
 from ..kinematics.inverse.solution import IKMSolution
 from ..model import RobotModel
+from ..symbolic import SingularityMap
 from ..trajectories.limits import MotionLimits
 from . import over_time, style
 from .over_time import Unit
