@@ -1211,6 +1211,7 @@ MUTATIONS = [
         "def _y_upwards(", "[x, z, -y]", "[x, y, z]", f"{SCENES} -k camera"),
     Mutation("viz: scenes", "a cut ellipsoid has the wrong width",
         "def _ellipsoid_surface(",
-        "np.sqrt(1.0 - (along / radii[axis]) ** 2)", "np.sqrt(1.0 - along / radii[axis])",
+        "((across / radii[others, None, None]) ** 2).sum(axis=0)",
+        "np.abs(across / radii[others, None, None]).sum(axis=0)",
         f"{SCENES} -k long_ellipsoid"),
 ]
