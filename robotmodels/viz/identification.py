@@ -390,7 +390,8 @@ def plot_excitation(
     labels = over_time.joint_names(None, n, model)
     columns = over_time.joints_by_unit(over_time.joint_units(None, n, model))
     figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * n, size, rows=0)
-    above, below = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
+    above, below = parts
     grid = above.subplots(rows, len(columns), squeeze=False, sharex=True)
     sigma = model.table.sigma[model.table.joint_rows]
     for column, (unit, joints) in zip(grid.T, columns.items(), strict=True):

@@ -109,7 +109,7 @@ def page(
         "depth": round(camera.depth, 6),
         "panel": panel,
     }
-    viewer = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
+    viewer = Path(str(meshcat.__file__)).parent / "viewer" / "dist" / "main.min.js"
     items = (
         f'<li><span style="background: #{_rgb(color):06x}"></span>{escape(text)}</li>'
         for text, color in legend
