@@ -42,14 +42,14 @@ COORDINATES = (
 )
 RATES = "tests/test_operational_coordinates.py -k (rates_of_rates or difference_of_coordinates)"
 BOUNDS = (
-    "tests/test_ikm_bounds.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
-    " tests/test_ikm_bounds.py::test_levels_under_bounds[7-sizes0]"
-    " tests/test_ikm_bounds.py::test_a_drift_that_cannot_be_held_is_met_in_part"
+    "tests/test_ikm_levels.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
+    " tests/test_ikm_levels.py::test_levels_under_bounds[7-sizes0]"
+    " tests/test_ikm_levels.py::test_a_drift_that_cannot_be_held_is_met_in_part"
 )
 LEVELS = (
     "tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[6-3]"
     " tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[3-7]"
-    " tests/test_ikm_levels.py::test_the_least_motion_that_meets_all_levels"
+    " tests/test_ikm_levels.py::test_each_level_is_met_as_well_as_the_higher_ones_let_it"
 )
 RAMPS = (
     "tests/test_trajectories.py"
@@ -218,20 +218,20 @@ MUTATIONS = [
     Mutation("kernels: singular values", "rotations turn the other way", "def orthogonal_rows(",
         "B[i, c] = cosine * x - sine * y", "B[i, c] = cosine * x + sine * y",
         "tests/test_ikm.py -k decomposition"),
-    Mutation("kernels: singular values", "they are not sorted again at the end",
-        "def orthogonal_rows(", "if descending(lengths, p) >= 0:",
-        "if descending(lengths, p) >= p:", "tests/test_ikm.py -k decomposition"),
+    Mutation("kernels: singular values", "the last of them is not sorted",
+        "def orthogonal_rows(", "sort_rows(B, p, w, lengths)", "sort_rows(B, p - 1, w, lengths)",
+        "tests/test_ikm.py -k decomposition"),
     Mutation("kernels: inverse velocity", "a damped direction forgets its square",
-        "def inverse_factors(", "sigma[i] / (sigma[i] * sigma[i] + square)",
-        "sigma[i] / (sigma[i] + square)", "tests/test_ikm.py -k every_method"),
+        "def inverse_factors(", "bottom = sigma[i] * sigma[i] + square",
+        "bottom = sigma[i] + square", "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "filtered directions: 3 - 2 x becomes 3 + 2 x",
         "def inverse_factors(", "ratio * (3.0 - 2.0 * ratio)", "ratio * (3.0 + 2.0 * ratio)",
         "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "what a secondary motion does to the task is added",
-        "def solve_row(", "z[j] -= total * work[i, first + j]",
-        "z[j] += total * work[i, first + j]", "tests/test_ikm.py -k never_disturbs"),
+        "def inverse_velocities(", "z[j] -= along * work[r, j]",
+        "z[j] += along * work[r, j]", "tests/test_ikm.py -k never_disturbs"),
     Mutation("kernels: inverse velocity", "weights of joints are applied once",
-        "def inverse_velocities(", "out[i, j] = column_scale[j] * y[j]", "out[i, j] = y[j]",
+        "def inverse_velocities(", "out[i, j] = scales[M + j] * y[j]", "out[i, j] = y[j]",
         "tests/test_ikm.py -k weights_make"),
     Mutation("kinematics: statics", "a moment is carried with the lever reversed",
         "def transported_wrench(", "np.cross(P, force)", "np.cross(force, P)",
@@ -253,8 +253,8 @@ MUTATIONS = [
         "def level_velocities(\n    J: Floats", "rest[a] -= A[a, j] * x[j]",
         "rest[a] += A[a, j] * x[j]", LEVELS),
     Mutation("kernels: levels",
-        "left and right singular vectors exchanged where rows outnumber freedoms",
-        "def decomposed(W: Floats", "V[i, c] = B[i, m + c]", "V[c, i] = B[i, m + c]", LEVELS),
+        "left singular vectors as columns", "def decomposed(W: Floats", "U[i, c] = B[i, f + c]",
+        "U[c, i] = B[i, f + c]", LEVELS),
     Mutation("kernels: levels", "what fits is left in the part to be scaled",
         "# No part of the rate alone fits", "w[j] -= x[j]", "w[j] += x[j]", BOUNDS),
     # --- description -----------------------------------------------------------------------------
@@ -314,8 +314,8 @@ MUTATIONS = [
     Mutation("coordinates: Jacobian", "axes of the frame for those of the world",
         "def coordinate_jacobian(", "@ jacobian(model, q, frame)",
         '@ jacobian(model, q, frame, "local")', RATES),
-    Mutation("coordinates: rates", "the derivative of c / s takes s once", "def _angle_rates_rate(",
-        "-dtheta / s**2", "-dtheta / s", RATES),
+    Mutation("coordinates: rates", "the third axis turns the other way", "def _angle_rates_rate(",
+        "np.cross(w, B[..., 2])", "np.cross(B[..., 2], w)", RATES),
     Mutation("coordinates: rates", "rate of [v]^2 takes one product twice",
         "def _vector_rates_rate(", "dS @ S + S @ dS", "2 * dS @ S", RATES),
     Mutation("coordinates: quaternions", "one product of the rotation with the other sign",
@@ -324,7 +324,7 @@ MUTATIONS = [
     Mutation("coordinates: quaternions", "a sequence's sign is that of the first sample alone",
         "def continuous_quaternions(", "np.cumprod(signs)", "signs", COORDINATES),
     Mutation("coordinates: vectors", "slope of gamma beyond the series",
-        "def inverse_left_factor_slope(", "0.5 * turning", "turning", RATES),
+        "def inverse_left_factor_slope(", "1.5 * gamma", "0.5 * gamma", RATES),
     Mutation("coordinates: conversion", "normal of two axes: a x n for n x a",
         "def pose_from_coordinates(", "np.cross(axes[..., 0, :], axes[..., 1, :])",
         "np.cross(axes[..., 1, :], axes[..., 0, :])", COORDINATES),

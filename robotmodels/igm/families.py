@@ -16,7 +16,7 @@ from .closed_form import prepare_closed_form
 from .constraints import WHOLE, Components, constraints
 from .elimination import prepare_elimination
 from .loop import JointChain
-from .neighbour import prepare_neighbour
+from .nominal import prepare_nominal
 from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
@@ -68,7 +68,7 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
 
 def _of_six_joints(chain: JointChain) -> Solver | None:
     """Closed forms first, then the structured neighbour, elimination and search."""
-    solver = prepare_closed_form(chain) or prepare_neighbour(chain)
+    solver = prepare_closed_form(chain) or prepare_nominal(chain)
     if solver is not None:
         return solver
     elimination = prepare_elimination(chain)
