@@ -35,20 +35,21 @@ COMPENSATOR = (
     "tests/test_gravity_compensator.py -k (slope_of_the_energy or forces_by_hand or its_work)"
 )
 CASES = "tests/test_kernels_cases.py"
+REDUCED, REDUNDANT = "tests/test_igm_reduced.py", "tests/test_igm_redundant.py"
 COORDINATES = (
     "tests/test_operational_coordinates.py"
     " -k (of_scipy or nearest_of_all or random_poses or each_sample)"
 )
 RATES = "tests/test_operational_coordinates.py -k (rates_of_rates or difference_of_coordinates)"
 BOUNDS = (
-    "tests/test_ikm_bounds.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
-    " tests/test_ikm_bounds.py::test_levels_under_bounds[7-sizes0]"
-    " tests/test_ikm_bounds.py::test_a_drift_that_cannot_be_held_is_met_in_part"
+    "tests/test_ikm_levels.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
+    " tests/test_ikm_levels.py::test_levels_under_bounds[7-sizes0]"
+    " tests/test_ikm_levels.py::test_a_drift_that_cannot_be_held_is_met_in_part"
 )
 LEVELS = (
     "tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[6-3]"
     " tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[3-7]"
-    " tests/test_ikm_levels.py::test_the_least_motion_that_meets_all_levels"
+    " tests/test_ikm_levels.py::test_each_level_is_met_as_well_as_the_higher_ones_let_it"
 )
 RAMPS = (
     "tests/test_trajectories.py"
@@ -217,20 +218,20 @@ MUTATIONS = [
     Mutation("kernels: singular values", "rotations turn the other way", "def orthogonal_rows(",
         "B[i, c] = cosine * x - sine * y", "B[i, c] = cosine * x + sine * y",
         "tests/test_ikm.py -k decomposition"),
-    Mutation("kernels: singular values", "they are not sorted again at the end",
-        "def orthogonal_rows(", "if descending(lengths, p) >= 0:",
-        "if descending(lengths, p) >= p:", "tests/test_ikm.py -k decomposition"),
+    Mutation("kernels: singular values", "the last of them is not sorted",
+        "def orthogonal_rows(", "sort_rows(B, p, w, lengths)", "sort_rows(B, p - 1, w, lengths)",
+        "tests/test_ikm.py -k decomposition"),
     Mutation("kernels: inverse velocity", "a damped direction forgets its square",
-        "def inverse_factors(", "sigma[i] / (sigma[i] * sigma[i] + square)",
-        "sigma[i] / (sigma[i] + square)", "tests/test_ikm.py -k every_method"),
+        "def inverse_factors(", "bottom = sigma[i] * sigma[i] + square",
+        "bottom = sigma[i] + square", "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "filtered directions: 3 - 2 x becomes 3 + 2 x",
         "def inverse_factors(", "ratio * (3.0 - 2.0 * ratio)", "ratio * (3.0 + 2.0 * ratio)",
         "tests/test_ikm.py -k every_method"),
     Mutation("kernels: inverse velocity", "what a secondary motion does to the task is added",
-        "def solve_row(", "z[j] -= total * work[i, first + j]",
-        "z[j] += total * work[i, first + j]", "tests/test_ikm.py -k never_disturbs"),
+        "def inverse_velocities(", "z[j] -= along * work[r, j]",
+        "z[j] += along * work[r, j]", "tests/test_ikm.py -k never_disturbs"),
     Mutation("kernels: inverse velocity", "weights of joints are applied once",
-        "def inverse_velocities(", "out[i, j] = column_scale[j] * y[j]", "out[i, j] = y[j]",
+        "def inverse_velocities(", "out[i, j] = scales[M + j] * y[j]", "out[i, j] = y[j]",
         "tests/test_ikm.py -k weights_make"),
     Mutation("kinematics: statics", "a moment is carried with the lever reversed",
         "def transported_wrench(", "np.cross(P, force)", "np.cross(force, P)",
@@ -252,8 +253,8 @@ MUTATIONS = [
         "def level_velocities(\n    J: Floats", "rest[a] -= A[a, j] * x[j]",
         "rest[a] += A[a, j] * x[j]", LEVELS),
     Mutation("kernels: levels",
-        "left and right singular vectors exchanged where rows outnumber freedoms",
-        "def decomposed(W: Floats", "V[i, c] = B[i, m + c]", "V[c, i] = B[i, m + c]", LEVELS),
+        "left singular vectors as columns", "def decomposed(W: Floats", "U[i, c] = B[i, f + c]",
+        "U[c, i] = B[i, f + c]", LEVELS),
     Mutation("kernels: levels", "what fits is left in the part to be scaled",
         "# No part of the rate alone fits", "w[j] -= x[j]", "w[j] += x[j]", BOUNDS),
     # --- description -----------------------------------------------------------------------------
@@ -313,8 +314,8 @@ MUTATIONS = [
     Mutation("coordinates: Jacobian", "axes of the frame for those of the world",
         "def coordinate_jacobian(", "@ jacobian(model, q, frame)",
         '@ jacobian(model, q, frame, "local")', RATES),
-    Mutation("coordinates: rates", "the derivative of c / s takes s once", "def _angle_rates_rate(",
-        "-dtheta / s**2", "-dtheta / s", RATES),
+    Mutation("coordinates: rates", "the third axis turns the other way", "def _angle_rates_rate(",
+        "np.cross(w, B[..., 2])", "np.cross(B[..., 2], w)", RATES),
     Mutation("coordinates: rates", "rate of [v]^2 takes one product twice",
         "def _vector_rates_rate(", "dS @ S + S @ dS", "2 * dS @ S", RATES),
     Mutation("coordinates: quaternions", "one product of the rotation with the other sign",
@@ -323,7 +324,7 @@ MUTATIONS = [
     Mutation("coordinates: quaternions", "a sequence's sign is that of the first sample alone",
         "def continuous_quaternions(", "np.cumprod(signs)", "signs", COORDINATES),
     Mutation("coordinates: vectors", "slope of gamma beyond the series",
-        "def inverse_left_factor_slope(", "0.5 * turning", "turning", RATES),
+        "def inverse_left_factor_slope(", "1.5 * gamma", "0.5 * gamma", RATES),
     Mutation("coordinates: conversion", "normal of two axes: a x n for n x a",
         "def pose_from_coordinates(", "np.cross(axes[..., 0, :], axes[..., 1, :])",
         "np.cross(axes[..., 1, :], axes[..., 0, :])", COORDINATES),
@@ -560,12 +561,41 @@ MUTATIONS = [
     Mutation("igm: numeric", "whole turns lead away from the start", "def _in_range(",
         "np.rint((self.first[rows] - q) / turn)", "np.rint((q - self.first[rows]) / turn)",
         "tests/test_igm_numeric.py -k whole_turns"),
-    Mutation("igm: three prismatic joints", "elimination adds to the right-hand side",
-        "def three_lengths(", "g[i] -= share * g[best]", "g[i] += share * g[best]",
-        CASES + " -k lengths_along"),
-    Mutation("igm: three prismatic joints", "a dependent direction's reference is added",
-        "def three_lengths(", "value -= Z[row, j]", "value += Z[row, j]",
-        CASES + " -k lengths_along"),
+    Mutation("igm: search", "a held joint moves", "def refined(wanted", "J[:, :, at] = 0.0",
+        "J[:, :, at] *= 1.0", REDUNDANT + " -k planar"),
+    Mutation("igm: search", "steps along a self-motion end before its turning point",
+        "def nearest_value(", "longest > 1e-6", "longest > 1e-2",
+        REDUNDANT + " -k planar"),
+    Mutation("igm: search", "a self-motion at a singular pose is a double root",
+        "def completed(", "if joint is None:", "if joint is not None:",
+        REDUCED + " -k double_roots"),
+    Mutation("igm: redundant", "the last joint that can be undone takes the reference",
+        "def redundant_joint(", "np.argmax(part.max(axis=0) > SHARE)",
+        "len(part[0]) - 1 - np.argmax(part.max(axis=0)[::-1] > SHARE)",
+        REDUNDANT + " -k planar"),
+    Mutation("igm: redundant", "any value of the joint counts as the nearest",
+        "def _nearest(solver: Redundant",
+        "there = d <= best[pose] + SAME", "there = d <= best[pose] + 9.0",
+        REDUNDANT + " -k planar"),
+    Mutation("igm: constraints", "the Jacobian of a freed rotation with the other sign",
+        "def linearised(self, U", "about + np.cross(about, Q[:, None, 1:])",
+        "about - np.cross(about, Q[:, None, 1:])", REDUCED + " -k 111001-tool"),
+    Mutation("igm: relations", "a relation of angles holds at one turn only",
+        "def relation_errors(", "r - turn * np.round(r / turn), r)", "r, r)",
+        REDUNDANT + " -k obey_a_relation", compiled=True),
+    Mutation("igm: masks", "a freed world axis is seen from the tool the other way round",
+        "def _freed_joints(", "R.T @ world[:3, :3]", "R @ world[:3, :3]",
+        REDUCED + " -k xarm5-111110"),
+    Mutation("igm: masks", "the rotation about the only axis is taken the other way round",
+        "def _(solver: OneAxis", "angle = 2.0 * np.arctan2", "angle = -2.0 * np.arctan2",
+        REDUCED + " -k planar_3r-110001-world"),
+    Mutation("igm: virtual joints", "a point behind a joint is left in the frame before it",
+        "def virtual_joints(", "centre = (se3.inverse(D)", "centre = (D", REDUCED + " -k RRRRR"),
+    Mutation("igm: rails", "the pose moves further out along a rail", "def far_along_rails(",
+        "poses[:, :3, 3] -= moved", "poses[:, :3, 3] += moved", REDUNDANT + " -k how_far_a_rail"),
+    Mutation("igm: status", "what a search found counts as all there is",
+        "def may_miss_solutions(", "(np.abs(d) > 1e-9)", "(np.abs(d) > 1e9)",
+        REDUNDANT + " -k planar"),
     Mutation("igm: point", "the product of two sines and cosines: half of cos 2x",
         "def add_product(", "0.5 * (cc - ss)", "(cc - ss)",
         "tests/test_igm_cases.py -k wrists_behind"),

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from robotmodels import se3
-from robotmodels.errors import InvalidValueError
+from robotmodels.igm import igm
 from robotmodels.igm.arm_angle import arm_angle_of, arm_angle_postures, prepare_arm_angle
-from robotmodels.igm.families import prepare
-from robotmodels.igm.lock import at_ends, locked_chain, prepare_locked
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.solver import Tolerances, postures
+from robotmodels.kinematics import dgm
 from robotmodels.robots import load
 
 ARMS = (
@@ -377,66 +376,22 @@ LOCKED = [(name, joint) for name in ("iiwa14", "panda", "erd:xarm7") for joint i
 
 @pytest.mark.parametrize(("name", "joint"), LOCKED)
 def test_any_joint_may_be_locked(name, joint):
-    chain = joint_chain(load(name))
+    model = load(name)
     q = random_postures(40, seed=13)
     q[:, joint] = 0.7
-    U = poses(chain, q)
-    solver = prepare_locked(chain, {joint: 0.7}, prepare)
-    found = postures(solver, U, q, Tolerances())
-    there = found.valid
-    assert np.abs(poses(chain, found.q) - U[:, None])[there].max() <= 1e-12
-    assert np.all(found.q[there][:, joint] == 0.7)
+    T = dgm(model, q)
+    found = igm(model, T, q, lock={joint: 0.7})
+    n, s = np.nonzero(found.valid)
+    assert np.abs(dgm(model, found.q[n, s]) - T[n]).max() <= 1e-12
+    assert np.all(found.q[n, s, joint] == 0.7)
     assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    assert np.all((there.sum(axis=1) + found.double.sum(axis=1)) % 2 == 0)
-    assert not found.free[..., joint].any()
-
-
-def test_one_value_for_each_pose():
-    chain = joint_chain(load("panda"))
-    q = random_postures(12, seed=14)
-    q[:, 6] = np.array([0.3, -1.0, 2.0])[np.arange(12) % 3]
-    U = poses(chain, q)
-    many = prepare_locked(chain, {6: q[:, 6]}, prepare)
-    assert len(many.solvers) == 3
-    found = postures(many, U, q, Tolerances())
-    assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    for n in range(3):
-        one = postures(
-            prepare_locked(chain, {6: q[n, 6]}, prepare), U[n : n + 1], q[n : n + 1], Tolerances()
-        )
-        S = one.q.shape[1]
-        np.testing.assert_array_equal(found.q[n, :S], one.q[0])
-        assert not found.valid[n, S:].any()
+    assert np.all((found.count + found.double.sum(axis=1)) % 2 == 0)
+    assert not found.free_joints[..., joint].any()
 
 
 def test_two_locked_joints_leave_a_robot_of_five():
-    chain = joint_chain(load("iiwa14"))
+    model = load("iiwa14")
     q = random_postures(20, seed=15)
     q[:, [2, 5]] = 0.4, 0.8
-    solver = prepare_locked(chain, {5: 0.8, 2: 0.4}, prepare)
-    found = postures(solver, poses(chain, q), q, Tolerances())
+    found = igm(model, dgm(model, q), q, lock={5: 0.8, 2: 0.4})
     assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    assert "joints 3, 6 locked" in solver.method
-
-
-@pytest.mark.parametrize("sigma", [(0, 0, 0, 0, 0, 0, 0), (1, 0, 0, 1, 0, 0, 0)])
-def test_a_locked_joint_is_a_constant(sigma, rng):
-    chain = random_arm("random skew", seed=16)
-    chain = JointChain(np.array([4, 1, 0, 7, 9, 2, 3]), np.array(sigma), chain.D, np.eye(4))
-    q = rng.normal(size=(5, 7))
-    whole = poses(chain, q)
-    for n in range(5):
-        shorter = locked_chain(chain, {0: q[n, 0], 3: q[n, 3], 6: q[n, 6]})
-        assert shorter.columns.tolist() == [1, 0, 9, 2]
-        np.testing.assert_allclose(poses(shorter, q[n, [1, 2, 4, 5]]), whole[n], atol=1e-14)
-    inner, U = at_ends(chain, whole, q[:, :2], q[:, 6:])
-    assert inner.columns.tolist() == [0, 7, 9, 2]
-    np.testing.assert_allclose(poses(inner, q[:, 2:6]), U, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "locks", [{}, {7: 0.0}, {-1: 0.0}, {2: np.nan}, {1: [0.0, 1.0], 2: [0.0]}, {1: [[0.0]]}]
-)
-def test_locks_that_are_none(locks):
-    with pytest.raises(InvalidValueError, match="locks"):
-        prepare_locked(joint_chain(load("iiwa14")), locks, prepare)

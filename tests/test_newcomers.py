@@ -1,5 +1,8 @@
 """First steps and usual mistakes: each gives an answer, or the sentence that mends it."""
 
+import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -160,3 +163,33 @@ def test_a_urdf_of_many_links_is_read_in_linear_time():
 
     few = min(seconds(1000) for _ in range(3))
     assert seconds(8000) < 20.0 * few
+
+
+COMPANIONS = (
+    "IPython", "jedi", "zmq", "tornado", "pyngrok", "embreex", "manifold3d", "vhacdx", "rtree",
+    "shapely", "lxml",
+)  # fmt: skip
+"""Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
+
+
+def test_companions_of_the_viewer_are_never_imported(tmp_path):
+    code = f"""
+import sys, numpy as np, robotmodels as rm
+arm = rm.load("ur5")
+rm.igm(arm, rm.dgm(arm, np.full(6, 0.3)))
+rm.viz.show(arm, np.zeros(6)).save({str(tmp_path / "ur5.html")!r})
+rm.viz.jog(arm).save({str(tmp_path / "jog.html")!r})
+print(sorted(set({COMPANIONS!r}) & set(sys.modules)))
+"""
+    # of meshes, trimesh reads some with what it finds installed; the package itself uses none
+    package = Path(rm.__file__).parent
+    found = {
+        name
+        for path in package.rglob("*.py")
+        for name in COMPANIONS
+        if re.search(rf"^\s*(import|from) {name}\b", path.read_text("utf-8"), re.MULTILINE)
+    }
+    assert found == set()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"

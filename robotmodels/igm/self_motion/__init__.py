@@ -1,19 +1,33 @@
-"""Infinite families of postures: the arm moves and the tool does not.
+"""Names of `singular` for files that are not moved yet."""
 
-`settle` asks which postures belong to one (`_members`), walks those families as curves
-(`family_curves`, in the compiled steps of `_directions` on those of `_correction`) and keeps the
-members at the reference; `member_curves` walks them for the postures that a relation cuts out.
-"""
+from __future__ import annotations
 
-from .member_curves import MemberCurve, curves_through
-from .settle import Settled, double_roots, replaced, settle_families, singular_postures
+import numpy as np
+from numpy.typing import NDArray
+
+from ..loop import JointChain
+from ..postures import Postures
+from ..singular import complete as settle_families
+from ..singular import singular_postures
 
 __all__ = [
-    "MemberCurve",
     "Settled",
-    "curves_through",
     "double_roots",
     "replaced",
     "settle_families",
     "singular_postures",
 ]
+
+Settled = Postures
+
+
+def double_roots(chain: JointChain, found: Postures) -> NDArray[np.bool_]:
+    """Flags (N, S) of double roots."""
+    return singular_postures(chain, found)[0]
+
+
+def replaced(
+    whole: Postures, moving: NDArray[np.bool_], rows: NDArray[np.int64], part: Postures
+) -> Postures:
+    """The postures with those of some poses replaced."""
+    return whole.put(rows, part)
