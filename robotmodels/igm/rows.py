@@ -249,8 +249,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Post
                 "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
                 f"seven. It is solved by: {solver.method}."
             )
-        every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-        found = every.take((np.arange(len(U)), np.zeros(len(U), np.int64)))
+        found = arm_angle_postures(solver, U, psi, references, tolerances)
         # the angle is given, so that only joints that took a reference are free
         found.family[...] = found.free.any(axis=-1)
     else:
