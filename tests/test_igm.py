@@ -188,6 +188,38 @@ def test_batches_single_poses_and_nothing():
         found.q[...] = 0
 
 
+@pytest.mark.parametrize("tolerance", [1e-9, 1.1e-9], ids=["by the plan", "by another method"])
+@pytest.mark.parametrize("given", [True, False], ids=["reference", "no reference"])
+@pytest.mark.parametrize("name", ["ur5", "lab_rrt", "planar_3r"])
+def test_solutions_within_limits_are_all_solutions_turned_and_sorted(name, given, tolerance):
+    model, rng = rm.load(name), np.random.default_rng(3)
+    low, high = -rng.uniform(1.0, 6.0, model.n), rng.uniform(1.0, 6.0, model.n)
+    model = model.with_table(model.table.replace(lower=low, upper=high))
+    T, turning = rm.dgm(model, random_q(model, 30)), model.table.sigma == 0
+    reference = rng.uniform(low, high) if given else None
+    every = rm.igm(model, T, reference, position_tolerance=tolerance)
+    found = rm.igm(model, T, reference, limits=True, position_tolerance=tolerance)
+    goal = reference if given else 0.5 * (low + high)
+    for rows, ours in zip(every.q, found.q, strict=True):
+        shortest = [distance(model, q, goal) if given else 0.0 for q in rows]
+        assert not given or np.all(np.diff([d for d in shortest if d == d]) >= 0.0)
+        expected = []
+        for q in rows[np.isfinite(rows[:, 0])].copy():
+            # of all values inside the limits the nearest to the goal
+            for j in np.flatnonzero(turning):
+                same = q[j] + 2.0 * np.pi * np.arange(-3, 4)
+                same = same[(same >= low[j]) & (same <= high[j])]
+                q[j] = same[np.abs(same - goal[j]).argmin()] if same.size else np.nan
+            if ((low <= q) & (q <= high)).all():
+                expected.append(q)
+        if given:
+            expected.sort(key=lambda q: np.linalg.norm(q - goal))
+        ours = ours[np.isfinite(ours[:, 0])]
+        np.testing.assert_allclose(ours, np.reshape(expected, ours.shape), rtol=0, atol=1e-9)
+    assert np.array_equal(found.within_limits, found.valid)
+    assert (found.count < every.count).any()
+
+
 def test_limits_shift_by_whole_turns_and_drop():
     rows = rm.load("puma560").table
     lower, upper = np.array([-3.0, -7, -7, 0.5, -1.5, 7.0]), np.array([3.0, 7, 7, 7.5, 1.5, 13.0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InvalidValueError
-from .asked import WHOLE_POSE, Task
 from .closed_form import prepare_closed_form
 from .dependent import prepare_dependent
 from .fewer import prepare_fewer
@@ -18,6 +17,7 @@ from .neighbour import prepare_neighbour
 from .prismatic import prepare_prismatic
 from .redundant import prepare_redundant
 from .relations import prepare_related
+from .request import WHOLE_POSE, Task
 from .solver import Solver
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..geometry import FIXED, PRISMATIC
 from ..model import RobotModel
-from .asked import Task
 from .numeric import igm_numeric
+from .request import Task
 from .solver import Tolerances
 from .status import IGMStatus
 

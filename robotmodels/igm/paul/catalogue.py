@@ -9,10 +9,10 @@ from itertools import combinations, permutations
 import numpy as np
 
 from ..._arrays import Array
-from .equation_type import EquationType
 from .equations import Equation
 from .expressions import ZERO, Expression, Graph, Kind, negative
 from .polynomials import part
+from .types import EquationType
 from .unknowns import Joints
 
 

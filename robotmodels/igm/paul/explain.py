@@ -9,8 +9,8 @@ from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
-from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
+from .types import EquationType
 from .whole import whole
 from .wording import Wording
 

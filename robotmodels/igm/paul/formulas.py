@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .equation_type import EquationType
 from .expressions import ONE, UNIT, Expression, negative
 from .prose import Line, equal
+from .types import EquationType
 
 if TYPE_CHECKING:
     from .plan import Step

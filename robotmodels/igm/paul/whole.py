@@ -11,11 +11,12 @@ from ...model import RobotModel
 from ...table_text import SMALLEST
 from .plan import PaulPlan
 from .prose import Line, Prose, angle, display, joined, number, said
+from .types import EquationType
 from .unknowns import Span
 from .wording import Wording
 
-_ARCS = (9, 3, 10)
-"""Codes of the types whose solution is an arc tangent of the pose."""
+_ARCS = (EquationType.TYPE_2_ZERO, EquationType.TYPE_3, EquationType.TYPE_3_DIRECT)
+"""Types whose solution is an arc tangent of the pose."""
 
 
 def whole(
@@ -73,7 +74,7 @@ def _end(words: Wording, takes_over: str) -> list[Prose]:
         lines.append(said(f"What takes over: {takes_over}."))
     if plan.steps and (offsets := _offsets(words)):
         lines.append(said("Joint variables with an offset: {}.", joined(offsets, ", ")))
-    if any(s.type.code in _ARCS for s in plan.steps):
+    if any(s.type in _ARCS for s in plan.steps):
         lines.append(
             said("atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept.")
         )

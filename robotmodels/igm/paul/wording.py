@@ -8,12 +8,12 @@ import numpy as np
 
 from ..._arrays import Array
 from .catalogue import positive_sine
-from .equation_type import EquationType
 from .equations import Split
 from .expressions import Expression, Kind, negative
 from .formulas import solution_of
 from .plan import PaulPlan, Step
 from .prose import Line, Prose, display, joined, said, type_formula
+from .types import EquationType
 from .writing import Writer
 
 
@@ -112,7 +112,6 @@ class Wording:
 
     def step(self, number: int, step: Step) -> Told:
         """One step in words."""
-        given = self._given(step)
         solution = solution_of(step, self)
         undetermined = self._undetermined(step)
         formulas = (*solution.formulas, *self._derived(number))
@@ -126,7 +125,7 @@ class Wording:
         kind = said("{}: {}", name, type_formula(step.type.formula))
         heading = f"Step {number + 1}:"
         first = said(
-            " {} (" + count + "), {}", joined([self.line(u) for u in given], " and "), kind
+            " {} (" + count + "), {}", joined([self.line(u) for u in step.unknowns], " and "), kind
         )
         second = said("{}, element" + several + f" {elements}", equation)
         text = [f"{heading}{first.text}", f"  {second.text}"]
@@ -140,19 +139,15 @@ class Wording:
             text.append(f"  {undetermined.text}")
             latex.append(undetermined.latex)
         return Told(
-            tuple(self.unknown(u) for u in given), self.matrix_equation(step.splits[0]),
+            tuple(self.unknown(u) for u in step.unknowns), self.matrix_equation(step.splits[0]),
             tuple(line.text for line in solution.equations),
             tuple(line.text for line in (*solution.definitions, *formulas)),
             undetermined.text if undetermined else "", "\n".join(text), "\n".join(latex),
         )  # fmt: skip
 
-    def _given(self, step: Step) -> tuple[int, ...]:
-        single = (EquationType.POLYNOMIAL, EquationType.QUARTIC)
-        return step.unknowns[:1] if step.type in single else step.unknowns
-
     def _derived(self, number: int) -> list[Line]:
         """Joints that follow from sums of angles once this step is done."""
-        order = {u: n for n, step in enumerate(self.plan.steps) for u in self._given(step)}
+        order = {u: n for n, step in enumerate(self.plan.steps) for u in step.unknowns}
         lines = []
         for j, row in enumerate(self.plan.form.rows):
             if row.sigma or j not in self.plan.solved:
