@@ -8,10 +8,11 @@ Pinocchio are imported here, the rest where it is used.
 from __future__ import annotations
 
 import importlib
+import re
 import threading
 from typing import TYPE_CHECKING, Any
 
-from . import errors, friction, kinematics, regressors
+from . import errors, friction, kinematics, regressors, se3
 from .drive import DriveKind, DriveParameters, Transmission
 from .dynamics import (
     base_model,
@@ -167,6 +168,8 @@ __all__ = [
     "read_par",
     "regressors",
     "robots",
+    "se3",
+    "show_versions",
     "simulate",
     "simulation",
     "standard_parameters",
@@ -186,9 +189,37 @@ __all__ = [
 ]
 
 
+def show_versions() -> str:
+    """Versions of the program, of Python and of its libraries, and the platform, for reports.
+
+    Returns
+    -------
+    str
+        One line for each.
+
+    Examples
+    --------
+    >>> show_versions().splitlines()[0].split()[0]
+    'robotmodels'
+    """
+    import platform
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    lines = [("robotmodels", __version__), ("Python", platform.python_version())]
+    lines.append(("platform", platform.platform()))
+    for requirement in requires("robotmodels") or ():
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        try:
+            lines.append((name, version(name)))
+        except PackageNotFoundError:
+            if "extra ==" not in requirement:
+                lines.append((name, "not installed"))
+    return "\n".join(f"{name:<28}{found}" for name, found in dict(lines).items())
+
+
 def __dir__() -> list[str]:
-    """What is imported on demand is there as well."""
-    return sorted({*globals(), *__all__})
+    """The public names, those that are imported on demand included."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})
 
 
 _ROOMS = {

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import robotmodels as rm
+from robotmodels import se3
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.igm.solutions import posture_distance
 
@@ -483,3 +484,49 @@ def test_a_family_whose_curve_does_not_close():
     found = checked(model, T, rm.igm(model, T, q))
     assert found.status == rm.IGMStatus.REACHED_FAMILY
     assert distance(model, found.q[0], q) < 1e-6
+
+
+def test_a_path_through_the_solutions_is_continuous():
+    model = rm.load("puma560")
+    q = 0.3 + np.linspace(0.0, 1.0, 50)[:, None] * [7.0, 0.4, 0.5, -9.0, 0.6, 3.0]
+    found = rm.igm(model, rm.dgm(model, q))
+    np.testing.assert_allclose(found.path(q[0]), q, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.path(q[0] + 0.2), q, rtol=0, atol=1e-9)
+    assert found.path(q[0] + 2.0 * np.pi)[0, 0] == pytest.approx(q[0, 0] + 2.0 * np.pi)
+    T = rm.dgm(model, q)
+    T[7, :3, 3] = 9.0
+    with pytest.raises(InvalidValueError, match="pose 7 has no solution: .* too far"):
+        rm.igm(model, T).path(q[0])
+    with pytest.raises(ShapeError, match="poses of shape"):
+        rm.igm(model, T[0]).path(q[0])
+
+
+@pytest.mark.parametrize(
+    ("word", "mask"),
+    [
+        ("position", (1, 1, 1, 0, 0, 0)),
+        ("xyz", (1, 1, 1, 0, 0, 0)),
+        ("orientation", (0, 0, 0, 1, 1, 1)),
+    ],
+)
+def test_masks_in_words(word, mask):
+    model = rm.load("lab_trr")
+    T = rm.dgm(model, [0.1, 0.2, 0.3])
+    if word == "orientation":
+        with pytest.raises(InvalidValueError, match="position"):
+            rm.igm(model, T, mask="positions")
+        found, same = (rm.igm_numeric(model, T, mask=m, rng=1) for m in (word, mask))
+    else:
+        found, same = (rm.igm(model, T, mask=m) for m in (word, mask))
+    assert found.mask.tolist() == list(map(bool, mask))
+    np.testing.assert_array_equal(found.q, same.q)
+
+
+def test_a_typed_rotation_is_refused_with_the_function_that_mends_it():
+    model = rm.load("rx90")
+    T = rm.dgm(model, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]).round(4)
+    with pytest.raises(NotARotationError, match=r"at most 1e-06 .* `se3.nearest_pose\(T\)`"):
+        rm.igm(model, T)
+    assert rm.igm(model, se3.nearest_pose(T)).count == 8
+    with pytest.raises(NotARotationError, match="no rounded rotation"):
+        se3.nearest_pose(np.diag([1.0, 1.0, 0.9, 1.0]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ from .request import (
     poses_of,
     relations_of,
 )
-from .self_motion import Settled, replaced, settle_families, singular_postures
+from .self_motion import Settled, settle_families, singular_postures
 from .solutions import IGMSolutions
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
@@ -43,7 +43,6 @@ NO_FAMILY = "numeric search for one posture: no family of closed forms serves th
 """Method of a result where there is none but the search."""
 
 _FLOAT = np.dtype(np.float64)
-_FOUND = tuple(field.name for field in fields(Found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -219,7 +218,7 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
         part = _settled_members(
             request, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
         )
-        rows = _laid_out(request, replaced(found, found.moving, at, part), references, columns)
+        rows = _laid_out(request, found.put(at, part), references, columns)
     lost = ~rows.valid[reasons.rows].any(axis=1)
     rows.status[reasons.rows[lost]] = reasons.status[lost]
     # a solution that the search came upon all the same
@@ -287,8 +286,7 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
     """Solutions of a chain, infinite families completed and double roots marked."""
     solver, tolerances, task = request.solver, request.tolerances, request.task
     if solver is None:
-        found = nothing_found(len(U), 1, references.shape[1])
-        return Settled(*(getattr(found, name) for name in _FOUND), moving=found.free)
+        return nothing_found(len(U), 1, references.shape[1])
     whole = task.mask == WHOLE_POSE
     if psi is not None:
         if not isinstance(solver, ArmAngle):
@@ -303,7 +301,7 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
                 f"seven. It is solved by: {solver.method}."
             )
         every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-        found = Found(*(getattr(every, name)[:, 0] for name in _FOUND))
+        found = every.take((np.arange(len(U)), np.zeros(len(U), np.int64)))
         # the angle is given, so that only joints that took a reference are free
         found.family[...] = found.free.any(axis=-1)
     else:
@@ -327,7 +325,7 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
         sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
         moving_joints(sigma, chain.D, length, found.q, rows, moving)
     moving |= found.free
-    return Settled(*(getattr(found, name) for name in _FOUND), moving=moving)
+    return replace(found, moving=moving)
 
 
 def _of_six(
@@ -345,9 +343,8 @@ def _of_six(
     worse = np.flatnonzero(_worst(settled) > np.maximum(_worst(found), MET))
     if worse.size == 0:
         return settled
-    part = Found(*(getattr(found, name)[worse] for name in _FOUND))
-    part = settle_families(chain, U[worse], part, references[worse], tolerances)
-    return replaced(settled, settled.moving, worse, part)
+    part = settle_families(chain, U[worse], found.take(worse), references[worse], tolerances)
+    return settled.put(worse, part)
 
 
 def _worst(found: Found) -> Array:

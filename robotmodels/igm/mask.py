@@ -237,7 +237,8 @@ def _of_the_arm(
     arm = merged(
         chain.sigma,
         judged(
-            replace(found, q=found.q[..., places], free=found.free[..., places]),
+            replace(found, q=found.q[..., places], free=found.free[..., places],
+                    moving=found.moving[..., places]),
             chain, U, components, tolerances,
         ),
     )  # fmt: skip

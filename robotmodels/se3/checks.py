@@ -96,17 +96,17 @@ def nearest_pose(T: Any) -> Array:
 
     Examples
     --------
-    >>> T = nearest_pose([[0.707, -0.707, 0, 0.1], [0.707, 0.707, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    >>> T[0].round(6)
+    >>> typed = [[0.707, -0.707, 0, 0.1], [0.707, 0.707, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    >>> nearest_pose(typed)[0].round(6)
     array([ 0.707107, -0.707107,  0.      ,  0.1     ])
     """
     T = as_core(getattr(T, "homogeneous", T), (4, 4), "T").copy()
     U, sizes, Vt = np.linalg.svd(T[..., :3, :3])
-    if np.abs(sizes**2 - 1.0).max(initial=0.0) > _ROUNDED:
+    off = float(np.abs(sizes**2 - 1.0).max(initial=0.0))
+    if off > _ROUNDED:
         raise NotARotationError(
-            f"T: the 3x3 block is not a rounded rotation: its singular values are "
-            f"{np.array2string(sizes.reshape(-1, 3)[np.abs(sizes - 1).max(-1).argmax()], precision=3)}"
-            f", expected 1 to {_ROUNDED / 2:g}."
+            f"T: the 3x3 block is no rounded rotation: R R^T differs from 1 by {off:.2g}, "
+            f"expected at most {_ROUNDED:g}."
         )
     T[..., :3, :3] = U @ Vt
     return as_pose(T)

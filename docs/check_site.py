@@ -1,6 +1,6 @@
 """Check a built site: no page asks another server for anything, and every entry has its page.
 
-python .docs/check_site.py SITE
+python docs/check_site.py SITE
 """
 
 import re

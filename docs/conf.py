@@ -1,7 +1,7 @@
-"""How the site is built: ``sphinx-build -W -q .docs site`` from the checkout.
+"""How the site is built: ``sphinx-build -W -q docs site`` from the checkout.
 
 The notebooks are executed by the build. Where they have run already (CI runs them), name the
-folder with the executed ones: ``sphinx-build -W -q -D executed_notebooks=FOLDER .docs site``; with
+folder with the executed ones: ``sphinx-build -W -q -D executed_notebooks=FOLDER docs site``; with
 ``-D nb_execution_mode=off`` they appear without their results. Nothing of the site is asked from
 another server: MathJax comes from a wheel, the search index is local.
 """
