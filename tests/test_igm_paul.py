@@ -17,8 +17,8 @@ from robotmodels.igm.loop import joint_chain
 from robotmodels.igm.motion import tool_poses
 from robotmodels.igm.paul import derive_plan, explain_igm, layout
 from robotmodels.igm.paul._types import solve, solve_rare
-from robotmodels.igm.paul.prose import type_formula
 from robotmodels.igm.paul.types import EquationType
+from robotmodels.igm.paul.typeset import type_formula
 from robotmodels.igm.virtual import VirtualJoint, with_virtual_joints
 from robotmodels.kernels._compile import compiled
 
@@ -163,7 +163,7 @@ def test_chains_with_locked_and_with_virtual_joints_have_plans():
     rows, _ = solved(plan, tool_poses(five, q))
     assert np.nanmin(np.abs(short(plan, rows - q[:, None])).max(axis=2), axis=1).max() < 1e-8
     arm = joint_chain(rm.load("lab_rrt"))
-    frame = se3.from_rpy(0.3, 0.2, 0.1)
+    frame = se3.from_rpy([0.3, 0.2, 0.1])
     longer, _ = with_virtual_joints(arm, [VirtualJoint(3, frame, 0)])
     assert derive_plan(longer).complete
 
@@ -429,7 +429,7 @@ FREE, DOUBLE = layout.FREE_1, layout.DOUBLE
         (layout.ONE_EQUATION, [0.0, 0.0, 0.0], 1, FREE, 0.4),
         (layout.ONE_EQUATION, [0.0, 0.0, 0.5], 0, layout.SMALL, None),
         # the same equation twice
-        (layout.TWO_EQUATIONS, [1.0, 0.0, 0.5, 2.0, 0.0, 1.0], 1, layout.SMALL, pi / 6),
+        (layout.TWO_EQUATIONS, [1.0, 0.0, 0.5, 2.0, 0.0, 1.0], 1, layout.SMALL, 5 * pi / 6),
         (layout.TWO_EQUATIONS, [0.0] * 6, 1, FREE, 0.4),
         # stretched, out of reach, folded onto the first axis (type 7, then type 8)
         (layout.TWO_ANGLES, [0.0, 1.0, 0.0, 2.0, 1.0, 0.0, -1.0], 1, DOUBLE, -pi / 2),
@@ -680,13 +680,13 @@ def test_latex_says_what_the_text_says():
     assert latex.count(r"r_{3} &=") == 1
     latex = told_of("rx90").latex
     assert r"$\theta_{4}$ has $S_{5} > 0$ and $\theta_{4}'$ has $S_{5} < 0$." in latex
-    assert "fall together where $X^2 + Y^2 = Z^2$ (stretched or folded)" in latex
+    assert "fall together where $X^{2} + Y^{2} = Z^{2}$ (stretched or folded)" in latex
     assert r"D_{3} &= 0.45 \quad (d_{3})" in latex
     assert r"with $X_{1} = Y_{2}, \; Y_{1} = X_{2} = 0$: $X_{1} \, S = Z_{1}" in latex
     assert r"\text{(squared and added)}" in latex
     ur5, cobra = told_of("ur5").latex, told_of("cobra_s600").latex
     assert r"\mathbf{U}_0 = \mathbf{Z}^{-1} \, \mathbf{T} \, \mathbf{E}^{-1}" in ur5
-    assert r"\theta_{3} &= (\theta_{2} + \theta_{3}) - \theta_{2}" in ur5
+    assert r"\theta_{3} &= \left(\theta_{2} + \theta_{3}\right) - \theta_{2}" in ur5
     assert cobra.count("r_{3} &=") == 1
     assert "S_{1+2-4}" in cobra
     assert "12-4" not in cobra

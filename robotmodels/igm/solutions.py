@@ -287,7 +287,8 @@ class IGMSolutions(_Later):
         >>> from robotmodels.igm import igm
         >>> from robotmodels.kinematics import dgm
         >>> from robotmodels.robots import load
-        >>> arm, q = load("rx90"), np.linspace(0.2, 1.2, 40)[:, None] * [6, 1, 1, 1, 1, 1]
+        >>> arm, t = load("rx90"), np.linspace(0.0, 1.0, 40)[:, None]
+        >>> q = [0.0, 0.4, 1.2, 0.3, 0.9, 0.0] + t * [7.0, 0.2, 0.2, -9.0, 0.3, 1.0]
         >>> bool(np.abs(igm(arm, dgm(arm, q)).path(q[0]) - q).max() < 1e-9)
         True
         """

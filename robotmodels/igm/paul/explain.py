@@ -125,17 +125,18 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     words = Wording(plan)
     steps = []
     for number, step in enumerate(plan.steps):
-        told = words.step(number, step)
+        printed = words.step(number, step)
         steps.append(
             ExplainedStep(
-                told.names, step.type, told.matrix_equation, told.equations, told.formulas,
-                told.undetermined, step.type.branches, told.text, told.latex,
+                printed.names, step.type, printed.matrix_equation, printed.equations,
+                printed.formulas, printed.undetermined, step.type.branches, printed.text,
+                printed.latex,
             )
         )  # fmt: skip
     remaining = tuple(words.variable(j) for j in plan.remaining)
     takes_over = "" if plan.complete else _successor(plan.chain)
-    told = [(step.text, step.latex) for step in steps]
-    text, latex = whole(model, words, told, takes_over)
+    printed = [(step.text, step.latex) for step in steps]
+    text, latex = whole(model, words, printed, takes_over)
     return InverseModelExplanation(
         model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
     )

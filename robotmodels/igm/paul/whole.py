@@ -6,12 +6,11 @@ import re
 
 import numpy as np
 
-from ...latex_text import escaped, meaning_latex, table_latex
+from ...latex_text import escaped, meaning_latex, powers, table_latex
 from ...model import RobotModel
 from ...table_text import SMALLEST
-from .plan import PaulPlan
-from .prose import Line, Prose, angle, display, joined, number, said
 from .types import EquationType
+from .typeset import Line, Prose, angle, display, matrices, number
 from .unknowns import Span
 from .wording import Wording
 
@@ -23,12 +22,12 @@ def whole(
     model: RobotModel, words: Wording, steps: list[tuple[str, str]], takes_over: str
 ) -> tuple[str, str]:
     """The explanation of an arm as text and LaTeX; ``steps`` are its steps in both."""
-    plan, constants = words.plan, words.plan.arm.constants
+    constants = words.plan.arm.constants
     title = f"Inverse geometric model of {model.name} by Paul's method"
     table = str(model.table)
     text, latex = [title, "", table], [rf"\textbf{{{escaped(title)}}}", table_latex(table)]
-    before = [_pose_line(model, plan)]
-    if notation := _notation(words, "\n".join(told for told, _ in steps)):
+    before = [_pose_line(model, words)]
+    if notation := _notation(words, "\n".join(step for step, _ in steps)):
         before.append(notation)
     for line in before:
         text += ["", line.text]
@@ -36,11 +35,11 @@ def whole(
     if constants:
         text += ["", "Constants"]
         text += [f"  {n} = {v:.12g}  ({meaning})" for n, _, v, meaning in constants]
-        rows = [Line("", rf"{symbol} &= {number(v).latex} \quad ({meaning_latex(meaning)})")
+        rows = [rf"{symbol} = {powers(number(v))} \quad ({meaning_latex(meaning)})"
                 for _, symbol, v, meaning in constants]  # fmt: skip
         latex.append("Constants\n" + display(rows))
-    for told, typeset in steps:
-        text += ["", told]
+    for step, typeset in steps:
+        text += ["", step]
         latex.append(typeset)
     text.append("")
     for line in _end(words, takes_over):
@@ -51,7 +50,7 @@ def whole(
 
 def _end(words: Wording, takes_over: str) -> list[Prose]:
     """How many postures or what remains, the offsets, and the quadrants."""
-    plan = words.plan
+    plan, said = words.plan, words.said
     lines = []
     if plan.complete:
         branches = [str(s.type.branches) for s in plan.steps if s.type.branches > 1]
@@ -63,7 +62,7 @@ def _end(words: Wording, takes_over: str) -> list[Prose]:
             "each is checked on the whole pose before it is returned.", how,
         ))  # fmt: skip
     else:
-        rest = joined([_variable(words, j) for j in plan.remaining], ", ")
+        rest = words.joined([words.variable(j) for j in plan.remaining], ", ")
         why = (
             "there are more joints than components of a pose"
             if plan.form.k > 6
@@ -73,7 +72,7 @@ def _end(words: Wording, takes_over: str) -> list[Prose]:
         lines.append(said("Paul's method stops here: {} remain, because " + why + ".", rest))
         lines.append(said(f"What takes over: {takes_over}."))
     if plan.steps and (offsets := _offsets(words)):
-        lines.append(said("Joint variables with an offset: {}.", joined(offsets, ", ")))
+        lines.append(said("Joint variables with an offset: {}.", words.joined(offsets, ", ")))
     if any(s.type in _ARCS for s in plan.steps):
         lines.append(
             said("atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept.")
@@ -81,23 +80,17 @@ def _end(words: Wording, takes_over: str) -> list[Prose]:
     return lines
 
 
-def _variable(words: Wording, j: int) -> Line:
-    return Line(words.variable(j), words.variable(j, True))
-
-
 def _offsets(words: Wording) -> list[Line]:
     """Joint variables as the model counts them, where the rows count them from elsewhere."""
     lines = []
     for j, row in enumerate(words.plan.form.rows):
-        size = (number if row.sigma else angle)(abs(row.offset))
         if abs(row.offset) < SMALLEST:  # the table shows none either
             continue
-        sign, q = "-" if row.offset > 0 else "+", int(words.plan.chain.columns[j]) + 1
-        x = _variable(words, j)
-        lines.append(
-            Line(f"q{q} = {x.text} {sign} {size.text}",
-                 f"q_{{{q}}} = {x.latex} {sign} {size.latex}")
-        )  # fmt: skip
+        sign, x = "-" if row.offset > 0 else "+", words.variable(j)
+        size = abs(row.offset)
+        value = number(size) if row.sigma else angle(size)
+        text = f"q{words.plan.chain.columns[j] + 1} = {x} {sign} {value}"
+        lines.append(Line(text, words.formula(re.sub(r"(\d)π", r"\1*π", text)).latex))
     return lines
 
 
@@ -114,46 +107,33 @@ def _notation(words: Wording, text: str) -> Prose | None:
                 u = joints.unknown(Span(group, a, b))
                 item = joints.unknowns[u]
                 if item.name in used:
-                    names = [Line(f"{c}{item.name}", f"{c}_{{{item.latex}}}") for c in ("C", "S")]
-                    sums.append(said("{} and {} of {}", *names, words.line(u)))
-    own = (Line("Cj", "C_{j}"), Line("Sj", "S_{j}"), Line("θj", r"\theta_{j}"))
-    tail = said(", {}", joined(sums, ", ")) if sums else Prose("", "")
-    return said("{} and {} are cosine and sine of {}{}.", *own, tail)
+                    names = [f"C{item.name}", f"S{item.name}"]
+                    sums.append(words.said("{} and {} of {}", *names, words.unknown(u)))
+    tail = words.said(", {}", words.joined(sums, ", ")) if sums else Prose("", "")
+    return words.said("{} and {} are cosine and sine of {}{}.", "Cj", "Sj", "θj", tail)
 
 
-def _pose_line(model: RobotModel, plan: PaulPlan) -> Prose:
-    """What U0, Z and E are."""
-    form = plan.form
-    plain = np.allclose(model.base, np.eye(4), atol=1e-13)
+def _pose_line(model: RobotModel, words: Wording) -> Prose:
+    """Meaning of U0, Z and E."""
+    form, whole = words.plan.form, words.plan.form.k >= 6
     moved = not np.allclose(form.before, np.eye(4), atol=1e-13)
-    left, right = moved or not plain, False
+    left = moved or not np.allclose(model.base, np.eye(4), atol=1e-13)
+    right = whole and not np.allclose(form.after, np.eye(4), atol=1e-13)
     meanings = []
-    if form.k < 6:
-        if moved:
-            meanings.append("{Z} the base and the constant before joint 1")
-        elif left:
-            meanings.append("{Z} the base")
-        if plan.arm.E is not None:
-            meanings.append("{E} the tool")
-    else:
-        right = not np.allclose(form.after, np.eye(4), atol=1e-13)
-        if left:
-            meanings.append("{Z} the base and what the table has before the first motion")
-        if right:
-            meanings.append("{E} what it has after the last motion, and the tool")
-    Z, E = Line("Z", r"\mathbf{Z}"), Line("E", r"\mathbf{E}")
-    why = [said(m.replace("{Z}", "{}").replace("{E}", "{}"), Z if "{Z}" in m else E)
-           for m in meanings]  # fmt: skip
-    U0 = Line(
-        "U0 = " + "Z^-1 " * left + "T" + " E^-1" * right,
-        r"\mathbf{U}_0 = " + r"\mathbf{Z}^{-1} \, " * left + r"\mathbf{T}"
-        + r" \, \mathbf{E}^{-1}" * right,
-    )  # fmt: skip
+    if whole and left:
+        meanings.append(("Z", "the base and what the table has before the first motion"))
+    elif left:
+        meanings.append(("Z", "the base" + " and the constant before joint 1" * moved))
+    if right:
+        meanings.append(("E", "what it has after the last motion, and the tool"))
+    elif words.plan.arm.E is not None:
+        meanings.append(("E", "the tool"))
+    U0 = matrices("U0 = " + "Z^-1 " * left + "T" + " E^-1" * right)
     rows = [
         Line(" ".join(c + a for c in "snaP"), r" \; ".join(f"{c}_{{{a}}}" for c in "snaP"))
         for a in "xyz"
     ]
-    cite = " [1.11]" if form.k >= 6 else ""
-    tail = said(", {}", joined(why, ", ")) if why else Prose("", "")
-    return said("{}: the desired pose" + cite + ", with the elements {}, {}, {} [1.13]{}.",
-                U0, *rows, tail)  # fmt: skip
+    tail = "".join(f", {{}} {meaning}" for _, meaning in meanings)
+    names = (matrices(name) for name, _ in meanings)
+    return words.said("{}: the desired pose" + " [1.11]" * whole + ", with the elements {}, {}, {}"
+                      " [1.13]" + tail + ".", U0, *rows, *names)  # fmt: skip
