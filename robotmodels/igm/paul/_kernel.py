@@ -17,49 +17,18 @@ from ...kernels._compile import INT, MATRIX, OUT2, OUT3, STACK, VECTOR, Floats, 
 from ...kernels.poses import improper_pose
 from ..request import FARTHEST, FARTHEST_POSITION
 from ..status import IGMStatus
+from . import layout
 from ._types import atan2, solve, solve_rare
-from .layout import (
-    CODE,
-    COEFFICIENTS,
-    FIRST,
-    FREE_1,
-    FREE_2,
-    GIVEN,
-    IMPROPER,
-    INITIAL,
-    JOINTS,
-    LABELS,
-    LENGTH,
-    LEVER,
-    LIMITS,
-    MOST,
-    OPERATIONS,
-    OPPOSITE_ANGLES,
-    QUARTIC,
-    REFERENCE,
-    REFERENCES,
-    REGISTERS,
-    RESULTS,
-    ROUGH,
-    SCALES,
-    SECOND,
-    SIDES,
-    SIGMA,
-    STARTS,
-    STEP,
-    STEP_TABLE,
-    STEPS,
-    TOLERANCES,
-    TWO_ANGLES,
-    UNKNOWNS,
-    UNORDERED,
-    WITHIN_LIMITS,
-)
 
 LANES = 16
 FALSE = 1e-2  # errors above this are of false candidates, not of rough ones
 EXACT = 5e-13  # errors above this are refined by Newton's method
 AT_LIMIT = 1e-9  # what rounding may carry a posture over its limits [rad, m]
+
+Task = tuple[Ints, Floats, Floats, Floats]
+"""Instructions, numbers, poses (N, 4, 4) and references (N, k)."""
+Out = tuple[Floats, Floats, Ints]
+"""Joint variables (N, S, k), errors (N, S) and marks (N, 2 + 2 S)."""
 
 _PLAN = types.Array(types.uint32, 1, "C", readonly=True)
 _MARKS = types.Array(types.int64, 2, "C")
@@ -70,8 +39,8 @@ _NOTHING = int(IGMStatus.NOT_CONVERGED)
 @compiled()
 def operate(plan: Ints, numbers: Floats, level: int, x: Floats) -> None:
     """``x_d = f x_a x_b + g x_c x_e`` for the operations of a level and every lane."""
-    lanes, at = x.shape[1], plan[OPERATIONS]
-    for i in range(plan[plan[STARTS] + level], plan[plan[STARTS] + level + 1]):
+    lanes, at = x.shape[1], plan[layout.OPERATIONS]
+    for i in range(plan[plan[layout.STARTS] + level], plan[plan[layout.STARTS] + level + 1]):
         row = at + 5 * i
         d, a, b, c, e = plan[row], plan[row + 1], plan[row + 2], plan[row + 3], plan[row + 4]
         f, g = numbers[2 * i], numbers[2 * i + 1]
@@ -83,11 +52,10 @@ def operate(plan: Ints, numbers: Floats, level: int, x: Floats) -> None:
 
 
 @compiled()
-def load(
-    plan: Ints, numbers: Floats, poses: Floats, references: Floats, n: int, x: Floats, lane: int
-) -> None:
+def load(task: Task, n: int, x: Floats, lane: int) -> None:
     """``U0 = before pose after`` into registers 1 to 12, column by column, and the references."""
-    before, after, k = plan[SIDES], plan[SIDES] + 12, plan[JOINTS]
+    plan, numbers, poses, references = task
+    before, after, k = plan[layout.SIDES], plan[layout.SIDES] + 12, plan[layout.JOINTS]
     for i in range(3):
         at = before + 4 * i
         a, b, c = numbers[at], numbers[at + 1], numbers[at + 2]
@@ -99,12 +67,12 @@ def load(
             e = after + j
             value = m0 * numbers[e] + m1 * numbers[e + 4] + m2 * numbers[e + 8]
             x[1 + 3 * j + i, lane] = value + m3 * numbers[e + 12]
-    for i in range(plan[UNKNOWNS]):
-        row = plan[REFERENCES] + i * (k + 1)
+    for i in range(plan[layout.UNKNOWNS]):
+        row = plan[layout.REFERENCES] + i * (k + 1)
         value = numbers[row + k]
         for j in range(k):
             value += numbers[row + j] * references[n, j]
-        x[plan[REGISTERS] + i, lane] = value
+        x[plan[layout.REGISTERS] + i, lane] = value
 
 
 @compiled()
@@ -124,15 +92,15 @@ def solve_step(
 
     ``state``: for each level, whether a lane is still valid, its solutions and flags.
     """
-    at, limits = plan[STEP_TABLE] + STEP * level, plan[TOLERANCES]
-    code, wanted = plan[at + CODE], plan[REGISTERS] + plan[at + REFERENCE]
-    second = plan[REGISTERS] + plan[at + REFERENCE + 1]
+    at, limits = plan[layout.STEP_TABLE] + layout.STEP * level, plan[layout.TOLERANCES]
+    code, wanted = plan[at + layout.CODE], plan[layout.REGISTERS] + plan[at + layout.REFERENCE]
+    second = plan[layout.REGISTERS] + plan[at + layout.REFERENCE + 1]
     # amplitudes are compared with their usual size
-    scale = numbers[plan[SCALES] + level]
+    scale = numbers[plan[layout.SCALES] + level]
     eps = (numbers[limits], numbers[limits + 1] * scale, numbers[limits + 2] * scale)
-    widest, lanes, direct = 0, x.shape[1], code <= OPPOSITE_ANGLES
+    widest, lanes, direct = 0, x.shape[1], code <= layout.OPPOSITE_ANGLES
     if direct:
-        sine, cosine = plan[at + COEFFICIENTS], plan[at + COEFFICIENTS + 1]
+        sine, cosine = plan[at + layout.COEFFICIENTS], plan[at + layout.COEFFICIENTS + 1]
         for lane in range(LANES if lanes > 1 else 1):
             S, C = x[sine, lane], x[cosine, lane]
             x[o + 1, lane], x[o + 2, lane], x[o + 7, lane], x[o + 8, lane] = C, S, -C, -S
@@ -144,19 +112,19 @@ def solve_step(
             count = 1 + code
         else:
             for i in range(7):
-                g[i] = x[plan[at + COEFFICIENTS + i], lane]
+                g[i] = x[plan[at + layout.COEFFICIENTS + i], lane]
             pair = (x[wanted, lane], x[second, lane])
             if rare is None:
                 count, flags = solve(code, g, eps, pair, x, o, lane)
-            elif code == QUARTIC or code > LENGTH:
+            elif code == layout.QUARTIC or code > layout.LENGTH:
                 count, flags = solve_rare(code, g, eps, pair, x, o, lane)
             else:
                 count, flags = solve(code, g, eps, pair, x, o, lane)
             marks[start + lane, 1] |= flags
         state[3 * level + 1, lane], state[3 * level + 2, lane] = count, flags
         widest = max(widest, count)
-    between = 3 if code == TWO_ANGLES else 6
-    for row in range(o if code < LENGTH else o + 3, o + 6 * widest, between):
+    between = 3 if code == layout.TWO_ANGLES else 6
+    for row in range(o if code < layout.LENGTH else o + 3, o + 6 * widest, between):
         complete(x[row], x[row + 1], x[row + 2])
     return widest
 
@@ -174,7 +142,7 @@ def complete(value: Floats, cosine: Floats, sine: Floats) -> None:
 @compiled()
 def error_of(plan: Ints, numbers: Floats, x: Floats, lane: int) -> float:
     """The larger of the tool's position error [m] and the rotation angle [rad]."""
-    at, lever = plan[RESULTS] + plan[JOINTS], plan[LEVER]
+    at, lever = plan[layout.RESULTS] + plan[layout.JOINTS], plan[layout.LEVER]
     turn, far = 0.0, 0.0
     for i in range(at, at + 3):
         d3 = x[plan[i + 9], lane] - x[plan[i + 21], lane]
@@ -198,17 +166,16 @@ def keep(
     at: int,
     state: Ints,
     branch: Ints,
-    q: Floats,
-    residuals: Floats,
-    marks: Ints,
+    out: Out,
 ) -> None:
     """Check both sides of the pose in every lane, and keep the postures that meet it.
 
     The error is the larger of the tool's position error [m] and the rotation angle [rad].
     """
-    k, m, most = plan[JOINTS], plan[STEPS], plan[MOST]
-    results, sigma = plan[RESULTS], plan[SIGMA]
-    accepted = numbers[plan[TOLERANCES] + 3]
+    q, residuals, marks = out
+    k, m, most = plan[layout.JOINTS], plan[layout.STEPS], plan[layout.MOST]
+    results, sigma = plan[layout.RESULTS], plan[layout.SIGMA]
+    accepted = numbers[plan[layout.TOLERANCES] + 3]
     way = 0
     for i in range(m):
         way |= branch[i, 0] << (2 * i)
@@ -226,12 +193,12 @@ def keep(
         if state[3 * m, lane] == 0 or not error <= max(FALSE, accepted):
             continue
         if error > EXACT:
-            marks[n, 1] |= ROUGH
+            marks[n, 1] |= layout.ROUGH
             if error > accepted:
                 continue
         count, bits = marks[n, 0], 0
         for i in range(m):
-            bits |= ((state[3 * i + 2, lane] & (FREE_1 | FREE_2)) >> 1) << (2 * i)
+            bits |= ((state[3 * i + 2, lane] & (layout.FREE_1 | layout.FREE_2)) >> 1) << (2 * i)
         for j in range(k):
             q[n, count, j] = x[at + j, lane]
         residuals[n, count] = error
@@ -240,33 +207,25 @@ def keep(
 
 
 @compiled()
-def run_plan(
-    plan: Ints,
-    numbers: Floats,
-    poses: Floats,
-    references: Floats,
-    q: Floats,
-    residuals: Floats,
-    marks: Ints,
-    rare: None,
-) -> None:
+def run_plan(task: Task, out: Out, rare: None) -> None:
     """Postures of every pose in the order of the tree.
 
     ``marks (N, 2 + 2 S)``: count, flags of the pose, bits of free unknowns and of branches.
     """
-    k, m, N = int(plan[JOINTS]), int(plan[STEPS]), poses.shape[0]
+    (plan, numbers, poses, _), marks = task, out[2]
+    k, m, N = int(plan[layout.JOINTS]), int(plan[layout.STEPS]), poses.shape[0]
     lanes = 1 if N == 1 else LANES
-    solutions = int(plan[REGISTERS] + plan[UNKNOWNS])
+    solutions = int(plan[layout.REGISTERS] + plan[layout.UNKNOWNS])
     x = np.empty((solutions + 24 * m + k + 1, lanes))
     state, branch = np.empty((3 * m + 1, lanes), np.int64), np.empty((m + 1, 2), np.int64)
     g = np.empty(7)
-    for i in range(plan[REGISTERS]):
+    for i in range(plan[layout.REGISTERS]):
         for lane in range(lanes):
-            x[i, lane] = numbers[plan[INITIAL] + i]
+            x[i, lane] = numbers[plan[layout.INITIAL] + i]
     for start in range(0, N, lanes):
         filled = min(lanes, N - start)
         for lane in range(lanes):
-            load(plan, numbers, poses, references, start + min(lane, filled - 1), x, lane)
+            load(task, start + min(lane, filled - 1), x, lane)
             state[0, lane] = int(lane < filled)
         for n in range(start, start + filled):
             marks[n, 0] = marks[n, 1] = 0
@@ -276,7 +235,7 @@ def run_plan(
             if arrived:
                 operate(plan, numbers, level, x)
                 if level == m:
-                    keep(plan, numbers, start, filled, x, o, state, branch, q, residuals, marks)
+                    keep(plan, numbers, start, filled, x, o, state, branch, out)
                     level, arrived = level - 1, False
                     continue
                 branch[level, 1] = solve_step(
@@ -289,11 +248,11 @@ def run_plan(
             if not arrived:
                 level -= 1
                 continue
-            step = plan[STEP_TABLE] + STEP * level
+            step = plan[layout.STEP_TABLE] + layout.STEP * level
             for lane in range(lanes):
                 state[3 * level + 3, lane] = int(now < state[3 * level + 1, lane])
             for i in range(6):
-                to = plan[step + FIRST] + i if i < 3 else plan[step + SECOND] + i - 3
+                to = plan[step + layout.FIRST] + i if i < 3 else plan[step + layout.SECOND] + i - 3
                 if to > 12:
                     for lane in range(lanes):
                         x[to, lane] = x[o + 6 * now + i, lane]
@@ -331,23 +290,16 @@ def before(rows: Floats, i: int, j: int, n: int) -> bool:
 
 
 @compiled()
-def ordered_rows(
-    plan: Ints,
-    numbers: Floats,
-    references: Floats,
-    mode: int,
-    q: Floats,
-    residual: Floats,
-    marks: Ints,
-) -> int:
+def ordered_rows(task: Task, mode: int, out: Out) -> int:
     """Order the postures of each pose; returns the most of any, or -1 - most.
 
     Poses without a posture, and unreliable ones, get the status NOT_CONVERGED: if there are any,
     the result is negative. ``marks`` becomes count, status, branch codes, within limits.
     """
+    (plan, numbers, _, references), (q, residual, marks) = task, out
     N, S, n = q.shape
-    limits, labels = int(plan[LIMITS]), int(plan[LABELS])
-    given, boxed, named = mode & GIVEN, mode & WITHIN_LIMITS, labels < numbers.size
+    limits, labels = int(plan[layout.LIMITS]), int(plan[layout.LABELS])
+    given, boxed, named = mode & layout.GIVEN, mode & layout.WITHIN_LIMITS, labels < numbers.size
     # joint variables, distance, branch, error
     rows, order = np.empty((S, n + 3)), np.empty(S, np.int64)
     most, unreliable = 0, 0
@@ -411,32 +363,23 @@ def ordered_rows(
 
 
 @compiled()
-def solved(
-    plan: Ints,
-    numbers: Floats,
-    poses: Floats,
-    references: Floats,
-    mode: int,
-    q: Floats,
-    residual: Floats,
-    marks: Ints,
-    rare: None,
-) -> int:
-    """Run a plan; see `ordered_rows` for the result, which UNORDERED leaves out."""
-    if not mode & UNORDERED:
+def solved(task: Task, mode: int, out: Out, rare: None) -> int:
+    """Run a plan; see `ordered_rows` for the result, which layout.UNORDERED leaves out."""
+    _, _, poses, references = task
+    if not mode & layout.UNORDERED:
         if improper_pose(poses) >= 0:
-            return IMPROPER
+            return layout.IMPROPER
         for p in range(poses.shape[0]):
             for i in range(3):
                 if abs(poses[p, i, 3]) > FARTHEST_POSITION:
-                    return IMPROPER
+                    return layout.IMPROPER
             for m in range(references.shape[1]):
                 if not abs(references[p, m]) <= FARTHEST:
-                    return IMPROPER
-    run_plan(plan, numbers, poses, references, q, residual, marks, rare)
-    if mode & UNORDERED:
+                    return layout.IMPROPER
+    run_plan(task, out, rare)
+    if mode & layout.UNORDERED:
         return 0
-    return ordered_rows(plan, numbers, references, mode, q, residual, marks)
+    return ordered_rows(task, mode, out)
 
 
 _SIGNATURE = types.int64(_PLAN, VECTOR, STACK, MATRIX, INT, OUT3, OUT2, _MARKS)
@@ -454,7 +397,7 @@ def solve_poses(
     marks: Ints,
 ) -> int:
     """Postures of poses by a plan of common equations, checked and ordered."""
-    return solved(plan, numbers, poses, references, mode, q, residual, marks, None)
+    return solved((plan, numbers, poses, references), mode, (q, residual, marks), None)
 
 
 @compiled(_SIGNATURE)
@@ -469,4 +412,4 @@ def solve_poses_rare(
     marks: Ints,
 ) -> int:
     """Postures of poses by any plan, checked and ordered."""
-    return solved(plan, numbers, poses, references, mode, q, residual, marks, 0)
+    return solved((plan, numbers, poses, references), mode, (q, residual, marks), 0)

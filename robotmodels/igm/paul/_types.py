@@ -18,19 +18,7 @@ import numpy as np
 
 from ...kernels._compile import Floats, compiled
 from .._equations import polynomial_roots, trigonometric_roots
-from .layout import (
-    DOUBLE,
-    FREE_1,
-    FREE_2,
-    LENGTH_AND_ANGLE,
-    LENGTH_TIMES_ANGLE,
-    ONE_EQUATION,
-    OPPOSITE_ANGLES,
-    QUARTIC,
-    SMALL,
-    TWO_ANGLES,
-    TWO_EQUATIONS,
-)
+from . import layout
 
 Tolerances = tuple[float, float, float]
 Pair = tuple[float, float]
@@ -89,10 +77,10 @@ def angles(
     rho = sqrt(g[0] * g[0] + g[1] * g[1])
     if rho <= eps[1]:
         put_free(found, o, lane, wanted[0])
-        return 1, FREE_1
+        return 1, layout.FREE_1
     put(found, o, lane, 0.0, g[1], g[0])
     put(found, o + 6, lane, 0.0, -g[1], -g[0])
-    return 1 + code, SMALL if rho <= eps[2] else 0
+    return 1 + code, layout.SMALL if rho <= eps[2] else 0
 
 
 @compiled()
@@ -110,16 +98,16 @@ def one_equation(
     rho = sqrt(square)
     if rho <= zero:
         if abs(Z) > max(zero, slack):
-            return 0, SMALL
+            return 0, layout.SMALL
         put_free(found, o, lane, wanted[0])
-        return 1, FREE_1
-    count, flags = 2, SMALL if rho <= small else 0
+        return 1, layout.FREE_1
+    count, flags = 2, layout.SMALL if rho <= small else 0
     room = (rho - Z) * (rho + Z)
     if room <= 1e-12 * square:
         # the two solutions coincide, or are missed by rounding
         if abs(Z) - rho > slack * rho:
-            return 0, flags | (SMALL if abs(Z) - rho < 1e-6 * rho else 0)
-        flags |= DOUBLE
+            return 0, flags | (layout.SMALL if abs(Z) - rho < 1e-6 * rho else 0)
+        flags |= layout.DOUBLE
         if room <= 0.0:
             count, room = 1, 0.0
     root, scale = sqrt(room), 1.0 / square
@@ -143,15 +131,15 @@ def two_equations(
         if two > one:
             g[0], g[1], g[2] = X2, Y2, Z2
         count, flags = one_equation(g, (1e-9, zero, small), wanted, found, o, lane)
-        return min(count, 1), flags | SMALL
+        return min(count, 1), flags | layout.SMALL
     sign = 1.0 if det > 0.0 else -1.0
     S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
     rho = sqrt(S * S + C * C)
     if size <= zero * zero or rho <= zero * zero:
         put_free(found, o, lane, wanted[0])
-        return 1, FREE_1
+        return 1, layout.FREE_1
     put(found, o, lane, 0.0, C, S)
-    return 1, SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
+    return 1, layout.SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
 
 
 @compiled()
@@ -179,7 +167,7 @@ def two_angles(
         Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
         if sqrt(Sj * Sj + Cj * Cj) <= zero * zero:
             put_free(found, row + 3, lane, wanted[1])
-            flags |= FREE_2
+            flags |= layout.FREE_2
         else:
             put(found, row + 3, lane, 0.0, Cj, Sj)
     return count, flags
@@ -191,9 +179,9 @@ def length(g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane
     size = abs(g[0])
     if size <= eps[1]:
         put(found, o, lane, wanted[0], 1.0, 0.0)
-        return 1, FREE_1
+        return 1, layout.FREE_1
     put(found, o, lane, g[1] / g[0], 1.0, 0.0)
-    return 1, SMALL if size <= eps[2] else 0
+    return 1, layout.SMALL if size <= eps[2] else 0
 
 
 @compiled()
@@ -201,13 +189,13 @@ def solve(
     code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
 ) -> Result:
     """Solutions of one step: the common equations."""
-    if code <= OPPOSITE_ANGLES:
+    if code <= layout.OPPOSITE_ANGLES:
         return angles(code, g, eps, wanted, found, o, lane)
-    if code == ONE_EQUATION:
+    if code == layout.ONE_EQUATION:
         return one_equation(g, eps, wanted, found, o, lane)
-    if code == TWO_EQUATIONS:
+    if code == layout.TWO_EQUATIONS:
         return two_equations(g, eps, wanted, found, o, lane)
-    if code == TWO_ANGLES:
+    if code == layout.TWO_ANGLES:
         return two_angles(g, eps, wanted, found, o, lane)
     return length(g, eps, wanted, found, o, lane)
 
@@ -219,17 +207,17 @@ def length_times_angle(
     """``X1 r S = Y1, X2 r C = Y2``: ``r = +-sqrt((Y1 / X1)^2 + (Y2 / X2)^2)``, then the angle."""
     least = min(abs(g[0]), abs(g[2]))
     if least <= eps[1]:
-        return 0, SMALL
+        return 0, layout.SMALL
     A, B = g[1] / g[0], g[3] / g[2]
     r = sqrt(A * A + B * B)
     put(found, o, lane, r, 1.0, 0.0)
     put(found, o + 6, lane, -r, 1.0, 0.0)
     if r <= eps[1]:
         put_free(found, o + 3, lane, wanted[1])
-        return 1, FREE_2
+        return 1, layout.FREE_2
     put(found, o + 3, lane, 0.0, B, A)
     put(found, o + 9, lane, 0.0, -B, -A)
-    return 2, SMALL if r <= eps[2] or least <= eps[2] else 0
+    return 2, layout.SMALL if r <= eps[2] or least <= eps[2] else 0
 
 
 @compiled()
@@ -237,13 +225,13 @@ def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> Resu
     """``a r^2 + 2 h r + c = 0``."""
     room, size = h * h - a * c, h * h + abs(a * c)
     if room < -slack * size:
-        return 0, SMALL if room > -1e-6 * size else 0
+        return 0, layout.SMALL if room > -1e-6 * size else 0
     if room <= 0.0:
         roots[0] = -h / a
-        return 1, DOUBLE
+        return 1, layout.DOUBLE
     whole = -(h + (sqrt(room) if h >= 0.0 else -sqrt(room)))
     roots[0], roots[1] = whole / a, c / whole if whole != 0.0 else 0.0
-    return 2, DOUBLE if room <= 1e-12 * size else 0
+    return 2, layout.DOUBLE if room <= 1e-12 * size else 0
 
 
 @compiled()
@@ -253,18 +241,18 @@ def length_and_angle(
     """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length, then an angle."""
     least = min(abs(g[0]), abs(g[3]))
     if least <= eps[1]:
-        return 0, SMALL
+        return 0, layout.SMALL
     u0, u1, v0, v1 = g[1] / g[0], g[2] / g[0], g[4] / g[3], g[5] / g[3]
     a = u1 * u1 + v1 * v1
     if a <= eps[1]:
-        return 0, SMALL
+        return 0, layout.SMALL
     roots = np.empty(2)
     count, flags = quadratic(a, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0, eps[0], roots)
     for i in range(count):
         r = roots[i]
         put(found, o + 6 * i, lane, r, 1.0, 0.0)
         put(found, o + 6 * i + 3, lane, 0.0, v0 + v1 * r, u0 + u1 * r)
-    return count, flags | (SMALL if least <= eps[2] else 0)
+    return count, flags | (layout.SMALL if least <= eps[2] else 0)
 
 
 @compiled()
@@ -277,10 +265,10 @@ def polynomial(
         size = max(size, abs(g[i]))
     if size == 0.0:
         put_free(found, o, lane, wanted[0])
-        return 1, FREE_1
-    if code == QUARTIC:
+        return 1, layout.FREE_1
+    if code == layout.QUARTIC:
         count = trigonometric_roots(g, roots, eps[0] * size)
-        flags = DOUBLE * (count % 2)
+        flags = layout.DOUBLE * (count % 2)
     elif g[3] == 0.0 and g[4] == 0.0 and g[2] != 0.0:
         count, flags = quadratic(g[2], 0.5 * g[1], g[0], eps[0], roots)
     else:
@@ -289,12 +277,12 @@ def polynomial(
         put_free(found, o + 6 * i, lane, roots[i])
         for m in range(i):
             gap = abs(roots[i] - roots[m])
-            if code == QUARTIC:
+            if code == layout.QUARTIC:
                 gap = min(gap, abs(gap - 2.0 * pi))
             else:
                 gap /= 1.0 + abs(roots[i])
             if gap < 1e-3:
-                flags |= DOUBLE
+                flags |= layout.DOUBLE
     return count, flags
 
 
@@ -303,8 +291,8 @@ def solve_rare(
     code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
 ) -> Result:
     """Solutions of one step: the equations that few arms need."""
-    if code == LENGTH_TIMES_ANGLE:
+    if code == layout.LENGTH_TIMES_ANGLE:
         return length_times_angle(g, eps, wanted, found, o, lane)
-    if code == LENGTH_AND_ANGLE:
+    if code == layout.LENGTH_AND_ANGLE:
         return length_and_angle(g, eps, wanted, found, o, lane)
     return polynomial(code, g, eps, wanted, found, o, lane)

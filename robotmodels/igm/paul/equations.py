@@ -177,8 +177,8 @@ class Arm:
     def equations(self, inverse: bool = False) -> list[Equation]:
         """Elements of all matrix equations that have one or two unknowns."""
         found: list[Equation] = []
-        for near in (True, False) if self.joints.tied else (False,):
-            self.joints.near = near
+        for shortest in (True, False) if self.joints.has_alternatives else (False,):
+            self.joints.shortest = shortest
             found += self._written(inverse)
         return found
 

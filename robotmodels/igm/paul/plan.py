@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ...errors import InvalidValueError
 from ..loop import JointChain
-from .catalogue import Candidate, candidates
+from .catalogue import Candidate, candidates, cost
 from .equations import Arm, Split
 from .expressions import Expression
 from .normal_form import NormalForm, normal_form
@@ -90,5 +90,5 @@ def _best(arm: Arm) -> Candidate | None:
     for inverse in (False, True):
         found = candidates(arm.equations(inverse), arm.joints)
         if found:
-            return min(found, key=lambda c: c.cost)
+            return min(found, key=lambda c: cost(c, arm.joints))
     return None

@@ -275,9 +275,9 @@ def _joint_value(arm: Arm, j: int, values: dict[int, Expression]) -> Expression:
         return arm.graph.sum((joints.lengths[j], offset))
     sense = joints.group[j][2]
     terms = []
-    for solved, way in joints.path(joints.span_of(j)):
+    for solved, sign in joints.path(joints.sum_of(j)):
         factor, node = values[solved.unknown]
-        terms.append((sense * way * joints.sense(solved.span) * factor, node))
+        terms.append((sense * sign * joints.sense(solved.span) * factor, node))
     return arm.graph.sum((*terms, offset))
 
 

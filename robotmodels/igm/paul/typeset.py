@@ -99,7 +99,7 @@ class Typesetter:
         letters = letters.replace("θ", r"\theta")
         return f"{letters}_{{{index}}}" if index else letters
 
-    def said(self, words: str, *parts: Line | Prose | str) -> Prose:
+    def sentence(self, words: str, *parts: Line | Prose | str) -> Prose:
         """A sentence; each ``{}`` of it is a formula or other words."""
         pieces = words.split("{}")
         text, latex = pieces[0], escaped(pieces[0])
@@ -112,7 +112,7 @@ class Typesetter:
 
     def joined(self, parts: Sequence[Line | Prose | str], by: str) -> Prose:
         """Formulas or words with something between them."""
-        return self.said(by.join(["{}"] * len(parts)), *parts)
+        return self.sentence(by.join(["{}"] * len(parts)), *parts)
 
 
 def number(value: float) -> str:

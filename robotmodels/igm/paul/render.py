@@ -9,25 +9,25 @@ import numpy as np
 from ...latex_text import escaped, meaning_latex, powers, table_latex
 from ...model import RobotModel
 from ...table_text import SMALLEST
+from .steps import ExplainedStep, PlanText
 from .types import EquationType
 from .typeset import Line, Prose, angle, display, matrices, number
-from .unknowns import Span
-from .wording import Wording
+from .unknowns import JointSum
 
 _ARCS = (EquationType.TYPE_2_ZERO, EquationType.TYPE_3, EquationType.TYPE_3_DIRECT)
 """Types whose solution is an arc tangent of the pose."""
 
 
-def whole(
-    model: RobotModel, words: Wording, steps: list[tuple[str, str]], takes_over: str
+def render(
+    model: RobotModel, words: PlanText, steps: tuple[ExplainedStep, ...], takes_over: str
 ) -> tuple[str, str]:
-    """The explanation of an arm as text and LaTeX; ``steps`` are its steps in both."""
+    """The explanation of an arm as text and LaTeX."""
     constants = words.plan.arm.constants
     title = f"Inverse geometric model of {model.name} by Paul's method"
     table = str(model.table)
     text, latex = [title, "", table], [rf"\textbf{{{escaped(title)}}}", table_latex(table)]
     before = [_pose_line(model, words)]
-    if notation := _notation(words, "\n".join(step for step, _ in steps)):
+    if notation := _notation(words, "\n".join(step.text for step in steps)):
         before.append(notation)
     for line in before:
         text += ["", line.text]
@@ -38,9 +38,9 @@ def whole(
         rows = [rf"{symbol} = {powers(number(v))} \quad ({meaning_latex(meaning)})"
                 for _, symbol, v, meaning in constants]  # fmt: skip
         latex.append("Constants\n" + display(rows))
-    for step, typeset in steps:
-        text += ["", step]
-        latex.append(typeset)
+    for step in steps:
+        text += ["", step.text]
+        latex.append(step.latex)
     text.append("")
     for line in _end(words, takes_over):
         text.append(line.text)
@@ -48,16 +48,16 @@ def whole(
     return "\n".join(text), "\n\n".join(latex)
 
 
-def _end(words: Wording, takes_over: str) -> list[Prose]:
+def _end(words: PlanText, takes_over: str) -> list[Prose]:
     """How many postures or what remains, the offsets, and the quadrants."""
-    plan, said = words.plan, words.said
+    plan, sentence = words.plan, words.sentence
     lines = []
     if plan.complete:
         branches = [str(s.type.branches) for s in plan.steps if s.type.branches > 1]
         most = plan.most_postures
         each = Line(" x ".join(branches), r" \times ".join(branches))
-        how = said(" ({})", each) if len(branches) > 1 else Prose("", "")
-        lines.append(said(
+        how = sentence(" ({})", each) if len(branches) > 1 else Prose("", "")
+        lines.append(sentence(
             f"At most {most} posture{'s' * (most != 1)}{{}}; "
             "each is checked on the whole pose before it is returned.", how,
         ))  # fmt: skip
@@ -69,18 +69,20 @@ def _end(words: Wording, takes_over: str) -> list[Prose]:
             else "no element of any matrix equation, however it is multiplied, has one or two "
             "unknowns in a form of the catalogue"
         )
-        lines.append(said("Paul's method stops here: {} remain, because " + why + ".", rest))
-        lines.append(said(f"What takes over: {takes_over}."))
+        lines.append(sentence("Paul's method stops here: {} remain, because " + why + ".", rest))
+        lines.append(sentence(f"What takes over: {takes_over}."))
     if plan.steps and (offsets := _offsets(words)):
-        lines.append(said("Joint variables with an offset: {}.", words.joined(offsets, ", ")))
+        lines.append(sentence("Joint variables with an offset: {}.", words.joined(offsets, ", ")))
     if any(s.type in _ARCS for s in plan.steps):
         lines.append(
-            said("atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept.")
+            sentence(
+                "atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept."
+            )
         )
     return lines
 
 
-def _offsets(words: Wording) -> list[Line]:
+def _offsets(words: PlanText) -> list[Line]:
     """Joint variables as the model counts them, where the rows count them from elsewhere."""
     lines = []
     for j, row in enumerate(words.plan.form.rows):
@@ -94,7 +96,7 @@ def _offsets(words: Wording) -> list[Line]:
     return lines
 
 
-def _notation(words: Wording, text: str) -> Prose | None:
+def _notation(words: PlanText, text: str) -> Prose | None:
     """What C, S and their numbers stand for, with the sums of angles that occur."""
     used = set(re.findall(r"\b[CS]([\dm_]+)\b", text))
     if not used:
@@ -104,16 +106,16 @@ def _notation(words: Wording, text: str) -> Prose | None:
     for group, members in enumerate(joints.members):
         for a in range(len(members)):
             for b in range(a + 2, len(members) + 1):
-                u = joints.unknown(Span(group, a, b))
+                u = joints.unknown(JointSum(group, a, b))
                 item = joints.unknowns[u]
                 if item.name in used:
                     names = [f"C{item.name}", f"S{item.name}"]
-                    sums.append(words.said("{} and {} of {}", *names, words.unknown(u)))
-    tail = words.said(", {}", words.joined(sums, ", ")) if sums else Prose("", "")
-    return words.said("{} and {} are cosine and sine of {}{}.", "Cj", "Sj", "θj", tail)
+                    sums.append(words.sentence("{} and {} of {}", *names, words.unknown(u)))
+    tail = words.sentence(", {}", words.joined(sums, ", ")) if sums else Prose("", "")
+    return words.sentence("{} and {} are cosine and sine of {}{}.", "Cj", "Sj", "θj", tail)
 
 
-def _pose_line(model: RobotModel, words: Wording) -> Prose:
+def _pose_line(model: RobotModel, words: PlanText) -> Prose:
     """Meaning of U0, Z and E."""
     form, whole = words.plan.form, words.plan.form.k >= 6
     moved = not np.allclose(form.before, np.eye(4), atol=1e-13)
@@ -135,5 +137,5 @@ def _pose_line(model: RobotModel, words: Wording) -> Prose:
     ]
     tail = "".join(f", {{}} {meaning}" for _, meaning in meanings)
     names = (matrices(name) for name, _ in meanings)
-    return words.said("{}: the desired pose" + " [1.11]" * whole + ", with the elements {}, {}, {}"
-                      " [1.13]" + tail + ".", U0, *rows, *names)  # fmt: skip
+    pose = "{}: the desired pose" + " [1.11]" * whole + ", with the elements {}, {}, {} [1.13]"
+    return words.sentence(pose + tail + ".", U0, *rows, *names)

@@ -15,23 +15,25 @@ from .formulas import Page
 from .plan import PaulPlan, Step
 from .types import EquationType
 from .typeset import Prose, Typesetter, display, matrices, type_formula
-from .writing import Writer
+from .writer import Writer
 
 
 @dataclass(frozen=True, slots=True)
-class StepText:
-    """Text of a step."""
+class ExplainedStep:
+    """One step of the derivation."""
 
-    names: tuple[str, ...]
+    joints: tuple[str, ...]
+    type: EquationType
     matrix_equation: str
     equations: tuple[str, ...]
     formulas: tuple[str, ...]
     undetermined: str
+    branches: int
     text: str
     latex: str
 
 
-class Wording(Typesetter):
+class PlanText(Typesetter):
     """Writes the steps of one plan."""
 
     def __init__(self, plan: PaulPlan) -> None:
@@ -108,9 +110,9 @@ class Wording(Typesetter):
         out = ", both sides inverted" if split.inverse else ""
         if split.twist:
             out += f", in the axes before joint {split.s + 1}"
-        return self.said("{}" + out, matrices(self.matrix_equation(split)))
+        return self.sentence("{}" + out, matrices(self.matrix_equation(split)))
 
-    def step(self, number: int, step: Step) -> StepText:
+    def step(self, number: int, step: Step) -> ExplainedStep:
         """One step in words."""
         symbols = [[self.graph.nodes[e[1]].name for e in self.joints.symbols(u)]
                    for u in step.unknowns]  # fmt: skip
@@ -127,12 +129,14 @@ class Wording(Typesetter):
         several = "s" * (len(step.elements) > 1)
         count = f"{step.type.branches} solutions" if step.type.branches > 1 else "one solution"
         title, _, case = step.type.title.partition(" with ")
-        name = self.said(title + " with {}", type_formula(case)) if case else self.said(title)
-        kind = self.said("{}: {}", name, type_formula(step.type.formula))
+        name = (
+            self.sentence(title + " with {}", type_formula(case)) if case else self.sentence(title)
+        )
+        kind = self.sentence("{}: {}", name, type_formula(step.type.formula))
         heading = f"Step {number + 1}:"
         found = self.joined([self.unknown(u) for u in step.unknowns], " and ")
-        first = self.said(" {} (" + count + "), {}", found, kind)
-        second = self.said("{}, element" + several + f" {elements}", equation)
+        first = self.sentence(" {} (" + count + "), {}", found, kind)
+        second = self.sentence("{}, element" + several + f" {elements}", equation)
         text = [f"{heading}{first.text}", f"  {second.text}"]
         latex = [rf"\textbf{{{heading}}}{first.latex}.", f"{second.latex}:"]
         for word, lines in (("", page.equations), ("with", page.definitions), ("hence", new)):
@@ -143,11 +147,17 @@ class Wording(Typesetter):
         if undetermined:
             text.append(f"  {undetermined.text}")
             latex.append(undetermined.latex)
-        return StepText(
-            page.angle, self.matrix_equation(step.splits[0]), tuple(page.equations),
-            (*page.definitions, *formulas), undetermined.text if undetermined else "",
-            "\n".join(text), "\n".join(latex),
-        )  # fmt: skip
+        return ExplainedStep(
+            joints=page.angle,
+            type=step.type,
+            matrix_equation=self.matrix_equation(step.splits[0]),
+            equations=tuple(page.equations),
+            formulas=(*page.definitions, *formulas),
+            undetermined=undetermined.text if undetermined else "",
+            branches=step.type.branches,
+            text="\n".join(text),
+            latex="\n".join(latex),
+        )
 
     def _derived(self, number: int) -> list[str]:
         """Joints that follow from sums of angles once this step is done."""
@@ -156,11 +166,11 @@ class Wording(Typesetter):
         for j, row in enumerate(self.plan.form.rows):
             if row.sigma or j not in self.plan.solved:
                 continue
-            path = self.joints.path(self.joints.span_of(j))
+            path = self.joints.path(self.joints.sum_of(j))
             if len(path) < 2 or max(order[s.unknown] for s, _ in path) != number:
                 continue
             sense, words = self.joints.group[j][2], ""
-            signed = [(sense * way * self.joints.sense(s.span), s) for s, way in path]
+            signed = [(sense * sign * self.joints.sense(s.span), s) for s, sign in path]
             for sign, solved in sorted(signed, key=lambda t: -t[0]):
                 name = self.unknown(solved.unknown)
                 name = f"({name})" if " " in name else name
@@ -171,31 +181,33 @@ class Wording(Typesetter):
 
     def _undetermined(self, step: Step) -> Prose | None:
         """Where the step has no single answer, and what is done there."""
-        first, said = self.unknown(step.unknowns[0]), self.said
-        takes = said("there {} takes the value of `q_ref` (0 without one) and counts once", first)
+        first, sentence = self.unknown(step.unknowns[0]), self.sentence
+        takes = sentence(
+            "there {} takes the value of `q_ref` (0 without one) and counts once", first
+        )
         if step.type is EquationType.TYPE_2_ZERO:
-            where = said("{} and {}", *(self._vanishes(e) for e in step.coefficients))
+            where = sentence("{} and {}", *(self._vanishes(e) for e in step.coefficients))
             which = self._which(step, first)
             meaning = self._meaning(step)
-            return said("{}{} is free where {}{}: {}.", which, first, where, meaning, takes)
+            return sentence("{}{} is free where {}{}: {}.", which, first, where, meaning, takes)
         if step.type in (EquationType.TYPE_2, EquationType.TYPE_6, EquationType.TYPE_7):
             elbow = "" if step.type is EquationType.TYPE_2 else " (stretched or folded)"
-            return said(
+            return sentence(
                 "The two solutions fall together where {}" + elbow + "; where it is smaller the "
                 "pose is out of reach. {} is free where {}: {}.",
                 "X**2 + Y**2 = Z**2", first, "X = Y = Z = 0", takes,
             )  # fmt: skip
         if step.type is EquationType.TYPE_8:
-            return said(
+            return sentence(
                 "The two solutions fall together where the cosine is 1 or {} (stretched or "
                 "folded); where it is larger in size the pose is out of reach. "
                 "{} is free where {}: {}.", "-1", first, "Z1 = Z2 = 0", takes,
             )  # fmt: skip
         if step.type is EquationType.TYPE_4:
-            return said("{} is free where {}.", self.unknown(step.unknowns[1]), "Y1 = Y2 = 0")
+            return sentence("{} is free where {}.", self.unknown(step.unknowns[1]), "Y1 = Y2 = 0")
         if step.type is EquationType.TYPE_1 and not self.graph.is_constant(step.coefficients[0]):
             X = f"{self.write(step.coefficients[0])} = 0"
-            return said("{} is not determined where {}.", first, X)
+            return sentence("{} is not determined where {}.", first, X)
         return None
 
     def _vanishes(self, e: Expression) -> str:
@@ -212,7 +224,7 @@ class Wording(Typesetter):
         frame = self.joints.frame(other[0])
         turned = f"({first})'" if " " in first else f"{first}'"
         above, below = f"S{frame} > 0", f"S{frame} < 0"
-        return self.said("{} has {} and {} has {}. ", first, above, turned, below)
+        return self.sentence("{} has {} and {} has {}. ", first, above, turned, below)
 
     def _meaning(self, step: Step) -> Prose:
         """What it means for the arm that the amplitude of an equation vanishes."""
@@ -227,13 +239,13 @@ class Wording(Typesetter):
             if m != j and across.max() > 1e-6 and _proportional(size, across):
                 a, b = sorted(self.plan.form.rows[i].frame for i in (j, m))
                 how = "aligned" if self._meet(j, m) else "parallel"
-                return self.said(f" (axes {a} and {b} are {how})")
+                return self.sentence(f" (axes {a} and {b} are {how})")
         for m in range(self.plan.form.k):
             away = self.origins[:, m] - origin
             lateral = np.linalg.norm(np.cross(axis, away), axis=1)
             if m != j and lateral.max() > 1e-6 and _proportional(size, lateral):
                 frame, of = self.plan.form.rows[j].frame, self.plan.form.rows[m].frame
-                return self.said(f" ({{}} is on the axis of joint {frame})", f"O{of}")
+                return self.sentence(f" ({{}} is on the axis of joint {frame})", f"O{of}")
         return nothing
 
     def _meet(self, j: int, m: int) -> bool:
