@@ -33,7 +33,7 @@ from .request import (
     relations_of,
 )
 from .self_motion import Settled, settle_families, singular_postures
-from .solutions import IGMSolutions
+from .solutions import IGMSolutions, later, of_fields
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
@@ -83,7 +83,7 @@ def solved(
     ):
         quick = _unchecked(model, T, q_ref)
         if quick is not None and quick.most >= 0:
-            return IGMSolutions.later(quick)
+            return later(quick)
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     if mask_axes not in ("world", "tool"):
@@ -123,7 +123,7 @@ def solved(
         batch = (*batch, *angles.shape)
         rows = _by_family(request, poses, references, psi)
     method = NO_FAMILY if solver is None else solver.method
-    return IGMSolutions.of_fields(result_fields(batch, rows, method, periodic, task.mask))
+    return of_fields(result_fields(batch, rows, method, periodic, task.mask))
 
 
 def _unchecked(model: RobotModel, T: Array, q_ref: ArrayLike | None) -> PlanRows | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import degrees, hypot
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,21 +137,6 @@ class IGMSolutions(_Later):
             if array.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
             object.__setattr__(self, name, array)
-
-    @classmethod
-    def of_fields(cls, values: tuple[Any, ...]) -> Self:
-        """Build from fields, in their order, that are read-only and fit each other already."""
-        result = object.__new__(cls)
-        for put, value in zip(_PUT.values(), values, strict=True):
-            put(result, value)
-        return result
-
-    @classmethod
-    def later(cls, rows: _Rows) -> Self:
-        """Build when a field is read: a single pose is solved in less time than that takes."""
-        result = object.__new__(cls)
-        _PUT_ROWS(result, rows)
-        return result
 
     if not TYPE_CHECKING:
 
@@ -371,6 +356,21 @@ def _named(what: str, joints: NDArray[np.bool_]) -> str:
 # the slots themselves: quicker than by name
 _PUT = {field.name: getattr(IGMSolutions, field.name).__set__ for field in fields(IGMSolutions)}
 _PUT_ROWS = vars(_Later)["_rows"].__set__
+
+
+def of_fields(values: tuple[Any, ...]) -> IGMSolutions:
+    """A result of fields, in their order, that are read-only and fit each other already."""
+    result = object.__new__(IGMSolutions)
+    for put, value in zip(_PUT.values(), values, strict=True):
+        put(result, value)
+    return result
+
+
+def later(rows: _Rows) -> IGMSolutions:
+    """A result whose fields are made when one is read: that takes longer than to solve a pose."""
+    result = object.__new__(IGMSolutions)
+    _PUT_ROWS(result, rows)
+    return result
 
 
 def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:
