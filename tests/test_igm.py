@@ -496,7 +496,7 @@ def test_a_path_through_the_solutions_is_continuous():
     assert found.path(q[0] + 2.0 * np.pi)[0, 0] == pytest.approx(q[0, 0] + 2.0 * np.pi)
     T = rm.dgm(model, q)
     T[7, :3, 3] = 9.0
-    with pytest.raises(InvalidValueError, match="pose 7 has no solution: .* too far"):
+    with pytest.raises(InvalidValueError, match=r"pose 7 has no solution: .* too far"):
         rm.igm(model, T).path(q[0])
     with pytest.raises(ShapeError, match="poses of shape"):
         rm.igm(model, T[0]).path(q[0])
