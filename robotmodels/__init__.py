@@ -48,21 +48,26 @@ from .robots import load, robots
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import calibration, datasets, identification, obstacles, simulation, trajectories, viz
+    from . import (
+        calibration,
+        datasets,
+        identification,
+        obstacles,
+        simulation,
+        symbolic,
+        trajectories,
+        viz,
+    )
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
         FilteredInverse,
         IKMSolution,
         IKMStatus,
-        JacobianExplanation,
         OrientationKind,
         PseudoInverse,
-        SingularityExplanation,
         classify_singularity,
         coordinate_jacobian,
-        explain_jacobian,
-        explain_singularities,
         force_ellipsoid,
         ikm,
         ikm_second_order,
@@ -85,7 +90,14 @@ if TYPE_CHECKING:
         uniform_bodies,
     )
     from .simulation import Simulation, simulate, torque_parts
-    from .symbolic_dgm import DirectModelExplanation, explain_dgm
+    from .symbolic import (
+        DirectModelExplanation,
+        JacobianExplanation,
+        SingularityExplanation,
+        explain_dgm,
+        explain_jacobian,
+        explain_singularities,
+    )
     from .symoro import read_par
 
 __version__ = "0.2.0"
@@ -175,6 +187,7 @@ __all__ = [
     "standard_parameters",
     "static_torque",
     "static_wrench",
+    "symbolic",
     "to_urdf",
     "torque_parts",
     "torque_regressor",
@@ -240,14 +253,10 @@ _ROOMS = {
         "FilteredInverse",
         "IKMSolution",
         "IKMStatus",
-        "JacobianExplanation",
         "OrientationKind",
         "PseudoInverse",
-        "SingularityExplanation",
         "classify_singularity",
         "coordinate_jacobian",
-        "explain_jacobian",
-        "explain_singularities",
         "force_ellipsoid",
         "ikm",
         "ikm_second_order",
@@ -266,7 +275,14 @@ _ROOMS = {
         "simulate",
         "torque_parts",
     ),
-    ".symbolic_dgm": ("DirectModelExplanation", "explain_dgm"),
+    ".symbolic": (
+        "DirectModelExplanation",
+        "JacobianExplanation",
+        "SingularityExplanation",
+        "explain_dgm",
+        "explain_jacobian",
+        "explain_singularities",
+    ),
     ".symoro": ("read_par",),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
@@ -278,8 +294,8 @@ def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
     with _OPENING:
         if name in (
-            "calibration", "datasets", "identification", "obstacles", "simulation", "trajectories",
-            "viz",
+            "calibration", "datasets", "identification", "obstacles", "simulation", "symbolic",
+            "trajectories", "viz",
         ):  # fmt: skip
             return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:

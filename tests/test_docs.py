@@ -19,7 +19,7 @@ ROOMS = (
     "robotmodels", "calibration", "datasets", "drive", "dynamics", "errors", "estimation",
     "friction", "geometry", "identification", "igm", "inertia", "kinematics", "logs",
     "minimal_parameters", "model", "obstacles", "regressors", "robots", "se3", "simulation",
-    "symbolic_dgm", "symoro", "trajectories", "urdf", "viz",
+    "symbolic", "symoro", "trajectories", "urdf", "viz",
 )  # fmt: skip
 FOR_OTHER_ROOMS = {
     "geometry": {"FIXED", "NOT_XML", "PRISMATIC", "REVOLUTE"},

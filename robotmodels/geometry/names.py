@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from ..errors import ShapeError, TableError
 from .joint_kinds import FIXED
 
-NOT_XML = re.compile("[\x00-\x1f\ud800-\udfff\ufffe\uffff]")
-"""Characters that an XML attribute cannot hold or does not keep: names must do without them."""
+NOT_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+"""Characters that XML does not keep, and control characters that a terminal obeys."""
 
 
 def default_names(sigma: NDArray[np.int64]) -> tuple[str, ...]:
@@ -27,15 +28,15 @@ def checked_names(names: Sequence[str], f: int) -> tuple[str, ...]:
     labels = tuple(map(str, names))
     if len(labels) != f:
         raise ShapeError(f"names: expected one name for each of the {f} rows, got {len(labels)}.")
-    repeated = sorted({name for name in labels if labels.count(name) > 1})
-    if repeated or not all(labels):
-        raise TableError(
-            f"names: each frame needs a name of its own, got {', '.join(map(repr, repeated))} "
-            "more than once."
-            if repeated
-            else "names: a frame has an empty name."
-        )
+    repeated = sorted(name for name, count in Counter(labels).items() if count > 1)
+    if repeated:
+        listed = ", ".join(f"{name!r:.80}" for name in repeated[:5])
+        raise TableError(f"names: each frame needs a name of its own, got {listed} more than once.")
+    if not all(labels):
+        raise TableError("names: a frame has an empty name.")
     for name in labels:
         if NOT_XML.search(name):
-            raise TableError(f"names: {name!r} holds a control character; a URDF cannot hold it.")
+            raise TableError(
+                f"names: {name!r:.80} holds a control character; a URDF cannot hold it."
+            )
     return labels

@@ -37,7 +37,7 @@ from .solutions import IGMSolutions, later, of_fields
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
-from .why import Search, search
+from .unreachable import Diagnosis, diagnose
 
 NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
 """Method of a result where there is none but the search."""
@@ -204,7 +204,7 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
     columns = arm.columns[~np.isin(arm.columns, locked)]
     found = _near_or_far(request, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(request, found, references, columns)
-    reasons = search(
+    reasons = diagnose(
         model, task, request.solver is None, poses, references, request.limits,
         request.tolerances, rows.status,
     )  # fmt: skip
@@ -228,7 +228,7 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
     return rows._replace(closest=reasons.closest, missing=reasons.missing)
 
 
-def _alone(rows: Rows, found: Search, chosen: NDArray[np.bool_], model: RobotModel) -> Rows:
+def _alone(rows: Rows, found: Diagnosis, chosen: NDArray[np.bool_], model: RobotModel) -> Rows:
     """Solutions of the search, one for each pose."""
     q = found.closest[found.rows[chosen]]
     there = np.ones((len(q), 1), np.bool_)

@@ -31,17 +31,6 @@ if TYPE_CHECKING:
     from .ellipsoids import OtherPart, TwistPart, force_ellipsoid, velocity_ellipsoid
     from .equilibrium import StaticStatus, StaticWrench, static_wrench
     from .factors import JacobianFactors, jacobian_factors
-    from .formulas import (
-        FormulaStatus,
-        JacobianExplanation,
-        SingularityCondition,
-        SingularityExplanation,
-        SingularityFactor,
-        SingularityMap,
-        explain_jacobian,
-        explain_singularities,
-        singularity_map,
-    )
     from .inverse import (
         Criterion,
         DampedInverse,
@@ -99,12 +88,10 @@ __all__ = [
     "Ellipsoid",
     "EllipsoidQuantity",
     "FilteredInverse",
-    "FormulaStatus",
     "FunctionTask",
     "IKMSolution",
     "IKMStatus",
     "InverseMethod",
-    "JacobianExplanation",
     "JacobianFactors",
     "JacobianRank",
     "JointBounds",
@@ -129,12 +116,8 @@ __all__ = [
     "SearchOutcome",
     "SelfMotion",
     "SelfMotionKind",
-    "SingularityCondition",
-    "SingularityExplanation",
-    "SingularityFactor",
     "SingularityFlags",
     "SingularityKind",
-    "SingularityMap",
     "SingularityReport",
     "SingularityStatus",
     "Sphere",
@@ -153,8 +136,6 @@ __all__ = [
     "dgm",
     "dkm",
     "dkm_second_order",
-    "explain_jacobian",
-    "explain_singularities",
     "force_ellipsoid",
     "ikm",
     "ikm_second_order",
@@ -170,7 +151,6 @@ __all__ = [
     "operational_dimension",
     "pose_from_coordinates",
     "singularity_flags",
-    "singularity_map",
     "static_torque",
     "static_wrench",
     "transported_wrench",
@@ -204,17 +184,6 @@ _ROOMS = {
     ".factors": (
         "JacobianFactors",
         "jacobian_factors",
-    ),
-    ".formulas": (
-        "FormulaStatus",
-        "JacobianExplanation",
-        "SingularityCondition",
-        "SingularityExplanation",
-        "SingularityFactor",
-        "SingularityMap",
-        "explain_jacobian",
-        "explain_singularities",
-        "singularity_map",
     ),
     ".inverse": (
         "Criterion",

@@ -18,7 +18,7 @@ from .._arrays import Array
 from ..drive import Drives
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
-from ..symbolic_dgm._angles import exact_turns
+from ..symbolic.angles import exact_turns
 from . import rules
 
 _LONGEST = 40

@@ -17,7 +17,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 
 from ...kernels._compile import Floats, compiled
-from .._equations import polynomial_roots, trigonometric_roots
+from ..kernels.equations import polynomial_roots, trigonometric_roots
 from . import layout
 
 Tolerances = tuple[float, float, float]
