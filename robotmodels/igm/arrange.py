@@ -137,7 +137,7 @@ def arranged(
         there = valid.reshape(at.shape)
         return np.where(there, np.take_along_axis(values, at, axis=1), values.dtype.type(nothing))
 
-    free, family = np.zeros((2, *q.shape), np.bool_)
+    free, family = np.zeros(q.shape, np.bool_), np.zeros(q.shape, np.bool_)
     free[..., columns] = found.free
     family[..., columns] = found.moving & ~found.free
     moving = np.any(found.moving | found.free, axis=-1)

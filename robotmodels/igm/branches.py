@@ -93,18 +93,14 @@ def arm_angle_sides(chain: JointChain, q: Array) -> tuple[Array, ...]:
 
     Each product depends on one joint alone, as ``a + b cos q + c sin q``.
     """
-    t = 2.0 * np.pi / 3.0 * np.arange(3)
+    t: Array = 2.0 * np.pi / 3.0 * np.arange(3.0)
     z, p = axes_of(chain, np.repeat(t[:, None], 7, axis=1))
     shoulder = _nearest_point(z[1], p[1], z[2], p[2])
     wrist = _nearest_point(z[5], p[5], z[4], p[4])
     elbow = _triple(z[3], p[3] - shoulder, wrist - p[3])
     samples = {1: _triple(z[0], z[1], z[2]), 3: elbow, 5: _triple(z[4], z[5], z[6])}
     return tuple(
-        (
-            value.sum()
-            + 2.0 * (value @ np.cos(t) * np.cos(q[:, j]) + value @ np.sin(t) * np.sin(q[:, j]))
-        )
-        for j, value in samples.items()
+        value.sum() + 2.0 * np.cos(q[:, j, None] - t) @ value for j, value in samples.items()
     )
 
 

@@ -153,6 +153,7 @@ def _plan_rows(
     N, S = len(poses), arm.most
     q, residual = np.empty((N, S, arm.turns.size)), np.empty((N, S))
     marks = np.empty((N, 2 + 2 * S), np.int64)
+    assert arm.kernel is not None
     most = arm.kernel(arm.instructions, arm.numbers, poses, references, mode, q, residual, marks)
     return PlanRows(arm, batch, q, residual, marks, most, mode)
 

@@ -109,7 +109,7 @@ def solve_step(
         if state[3 * level, lane] == 0:
             pass
         elif direct and x[o + 1, lane] ** 2 + x[o + 2, lane] ** 2 > eps[2] * eps[2]:
-            count = 1 + code
+            count = 2 if code == layout.OPPOSITE_ANGLES else 1
         else:
             for i in range(7):
                 g[i] = x[plan[at + layout.COEFFICIENTS + i], lane]
@@ -122,7 +122,8 @@ def solve_step(
                 count, flags = solve(code, g, eps, pair, x, o, lane)
             marks[start + lane, 1] |= flags
         state[3 * level + 1, lane], state[3 * level + 2, lane] = count, flags
-        widest = max(widest, count)
+        if count > widest:
+            widest = count
     between = 3 if code == layout.TWO_ANGLES else 6
     for row in range(o if code < layout.LENGTH else o + 3, o + 6 * widest, between):
         complete(x[row], x[row + 1], x[row + 2])

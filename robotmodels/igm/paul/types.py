@@ -1,5 +1,9 @@
 """The types of equations that Paul's method comes down to: one row for each.
 
+Columns: name, equation (``formula``), most solutions (``branches``), function that prints the
+solution (``write``), code of the equation that the kernel solves (``kernel``), coefficients that
+must not all be zero (``amplitude``), the kernel's coefficients from the type's (``arguments``).
+
 Source: W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, section 4.4 and
 appendix 1, for the types.
 """
@@ -21,12 +25,7 @@ def _same(*coefficients: Expression) -> tuple[Expression, ...]:
 
 
 class EquationType(Enum):
-    """Types of equations, numbered as in the literature; two more that lead to a polynomial.
-
-    ``formula``: the equation. ``branches``: the most solutions. ``write`` prints its solution.
-    ``kernel``: code of the equation that the kernel solves (`layout`), with ``arguments`` of the
-    type's coefficients. ``amplitude``: coefficients that must not all be zero.
-    """
+    """Types of equations, numbered as in the literature; two more that lead to a polynomial."""
 
     formula: str
     branches: int
