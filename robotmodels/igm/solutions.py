@@ -27,7 +27,7 @@ class _Later:
     """Place of the rows of a result whose fields are made when the first of them is read."""
 
     __slots__ = ("_rows",)
-    _rows: _Rows
+    _rows: _Rows | None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -144,9 +144,12 @@ class IGMSolutions(_Later):
             # a slot without a value is a field that is not made yet
             if name not in _PUT:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            for put, value in zip(_PUT.values(), self._rows.fields(), strict=True):
-                put(self, value)
-            return getattr(self, name)
+            rows = self._rows
+            if rows is not None:
+                for put, value in zip(_PUT.values(), rows.fields(), strict=True):
+                    put(self, value)
+                _PUT_ROWS(self, None)  # after the fields, for threads that read the same result
+            return object.__getattribute__(self, name)
 
     @property
     def branch(self) -> NDArray[np.str_]:

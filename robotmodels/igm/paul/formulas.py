@@ -4,38 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any
 
-from .expressions import ONE, UNIT, Expression, Graph, negative
-
-
-class Words(Protocol):
-    """What the formulas of a step need from the text of the whole plan."""
-
-    graph: Graph
-
-    def write(self, e: Expression) -> str:
-        """An expression."""
-        ...
-
-    def sum(self, *terms: tuple[Expression, str]) -> str:
-        """Expressions times symbols, added."""
-        ...
-
-    def short(self, e: Expression, lines: list[str]) -> Expression:
-        """A name for a long expression; its definition is added to the lines if it is new."""
-        ...
-
-    def difference(self, i: int, j: int) -> tuple[str, float, str, str]:
-        """The angle j without the angle i: its name, sign, cosine and sine."""
-        ...
+from .expressions import ONE, UNIT, Expression, negative
 
 
 @dataclass(slots=True)
 class Page:
-    """Symbols of one step, and its lines: the equations, what stands for what, what follows."""
+    """Symbols of one step, and its lines: the equations, what stands for what, what follows.
 
-    words: Words
+    ``words`` is the `PlanText` of the whole plan.
+    """
+
+    words: Any
     coefficients: tuple[Expression, ...]
     unknowns: tuple[int, ...]
     angle: tuple[str, ...]
