@@ -286,6 +286,13 @@ def test_an_aligned_wrist_is_reported_and_loses_no_branch(name, wrist):
         assert (marks[:, 0] == regular).all()
 
 
+@pytest.mark.parametrize("off", [se3.from_rpy([0.1, 0.0, 0.0]), se3.translation(0.0, 0.0, 0.01)])
+def test_candidates_that_miss_the_pose_are_not_returned(off):
+    plan, model = plan_of("lab_trr"), rm.load("lab_trr")
+    U = poses_of(model, plan, postures_at_random(plan, 20)) @ off
+    assert (solved(plan, U)[1][:, 0] == 0).all()
+
+
 def test_structure_within_rounding_is_used_and_the_true_table_is_met():
     model = rm.load("puma560")
     rng = np.random.default_rng(4)

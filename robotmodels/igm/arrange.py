@@ -170,33 +170,30 @@ def turned_inside(x: Array, lower: Array, upper: Array, goal: Array) -> Array:
     return np.where(lowest <= highest, nearest, np.nan)
 
 
-def padded(rows: Rows, S: int) -> Rows:
-    """Rows with at least S for each pose."""
-    nothing = {"q": np.nan, "residual": np.nan, "code": -1}
-    wider = {}
-    for name in ("q", "valid", "residual", "inside", "code", "double", "free", "family"):
-        values = getattr(rows, name)
-        more = [(0, 0), (0, max(S - values.shape[1], 0)), *[(0, 0)] * (values.ndim - 2)]
-        wider[name] = np.pad(values, more, constant_values=nothing.get(name, 0))
-    return rows._replace(**wider)
+_NOTHING = {"q": np.nan, "residual": np.nan, "code": -1}
 
 
 def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
     """Rows with those of some poses replaced; labels of both."""
-    S = max(rows.q.shape[1], part.q.shape[1])
     labels, shorter = sorted((rows.labels, part.labels), key=len, reverse=True)
     if labels[: len(shorter)] != shorter:
         # the two solvers use different branch labels
         labels = rows.labels + part.labels
         part = part._replace(code=np.where(part.valid, part.code + len(rows.labels), -1))
-    wide, part = padded(rows, S), padded(part, S)
-    for name in ("q", "valid", "residual", "inside", "code", "status", "double", "free", "family"):
-        getattr(wide, name)[at] = getattr(part, name)
-    if part.closest is None or part.missing is None:
-        return wide._replace(labels=labels)
-    closest, missing = (
-        np.full((len(wide.q), wide.q.shape[2]), np.nan),
-        np.full((len(wide.q), 6), np.nan),
-    )
-    closest[at], missing[at] = part.closest, part.missing
-    return wide._replace(labels=labels, closest=closest, missing=missing)
+    N, most = len(rows.q), max(rows.q.shape[1], part.q.shape[1])
+    wide: dict[str, Any] = {"labels": labels}
+    for name in ("q", "valid", "residual", "inside", "code", "double", "free", "family"):
+        old, new = getattr(rows, name), getattr(part, name)
+        values = np.full((N, most, *old.shape[2:]), _NOTHING.get(name, 0), old.dtype)
+        values[:, : old.shape[1]] = old
+        values[at] = _NOTHING.get(name, 0)
+        values[at, : new.shape[1]] = new
+        wide[name] = values
+    wide["status"] = rows.status.copy()
+    wide["status"][at] = part.status
+    for name in ("closest", "missing"):
+        new = getattr(part, name)
+        if new is not None:
+            wide[name] = np.full((N, new.shape[1]), np.nan)
+            wide[name][at] = new
+    return rows._replace(**wide)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import singledispatch
+from functools import lru_cache, singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,13 +71,13 @@ def sides(chain: JointChain, order: list[int], parallel: bool, q: Array) -> tupl
     a, b, c, d, e, f = order
 
     def velocity(j: int, point: Array) -> Array:
-        return z[j] if chain.sigma[j] else np.cross(z[j], point - p[j])
+        return z[j] if chain.sigma[j] else _cross(z[j], point - p[j])
 
     if parallel:
         centre = _nearest_point(z[f], p[f], z[e], p[e])
         elbow = _triple(z[b], p[c] - p[b], p[d] - p[c])
         wrist = _triple(z[e], z[b], z[f])
-        return _dot(np.cross(z[a], centre - p[a]), z[b]), elbow, wrist
+        return _dot(_cross(z[a], centre - p[a]), z[b]), elbow, wrist
     centre = _nearest_point(z[d], p[d], z[e], p[e])
     wrist = _triple(z[d], z[e], z[f])
     u, v, w = (velocity(j, centre) for j in (a, b, c))
@@ -88,19 +88,27 @@ def sides(chain: JointChain, order: list[int], parallel: bool, q: Array) -> tupl
     return shoulder, np.where(shoulder >= 0.0, elbow, -elbow), wrist
 
 
-def arm_angle_sides(chain: JointChain, q: Array) -> tuple[Array, ...]:
-    """The same for seven joints with a spherical shoulder (1 to 3) and wrist (5 to 7).
+@lru_cache(maxsize=64)
+def _samples(chain: JointChain) -> tuple[Array, tuple[Array, ...]]:
+    """Three angles, and the products of a shoulder, an elbow and a wrist at them.
 
-    Each product depends on one joint alone, as ``a + b cos q + c sin q``.
+    Seven joints with a spherical shoulder (1 to 3) and wrist (5 to 7): each product depends on one
+    joint alone, as ``a + b cos q + c sin q``.
     """
     t: Array = 2.0 * np.pi / 3.0 * np.arange(3.0)
     z, p = axes_of(chain, np.repeat(t[:, None], 7, axis=1))
     shoulder = _nearest_point(z[1], p[1], z[2], p[2])
     wrist = _nearest_point(z[5], p[5], z[4], p[4])
     elbow = _triple(z[3], p[3] - shoulder, wrist - p[3])
-    samples = {1: _triple(z[0], z[1], z[2]), 3: elbow, 5: _triple(z[4], z[5], z[6])}
+    return t, (_triple(z[0], z[1], z[2]), elbow, _triple(z[4], z[5], z[6]))
+
+
+def arm_angle_sides(chain: JointChain, q: Array) -> tuple[Array, ...]:
+    """The same for arms with an arm angle, by trigonometric interpolation in joints 2, 4, 6."""
+    t, products = _samples(chain)
     return tuple(
-        value.sum() + 2.0 * np.cos(q[:, j, None] - t) @ value for j, value in samples.items()
+        values.sum() + 2.0 * np.cos(q[:, j, None] - t) @ values
+        for j, values in zip((1, 3, 5), products, strict=True)
     )
 
 
@@ -108,14 +116,19 @@ def _dot(a: Array, b: Array) -> Array:
     return np.einsum("ij,ij->i", a, b)
 
 
+def _cross(a: Array, b: Array) -> Array:
+    i, j = [1, 2, 0], [2, 0, 1]
+    return a[:, i] * b[:, j] - a[:, j] * b[:, i]
+
+
 def _triple(a: Array, b: Array, c: Array) -> Array:
     """``a . (b x c)``."""
-    return _dot(a, np.cross(b, c))
+    return _dot(a, _cross(b, c))
 
 
 def _nearest_point(z: Array, p: Array, other_z: Array, other_p: Array) -> Array:
     """Point of a line that is nearest to another; its origin if they are parallel."""
-    n = np.cross(z, other_z)
+    n = _cross(z, other_z)
     size = _dot(n, n)
     along = _triple(other_p - p, other_z, n) / np.where(size > 1e-12, size, np.inf)
     return p + along[:, None] * z

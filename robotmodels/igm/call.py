@@ -187,6 +187,8 @@ def _by_plan(request: Request, poses: Array, references: Array, quick: PlanRows 
         return _by_family(request, poses, references)
     doubtful = np.flatnonzero(quick.marks[:, 1] == IGMStatus.NOT_CONVERGED)
     part = _by_family(request, poses[doubtful], references[doubtful])
+    if doubtful.size == len(poses):
+        return part
     return put(quick._replace(most=-1 - quick.most).rows(), doubtful, part)
 
 
