@@ -12,14 +12,13 @@ from numba import types as nb
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError
-from robotmodels.igm.lock import locked_chain
+from robotmodels.igm.chain import VirtualJoint, locked_chain, with_virtual_joints
 from robotmodels.igm.loop import joint_chain
 from robotmodels.igm.motion import tool_poses
 from robotmodels.igm.paul import derive_plan, explain_igm, layout
 from robotmodels.igm.paul._types import solve, solve_rare
 from robotmodels.igm.paul.types import EquationType
 from robotmodels.igm.paul.typeset import type_formula
-from robotmodels.igm.virtual import VirtualJoint, with_virtual_joints
 from robotmodels.kernels._compile import compiled
 
 COMPLETE = (

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .._arrays import Array, read_only
 from .known import KnownArm
 from .paul.layout import WITHIN_LIMITS
-from .self_motion import Settled
+from .postures import Postures
 from .solutions import posture_distance
 from .status import IGMStatus
 
@@ -98,7 +98,7 @@ def result_fields(
 
 
 def arranged(
-    found: Settled,
+    found: Postures,
     code: NDArray[np.int16],
     labels: tuple[str, ...],
     columns: NDArray[np.int64],

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
-from .fewer import FewerJoints
 from .loop import JointChain
 from .motion import axes_of
+from .reduced import FewerJoints
 from .solver import Found, Solver
 from .structure import Family
 

@@ -14,29 +14,21 @@ from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
 from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
-from .centred import Centred, centred, put_back
+from .chain import far_along_rails
 from .check import checked
-from .components import Components, asked_jacobians
-from .dependent import DependentJoints
-from .gather import MERGE
+from .constraints import Components, asked_jacobians, constraints
+from .families import may_miss_solutions
 from .known import KnownArm, known_arm, solver_for
 from .loop import JointChain
 from .motion import lever
 from .paul.layout import GIVEN, IMPROPER, WITHIN_LIMITS
-from .request import (
-    FARTHEST,
-    WHOLE_POSE,
-    Task,
-    above_zero,
-    locks_of,
-    poses_of,
-    relations_of,
-)
-from .self_motion import Settled, settle_families, singular_postures
+from .postures import Postures
+from .redundant import Redundant
+from .request import FARTHEST, WHOLE_POSE, Task, above_zero, locks_of, poses_of, relations_of
+from .singular import complete
 from .solutions import IGMSolutions, later, of_fields
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
-from .thorough import MET
 from .unreachable import Diagnosis, diagnose
 
 NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
@@ -107,7 +99,7 @@ def solved(
             "relation too, with a single 1 in its row."
         )
     batch, poses, references = _checked(model, T, q_ref, bool(limits))
-    arm = known_arm(model)
+    arm = known_arm(model, task == Task())
     solver = solver_for(model, arm, task)
     request = Request(model, arm, task, solver, q_ref is not None, bool(limits), tolerances)
     periodic = arm.never if limits else arm.turns
@@ -205,8 +197,11 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
         references = references.copy()
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
-    found = _near_or_far(request, U, psi, np.ascontiguousarray(references[:, columns]))
+    found = _solved_chain(request, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(request, found, references, columns)
+    if request.solver is not None:
+        missing = may_miss_solutions(request.solver, U, found, references[:, columns])
+        rows.status[missing & (rows.status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
     reasons = diagnose(
         model, task, request.solver is None, poses, references, request.limits,
         request.tolerances, rows.status,
@@ -251,7 +246,7 @@ def _alone(rows: Rows, found: Diagnosis, chosen: NDArray[np.bool_], model: Robot
 
 
 def _laid_out(
-    request: Request, found: Settled, references: Array, columns: NDArray[np.int64]
+    request: Request, found: Postures, references: Array, columns: NDArray[np.int64]
 ) -> Rows:
     """Solutions of a chain as rows of a result, in the columns of the model."""
     code, labels = branches(request.solver, found)
@@ -259,41 +254,40 @@ def _laid_out(
     return arranged(found, code, labels, columns, references, request.given, joints, limits)
 
 
-def _settled_members(request: Request, U: Array, q: Array, references: Array) -> Settled:
-    """The solutions at the reference, of the families that some postures ``(m, k)`` belong to."""
+def _settled_members(request: Request, U: Array, q: Array, references: Array) -> Postures:
+    """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
     assert request.solver is not None
-    chain, components = request.solver.chain, Components(WHOLE_POSE, in_tool_axes=False)
-    where = centred(chain, U, references, components)
-    if where is None:
-        where = Centred(U, references, np.zeros(references.shape))
-    goals, there = np.ascontiguousarray(where.U), np.ones((len(U), 1), np.bool_)
-    found = checked(chain, goals, (q - where.moved)[:, None], there, request.tolerances)
+    chain, there = request.solver.chain, np.ones((len(U), 1), np.bool_)
+    found = checked(chain, U, q[:, None], there, request.tolerances)
     found.family[...] = found.valid
-    settled = settle_families(chain, goals, found, where.references, request.tolerances)
-    return put_back(chain, U, references, where, settled, components, request.tolerances)
+    return complete(chain, U, found, references, request.tolerances)
 
 
-def _near_or_far(request: Request, U: Array, psi: Array | None, references: Array) -> Settled:
-    """Solutions of a chain; slides at its ends that are far out are brought back for it."""
+def _solved_chain(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain; poses far along rails at its base are solved beside the origin."""
     task, solver = request.task, request.solver
-    components, where = Components(task.mask, task.in_tool_axes), None
-    if solver is not None and not task.relations:
-        where = centred(solver.chain, U, references, components)
-    if solver is None or where is None:
+    if solver is None or task.relations or not all(task.mask[:3]):
         return _settled(request, U, psi, references)
-    found = _settled(request, np.ascontiguousarray(where.U), psi, where.references)
-    return put_back(solver.chain, U, references, where, found, components, request.tolerances)
+    chain = solver.chain
+    moved, poses = far_along_rails(chain, U)
+    if not moved.any():
+        return _settled(request, U, psi, references)
+    found = _settled(request, poses, psi, references - moved)
+    n, s = np.nonzero(found.valid)
+    wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
+    q, residual, valid = found.q + moved[:, None], found.residual.copy(), found.valid.copy()
+    residual[n, s], valid[n, s] = wanted.met(U[n], q[n, s], request.tolerances)
+    return replace(found, q=q, residual=residual, valid=valid)
 
 
-def _settled(request: Request, U: Array, psi: Array | None, references: Array) -> Settled:
-    """Solutions of a chain, infinite families completed and double roots marked."""
-    solver, tolerances, task = request.solver, request.tolerances, request.task
+def _settled(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain, infinite families settled and double roots marked."""
+    solver, tolerances = request.solver, request.tolerances
     if solver is None:
-        return nothing_found(len(U), 1, references.shape[1])
-    whole = task.mask == WHOLE_POSE
-    if psi is not None:
+        found = nothing_found(len(U), 1, references.shape[1])
+    elif psi is not None:
         if not isinstance(solver, ArmAngle):
-            if task.locks or not whole:
+            if request.task.locks or request.task.mask != WHOLE_POSE:
                 raise InvalidValueError(
                     "arm_angle: not together with a locked joint or a mask; each of them already "
                     "says which of the infinitely many postures are meant."
@@ -303,56 +297,26 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
                 "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
                 f"seven. It is solved by: {solver.method}."
             )
-        every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-        found = every.take((np.arange(len(U)), np.zeros(len(U), np.int64)))
+        found = arm_angle_postures(solver, U, psi, references, tolerances)
         # the angle is given, so that only joints that took a reference are free
         found.family[...] = found.free.any(axis=-1)
     else:
         found = postures(solver, U, references, tolerances)
-    chain = solver.chain
-    if whole and chain.k <= 6:
-        if isinstance(solver, DependentJoints):
-            # at a value that was only tried the family is not completed yet
-            delta = found.q - references[:, None]
-            turns = np.where(chain.sigma == 0, np.round(delta / (2.0 * np.pi)), 0.0)
-            delta = np.abs(delta - 2.0 * np.pi * turns)
-            found.free[np.any(found.free & (delta > MERGE), axis=-1)] = False
-        return _of_six(chain, U, found, references, tolerances)
+    whole = request.task.mask == WHOLE_POSE
+    if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
+        return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
-    if not whole:
-        moving = moving_for_mask(chain, task, U, found)
-    elif psi is None:
+    if solver is not None and psi is None and whole:
         from ._moving import moving_joints
 
+        chain = solver.chain
         length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
         sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
         moving_joints(sigma, chain.D, length, found.q, rows, moving)
+    if solver is not None and not whole:
+        moving |= moving_for_mask(solver.chain, request.task, U, found)
     moving |= found.free
     return replace(found, moving=moving)
-
-
-def _of_six(
-    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> Settled:
-    """Families completed at the reference, double roots marked."""
-    if chain.k < 6:
-        return settle_families(chain, U, found, references, tolerances)
-    double, member = singular_postures(chain, found)
-    found.double[...] |= double
-    # a double root good to half of its digits can hide that a wrist behind it is aligned
-    candidates = replace(found, family=found.family | member)
-    settled = settle_families(chain, U, candidates, references, tolerances)
-    # beside a family the reference may be only nearly as good as the posture itself
-    worse = np.flatnonzero(_worst(settled) > np.maximum(_worst(found), MET))
-    if worse.size == 0:
-        return settled
-    part = settle_families(chain, U[worse], found.take(worse), references[worse], tolerances)
-    return settled.put(worse, part)
-
-
-def _worst(found: Found) -> Array:
-    """Largest error of the solutions of each pose, shape (N,)."""
-    return np.where(found.valid, found.residual, 0.0).max(axis=1, initial=0.0)
 
 
 def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .. import se3
 from .._arrays import Array
 from ..model import RobotModel
-from .lock import locked_chain
+from .chain import locked_chain
 from .loop import joint_chain
 from .pose_search import SearchTask, pose_search, search_space
 from .request import Task

@@ -27,7 +27,7 @@ SLACK = 1e-9
 """Overshoot beside the amplitude that is tried as a double root."""
 ZERO_AMPLITUDE = 1e-13
 """Amplitudes beside their usual size that leave a joint undetermined."""
-SMALL_AMPLITUDE = 1e-6
+SMALL_AMPLITUDE = 1e-4
 """Amplitudes beside their usual size below which a pose is left to a more careful method."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
