@@ -5,6 +5,8 @@ Plain array code: it runs when an arm is prepared and on the few postures that a
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,7 @@ def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> 
     )
 
 
+@lru_cache(maxsize=256)
 def lever(chain: JointChain) -> float:
     """A length of the arm [m]: the lever of its revolute joints about the tool, 1 without any."""
     turning = chain.sigma == 0
