@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identities.random_robots import random_model, random_pose, random_rotation, random_state
-from numba import njit
+from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, NotARotationError, RobotModelsError, ShapeError
 from robotmodels.igm import IGMStatus, igm_numeric
-from robotmodels.igm.numeric import _pose_error as compiled_error
+from robotmodels.igm.loop import joint_chain
+from robotmodels.igm.pose_search import SearchTask, _Search, search_space
+from robotmodels.igm.solver import Tolerances
 
 ORACLES = Path(__file__).parent / "oracles"
 POSITION = [1, 1, 1, 0, 0, 0]
@@ -38,22 +40,13 @@ def postures(model, rng, count):
     return rng.uniform(lower, upper, (count, model.n))
 
 
-def log_rotation(R):
-    """Rotation vectors by the plain formula, away from pi."""
-    angle = np.arccos(np.clip((np.trace(R, axis1=-2, axis2=-1) - 1) / 2, -1, 1))
-    axis = np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
-    )
-    return axis / (2 * np.sinc(angle / np.pi))[..., None]
-
-
 def pose_error(model, q, T, axes):
     """What is missing at q, by the definition in the docstring."""
     P = rm.dgm(model, q)
     R = T[..., :3, :3]
     turn = R if axes == "tool" else np.broadcast_to(np.eye(3), R.shape)
     away = np.einsum("...ji,...j->...i", turn, T[..., :3, 3] - P[..., :3, 3])
-    phi = log_rotation(R @ np.swapaxes(P[..., :3, :3], -1, -2))
+    phi = Rotation.from_matrix(R @ np.swapaxes(P[..., :3, :3], -1, -2)).as_rotvec()
     return np.concatenate([away, np.einsum("...ji,...j->...i", turn, phi)], axis=-1)
 
 
@@ -76,52 +69,38 @@ def check_met(model, T, found, mask=None, tolerance=1e-6):
 # --- the derivative ------------------------------------------------------------------------------
 
 
-@njit
-def probe(q, arm, goal, z, o, e, J):
-    R, p = compiled_error.forward(q, arm, z, o)
-    phi = compiled_error.missing(R, p, goal, e)
-    compiled_error.error_jacobian(p, phi, goal, arm, z, o, J)
-
-
-def plain(array):
-    return tuple(float(v) for v in np.ravel(array))
+def error_at(model, q, T, axes):
+    """Error (6,) of a configuration and minus its derivative (6, n), from the compiled search."""
+    chain = joint_chain(model)
+    space = search_space(chain, *(np.zeros((2, chain.k))), False, 0, 0)
+    task = SearchTask(np.ones(6, bool), axes == "tool", Tolerances(), 0, 0)
+    columns = space.chain.columns
+    search = _Search(space, task, (se3.inverse(model.base) @ T)[None], q[None, columns], True)
+    e, J = search._errors(np.zeros(1, int), q[None, columns])
+    whole = np.zeros((6, model.n))
+    whole[:, columns] = J[0]
+    return e[0], whole
 
 
 @pytest.mark.parametrize("axes", ["world", "tool"])
-@pytest.mark.parametrize("turn", [0.0, 1e-6, 0.01, 2.0, np.pi - 1e-4])
-def test_error_and_its_derivative(axes, turn, rng):
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.01, 2.0, np.pi - 1e-4])
+def test_error_and_its_derivative(axes, angle, rng):
     """The analytic derivative of all six components is that of finite differences."""
     for seed in range(3):
         model = random_model(np.random.default_rng(seed), f=7, tree=True, fixed=True, tip=7)
-        chain, path = model.chain, np.array(model.table.path(model.tip))
-        arm = (
-            chain.sigma, chain.joint, chain.rotation, chain.position, plain(chain.base_rotation),
-            plain(chain.base_position), path, plain(model.tool[:3, :3]), plain(model.tool[:3, 3]),
-        )  # fmt: skip
         q = random_state(model, rng)[0]
-        axis = random_rotation(rng)[0]
-        R = se3.rotation("z", turn)[:3, :3]
-        turned = np.linalg.qr(np.c_[axis, rng.normal(size=(3, 2))])[0]
-        turned = np.roll(turned * np.sign(np.linalg.det(turned)), -1, axis=1)
         T = rm.dgm(model, q)
-        T[:3, :3] = turned @ R @ turned.T @ T[:3, :3]
+        axis = rng.normal(size=3)
+        T[:3, :3] = (
+            Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix() @ T[:3, :3]
+        )
         T[:3, 3] += rng.normal(size=3)
-        goal = (plain(T[:3, :3]), plain(T[:3, 3]),
-                plain(T[:3, :3]) if axes == "tool" else plain(np.eye(3)))  # fmt: skip
-        z, o = np.empty((len(path), 3)), np.empty((len(path), 3))
-
-        def error(x, arm=arm, goal=goal, z=z, o=o, n=model.n):
-            e, J = np.zeros(6), np.zeros((6, n))
-            probe(x, arm, goal, z, o, e, J)
-            return e, J
-
-        e, J = error(q)
-        assert np.linalg.norm(e[3:]) == pytest.approx(turn, abs=1e-9)
-        if 1e-3 < turn < 3:
-            np.testing.assert_allclose(e, pose_error(model, q, T, axes), atol=1e-9)
-        h = 1e-6
-        for i, step in enumerate(h * np.eye(model.n)):
-            numeric = -(error(q + step)[0] - error(q - step)[0]) / (2 * h)
+        e, J = error_at(model, q, T, axes)
+        assert np.linalg.norm(e[3:]) == pytest.approx(angle, abs=1e-9)
+        np.testing.assert_allclose(e, pose_error(model, q, T, axes), atol=1e-9)
+        for i, step in enumerate(1e-6 * np.eye(model.n)):
+            ahead, behind = (error_at(model, q + s, T, axes)[0] for s in (step, -step))
+            numeric = (behind - ahead) / 2e-6
             np.testing.assert_allclose(J[:, i], numeric, atol=2e-8 * (1 + np.abs(J[:, i]).max()))
 
 

@@ -15,6 +15,7 @@ import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.igm.closed_form import closed_form_postures, plan_loop
+from robotmodels.igm.loop import joint_chain
 from robotmodels.igm.paul import derive_plan, explain_igm, paul_postures
 from robotmodels.igm.paul._run import solve
 from robotmodels.igm.paul.equation_type import EquationType
@@ -34,7 +35,7 @@ RIGHT = pi / 2
 
 @cache
 def plan_of(name):
-    return derive_plan(rm.load(name))
+    return derive_plan(joint_chain(rm.load(name)))
 
 
 @cache
@@ -125,7 +126,7 @@ def test_a_plan_that_stops_in_the_middle_keeps_what_it_found():
     # a slide along its own axis is found, the general arm behind it is not
     rows = [{"sigma": 1}, *({"alpha": a, "d": 0.1 + a / 9, "r": 0.2} for a in (1.0, 1.3, 0.7, 1.1))]
     arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-    plan = derive_plan(arm)
+    plan = derive_plan(joint_chain(arm))
     assert not plan.complete
     assert set(plan.solved) | set(plan.remaining) == set(range(5))
     assert explain_igm(arm).takes_over
@@ -133,7 +134,7 @@ def test_a_plan_that_stops_in_the_middle_keeps_what_it_found():
 
 def test_no_joint_moves_the_tool():
     with pytest.raises(InvalidValueError, match="no joint"):
-        derive_plan(rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[2])))
+        explain_igm(rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[2])))
 
 
 # postures
@@ -225,7 +226,7 @@ def test_short_arms_of_every_kind(name, rotated):
     lengths = rng.uniform(0.1, 0.5, (k, 2)) * (rng.random((k, 2)) < (1.0 if rotated else 0.6))
     lengths[1:, 0] = np.where(lengths[1:, 0] == 0, 0.3, lengths[1:, 0])
     arm = arm_of(rows_of(kinds, twists, lengths, rng.uniform(-1, 1, k)), rng, rotated)
-    plan = derive_plan(arm)
+    plan = derive_plan(joint_chain(arm))
     assert plan.complete
     _, gap = checked(arm, plan, postures_at_random(plan, 60, seed=1))
     assert gap.max() < 1e-6
@@ -247,7 +248,7 @@ def test_six_joint_arms_with_a_wrist(kinds):
         q[:, arm.table.sigma == 1] *= 0.3
         if np.median(np.linalg.svd(rm.jacobian(arm, q), compute_uv=False)[:, -1]) < 1e-6:
             continue  # two slides in line: redundant
-        plan = derive_plan(arm)
+        plan = derive_plan(joint_chain(arm))
         if not plan.complete:
             continue  # needs Pieper's quartic
         done += 1
@@ -264,7 +265,7 @@ def test_an_arm_turned_round_has_the_same_postures_backwards():
             {"alpha": -RIGHT}]  # fmt: skip
     arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
     U = poses_of(model, plan, postures_at_random(plan, 100))
-    backwards = derive_plan(arm)
+    backwards = derive_plan(joint_chain(arm))
     assert backwards.complete
     ours, theirs = paul_postures(backwards, se3.inverse(U)), paul_postures(plan, U)
     assert (ours.valid.sum(axis=1) == theirs.valid.sum(axis=1)).all()
@@ -394,7 +395,7 @@ def test_structure_within_rounding_is_used_and_the_true_table_is_met():
         alpha=table.alpha + rng.uniform(-5e-10, 5e-10, 6), d=table.d + rng.uniform(-5e-10, 5e-10, 6)
     )
     arm = model.with_table(rough)
-    plan = derive_plan(arm)
+    plan = derive_plan(joint_chain(arm))
     assert [s.type for s in plan.steps] == [s.type for s in plan_of("puma560").steps]
     q = postures_at_random(plan, 40)
     found, gap = checked(arm, plan, q)

@@ -11,8 +11,8 @@ from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.igm.arm_angle import ArmAngle
 from robotmodels.igm.closed_form import prepare_closed_form
 from robotmodels.igm.crossings import relations, solved_with_relations
+from robotmodels.igm.elimination import EliminationArm
 from robotmodels.igm.families import prepare
-from robotmodels.igm.general import GeneralArm
 from robotmodels.igm.lock import Locked, prepare_locked
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.motion import tool_poses
@@ -218,11 +218,16 @@ def test_a_joint_that_does_not_move_is_not_freed():
     D[6] = se3.translation(0.1, 0.2, 0) @ se3.rotation("y", 0.9)
     D[7] = se3.translation(0.1, 0, 0.2) @ se3.rotation("x", -0.7)
     chain = JointChain(np.arange(7), np.array([1, 0, 0, 0, 0, 0, 0]), D[:8], np.eye(4))
-    solver = prepare_redundant(chain, lambda rest: GeneralArm(rest, None))
+    solver = prepare_redundant(chain, lambda rest: EliminationArm(rest, rest, 1.0, ()))
     assert solver.order == (1,)
     # with joints 3 and 5 as the only ones that may be set
-    assert prepare_redundant(chain, lambda rest: GeneralArm(rest, None), [2, 4]).order == (2,)
-    assert prepare_redundant(chain, lambda rest: GeneralArm(rest, None), [0, 5, 6]) is None
+    assert prepare_redundant(
+        chain, lambda rest: EliminationArm(rest, rest, 1.0, ()), [2, 4]
+    ).order == (2,)
+    assert (
+        prepare_redundant(chain, lambda rest: EliminationArm(rest, rest, 1.0, ()), [0, 5, 6])
+        is None
+    )
 
 
 def test_an_arm_without_a_family_at_the_reference_is_found_from_other_joints():

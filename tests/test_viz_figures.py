@@ -320,7 +320,7 @@ FIGURES: dict[str, dict[str, Callable[[], Figure]]] = {
     "singularities": {
         "": lambda: rm.viz.plot_singularities(
             [
-                kin.singularity_map(RX90, joints=pair, at=Q, factor=factor)
+                rm.symbolic.singularity_map(RX90, joints=pair, at=Q, factor=factor)
                 for pair, factor in zip(
                     [(1, 2), (2, 4)], rm.explain_singularities(RX90).factors[:2], strict=True
                 )

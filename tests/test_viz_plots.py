@@ -20,10 +20,10 @@ from robotmodels import se3
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.geometry import DHTable
 from robotmodels.kinematics import dgm, jacobian
-from robotmodels.kinematics.formulas.singularity_map import SingularityMap, singularity_map
 from robotmodels.kinematics.inverse.ikm import ikm
 from robotmodels.model import RobotModel
 from robotmodels.robots import load
+from robotmodels.symbolic import SingularityMap, singularity_map
 from robotmodels.trajectories import (
     JointPath,
     MotionLimits,

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, MATRIX, OUT1, STACK, VECTOR, Floats, Ints, compiled
 from ._check import EXACT, MERGE, improved, missing, wrapped
-from ._concurrent import advance
-from ._equations import DOUBLE, NONE, TWO, type_2
-from ._wrist import wrist_postures
+from .kernels.equations import DOUBLE, NONE, TWO, type_2
+from .kernels.pieper import advance, wrist_postures
 
 STEPS = 12  # Gauss-Newton steps for a posture that rounding or a rounded table left beside its pose
 ROUGH = 1e-2  # candidates that miss by more are none [m, rad]

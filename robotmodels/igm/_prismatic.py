@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 
 from ..kernels._compile import INTS, MATRIX, OUT3, STACK, compiled
-from ._wrist import wrist_postures
+from .kernels.pieper import wrist_postures
 
 _DEPENDENT = 1e-11  # what elimination leaves of a direction that depends on the others
 _COUNTS = types.Array(types.int64, 1, "C")

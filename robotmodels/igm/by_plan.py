@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
-from ..model import RobotModel
 from .branches import SIDES, branches, ranked
 from .check import checked
 from .closed_form import ClosedForm, closed_form_postures
@@ -67,12 +66,11 @@ class ByPlan:
         return "Paul's equations"
 
 
-def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
+def prepare_by_plan(chain: JointChain, family: Solver) -> ByPlan | None:
     """Derive the plan of an arm and test it."""
-    plan = derive_plan(model)
+    plan = derive_plan(chain)
     if plan.program is None or plan.program.branches > 16:
         return None
-    chain = family.chain
     q = random_postures(chain, TESTS, np.random.default_rng(0))
     rows, residual, marks = run(plan, plan.program.numbers, tool_poses(chain, q), q)
     S = rows.shape[1]

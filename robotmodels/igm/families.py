@@ -8,8 +8,8 @@ from ..errors import InvalidValueError
 from .asked import WHOLE_POSE, Task
 from .closed_form import prepare_closed_form
 from .dependent import prepare_dependent
+from .elimination import prepare_elimination
 from .fewer import prepare_fewer
-from .general import GeneralArm, prepare_general
 from .lock import locked_chain
 from .loop import JointChain
 from .many_starts import prepare_many_starts
@@ -65,9 +65,9 @@ def prepare(chain: JointChain) -> Solver | None:
         neighbour = prepare_neighbour(chain)
         if neighbour is not None:
             return neighbour
-        general = prepare_general(chain)
-        # with doubts at most poses it is slow, but all that counts is that nothing is missing
-        if general is not None and (general.reliable or general.misses == general.odd == 0):
-            return GeneralArm(chain, general)
+        elimination = prepare_elimination(chain)
+        # accepted also where most poses need further forms: it is slow but complete
+        if elimination is not None and elimination.missed == 0:
+            return elimination
         return prepare_many_starts(chain)
     return None

@@ -78,7 +78,7 @@ def _prepared(model: RobotModel) -> KnownArm:
     family = prepare_task(chain, whole)
     plan = None
     if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
-        plan = prepare_by_plan(model, family)
+        plan = prepare_by_plan(chain, family)
     return KnownArm(
         columns=chain.columns,
         to_base=to_base,

@@ -21,6 +21,7 @@ from .fewer import prepare_fewer
 from .gather import assembled, merged, rows_of
 from .loop import JointChain
 from .motion import lever, singular_rows, tool_poses
+from .position import POSITION, prepare_position
 from .self_motion import settle_families
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
 from .swing import judged, prepare_swing
@@ -75,6 +76,10 @@ def prepare_masked(
     components = Components(tuple(bool(asked) for asked in mask), in_tool_axes)
     if all(components.asked):
         return _prepared(chain, prepare)
+    if components.asked == POSITION:
+        solver = prepare_position(chain)
+        if solver is not None:
+            return solver
     if len(components.freed_rotations) == 2:
         places_only = (*components.asked[:3], False, False, False)
         return prepare_swing(
@@ -237,7 +242,8 @@ def _of_the_arm(
     arm = merged(
         chain.sigma,
         judged(
-            replace(found, q=found.q[..., places], free=found.free[..., places]),
+            replace(found, q=found.q[..., places], free=found.free[..., places],
+                    moving=found.moving[..., places]),
             chain, U, components, tolerances,
         ),
     )  # fmt: skip

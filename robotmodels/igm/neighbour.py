@@ -20,7 +20,7 @@ from . import _neighbour_arm as arm
 from ._neighbour_arm import OFFSET_TOLERANCE, TILT_TOLERANCE
 from .check import checked
 from .closed_form import closed_form_postures
-from .general import GeneralSolver, general_postures, prepare_general
+from .elimination import EliminationArm, elimination_solutions, prepare_elimination
 from .loop import JointChain
 from .solver import Found, Tolerances, nothing_found, postures
 from .structure import Family, LoopPlan
@@ -299,7 +299,7 @@ def _ask_general(solver: Neighbour, U: Array, part: _Search, tolerances: Toleran
     if general is None:
         return
     rest = part.rows(chosen)
-    starts, there, _ = general_postures(general, U[chosen])
+    starts, there, _ = elimination_solutions(general, U[chosen])
     starts[:, :, solver.chain.sigma == 1] /= solver.unit
     arrived = np.zeros_like(there)
     kernels.tried(
@@ -356,7 +356,7 @@ def _shifts(solver: Neighbour) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _general(chain: JointChain) -> GeneralSolver | None:
+def _general(chain: JointChain) -> EliminationArm | None:
     """The elimination for the arm itself, where it is well conditioned."""
-    solver = prepare_general(chain)
-    return solver if solver is not None and solver.reliable else None
+    solver = prepare_elimination(chain)
+    return solver if solver is not None and solver.well_conditioned else None

@@ -22,7 +22,7 @@ from ..errors import InvalidValueError, ShapeError
 from .check import checked
 from .closed_form import ClosedForm
 from .crossings import Relations, relations, solved_with_relations, within_reach
-from .general import GeneralArm
+from .elimination import EliminationArm
 from .lock import Locked, locked_chain
 from .loop import JointChain
 from .motion import jacobians
@@ -109,10 +109,12 @@ def search_related(chain: JointChain, A: Array, b: Array, prepare: Prepare) -> R
         solver = arms.solver((j,), () if at_an_end((j,), chain.k) else (0.5,))
         if solver is None:
             continue
-        cost = 2.0 if isinstance(solver, GeneralArm) else float(not isinstance(solver, ClosedForm))
+        cost = (
+            2.0 if isinstance(solver, EliminationArm) else float(not isinstance(solver, ClosedForm))
+        )
         # joints inside the chain make a chain of every value
         if not at_an_end((j,), chain.k):
-            cost += 10.0 if isinstance(solver, GeneralArm) else 0.5
+            cost += 10.0 if isinstance(solver, EliminationArm) else 0.5
         if best is None or cost < best[0]:
             best = cost, j, solver.method
     return None if best is None else Related(chain, wanted, best[1], best[2], arms)

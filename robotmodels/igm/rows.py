@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,11 +23,11 @@ from .gather import MERGE
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled, replaced, settle_families, singular_postures
+from .self_motion import Settled, settle_families, singular_postures
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
-from .why import search
+from .unreachable import diagnose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     columns = arm.columns[~np.isin(arm.columns, locked)]
     found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(call, found, references, columns)
-    reasons = search(
+    reasons = diagnose(
         model, task, call.solver is None, poses, references, call.limits, call.tolerances,
         rows.status,
     )  # fmt: skip
@@ -93,7 +93,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         part = _settled_members(
             call, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
         )
-        found = replaced(found, found.moving, at, part)
+        found = found.put(at, part)
         rows = _laid_out(call, found, references, columns)
     q, residual, valid, codes = rows.q, rows.residual, rows.valid, rows.code
     assert rows.family is not None
@@ -246,8 +246,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
                 f"seven. It is solved by: {solver.method}."
             )
         every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-        rows = (getattr(every, field.name)[:, 0] for field in fields(every))
-        found = Found(*rows)
+        found = every.take((np.arange(len(U)), np.zeros(len(U), np.int64)))
         # the angle is given, so that only joints that took a reference are free
         found.family[...] = found.free.any(axis=-1)
     else:
@@ -272,7 +271,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
     if solver is not None and not whole:
         moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
-    return Settled(*(getattr(found, field.name) for field in fields(Found)), moving=moving)
+    return replace(found, moving=moving)
 
 
 def _of_six(
@@ -291,21 +290,8 @@ def _of_six(
     rows = np.flatnonzero(worse)
     if rows.size == 0:
         return settled
-    part = Found(*(getattr(found, name)[rows] for name in _FOUND))
-    part = settle_families(chain, U[rows], part, references[rows], tolerances)
-    S = max(settled.q.shape[1], part.q.shape[1])
-    wide = {}
-    for name in (*_FOUND, "moving"):
-        whole, piece = getattr(settled, name), getattr(part, name)
-        nothing = np.nan if whole.dtype == np.float64 else False
-        wide[name] = np.full((len(U), S, *whole.shape[2:]), nothing, whole.dtype)
-        wide[name][:, : whole.shape[1]] = whole
-        wide[name][rows] = nothing
-        wide[name][rows, : piece.shape[1]] = piece
-    return Settled(**wide)
-
-
-_FOUND = tuple(field.name for field in fields(Found))
+    part = settle_families(chain, U[rows], found.take(rows), references[rows], tolerances)
+    return settled.put(rows, part)
 
 
 def _worst(found: Found) -> Array:

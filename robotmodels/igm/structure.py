@@ -49,7 +49,6 @@ class LoopPlan:
     inverted: bool
     sigma: NDArray[np.int64]
     meeting: Array
-    backwards: bool
     size: float
 
 
@@ -63,7 +62,7 @@ def plan_loop(chain: JointChain) -> LoopPlan | None:
             plan = _loop(chain, shift, reverse)
             for rank, found in ((0, _concurrent(plan)), (1, _parallel(plan))):
                 # plain order and a wrist at the end are preferred: fewer moves to explain
-                cost = 100 * rank + 10 * (found is not None and found.backwards) + 20 * shift
+                cost = 100 * rank + 20 * shift
                 cost += 5 * reverse
                 if found is not None and (best is None or cost < best[0]):
                     best = cost, found
@@ -95,7 +94,6 @@ def _loop(chain: JointChain, shift: int, reverse: bool) -> LoopPlan:
         inverted=not reverse,
         sigma=chain.sigma[order],
         meeting=np.zeros(2),
-        backwards=False,
         size=size,
     )
 
@@ -116,8 +114,7 @@ def _concurrent(plan: LoopPlan) -> LoopPlan | None:
     slots = {0: plan.slot == 0, 1: plan.slot == 1}
     if (first is None and not slots[0]) or (second is None and not slots[1]):
         return None
-    backwards = not (first or slots[0]) and bool(second) and not slots[1]
-    return replace(plan, meeting=np.array([on_first[1], on_last[1]]), backwards=backwards)
+    return replace(plan, meeting=np.array([on_first[1], on_last[1]]))
 
 
 def _meets_z(point: Array, direction: Array) -> tuple[float, float] | None:

@@ -62,16 +62,7 @@ def thorough_postures(
         moved[:, :3, 3] += away * size * _direction(rng)
         parts.append(candidates(moved, wanted, OVERSHOOT))
     second = _home(chain, parts, goals, tolerances)
-    S = max(first.q.shape[1], second.q.shape[1])
-    out = nothing_found(len(U), S, chain.k)
-    for part, rows in ((first, slice(None)), (second, twice)):
-        for name in _FIELDS:
-            whole, piece = getattr(out, name), getattr(part, name)
-            whole[rows, : piece.shape[1]] = piece
-    return out
-
-
-_FIELDS = ("q", "valid", "residual", "double", "free", "family")
+    return first.put(twice, second)
 
 
 def _home(
@@ -91,8 +82,7 @@ def _home(
         np.ascontiguousarray(U), np.ascontiguousarray(chain.sigma), chain.D,
         np.where(there[..., None], q, 0.0), there, accepted, found.q, found.valid, found.residual,
     )  # fmt: skip
-    most = max(int(found.valid.sum(axis=1).max(initial=0)), 1)
-    return Found(*(np.ascontiguousarray(getattr(found, name)[:, :most]) for name in _FIELDS))
+    return found.pack(found.valid)
 
 
 def two_singularities(chain: JointChain, found: Found) -> NDArray[np.bool_]:

@@ -46,11 +46,11 @@ KERNELS: list[Any] = []
 """Every kernel of the modules that are imported."""
 
 
-def compiled(*signature: Any, inlined: bool = False) -> Any:
+def compiled(*signature: Any, inlined: bool = False, cached: bool = True) -> Any:
     """Decorator: compile a kernel for its declared signature at the first call.
 
     Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
-    puts its code into its callers.
+    puts its code into its callers, ``cached=False`` is for functions that take functions.
     """
 
     def decorate(function: Any) -> Any:
@@ -65,9 +65,16 @@ def compiled(*signature: Any, inlined: bool = False) -> Any:
         kernel: Any = njit(**options)(function)
         if kernel is function:  # numba's compilation is switched off
             return function
-        cache = cache_of(function)
+        cache = cache_of(function) if cached else None
         if cache is not None:
             kernel._cache = cache  # numba has no public way to another folder
+        template = kernel.get_call_template
+
+        def template_for(args: Any, kws: Any) -> Any:
+            """Compile once for all constants of a type, where numba would for each constant."""
+            return template(tuple(map(types.unliteral, args)), kws)
+
+        kernel.get_call_template = template_for
         if signature:
             compile_for = kernel.compile
 

@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from .ellipsoid import *  # noqa: F403
     from .ellipsoids import *  # noqa: F403
     from .factors import *  # noqa: F403
-    from .formulas import *  # noqa: F403
     from .inverse import *  # noqa: F403
     from .singular import *  # noqa: F403
     from .singularity_kind import *  # noqa: F403
@@ -72,17 +71,6 @@ _ROOMS = {
     ".factors": (
         "JacobianFactors",
         "jacobian_factors",
-    ),
-    ".formulas": (
-        "FormulaStatus",
-        "JacobianExplanation",
-        "SingularityCondition",
-        "SingularityExplanation",
-        "SingularityFactor",
-        "SingularityMap",
-        "explain_jacobian",
-        "explain_singularities",
-        "singularity_map",
     ),
     ".inverse": (
         "Criterion",

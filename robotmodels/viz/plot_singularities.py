@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.formulas.singularity_map import SingularityMap
 from ..model import RobotModel
+from ..symbolic import SingularityMap
 from .figures import (
     COLUMN,
     LABEL_SIZE,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...latex_text import markdown
 from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
-from ..loop import JointChain
+from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
 from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
@@ -120,7 +120,8 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az); θ4' = θ4 + π
     """
     check_model(model)
-    plan = derive_plan(model)
+    chain = joint_chain(model)
+    plan = derive_plan(chain, [int(model.table.joint_rows[c]) + 1 for c in chain.columns])
     words = Wording(plan)
     steps = []
     for number, step in enumerate(plan.steps):

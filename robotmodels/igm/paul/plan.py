@@ -5,11 +5,11 @@ Source: Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...errors import InvalidValueError
-from ...model import RobotModel
-from ..loop import JointChain, joint_chain
+from ..loop import JointChain
 from .catalogue import Candidate, candidates
 from .equation_type import EquationType
 from .equations import Arm, Split
@@ -55,13 +55,14 @@ class PaulPlan:
         return most
 
 
-def derive_plan(model: RobotModel) -> PaulPlan:
-    """Derive, by pre- and post-multiplication, which equation gives which joint."""
-    chain = joint_chain(model)
+def derive_plan(chain: JointChain, frames: Sequence[int] = ()) -> PaulPlan:
+    """Derive, by pre- and post-multiplication, which equation gives which joint of a chain.
+
+    ``frames`` are the numbers of its frames in print; 1 to k without them.
+    """
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")
-    frames = tuple(int(model.table.joint_rows[c]) + 1 for c in chain.columns)
-    arm = Arm(normal_form(chain, frames))
+    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))))
     joints, steps = arm.joints, []
     everyone = range(chain.k)
     solved: list[int] = []

@@ -8,8 +8,7 @@ posture of the family at that value is returned: a closed curve passes a value m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +16,13 @@ from numpy.typing import NDArray
 from ..._arrays import Array
 from ..check import checked
 from ..loop import JointChain
+from ..postures import Postures
 from ..shortened import shortened
 from ..solver import Found, Tolerances
 
 __all__ = ["Settled", "double_roots", "replaced", "settle_families", "singular_postures"]
 
-_Kind = TypeVar("_Kind", bound=np.generic)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Settled(Found):
-    """Postures with the reference members of infinite families. Shapes: moving (N, S, k)."""
-
-    moving: NDArray[np.bool_]
+Settled = Postures
 
 
 def settle_families(
@@ -43,13 +36,12 @@ def settle_families(
 
     Shapes: U (N, 4, 4), references (N, k).
     """
-    N, S, k = found.q.shape
     chosen = np.flatnonzero(np.any(found.family & found.valid, axis=1))
     if chosen.size == 0:
-        return _with_moving(found, np.broadcast_to(np.False_, (N, S, k)))
+        return found
     goals = np.ascontiguousarray(U[chosen])
-    part = _settled(chain, goals, _rows(found, chosen), references[chosen], tolerances)
-    return replaced(found, np.zeros((N, S, k), np.bool_), chosen, part)
+    part = _settled(chain, goals, found.take(chosen), references[chosen], tolerances)
+    return found.put(chosen, part)
 
 
 def singular_postures(
@@ -77,53 +69,11 @@ def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
     return singular_postures(chain, found)[0]
 
 
-def _rows(found: Found, chosen: NDArray[np.int64]) -> Found:
-    """Some poses."""
-    return Found(
-        q=found.q[chosen],
-        valid=found.valid[chosen],
-        residual=found.residual[chosen],
-        double=found.double[chosen],
-        free=found.free[chosen],
-        family=found.family[chosen],
-    )
-
-
 def replaced(
-    whole: Found, moving: NDArray[np.bool_], chosen: NDArray[np.int64], part: Settled
-) -> Settled:
-    """The postures with those of some poses replaced; more rows where they need more."""
-    most = max(whole.q.shape[1], part.q.shape[1])
-
-    def merged(field: NDArray[_Kind], piece: NDArray[_Kind], fill: float) -> NDArray[_Kind]:
-        out = np.full((field.shape[0], most, *field.shape[2:]), fill, field.dtype)
-        out[:, : field.shape[1]] = field
-        out[chosen] = fill
-        out[chosen, : piece.shape[1]] = piece
-        return out
-
-    return Settled(
-        q=merged(whole.q, part.q, np.nan),
-        valid=merged(whole.valid, part.valid, False),
-        residual=merged(whole.residual, part.residual, np.nan),
-        double=merged(whole.double, part.double, False),
-        free=merged(whole.free, part.free, False),
-        family=merged(whole.family, part.family, False),
-        moving=merged(moving, part.moving, False),
-    )
-
-
-def _with_moving(found: Found, moving: NDArray[np.bool_]) -> Settled:
-    """The same postures, and the joints that move."""
-    return Settled(
-        q=found.q,
-        valid=found.valid,
-        residual=found.residual,
-        double=found.double,
-        free=found.free,
-        family=found.family,
-        moving=moving,
-    )
+    whole: Postures, moving: NDArray[np.bool_], chosen: NDArray[np.int64], part: Postures
+) -> Postures:
+    """The postures with those of some poses replaced."""
+    return replace(whole, moving=moving).put(chosen, part)
 
 
 def _bits(packed: NDArray[np.int64], k: int) -> NDArray[np.bool_]:
@@ -151,7 +101,7 @@ def _settled(
     settled_already(goals, sigma, D, q, free, member, moving)
     unsettled = np.flatnonzero(np.any(member & (moving == 0), axis=1))
     if unsettled.size == 0:
-        return _with_moving(found, _bits(moving, k))
+        return replace(found, moving=_bits(moving, k))
     # rows of a pose: posture, free and moving joints, double root
     rows: list[list[tuple[Array, int, int, bool]]] = []
     for n in unsettled:
@@ -183,4 +133,4 @@ def _settled(
     d = np.where(sigma == 0, np.minimum(d, np.abs(d - 2.0 * np.pi)), d).max(axis=-1)
     source = np.argmin(np.where(np.isnan(d), np.inf, d), axis=-1)
     moves = _bits(np.take_along_axis(marks[1], source, axis=1), k) & part.valid[..., None]
-    return replaced(found, _bits(moving, k), unsettled, _with_moving(part, moves))
+    return replace(found, moving=_bits(moving, k)).put(unsettled, replace(part, moving=moves))
