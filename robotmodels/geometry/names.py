@@ -1,10 +1,11 @@
-"""Names of frames: each its own, and none that a URDF could not hold."""
+"""Names of frames, each its own and none that a URDF could not hold; symbols of constants."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,3 +41,46 @@ def checked_names(names: Sequence[str], f: int) -> tuple[str, ...]:
                 f"names: {name!r:.80} holds a control character; a URDF cannot hold it."
             )
     return labels
+
+
+def checked_symbols(
+    symbols: Mapping[tuple[str, int], str] | None, f: int
+) -> Mapping[tuple[str, int], str]:
+    """Names of geometric constants by column and row number, read-only."""
+    if symbols is None:
+        return _NO_SYMBOLS
+    if not isinstance(symbols, Mapping):
+        raise TableError(
+            f"symbols: expected a mapping such as {{('d', 3): 'L1'}}, got {type(symbols).__name__}."
+        )
+    checked = {}
+    for key, name in symbols.items():
+        column, row = key if isinstance(key, tuple) and len(key) == 2 else (None, None)
+        if column not in _SYMBOLIC or not isinstance(row, int) or not 1 <= row <= f:
+            raise TableError(
+                f"symbols: expected a column ({', '.join(_SYMBOLIC)}) and a row from 1 to {f}, got "
+                f"{key!r:.80}."
+            )
+        if not isinstance(name, str) or not _SYMBOL.fullmatch(name):
+            raise TableError(f"symbols: expected the name or formula of {key}, got {name!r:.80}.")
+        checked[column, row] = name
+    return MappingProxyType(checked)
+
+
+_SYMBOLIC = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+_SYMBOL = re.compile(r"[A-Za-z_][\w+*/(). -]{0,59}")
+_NO_SYMBOLS: Mapping[tuple[str, int], str] = MappingProxyType({})
+_DEFAULT = {
+    "gamma": "G", "b": "BL", "beta": "B", "alpha": "A", "d": "D", "theta": "TH", "r": "RL",
+}  # fmt: skip
+_IN_USE = re.compile(r"[CSUr]\d.*|theta\d+|[snax][xyz]|P[xyz]|[EISZ]|pi")
+
+
+def constant_names(symbols: Mapping[tuple[str, int], str]) -> dict[str, str]:
+    """A table's own names of constants by those of formulas, where each stands for one constant."""
+    names = list(symbols.values())
+    return {
+        f"{_DEFAULT[column]}{j}": name
+        for (column, j), name in symbols.items()
+        if name.isidentifier() and names.count(name) == 1 and not _IN_USE.fullmatch(name)
+    }

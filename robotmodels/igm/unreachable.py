@@ -11,7 +11,7 @@ from .. import se3
 from .._arrays import Array
 from ..model import RobotModel
 from .asked import Task
-from .lock import locked_chain
+from .chain import locked_chain
 from .loop import joint_chain
 from .pose_search import SearchTask, pose_search, search_space
 from .solver import Tolerances

@@ -82,18 +82,7 @@ class JointPath:
         return not any(event.kind in stops for event in self.events)
 
     def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
-        """The events of one kind.
-
-        Parameters
-        ----------
-        kind : PathEventKind
-            Which.
-
-        Returns
-        -------
-        tuple of PathEvent
-            In the order of the path.
-        """
+        """The events of a kind, in the order of the path."""
         return tuple(event for event in self.events if event.kind is kind)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:

@@ -10,7 +10,7 @@ Source: Khalil and Dombre, Modeling, identification and control of robots, secti
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,6 @@ from .seven_phases import seven_phases
 
 _MARGIN = 1.0 + 1e-14
 """Durations are this much above the least, so that rounding does not exceed a limit."""
-
-_FAR = 4000.0
-"""Power of two of seconds beyond any float, which stands for infinity and zero."""
-_LEAST, _MOST = 2.0**-200, 2.0**200
-"""Limits in units of the motion: whatever is beyond these acts as they do, to the last digit."""
 
 _PHASE = 1.0 / 3.0
 """Part of the duration that each ramp takes when no limits are given, as in ``ctraj``."""
@@ -94,40 +89,8 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
     what, limit = needed[law]
     if np.isinf(limit[moves]).any():
         raise InvalidValueError(f"limits: {law.name} needs a limit of {what}.")
-    length, time = _units(L, V, np.minimum(A, B), any_jerk)
-    rates = (_in_units(x, k * time - length) for k, x in ((1, V), (2, A), (2, B), (3, J), (3, K)))
-    pieces = _quickest(law, np.ldexp(L, -length), *rates)
-    with np.errstate(over="ignore", under="ignore"):  # looked for below
-        durations = np.ldexp(pieces.durations * _MARGIN, time[:, None])
-        total = durations.sum(axis=-1)
-    if not ((total > 0.0) | ~moves).all() or not np.isfinite(total).all():
-        i = int(np.argmin(np.isfinite(total) & ((total > 0.0) | ~moves)))
-        raise InvalidValueError(
-            f"limits: with them a motion over {distance[i]:.3g} takes about 2^{time[i]} s, which "
-            "no float holds; check the units of the positions and of the limits."
-        )
-    return Pieces(durations, np.ldexp(pieces.coefficients, length[:, None, None]))
-
-
-def _units(L: Array, V: Array, A: Array, J: Array) -> tuple[Any, Any]:
-    """Powers of two of units of length and time, (R,), in which distances and times are near 1.
-
-    Products of lengths of 1e-200 and their squares would vanish; of powers of two no digit is lost.
-    """
-    moves = L > 0.0
-    exponent = np.frexp(np.where(moves, L, 1.0))[1]
-    way = np.log2(np.where(moves, L, 1.0))
-    with np.errstate(divide="ignore"):  # limits that no float holds beside the way: refused later
-        times = [(way - np.log2(limit)) / k for k, limit in ((1, V), (2, A), (3, J))]
-    longest = np.clip(np.where(moves, np.maximum.reduce(times), 0.0), -_FAR, _FAR)
-    return exponent, np.round(longest).astype(np.int64)
-
-
-def _in_units(limit: Array, exponent: Any) -> Array:
-    """A limit in other units: none that is a number becomes none at all, or 0."""
-    with np.errstate(over="ignore", under="ignore"):
-        scaled = np.ldexp(limit, exponent)
-    return np.where(np.isinf(limit), limit, np.clip(scaled, _LEAST, _MOST))
+    pieces = _quickest(law, L, V, A, B, J, K)
+    return Pieces(pieces.durations * _MARGIN, pieces.coefficients)
 
 
 def law_of_duration(law: TimeLaw, distance: Array, duration: Array) -> Pieces:
