@@ -54,6 +54,7 @@ LEVELS = (
     " tests/test_ikm_levels.py::test_each_level_is_met_as_well_as_the_higher_ones_let_it"
 )
 FIGURES, FITS, SCENES = (f"tests/test_viz_{name}.py" for name in ("figures", "fits", "scenes"))
+COMMANDS, ERRORS = "tests/test_cli.py", "tests/test_cli_errors.py"
 RAMPS = (
     "tests/test_trajectories.py"
     " -k (least_times_of_smooth or (derivatives and not cubic and not quintic))"
@@ -1309,4 +1310,39 @@ MUTATIONS = [
         "((across / radii[others, None, None]) ** 2).sum(axis=0)",
         "np.abs(across / radii[others, None, None]).sum(axis=0)",
         f"{SCENES} -k long_ellipsoid"),
+    # --- command line ----------------------------------------------------------------------------
+    Mutation("cli: arguments", "slides of a posture in degrees are taken as angles",
+        "def posture(text", "np.deg2rad(q, out=q, where=revolute(model))", "np.deg2rad(q)",
+        f"{COMMANDS} -k degrees_leave_slides"),
+    Mutation("cli: arguments", "negative numbers behind an option are not joined",
+        "def joined(argv",
+        """f"{word}={','.join(taken)}" if taken else word""", "word",
+        f"{COMMANDS} -k numbers_may_be_negative"),
+    Mutation("cli: igm", "roll, pitch and yaw in degrees are taken as radians", "def pose_of(",
+        "np.deg2rad(rpy) if arguments.degrees else rpy", "rpy", f"{COMMANDS} -k three_ways"),
+    Mutation("cli: igm", "joints that are locked are counted from 0",
+        "def locks_of(\n    words",
+        "else int(joint) - 1", "else int(joint) % model.n", f"{COMMANDS} -k seven_joints"),
+    Mutation("cli: igm", "a pose that is not reached ends as done",
+        "print(as_text(model, T, found, arguments.mask_axes, degrees))", "ExitStatus.NOT_REACHED",
+        "ExitStatus.DONE", f"{COMMANDS} -k pose_that_is_not_reached"),
+    Mutation("cli: igm", "angles are printed in radians under degrees",
+        "def _shown(model: RobotModel, q",
+        "np.rad2deg(q), q", "q, q", f"{COMMANDS} -k degrees_leave_slides"),
+    Mutation("cli: program", "wrong input ends as a bug", "def _outcome(error",
+        "ExitStatus.WRONG_INPUT", "ExitStatus.BUG", f"{ERRORS} -k wrong_input_is_one_line"),
+    Mutation("cli: program", "an option with a typing error has no suggestion",
+        "def refuse(self",
+        "if near else", "if False else", f"{ERRORS} -k wrong_input_is_one_line"),
+    Mutation("cli: messages", "messages keep the names of arguments", "def in_options(",
+        "message = _ARGUMENT.sub(with_value, message)", "pass", f"{COMMANDS} -k messages_speak"),
+    Mutation("cli: output", "a folder that cannot be written is found after the work",
+        "def check_output(", "if not os.access(there, os.W_OK | os.X_OK):", "if False:",
+        f"{ERRORS} -k folder_that_cannot_be_written"),
+    Mutation("cli: output", "JSON of a robot has another tip", "def as_json(model: RobotModel) ->",
+        '"tip": int(model.tip)', '"tip": 0', f"{ERRORS} -k json_of_robots"),
+    Mutation("cli: view", "a page is opened where there is no display", "def _open(path",
+        "return windows and webbrowser", "return webbrowser", f"{SCENES} -k command_opens"),
+    Mutation("cli: terminal", "warnings of the package are dropped", "def prepared(",
+        'say(f"warning: {message}")', "pass", f"{ERRORS} -k warnings_of_the_package"),
 ]
