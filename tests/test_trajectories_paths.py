@@ -36,8 +36,8 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.follow import _following
-from robotmodels.trajectories.path_task import _inverted
-from robotmodels.trajectories.rotations import rotation_about
+from robotmodels.trajectories.path_events import _inverted
+from robotmodels.trajectories.paths import rotation_about
 
 
 def central(f, t, h=1e-5):

@@ -22,8 +22,7 @@ from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
 from ..model import RobotModel
 from .follow import continuous, follow, follow_singly
-from .path_events import PathEvent, PathEventKind, path_events
-from .path_task import Task
+from .path_events import PathEvent, PathEventKind, Task, path_events
 from .pose_trajectory import PoseTrajectory
 
 
