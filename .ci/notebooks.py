@@ -2,7 +2,7 @@
 
 The pages are for looking at figures and scenes. Those of nbconvert take MathJax and other scripts
 from the network, so that formulas stay plain text without it; the course as it is read is in the
-site made from `.docs`, which needs no network.
+site made from `docs`, which needs no network.
 """
 
 import os

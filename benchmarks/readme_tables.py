@@ -1,10 +1,10 @@
-"""The README's tables, made from `benchmarks/results`.
+"""The tables of `docs/benchmarks.md` and of the README, made from `benchmarks/results`.
 
-    python benchmarks/readme_tables.py [--check] [--readme README.md]
+    python benchmarks/readme_tables.py [--check] [--root FOLDER]
 
 Puts them between the lines ``<!-- tables from benchmarks/results: begin -->`` and
 ``<!-- tables from benchmarks/results: end -->``; ``--check`` changes nothing and ends with 1 where
-the README is not what the results give. Needs the standard library alone.
+a page is not what the results give. Needs the standard library alone.
 """
 
 from __future__ import annotations
@@ -29,6 +29,14 @@ PACKAGES = {
     "ssik": "ssik", "ik-geo": "ik-geo", "pybotics": "pybotics", "ruckig": "ruckig",
 }  # fmt: skip
 Row = dict[str, Any]
+SHORT = {
+    "inverse dynamics, 100000 samples": "inverse dynamics, one sample of 100 000",
+    "all 8 postures, batch of 100000 poses, UR5e": "all 8 solutions of a pose, UR5e, batch",
+    "torque regressor 6 x 60, 100000 samples": "torque regressor, one sample of 100 000",
+    "base parameters, 6R with friction and rotors": "base parameters of a 6R from 100 000 samples",
+    "UR10 full calibration, 100 poses": "calibration of a UR10, 100 poses",
+}
+"""The rows of the README: the work in the results, and its words there."""
 
 
 def tables(results: Path = RESULTS) -> str:
@@ -69,6 +77,37 @@ def speed(peers: dict[str, Any]) -> list[str]:
     return lines
 
 
+def short(results: Path = RESULTS) -> str:
+    """The five rows of the README."""
+    peers = json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    rows = {r["work"]: r for r in peers["rows"]}
+    lines = ["| task | robotmodels | fastest other program | ratio |", "|---|---|---|---|"]
+    for work, words in SHORT.items():
+        r = rows[work]
+        mode = max(r["ratios"], key=r["ratios"].__getitem__)
+        same = [e for e in r["entries"] if e["mode"] == mode and e["whole"]]
+        ours = min((e for e in same if e["tool"] == OURS), key=lambda e: e["median"])
+        other = min((e for e in same if e["tool"] != OURS), key=lambda e: e["median"])
+        lines.append(
+            f"| {words} | {figure(ours['median'])} {r['unit']} | "
+            f"{other['tool']} {figure(other['median'])} {r['unit']} | {figure(r['ratios'][mode])} |"
+        )
+    poses, singular, arms, lost = missed(results)
+    lines.append(
+        f"\nOf the configurations of {poses} poses of {arms} arms ({singular} of the poses "
+        f"singular or nearly so), the inverse model misses {lost}."
+    )
+    return "\n".join(lines)
+
+
+def missed(results: Path) -> tuple[int, int, int, int]:
+    """Poses, singular ones among them, arms, and configurations that our inverse model misses."""
+    rows = json.loads((results / "accuracy_igm.json").read_text(encoding="utf-8"))["rows"]
+    ours = [r for r in rows if r["solver"] == OURS]
+    poses, singular, lost = (sum(r[k] for r in ours) for k in ("poses", "singular", "lost"))
+    return poses, singular, len(ours), lost
+
+
 def left_out(peers: dict[str, Any]) -> str:
     """What was not measured."""
     return f" Left out: {'; '.join(peers['absent'])}." if peers["absent"] else ""
@@ -84,17 +123,16 @@ def accuracy(results: Path) -> list[str]:
     igm = json.loads((results / "accuracy_igm.json").read_text(encoding="utf-8"))["rows"]
     camera = json.loads((results / "calibration.json").read_text(encoding="utf-8"))["camera"]
     lines = ["| accuracy | robotmodels | peers |", "|---|---|---|"]
-    ours = [r for r in igm if r["solver"] == OURS]
-    poses, singular, lost = (sum(r[k] for r in ours) for k in ("poses", "singular", "lost"))
+    poses, singular, arms, lost = missed(results)
     title = (
-        f"postures not given back, of {poses} poses of {len(ours)} arms, {singular} of them "
-        "singular or nearly so"
+        f"configurations missed, of {poses} poses of {arms} arms, {singular} of them singular or "
+        "nearly so"
     )
     theirs = []
     for solver in dict.fromkeys(r["solver"] for r in igm if r["solver"] != OURS):
         own = [r for r in igm if r["solver"] == solver]
-        count, missed = (sum(r[k] for r in own) for k in ("poses", "lost"))
-        theirs.append(f"{solver} {missed} of {count} ({len(own)} arms)")
+        count, left = (sum(r[k] for r in own) for k in ("poses", "lost"))
+        theirs.append(f"{solver} {left} of {count} ({len(own)} arms)")
     lines.append(f"| {title} | {lost} | {'; '.join(theirs)} |")
     best = {}
     for r in camera:
@@ -113,12 +151,12 @@ def told_time(entry: Row, unit: str) -> str:
     return f"{figure(entry['median'])} {unit}" + (f" ({way})" if way else "")
 
 
-def replaced(readme: str, new: str) -> str:
-    """The README with the tables between its two lines."""
-    before, begin, rest = readme.partition(BEGIN)
+def replaced(page: str, new: str) -> str:
+    """The page with the tables between its two lines."""
+    before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise ValueError(f"The README lacks the lines {BEGIN!r} and {END!r}, in this order.")
+        raise ValueError(f"The page lacks the lines {BEGIN!r} and {END!r}, in this order.")
     return f"{before}{BEGIN}\n{new}\n{END}{after}"
 
 
@@ -126,15 +164,20 @@ def main() -> None:
     """Replace, or check."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="change nothing")
-    parser.add_argument("--readme", type=Path, default=RESULTS.parents[1] / "README.md")
+    parser.add_argument("--root", type=Path, default=RESULTS.parents[1])
     given = parser.parse_args()
-    old = given.readme.read_text(encoding="utf-8")
-    new = replaced(old, tables())
-    if given.check:
+    for path, made in (
+        (given.root / "README.md", short),
+        (given.root / "docs/benchmarks.md", tables),
+    ):
+        old = path.read_text(encoding="utf-8")
+        new = replaced(old, made())
+        if given.check and new != old:
+            sys.exit(
+                f"{path.name} is not what the results give: benchmarks/readme_tables.py does it."
+            )
         if new != old:
-            sys.exit("README.md is not what the results give: benchmarks/readme_tables.py does it.")
-    elif new != old:
-        given.readme.write_text(new, encoding="utf-8")
+            path.write_text(new, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ Pinocchio are imported here, the rest where it is used.
 from __future__ import annotations
 
 import importlib
+import re
 import threading
 from typing import TYPE_CHECKING, Any
 
-from . import errors, friction, kinematics, regressors
+from . import errors, friction, kinematics, regressors, se3
 from .drive import DriveKind, DriveParameters, Transmission
 from .dynamics import (
     base_model,
@@ -47,21 +48,26 @@ from .robots import load, robots
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import calibration, datasets, identification, obstacles, simulation, trajectories, viz
+    from . import (
+        calibration,
+        datasets,
+        identification,
+        obstacles,
+        simulation,
+        symbolic,
+        trajectories,
+        viz,
+    )
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
         FilteredInverse,
         IKMSolution,
         IKMStatus,
-        JacobianExplanation,
         OrientationKind,
         PseudoInverse,
-        SingularityExplanation,
         classify_singularity,
         coordinate_jacobian,
-        explain_jacobian,
-        explain_singularities,
         force_ellipsoid,
         ikm,
         ikm_second_order,
@@ -84,7 +90,14 @@ if TYPE_CHECKING:
         uniform_bodies,
     )
     from .simulation import Simulation, simulate, torque_parts
-    from .symbolic_dgm import DirectModelExplanation, explain_dgm
+    from .symbolic import (
+        DirectModelExplanation,
+        JacobianExplanation,
+        SingularityExplanation,
+        explain_dgm,
+        explain_jacobian,
+        explain_singularities,
+    )
     from .symoro import read_par
 
 __version__ = "0.2.0"
@@ -167,11 +180,14 @@ __all__ = [
     "read_par",
     "regressors",
     "robots",
+    "se3",
+    "show_versions",
     "simulate",
     "simulation",
     "standard_parameters",
     "static_torque",
     "static_wrench",
+    "symbolic",
     "to_urdf",
     "torque_parts",
     "torque_regressor",
@@ -186,9 +202,37 @@ __all__ = [
 ]
 
 
+def show_versions() -> str:
+    """Versions of the program, of Python and of its libraries, and the platform, for reports.
+
+    Returns
+    -------
+    str
+        One line for each.
+
+    Examples
+    --------
+    >>> show_versions().splitlines()[0].split()[0]
+    'robotmodels'
+    """
+    import platform
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    lines = [("robotmodels", __version__), ("Python", platform.python_version())]
+    lines.append(("platform", platform.platform()))
+    for requirement in requires("robotmodels") or ():
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        try:
+            lines.append((name, version(name)))
+        except PackageNotFoundError:
+            if "extra ==" not in requirement:
+                lines.append((name, "not installed"))
+    return "\n".join(f"{name:<28}{found}" for name, found in dict(lines).items())
+
+
 def __dir__() -> list[str]:
-    """What is imported on demand is there as well."""
-    return sorted({*globals(), *__all__})
+    """The public names, those that are imported on demand included."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})
 
 
 _ROOMS = {
@@ -209,14 +253,10 @@ _ROOMS = {
         "FilteredInverse",
         "IKMSolution",
         "IKMStatus",
-        "JacobianExplanation",
         "OrientationKind",
         "PseudoInverse",
-        "SingularityExplanation",
         "classify_singularity",
         "coordinate_jacobian",
-        "explain_jacobian",
-        "explain_singularities",
         "force_ellipsoid",
         "ikm",
         "ikm_second_order",
@@ -235,7 +275,14 @@ _ROOMS = {
         "simulate",
         "torque_parts",
     ),
-    ".symbolic_dgm": ("DirectModelExplanation", "explain_dgm"),
+    ".symbolic": (
+        "DirectModelExplanation",
+        "JacobianExplanation",
+        "SingularityExplanation",
+        "explain_dgm",
+        "explain_jacobian",
+        "explain_singularities",
+    ),
     ".symoro": ("read_par",),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
@@ -247,10 +294,12 @@ def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
     with _OPENING:
         if name in (
-            "calibration", "datasets", "identification", "obstacles", "simulation", "trajectories",
-            "viz",
+            "calibration", "datasets", "identification", "obstacles", "simulation", "symbolic",
+            "trajectories", "viz",
         ):  # fmt: skip
             return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:
-            return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+            value = getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+            globals()[name] = value  # the next use is a plain attribute
+            return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

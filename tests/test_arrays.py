@@ -185,7 +185,7 @@ def test_values_are_read_only_after_a_copy_too():
         rm.operational_dimension(model),
         kin.jacobian_rank(model, [0.1] * 6),
         kin.singularity_flags(model, [[0.1] * 6]),
-        kin.singularity_map(model, (1, 2), samples=(5, 5)),
+        rm.symbolic.singularity_map(model, (1, 2), samples=(5, 5)),
     )
     for value in values:
         for again in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value)):

@@ -63,17 +63,6 @@ def definitions(node, path=""):
             yield from definitions(child, path)
 
 
-def is_robot(module, node):
-    """Whether a function builds a robot of the catalogue: it names the source of each number."""
-    returns = ast.unparse(node.returns) if getattr(node, "returns", None) else ""
-    return (
-        module.startswith("robotmodels.robots.")
-        and returns == "RobotModel"
-        and not node.name.startswith("_")
-        and not node.args.args
-    )
-
-
 def missing_sections(node, have):
     """Sections that the docstring of an exported function must have and does not."""
     returns = ast.unparse(node.returns) if node.returns else "None"
@@ -101,7 +90,7 @@ def faults(module, text, names, members):
             continue
         elif have:
             yield f"{module}.{name}: not exported, with the section {min(have)}"
-        elif lines > LONGEST and not is_robot(module, node):
+        elif lines > LONGEST:
             yield f"{module}.{name}: not exported, {lines} lines instead of at most {LONGEST}"
 
 

@@ -154,7 +154,6 @@ def test_rows_without_neighbours_are_listed():
     bare = np.where(np.arange(10)[:, None] % 2, np.nan, data)
     for stamps, given, dt, words in (
         (None, bare, DT, "the log is empty"),
-        (None, data, None, "give dt="),
         (-t, values(t), None, "right column"),
         (t, values(t), 0.02, "without a filter"),
         (t, values(t), 1e-6, "more than 100 of one"),

@@ -346,8 +346,10 @@ CALLS = {
     "jacobian_rate": lambda m, x: rm.jacobian_rate(m, np.zeros(6), x),
     "dkm": lambda m, x: rm.dkm(m, np.zeros(6), x),
     "idm q": lambda m, x: rm.idm(m, x, np.zeros(6), np.zeros(6)),
-    "idm v": lambda m, x: rm.idm(m, np.zeros(6), x, np.zeros(6)),
-    "idm a": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), x),
+    "idm v": lambda m, x: rm.idm(m, np.zeros(6), x, np.zeros(6))
+    if x is not None else rm.dgm(m, x),
+    "idm a": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), x)
+    if x is not None else rm.dgm(m, x),
     "wrench": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), np.zeros(6), wrench=x)
     if x is not None else rm.dgm(m, x),
     "ddm tau": lambda m, x: rm.ddm(m, np.zeros(6), np.zeros(6), x),

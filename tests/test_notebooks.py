@@ -153,7 +153,7 @@ def test_links_lead_somewhere(path):
     for text in sources(path, "markdown"):
         for link in re.findall(r"\]\(([^)#]+)\)", text):
             assert link.startswith("https://") or (FOLDER / link).is_file(), link
-        for named in re.findall(r"`((?:benchmarks|notebooks|tests|\.docs)/[\w./]+)`", text):
+        for named in re.findall(r"`((?:benchmarks|notebooks|tests|docs)/[\w./]+)`", text):
             assert (FOLDER.parent / named).exists(), named
 
 

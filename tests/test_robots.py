@@ -1,15 +1,13 @@
 """The catalogue: its numbers against published ones, its URDF files, and example-robot-data.
 
-The joint placements below are the facts of the makers' and ROS-Industrial's URDF files named in
-each robot's docstring; the poses are a plain product of them, with no code of the package.
+The joint placements below are the facts of the makers' and ROS-Industrial's URDF files that
+`source` names for each robot; the poses are a plain product of them, with no code of the package.
 """
 
-import inspect
 import json
 import pickle
 import re
 import sys
-from importlib import import_module
 from math import pi, sqrt
 from pathlib import Path
 from time import process_time
@@ -21,8 +19,7 @@ import pytest
 import robotmodels as rm
 from robotmodels import errors
 from robotmodels.errors import RobotNotFoundError
-from robotmodels.robots import CATALOGUE, erd, load, title
-from robotmodels.robots.catalogue import MODULES
+from robotmodels.robots import CATALOGUE, erd, load, source, title
 from robotmodels.robots.generate import generate
 
 ORACLES = Path(__file__).parent / "oracles"
@@ -157,9 +154,8 @@ def test_a_robot_builds_fast_is_a_value_and_prints(name):
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_a_robot_says_where_its_numbers_come_from(name):
-    module = next(m for m, names in MODULES.items() if name in names)
-    text = inspect.getdoc(getattr(import_module(f"robotmodels.robots.{module}"), name))
-    assert "\nSource: " in text or name == "gantry"
+    text = source(name)
+    assert "\nSource: " in text
     assert "etres" in text
     assert "adians" in text
 
@@ -176,7 +172,7 @@ def test_limits_are_ordered_and_postures_are_within_them():
                 assert (q <= model.upper + 1e-12).all(), (name, key)
 
 
-def test_physical_consistency_is_as_reported_in_the_docstrings():
+def test_physical_consistency_is_as_the_sources_report():
     faulty = {}
     for name in CATALOGUE:
         model = load(name)
@@ -555,7 +551,7 @@ def test_a_misspelt_name_is_answered_with_near_ones(name, nearest):
         load(name)
     assert nearest in caught.value.nearest
     assert isinstance(caught.value, KeyError)
-    assert "from_urdf" in str(caught.value)
+    assert "urdf" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", [None, 3, "", "erd:"])

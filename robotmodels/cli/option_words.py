@@ -19,7 +19,7 @@ _WHOLE = (
     (" of read_log", ""),
     ("sorted(Path(...).glob('*.csv'))", "FOLDER/*.csv"),
     ("All names: robots().", "All names: robotmodels robots."),
-    ("A URDF file is read with RobotModel.from_urdf(path).", "Or give a .urdf or .par file."),
+    ("Files are known by their suffix .urdf or .par.", "Or give a .urdf or .par file."),
     ("use RobotModel.from_urdf(path, base_link, tip_link)",
      "give its path, with --base-link and --tip-link"),
     ("give it others: model.with_table(model.table.replace(lower=..., upper=...))",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from .._arrays import Array, as_vector, batch_rows, batch_shape
 from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
+from ..inertia import InertiaWarning
 from ..model import RobotModel, check_model
 
 _CHUNK = 1024  # Jacobians per piece, for the processor's cache
@@ -22,8 +24,8 @@ _WORLD_ALIGNED = 0  # frame code of the kernels
 def idm(
     model: RobotModel,
     q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
+    v: ArrayLike | None = None,
+    a: ArrayLike | None = None,
     wrench: ArrayLike | None = None,
     drive: bool = True,
     friction: Friction | None = None,
@@ -42,7 +44,8 @@ def idm(
     model : RobotModel
         The robot, n joints.
     q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
+        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast. A
+        robot without ``v`` or ``a`` is at rest.
     wrench : array_like, shape (..., 6), optional
         Force and moment ``[f; m]`` (N, N m) that the tool exerts on the environment, at the tool
         point, in world axes.
@@ -62,6 +65,11 @@ def idm(
     ShapeError, InvalidValueError
         Arguments of the wrong length, or with NaN or infinity.
 
+    Warns
+    -----
+    InertiaWarning
+        Once for a robot that has neither masses nor drives.
+
     References
     ----------
     Seed book sections 1.5.1 (eq. of motion, friction, rotors, external forces) and 1.5.2.
@@ -79,7 +87,12 @@ def idm(
     check_model(model)
     check_all_or_none(drive)
     n = model.n
-    q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
+    rest = np.zeros(n)
+    q = as_vector(q, n, "q")
+    v = rest if v is None else as_vector(v, n, "v")
+    a = rest if a is None else as_vector(a, n, "a")
+    if model.twin.torques_warn:
+        warn_without_masses(model)
     if wrench is not None:
         wrench = as_vector(wrench, 6, "wrench")
         batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))
@@ -99,6 +112,17 @@ def idm(
     if friction is not None:
         tau = tau + torque_at(friction, v, q)
     return tau
+
+
+def warn_without_masses(model: RobotModel, stacklevel: int = 3) -> None:
+    """Warn once for a robot whose torques are zero because it has no masses."""
+    model.twin.torques_warn = False
+    warnings.warn(
+        f"{model.name}: it has no masses and no drives, so its torques are zero. Give it inertial "
+        "parameters: with_inertia(...).",
+        InertiaWarning,
+        stacklevel=stacklevel,
+    )
 
 
 def rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_vector
 from ..drive import check_all_or_none
 from ..model import RobotModel, check_model
-from .inverse import batched, rigid_torques
+from .inverse import batched, rigid_torques, warn_without_masses
 
 
 def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
@@ -155,12 +155,17 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     Examples
     --------
     >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> gravity_torque(arm, [0.0, 0.0])
-    array([0., 0.])
+    >>> from robotmodels.inertia import InertialParameters
+    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
+    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link,
+    ...                                  gravity=(0, -9.81, 0))
+    >>> gravity_torque(pendulum, [0.0])
+    array([1.962])
     """
     check_model(model)
     q = as_vector(q, model.n, "q")
+    if model.twin.torques_warn:
+        warn_without_masses(model)
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:
         g = pin.computeGeneralizedGravity(twin.model, twin.data(), twin.to_pin(q))

@@ -226,7 +226,7 @@ def representative(
 
 
 @compiled(NOTHING(INTS, STACK, STACK, STACK, FLAGS, MATRIX, VECTOR, OUT3, COUNTS, FLAGS, MARKS))
-def completed(
+def continued(
     sigma: Ints,
     D: Floats,
     goals: Floats,

@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from .. import se3
 from .._arrays import Array, read_only
+from .chain import canonical_frames
 from .check import checked
 from .closed_form import closed_form_postures
 from .loop import JointChain
 from .motion import random_postures, tool_poses
-from .shortened import shortened
 from .solver import Found, Tolerances, postures
 from .structure import LoopPlan, plan_loop
 
@@ -68,7 +68,7 @@ def prepare_nominal(chain: JointChain) -> NominalArm | None:
     """Nominal arm with a closed form next to a six-joint arm."""
     if chain.k != 6:
         return None
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     exact = replace(chain, D=read_only(D))
     half = 0.5 * float(np.linalg.norm(D[1:, :3, 3], axis=1).sum())
     changed, offset, tilt = structured(D, chain.sigma, min(OFFSET_TOLERANCE / unit, SHARE * half))
@@ -176,7 +176,7 @@ def _solutions(
 
     def complete(rows: NDArray[np.int64], starts: Array, usable: NDArray[np.bool_]) -> None:
         part = [np.ascontiguousarray(a[rows]) for a in (references, found, count, double, free)]
-        kernels.completed(sigma, D, goals[rows], starts, usable, part[0], limits, *part[1:])
+        kernels.continued(sigma, D, goals[rows], starts, usable, part[0], limits, *part[1:])
         found[rows], count[rows], double[rows], free[rows] = part[1:]
 
     own = there.sum(axis=1)

@@ -13,15 +13,12 @@ so that rooms which change the chain (a locked joint, a mask, a calibrated arm) 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import singledispatch
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .._arrays import Array
 from .loop import JointChain
+from .postures import Postures, no_postures
 
 
 class Tolerances(NamedTuple):
@@ -49,31 +46,8 @@ Prepare = Callable[[JointChain], "Solver | None"]
 """Chooses the family of a chain; handed to families that solve another chain on the way."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """Postures of N poses, in the order of the chain, checked on the chain itself.
-
-    Shapes: q, free (N, S, k); valid, residual, double, family (N, S).
-    """
-
-    q: Array
-    valid: NDArray[np.bool_]
-    residual: Array
-    double: NDArray[np.bool_]
-    free: NDArray[np.bool_]
-    family: NDArray[np.bool_]
-
-
-def nothing_found(N: int, S: int, k: int) -> Found:
-    """No posture for any of N poses: to be filled in."""
-    return Found(
-        q=np.full((N, S, k), np.nan),
-        valid=np.zeros((N, S), np.bool_),
-        residual=np.full((N, S), np.nan),
-        double=np.zeros((N, S), np.bool_),
-        free=np.zeros((N, S, k), np.bool_),
-        family=np.zeros((N, S), np.bool_),
-    )
+Found = Postures
+nothing_found = no_postures
 
 
 @singledispatch

@@ -81,6 +81,12 @@ def find_time(table: LogTable) -> tuple[tuple[int, ...], TimeUnit | None] | None
             i = names.index(name)
             unit = time_unit_of(table.names[i]) if name in _TIMES else TimeUnit.NANOSECOND
             return (i,), unit
+    # a column of a structure, such as "log.t"
+    last = [_SPLIT.split(name)[-1] for name in names]
+    for name in _TIMES:
+        if last.count(name) == 1:
+            i = last.index(name)
+            return (i,), time_unit_of(table.names[i])
     return None
 
 

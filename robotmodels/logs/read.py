@@ -128,7 +128,7 @@ def read_log(
     FileNotFoundError
         There is no such file; it is an InvalidValueError too.
     MissingExtraError
-        Parquet without pyarrow.
+        Parquet without pyarrow, MAT of version 7.3 without h5py.
 
     References
     ----------
@@ -179,6 +179,11 @@ def read_log(
             n, angle, length, signs, gears, transmission, drive_gains, offsets, model
         )
         columns, name = np.concatenate(list(raw.blocks.values()), axis=1), table.path.name
+        if raw.t is None and dt is None:
+            raise InvalidValueError(
+                f"{name}: no column of times was given or found; give dt=, the sampling period in "
+                f"seconds, or time=, the column. Its columns: {table.called(range(table.width))}."
+            )
         rows = regular_rows(raw.t, columns, name, dt, largest_gap, largest_jitter, n)
         if raw.t is not None and not _SHORTEST <= rows.dt <= _LONGEST:
             raise InvalidValueError(

@@ -148,7 +148,7 @@ def _opened(path: Path, what: str, advice: str) -> Iterator[BinaryIO]:
     with path.open("rb") as file:
         try:
             yield file
-        except InvalidValueError:
+        except (InvalidValueError, MissingExtraError):
             raise
         except Exception as error:  # noqa: BLE001 - parsers raise anything
             raise InvalidValueError(
@@ -176,7 +176,36 @@ def _mat(path: Path) -> dict[str, Any]:
 
     advice = "in MATLAB save it with save(file, '-v7'), or write CSV"
     with _opened(path, "MAT", advice) as file:
+        head = file.read(520)
+        file.seek(0)
+        if b"MATLAB 7.3" in head[:128] and head[512:516] == b"\x89HDF":
+            return _mat_7_3(file)
         return dict(flat(loadmat(file, simplify_cells=True)))
+
+
+def _mat_7_3(file: BinaryIO) -> dict[str, Any]:
+    """Arrays and texts of a MAT file of version 7.3 (HDF5), those in structures as "log.q"."""
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtraError(
+            "MAT files of version 7.3 need h5py: pip install 'robotmodels[logs]'; or save the file "
+            "with save(file, '-v7')."
+        ) from None
+    found: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            kind = item.attrs.get("MATLAB_class", b"").decode()
+            value = item[()]
+            if kind == "char":
+                found[name.replace("/", ".")] = "".join(map(chr, np.ravel(value)))
+            elif value.dtype.kind in "fiub":
+                found[name.replace("/", ".")] = value.T  # MATLAB stores columns first
+
+    with h5py.File(file, "r") as stored:
+        stored.visititems(visit)
+    return found
 
 
 def _parquet(path: Path) -> dict[str, Any]:

@@ -51,11 +51,6 @@ def regular_rows(
     Shapes: t (N,), values (N, m).
     """
     N = len(values)
-    if t is None and dt is None:
-        raise InvalidValueError(
-            f"{source}: no column of times was given or found; give dt=, the sampling period in "
-            "seconds, or time=, the column."
-        )
     known = dt if t is None else None
     stamps = np.asarray(np.arange(N) * (known or 1.0) if t is None else t, np.float64)
     good = np.isfinite(values).all(axis=1) & np.isfinite(stamps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from ..urdf.parts import UrdfSource
 from ..visual import Visual
 from .chain import multiplied_out
 from .changed import Changeable
+from .other_names import no_attribute
 from .part_checks import check_count, check_name, check_table, check_tip, checked_postures
 from .tip_text import tip_text
 from .twin import PinocchioTwin
@@ -273,6 +274,11 @@ class RobotModel(Changeable):
             transmission=parts.transmission, frames=parts.frames, visuals=parts.visuals,
             notes=parts.notes, source=parts.source,
         )  # fmt: skip
+
+    if not TYPE_CHECKING:  # otherwise every name would be accepted by type checkers
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_attribute(type(self).__name__, name)
 
     @property
     def n(self) -> int:

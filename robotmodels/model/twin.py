@@ -46,7 +46,7 @@ class PinocchioTwin:
 
     __slots__ = (
         "_frames", "_parts", "_scratch", "base_is_massless", "in_table_order",
-        "model", "names", "order", "serves_dynamics", "serves_poses",
+        "model", "names", "order", "serves_dynamics", "serves_poses", "torques_warn",
     )  # fmt: skip
 
     def __init__(self, parts: RobotParts, gravity: Array) -> None:
@@ -72,6 +72,9 @@ class PinocchioTwin:
         table, fixed = parts.table, parts.table.sigma == FIXED
         on_base = [j for j in range(table.f) if all(fixed[i - 1] for i in table.path(j + 1))]
         self.base_is_massless = not parts.inertia.values[on_base].any()
+        # one warning where the torques of a robot are asked for that has no masses and no drives
+        d = parts.drive
+        self.torques_warn = not any(x.any() for x in (parts.inertia.values, d.Ia, d.Fv, d.Fc))
         self.names = link_names(parts)
         self._parts = parts
         self._frames: dict[str | int | None, FrameOfInterest] = {}

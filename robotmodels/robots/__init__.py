@@ -1,8 +1,8 @@
-"""The catalogue: robots by name, each built in code with the source of every number.
+"""The catalogue: robots by name, one file of numbers with their sources for each.
 
-One file per maker (or group). `robotmodels.load` and `robotmodels.robots` are its door.
+`robotmodels.load` and `robotmodels.robots` open it.
 """
 
-from .catalogue import CATALOGUE, load, robots, title
+from .catalogue import CATALOGUE, load, robots, source, title
 
-__all__ = ["CATALOGUE", "load", "robots", "title"]
+__all__ = ["CATALOGUE", "load", "robots", "source", "title"]

@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array
+from ..drive import DriveParameters, Transmission
 from ..errors import RobotNotFoundError
+from ..geometry import DHTable, link_transforms
+from ..inertia import InertialParameters
 from ..model import RobotModel
+from ..symoro import read_par
 from .erd import ERD_ARMS, load_erd
 
 ERD_PREFIX = "erd:"
-"""Names that start with it are looked up in the installed example-robot-data."""
+"""Names with this prefix are those of the installed example-robot-data."""
 
-MODULES: dict[str, tuple[str, ...]] = {
-    "exercise": ("lab_rr", "lab_rrt", "lab_trr"),
-    "generic": ("planar_2r", "planar_3r", "gantry"),
-    "staubli": ("rx90", "tx40"),
-    "unimation": ("puma560",),
-    "stanford": ("stanford_arm",),
-    "adept": ("cobra_s600",),
-    "universal_robots": ("ur5", "ur3e", "ur5e", "ur10e", "ur16e"),
-    "kuka": ("kr6_r900", "lwr4_plus", "iiwa14"),
-    "abb": ("irb120", "irb140", "irb6640"),
-    "fanuc": ("crx10ia", "crx10ia_l"),
-    "franka": ("panda",),
-    "ufactory": ("xarm5", "xarm6"),
-}
-"""Module of this package, and the robots it builds: one function of that name each."""
+CATALOGUE: tuple[str, ...] = (
+    "lab_rr", "lab_rrt", "lab_trr", "planar_2r", "planar_3r", "gantry", "rx90", "tx40", "puma560",
+    "stanford_arm", "cobra_s600", "ur5", "ur3e", "ur5e", "ur10e", "ur16e", "kr6_r900",
+    "lwr4_plus", "iiwa14", "irb120", "irb140", "irb6640", "crx10ia", "crx10ia_l", "panda", "xarm5",
+    "xarm6",
+)  # fmt: skip
+"""The robots that the package describes itself: simple ones first, then by maker."""
 
-_MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
+_FILES = (".urdf", ".xml", ".xacro", ".par")
 
-CATALOGUE: tuple[str, ...] = tuple(_MODULE_OF)
-"""The robots that this package builds itself: simple ones first, then by maker."""
+Rows = list[dict[str, Any]]
 
 
 def robots() -> tuple[str, ...]:
-    """Names that `load` knows.
+    """Names that `load` accepts.
 
     Returns
     -------
@@ -51,7 +56,7 @@ def robots() -> tuple[str, ...]:
 
 
 def title(name: str) -> str:
-    """What a name stands for: the first line of what builds it.
+    """Name of a robot in words.
 
     Parameters
     ----------
@@ -77,24 +82,53 @@ def title(name: str) -> str:
         arm = ERD_ARMS[name.removeprefix(ERD_PREFIX)]
         part = f", from {arm.base_link} to {arm.tip_link}" if arm.base_link else ""
         return f"example-robot-data: {arm.urdf}{part}."
-    return str(_builder(name).__doc__).splitlines()[0].replace("`", "")
+    return _data(name)["title"]
 
 
-def load(name: str) -> RobotModel:
-    """Load a robot of the catalogue; also called model or robot factory elsewhere.
+def source(name: str) -> str:
+    """Origin of every number of a robot of the catalogue.
 
     Parameters
     ----------
     name : str
-        One of `robots`, for example ``"rx90"``; or ``"erd:<name>"`` for an arm of the package
+        One of `robots`.
+
+    Returns
+    -------
+    str
+        Title, conventions, source of geometry, limits, inertia and drives, references.
+
+    Raises
+    ------
+    RobotNotFoundError
+        The name is unknown.
+
+    Examples
+    --------
+    >>> print(source("planar_3r").splitlines()[-1])
+    Source: P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Planar3.py``.
+    """
+    if isinstance(name, str) and name.startswith(ERD_PREFIX):
+        return title(name)
+    data = _data(name)
+    return f"{data['title']}\n\n{data['text'].strip()}\n\nSource: {data['source']}"
+
+
+def load(name: str | Path) -> RobotModel:
+    """Load a robot by its name, or from a file; also called robot factory elsewhere.
+
+    Parameters
+    ----------
+    name : str or Path
+        One of `robots`, for example ``"rx90"``; ``"erd:<name>"`` for an arm of the package
         example-robot-data by its name there, for example ``"erd:ur5"``, or one of its arms on a
-        mobile base, for example ``"erd:pr2_left_arm"``.
+        mobile base, for example ``"erd:pr2_left_arm"``; or a file: a URDF (``.urdf``, ``.xml``) or
+        SYMORO's ``.par``. `RobotModel.from_urdf` has the options of URDF files.
 
     Returns
     -------
     RobotModel
-        The robot. Where its numbers come from is in the docstring of the function that builds
-        it: ``help(robotmodels.robots.staubli.rx90)``.
+        The robot. `source` names the origin of the numbers of the catalogue.
 
     Raises
     ------
@@ -102,24 +136,93 @@ def load(name: str) -> RobotModel:
         The name is unknown; the nearest names are listed.
     MissingExtraError
         An ``erd:`` name, and the data of example-robot-data are not installed.
+    UrdfError, InvalidValueError, FileNotFoundError
+        A file that cannot be read as a robot.
 
     Examples
     --------
     >>> load("rx90").n
     6
     """
+    if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix in _FILES):
+        return read_par(name) if Path(name).suffix == ".par" else RobotModel.from_urdf(Path(name))
     if isinstance(name, str) and name.startswith(ERD_PREFIX):
         return load_erd(name.removeprefix(ERD_PREFIX))
-    return _builder(name)()
+    data = _data(name)
+    columns = dict(data["table"])
+    convention = columns.pop("convention", "khalil")
+    degrees = columns.pop("degrees", False)
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    if convention == "classical":
+        table, tool = DHTable.from_standard(rows, degrees=degrees)
+    else:
+        table, tool = DHTable.from_rows(rows, degrees=degrees), _pose(data.get("tool"))
+    model = RobotModel.from_table(
+        table,
+        inertia=_inertia(table, rows, degrees, data["inertia"]) if "inertia" in data else None,
+        drive=DriveParameters(**data["drive"]) if "drive" in data else None,
+        base=_pose(data.get("base")),
+        tool=tool,
+        transmission=_transmission(**data["transmission"]) if "transmission" in data else None,
+        configurations=data.get("configurations"),
+        name=name,
+    )
+    return replace(model, notes=tuple(data["notes"])) if "notes" in data else model
 
 
-def _builder(name: str) -> Callable[[], RobotModel]:
-    module = _MODULE_OF.get(name) if isinstance(name, str) else None
-    if module is None:
+def _data(name: str) -> dict[str, Any]:
+    """The file of a robot."""
+    if not isinstance(name, str) or name not in CATALOGUE:
         raise RobotNotFoundError(
             "robot",
             name,
             robots(),
-            "All names: robots(). A URDF file is read with RobotModel.from_urdf(path).",
+            "All names: robots(). Files are known by their suffix .urdf or .par.",
         )
-    return getattr(import_module(f".{module}", __package__), name)
+    return _parsed(name)
+
+
+@cache
+def _parsed(name: str) -> dict[str, Any]:
+    """The file of a robot, parsed once."""
+    return tomllib.loads((files(__package__) / "data" / f"{name}.toml").read_text("utf-8"))
+
+
+def _pose(motions: Sequence[Sequence[Any]] | None) -> Array | None:
+    """Product of motions such as ``["translation", x, y, z]``, ``["rotation", axis, degrees]``."""
+    if motions is None:
+        return None
+    pose = np.eye(4)
+    for kind, *numbers in motions:
+        if kind == "rotation":
+            pose = pose @ se3.rotation(numbers[0], np.radians(numbers[1]))
+        else:
+            pose = pose @ se3.translation(*numbers)
+    return pose
+
+
+def _transmission(gears: ArrayLike, **friction: Any) -> Transmission:
+    """Transmission from the matrix that gives motor angles from joint angles."""
+    return Transmission(np.linalg.inv(gears), **friction)
+
+
+def _inertia(table: DHTable, rows: Rows, degrees: bool, data: dict[str, Any]) -> InertialParameters:
+    """Inertial parameters given in the frames of the table, in classical ones, or in a URDF's."""
+    # six numbers of a tensor in the order of a URDF: xx, xy, xz, yy, yz, zz
+    tensors = np.asarray(data["inertia"], dtype=float)[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    mass, com, frames = data["mass"], data["com"], data.get("frames", "table")
+    if frames == "classical":
+        return InertialParameters.from_standard(rows, mass, com, tensors, degrees=degrees)
+    if frames == "table":
+        return InertialParameters.from_com(mass, com, tensors)
+    factors = link_transforms(table, data.get("q_zero", np.zeros(table.n)))
+    ours = theirs = np.eye(4)
+    moved = np.empty((table.f, 4, 4))
+    yaws = data.get("yaw", [0.0] * table.f)
+    for j, (xyz, rpy, yaw) in enumerate(zip(data["xyz"], data["rpy"], yaws, strict=True)):
+        ours = ours @ factors[j]
+        theirs = theirs @ se3.from_rpy(rpy, xyz)
+        moved[j] = se3.inverse(ours) @ theirs
+        turn = se3.rotation("z", yaw)[:3, :3]
+        tensors[j] = turn @ tensors[j] @ turn.T
+    return InertialParameters.from_com(mass, com, tensors).moved(moved)

@@ -28,7 +28,7 @@ _FINEST = 100 * float(np.finfo(np.float64).eps)
 def simulate(
     model: RobotModel,
     q0: ArrayLike,
-    v0: ArrayLike,
+    v0: ArrayLike | None = None,
     control: Callable[..., ArrayLike] | ArrayLike | None = None,
     t: ArrayLike = 1.0,
     wrench: Callable[..., ArrayLike] | ArrayLike | None = None,
@@ -58,7 +58,7 @@ def simulate(
     model : RobotModel
         The robot, n joints; a payload is part of it (`with_payload`).
     q0, v0 : array_like, shape (n,)
-        Positions (rad or m) and velocities at the start.
+        Positions (rad or m) and velocities at the start; default at rest.
     control : callable, or array_like of shape (n,) or (N, n), optional
         Torques, N m or N: a function of (t, q, v), constant ones, or rows for the N times ``t``,
         linear between them. Default none: the arm falls freely.
@@ -123,7 +123,8 @@ def simulate(
     check_model(model)
     check_all_or_none(drive)
     n = model.n
-    q, v = as_exact(q0, (n,), "q0").copy(), as_exact(v0, (n,), "v0").copy()
+    q = as_exact(q0, (n,), "q0").copy()
+    v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
     start, end, times = _times(t)
     law, knots = _law(control, n, times, "control")
     tool, tool_knots = _law(wrench, 6, times, "wrench")

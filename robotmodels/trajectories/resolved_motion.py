@@ -19,16 +19,15 @@ from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
 from ..kinematics.inverse.methods import InverseMethod
-from ..kinematics.inverse.request import Secondary
-from ..kinematics.inverse.solution import IKMSolution
-from ..kinematics.inverse.status import IKMStatus
+from ..kinematics.inverse.solution import IKMSolution, IKMStatus
+from ..kinematics.inverse.solver import Secondary
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
-from .asked import ROUNDING
+from .checks import ROUNDING
+from .number_text import counted, greatest_shown, most_shown, seconds_shown
 from .pose_trajectory import PoseTrajectory
-from .shown import counted, greatest_shown, most_shown, seconds_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -124,11 +124,11 @@ def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> Excitatio
     model = problem.model
     times = np.linspace(0.0, problem.basis.duration, _DENSE * len(problem.t) + 1)
     q, v, a = trajectory.motion.derivatives(times, (0, 1, 2))
-    torque = np.abs(idm(model, q, v, a))
+    torque = _torques(model, q, v, a)
     peaks = (torque + _between(torque, 0.125)).max(axis=0)
     if (beside := _beside_jumps(model, times, v)).size:
         qb, vb, ab = trajectory.motion.derivatives(beside, (0, 1, 2))
-        peaks = np.maximum(peaks, np.abs(idm(model, qb, vb, ab)).max(axis=0))
+        peaks = np.maximum(peaks, _torques(model, qb, vb, ab).max(axis=0))
     clearance = np.inf
     if problem.distances is not None:
         distance, _ = problem.distances(q)
@@ -174,6 +174,11 @@ def _beside_jumps(model: RobotModel, times: Array, v: Array) -> Array:
 def _means(problem: ExcitationProblem, X: Array) -> Array:
     """Mean posture of a motion."""
     return (problem.functions[0] @ X).mean(axis=0)
+
+
+def _torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
+    """Sizes of the torques of a motion (N, n), 0 for a robot without masses and drives."""
+    return np.zeros_like(q) if model.twin.torques_warn else np.abs(idm(model, q, v, a))
 
 
 def _middle(problem: ExcitationProblem, rng: np.random.Generator) -> Array:

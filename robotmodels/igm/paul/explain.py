@@ -7,27 +7,11 @@ from dataclasses import dataclass
 from ...latex_text import markdown
 from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
-from ..loop import JointChain
+from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
-from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
-from .whole import whole
-from .wording import Wording
-
-
-@dataclass(frozen=True, slots=True)
-class ExplainedStep:
-    """One step of the derivation."""
-
-    joints: tuple[str, ...]
-    type: EquationType
-    matrix_equation: str
-    equations: tuple[str, ...]
-    formulas: tuple[str, ...]
-    undetermined: str
-    branches: int
-    text: str
-    latex: str
+from .render import render
+from .steps import ExplainedStep, PlanText
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -120,23 +104,15 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az); θ4' = θ4 + π
     """
     check_model(model)
-    plan = derive_plan(model)
-    words = Wording(plan)
-    steps = []
-    for number, step in enumerate(plan.steps):
-        told = words.step(number, step)
-        steps.append(
-            ExplainedStep(
-                told.names, step.type, told.matrix_equation, told.equations, told.formulas,
-                told.undetermined, step.type.branches, told.text, told.latex,
-            )
-        )  # fmt: skip
+    chain = joint_chain(model)
+    plan = derive_plan(chain, [int(model.table.joint_rows[c]) + 1 for c in chain.columns])
+    words = PlanText(plan)
+    steps = tuple(words.step(number, step) for number, step in enumerate(plan.steps))
     remaining = tuple(words.variable(j) for j in plan.remaining)
     takes_over = "" if plan.complete else _successor(plan.chain)
-    told = [(step.text, step.latex) for step in steps]
-    text, latex = whole(model, words, told, takes_over)
+    text, latex = render(model, words, steps, takes_over)
     return InverseModelExplanation(
-        model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
+        model.name, steps, plan.complete, remaining, takes_over, plan, text, latex
     )
 
 

@@ -1,0 +1,66 @@
+"""Print the lines and files of every package of robotmodels, of the tests and of the benchmarks.
+
+    python .ci/lines.py [--check]
+
+Whole Python files are counted as they stand. ``--check`` ends with 1 where a package is more than
+15 % above its budget and above the lines that `ACCEPTED` states for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BUDGETS = {
+    "igm": 9000, "kinematics": 5300, "symbolic": 2700, "identification": 6800,
+    "calibration": 5900, "estimation": 1800, "logs": 1500, "minimal_parameters": 2100,
+    "regressors": 1200, "dynamics, friction, drive, inertia, simulation": 3000, "viz": 3500,
+    "cli": 1700, "trajectories": 2900, "kernels": 3100,
+}  # fmt: skip
+"""Lines of a package, or of several together; the rest shares `REST`."""
+REST = 6500
+ACCEPTED: dict[str, int] = {}
+"""Packages above their budget, and the lines they may have: they only shrink."""
+
+
+def lines(path: Path) -> tuple[int, int]:
+    """Lines and Python files of a file or folder."""
+    found = [path] if path.is_file() else sorted(path.rglob("*.py"))
+    return sum(len(p.read_text(encoding="utf-8").splitlines()) for p in found), len(found)
+
+
+def total(counts: list[tuple[int, int]]) -> tuple[int, int]:
+    """Sums of lines and files."""
+    return sum(count for count, _ in counts), sum(files for _, files in counts)
+
+
+def main() -> None:
+    """Print the table, or check it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="end with 1 above the budgets")
+    check = parser.parse_args().check
+    package = ROOT / "robotmodels"
+    rooms = {p.stem: lines(p) for p in sorted(package.iterdir()) if p.suffix == ".py" or p.is_dir()}
+    rooms = {name: count for name, count in rooms.items() if count[0]}
+    rows, named, wrong = [], set(), []
+    for group, budget in BUDGETS.items():
+        names = [name for name in group.split(", ") if name in rooms]
+        named |= set(names)
+        rows.append((group, *total([rooms[name] for name in names]), budget))
+    rest = [rooms[name] for name in rooms if name not in named]
+    rows.append(("all other packages", *total(rest), REST))
+    for name, count, files, budget in rows:
+        print(f"{name:<50}{count:>8}{files:>6} files, budget {budget}")
+        if count > max(1.15 * budget, ACCEPTED.get(name, 0)):
+            wrong.append(f"{name}: {count} lines, budget {budget}")
+    for folder in (package, ROOT / "tests", ROOT / "benchmarks"):
+        count, files = lines(folder)
+        print(f"{folder.name:<50}{count:>8}{files:>6} files")
+    if check and wrong:
+        sys.exit("\n".join(wrong))
+
+
+if __name__ == "__main__":
+    main()

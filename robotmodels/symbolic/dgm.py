@@ -1,0 +1,273 @@
+"""The direct geometric model as formulas, derived step by step as in the book."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_vector
+from ..latex_text import table_latex
+from ..model import RobotModel
+from .chain import TOOL, Chain, Move, motion_text, multiplied_out
+from .explanation import Document, Explanation, FormulaNumbers, frame_label
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolicTransform:
+    """One transformation matrix of the derivation.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"2T3"``, the pose of R_3 in R_2; ``"Z"`` and ``"E"`` are base and tool.
+    motion : str
+        The product that it is, such as ``"Trans(x, D3) Rot(z, θ3)"`` or ``"2T3 3T6"``.
+    matrix : sympy.ImmutableDenseMatrix, shape (4, 4)
+        Its entries, lengths in metres.
+
+    Examples
+    --------
+    >>> from robotmodels import DHTable, RobotModel
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> step = explain_dgm(arm).factors[1]
+    >>> step.name, step.motion, step.matrix[0, 3]
+    ('1T2', 'Trans(x, D2) Rot(z, θ2)', D2)
+    """
+
+    name: str
+    motion: str
+    matrix: Any
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class DirectModelExplanation(Explanation):
+    """The symbolic direct geometric model of a robot, made by `explain_dgm`.
+
+    Printing it shows the derivation; the expressions are SymPy's.
+
+    Parameters
+    ----------
+    robot, frame : str
+        Names of the robot and of the frame whose pose it is.
+    variables : tuple of sympy.Symbol, length n
+        Joint variables in table order: ``theta_j`` if revolute, ``r_j`` if prismatic, numbered
+        by frame.
+    factors : tuple of SymbolicTransform
+        ``T(a(j), j)`` of each row from the base to the frame.
+    products : tuple of SymbolicTransform
+        Products of the last two, three, ... factors; the last one is the product of all of them.
+    product : SymbolicTransform
+        ``0Tn``, the pose of the last frame of the chain in R_0.
+    base, tool : SymbolicTransform or None
+        ``Z`` and ``E`` of eq. [1.10]; None where they are the identity.
+    pose : sympy.ImmutableDenseMatrix, shape (4, 4)
+        The world pose, ``Z 0Tn E``; its columns are ``s``, ``n``, ``a``, ``P``.
+    abbreviations : tuple of (sympy.Symbol, sympy.Expr)
+        ``C23`` and its meaning ``cos(theta2 + theta3)``, and so on; each uses only symbols that
+        come before it.
+    constants : tuple of (sympy.Symbol, float)
+        The values of lengths (metres) and angles (radians) of this robot.
+    text, latex : str
+        The derivation for people; the LaTeX has the same content, as paragraphs and amsmath
+        environments.
+
+    Examples
+    --------
+    >>> from robotmodels import DHTable, RobotModel
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> model = explain_dgm(arm)
+    >>> model.P.T
+    Matrix([[C1*D2, D2*S1, 0]])
+    >>> float(model.evaluate([1.0, 0.0])[2, 2])
+    1.0
+    """
+
+    robot: str
+    frame: str
+    variables: tuple[Any, ...]
+    factors: tuple[SymbolicTransform, ...]
+    products: tuple[SymbolicTransform, ...]
+    product: SymbolicTransform
+    base: SymbolicTransform | None
+    tool: SymbolicTransform | None
+    pose: Any
+    abbreviations: tuple[tuple[Any, Any], ...]
+    constants: tuple[tuple[Any, float], ...]
+    text: str
+    latex: str
+
+    @property
+    def s(self) -> Any:
+        """First axis of the frame in the world, a column of three expressions."""
+        return self.pose[:3, 0]
+
+    @property
+    def n(self) -> Any:
+        """Second axis of the frame in the world."""
+        return self.pose[:3, 1]
+
+    @property
+    def a(self) -> Any:
+        """Third axis of the frame in the world."""
+        return self.pose[:3, 2]
+
+    @property
+    def P(self) -> Any:
+        """Origin of the frame in the world, metres."""
+        return self.pose[:3, 3]
+
+    def written_out(self) -> Any:
+        """The pose (4, 4) in joint variables and constants only, for differentiation and the like.
+
+        It is long for an arm with many oblique axes.
+        """
+        pose = self.pose
+        for symbol, meaning in reversed(self.abbreviations):
+            pose = pose.xreplace({symbol: meaning})
+        return pose
+
+    def evaluate(self, q: ArrayLike) -> Array:
+        """World poses (..., 4, 4) of q (..., n) by the formulas: equal to `dgm`."""
+        q = as_vector(q, len(self.variables), "q")
+        numbers = FormulaNumbers(self.variables, self.abbreviations, self.constants)
+        return numbers.matrix(self.pose, q)
+
+    def __repr__(self) -> str:
+        return f"<DirectModelExplanation of {self.robot}: pose of {self.frame} in the world>"
+
+
+def explain_dgm(
+    model: RobotModel,
+    frame: str | int | None = None,
+    symbols: Mapping[str, str] | None = None,
+) -> DirectModelExplanation:
+    """The direct geometric model as formulas, derived step by step as in the book.
+
+    First the matrix ``T(a(j), j)`` of each row, then their products from the right, then the
+    components s, n, a, P of ``0Tn``, and with the base and the tool where there are any. Angles
+    about parallel axes are added, also where translations stand between them.
+
+    Notation: ``C1``, ``S1`` are cosine and sine of ``θ1``, ``C23`` of ``θ2 + θ3``; an ``m`` before
+    a number subtracts, so ``C2m3 = cos(θ2 - θ3)`` for opposite axes. With ten frames or more,
+    sums have underscores: ``C2_3``. Constants that are not zero get symbols: ``Dj``, ``RLj`` and
+    ``BLj`` for d, r and b of row j, and for angles that are no multiple of 30 or 45 degrees ``Aj``,
+    ``Bj``, ``Gj`` and ``THj`` for alpha, beta, gamma and the constant part of theta
+    (``C2TH2 = cos(θ2 + TH2)``); ``C1p45 = cos(θ1 + 45°)``. Names in ``DHTable.symbols``, such as
+    those of a ``.par`` file, replace these. The base is ``Z = Trans(X0, Y0, Z0)
+    Rot(z, AZ0) Rot(y, AY0) Rot(x, AX0)``, the tool the same with E instead of 0. Partial results
+    of more than 100 symbols (arms with many oblique axes) are named ``U1``, ``U2``, ...
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+    symbols : mapping of str to str, optional
+        Other names for some of the symbols, such as ``{"RL1": "l1", "C1": "c1"}``.
+
+    Returns
+    -------
+    DirectModelExplanation
+        Prints as the derivation; has the matrices, ``.latex`` and ``.evaluate(q)``.
+
+    Raises
+    ------
+    FrameNotFoundError
+        No such frame.
+    InvalidValueError
+        ``symbols`` renames a symbol that does not occur, gives a name that is not an identifier,
+        or gives a name twice.
+
+    Notes
+    -----
+    Angles within 1e-13 rad of a multiple of 30 or 45 degrees are taken as exact, lengths below
+    1e-13 m as zero.
+
+    References
+    ----------
+    Seed book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> rx90 = explain_dgm(load("rx90"))
+    >>> print(rx90.text[rx90.text.rindex("Px"):])
+    Px = -C1*(S23*RL4 - C2*D3)
+    Py = -S1*(S23*RL4 - C2*D3)
+    Pz = C23*RL4 + S2*D3
+    """
+    import sympy
+
+    chain = Chain(model, model.twin.frame(frame), symbols)
+    notation, path, moves = chain.notation, chain.path, chain.moves
+    parent = {j: int(model.table.antecedent[j - 1]) for j in path}
+
+    def step(name: str, moves: Sequence[Move]) -> SymbolicTransform:
+        matrix = multiplied_out(moves, notation)
+        return SymbolicTransform(name, motion_text(moves, notation), matrix)
+
+    factors = tuple(step(f"{parent[j]}T{j}", moves[j]) for j in path)
+    products: list[SymbolicTransform] = []
+    for k in range(len(path) - 2, -1, -1):
+        before = products[-1] if products else factors[-1]
+        matrix = multiplied_out([move for j in path[k:] for move in moves[j]], notation)
+        motion = f"{factors[k].name} {before.name}"
+        products.append(SymbolicTransform(f"{parent[path[k]]}T{path[-1]}", motion, matrix))
+    product = SymbolicTransform("0T0", "1", sympy.ImmutableDenseMatrix.eye(4))
+    if path:
+        product = products[-1] if products else factors[0]
+    pose = product.matrix
+    if moves[0] or moves[TOOL]:
+        rows = [move for j in path for move in moves[j]]
+        pose = multiplied_out([*moves[0], *rows, *moves[TOOL]], notation)
+    base = step("Z", moves[0]) if moves[0] else None
+    tool = step("E", moves[TOOL]) if moves[TOOL] else None
+    notation.check_new_names()
+    steps = (*factors, *products, *(t for t in (base, tool) if t))
+    draft = DirectModelExplanation(
+        robot=model.name,
+        frame=frame_label(frame),
+        variables=chain.variables,
+        factors=factors,
+        products=tuple(products),
+        product=product,
+        base=base,
+        tool=tool,
+        pose=pose,
+        abbreviations=notation.used_abbreviations([pose, *(t.matrix for t in steps)]),
+        constants=tuple((c.symbol, c.value) for c in notation.constants),
+        text="",
+        latex="",
+    )
+    document = _document(draft, chain)
+    return replace(draft, text=document.text, latex=document.latex)
+
+
+def _document(e: DirectModelExplanation, chain: Chain) -> Document:
+    out = Document(
+        f"Direct geometric model of {e.robot}: pose of {e.frame} in the world", chain.notation
+    )
+    table, last = str(chain.table), e.product.name[1:]
+    out.add(table, table_latex(table))
+    out.add_symbols([], e.abbreviations, every=True)
+    if e.factors:
+        out.add("Transformation of each row, T(a(j), j) [1.3]")
+    for step in e.factors:
+        out.add_transform(step.name, step.motion, step.matrix)
+    if len(e.products) > 1:
+        out.add("Products from the right")
+    for step in e.products[:-1]:
+        out.add_transform(step.name, step.motion, step.matrix)
+    names = " ".join(t.name for t in e.factors) or "1"
+    out.add_components(f"0{last}", e.product.matrix, names, " [1.4]: its columns are s, n, a, P")
+    if e.base or e.tool:
+        for step, of in ((e.base, "R_0 in the world"), (e.tool, f"{e.frame} in R_{last[1:]}")):
+            if step:
+                out.add_transform(step.name, step.motion, step.matrix, f"the pose of {of}")
+        names = " ".join(t.name for t in (e.base, e.product, e.tool) if t)
+        out.add_components("", e.pose, names, f" [1.10], the pose of {e.frame} in the world")
+    return out

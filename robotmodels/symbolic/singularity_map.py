@@ -1,0 +1,222 @@
+"""A singular factor, or the determinant, over two joint ranges: data for a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import index
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
+from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..geometry import PRISMATIC
+from ..kinematics import SingularityKind
+from ..model import RobotModel, check_model
+from .factor import SingularityFactor
+from .singularities import explain_singularities
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SingularityMap(Rebuilt):
+    """Values of a singular factor or of the determinant over two joints; drawn by ``viz``.
+
+    The robot is singular where the value is zero.
+
+    Parameters
+    ----------
+    model_name : str
+        Name of the robot.
+    joints : ndarray of int, shape (2,)
+        Columns of q, from 0, of the two joints.
+    names : tuple of str, length 2
+        Names of the two joints.
+    first, second : ndarray, shapes (na,), (nb,)
+        Their values, rad or m, ascending.
+    values : ndarray, shape (na, nb)
+        Entry [a, b] belongs to ``first[a]``, ``second[b]``.
+    label : str
+        The quantity, such as ``"elbow: C3"``.
+    units : tuple of str, length 3
+        Units of ``first``, ``second`` and ``values``, such as ``("rad", "rad", "m^2")``; ``"1"``
+        where there is none.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> grid = singularity_map(load("rx90"), joints=(1, 2), samples=(5, 7))
+    >>> grid.values.shape, grid.units
+    ((5, 7), ('rad', 'rad', 'm^3'))
+    """
+
+    model_name: str
+    joints: NDArray[np.int64]
+    names: tuple[str, str]
+    first: Array
+    second: Array
+    values: Array
+    label: str
+    units: tuple[str, str, str]
+
+    def __repr__(self) -> str:
+        unit = "" if self.units[2] == "1" else f" {self.units[2]}"
+        text = "no values"
+        if self.values.size:
+            text = f"{self.values.min():.4g} to {self.values.max():.4g}{unit}"
+        size = " by ".join(map(str, self.values.shape))
+        return (
+            f"<SingularityMap of {self.model_name} over {' and '.join(self.names)}, {size}: "
+            f"{self.label:.60} from {text}>"
+        )
+
+
+def singularity_map(
+    model: RobotModel,
+    joints: Sequence[int | str],
+    at: ArrayLike | None = None,
+    samples: tuple[int, int] = (121, 121),
+    factor: SingularityFactor | SingularityKind | None = None,
+    ranges: ArrayLike | None = None,
+) -> SingularityMap:
+    """Values of a singular factor, or of the determinant, over the ranges of two joints.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    joints : pair of int or str
+        Columns of q, from 0, or names of two different joints.
+    at : array_like, shape (n,), optional
+        Values of the other joints, rad or m; default all zero.
+    samples : pair of int, optional
+        Numbers of values of each joint, at least 1.
+    factor : SingularityFactor or SingularityKind, optional
+        A factor of ``explain_singularities(model)``, or its kind if one factor has it; default
+        the determinant of the square matrix that decides.
+    ranges : array_like, shape (2, 2), optional
+        Lower and upper value of each of the two joints, rad or m; default their limits, and
+        from -pi to pi for a revolute joint without.
+
+    Returns
+    -------
+    SingularityMap
+        The two axes and the values.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        ``joints`` are not two different joints, ``at``, ``samples`` or ``ranges`` do not fit,
+        a prismatic joint has no limits, several or no factors are of the kind, or the robot has
+        no determinant (it is redundant, for instance): choose a factor.
+
+    References
+    ----------
+    Seed book section 1.3.1.3.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> grid = singularity_map(load("rx90"), (2, 4), samples=(3, 3), ranges=[[-1, 1], [0, 3]])
+    >>> grid.names, float(grid.values[1, 0])
+    (('joint_3', 'joint_5'), 0.0)
+    """
+    check_model(model)
+    columns = _columns(model, joints)
+    q = np.zeros(model.n) if at is None else as_vector(at, model.n, "at")
+    if q.ndim != 1:
+        raise ShapeError(f"at: expected one configuration ({model.n},), got shape {q.shape}.")
+    counts = _counts(samples)
+    limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
+    for low, high in limits:
+        if low >= high:
+            raise InvalidValueError(
+                f"ranges: expected the lower value first, got {low:g} and {high:g}."
+            )
+    axes = [np.linspace(limits[k, 0], limits[k, 1], counts[k]) for k in range(2)]
+    grid = np.tile(q, (*counts, 1))
+    grid[..., columns[0]] = axes[0][:, None]
+    grid[..., columns[1]] = axes[1]
+    if factor is None:
+        # more joints than six never make a square matrix: no formulas are needed to know
+        count = int(np.isin(model.table.joint_rows + 1, model.twin.frame(None).path).sum())
+        if count > 6:
+            raise InvalidValueError(
+                f"{model.name}: there is no determinant ({count} joints move the tool, the matrix "
+                "is not square); pass one of explain_singularities(model).factors as factor."
+            )
+        explanation = explain_singularities(model)
+        values, label, unit = explanation.determinant(grid), "determinant", explanation.unit
+    else:
+        if not isinstance(factor, SingularityFactor):
+            factor = explain_singularities(model).factor(factor)
+        values, unit = factor.values(grid), factor.unit
+        label = f"{factor.kind.value}: {factor.text}"
+    rows = model.table.joint_rows[columns]
+    own = ["m" if model.table.sigma[row] == PRISMATIC else "rad" for row in rows]
+    names = [str(model.table.names[row]) for row in rows]
+    return SingularityMap(
+        model_name=model.name,
+        joints=read_only(columns, np.int64),
+        names=(names[0], names[1]),
+        first=read_only(axes[0]),
+        second=read_only(axes[1]),
+        values=read_only(values),
+        label=label,
+        units=(own[0], own[1], unit),
+    )
+
+
+def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
+    names = [str(model.table.names[row]) for row in model.table.joint_rows]
+    if not isinstance(joints, (list, tuple, np.ndarray)) or len(joints) != 2:
+        raise InvalidValueError(
+            f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
+        )
+    known: dict[int | str, int] = {k: k for k in range(model.n)}
+    known |= {name: k for k, name in enumerate(names)}
+    columns = []
+    for joint in joints:
+        if isinstance(joint, str) and joint not in names:
+            near = nearest_names(joint, names) or names
+            raise InvalidValueError(
+                f"joints: no joint is called {joint!r}; there is {', '.join(near)}."
+            )
+        if (
+            isinstance(joint, bool)
+            or not isinstance(joint, (int, np.integer, str))
+            or (joint not in known)
+        ):
+            raise InvalidValueError(
+                f"joints: expected names or columns of q from 0 to {model.n - 1}, got {joint!r}."
+            )
+        columns.append(known[joint])
+    if columns[0] == columns[1]:
+        raise InvalidValueError(f"joints: expected two different joints, got {joints!r}.")
+    return columns
+
+
+def _counts(samples: tuple[int, int]) -> tuple[int, int]:
+    try:
+        first, second = map(index, samples)
+    except (TypeError, ValueError):
+        first, second = 0, 0
+    if min(first, second) < 1:
+        raise InvalidValueError(
+            f"samples: expected two whole numbers of at least 1, as (121, 121), got {samples!r}."
+        )
+    return first, second
+
+
+def _limits(model: RobotModel, columns: list[int]) -> Array:
+    limits = np.stack([model.lower[columns], model.upper[columns]], axis=1)
+    for k, row in enumerate(model.table.joint_rows[columns]):
+        if np.isfinite(limits[k]).all():
+            continue
+        if model.table.sigma[row] == PRISMATIC:
+            raise InvalidValueError(
+                f"ranges: the prismatic joint {model.table.names[row]!r} has no limits; pass "
+                "the ranges of both joints, such as [[-3.1, 3.1], [0, 0.5]]."
+            )
+        limits[k] = -np.pi, np.pi
+    return limits

@@ -1,0 +1,195 @@
+"""First steps and usual mistakes: each gives an answer, or the sentence that mends it."""
+
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.errors import RobotNotFoundError
+
+URDF = Path(__file__).parents[1] / "urdf"
+REST = np.zeros(6)
+
+
+@pytest.fixture(scope="module")
+def rx90():
+    return rm.load("rx90")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("fkine", r"rm\.dgm\(robot, q\)"), ("rne", r"rm\.idm"), ("teach", r"rm\.viz\.jog"),
+     ("qz", "configurations"), ("dof", r"robot\.n")],
+)  # fmt: skip
+def test_names_of_other_programs_are_answered_with_ours(rx90, name, words):
+    with pytest.raises(AttributeError, match=words):
+        getattr(rx90, name)
+    assert not hasattr(rx90, "nothing_at_all")
+
+
+def test_every_replacement_exists(rx90):
+    from robotmodels.model.other_names import REPLACEMENTS
+
+    for words in REPLACEMENTS.values():
+        thing = rm if words.startswith("rm.") else rx90
+        for part in words.split("(")[0].split()[0].strip(";").split("[")[0].split(".")[1:]:
+            thing = getattr(thing, part)
+
+
+@pytest.mark.parametrize("as_path", [str, Path], ids=["text", "path"])
+def test_a_file_is_loaded_like_a_name(as_path, tmp_path):
+    loaded = rm.load(as_path(URDF / "rx90.urdf"))
+    q = np.linspace(0.1, 0.6, 6)
+    np.testing.assert_allclose(rm.dgm(loaded, q), rm.dgm(rm.load("rx90"), q), atol=1e-12)
+    par = Path(__file__).parent / "oracles"
+    for path in sorted(par.rglob("*.par"))[:1]:
+        assert rm.load(as_path(path)).n == rm.read_par(path).n
+    with pytest.raises(rm.errors.UrdfError, match=r"none\.urdf"):
+        rm.load(as_path(tmp_path / "none.urdf"))
+
+
+def test_an_unknown_name_is_told_the_suffixes():
+    with pytest.raises(RobotNotFoundError, match=r"\.urdf or \.par"):
+        rm.load("rx91")
+
+
+def test_the_door_lists_public_names_only():
+    shown = [name for name in dir(rm) if not name.startswith("__")]
+    assert sorted(shown) == sorted(rm.__all__)
+    assert {"se3", "load", "igm", "viz"} <= set(shown)
+
+
+def test_velocity_and_acceleration_default_to_rest(rx90):
+    q = np.full(6, 0.3)
+    np.testing.assert_array_equal(rm.idm(rx90, q), rm.idm(rx90, q, REST, REST))
+    np.testing.assert_allclose(rm.idm(rx90, [q, q])[1], rm.idm(rx90, q), rtol=1e-12, atol=1e-12)
+    still = rm.simulate(rx90, q, t=[0.0, 0.01])
+    np.testing.assert_array_equal(still.v[0], REST)
+
+
+@pytest.mark.parametrize("torque", [rm.idm, rm.gravity_torque], ids=["idm", "gravity"])
+def test_torques_without_masses_warn_once(torque):
+    arm = rm.load("lab_rr")
+    with pytest.warns(rm.InertiaWarning, match="no masses"):
+        torque(arm, [0.1, 0.2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        torque(arm, [0.1, 0.2])
+
+
+def mat_7_3(path, variables):
+    """A file as MATLAB's save(..., '-v7.3') writes it: HDF5 behind a header of 512 bytes."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in variables.items():
+            if isinstance(value, str):
+                data, kind = np.array([[ord(c)] for c in value], np.uint16), b"char"
+            else:
+                data, kind = np.atleast_2d(value).T, b"double"
+            file.create_dataset(name, data=data).attrs["MATLAB_class"] = np.bytes_(kind)
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    with open(path, "r+b") as file:
+        file.write(head)
+
+
+@pytest.mark.parametrize("version", ["7", "7.3"])
+def test_logs_of_matlab_are_read_with_their_structures(tmp_path, rng, version):
+    from scipy.io import savemat
+
+    t = np.arange(200) * 1e-3
+    q, tau = rng.normal(size=(2, 200, 3))
+    path = tmp_path / "log.mat"
+    if version == "7":
+        savemat(path, {"log": {"t": t, "q": q.T, "tau": tau, "robot": "rx90"}})
+    else:
+        mat_7_3(path, {"log/t": t[:, None], "log/q": q.T, "log/tau": tau, "log/robot": "rx90"})
+    from robotmodels.identification import read_log
+
+    log = read_log(path)  # found by the usual names
+    np.testing.assert_array_equal(log.q, q)
+    np.testing.assert_array_equal(log.tau, tau)
+    assert log.dt == pytest.approx(1e-3)
+    with pytest.raises(rm.errors.InvalidValueError, match=r"log\.tau"):
+        read_log(path, time="log.t", positions="log.q", torques="effort")
+
+
+def test_names_with_control_characters_are_refused_and_long_ones_cut():
+    table = rm.DHTable(antecedent=[0], sigma=[0])
+    for name in ("a\x1bb", "a\x7f", "a\x9b31m"):
+        with pytest.raises(rm.errors.InvalidValueError, match="control character"):
+            rm.RobotModel.from_table(table, name=name)
+        with pytest.raises(rm.errors.TableError, match="control character"):
+            rm.DHTable(antecedent=[0], sigma=[0], names=[name])
+    with pytest.raises(rm.errors.TableError) as refused:
+        rm.DHTable(antecedent=[0], sigma=[0], names=["x" * 10**6 + "\x00"])
+    assert len(str(refused.value)) < 300
+
+
+def test_a_name_with_a_comma_stays_one_cell_of_a_table(tmp_path):
+    import csv
+
+    from robotmodels.identification import write_trajectory
+
+    motion = rm.trajectories.quintic([0.0, 0.0], [1.0, 2.0], duration=1.0)
+    path = tmp_path / "move.csv"
+    write_trajectory(motion, path, rate=10.0, names=["a,=1+1", "b"])
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert len(head) == 7
+    assert head[1] == "q a,=1+1 (rad)"
+    assert all(len(row) == 7 for row in rows)
+    assert not any(cell.startswith(("=", "+", "-", "@")) for cell in head)
+
+
+def test_a_urdf_of_many_links_is_read_in_linear_time():
+    from time import process_time
+
+    def seconds(count):
+        links = "".join(
+            f"<link name='l{i}'/><joint name='j{i}' type='{'revolute' if i < 7 else 'fixed'}'>"
+            f"<parent link='l{i - 1}'/><child link='l{i}'/><origin xyz='0 0 0.1'/>"
+            "<axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+            for i in range(1, count + 1)
+        )
+        start = process_time()
+        read = rm.RobotModel.from_urdf(f"<robot name='r'><link name='l0'/>{links}</robot>")
+        assert read.n == 6
+        return process_time() - start
+
+    few = min(seconds(1000) for _ in range(3))
+    assert seconds(8000) < 20.0 * few
+
+
+COMPANIONS = (
+    "IPython", "jedi", "zmq", "tornado", "pyngrok", "embreex", "manifold3d", "vhacdx", "rtree",
+    "shapely", "lxml",
+)  # fmt: skip
+"""Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
+
+
+def test_companions_of_the_viewer_are_never_imported(tmp_path):
+    code = f"""
+import sys, numpy as np, robotmodels as rm
+arm = rm.load("ur5")
+rm.igm(arm, rm.dgm(arm, np.full(6, 0.3)))
+rm.viz.show(arm, np.zeros(6)).save({str(tmp_path / "ur5.html")!r})
+rm.viz.jog(arm).save({str(tmp_path / "jog.html")!r})
+print(sorted(set({COMPANIONS!r}) & set(sys.modules)))
+"""
+    # of meshes, trimesh reads some with what it finds installed; the package itself uses none
+    package = Path(rm.__file__).parent
+    found = {
+        name
+        for path in package.rglob("*.py")
+        for name in COMPANIONS
+        if re.search(rf"^\s*(import|from) {name}\b", path.read_text("utf-8"), re.MULTILINE)
+    }
+    assert found == set()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,426 @@
+"""The direct model and the Jacobian as formulas: the book's and the exercise's, and in numbers."""
+
+import math
+import pickle
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given, settings
+from identities.random_robots import models, random_angle, random_pose, random_state, robot_size
+
+import robotmodels as rm
+from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.se3 import from_rpy
+from robotmodels.symbolic import explain_dgm, explain_jacobian
+from robotmodels.symbolic.angles import exact_turns, wrapped
+
+RIGHT = np.pi / 2
+CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
+FOREIGN = ("erd:panda", "erd:kinova", "erd:talos_arm", "erd:so100", "erd:icub_left_arm")
+
+EXAMPLE_1_2 = """\
+sx = C1*(C23*(C4*C5*C6 - S4*S6) - S23*S5*C6) - S1*(S4*C5*C6 + C4*S6)
+sy = S1*(C23*(C4*C5*C6 - S4*S6) - S23*S5*C6) + C1*(S4*C5*C6 + C4*S6)
+sz = S23*(C4*C5*C6 - S4*S6) + C23*S5*C6
+nx = C1*(-C23*(C4*C5*S6 + S4*C6) + S23*S5*S6) + S1*(S4*C5*S6 - C4*C6)
+ny = S1*(-C23*(C4*C5*S6 + S4*C6) + S23*S5*S6) - C1*(S4*C5*S6 - C4*C6)
+nz = -S23*(C4*C5*S6 + S4*C6) - C23*S5*S6
+ax = -C1*(C23*C4*S5 + S23*C5) + S1*S4*S5
+ay = -S1*(C23*C4*S5 + S23*C5) - C1*S4*S5
+az = -S23*C4*S5 + C23*C5
+Px = -C1*(S23*RL4 - C2*D3)
+Py = -S1*(S23*RL4 - C2*D3)
+Pz = C23*RL4 + S2*D3"""
+
+
+def arm(*rows, **parts):
+    return rm.RobotModel.from_table(rm.DHTable.from_rows(rows), **parts)
+
+
+def names(explanation):
+    return {s.name for s, _ in explanation.abbreviations}
+
+
+def check(model, explanation, rng, frame=None, tolerance=1e-12):
+    q = rng.uniform(-np.pi, np.pi, size=(5, model.n))
+    np.testing.assert_allclose(
+        explanation.evaluate(q), rm.dgm(model, q, frame), rtol=0, atol=tolerance
+    )
+
+
+def check_factors(model, explanation, q, i, j):
+    numbers, factors = explanation.evaluate(q), rm.jacobian_factors(model, q, i, j)
+    for part in ("rotation", "transport", "reduced"):
+        np.testing.assert_allclose(getattr(numbers, part), getattr(factors, part), atol=1e-12)
+
+
+# --- the two documents ---------------------------------------------------------------------------
+
+
+def test_rx90_is_example_1_2_letter_by_letter():
+    rx90 = explain_dgm(rm.load("rx90"))
+    assert str(rx90).endswith("\n" + EXAMPLE_1_2)
+    for k, line in enumerate(EXAMPLE_1_2.splitlines()):
+        expected = sympy.sympify(line.split(" = ")[1])
+        assert sympy.expand(rx90.pose[k % 3, k // 3] - expected) == 0
+    assert rx90.base is rx90.tool is None
+    C4, S4, RL4, D3, C23 = sympy.symbols("C4 S4 RL4 D3 C23")
+    assert dict(rx90.constants) == {D3: 0.45, RL4: 0.45}
+    theta2, theta3 = sympy.symbols("theta2 theta3")
+    assert dict(rx90.abbreviations)[C23] == sympy.cos(theta2 + theta3)
+    assert [t.name for t in rx90.factors] == ["0T1", "1T2", "2T3", "3T4", "4T5", "5T6"]
+    assert [t.name for t in rx90.products] == ["4T6", "3T6", "2T6", "1T6", "0T6"]
+    assert rx90.products[1].motion == "3T4 4T6"
+    assert rx90.factors[3].motion == "Rot(x, -π/2) Rot(z, θ4) Trans(z, RL4)"
+    T = sympy.Matrix([[C4, -S4, 0, 0], [0, 0, 1, RL4], [-S4, -C4, 0, 0], [0, 0, 0, 1]])
+    assert rx90.factors[3].matrix == T
+    for part, of in ((rx90.s, 0), (rx90.n, 1), (rx90.a, 2), (rx90.P, 3)):
+        assert part == rx90.pose[:3, of]
+
+
+def test_lab_rr_is_equation_4_5():
+    new = {"RL1": "l1", "XE": "l2", "C1": "c1", "S1": "s1", "C2": "c2", "S2": "s2"}
+    c1, s1, c2, s2, l1, l2 = sympy.symbols("c1 s1 c2 s2 l1 l2")
+    expected = sympy.Matrix(
+        [
+            [c1 * c2, -s1, c1 * s2, c1 * c2 * l2],
+            [s1 * c2, c1, s1 * s2, s1 * c2 * l2],
+            [-s2, 0, c2, l1 - l2 * s2],
+            [0, 0, 0, 1],
+        ]
+    )
+    rr = explain_dgm(rm.load("lab_rr"), symbols=new)
+    assert expected == rr.pose
+    assert "⎢   -s2    0     c2  l1 - s2*l2 ⎥" in rr.text
+    assert r"l_{1} - s_{2} \, l_{2}" in rr.latex
+    assert dict(rr.constants) == {l1: 0.5, l2: 0.2}
+
+
+def test_rx90_has_the_third_matrix_of_the_book():
+    J = explain_jacobian(rm.load("rx90"))
+    assert (J.projection, J.intermediate) == ("R_3", "R_4")
+    C2, C3, S3, C4, S4, C5, S5, C23, S23, D3, RL4 = sympy.symbols(
+        "C2 C3 S3 C4 S4 C5 S5 C23 S23 D3 RL4"
+    )
+    expected = [
+        [0, S3 * D3 - RL4, -RL4, 0, 0, 0],
+        [0, C3 * D3, 0, 0, 0, 0],
+        [S23 * RL4 - C2 * D3, 0, 0, 0, 0, 0],
+        [S23, 0, 0, 0, S4, -C4 * S5],
+        [C23, 0, 0, 1, 0, C5],
+        [0, 1, 1, 0, C4, S4 * S5],
+    ]
+    assert sympy.expand(J.reduced - sympy.Matrix(expected)) == sympy.zeros(6)
+    assert J.lever == sympy.zeros(3, 1)
+    assert J.second == sympy.eye(6)
+    assert J.first[:3, :3] == J.rotation == J.first[3:, 3:]
+    assert "⎢ S23*RL4 - C2*D3             0     0  0   0       0 ⎥" in str(J)
+    assert r"{}^{3}\mathbf{J}_{6,4} =" in J.latex
+
+
+# --- numbers -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *FOREIGN])
+def test_catalogue(name, rng):
+    model = rm.load(name)
+    check(model, explain_dgm(model), rng)
+    if name in CATALOGUE:
+        q = rng.uniform(-np.pi, np.pi, size=(5, model.n))
+        J = explain_jacobian(model)
+        check_factors(model, J, q, *(int(frame[2:]) for frame in (J.projection, J.intermediate)))
+
+
+@settings(max_examples=15)
+@given(model=models(max_frames=5, inertia="physical"))
+def test_random_robots(model):
+    rng = np.random.default_rng(0)
+    q, *_ = random_state(model, rng, 2)
+    i, j = (int(k) for k in rng.integers(0, model.f + 1, size=2))
+    size = max(robot_size(model, row) for row in q)
+    pose = explain_dgm(model)
+    assert "nan" not in pose.text
+    np.testing.assert_allclose(pose.evaluate(q), rm.dgm(model, q), rtol=0, atol=2e-12 * size)
+    J = rm.jacobian(model, q)
+    jacobians = [explain_jacobian(model), explain_jacobian(model, i, j)]
+    for found in jacobians:
+        np.testing.assert_allclose(found.evaluate(q).jacobian, J, rtol=0, atol=2e-12 * size)
+    for latex in (pose.latex, *(found.latex for found in jacobians)):
+        for left, right in ((r"\{", r"\}"), (r"\\left\(", r"\\right\)"), (r"\\begin", r"\\end")):
+            assert len(re.findall(left, latex)) == len(re.findall(right, latex))
+
+
+def test_pairs_of_frames(rng):
+    model = rm.load("puma560").with_base(from_rpy([0.1, 0.2, 0.3], [1, 2, 3]))
+    model = model.with_tool(from_rpy([0.3, 0.1, -0.2], [0.1, 0, 0.2]))
+    q = rng.uniform(-3, 3, size=(3, 6))
+    for i, j in ((0, 0), (0, 6), (2, 4), (6, 0)):
+        check_factors(model, explain_jacobian(model, i, j), q, i, j)
+    at_tool = explain_jacobian(model, 3, "tool")
+    assert at_tool.lever == sympy.zeros(3, 1)
+    J = rm.jacobian(model, q)
+    np.testing.assert_allclose(at_tool.evaluate(q).jacobian, J, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["panda", "xarm6", "crx10ia"])
+def test_the_text_is_python(name, rng):
+    """Every line of the result can be pasted into a program."""
+    model = rm.load(name)
+    pose, J = explain_dgm(model), explain_jacobian(model, 0, 0)
+    q = rng.uniform(-3, 3, size=model.n)
+    functions = {"cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "π": math.pi}
+
+    def symbols(text, constants):
+        known = {s.name: value for s, value in constants} | functions
+        known |= {f"θ{k + 1}": x for k, x in enumerate(q)}
+        for line in text.split("Abbreviations\n")[1].split("\n\n")[0].splitlines():
+            left, right = line.split(" = ")
+            known[left.strip()] = eval(right, known)
+        return known
+
+    known = symbols(pose.text, pose.constants)
+    lines = [line for line in pose.text.splitlines() if re.match("[snaP][xyz] = ", line)]
+    values = [eval(line.split(" = ")[1], known) for line in lines[-12:]]
+    T = rm.dgm(model, q)[:3]
+    np.testing.assert_allclose(np.reshape(values, (4, 3)).T, T, rtol=0, atol=1e-12)
+    known, reduced = (
+        symbols(J.text, J.numbers.constants),
+        rm.jacobian_factors(model, q, 0, 0).reduced,
+    )
+    columns = J.text[J.text.rindex("\n  joint 1\n") :].split("\n  joint ")[1:]
+    for k, column in enumerate(columns):
+        found = dict(line.strip().split(" = ") for line in column.splitlines()[1:])
+        for row, name in enumerate(("vx", "vy", "vz", "wx", "wy", "wz")):
+            value = eval(found.get(name, "0"), known)
+            assert value == pytest.approx(reduced[row, k], abs=1e-12)
+    assert len(columns) == model.n
+
+
+def test_batches_and_mistakes():
+    model = rm.load("rx90")
+    pose, J = explain_dgm(model), explain_jacobian(model)
+    for batch in ((), (2, 3), (0,)):
+        assert pose.evaluate(np.zeros((*batch, 6))).shape == (*batch, 4, 4)
+        assert J.evaluate(np.zeros((*batch, 6))).jacobian.shape == (*batch, 6, 6)
+    for explanation in (pose, J):
+        with pytest.raises(ShapeError):
+            explanation.evaluate(np.zeros(5))
+        with pytest.raises(InvalidValueError):
+            explanation.evaluate([0, 0, 0, 0, 0, np.nan])
+    for wrong in (lambda: explain_dgm(model, "nope"), lambda: explain_jacobian(model, 9)):
+        with pytest.raises(FrameNotFoundError):
+            wrong()
+    panda = rm.load("erd:panda")
+    frame = panda.twin.frame
+    fixed = next(x for x in panda.frame_names if frame(x).position.any() and x != "tool")
+    with pytest.raises(InvalidValueError, match="jacobian_factors"):
+        explain_jacobian(panda, fixed)
+
+
+def test_written_out_has_only_variables_and_constants():
+    model = rm.load("stanford_arm")
+    pose = explain_dgm(model)
+    q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    values = dict(zip(pose.variables, q, strict=True)) | dict(pose.constants)
+    assert pose.written_out().free_symbols <= set(values)
+    numbers = np.array(pose.written_out().subs(values).evalf(), dtype=float)
+    np.testing.assert_allclose(numbers, rm.dgm(model, q), rtol=0, atol=1e-14)
+
+
+# --- sums of angles, and constants ---------------------------------------------------------------
+
+
+def test_parallel_axes_are_added_and_opposite_ones_subtracted():
+    ur = explain_dgm(rm.load("ur5"))
+    D3, S2 = sympy.symbols("D3 S2")
+    used = {s.name for s in ur.pose.free_symbols}
+    assert {"C23", "C234"} <= used
+    assert not {"C3", "C34"} & used
+    assert ur.pose[2, 3].coeff(D3) == S2
+    crx = explain_dgm(rm.load("crx10ia"))
+    assert "C2m3 = cos(θ2 - θ3)" in crx.text
+    assert "C_{2-3}" in crx.latex
+
+
+@pytest.mark.parametrize("turn", [RIGHT, -RIGHT, 0.3])
+def test_parallel_axes_on_both_sides_of_a_prismatic_joint(turn, rng):
+    """Also if the sliding direction is oblique: the two constant rotations cancel."""
+    slide = {"sigma": 1, "alpha": turn, "d": 0.2, "r": 0.1}
+    tool = from_rpy(np.zeros(3), [0.2, 0, 0])
+    model = arm({"d": 0.1}, slide, {"alpha": -turn, "d": 0.3}, tool=tool)
+    pose = explain_dgm(model)
+    check(model, pose, rng)
+    if turn != 0.3:  # the oblique slide stands between two turns about x
+        assert "C13" in {s.name for s in pose.pose.free_symbols}
+    assert "RL2 + r2" in pose.text
+
+
+def test_constants_that_cancel_disappear():
+    assert {"C2TH2", "C23"} <= names(explain_dgm(rm.load("xarm6")))
+    model = arm({"alpha": 0.3}, {"sigma": 2, "alpha": -0.3})
+    assert explain_dgm(model, 2).pose.free_symbols >= set(sympy.symbols("C1 CA1"))
+    straight = arm({"theta": 0.7}, {"theta": -0.7 + RIGHT})
+    assert explain_dgm(straight).pose[0, 0] == -sympy.Symbol("S12")
+    bent = arm({}, {"sigma": 2, "alpha": np.pi / 4}, {"alpha": np.pi / 4})
+    assert explain_dgm(bent).pose[2, 1] == sympy.Symbol("C3")
+
+
+def test_angles_are_exact_or_symbols(rng):
+    model = arm({"theta": np.pi / 4}, {"alpha": np.pi / 3, "d": 0.2}, {"alpha": -np.pi / 6})
+    exact = explain_dgm(model)
+    assert not [s for s, _ in exact.constants if s.name.startswith(("A", "TH"))]
+    assert exact.factors[1].matrix[2, 2] == sympy.Rational(1, 2)
+    assert exact.factors[2].matrix[2, 2] == sympy.sqrt(3) / 2
+    assert r"\frac{\sqrt{3}}{2}" in exact.latex
+    assert "C1p45 = cos(θ1 + π/4)" in exact.text
+    check(model, exact, rng)
+    model = arm({"alpha": RIGHT + 1e-9}, {"d": 1e-9, "beta": 1e-6})
+    near = explain_dgm(model)
+    assert {s.name for s, _ in near.constants} == {"A1", "B2", "D2"}
+    check(model, near, rng)
+    # two offsets of 3/4 pi are one of -pi/2
+    model = arm({"theta": 0.75 * np.pi}, {"theta": 0.75 * np.pi, "d": 0.4})
+    assert "3π/2" not in explain_dgm(model).text
+    check(model, explain_dgm(model), rng)
+
+
+@pytest.mark.parametrize(
+    ("turns", "expected"), [("3/2", "-1/2"), ("-3/2", "1/2"), ("-1", "1"), ("2", "0"), ("5", "1")]
+)
+def test_multiples_of_pi_are_wrapped(turns, expected):
+    assert wrapped(Fraction(turns)) == Fraction(expected)
+
+
+@pytest.mark.parametrize("turns", ["1/2", "-1/3", "1/4", "1/6", "0", None])
+def test_fractions_of_pi_are_exact(turns):
+    angle = np.pi / 12 if turns is None else float(Fraction(turns)) * np.pi
+    assert exact_turns(angle) == (None if turns is None else Fraction(turns))
+    assert exact_turns(angle + 1e-6) is None
+
+
+def test_long_results_are_cut_into_named_parts(rng):
+    """An arm with every parameter oblique would otherwise print millions of terms."""
+    keys = dict.fromkeys(("gamma", "beta", "alpha", "theta"), (0.1, 1.4))
+    keys |= dict.fromkeys(("b", "d", "r"), (-1, 1))
+    rows = [{k: rng.uniform(*ends) for k, ends in keys.items()} for _ in range(6)]
+    model = arm(*rows, base=random_pose(rng), tool=random_pose(rng))
+    pose = explain_dgm(model)
+    assert "U1" in names(pose)
+    assert len(pose.text) < 200_000
+    check(model, pose, rng, tolerance=1e-13 * 50)
+    rows = [{k: row[k] for k in ("alpha", "d", "theta", "r")} for row in (*rows, *rows[:2])]
+    rows[3]["sigma"] = 1
+    model, q = arm(*rows), rng.uniform(-1, 1, size=(3, 8))
+    for pair in ((None, None), (0, 8)):
+        J = explain_jacobian(model, *pair)
+        np.testing.assert_allclose(J.evaluate(q).jacobian, rm.jacobian(model, q), atol=1e-12)
+        assert max(len(str(entry)) for entry in J.reduced) < 4000
+
+
+# --- frames, base, tool --------------------------------------------------------------------------
+
+
+def test_frames(rng):
+    model = rm.load("erd:ur5")
+    for frame in (0, 1, "base", *model.frame_names[-2:]):
+        check(model, explain_dgm(model, frame), rng, frame)
+    assert explain_dgm(model, 0).factors == ()
+    assert explain_dgm(model, 2).frame == "R_2"
+    model = arm(*({"d": 0.1} for _ in range(12)))
+    pose = explain_dgm(model, 3)
+    assert "C1_2_3" in names(pose)
+    check(model, pose, rng, 3)
+
+
+def test_branches(rng):
+    rows = [
+        {},
+        {"d": 0.3},
+        {"antecedent": 1, "sigma": 2, "gamma": 0.4, "b": 0.2, "alpha": RIGHT, "d": 0.1},
+        {"antecedent": 3, "sigma": 1},
+    ]
+    model = arm(*rows)
+    for frame in range(5):
+        check(model, explain_dgm(model, frame), rng, frame)
+    branch = explain_dgm(model)
+    assert [t.name for t in branch.factors] == ["0T1", "1T3", "3T4"]
+    assert "C1G3" in names(branch)
+    assert "G3 = 0.4 rad (gamma3)" in branch.text
+    assert [v.name for v in branch.variables] == ["theta1", "theta2", "r4"]
+
+
+def test_base_and_tool_have_their_steps(rng):
+    model = rm.load("rx90").with_base(random_pose(rng)).with_tool(random_pose(rng))
+    pose = explain_dgm(model)
+    check(model, pose, rng)
+    for step in (pose.base, pose.tool):
+        assert step is not None
+        assert len(step.matrix.free_symbols) == 9
+    assert "Components of Z 0T6 E [1.10]" in pose.text
+    assert r"\mathbf{Z} \, {}^{0}\mathbf{T}_{6} \, \mathbf{E}" in pose.latex
+
+
+@pytest.mark.parametrize("pitch", [RIGHT, -RIGHT, RIGHT - 1e-8, RIGHT - 3e-13])
+def test_tools_at_gimbal_lock(pitch, rng):
+    for _ in range(5):
+        roll, yaw = random_angle(rng), random_angle(rng)
+        model = rm.load("lab_rr").with_tool(from_rpy([roll, pitch, yaw], [0.1, 0, 0]))
+        check(model, explain_dgm(model), rng)
+
+
+# --- the result as a value, LaTeX and names ------------------------------------------------------
+
+
+def test_latex_has_the_content_of_the_text():
+    tool = from_rpy([0.3, 0.0, 0.2], [0.1, 0, 0])
+    model = rm.load("cobra_s600").with_base(from_rpy([0, 0, 0], [0, 0, 1e-5])).with_tool(tool)
+    pose = explain_dgm(model)
+    for word in re.findall(r"\b[A-Z]?[a-z]{3,}\b", pose.text):
+        assert word in pose.latex, word
+    for part in (
+        r"3 & 1 & \pi & 0.275 & 0 & r_{3} \\",
+        r"D_{3} &= 0.275 \, \mathrm{m} \quad (d_{3})",
+        r"1 \cdot 10^{-5} \, \mathrm{m} \quad (z\text{ of the base})",
+        r"(\text{angle about }z\text{ of the tool})",
+        r"C_{1+2-4} &= \cos\left(\theta_{1} + \theta_{2} - \theta_{4}\right)",
+        r"$\mathbf{Z}$, the pose of $R_{0}$ in the world",
+    ):
+        assert part in pose.latex
+    words = re.sub(r"\\begin\{(\w+\*)\}.*?\\end\{\1\}", "", pose.latex, flags=re.DOTALL)
+    words = re.sub(r"\$[^$]*\$", "", words)
+    assert words.isascii()
+    assert not re.search(r"(?<!\\)[_^&#%$]", words), words
+
+
+def test_it_is_a_value():
+    a, b = explain_dgm(rm.load("lab_rr")), explain_dgm(rm.load("lab_rr"))
+    assert a == b
+    assert hash(a) == hash(b)
+    assert pickle.loads(pickle.dumps(a)) == a
+    assert repr(a) == "<DirectModelExplanation of lab_rr: pose of the tool in the world>"
+    assert a._repr_latex_() == a.latex
+    shown = a._repr_markdown_()
+    title = r"**Direct geometric model of lab\_rr: pose of the tool in the world**"
+    assert shown.startswith(title + "\n\n$$\n\\begin{array}{c|")
+    blocks = a.latex.count(r"\begin{align*}") + a.latex.count(r"\begin{equation*}")
+    assert len(re.findall(r"^\$\$$", shown, re.MULTILINE)) == 2 * blocks
+
+
+@pytest.mark.parametrize(
+    ("symbols", "message"),
+    [
+        ({"D9": "x"}, "'D9' does not occur"),
+        ({"RL2": "x"}, "Did you mean 'RL1'"),
+        ({"RL1": "XE"}, "two things"),
+        ({"RL1": "2l"}, "identifier|letters"),
+        ({"RL1": 3}, "got 3"),
+        ("RL1", "mapping"),
+    ],
+)
+def test_new_names_are_checked(symbols, message):
+    for explain in (explain_dgm, explain_jacobian, rm.explain_singularities):
+        with pytest.raises(InvalidValueError, match=message):
+            explain(rm.load("lab_rr"), symbols=symbols)

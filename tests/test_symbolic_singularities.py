@@ -1,0 +1,373 @@
+"""Singular positions as formulas, against numbers and published factors."""
+
+import pickle
+import sys
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model
+
+import robotmodels as rm
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.kinematics import SingularityKind
+from robotmodels.symbolic import FormulaStatus, explain_singularities, singularity_map
+from robotmodels.symbolic.factoring import factored
+from robotmodels.symbolic.formula import formula
+from robotmodels.symbolic.polynomials import PolynomialChain
+
+CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
+SIX = [name for name in CATALOGUE if rm.load(name).n == 6]
+SHOULDER, ELBOW, WRIST = SingularityKind.SHOULDER, SingularityKind.ELBOW, SingularityKind.WRIST
+
+
+def explained(name):
+    return explain_singularities(rm.load(name))
+
+
+def postures(model, rng, count):
+    q = rng.uniform(-np.pi, np.pi, size=(count, model.n))
+    prismatic = model.table.sigma[model.table.joint_rows] == 1
+    return np.where(prismatic, rng.uniform(0.1, 0.9, size=q.shape), q)
+
+
+def factor_texts(explanation):
+    return {(f.kind.value, f.text) for f in explanation.factors}
+
+
+@pytest.mark.parametrize("name", SIX)
+def test_factors_and_their_zeros(name, rng):
+    """The product is the determinant; where a factor is solved for a joint, rank is lost."""
+    model, e = rm.load(name), explained(name)
+    q = postures(model, rng, 200)
+    D = np.linalg.det(rm.jacobian(model, q))
+    np.testing.assert_allclose(e.determinant(q), D, rtol=0, atol=1e-12 * np.abs(D).max())
+    product = np.prod(e.values(q) ** [f.power for f in e.factors], axis=-1)
+    np.testing.assert_allclose(e.constant * product, D, rtol=0, atol=1e-12 * np.abs(D).max())
+    checked = 0
+    for factor in e.factors:
+        q = postures(model, rng, 40)
+        for zeros in factor.zeros(q).T:
+            at, found = q.copy(), ~np.isnan(zeros)
+            at[:, factor.solved_joint] = zeros
+            at = at[found]
+            np.testing.assert_allclose(factor.values(at), 0.0, atol=2e-8)
+            smallest = np.linalg.svd(rm.jacobian(model, at), compute_uv=False)[:, -1]
+            assert (smallest < 1e-7).all()
+            checked += len(at)
+    assert checked >= 30
+
+
+@pytest.mark.parametrize(
+    ("name", "shoulder", "elbow"),
+    [
+        ("rx90", "S23*RL4 - C2*D3", "C3"),
+        ("tx40", "S23*RL4 + S2*D3", "S3"),
+        ("puma560", "S23*RL4 - C23*D4 - C2*D3", "C3*RL4 + S3*D4"),
+        ("kr6_r900", "D2 - C23*RL4 + S23*D4 + C2*D3", "S3*RL4 + C3*D4"),
+        ("irb140", "D2 + C23*RL4 + S2*D3", "C3"),
+        ("irb6640", "D2 + C23*RL4 + S23*D4 + S2*D3", "C3*RL4 + S3*D4"),
+        ("ur5e", "S234*RL5 + C23*D4 + C2*D3", "S3"),
+        ("ur10e", "S234*RL5 + C23*D4 + C2*D3", "S3"),
+    ],
+)
+def test_shoulder_elbow_wrist(name, shoulder, elbow):
+    e = explained(name)
+    assert e.status is FormulaStatus.FACTORED
+    assert factor_texts(e) == {("shoulder", shoulder), ("elbow", elbow), ("wrist", "S5")}
+    wrist = e.factor(WRIST)
+    assert wrist.solution == "θ5 = 0 or π"
+    assert wrist.meaning == f"axes 4 and 6 are {'parallel' if 'ur' in name else 'aligned'}"
+    assert wrist.joints == (4,)
+    assert "stretched or folded" in e.factor(ELBOW).meaning
+    assert "axis 1" in e.factor(SHOULDER).meaning
+    assert e.factor(SHOULDER).unit == "m"
+
+
+def test_rx90_text():
+    e = explained("rx90")
+    assert "Its determinant is -D3*RL4 * (S23*RL4 - C2*D3) * C3 * S5" in str(e)
+    assert "θ2 = atan2(D3 - S3*RL4, C3*RL4) or that plus π" in str(e)
+    assert r"S_{23} \, RL_{4} - C_{2} \, D_{3} = 0" in e.latex
+    assert r"\theta_{5} = 0 \text{ or } \pi" in e.latex
+    assert e.latex.count("{") == e.latex.count("}")
+    assert e._repr_markdown_().startswith("**Singular positions of rx90")
+
+
+@pytest.mark.parametrize(
+    ("name", "texts", "task"),
+    [
+        ("gantry", {"S5"}, "all six rows"),
+        ("stanford_arm", {"S2", "S5", "r3"}, "all six rows"),
+        ("cobra_s600", {"S2"}, "rows that are not zero, vx, vy, vz and w"),
+        ("planar_3r", {"S2"}, ""),
+        ("planar_2r", {"S2"}, "position"),
+        ("lab_rr", {"C2"}, "position"),
+        ("lab_rrt", {"C2", "r3"}, "position"),
+        ("lab_trr", {"S3"}, "position"),
+    ],
+)
+def test_other_arms(name, texts, task, rng):
+    model, e = rm.load(name), explained(name)
+    assert {f.text for f in e.factors} == texts
+    assert task in e.task
+    if name == "stanford_arm":
+        assert {f.text: f.power for f in e.factors}["r3"] == 2
+    if task == "position":  # to its sign; of two joints, the area of the two columns
+        q = postures(model, rng, 50)
+        J = rm.jacobian(model, q)[:, :3]
+        area = np.sqrt(np.linalg.det(np.swapaxes(J, 1, 2) @ J))
+        np.testing.assert_allclose(np.abs(e.determinant(q)), area, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["crx10ia", "xarm6"])
+def test_determinants_that_do_not_factor(name):
+    e = explained(name)
+    assert e.status is FormulaStatus.NOT_FACTORED
+    assert "does not factor" in e.text
+    assert [f.solved_joint is not None for f in e.factors] == [True]
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "lwr4_plus"])
+def test_seven_joints_with_spherical_shoulder_and_wrist(name):
+    """M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant
+    manipulators with joint limits", 2008: the elbow stretched, and pairs of joints."""
+    e = explained(name)
+    assert e.status is FormulaStatus.MINORS
+    assert {c.text for c in e.conditions} == {
+        "S4 = 0", "S2 = 0 and C3 = 0", "S2 = 0 and S6 = 0", "C5 = 0 and S6 = 0",
+    }  # fmt: skip
+    assert [c.kind for c in e.conditions][:2] == [ELBOW, SHOULDER]
+    assert "without joint 1: " in e.text
+    with pytest.raises(InvalidValueError, match="no determinant"):
+        e.determinant(np.zeros(7))
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "xarm5"])
+def test_conditions_are_where_rank_is_lost(name, rng):
+    model, e = rm.load(name), explained(name)
+    full = min(6, model.n)
+
+    def above(q):
+        return np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, full - 1]
+
+    for condition in e.conditions:
+        q = postures(model, rng, 60)
+        # in this order none moves a joint of one that is solved already
+        for factor in sorted(condition.factors, key=lambda f: len(f.joints)):
+            q[:, factor.solved_joint] = factor.zeros(q)[:, rng.integers(0, 2)]
+            q = q[~np.isnan(q).any(axis=1)]
+        q = q[condition.holds(q, 1e-8)]
+        assert len(q) >= 10
+        assert above(q).max() < 1e-7
+        # one factor less is not enough
+        for factor in condition.factors if len(condition.factors) > 1 else ():
+            moved = q.copy()
+            moved[:, factor.solved_joint] += 0.4
+            rest = [f for f in condition.factors if f is not factor]
+            kept = np.all([np.abs(f.values(moved)) < 1e-8 for f in rest], axis=0)
+            others = [c for c in e.conditions if c is not condition]
+            free = kept & ~np.any([c.holds(moved, 0.05) for c in others], axis=0)
+            assert (above(moved[free]) > 1e-4).all()
+    assert len(e.conditions) >= 2
+
+
+def test_singular_positions_found_in_numbers_fulfil_a_condition(rng):
+    """Independently: minimise the smallest singular value; a condition holds there."""
+    from scipy.optimize import minimize
+
+    model, e = rm.load("iiwa14"), explained("iiwa14")
+
+    def smallest(q):
+        return np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[-1]
+
+    found = 0
+    for q in postures(model, rng, 8):
+        result = minimize(smallest, q, method="Nelder-Mead", options={"maxiter": 1500})
+        if result.fun < 1e-5:
+            found += 1
+            assert any(c.holds(result.x, 0.02) for c in e.conditions)
+    assert found >= 2
+
+
+def test_base_and_tool_do_not_matter():
+    model = rm.load("irb120")
+    moved = model.with_base(rm.se3.from_rpy([0.3, -0.4, 0.5], [1, 2, 3]))
+    moved = moved.with_tool(rm.se3.from_rpy([0.1, 0.2, 0.3], [0.1, 0.2, 0.3]))
+    assert factor_texts(explain_singularities(moved)) == factor_texts(explained("irb120"))
+
+
+def test_trees_and_fixed_frames(rng):
+    """An arm on a branch, behind a fixed frame: its joints alone count."""
+    rows = [
+        {"sigma": 1, "antecedent": 0, "d": 0.2},
+        {"sigma": 2, "antecedent": 0, "alpha": 0.3, "d": 0.1},
+        {"sigma": 0, "antecedent": 2, "alpha": 0.4},
+        {"sigma": 0, "antecedent": 3, "alpha": np.pi / 2},
+        {"sigma": 0, "antecedent": 1, "r": 0.3},
+        {"sigma": 0, "antecedent": 4, "d": 0.5},
+        {"sigma": 0, "antecedent": 6, "alpha": -np.pi / 2, "r": 0.4},
+        {"sigma": 0, "antecedent": 7, "alpha": np.pi / 2},
+        {"sigma": 0, "antecedent": 8, "alpha": -np.pi / 2},
+    ]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tip=9)
+    e = explain_singularities(model)
+    assert {f.kind for f in e.factors} == {SHOULDER, ELBOW, WRIST}
+    assert e.factor(WRIST).joints == (6,)
+    q = rng.uniform(-3, 3, size=(50, 8))
+    D = np.linalg.det(rm.jacobian(model, q)[..., [1, 2, 4, 5, 6, 7]])
+    np.testing.assert_allclose(e.determinant(q), D, rtol=0, atol=1e-13)
+    assert explain_singularities(model, 5).status is not FormulaStatus.NO_JOINTS
+    none = explain_singularities(model, 2)
+    assert none.status is FormulaStatus.NO_JOINTS
+    assert none.values(q).shape == (50, 0)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_random_arms(seed):
+    """No structure at all: still the determinant, written out or from the matrix."""
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=6, prismatic=bool(seed % 2), inertia=None)  # pyright: ignore[reportArgumentType]
+    e = explain_singularities(model)
+    q = postures(model, rng, 30)
+    J = rm.jacobian(model, q)
+    if e.status is FormulaStatus.NEVER_FULL_RANK:
+        assert np.linalg.svd(J, compute_uv=False)[:, -1].max() < 1e-8
+        np.testing.assert_array_equal(e.determinant(q), 0.0)
+    else:
+        size = np.prod(np.linalg.norm(J, axis=1), axis=-1).max()
+        np.testing.assert_allclose(e.determinant(q), np.linalg.det(J), rtol=0, atol=1e-14 * size)
+
+
+def test_long_determinants_come_from_their_matrix(monkeypatch, rng):
+    monkeypatch.setattr(sys.modules[explain_singularities.__module__], "_MOST_TERMS", 5)
+    model = rm.load("xarm6").with_tool(rm.se3.translation(0, 0, 0.1))
+    e = explain_singularities(model)
+    assert e.status is FormulaStatus.TOO_LONG
+    q = postures(model, rng, 20)
+    D = np.linalg.det(rm.jacobian(model, q))
+    np.testing.assert_allclose(e.determinant(q), D, rtol=0, atol=1e-13)
+    (factor,) = e.factors
+    assert factor.expression is None
+    with pytest.raises(InvalidValueError, match="singularity_map"):
+        factor.zeros(q)
+
+
+def test_always_singular():
+    """The first two axes coincide."""
+    rows = [{}, {}, {"alpha": 1.0}, {"d": 0.4}, {"alpha": -1.0, "r": 0.3}, {"alpha": 1.0}]
+    e = explain_singularities(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
+    assert e.status is FormulaStatus.NEVER_FULL_RANK
+    assert e.determinant(np.zeros(6)) == 0.0
+
+
+def test_batches_pickles_and_mistakes():
+    e = explained("rx90")
+    for batch in ((), (2, 3), (0,)):
+        q = np.ones((*batch, 6))
+        assert e.values(q).shape == (*batch, 3)
+        assert e.determinant(q).shape == batch
+        assert e.factors[0].values(q).shape == batch
+        assert e.factors[0].zeros(q).shape == (*batch, 2)
+    again = pickle.loads(pickle.dumps(e))
+    np.testing.assert_array_equal(again.values(np.ones(6)), e.values(np.ones(6)))
+    with pytest.raises(ShapeError):
+        e.values(np.zeros(5))
+    with pytest.raises(InvalidValueError, match="SingularityKind"):
+        e.factor("elbow")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InvalidValueError, match="0 factors"):
+        e.factor(SingularityKind.OTHER)
+
+
+def test_results_are_kept():
+    arm = rm.load("rx90")
+    first = explain_singularities(arm)
+    assert explain_singularities(arm) is first
+    assert explain_singularities(arm, frame=6) is not first
+    assert explain_singularities(arm, symbols={"RL4": "l4"}).text != first.text
+
+
+def test_products_of_closed_forms_are_taken_apart():
+    model = rm.load("puma560")
+    chain = PolynomialChain(model, model.twin.frame(None))
+    ring = chain.ring
+    g = {str(s): generator for s, generator in zip(ring.symbols, ring.gens, strict=True)}
+    S23, C23 = g["S2"] * g["C3"] + g["C2"] * g["S3"], g["C2"] * g["C3"] - g["S2"] * g["S3"]
+    shoulder = g["D3"] * g["C2"] + g["D4"] * C23 - g["RL4"] * S23
+    elbow = g["D4"] * g["S3"] + g["RL4"] * g["C3"]
+    cases = [
+        (shoulder * elbow, {elbow: 1, shoulder: 1}),
+        (3 * g["D3"] * shoulder * elbow * g["S5"], {g["S5"]: 1, elbow: 1, shoulder: 1}),
+        (elbow**2, {elbow: 2}),
+        ((g["C4"] ** 2 - 1) * elbow, {g["S4"]: 2, elbow: 1}),
+        (g["C3"] * (1 + g["C3"]), {g["C3"]: 1, g["C3"] + 1: 1}),
+        ((g["D3"] + g["D4"]) * elbow, {elbow: 1}),
+        (shoulder + elbow, {shoulder + elbow: 1}),
+    ]
+    for p, expected in cases:
+        p = ring.reduced(p)
+        found = factored(p, chain)
+        assert {q if q in expected else -q: k for q, k in found.factors} == expected
+        whole = found.constant
+        for q, k in found.factors:
+            whole = ring.reduced(whole * q**k)
+        assert whole == p
+    assert chain.notation.text(formula(ring.reduced(S23 * g["S4"]), chain)) == "S23*S4"
+
+
+# --- maps ----------------------------------------------------------------------------------------
+
+
+def test_map_of_the_determinant_and_of_a_factor():
+    model = rm.load("rx90")
+    at = np.array([0.3, 0.1, 0.2, 0.4, 0.9, 0.6])
+    grid = singularity_map(model, (1, "joint_3"), at, (7, 9))
+    assert grid.values.shape == (7, 9)
+    assert grid.names == ("joint_2", "joint_3")
+    assert grid.joints.tolist() == [1, 2]
+    assert "joint_2 and joint_3, 7 by 9: determinant" in repr(grid)
+    np.testing.assert_allclose(grid.first[[0, -1]], [-np.pi, np.pi])
+    limited = rm.load("irb120")
+    axis = singularity_map(limited, (1, 2), samples=(2, 2)).second
+    np.testing.assert_allclose(axis, [limited.lower[2], limited.upper[2]])
+    q = np.array(at)
+    q[1], q[2] = grid.first[2], grid.second[5]
+    D = np.linalg.det(rm.jacobian(model, q))
+    assert grid.values[2, 5] == pytest.approx(D, abs=1e-14)
+    assert not grid.values.flags.writeable
+    elbow = singularity_map(model, (1, 2), at, (3, 5), ELBOW, [[0, 1], [0, 2]])
+    np.testing.assert_allclose(elbow.values, np.tile(np.cos(np.linspace(0, 2, 5)), (3, 1)))
+    assert elbow.label == "elbow: C3"
+    assert elbow.units == ("rad", "rad", "1")
+    shoulder = explained("rx90").factor(SHOULDER)
+    assert singularity_map(model, (1, 2), at, (3, 5), shoulder).units[2] == "m"
+
+
+def test_map_of_a_stroke_and_of_seven_joints():
+    stanford = rm.load("stanford_arm")
+    grid = singularity_map(stanford, (1, 2), samples=(4, 5), ranges=[[-1, 1], [0, 0.5]])
+    assert grid.units == ("rad", "m", "m^2")
+    iiwa = rm.load("iiwa14")
+    with pytest.raises(InvalidValueError, match="no determinant"):
+        singularity_map(iiwa, (1, 3))
+    grid = singularity_map(iiwa, (1, 3), samples=(3, 4), factor=ELBOW)
+    np.testing.assert_allclose(np.abs(grid.values), np.abs(np.tile(np.sin(grid.second), (3, 1))))
+    table = rm.DHTable.from_rows([{"sigma": 1}, {"sigma": 0, "alpha": 1.0, "d": 0.2}])
+    with pytest.raises(InvalidValueError, match="no limits"):
+        singularity_map(rm.RobotModel.from_table(table), (0, 1))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *({"joints": joints} for joints in ((1, 1), (1, 6), (1,), "ab", 1, None, {1, 2})),
+        *({"joints": joints} for joints in ((1, "elbow"), (True, 2), (1.5, 2), ([1], 2))),
+        {"joints": (1, 2), "samples": (0, 3)},
+        {"joints": (1, 2), "samples": 5},
+        {"joints": (1, 2), "ranges": [[1, 0], [0, 1]]},
+        {"joints": (1, 2), "at": np.zeros((2, 6))},
+        {"joints": (1, 2), "factor": SingularityKind.OTHER},
+    ],
+)
+def test_mistakes_in_a_map_are_refused(arguments):
+    with pytest.raises((InvalidValueError, ShapeError)):
+        singularity_map(rm.load("rx90"), **arguments)
