@@ -37,8 +37,8 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.between_states import excess, least_duration
+from robotmodels.trajectories.number_text import least_shown
 from robotmodels.trajectories.piecewise import PiecewisePolynomial
-from robotmodels.trajectories.shown import least_shown
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion

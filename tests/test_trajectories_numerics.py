@@ -22,9 +22,8 @@ from robotmodels.trajectories import (
     smoothed_trapezoidal,
     trapezoidal,
 )
-from robotmodels.trajectories.paths import FixedAxisPath
+from robotmodels.trajectories.paths import FixedAxisPath, axis_and_angle, rotation_about
 from robotmodels.trajectories.point_to_point import along_line
-from robotmodels.trajectories.rotations import axis_and_angle, rotation_about
 
 # --- blends of poses -----------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """Inverse geometric models: poses to joint variables, with a status for every pose.
 
-`inverse` documents the call, `call` checks it (`asked`). `loop` writes the arm as a chain of
+`inverse` documents the call, `call` checks it (`request`). `loop` writes the arm as a chain of
 joints, `chain` makes other chains of it; `families` chooses once which solver serves it: a plan of
 Paul's equations (`paul`, `closed_form`, `by_plan`), elimination for any six joints
 (`elimination`) or the nominal arm next to them (`nominal`), fewer joints or components

@@ -15,7 +15,7 @@ def igm(
     model: RobotModel,
     T: ArrayLike,
     q_ref: ArrayLike | None = None,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: str = "world",
     limits: bool = False,
     lock: Mapping[int | str, float] | None = None,
@@ -39,14 +39,14 @@ def igm(
         The robot.
     T : array_like, shape (..., 4, 4)
         World poses of the tool [m]. A rotation that is off by no more than 1e-6 is projected onto
-        a proper one.
+        a proper one; `se3.nearest_pose` does so for matrices with fewer digits.
     q_ref : array_like, shape (..., n), optional
         Reference postures [rad or m]; the leading axes broadcast with those of ``T``. Solutions
         are ordered by their distance to it, and joints that a pose leaves free take its value
         (0 without it; where no posture exists at that value, the nearest one where one does).
         Joints that do not move the tool keep its value (0 without it, within limits if asked for);
         they are no redundancy: the others are solved as if they were the whole arm.
-    mask : array_like, shape (6,), optional
+    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
         Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.
     mask_axes : {"world", "tool"}

@@ -37,6 +37,11 @@ def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
     return U, J
 
 
+def axes_of(chain: JointChain, q: Array) -> tuple[list[Array], list[Array]]:
+    """Directions and origins of the axes in R_0. Shapes: q (N, k) -> k of (N, 3) each."""
+    return _walk(chain, q)[1:]
+
+
 def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
     """Postures for trying an arm out, shape (count, k): any angle, lengths like the arm's own."""
     length = lever(chain)

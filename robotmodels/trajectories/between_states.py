@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .asked import (
+from .checks import (
     ROUNDING,
     checked_limits,
     given_durations,
@@ -19,8 +19,8 @@ from .asked import (
     refuse_short,
 )
 from .limits import MotionLimits
+from .number_text import least_shown
 from .piecewise import PiecewisePolynomial
-from .shown import least_shown
 from .trajectory import Trajectory
 
 _KEPT = 1e-14

@@ -44,17 +44,16 @@ from .._arrays import Array, as_exact, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
-from .asked import ROUNDING, given_durations, limits_along, refuse_short
 from .blends import PARABOLA, QUARTIC, schedule
+from .checks import ROUNDING, given_durations, limits_along, refuse_short
 from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits
-from .paths import BlendedPoses, FixedAxisPath, arc, line
+from .number_text import least_shown
+from .paths import BlendedPoses, FixedAxisPath, arc, line, rotation_about
 from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line, assembled, stretched
 from .pose_trajectory import PoseTrajectory
-from .rotations import rotation_about
-from .shown import least_shown
 from .trajectory import Trajectory
 
 _MOVES = ("translation", "rotation")

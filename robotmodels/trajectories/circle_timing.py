@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from .laws import Pieces, TimeLaw, law_of_duration, ramped
-from .seven_phases import Ramp, phases
+from .laws import Pieces, Ramp, TimeLaw, law_of_duration, phases, ramped
 
 _MARGIN = 1.0 + 1e-13
 """Durations are this much above the least, so that rounding does not exceed a limit."""

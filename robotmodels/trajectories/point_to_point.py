@@ -52,7 +52,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .asked import (
+from .between_states import motion_between
+from .checks import (
     checked_limits,
     given_durations,
     joint_vectors,
@@ -60,7 +61,6 @@ from .asked import (
     refuse_extremes,
     refuse_short,
 )
-from .between_states import motion_between
 from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial

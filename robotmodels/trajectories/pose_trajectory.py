@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, read_only
 from ..errors import ShapeError
+from .number_text import seconds_shown
 from .paths import PosePath
-from .shown import seconds_shown
 from .trajectory import Trajectory
 
 

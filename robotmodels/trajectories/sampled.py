@@ -14,9 +14,9 @@ from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 from .laws import TimeLaw, law_of_duration
+from .paths import axis_and_angle, rotation_about
 from .piecewise import PiecewisePolynomial
 from .point_to_point import quintic
-from .rotations import axis_and_angle, rotation_about
 from .trajectory import Samples, Trajectory
 
 _MOST = 10**9

@@ -44,10 +44,10 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from .asked import ROUNDING, checked_limits, refuse_jointless
+from .checks import ROUNDING, checked_limits, refuse_jointless
 from .limits import MotionLimits
+from .number_text import least_shown
 from .piecewise import PiecewisePolynomial
-from .shown import least_shown
 from .trajectory import Trajectory
 
 

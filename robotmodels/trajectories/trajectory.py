@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError
 from .limits import LimitsReport, MotionLimits
-from .shown import counted, greatest_shown, seconds_shown
+from .number_text import counted, greatest_shown, seconds_shown
 
 
 class Motion(Protocol):

@@ -108,8 +108,8 @@ def timed_samples(
             f"{name}: {count} of the {missing.size} poses of the path have no posture, the first "
             f"is pose {first}; animate a part that is reached, such as path.q[:{first}]."
         )
-    q = value.q if timed else value
-    q = as_vector(q[:, None] if timed and q.ndim == 1 == n else q, n, name)
+    given: Any = value.q if timed else value
+    q = as_vector(given[:, None] if timed and given.ndim == 1 == n else given, n, name)
     if q.ndim != 2 or len(q) < 2:
         raise ShapeError(
             f"{name}: an animation needs at least two samples, shape (N, {n}), got {q.shape}; "

@@ -15,7 +15,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from ...kernels._compile import MATRIX, OUT1, OUT3, STACK, VECTOR, Floats, compiled
-from .._check import wrapped
+from .chain import wrapped
 from .equations import DOUBLE, NONE, TWO, type_2
 from .pieper import advance, wrist_postures
 

@@ -28,7 +28,7 @@ from ...kernels._compile import (
     Ints,
     compiled,
 )
-from .._check import wrapped
+from .chain import wrapped
 from .equations import (
     ANY,
     polynomial_roots,

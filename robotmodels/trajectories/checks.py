@@ -11,7 +11,7 @@ from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .laws import LineLimits
 from .limits import MotionLimits
-from .shown import least_shown
+from .number_text import least_shown
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
