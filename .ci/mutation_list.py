@@ -566,7 +566,7 @@ MUTATIONS = [
         SELF + "left_alone"),
     Mutation("igm: self-motion", "a step that the corrector takes back counts as a direction",
         "def directions(self", "np.linalg.norm(y - ahead) < 0.2 * PROBE",
-        "np.linalg.norm(y - ahead) < 2.0 * PROBE", SELF + "double_roots"),
+        "np.linalg.norm(y - ahead) < 2.0 * PROBE", SELF + "stretched_elbow"),
     Mutation("igm: Newton", "the step is not divided by the singular value",
         "spare: int, weights: Floats", "part /= s[i] * s[i]", "part /= s[i]", SELF + "left_alone"),
     Mutation("igm: Newton", "held joints move and the others stay",
