@@ -77,7 +77,24 @@ _IN_USE = re.compile(r"[CSUr]\d.*|theta\d+|[snax][xyz]|P[xyz]|[EISZ]|pi")
 
 
 def constant_names(symbols: Mapping[tuple[str, int], str]) -> dict[str, str]:
-    """A table's own names of constants by those of formulas, where each stands for one constant."""
+    """A table's own names of constants by the usual ones of formulas.
+
+    Parameters
+    ----------
+    symbols : mapping of (str, int) to str
+        ``DHTable.symbols``.
+
+    Returns
+    -------
+    dict of str to str
+        Such as ``{"D3": "L1"}``: names that are identifiers, stand for one constant each and are
+        not used by formulas otherwise.
+
+    Examples
+    --------
+    >>> constant_names({("d", 3): "L1", ("r", 2): "L1+L2"})
+    {'D3': 'L1'}
+    """
     names = list(symbols.values())
     return {
         f"{_DEFAULT[column]}{j}": name
