@@ -568,7 +568,7 @@ MUTATIONS = [
         "def directions(self", "np.linalg.norm(y - ahead) < 0.2 * PROBE",
         "np.linalg.norm(y - ahead) < 2.0 * PROBE", SELF + "stretched_elbow"),
     Mutation("igm: Newton", "the step is not divided by the singular value",
-        "spare: int, weights: Floats", "part /= s[i] * s[i]", "part /= s[i]", SELF + "left_alone"),
+        "spare: int, weights: Floats", "part /= s[i] * s[i]", "part /= s[i]", SELF + "nearest_value"),
     Mutation("igm: Newton", "held joints move and the others stay",
         "def singular_directions(", "if (held >> m) & 1 == 1:", "if (held >> m) & 1 == 0:",
         SELF + "left_alone"),
