@@ -5,7 +5,6 @@ import pytest
 from numba import njit
 
 import robotmodels as rm
-from robotmodels.igm import _homing
 from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.erroneous_poses import erroneous_poses
@@ -17,17 +16,6 @@ from robotmodels.kernels.posture_chains import following_postures
 from robotmodels.kernels.regressor_gradient import regressor_gradients
 from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
-
-# Python cannot call what is inside kernels, unless it calls nothing: then as it is written
-eliminated, least_of_square, size_of = (
-    getattr(kernel, "py_func", kernel)
-    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of)
-)
-
-
-@njit
-def shortest(r, m, x, work):
-    return _homing.shortest(r, m, x, work)
 
 
 @njit
@@ -248,52 +236,6 @@ def test_inverses_of_small_matrices_with_and_without_an_exchange_of_rows(rng):
     np.testing.assert_allclose(conditioning, expected, rtol=1e-12)
     A[7, :, 1] = 0.0
     assert inverses(A, inverse, conditioning, sign) == 7
-
-
-def homing_work(r, m):
-    wide = max(m, 6) + 1
-    return (
-        np.zeros(6), np.zeros((6, m)), np.zeros((6, wide)), np.zeros((wide, 2 * wide)),
-        np.zeros(wide), np.zeros(m, np.int64), np.zeros((1, 3)), np.zeros((1, 3)),
-    )  # fmt: skip
-
-
-def test_square_systems_of_newtons_method(rng):
-    for n in (1, 2, 3, 6):
-        A, b, x = rng.normal(size=(n, n)), rng.normal(size=n), np.empty(n)
-        if n > 1:
-            A[0, 0] = 0.0
-        assert eliminated(np.column_stack((A, b)), n, x)
-        np.testing.assert_allclose(A @ x, b, rtol=0, atol=1e-12 * np.linalg.cond(A))
-        least = least_of_square(A, n, np.empty((n, 2 * n)))
-        assert least == pytest.approx(1.0 / np.linalg.norm(np.linalg.inv(A)), rel=1e-10)
-    A[-1] = A[0] + 1e-9 * A[-1]
-    assert not eliminated(np.column_stack((A, b)), 6, x)
-    assert least_of_square(np.zeros((2, 2)), 2, np.empty((2, 4))) == 0.0
-
-
-@pytest.mark.parametrize(("r", "m"), [(6, 7), (3, 6), (4, 4), (6, 4), (5, 2)])
-@pytest.mark.parametrize("dependent", [False, True])
-def test_shortest_steps_of_newtons_method_are_those_of_the_pseudo_inverse(rng, r, m, dependent):
-    A, b = rng.normal(size=(r, m)), rng.normal(size=r)
-    if dependent:
-        A[-1] = A[0]
-        A[:, -1] = A[:, 0]
-    work, x = homing_work(r, m), np.empty(m)
-    work[2][:r, :m], work[2][:r, m] = A, b
-    least = shortest(r, m, x, work)
-    np.testing.assert_allclose(x, np.linalg.pinv(A, rcond=1e-9) @ b, rtol=0, atol=1e-11)
-    values = np.linalg.svd(A, compute_uv=False)
-    assert least == pytest.approx(values[min(r, m) - 1], rel=1e-9, abs=1e-14)
-
-
-def test_the_size_of_an_error_is_the_larger_part_that_is_asked_for():
-    e = np.array([3.0, 4.0, 12.0, 1.0, 2.0, 2.0])
-    for mask, size in [
-        ([1, 1, 1, 1, 1, 1], 13.0), ([1, 1, 0, 1, 1, 1], 5.0), ([0, 0, 0, 1, 1, 1], 3.0),
-        ([1, 0, 0, 0, 1, 0], 3.0), ([0, 0, 0, 1, 0, 0], 1.0),
-    ]:  # fmt: skip
-        assert size_of(e, np.array(mask)) == size
 
 
 @pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])

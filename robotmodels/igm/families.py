@@ -67,7 +67,7 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
 
 
 def _of_six_joints(chain: JointChain) -> Solver | None:
-    """Closed forms first, then the structured neighbour, elimination and search."""
+    """Closed forms first, then the nominal arm, elimination and search."""
     solver = prepare_closed_form(chain) or prepare_nominal(chain)
     if solver is not None:
         return solver
