@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..kernels import continuation as curves
 from ..kernels._compile import INTS, MATRIX, NOTHING, OUT3, STACK, VECTOR, Floats, Ints, compiled
-from ._check import forward, jacobian, missing, wrapped
+from .kernels.chain import forward, jacobian, wrapped
+from .kernels.chain import pose_error as missing
 
 Data = tuple[Ints, Floats, Floats, Floats, Floats]
 

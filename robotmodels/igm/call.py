@@ -306,21 +306,14 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
     if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
         return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
-    if solver is not None and psi is None and whole:
-        from ._moving import moving_joints
-
-        chain = solver.chain
-        length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
-        sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
-        moving_joints(sigma, chain.D, length, found.q, rows, moving)
-    if solver is not None and not whole:
-        moving |= moving_for_mask(solver.chain, request.task, U, found)
+    if solver is not None and (psi is None or not whole):
+        moving = moving_joints(solver.chain, request.task, U, found)
     moving |= found.free
     return replace(found, moving=moving)
 
 
-def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
-    """Joints that move along the families of a masked task, shape (N, S, k)."""
+def moving_joints(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
+    """Joints that move along the self-motions of redundant arms and masked tasks (N, S, k)."""
     moving = np.zeros(found.q.shape, np.bool_)
     n, s = np.nonzero(found.family & found.valid)
     if n.size == 0:
