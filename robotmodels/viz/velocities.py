@@ -419,7 +419,7 @@ def _draw_map(
     zero = z == 0.0
     if zero.any():
         i, j = np.nonzero(zero)
-        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, label="_zero")
+        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, markeredgewidth=0.0, label="_zero")
     z = np.ma.masked_invalid(np.where(zero, 1e-12 * most, z).T)
     if (z > 0.0).any() and (z < 0.0).any():
         axes.contour(x, y, z, levels=[0.0], colors=[INK], linewidths=2.0)

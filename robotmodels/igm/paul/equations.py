@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import cos, pi, sin
 
@@ -54,8 +54,11 @@ class Equation:
 class Arm:
     """The matrices of one arm, with the symbols of its pose and table."""
 
-    def __init__(self, form: NormalForm) -> None:
+    def __init__(
+        self, form: NormalForm, names: Mapping[str, tuple[str, float]] | None = None
+    ) -> None:
         self.form = form
+        self.names = names or {}
         graph = self.graph = Graph(SAMPLES)
         rng = np.random.default_rng(3)
         postures = rng.uniform(-2.5, 2.5, (SAMPLES, form.k))
@@ -78,6 +81,10 @@ class Arm:
     def _constant(self, name: str, latex: str, value: float, meaning: str) -> Expression:
         if value == 0.0:
             return ZERO
+        own, meant = self.names.get(name, ("", 0.0))
+        # frames that were moved along their axes have other constants than the table
+        if own and abs(value - meant) < 1e-12:
+            name, latex = own, rf"\mathit{{{own}}}".replace("_", r"\_")
         if all(name != c[0] for c in self.constants):
             self.constants.append((name, latex, value, meaning))
         return self.graph.symbol(Kind.CONSTANT, name, latex, np.full(SAMPLES, value))

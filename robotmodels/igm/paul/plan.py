@@ -5,7 +5,7 @@ Source: Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import InvalidValueError
@@ -55,14 +55,19 @@ class PaulPlan:
         return most
 
 
-def derive_plan(chain: JointChain, frames: Sequence[int] = ()) -> PaulPlan:
+def derive_plan(
+    chain: JointChain,
+    frames: Sequence[int] = (),
+    names: Mapping[str, tuple[str, float]] | None = None,
+) -> PaulPlan:
     """Derive, by pre- and post-multiplication, which equation gives which joint of a chain.
 
-    ``frames`` are the numbers of its frames in print; 1 to k without them.
+    ``frames`` are the numbers of its frames in print (1 to k without them), ``names`` the names and
+    values of constants that the table has named, by their usual names.
     """
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")
-    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))))
+    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))), names)
     joints, steps = arm.joints, []
     everyone = range(chain.k)
     solved: list[int] = []
