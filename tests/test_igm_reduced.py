@@ -263,13 +263,10 @@ def test_double_roots_and_self_motions():
     assert found.count == 2
     assert np.all(found.free_joints == [False, False, True])
     np.testing.assert_allclose(found.q[:, 2], -0.9)
-    # a point on the first axis: that joint is free, and takes the reference
-    lab = arm("RRR/1")
-    q0 = drawn(lab, 1, 4)[0]
-    axis = rm.link_poses(lab, q0)[0][:3, 2]
-    T = rm.dgm(lab, q0)
-    T[:3, 3] = rm.link_poses(lab, q0)[0][:3, 3] + 0.1 * axis
-    found = rm.igm(lab, T, q_ref=[0.5, 0.0, 0.0], mask=flags(POINT))
-    if found.count:
-        assert np.all(found.free_joints[:, 0])
-        np.testing.assert_allclose(found.q[:, 0], 0.5, atol=1e-12)
+    # two equal links folded: the point is on the first axis, whose joint takes the reference
+    equal = rm.RobotModel.from_table(
+        rm.DHTable.from_rows([{}, {"d": 1.0}]), tool=rm.se3.translation(1.0, 0.0, 0.0)
+    )
+    folded = rm.igm(equal, rm.dgm(equal, [0.4, np.pi]), q_ref=[0.9, 0.0], mask=flags("110000"))
+    np.testing.assert_allclose(np.abs(folded.q), [[0.9, np.pi]], atol=1e-6)
+    assert folded.free_joints.tolist() == [[True, False]]

@@ -177,12 +177,10 @@ def test_solutions_that_obey_a_relation(name, row):
         assert relation_errors(A, A @ q[n], found.q[found.valid]) < 1e-9
         assert nearest(model, found, q[n : n + 1]).max() < 1e-6
         assert found.status == rm.IGMStatus.INCOMPLETE
-        # no random start of another method finds a solution more
-        near = rm.igm_numeric(model, np.repeat(T[n : n + 1], 40, axis=0), q0=drawn(model, 40, 3))
-        starts = near.q[near.valid][np.abs(near.q[near.valid] @ A[0] - A @ q[n]) < 0.05]
-        for start in starts:
-            other = rm.igm(model, T[n], start, relations=(A, A @ q[n]))
-            assert other.count == found.count[0]
+        if np.array_equal(A, np.round(A)):
+            # angles count modulo a turn
+            again = rm.igm(model, T[n], relations=(A, A @ q[n] + 2 * np.pi))
+            assert again.count == found.count[0]
 
 
 @pytest.mark.parametrize(("name", "joint"), [("iiwa14", 2), ("panda", 0), ("panda", 4)])
