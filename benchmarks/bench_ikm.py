@@ -27,9 +27,7 @@ from benchmarks import measure
 from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
 from benchmarks.measure import in_turns
-from robotmodels.kinematics.inverse.ikm import ikm
-from robotmodels.kinematics.inverse.joint_task import JointTask
-from robotmodels.kinematics.inverse.methods import DampedInverse, PseudoInverse
+from robotmodels.kinematics import DampedInverse, JointTask, PseudoInverse, ikm
 
 ROUNDS = 9
 GOAL = 8.0

@@ -5,9 +5,6 @@ import pytest
 from numba import njit
 
 import robotmodels as rm
-from robotmodels.igm import _homing
-from robotmodels.igm._arrange import AT_LIMIT
-from robotmodels.igm._regular import ordered_rows
 from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.erroneous_poses import erroneous_poses
@@ -20,28 +17,10 @@ from robotmodels.kernels.regressor_gradient import regressor_gradients
 from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
 
-# Python cannot call what is inside kernels, unless it calls nothing: then as it is written
-eliminated, least_of_square, size_of = (
-    getattr(kernel, "py_func", kernel)
-    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of)
-)
-
-
-@njit
-def shortest(r, m, x, work):
-    return _homing.shortest(r, m, x, work)
-
 
 @njit
 def nearest(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R):
     return nearest_inside(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R)
-
-
-@njit
-def ordered(marks, labels, references, given, joints, boxed, q, errors, flags, code, status):
-    return ordered_rows(
-        marks, labels, references, given, joints, boxed, q, errors, flags, code, status
-    )
 
 
 def accelerations_of(mass, tau):
@@ -259,53 +238,6 @@ def test_inverses_of_small_matrices_with_and_without_an_exchange_of_rows(rng):
     assert inverses(A, inverse, conditioning, sign) == 7
 
 
-def homing_work(r, m):
-    wide = max(m, 6) + 1
-    return (
-        np.zeros(6), np.zeros((6, m)), np.zeros((6, wide)), np.zeros((wide, 2 * wide)),
-        np.zeros(wide), np.zeros(m, np.int64), np.zeros((1, 3)), np.zeros((1, 3)),
-    )  # fmt: skip
-
-
-def test_square_systems_of_newtons_method(rng):
-    for n in (1, 2, 3, 6):
-        A, b, x = rng.normal(size=(n, n)), rng.normal(size=n), np.empty(n)
-        if n > 1:
-            A[0, 0] = 0.0
-        assert eliminated(np.column_stack((A, b)), n, x)
-        np.testing.assert_allclose(A @ x, b, rtol=0, atol=1e-12 * np.linalg.cond(A))
-        least = least_of_square(A, n, np.empty((n, 2 * n)))
-        assert least == pytest.approx(1.0 / np.linalg.norm(np.linalg.inv(A)), rel=1e-10)
-    A[-1] = A[0] + 1e-9 * A[-1]
-    assert not eliminated(np.column_stack((A, b)), 6, x)
-    assert least_of_square(np.zeros((2, 2)), 2, np.empty((2, 4))) == 0.0
-
-
-@pytest.mark.parametrize(("r", "m"), [(6, 7), (3, 6), (4, 4), (6, 4), (5, 2)])
-@pytest.mark.parametrize("dependent", [False, True])
-def test_shortest_steps_of_newtons_method_are_those_of_the_pseudo_inverse(rng, r, m, dependent):
-    A, b = rng.normal(size=(r, m)), rng.normal(size=r)
-    if dependent:
-        A[-1] = A[0]
-        A[:, -1] = A[:, 0]
-    work, x = homing_work(r, m), np.empty(m)
-    work[2][:r, :m], work[2][:r, m] = A, b
-    least = shortest(r, m, x, work)
-    np.testing.assert_allclose(x, np.linalg.pinv(A, rcond=1e-9) @ b, rtol=0, atol=1e-11)
-    values = np.linalg.svd(A, compute_uv=False)
-    assert least == pytest.approx(values[min(r, m) - 1], rel=1e-9, abs=1e-14)
-
-
-def test_the_size_of_an_error_is_the_larger_part_that_is_asked_for():
-    e = np.array([3.0, 4.0, 12.0, 1.0, 2.0, 2.0])
-    for mask, size in [
-        ([1, 1, 1, 1, 1, 1], 13.0), ([1, 1, 0, 1, 1, 1], 5.0), ([0, 0, 0, 1, 1, 1], 3.0),
-        ([1, 0, 0, 0, 1, 0], 3.0), ([0, 0, 0, 1, 0, 0], 1.0),
-    ]:  # fmt: skip
-        assert size_of(e, np.array(mask)) == size
-
-
-
 @pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])
 def test_velocities_inside_bounds_are_the_nearest_by_their_multipliers(rng, f, n):
     """What is missing of the wish is what the active bounds press, none of them outwards."""
@@ -378,62 +310,3 @@ def test_postures_go_on_where_they_change_least():
     q = np.array([[[0.0, 0.0], [3.1, 0.0], [1.0, 1.0]], [[0.3, 0.0], [-2.9, 0.0], [1.0, 1.3]]])
     following_postures(q, valid, periodic, 0.5, following)
     np.testing.assert_array_equal(following[0], [0, 1, 2])
-
-
-@pytest.mark.parametrize("named", [True, False], ids=["named", "not named"])
-@pytest.mark.parametrize("boxed", [False, True], ids=["free", "within limits"])
-@pytest.mark.parametrize("given", [True, False], ids=["reference", "no reference"])
-def test_postures_of_a_plan_are_ordered_as_they_are_sorted(rng, given, boxed, named):
-    N, S, n = 12, 5, 3
-    q = rng.uniform(-np.pi, np.pi, (N, S, n))
-    count = rng.integers(0, S + 1, N)
-    joints = np.array([[-2.0, -6.0, -1.0], [3.0, 6.0, 2.0], [1.0, 1.0, 0.0]])
-    references = rng.uniform(-6.0, 6.0, (N, n))
-    ways = np.array([rng.permutation(S) for _ in range(N)])
-    labels = np.array([7, 3, 9, 1, 5], np.int16) if named else np.empty(0, np.int16)
-    marks = np.column_stack((count, np.zeros(N, int), np.zeros((N, S), int), ways))
-    residual, flags = rng.random((N, S)), np.zeros((2, N, S), np.bool_)
-    code, status = np.zeros((N, S), np.int16), np.zeros(N, np.int8)
-    found, errors = q.copy(), residual.copy()
-    most = ordered(
-        marks, labels, references, int(given), joints, int(boxed), found, errors, flags, code,
-        status,
-    )  # fmt: skip
-    low, high, turns = joints[0], joints[1], joints[2] == 1.0
-    sizes = []
-    for p in range(N):
-        rows = []
-        for i in range(count[p]):
-            x = q[p, i].copy()
-            goal = references[p] if given else 0.5 * (low + high)
-            if boxed:
-                # of all values inside the limits the nearest to the goal
-                for j in np.flatnonzero(turns):
-                    same = x[j] + 2.0 * np.pi * np.arange(-3, 4)
-                    same = same[(same >= low[j] - AT_LIMIT) & (same <= high[j] + AT_LIMIT)]
-                    x[j] = same[np.abs(same - goal[j]).argmin()] if same.size else np.nan
-                if not ((x >= low - AT_LIMIT) & (x <= high + AT_LIMIT)).all():
-                    continue
-            way = x - references[p]
-            if not boxed:
-                way[turns] = np.angle(np.exp(1j * way[turns]))
-            key = np.linalg.norm(way) if given else 0.0
-            rows.append((key, labels[ways[p, i]] if named else 0, tuple(x), residual[p, i]))
-        rows.sort()
-        sizes.append(len(rows))
-        k = len(rows)
-        np.testing.assert_array_equal(flags[0, p], np.arange(S) < k)
-        if not rows:
-            continue
-        np.testing.assert_allclose(found[p, :k], [row[2] for row in rows], rtol=0, atol=1e-14)
-        np.testing.assert_array_equal(errors[p, :k], [row[3] for row in rows])
-        if named:
-            np.testing.assert_array_equal(code[p, :k], [row[1] for row in rows])
-        else:
-            ascending = sorted(row[2] for row in rows)
-            np.testing.assert_array_equal(code[p, :k], [ascending.index(row[2]) for row in rows])
-        inside = ((found[p, :k] >= low - AT_LIMIT) & (found[p, :k] <= high + AT_LIMIT)).all(axis=1)
-        np.testing.assert_array_equal(flags[1, p, :k], inside)
-        assert np.isnan(found[p, k:]).all()
-    # poses without a posture are left to others
-    assert most == -1 - max(sizes)

@@ -455,6 +455,7 @@ def test_symbols_keep_their_names_in_tables_and_formulas(tmp_path):
     assert "H1 = 0.4 m (r1)" in text
     assert "D3 = 0.5 m (d3 = L1+L2)" in text
     assert "C1*(L1 - S2*D3)" in text
+    assert "atan2(Pz - H1, C1*Px + S1*Py - L1)" in rm.explain_igm(arm).text
     assert pickle.loads(pickle.dumps(arm)).table.symbols == arm.table.symbols
     # another length is no longer the one that had the name
     assert dict(arm.table.replace(d=[0, 0.1, 0.2]).symbols) == {("r", 1): "H1"}

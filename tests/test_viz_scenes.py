@@ -197,6 +197,9 @@ def test_camera_sees_all_and_is_near(size, rng):
     assert max(across.max() / 1.15, high.max()) < 1.0
     camera = rm.viz.show(RX90, view=(0.0, 0.0)).camera
     np.testing.assert_allclose((camera.position - camera.target)[1:], 0, atol=1e-12)
+    x, y, z = camera.target
+    sent = content(rm.viz.show(RX90, view=(0, 0)))["target"]
+    np.testing.assert_allclose(sent, (x, z, -y), atol=1e-6)  # the y axis of the viewer is upwards
 
 
 # ---------------------------------------------------------------- animation

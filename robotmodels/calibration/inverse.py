@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_vector, batch_rows, read_only
+from .._arrays import Array, Rebuilt, as_mask, as_vector, batch_rows, read_only
 from .._outcomes import Outcome
 from ..geometry import PRISMATIC
 from ..igm import igm
-from ..igm.asked import above_zero, locks_of, mask_of
 from ..igm.known import known_arm
+from ..igm.request import above_zero, locks_of
 from ..igm.solutions import IGMSolutions, posture_distance
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
 from ..model import RobotModel
-from .refinement import Flags, Postures, Refinement
+from .refinement import Candidates, Flags, Refinement
 from .robot import CalibratedRobot, as_calibrated, calibrated_pose
 
 SAMPLES = 32  # configurations at which calibrated and nominal poses are compared
@@ -196,7 +196,7 @@ def corrected_igm(
     robot = as_calibrated(robot)
     model, n = robot.model, robot.model.n
     tolerance = above_zero(tolerance, "tolerance")
-    requested, locks = mask_of(mask), locks_of(model, lock)
+    requested, locks = as_mask(mask), locks_of(model, lock)
     poses = se3.as_pose(T)
     reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref")
     flat = poses.reshape(*poses.shape[:-2], 16)
@@ -211,58 +211,49 @@ def corrected_igm(
         "position_tolerance": max(1e-9, tolerance),
         "orientation_tolerance": max(1e-9, tolerance),
     }
-    # the nominal postures, in the variables of the calibrated table
+    # the nominal solutions, in the variables of the calibrated table
     starts = igm(
-        robot.structured, targets, None if q_ref is None else references + shift,
-        lock={c: value + shift[c] for c, value in locks} or None, **options,
-    )  # fmt: skip
+        robot.structured,
+        targets,
+        None if q_ref is None else references + shift,
+        lock={c: value + shift[c] for c, value in locks} or None,
+        **options,
+    )
     nominal = starts.q - shift
-    held = (starts.free_joints & newton.is_redundant) | newton.locked
-    first = newton.refine(targets, nominal, starts.valid, held, nominal)
-    more = Postures.none(N, n)
-    reached = starts.valid.any(axis=1)
-    status = np.where(reached, int(IGMStatus.NOT_CONVERGED), starts.status).astype(np.int8)
+    first = newton.refine(targets, starts, nominal, nominal, starts.code)
+    status = np.where(starts.count > 0, int(IGMStatus.NOT_CONVERGED), starts.status)
     closest, missing = np.full((N, n), np.nan), np.full((N, 6), np.nan)
-    again = np.flatnonzero(_may_be_incomplete(robot, starts, first, newton) & complete)
+    every = first
+    again = np.flatnonzero(_may_be_incomplete(starts, first, newton) & complete)
     if again.size:
         actual = robot.joint_errors.actual(references[again])
-        extra = igm(
-            model, newton.rigid_targets(targets[again], first, again),
-            None if q_ref is None else actual, lock=dict(locks) or None, **options,
-        )  # fmt: skip
-        held = (extra.free_joints & newton.is_redundant) | newton.locked
+        reference = None if q_ref is None else actual
+        extra = igm(model, targets[again], reference, lock=dict(locks) or None, **options)
         # free joints have the variable, not the reading, of the reference
-        apart = (references[again] - actual)[:, None] * (held & ~newton.locked)
-        refined = newton.refine(targets[again], extra.q, extra.valid, held, extra.q + apart)
-        more = refined.spread(again, N, extra)
+        wanted = extra.q + (references[again] - actual)[:, None] * ~newton.locked
+        only = np.full(extra.valid.shape, len(starts.labels))
+        every = first.with_some(again, newton.refine(targets[again], extra, extra.q, wanted, only))
         status[again] = extra.status
         if extra.closest is not None and extra.missing is not None:
             closest[again], missing[again] = extra.closest, extra.missing
-    every = first.joined(more)
-    every.free[:, : nominal.shape[1]] |= starts.free_joints & newton.is_redundant
-    every.family[:, : nominal.shape[1]] |= starts.family_joints & newton.is_redundant
     aim = references if q_ref is not None else None
-    return _merged(
-        newton, batch, targets, starts, nominal, first, every, references, aim, limits,
-        (status, closest, missing),
-    )  # fmt: skip
+    merged = _Merged(newton, targets, every, references, aim, limits)
+    return merged.solutions(batch, starts, nominal, (status, closest, missing))
 
 
-def _may_be_incomplete(
-    robot: CalibratedRobot, starts: IGMSolutions, first: Postures, newton: Refinement
-) -> Flags:
-    """Poses where the nominal postures may not be all, or not lead to all."""
-    present = starts.valid
-    failed = present & ~(first.met & first.readable)
-    near_singular = first.least < NEAR_SINGULAR * _pose_difference(robot)
-    doubtful = failed | (present & (near_singular | starts.double))
-    if not newton.is_redundant:
-        doubtful |= present & starts.free_joints.any(axis=-1)
+def _may_be_incomplete(starts: IGMSolutions, first: Candidates, newton: Refinement) -> Flags:
+    """Poses where the nominal solutions may not be all, or not lead to all."""
+    robot, present = newton.robot, starts.valid
     plan = known_arm(robot.structured)
     if plan.plan is None or starts.method != plan.method:
-        return np.ones(len(present), np.bool_)  # the greatest number of postures is unknown
+        return np.ones(len(present), np.bool_)  # the greatest number of solutions is unknown
+    doubtful = ~newton.met(first)
+    doubtful |= (first.least < NEAR_SINGULAR * _pose_difference(robot)) | starts.double
+    if not newton.is_redundant:
+        doubtful |= starts.free_joints.any(axis=-1)
     few = (present.sum(axis=1) < plan.most) | ~present.any(axis=1)
-    return np.asarray(few | doubtful.any(axis=1) | same_as(first, newton).any(axis=(1, 2)))
+    same = same_as(first, newton).any(axis=(1, 2))
+    return np.asarray(few | (present & doubtful).any(axis=1) | same)
 
 
 def _pose_difference(robot: CalibratedRobot) -> float:
@@ -288,126 +279,120 @@ def _variable_offsets(robot: CalibratedRobot) -> Array:
     return constants(robot.model) - constants(robot.structured)
 
 
-def same_as(postures: Postures, newton: Refinement) -> NDArray[np.bool_]:
-    """Whether a candidate converged to the same posture as an earlier one. Shapes: -> (N, C, C)."""
-    C = postures.met.shape[1]
-    same = postures.met[:, :, None] & postures.met[:, None] & np.tri(C, k=-1, dtype=np.bool_)
-    # joint by joint: few are left after the first
-    i, c, k = np.nonzero(same)
+def same_as(found: Candidates, newton: Refinement) -> Flags:
+    """Whether a candidate converged to the same solution as an earlier one. Shapes: (N, C, C)."""
+    met = newton.met(found)
+    same = met[:, :, None] & met[:, None] & np.tri(met.shape[1], k=-1, dtype=np.bool_)
     for joint, turn in enumerate(newton.turns):
-        way = np.abs(postures.q[i, c, joint] - postures.q[i, k, joint])
-        if turn:
-            way = np.minimum(way, 2.0 * pi - way)
-        close = way < MERGE
-        i, c, k = i[close], c[close], k[close]
-    same[:] = False
-    same[i, c, k] = True
+        distance = np.abs(found.q[:, :, None, joint] - found.q[:, None, :, joint])
+        same &= (np.minimum(distance, 2.0 * pi - distance) if turn else distance) < MERGE
     return same
 
 
-def _merged(
-    newton: Refinement,
-    batch: tuple[int, ...],
-    targets: Array,
-    starts: IGMSolutions,
-    nominal: Array,
-    first: Postures,
-    every: Postures,
-    references: Array,
-    aim: Array | None,
-    limits: bool,
-    failed: tuple[NDArray[np.int8], Array, Array],
-) -> CorrectedSolutions:
-    """Merge the candidates of all poses, order them, and give the outcome of each start.
+class _Merged:
+    """Candidates of all poses without repetitions, in the order of the reference."""
 
-    Shapes: nominal (N, C, n); references, aim (N, n); failed: status, closest and missing of
-    poses without a solution.
-    """
-    model, N, C = newton.robot.model, len(targets), nominal.shape[1]
-    same = same_as(every, newton)
-    merged = np.asarray(same.any(axis=-1))
-    readable = every.readable
-    reading = np.where(readable[..., None], every.reading, 0.0)
-    reading = _turned(newton, every.q, reading, aim, limits)
-    residual, kept = every.residual, every.met & ~merged
-    if newton.bends:
-        # with gains, a whole turn of a joint is no whole turn of its reading: bending differs
-        rows, held = kept & readable, every.free | newton.locked
-        reading, size = newton.refined_readings(targets, reading, rows, held, rows)
-        residual = np.where(rows, size, residual)
-        kept &= residual <= newton.tolerance
-    within = (reading >= model.lower) & (reading <= model.upper)
-    inside = np.asarray(within.all(axis=-1))
-    chosen = kept & readable & (inside | (not limits))
-    into = np.broadcast_to(np.arange(same.shape[1]), merged.shape)
-    if same.size:
-        into = np.where(merged, same.argmax(axis=-1), into)
-    # the flags of a posture hold for the one it is merged into
-    for values in (every.double, every.free, every.family):
-        for c in range(C, into.shape[1]):
-            at = np.flatnonzero(merged[:, c])
-            values[at, into[at, c]] |= values[at, c]
+    def __init__(
+        self,
+        newton: Refinement,
+        targets: Array,
+        every: Candidates,
+        references: Array,
+        aim: Array | None,
+        limits: bool,
+    ) -> None:
+        model, self.newton, self.every, self.limits = newton.robot.model, newton, every, limits
+        same = same_as(every, newton)
+        self.merged = np.asarray(same.any(axis=-1))
+        reading = np.where(every.readable[..., None], every.reading, 0.0)
+        reading = _turned(newton, every.q, reading, aim, limits)
+        self.residual, kept = every.residual, newton.met(every) & ~self.merged
+        if newton.bends:
+            # with gains, a whole turn of a joint is no whole turn of its reading: bending differs
+            held = every.free | newton.locked
+            reading, self.residual, _ = newton.newton(targets, reading, kept, held)
+            kept &= self.residual <= newton.tolerance
+        self.reading, self.kept = reading, kept
+        within = (reading >= model.lower) & (reading <= model.upper)
+        self.inside = np.asarray(within.all(axis=-1))
+        self.chosen = kept & (self.inside | (not limits))
+        self.into = np.broadcast_to(np.arange(same.shape[1]), kept.shape)
+        if same.size:
+            self.into = np.where(self.merged, same.argmax(axis=-1), self.into)
+        # the flags of a candidate hold for the one it is merged into
+        for values in (every.double, every.free, every.family):
+            for c in range(self.merged.shape[1]):
+                i = np.flatnonzero(self.merged[:, c])
+                values[i, self.into[i, c]] |= values[i, c]
+        distance = posture_distance(reading, references[:, None], newton.turns & (not limits))
+        key = np.broadcast_to(np.arange(float(kept.shape[1])), kept.shape)
+        key = np.where(self.chosen, key if aim is None else distance, np.inf)
+        self.order = np.argsort(key, axis=1, kind="stable")
 
-    correction = np.full((N, C), int(CorrectionStatus.NO_POSTURE), np.int8)
-    for code, where in (
-        (CorrectionStatus.VANISHED, starts.valid),
-        (CorrectionStatus.ARRIVED, first.met),
-        (CorrectionStatus.NO_READING, first.met & ~readable[:, :C]),
-        (CorrectionStatus.OUTSIDE_LIMITS, first.met & ~inside[:, :C] & limits),
-        (CorrectionStatus.MERGED, merged[:, :C]),
-    ):
-        correction[where & starts.valid] = int(code)
+    def solutions(
+        self,
+        batch: tuple[int, ...],
+        starts: IGMSolutions,
+        nominal: Array,
+        failed: tuple[NDArray[np.int8], Array, Array],
+    ) -> CorrectedSolutions:
+        """Packed solutions and the outcome of each start, nominal (N, C, n).
 
-    distance = posture_distance(reading, references[:, None], newton.turns & (not limits))
-    key = np.broadcast_to(np.arange(float(into.shape[1])), distance.shape)
-    key = np.where(chosen, key if aim is None else distance, np.inf)
-    order = np.argsort(key, axis=1, kind="stable")
-    S = int(chosen.sum(axis=1).max(initial=0))
-    rank = np.argsort(order, axis=1)
-    row = np.where(np.take_along_axis(chosen, into, 1), np.take_along_axis(rank, into, 1), -1)
+        ``failed``: status, closest and missing of poses without a solution.
+        """
+        newton, every, chosen, limits = self.newton, self.every, self.chosen, self.limits
+        C, S = nominal.shape[1], int(chosen.sum(axis=1).max(initial=0))
+        rank, into = np.argsort(self.order, axis=1), self.into
+        row = np.where(np.take_along_axis(chosen, into, 1), np.take_along_axis(rank, into, 1), -1)
+        met = newton.met(every)[:, :C]
+        correction = np.full(met.shape, int(CorrectionStatus.NO_POSTURE), np.int8)
+        for code, where in (
+            (CorrectionStatus.VANISHED, starts.valid),
+            (CorrectionStatus.ARRIVED, met),
+            (CorrectionStatus.NO_READING, ~every.readable[:, :C]),
+            (CorrectionStatus.OUTSIDE_LIMITS, met & ~self.inside[:, :C] & limits),
+            (CorrectionStatus.MERGED, self.merged[:, :C]),
+        ):
+            correction[where & starts.valid] = int(code)
 
-    def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
-        at = order[:, :S].reshape(N, S, *(1,) * (values.ndim - 2))
-        rows = np.take_along_axis(values, at, axis=1)
-        rows[~np.take_along_axis(chosen, order[:, :S], axis=1)] = empty
-        return rows.reshape(*batch, *rows.shape[1:])
+        def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
+            at = self.order[:, :S].reshape(len(values), S, *(1,) * (values.ndim - 2))
+            rows = np.take_along_axis(values, at, axis=1)
+            rows[~np.take_along_axis(chosen, self.order[:, :S], axis=1)] = empty
+            return rows.reshape(*batch, *rows.shape[1:])
 
-    codes = np.full(into.shape, len(starts.labels), np.int16)
-    codes[:, :C] = starts.code
-    status, closest, missing = failed
-    solved = np.asarray(chosen.any(axis=1))
-    family = (every.free & chosen[..., None]).any(axis=(1, 2)) | newton.is_redundant
-    # the inverse model of the calibrated table may meet a pose less closely than requested
-    status = np.where(
-        np.isin(status, (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY)),
-        IGMStatus.NOT_CONVERGED, status,
-    )  # fmt: skip
-    status = np.where((kept & readable).any(axis=1), IGMStatus.OUTSIDE_LIMITS, status)
-    reached = np.where(family, IGMStatus.REACHED_FAMILY, IGMStatus.REACHED)
-    solutions = IGMSolutions(
-        q=packed(reading, np.nan),
-        valid=packed(chosen, False),
-        residual=packed(residual, np.nan),
-        within_limits=packed(inside & chosen, False),
-        code=packed(codes, -1),
-        labels=(*starts.labels, CALIBRATED_ONLY),
-        status=np.where(solved, reached, status).astype(np.int8).reshape(batch),
-        double=packed(every.double, False),
-        free_joints=packed(every.free, False),
-        family_joints=packed(every.family, False),
-        method=f"{starts.method}; refined on the calibrated table by Newton steps",
-        periodic=newton.turns & (not limits),
-        mask=newton.mask,
-        closest=np.where(solved[:, None], np.nan, closest).reshape(*batch, model.n),
-        missing=np.where(solved[:, None], np.nan, missing).reshape(*batch, 6),
-    )
-    return CorrectedSolutions(
-        solutions,
-        packed(newton.errors.actual(reading), np.nan),
-        nominal.reshape(*batch, C, model.n),
-        correction.reshape(*batch, C),
-        row[:, :C].reshape(*batch, C),
-    )
+        status, closest, missing = failed
+        solved = np.asarray(chosen.any(axis=1))
+        family = (every.free & chosen[..., None]).any(axis=(1, 2)) | newton.is_redundant
+        # the inverse model of the calibrated table may meet a pose less closely than requested
+        reached = np.isin(status, (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY))
+        status = np.where(reached, IGMStatus.NOT_CONVERGED, status)
+        status = np.where(self.kept.any(axis=1), IGMStatus.OUTSIDE_LIMITS, status)
+        reached = np.where(family, IGMStatus.REACHED_FAMILY, IGMStatus.REACHED)
+        solutions = IGMSolutions(
+            q=packed(self.reading, np.nan),
+            valid=packed(chosen, False),
+            residual=packed(self.residual, np.nan),
+            within_limits=packed(self.inside & chosen, False),
+            code=packed(every.code, -1),
+            labels=(*starts.labels, CALIBRATED_ONLY),
+            status=np.where(solved, reached, status).astype(np.int8).reshape(batch),
+            double=packed(every.double, False),
+            free_joints=packed(every.free, False),
+            family_joints=packed(every.family, False),
+            method=f"{starts.method}; refined on the calibrated table by Newton steps",
+            periodic=newton.turns & (not limits),
+            mask=newton.mask,
+            closest=np.where(solved[:, None], np.nan, closest).reshape(*batch, nominal.shape[-1]),
+            missing=np.where(solved[:, None], np.nan, missing).reshape(*batch, 6),
+        )
+        return CorrectedSolutions(
+            solutions,
+            packed(newton.errors.actual(self.reading), np.nan),
+            nominal.reshape(*batch, *nominal.shape[1:]),
+            correction.reshape(*batch, C),
+            row[:, :C].reshape(*batch, C),
+        )
 
 
 def _turned(newton: Refinement, q: Array, reading: Array, aim: Array | None, limits: bool) -> Array:

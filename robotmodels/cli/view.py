@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from .exit_status import ending
-from .numbers import posture
+from .arguments import add_source, posture, robot_of
 from .output import add_json, print_json
-from .source import add_source, robot_of
+from .terminal import ending
 
 _EXAMPLES = """\
 examples:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +12,19 @@ from .branches import SIDES, branches, ranked
 from .closed_form import ClosedForm
 from .loop import JointChain
 from .motion import lever, random_postures, tool_poses
+from .paul import layout
 from .paul.plan import PaulPlan, derive_plan
-from .paul.postures import SLACK, SMALL, ZERO
+from .paul.program import ACCEPTED, SLACK, SMALL_AMPLITUDE, ZERO_AMPLITUDE, Program
 from .postures import Postures, difference
 from .singular import solve_singular
 from .solver import Solver, Tolerances, postures
 
 TESTS = 128
 """Random postures that a plan has to give back before it is used."""
-ACCEPTED = 1e-9
-"""Largest error of a posture of the plan [m, rad]."""
 OVERSHOOT = 1e-5
 """Overshoot tried as a double root at singular poses, beside the length of the arm."""
 ROUGH = 1e-2
 """Errors up to which candidates at singular poses are refined [m, rad]."""
-TOLERANCES = read_only([SLACK, ZERO, 1e-4, ACCEPTED])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,16 +37,15 @@ class ByPlan:
     branch_of_way: NDArray[np.int16]
 
     @property
-    def instructions(self) -> NDArray[np.uint32]:
+    def program(self) -> Program:
         """The plan as the kernel reads it."""
         assert self.plan.program is not None
-        return self.plan.program.plan
+        return self.plan.program
 
     @property
     def most(self) -> int:
         """Most postures of a pose."""
-        assert self.plan.program is not None
-        return self.plan.program.branches
+        return self.program.branches
 
     @property
     def chain(self) -> JointChain:
@@ -96,39 +91,14 @@ def run(
     numbers: Array,
     poses: Array,
     references: Array,
-    tolerances: Array = TOLERANCES,
+    tolerances: tuple[float, ...] = (SLACK, ZERO_AMPLITUDE, SMALL_AMPLITUDE, ACCEPTED),
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Run a plan by its kernel.
-
-    Shapes: poses (N, 4, 4), references (N, k), tolerances (4,) -> q (N, S, k), residual (N, S),
-    marks (N, 2 + 2 S).
-    """
-    from .paul._run import run_plan
-
+    """Run a plan with other tolerances; shapes as in `Program.run`."""
     assert plan.program is not None
-    N, k, S = poses.shape[0], references.shape[1], plan.program.branches
-    q, residual = np.empty((N, S, k)), np.empty((N, S))
-    marks = np.empty((N, 2 + 2 * S), np.int64)
-    run_plan(plan.program.plan, numbers, tolerances, poses, references, q, residual, marks)
-    return q, residual, marks
-
-
-@cache
-def plan_kernel() -> Callable[..., int]:
-    """The kernel of plans, imported when the first arm is prepared: see `regular_postures`."""
-    from ._regular import regular_postures
-
-    return regular_postures
-
-
-def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
-    """The numbers of a plan's program for poses in the world."""
-    assert plan.program is not None
-    numbers = np.array(plan.program.numbers)
-    at = int(plan.program.plan[12])
-    before = numbers[at : at + 12].reshape(3, 4)
-    before[...] = before @ to_base
-    return read_only(numbers)
+    at = int(plan.program.plan[layout.TOLERANCES])
+    numbers = np.array(numbers)
+    numbers[at : at + 4] = tolerances
+    return plan.program.run(numbers, poses, references)
 
 
 @postures.register
@@ -137,7 +107,7 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Po
     assert plan.program is not None
     numbers = plan.program.numbers
     slack = max(OVERSHOOT, tolerances.position / lever(chain), tolerances.orientation)
-    limits = np.array([slack, ZERO, SMALL, max(ROUGH, *tolerances)])
+    limits = (slack, ZERO_AMPLITUDE, SMALL_AMPLITUDE, max(ROUGH, *tolerances))
 
     def candidates(
         poses: Array, wanted: Array

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -102,6 +103,7 @@ def with_virtual_joints(
     return longer, read_only(places, np.int64)
 
 
+@lru_cache(maxsize=256)
 def canonical_frames(chain: JointChain) -> tuple[Array, float]:
     """Constants (k + 1, 4, 4) with frames slid along their axes, in units of the arm; the unit."""
     D, k = np.array(chain.D), chain.k
@@ -120,7 +122,7 @@ def canonical_frames(chain: JointChain) -> tuple[Array, float]:
     unit = float(np.sum(np.linalg.norm(D[1:k, :3, 3], axis=1))) / 2.0
     unit = unit if unit >= 1e-9 else 1.0
     D[:, :3, 3] /= unit
-    return D, unit
+    return read_only(D), unit
 
 
 def far_along_rails(chain: JointChain, U: Array) -> tuple[Array, Array]:

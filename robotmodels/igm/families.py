@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InvalidValueError
 from .arm_angle import prepare_arm_angle
-from .asked import Task
 from .chain import locked_chain
 from .closed_form import prepare_closed_form
 from .constraints import WHOLE, Components, constraints
@@ -21,6 +20,7 @@ from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
 from .relations import Related, prepare_related
+from .request import Task
 from .search import ManyStarts, prepare_many_starts
 from .solver import Solver
 
@@ -67,7 +67,7 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
 
 
 def _of_six_joints(chain: JointChain) -> Solver | None:
-    """Closed forms first, then the structured neighbour, elimination and search."""
+    """Closed forms first, then the nominal arm, elimination and search."""
     solver = prepare_closed_form(chain) or prepare_nominal(chain)
     if solver is not None:
         return solver

@@ -13,10 +13,10 @@ from .. import se3
 from .._arrays import Array, read_only
 from ..geometry import REVOLUTE
 from ..model import RobotModel
-from .asked import Task
-from .by_plan import ByPlan, numbers_for_world, plan_kernel, prepare_by_plan
+from .by_plan import ByPlan, prepare_by_plan
 from .families import prepare_task
 from .loop import joint_chain
+from .request import Task
 from .solver import Solver
 
 KEPT_TASKS = 32
@@ -39,7 +39,6 @@ class KnownArm:
     numbers: Array | None
     kernel: Callable[..., int] | None
     instructions: NDArray[np.uint32] | None
-    branch_of_way: NDArray[np.int16] | None
     labels: tuple[str, ...]
     most: int
     method: str
@@ -79,17 +78,20 @@ def _prepared(model: RobotModel, for_whole_poses: bool) -> KnownArm:
     plan = None
     if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
         plan = prepare_by_plan(chain, family)
+    joints = read_only(np.array([model.lower, model.upper, turns]))
+    numbers = None
+    if plan is not None:
+        numbers = plan.program.adapted(to_base, joints, plan.branch_of_way)
     return KnownArm(
         columns=chain.columns,
         to_base=to_base,
         turns=read_only(turns, np.bool_),
         never=read_only(np.zeros(model.n), np.bool_),
-        joints=read_only(np.array([model.lower, model.upper, turns])),
+        joints=joints,
         plan=plan,
-        numbers=None if plan is None else numbers_for_world(plan.plan, to_base),
-        kernel=None if plan is None else plan_kernel(),
-        instructions=None if plan is None else plan.instructions,
-        branch_of_way=None if plan is None else plan.branch_of_way,
+        numbers=numbers,
+        kernel=None if plan is None else plan.program.kernel,
+        instructions=None if plan is None else plan.program.plan,
         labels=() if plan is None else plan.labels,
         most=0 if plan is None else plan.most,
         method="" if plan is None else plan.method,

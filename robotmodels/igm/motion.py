@@ -5,6 +5,8 @@ Plain array code: it runs when an arm is prepared and on the few postures that a
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +37,11 @@ def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
     return U, J
 
 
+def axes_of(chain: JointChain, q: Array) -> tuple[list[Array], list[Array]]:
+    """Directions and origins of the axes in R_0. Shapes: q (N, k) -> k of (N, 3) each."""
+    return _walk(chain, q)[1:]
+
+
 def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
     """Postures for trying an arm out, shape (count, k): any angle, lengths like the arm's own."""
     length = lever(chain)
@@ -45,6 +52,7 @@ def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> 
     )
 
 
+@lru_cache(maxsize=256)
 def lever(chain: JointChain) -> float:
     """A length of the arm [m]: the lever of its revolute joints about the tool, 1 without any."""
     turning = chain.sigma == 0

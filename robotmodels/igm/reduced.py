@@ -121,8 +121,6 @@ def prepare_reduced(
         if solver is not None:
             return solver
     longer, places = with_virtual_joints(chain, _freed_joints(chain, components, _SKEW))
-    if longer.k > 6:
-        return None
     inner = prepare(longer, WHOLE)
     return inner and Masked(chain, components, inner, places, lambda six: prepare(six, WHOLE))
 

@@ -68,7 +68,8 @@ def redundant_joint(chain: JointChain, components: Components) -> int | None:
         return None
     usual = null.sum(axis=1) == least
     part = np.sqrt(np.sum(np.where(null[usual][..., None], rows[usual], 0.0) ** 2, axis=1))
-    return int(np.argmax(part.max(axis=0) > SHARE))
+    moves = (part.max(axis=0) > SHARE) & (chain.columns >= 0)
+    return int(np.argmax(moves)) if moves.any() else None
 
 
 def prepare_redundant(

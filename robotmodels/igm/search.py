@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from .constraints import Constraints, in_half_open_turn
 from .loop import JointChain
-from .motion import random_postures
+from .motion import random_postures, singular_rows
 from .postures import Postures, assembled, difference, no_postures, side_by_side
 from .solver import Tolerances, postures
 
@@ -226,16 +226,16 @@ def classified(
     n, s = np.nonzero(found.valid)
     if n.size == 0:
         return found
-    sizes = np.linalg.svd(wanted.linearised(U[n], found.q[n, s])[1], compute_uv=False)
-    least = sizes[:, -1] if sizes.shape[1] >= chain.k else np.zeros(n.size)
-    flat = least <= FOLD * np.maximum(sizes[:, 0], 1e-300)
-    if not flat.any():
+    J = wanted.linearised(U[n], found.q[n, s])[1]
+    # fewer constraints than joints: a self-motion everywhere
+    flat = singular_rows(J, FOLD)[0] if J.shape[1] >= chain.k else np.arange(n.size)
+    if flat.size == 0:
         return found
     poses = np.unique(n[flat])
     others = np.setdiff1d(np.arange(len(U)), poses)
     parts = [(others, found.take(others))]
     for i in poses:
-        rows = s[(n == i) & flat]
+        rows = s[flat][n[flat] == i]
         one = _singular_pose(
             wanted, U[i : i + 1], found.take(np.array([i])), rows, references[i], tolerances
         )

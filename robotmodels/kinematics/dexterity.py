@@ -147,7 +147,7 @@ def manipulability(
     joint_velocity : array_like, shape (n,), optional
         Half axes of the ball of joint velocities (rad/s, m/s), as in `velocity_ellipsoid`.
     length : float
-        Metres that count as much as a radian where both kinds of row are asked for. The default
+        Metres that count as much as a radian where both kinds of row are requested. The default
         of 1 m is the measure of most books; the size of the robot makes a fairer condition.
     tolerance : float
         Singular values below this part of the size of the whole Jacobian are zero.
@@ -185,7 +185,7 @@ def manipulability(
     size = size + np.linalg.norm(J[..., 3:, :], axis=(-2, -1))
     mixed = rows[:3].any() and rows[3:].any()
     weights = np.repeat((1.0 / length_of(model, frame, length) if mixed else 1.0, 1.0), 3)
-    # the size in the unit of the rows asked for
+    # the size in the unit of the rows requested
     unit = np.max(np.where(rows, weights * np.repeat((own, 1.0), 3), 0.0))
     J, weights = J[..., rows, :], weights[rows]
     _, s = _left_vectors(weights[:, None] * J)

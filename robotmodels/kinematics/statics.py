@@ -225,20 +225,20 @@ def static_wrench(
     joints = np.where(model.table.sigma[model.table.joint_rows] == PRISMATIC, L, 1.0)
     rows = np.repeat((1.0 / L, 1.0), 3)
     J = rows[:, None] * jacobian(model, q, frame, reference) * joints
-    asked = np.broadcast_to(joints * (tau - weight), (*batch, n))
+    required = np.broadcast_to(joints * (tau - weight), (*batch, n))
     J = np.broadcast_to(J, (*batch, 6, n))
     # at least six columns, so that U is complete and every row has six singular values
     padded = np.concatenate((J, np.zeros((*batch, 6, max(6 - n, 0)))), axis=-1)
     U, s, Vt = np.linalg.svd(padded, full_matrices=False)
     kept = s > threshold * s[..., :1]
-    along = np.where(kept, np.einsum("...ki,...i->...k", Vt[..., :n], asked), 0.0)
+    along = np.where(kept, np.einsum("...ki,...i->...k", Vt[..., :n], required), 0.0)
     inverse = np.divide(1.0, s, out=np.zeros_like(s), where=kept)
     wrench = np.einsum("...ik,...k->...i", U, inverse * along) * rows
     balanced = np.einsum("...ki,...k->...i", Vt[..., :n], along)
     rank = kept.sum(axis=-1)
     # free wrenches first; moments come back with the length, so that [f; m / length] is the norm
     carried = np.where(kept[..., None, :], 0.0, U)[..., ::-1] * (L * rows)[:, None]
-    residual = asked - balanced
+    residual = required - balanced
     least = np.min(np.where(kept, s, np.inf), axis=-1, initial=np.inf)
     condition = np.where(rank > 0, s[..., 0] / least, 0.0)
     allowed = np.maximum(threshold, 16 * n * _EPS * np.maximum(condition, 1.0))

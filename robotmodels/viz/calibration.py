@@ -127,9 +127,17 @@ def plot_calibration_residuals(
                 axes.vlines(x, 0.0, y, color=color, linewidth=0.8, alpha=0.6)
             axes.plot(x, y, marker, color=color, markersize=dot, markeredgewidth=0.0, label=label)
             if outlier.any():
-                axes.plot(x[outlier], np.clip(y[outlier], -most, most), "o", color=ALERT,
-                          markersize=6.0, markerfacecolor="none", markeredgewidth=0.9,
-                          clip_on=False, label="outlier (at the edge: beyond it)")  # fmt: skip
+                axes.plot(
+                    x[outlier],
+                    np.clip(y[outlier], -most, most),
+                    "o",
+                    color=ALERT,
+                    markersize=6.0,
+                    markerfacecolor="none",
+                    markeredgewidth=0.9,
+                    clip_on=False,
+                    label="outlier (at the edge: beyond it)",
+                )
             axes.set_ylim(-most, most)
             axes.locator_params(axis="y", nbins=5)
             rms = float(np.sqrt(np.mean(y**2)))
@@ -190,8 +198,9 @@ def plot_calibration_normality(
         y = np.sort(values[own & ~outlier])
         if len(y):
             x = ndtri((np.arange(len(y)) + 0.5) / len(y))
-            right.plot(x, y, "os"[k], color=PALETTE[k], markersize=2.6, markeredgewidth=0.0,
-                       label=name)  # fmt: skip
+            right.plot(
+                x, y, "os"[k], color=PALETTE[k], markersize=2.6, markeredgewidth=0.0, label=name
+            )
             reach = max(reach, 1.05 * float(x[-1]))
     right.plot((-reach, reach), (-reach, reach), color=PALE, label="as stated", **DASHED)
     right.set(xlabel="normal quantile", ylabel="residual / standard deviation")

@@ -116,18 +116,22 @@ def plot_torque_parts(
         labels = [_PARTS[part][1] for part in present] or ["_none"]
         over_time.lines_over_time(axes, times, lines, labels, present or [0])
         marker = "" if len(times) > 1 else "o"
-        axes.plot(times, total[:, k], marker=marker, color=INK, linewidth=1.8, alpha=0.85,
-                  zorder=1.9, label="total")  # fmt: skip
+        axes.plot(
+            times,
+            total[:, k],
+            marker=marker,
+            color=INK,
+            linewidth=1.8,
+            alpha=0.85,
+            zorder=1.9,
+            label="total",
+        )
         axes.set_title(f"{names[j]} ({'N' if prismatic[j] else 'N m'})", loc="left")
     return style.finished(figure, title)
 
 
 def _split(
-    model: RobotModel,
-    motion: Any,
-    wrench: ArrayLike | None,
-    drive: bool,
-    friction: Friction | None,
+    model: RobotModel, motion: Any, wrench: ArrayLike | None, drive: bool, friction: Friction | None
 ) -> tuple[Array, TorqueParts]:
     """Times and parts of the torques."""
     if isinstance(motion, Simulation):
@@ -337,10 +341,15 @@ def _maps(
     coupling = grid.coupling[..., i, j]
     maps = (
         (f"gravity torque\nof {names[joint]}", "(N)" if long else "(N m)", torque, tiny, True),
-        (f"inertia\nof {names[joint]}", "(kg)" if long else "(kg m²)",
-         grid.mass[..., joint, joint], 0.0, False),
+        (
+            f"inertia\nof {names[joint]}",
+            "(kg)" if long else "(kg m²)",
+            grid.mass[..., joint, joint],
+            0.0,
+            False,
+        ),
         (f"coupling\n{names[i]}, {names[j]}", "no unit", coupling, _ROUNDING, True),
-    )  # fmt: skip
+    )
     (x_factor, x_unit), (y_factor, y_unit) = (_axis(grid, k, degrees) for k in (0, 1))
     x, y = x_factor * grid.ranges[0], y_factor * grid.ranges[1]
     for axes, (label, unit, values, rounding, signed) in zip(places[0], maps, strict=True):

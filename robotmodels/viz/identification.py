@@ -107,8 +107,18 @@ def plot_identification_torques(
         signals, slow_t, slow = _torques(found, log)
         for j, axes in enumerate(column):
             place = axes.get_xaxis_transform()
-            axes.fill_between(slow_t, 0.0, 1.0, where=slow[:, j], step="mid", transform=place,
-                              color=BAND, linewidth=0.0, zorder=0.5, label="dead band")  # fmt: skip
+            axes.fill_between(
+                slow_t,
+                0.0,
+                1.0,
+                where=slow[:, j],
+                step="mid",
+                transform=place,
+                color=BAND,
+                linewidth=0.0,
+                zorder=0.5,
+                label="dead band",
+            )
             axes.axhline(0.0, **ZERO)
             for k, width, label in (
                 (3, 0.8, "measured"),
@@ -198,8 +208,15 @@ def plot_identification_residuals(
     both = "two standard deviations; 95 % of white residuals"
     for j, (left, right) in enumerate(grid):
         left.axhspan(-2.0 * sigma[j], 2.0 * sigma[j], label=both, **band)
-        left.plot(t, e[:, j], "o", color=PALETTE[0], markersize=1.4, markeredgewidth=0.0,
-                  label="residual; its autocorrelation")  # fmt: skip
+        left.plot(
+            t,
+            e[:, j],
+            "o",
+            color=PALETTE[0],
+            markersize=1.4,
+            markeredgewidth=0.0,
+            label="residual; its autocorrelation",
+        )
         left.set_ylabel(f"residual ({units[j]})")
         left.set_title(f"{names[j]}: {100.0 * far[j]:.2g} % outside", loc="left")
         bound = correlation.bounds[j, 1:]
@@ -302,10 +319,22 @@ def plot_identification_standard_errors(
         weak = relative[some] > 100.0 * WEAK
         for k, (mask, label) in enumerate(((~weak, "determined"), (weak, "poorly determined"))):
             if mask.any():
-                axes.bar(x[mask], height[mask] - low, bottom=low, width=0.7, color=PALETTE[k],
-                         label=label)  # fmt: skip
-        axes.hlines(white[some], x - 0.42, x + 0.42, color=INK, linewidth=1.1,
-                    label="if residuals were white")  # fmt: skip
+                axes.bar(
+                    x[mask],
+                    height[mask] - low,
+                    bottom=low,
+                    width=0.7,
+                    color=PALETTE[k],
+                    label=label,
+                )
+        axes.hlines(
+            white[some],
+            x - 0.42,
+            x + 0.42,
+            color=INK,
+            linewidth=1.1,
+            label="if residuals were white",
+        )
         axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
         axes.set_yscale("log")
         axes.set_ylim(low, high)
@@ -328,10 +357,7 @@ def plot_identification_correlations(
 
 @style.plot
 def plot_excitation(
-    found: ExcitingTrajectory,
-    *,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    found: ExcitingTrajectory, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
     """Motion and torques of an exciting trajectory within their limits, and its search.
 
@@ -357,15 +383,15 @@ def plot_excitation(
     style.as_instance(found, ExcitingTrajectory, "found", "exciting_trajectory")
     model, limits = found.model, found.limits.motion.limits
     motion = over_time.sampled(found.trajectory)
-    torque = idm(model, *motion.values[:3])
-    rows = 3 + bool(np.abs(torque).max(initial=0.0) > 0.0)
-    labels, kinds = (
-        over_time.joint_names(None, model.n, model),
-        over_time.joint_units(None, model.n, model),
-    )
-    columns = over_time.joints_by_unit(kinds)
-    figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * model.n, size, rows=0)
-    above, below = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
+    drive, n = model.drive, model.n
+    parameters = (model.inertia.values, drive.Ia, drive.Fv, drive.Fc, drive.offset)
+    rows = 3 + any(values.any() for values in parameters)  # torques of a robot that has some
+    torque = idm(model, *motion.values[:3]) if rows == 4 else np.empty((0, n))
+    labels = over_time.joint_names(None, n, model)
+    columns = over_time.joints_by_unit(over_time.joint_units(None, n, model))
+    figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * n, size, rows=0)
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
+    above, below = parts
     grid = above.subplots(rows, len(columns), squeeze=False, sharex=True)
     sigma = model.table.sigma[model.table.joint_rows]
     for column, (unit, joints) in zip(grid.T, columns.items(), strict=True):

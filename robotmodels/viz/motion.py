@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
 
 
 def timed_samples(
-    value: object, n: int, dt: float | None, fps: float | None, name: str
+    value: Any, n: int, dt: float | None, fps: float | None, name: str
 ) -> tuple[Array, Array]:
     """The configurations of an animation and their times. Shapes: -> times (N,), q (N, n)."""
     if isinstance(value, Trajectory):
@@ -107,16 +108,16 @@ def timed_samples(
             f"{name}: {count} of the {missing.size} poses of the path have no posture, the first "
             f"is pose {first}; animate a part that is reached, such as path.q[:{first}]."
         )
-    q = value.q if timed else value  # type: ignore[attr-defined]
-    q = as_vector(q[:, None] if timed and q.ndim == 1 == n else q, n, name)
+    given: Any = value.q if timed else value
+    q = as_vector(given[:, None] if timed and given.ndim == 1 == n else given, n, name)
     if q.ndim != 2 or len(q) < 2:
         raise ShapeError(
             f"{name}: an animation needs at least two samples, shape (N, {n}), got {q.shape}; "
             "draw a single posture with show."
         )
-    if not timed or dt is not None or fps is not None or np.isnan(value.t).any():  # type: ignore[attr-defined]
+    if not timed or dt is not None or fps is not None or np.isnan(value.t).any():
         return sample_times(len(q), dt, fps), q
-    t: Array = value.t  # type: ignore[attr-defined]
+    t: Array = value.t
     if t.shape != (len(q),) or (np.diff(t) <= 0.0).any():
         raise InvalidValueError(f"{name}: expected samples at ascending times; give dt or fps.")
     return t - t[0], q

@@ -106,9 +106,7 @@ def joint_units(
 
 def joints_by_unit(kinds: Sequence[Unit]) -> dict[Unit, list[int]]:
     """Numbers of the joints of each unit."""
-    return {
-        unit: [j for j, kind in enumerate(kinds) if kind is unit] for unit in dict.fromkeys(kinds)
-    }
+    return {u: [j for j, kind in enumerate(kinds) if kind is u] for u in dict.fromkeys(kinds)}
 
 
 def as_unit(unit: Unit | str) -> Unit:

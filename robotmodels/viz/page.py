@@ -109,7 +109,7 @@ def page(
         "depth": round(camera.depth, 6),
         "panel": panel,
     }
-    viewer = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
+    viewer = Path(str(meshcat.__file__)).parent / "viewer" / "dist" / "main.min.js"
     items = (
         f'<li><span style="background: #{_rgb(color):06x}"></span>{escape(text)}</li>'
         for text, color in legend
@@ -153,8 +153,8 @@ def _set_stage(root: Any, recorder: Recorder, camera: Camera, dark: bool) -> Non
         recorder.commands.append({"type": "set_object", "path": path, "object": lamp})
         # the viewer lets every object that it loads cast shadows
         _set(recorder, f"{path}/<object>", "castShadow", False)
-    far = 50.0 * max(camera.distance, 1.0)
-    lens = PerspectiveCamera(FIELD_OF_VIEW, 1.0, camera.distance / 200.0, far)
+    near, far = camera.distance / 200.0, 50.0 * max(camera.distance, 1.0)
+    lens = PerspectiveCamera(FIELD_OF_VIEW, 1, near, far)  # type: ignore[arg-type]
     lens.uuid = "camera"
     root["Cameras/default/rotated"].set_object(lens)
     position = _y_upwards(camera.position)
@@ -193,7 +193,8 @@ def _object(node: Node) -> Any:
         case Triangles(vertices, faces):
             return g.Mesh(g.TriangularMeshGeometry(vertices, faces), solid)
         case Segments(points):
-            return g.LineSegments(g.PointsGeometry(points.T), g.LineBasicMaterial(**look))
+            thin: Any = g.LineBasicMaterial(**look)
+            return g.LineSegments(g.PointsGeometry(points.T), thin)
 
 
 def _animation(motion: Motion) -> Any:

@@ -116,9 +116,15 @@ def plot_processing(
     figure, grid = style.panels(PAGE, 1.2 + 1.15 * count, size, count, 2, sharex=True)
     for column, what, whole, kept, cutoff, of in (
         (grid[:, 0], "position", q, filtered, chosen.cutoff, units),
-        (grid[:, 1], "torque", tau, _decimated(tau, chosen.decimation), chosen.torque_cutoff,
-         efforts),
-    ):  # fmt: skip
+        (
+            grid[:, 1],
+            "torque",
+            tau,
+            _decimated(tau, chosen.decimation),
+            chosen.torque_cutoff,
+            efforts,
+        ),
+    ):
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)
         cut, rms = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (whole - kept, whole))
@@ -133,8 +139,13 @@ def plot_processing(
             high = (f > 0.25 / log.dt) & (f < 0.45 / log.dt)  # frequencies without motion
             noise = float(np.median(before[high, j])) if high.any() else 0.0
             if what == "position" and noise > 0.0:
-                axes.axhline(noise, color=ALERT, linewidth=0.9, linestyle=(0, (1.3, 1.1)),
-                             label="noise of the positions")  # fmt: skip
+                axes.axhline(
+                    noise,
+                    color=ALERT,
+                    linewidth=0.9,
+                    linestyle=(0, (1.3, 1.1)),
+                    label="noise of the positions",
+                )
             axes.set_ylim(*_range(before[:, j], after[:, j]))
             relative = what == "torque" and rms[j] > 0.0
             share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if relative else ""
@@ -204,10 +215,15 @@ def _draw_criteria(row: Any, system: Equations) -> None:
     bounds = f"bounds: {MOST_BIAS:g} standard errors, {LEAST_EQUATIONS} equations"
     for axes, curve, cutoff, value, bound in (
         # without noise there is no bias, and logarithmic axes have no place for it
-        (row[0], np.where(biases > 0.0, biases, np.nan), lower, max(chosen[worst], _LEAST_BIAS),
-         MOST_BIAS),
+        (
+            row[0],
+            np.where(biases > 0.0, biases, np.nan),
+            lower,
+            max(chosen[worst], _LEAST_BIAS),
+            MOST_BIAS,
+        ),
         (row[1], counts, torque, count, LEAST_EQUATIONS),
-    ):  # fmt: skip
+    ):
         axes.loglog(f, curve, color=PALETTE[4], label="at other cutoffs")
         axes.axhline(bound, color=ALERT, linewidth=0.9, linestyle=_BOUNDS, label=bounds)
         axes.plot(cutoff, value, "o", color=INK, markersize=4.0, clip_on=False, label="choice")

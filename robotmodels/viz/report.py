@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Iterable
+from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -29,8 +30,8 @@ from .processing import plot_processing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Drawing = tuple[Callable[[], "Figure"], str]
-"""A function that draws a figure, and the caption of the figure."""
+Drawing = tuple[Callable[..., "Figure"], str]
+"""A function that draws a figure of a result, and the caption of the figure."""
 
 
 def html_report(result: CalibrationResult, path: str | Path) -> None:
@@ -68,30 +69,27 @@ def html_report(result: CalibrationResult, path: str | Path) -> None:
     found = calibration.as_result(result)
     figures: list[Drawing] = [
         (
-            lambda: calibration.plot_calibration_residuals(found),
+            calibration.plot_calibration_residuals,
             "Residuals (predicted minus measured) of each row over the number of the "
             "configuration, before (nominal table, base and tool fitted) and after; the scales of "
             "both sides differ.",
         ),
         (
-            lambda: calibration.plot_calibration_in_space(found),
+            calibration.plot_calibration_in_space,
             "Errors of position where they were made, magnified as stated; crosses are outliers.",
         ),
         (
-            lambda: calibration.plot_calibration_parameters(found),
+            calibration.plot_calibration_parameters,
             "Corrections of the parameters with their intervals.",
         ),
+        (calibration.plot_calibration_correlations, "Correlations of the estimates."),
         (
-            lambda: calibration.plot_calibration_correlations(found),
-            "Correlations of the estimates.",
-        ),
-        (
-            lambda: calibration.plot_calibration_normality(found),
+            calibration.plot_calibration_normality,
             "Residuals in standard deviations: Gaussian ones follow the curve and the line.",
         ),
     ]
     title = f"Geometric calibration of {found.nominal.name}"
-    _write(path, title, calibration_sections(found), figures)
+    _write(path, title, calibration_sections(found), figures, found)
 
 
 def identification_html(
@@ -136,64 +134,63 @@ def identification_html(
     found = identification.as_result(result, test)
     figures: list[Drawing] = [
         (
-            lambda: identification.plot_identification_torques(found, test),
+            partial(identification.plot_identification_torques, test=test),
             "Measured and predicted torques and their difference, with its size relative to the "
             "measured torque; grey: the joint is in its dead band.",
         ),
         (
-            lambda: identification.plot_identification_residuals(found),
+            identification.plot_identification_residuals,
             "Residuals of the fitted equations, with two standard deviations, and their "
             "autocorrelation, with the 95 % band of white residuals.",
         ),
         (
-            lambda: identification.plot_identification_parameters(found),
+            partial(identification.plot_identification_residuals, test=test),
+            "The same for the held-out log.",
+        ),
+        (
+            identification.plot_identification_parameters,
             "Parameters with 95 % intervals, as their contributions to the torques of the log.",
         ),
         (
-            lambda: identification.plot_identification_standard_errors(found),
+            identification.plot_identification_standard_errors,
             "Relative standard errors; above the dashed line (30 %) the log does not determine the "
             "parameter.",
         ),
+        (identification.plot_identification_correlations, "Correlations of the estimates."),
         (
-            lambda: identification.plot_identification_correlations(found),
-            "Correlations of the estimates.",
-        ),
-        (
-            lambda: plot_processing(found),
+            plot_processing,
             "Spectra of positions and torques, kept and cut off as noise (grey); below, the "
             "criteria: the bias that noise of the positions causes, and the number of equations.",
         ),
     ]
-    if test is not None:
-        figures.insert(
-            2,
-            (
-                lambda: identification.plot_identification_residuals(found, test),
-                "The same for the held-out log.",
-            ),
-        )
+    if test is None:
+        del figures[2]
     title = f"Dynamic identification of {found.model.name}"
-    _write(path, title, identification_sections(found, robot), figures)
+    _write(path, title, identification_sections(found, robot), figures, found)
 
 
 def _write(
-    path: str | Path, title: str, sections: Iterable[ReportSection], figures: Iterable[Drawing]
+    path: str | Path,
+    title: str,
+    sections: Iterable[ReportSection],
+    figures: Iterable[Drawing],
+    result: object,
 ) -> None:
     """Write a report with its figures into one file that needs no network."""
     template = Template(Path(__file__).with_name("report.html").read_text(encoding="utf-8"))
     text = template.substitute(
         title=escape(title),
         sections="\n".join(map(_section, sections)),
-        figures="\n".join(_figure(draw, caption) for draw, caption in figures),
+        figures="\n".join(_figure(draw, caption, result) for draw, caption in figures),
     )
     Path(path).write_text(text, encoding="utf-8")
 
 
-def _figure(draw: Callable[[], Figure], caption: str) -> str:
-    """A figure as an embedded image with its caption."""
+def _figure(draw: Callable[..., Figure], caption: str, result: object) -> str:
+    """A figure of a result as an embedded image with its caption."""
     buffer = BytesIO()
     try:
-        draw().savefig(buffer, format="svg", metadata={"Date": None})
+        draw(result).savefig(buffer, format="svg", metadata={"Date": None})
     except InvalidValueError as reason:  # such as arrows in space where no position is measured
         return f"<p>{escape(str(reason).removeprefix('result: '))}</p>"
     image = "data:image/svg+xml;base64," + b64encode(buffer.getvalue()).decode("ascii")

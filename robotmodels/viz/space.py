@@ -92,7 +92,7 @@ def _taken(axes: Any) -> tuple[Array, Array]:
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
-    x, y, _ = proj_transform(*corners.reshape(3, -1), axes.get_proj())
+    x, y, _ = proj_transform(*corners.reshape(3, -1), axes.get_proj())  # type: ignore[call-arg]
     points = [axes.transData.transform(np.column_stack((x, y)))]
     for name in "xyz":
         axis = getattr(axes, f"{name}axis")

@@ -222,7 +222,7 @@ def interval_panel(
     names: Sequence[str],
     values: Array,
     half: Array,
-    groups: Mapping[str, Array],
+    groups: Mapping[str, Any],
     crowded: bool,
     truth: Array | None = None,
 ) -> None:

@@ -26,7 +26,6 @@ matplotlib.figure.Figure
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +37,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
 from ..trajectories.limits import MotionLimits
-from ..trajectories.path_events import PathEvent, PathEventKind
+from ..trajectories.path_events import PathEventKind
 from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
 from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
@@ -164,7 +163,8 @@ def plot_profiles(
     """
     named = style.as_named(profiles, names, "profiles", "motion")
     motions = {name: over_time.sampled(motion, repr(name)) for name, motion in named.items()}
-    j = _joint(joint, min(motion.n for motion in motions.values()))
+    least = min(motion.n for motion in motions.values())
+    (j,) = style.as_choice([joint], least, "joint", "a number")
     shown, kind = over_time.as_orders(orders), over_time.as_unit(unit)
     columns = len(motions) if side_by_side else 1
     width, height = COLUMN if columns == 1 else PAGE, 0.75 + 1.05 * len(shown)
@@ -183,19 +183,6 @@ def plot_profiles(
     for axes in grid.flat:
         axes.label_outer()
     return style.finished(figure, title)
-
-
-def _joint(joint: Any, n: int) -> int:
-    try:
-        j = index(joint)
-    except TypeError:
-        j = -1
-    if isinstance(joint, bool) or not 0 <= j < n:
-        raise InvalidValueError(
-            f"joint: expected a number from 0 to {n - 1}, as all motions have that joint, got "
-            f"{joint!r}."
-        )
-    return j
 
 
 @style.plot
@@ -260,7 +247,8 @@ def plot_joint_path(
     lowest.tick_params(axis="y", length=0.0)
     for row, kind in enumerate(happens):
         for event in path.of_kind(kind):
-            _draw_event(lowest, above, row, kind, _span(event, timed))
+            ends = (event.start, event.stop) if timed else (event.first, event.last)
+            _draw_event(lowest, above, row, kind, ends)
     if not happens:
         style.note(lowest, "no events on the path")
     lowest.set_xlabel("time (s)" if timed else "number of the pose")
@@ -280,11 +268,7 @@ def _draw_conditioning(axes: Axes, x: Array, conditioning: Array) -> None:
 
 
 def _draw_event(
-    axes: Axes,
-    above: Sequence[Axes],
-    row: int,
-    kind: PathEventKind,
-    span: tuple[float, float],
+    axes: Axes, above: Sequence[Axes], row: int, kind: PathEventKind, span: tuple[float, float]
 ) -> None:
     """A bar with marked ends, and shades or lines in the panels above."""
     text, color, marker = _EVENTS[kind]
@@ -297,10 +281,6 @@ def _draw_event(
         elif kind not in _SEEN_ON_LINES:
             middle = 0.5 * (start + stop)
             panel.axvline(middle, color=color, linewidth=0.8, zorder=1.2, label=f"_{text}")
-
-
-def _span(event: PathEvent, timed: bool) -> tuple[float, float]:
-    return (event.start, event.stop) if timed else (float(event.first), float(event.last))
 
 
 @style.plot

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_reals, as_vector
+from .._arrays import Array, as_floats, as_reals
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
 from ..kinematics.inverse.solution import IKMSolution
@@ -363,9 +363,9 @@ def plot_singularities(
         raise InvalidValueError(
             f"maps: expected one or several SingularityMap of singularity_map, got {maps!r:.60}."
         )
+    postures = None if q is None else np.atleast_2d(as_floats(q, "q"))
     for grid in given:
-        _check(grid, model)
-    postures = None if q is None else _postures(q, given)
+        _check(grid, model, postures)
     wide = style.as_columns(columns, len(given), 2)
     rows = -(-len(given) // wide)
     width = COLUMN if wide == 1 else PAGE
@@ -381,8 +381,18 @@ def plot_singularities(
         if postures is not None:
             x, y = (k * postures[:, grid.joints[i]] for i, (k, _) in enumerate(scales))
             every = max(1, len(x) // 10)
-            axes.plot(x, y, color=INK, linewidth=1.0, marker="o", markersize=3.6, zorder=4.0,
-                      markerfacecolor="white", markevery=every, label="postures")  # fmt: skip
+            axes.plot(
+                x,
+                y,
+                color=INK,
+                linewidth=1.0,
+                marker="o",
+                markersize=3.6,
+                zorder=4.0,
+                markerfacecolor="white",
+                markevery=every,
+                label="postures",
+            )
         axes.set_title(style.wrapped(grid.label, width / wide))
     return style.finished(figure, title)
 
@@ -409,7 +419,7 @@ def _draw_map(
     zero = z == 0.0
     if zero.any():
         i, j = np.nonzero(zero)
-        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, label="_zero")
+        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, markeredgewidth=0.0, label="_zero")
     z = np.ma.masked_invalid(np.where(zero, 1e-12 * most, z).T)
     if (z > 0.0).any() and (z < 0.0).any():
         axes.contour(x, y, z, levels=[0.0], colors=[INK], linewidths=2.0)
@@ -421,8 +431,14 @@ def _hatch_outside(
     axes: Axes, grid: SingularityMap, model: RobotModel, scales: list[tuple[float, str]]
 ) -> None:
     """Hatches outside the joint limits, and lines at them."""
-    box = {"facecolor": (1.0, 1.0, 1.0, 0.55), "edgecolor": PALE, "hatch": "////",
-           "linewidth": 0.0, "zorder": 2.4, "label": "outside joint limits"}  # fmt: skip
+    box = {
+        "facecolor": (1.0, 1.0, 1.0, 0.55),
+        "edgecolor": PALE,
+        "hatch": "////",
+        "linewidth": 0.0,
+        "zorder": 2.4,
+        "label": "outside joint limits",
+    }
     lines, areas = (axes.axvline, axes.axhline), (axes.axvspan, axes.axhspan)
     for i, values in enumerate((grid.first, grid.second)):
         j, k = int(grid.joints[i]), scales[i][0]
@@ -442,7 +458,8 @@ def _scale(grid: SingularityMap, i: int, degrees: bool) -> tuple[float, str]:
     return unit.factor, unit.value
 
 
-def _check(grid: SingularityMap, model: RobotModel | None) -> None:
+def _check(grid: SingularityMap, model: RobotModel | None, q: Array | None) -> None:
+    """Raise unless a map can be drawn, with the limits of a robot and configurations."""
     shape = (grid.first.size, grid.second.size)
     if grid.values.shape != shape or min(shape) < 2:
         raise ShapeError(
@@ -451,20 +468,13 @@ def _check(grid: SingularityMap, model: RobotModel | None) -> None:
         )
     if not np.isfinite(grid.values).any():
         raise InvalidValueError(f"maps: {grid.label!r} has no finite value.")
-    if model is not None and max(grid.joints) >= model.n:
+    least = 1 + int(grid.joints.max())
+    if model is not None and model.n < least:
         raise ShapeError(
             f"model: {grid.label!r} is a map over joints {grid.joints.tolist()} (from 0), which "
             f"{model.name!r} with its {model.n} joints does not have."
         )
-
-
-def _postures(q: ArrayLike, maps: Sequence[SingularityMap]) -> Array:
-    """Configurations to mark. Shapes: -> (N, n)."""
-    values = np.atleast_1d(np.asarray(q, dtype=float))
-    rows = as_vector(q, values.shape[-1], "q")
-    least = 1 + max(int(grid.joints.max()) for grid in maps)
-    if rows.ndim > 2 or rows.shape[-1] < least:
+    if q is not None and (q.ndim > 2 or q.shape[-1] < least):
         raise ShapeError(
-            f"q: expected one posture (n,) or several (N, n), n at least {least}, got {rows.shape}."
+            f"q: expected one posture (n,) or several (N, n), n at least {least}, got {q.shape}."
         )
-    return rows.reshape(-1, rows.shape[-1])

@@ -4,30 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...geometry import constant_names
 from ...latex_text import markdown
 from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
-from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
-from .whole import whole
-from .wording import Wording
-
-
-@dataclass(frozen=True, slots=True)
-class ExplainedStep:
-    """One step of the derivation."""
-
-    joints: tuple[str, ...]
-    type: EquationType
-    matrix_equation: str
-    equations: tuple[str, ...]
-    formulas: tuple[str, ...]
-    undetermined: str
-    branches: int
-    text: str
-    latex: str
+from .render import render
+from .steps import ExplainedStep, PlanText
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -89,7 +74,8 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
 
     Notation: ``U0`` is the desired pose, its elements ``sx nx ax Px`` and so on as in eq. [1.13];
     ``sTp`` the pose of R_p in R_s. ``C1``, ``S1`` are cosine and sine of ``θ1``, ``C23`` of
-    ``θ2 + θ3`` (an ``m`` before a number subtracts). ``Dj`` and ``RLj`` are d and r of row j.
+    ``θ2 + θ3`` (an ``m`` before a number subtracts). ``Dj`` and ``RLj`` are d and r of row j,
+    unless ``DHTable.symbols`` names them.
 
     Parameters
     ----------
@@ -121,23 +107,26 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     """
     check_model(model)
     chain = joint_chain(model)
-    plan = derive_plan(chain, [int(model.table.joint_rows[c]) + 1 for c in chain.columns])
-    words = Wording(plan)
-    steps = []
-    for number, step in enumerate(plan.steps):
-        told = words.step(number, step)
-        steps.append(
-            ExplainedStep(
-                told.names, step.type, told.matrix_equation, told.equations, told.formulas,
-                told.undetermined, step.type.branches, told.text, told.latex,
-            )
-        )  # fmt: skip
+    table = model.table
+    own = constant_names(table.symbols)
+    lengths = [
+        (letter + str(j), column, j)
+        for column, letter in (("d", "D"), ("r", "RL"))
+        for j in range(1, table.f + 1)
+    ]
+    names = {
+        usual: (own[usual], float(getattr(table, column)[j - 1]))
+        for usual, column, j in lengths
+        if usual in own
+    }
+    plan = derive_plan(chain, [int(table.joint_rows[c]) + 1 for c in chain.columns], names)
+    words = PlanText(plan)
+    steps = tuple(words.step(number, step) for number, step in enumerate(plan.steps))
     remaining = tuple(words.variable(j) for j in plan.remaining)
     takes_over = "" if plan.complete else _successor(plan.chain)
-    told = [(step.text, step.latex) for step in steps]
-    text, latex = whole(model, words, told, takes_over)
+    text, latex = render(model, words, steps, takes_over)
     return InverseModelExplanation(
-        model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
+        model.name, steps, plan.complete, remaining, takes_over, plan, text, latex
     )
 
 

@@ -5,17 +5,17 @@ Source: Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import InvalidValueError
 from ..loop import JointChain
-from .catalogue import Candidate, candidates
-from .equation_type import EquationType
+from .catalogue import Candidate, candidates, cost
 from .equations import Arm, Split
 from .expressions import Expression
 from .normal_form import NormalForm, normal_form
-from .program import Program, lowered
+from .program import Program, compile_plan
+from .types import EquationType
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,14 +55,19 @@ class PaulPlan:
         return most
 
 
-def derive_plan(chain: JointChain, frames: Sequence[int] = ()) -> PaulPlan:
+def derive_plan(
+    chain: JointChain,
+    frames: Sequence[int] = (),
+    names: Mapping[str, tuple[str, float]] | None = None,
+) -> PaulPlan:
     """Derive, by pre- and post-multiplication, which equation gives which joint of a chain.
 
-    ``frames`` are the numbers of its frames in print; 1 to k without them.
+    ``frames`` are the numbers of its frames in print (1 to k without them), ``names`` the names and
+    values of constants that the table has named, by their usual names.
     """
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")
-    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))))
+    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))), names)
     joints, steps = arm.joints, []
     everyone = range(chain.k)
     solved: list[int] = []
@@ -78,11 +83,11 @@ def derive_plan(chain: JointChain, frames: Sequence[int] = ()) -> PaulPlan:
                 tuple((e.row, e.column) for e in best.equations),
             )
         )  # fmt: skip
-        for number in best.unknowns[: _given(best.type)]:
+        for number in best.unknowns:
             joints.settle(number)
         solved += [j for j in everyone if joints.knows(j) and j not in solved]
     remaining = tuple(j for j in everyone if not joints.knows(j))
-    program = None if remaining else lowered(arm, steps)
+    program = None if remaining else compile_plan(arm, steps)
     return PaulPlan(chain, arm.form, tuple(steps), tuple(solved), remaining, arm, program)
 
 
@@ -90,11 +95,5 @@ def _best(arm: Arm) -> Candidate | None:
     for inverse in (False, True):
         found = candidates(arm.equations(inverse), arm.joints)
         if found:
-            return min(found, key=lambda c: c.cost)
+            return min(found, key=lambda c: cost(c, arm.joints))
     return None
-
-
-def _given(type_: EquationType) -> int:
-    """How many unknowns a step gives."""
-    single = (EquationType.POLYNOMIAL, EquationType.QUARTIC)
-    return 1 if type_ in single else 2

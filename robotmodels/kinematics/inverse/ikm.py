@@ -77,7 +77,7 @@ def ikm(
     ------
     ShapeError, InvalidValueError, FrameNotFoundError
         Arguments of the wrong shape, with NaN or infinity; an unknown reference or frame; a mask
-        that asks for nothing; weights or a length that are not positive.
+        without a 1; weights or a length that are not positive.
 
     References
     ----------

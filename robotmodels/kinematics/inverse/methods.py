@@ -215,7 +215,7 @@ InverseMethod = PseudoInverse | FilteredInverse | DampedInverse
 
 
 def as_method(method: InverseMethod | None) -> InverseMethod:
-    """The method asked for; None is `DampedInverse` with its defaults."""
+    """The method requested; None is `DampedInverse` with its defaults."""
     if method is None:
         return _DEFAULT
     if not isinstance(method, InverseMethod):

@@ -47,7 +47,7 @@ class IKMSolution(Rebuilt):
     """Joint velocities of twists, or joint accelerations. Read-only, picklable.
 
     The leading axes are those of the call. Six-vectors are linear then angular; rows that were
-    not asked for are zero. From `ikm_second_order` twists are accelerations, m/s^2 and rad/s^2.
+    not requested are zero. From `ikm_second_order` twists are accelerations, m/s^2 and rad/s^2.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class IKMSolution(Rebuilt):
     status : ndarray of int8, shape (...)
         Codes of `IKMStatus`.
     achieved : ndarray, shape (..., 6)
-        ``J v``, the part that was asked for [m/s, rad/s].
+        ``J v``, the part that was requested [m/s, rad/s].
     error : ndarray, shape (..., 6)
         The twist minus ``achieved``.
     reachable : ndarray, shape (..., 6)
@@ -74,7 +74,7 @@ class IKMSolution(Rebuilt):
     limited : ndarray of bool, shape (..., n)
         Joints that are at a limit of their velocity or acceleration.
     mask : ndarray of bool, shape (6,)
-        Rows that were asked for.
+        Rows that were requested.
     task_errors : tuple of ndarray, shapes (..., m_i)
         The rates of the tasks minus those achieved: ``augmented`` in their order, then ``tasks``.
     task_scales : ndarray, shape (..., t)

@@ -65,10 +65,10 @@ class Request(NamedTuple):
 
 
 class Scaling(NamedTuple):
-    """Rows asked for, and the factors that make rows and columns comparable."""
+    """Rows requested, and the factors that make rows and columns comparable."""
 
     mask: NDArray[np.bool_]
-    asked: NDArray[np.int64]
+    selected: NDArray[np.int64]
     rows: Array
     columns: Array
 
@@ -82,7 +82,7 @@ class PreparedFrame:
         self.point = model.twin.frame(frame)
         self.length = characteristic_length(model, frame)
         self.usual = _scaling(model, self.length, None, None)
-        self.packed = packed(model, self.point, self.usual.asked, *self.usual[2:])
+        self.packed = packed(model, self.point, self.usual.selected, *self.usual[2:])
         self.ranks: dict[tuple[int, ...], int] = {}
 
 
@@ -108,11 +108,15 @@ def prepared_frame(model: RobotModel, frame: str | int | None) -> PreparedFrame:
 
 
 def packed(
-    model: RobotModel, point: FrameOfInterest, asked: NDArray[np.int64], rows: Array, columns: Array
+    model: RobotModel,
+    point: FrameOfInterest,
+    selected: NDArray[np.int64],
+    rows: Array,
+    columns: Array,
 ) -> tuple[NDArray[np.int64], Array, Array, Array]:
     """Robot, frame, rows and factors for the kernel: each array costs 0.3 us of a single call."""
     chain, (path, rotation, position) = model.chain, point.kernel_arguments
-    whole = [(chain.sigma.size, path.size, asked.size), *chain[:3], path, asked]
+    whole = [(chain.sigma.size, path.size, selected.size), *chain[:3], path, selected]
     return (
         np.concatenate(whole).astype(np.int64),
         np.concatenate([chain.rotation, [chain.base_rotation, rotation]]),
@@ -132,10 +136,10 @@ def _scaling(
             f"joint_weights: expected positive numbers, got {weights}; a joint that should hardly "
             "move has a large weight."
         )
-    asked_for = as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
+    selected = as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
     return Scaling(
-        mask=read_only(asked_for, np.bool_),
-        asked=np.flatnonzero(asked_for),
+        mask=read_only(selected, np.bool_),
+        selected=np.flatnonzero(selected),
         rows=np.repeat([1.0 / length, 1.0], 3),
         columns=1.0 / np.sqrt(weights),
     )
@@ -188,21 +192,21 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     drift = np.zeros((N, 6))
     if v is not None:
         drift = _drift(model, frame.point, q, v, reference)
-    numbers, rows, asked = frame.packed, np.empty((0, 6, n)), scaling.asked
+    numbers, rows, selected = frame.packed, np.empty((0, 6, n)), scaling.selected
     first = Level(rows, rate, drift, scaling.rows)
     if augmented or lower or bounds is not None:
         J = _jacobians(model, frame.point, q, reference)
         first = _stacked([Level(J, rate, drift, scaling.rows), *augmented])
-        asked = np.concatenate([asked, np.arange(6, first.rate.shape[1])])
+        selected = np.concatenate([selected, np.arange(6, first.rate.shape[1])])
         rows = first.J
-        if min(asked.size, n) > _MOST_ROWS:
+        if min(selected.size, n) > _MOST_ROWS:
             raise InvalidValueError(
                 f"augmented: expected at most {_MOST_ROWS} rows together with the twist, got "
-                f"{asked.size}; give some of them as tasks of lower priority."
+                f"{selected.size}; give some of them as tasks of lower priority."
             )
     if scaling is not frame.usual or rows.size:
-        numbers = packed(model, frame.point, asked, first.weights, scaling.columns)
-    M, k = first.rate.shape[1], min(asked.size, n)
+        numbers = packed(model, frame.point, selected, first.weights, scaling.columns)
+    M, k = first.rate.shape[1], min(selected.size, n)
     wanted = first.rate - first.drift
     out, codes = np.empty((N, n + 3 * M + k + 1)), np.empty((N, 2), np.int8)
     inverse_velocities(
@@ -212,19 +216,21 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     cuts = np.cumsum([n, M, M, M, k])
     motion, achieved, error, reachable, values, damping = np.split(out, cuts, axis=1)
     status, rank = codes[:, 0].copy(), codes[:, 1].copy()
-    _set_structure(model, frame, scaling, reference, status, rank, asked.size - scaling.asked.size)
+    _set_structure(
+        model, frame, scaling, reference, status, rank, selected.size - scaling.selected.size
+    )
     scale, limited = np.ones((N, 1 + len(lower))), np.zeros((N, n), np.bool_)
     errors: tuple[Array, ...] = ()
     if lower or bounds is not None:
-        top = Level(rows[:, asked], first.rate[:, asked], first.drift[:, asked],
-                    first.weights[asked])  # fmt: skip
+        top = Level(rows[:, selected], first.rate[:, selected], first.drift[:, selected],
+                    first.weights[selected])  # fmt: skip
         found = level_velocities(
             [top, *lower], np.zeros((N, n)) if z is None else z, bounds, scaling.columns**-2, method
         )
         motion, scale, limited = found.v, found.scale, found.limited
         error = np.zeros((N, M))
-        error[:, asked] = found.error[0]
-        achieved = np.where(np.isin(np.arange(M), asked), wanted - error, 0.0)
+        error[:, selected] = found.error[0]
+        achieved = np.where(np.isin(np.arange(M), selected), wanted - error, 0.0)
         errors = found.error[1:]
         status[(scale[:, 0] < _KEPT) | found.mixed[:, 0]] = IKMStatus.LIMITED
     start = drift * scaling.mask
@@ -386,14 +392,14 @@ def _set_structure(
 
 
 def _usual_rank(model: RobotModel, frame: PreparedFrame, scaling: Scaling, reference: int) -> int:
-    """Rank that the rows asked for have at nearly all configurations."""
-    key = (reference, *map(int, scaling.asked))
+    """Rank that the rows requested have at nearly all configurations."""
+    key = (reference, *map(int, scaling.selected))
     if key not in frame.ranks:
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, model.n))
         q *= np.where(_slides(model), frame.length / np.pi, 1.0)
         J = _jacobians(model, frame.point, q, reference)
         J *= frame.usual.rows[:, None] * frame.usual.columns
         size = np.linalg.norm(J, axis=(1, 2))
-        values = np.linalg.svd(J[:, scaling.asked], compute_uv=False)
+        values = np.linalg.svd(J[:, scaling.selected], compute_uv=False)
         frame.ranks[key] = int((values > _RANK * size[:, None]).sum(axis=1).max(initial=0))
     return frame.ranks[key]

@@ -1,7 +1,7 @@
 """Tasks of a redundant robot beside the twist: rows ``J v = rate`` of its joint velocities.
 
 Seed book section 1.3.2.4; J. Baillieul 1985 (functions of the configuration). Tasks are given to
-`ikm` as ``augmented`` or ``tasks``. In `ikm_second_order` they ask for accelerations,
+`ikm` as ``augmented`` or ``tasks``. In `ikm_second_order` their rates are accelerations,
 ``J a + dJ/dt v = rate``.
 
 Parameters
@@ -12,7 +12,7 @@ rate : array_like, shape (..., m)
 frame, first, second : str or int, optional
     Names or numbers of frames; default the tool.
 mask : array_like, optional
-    Ones for the components that are asked for; default all.
+    Ones for the components that are requested; default all.
 length : float, optional
     Metres that count as one radian; default `characteristic_length` of the frame, as in `ikm`.
 weights : array_like, shape (m,), optional
@@ -34,11 +34,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import (
     Array,
@@ -78,14 +77,14 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task(Rebuilt):
-    """Rates that are asked for, and the function that gives their rows.
+    """Rates that are requested, and the function that gives their rows.
 
     Parameters
     ----------
     rate : array_like, shape (..., m)
         Rates wanted.
     rows : callable
-        ``rows(model, q, v)`` with q (N, n), and v (N, n) or None where velocities are asked for,
+        ``rows(model, q, v)`` with q (N, n), and v (N, n) or None where velocities are requested,
         gives J (N, m, n), ``dJ/dt v`` (N, m) or None for zero, and the weights (m,).
 
     Examples
@@ -149,9 +148,18 @@ def TwistTask(
     (1, 3, 6)
     """
     reference_of(reference)
-    asked = np.flatnonzero(as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz")))
-    rate = as_core(rate, (6,), "rate")[..., asked]
-    return Task(rate, partial(_twist_rows, frame, reference, asked, length))
+    selected = np.flatnonzero(as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz")))
+    rate = as_core(rate, (6,), "rate")[..., selected]
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        weights = np.repeat([1.0 / length_of(model, frame, length), 1.0], 3)[selected]
+        J = jacobian(model, q, frame, reference)[:, selected]
+        if v is None:
+            return J, None, weights
+        rates = jacobian_rate(model, q, v, frame, reference)[:, selected]
+        return J, np.einsum("kij,kj->ki", rates, v), weights
+
+    return Task(rate, rows)
 
 
 def PositionTask(
@@ -170,10 +178,23 @@ def PositionTask(
     >>> elbow.level(load("panda"), np.zeros((5, 7))).J.shape
     (5, 1, 7)
     """
-    asked = np.flatnonzero(as_mask(mask, ("x", "y", "z")))
-    rate = as_core(rate, (3,), "rate")[..., asked]
-    point = np.zeros(3) if point is None else as_exact(point, (3,), "point")
-    return Task(rate, partial(_point_rows, frame, point, asked, length))
+    selected = np.flatnonzero(as_mask(mask, ("x", "y", "z")))
+    rate = as_core(rate, (3,), "rate")[..., selected]
+    point = read_only(np.zeros(3) if point is None else as_exact(point, (3,), "point"))
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        from ...kernels.poses import accelerations, jacobians
+
+        path, rotation, position = model.twin.frame(frame).kernel_arguments
+        place = path, rotation, position + rotation @ point
+        J, drift = np.empty((len(q), 6, model.n)), np.empty((len(q), 6))
+        jacobians(q, model.chain, *place, 0, J)
+        if v is not None:
+            accelerations(q, v, np.zeros_like(q), model.chain, *place, 0, drift)
+        weights = np.full(len(selected), 1.0 / length_of(model, frame, length))
+        return J[:, selected], None if v is None else drift[:, selected], weights
+
+    return Task(rate, rows)
 
 
 def JointTask(rate: ArrayLike, joints: Sequence[int | str], length: float | None = None) -> Task:
@@ -197,7 +218,16 @@ def JointTask(rate: ArrayLike, joints: Sequence[int | str], length: float | None
             )
     if not joints or len(set(joints)) < len(joints):
         raise InvalidValueError(f"joints: expected different joints, got {joints}.")
-    return Task(as_core(rate, (len(joints),), "rate"), partial(_joint_rows, joints, length))
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        columns = [_column(model, joint) for joint in joints]
+        if len(set(columns)) < len(columns):
+            raise InvalidValueError(f"joints: {joints} names a joint twice.")
+        J = np.tile(np.eye(model.n)[columns], (len(q), 1, 1))
+        slides = model.table.sigma[model.table.joint_rows][columns] == PRISMATIC
+        return J, None, np.where(slides, 1.0 / length_of(model, None, length), 1.0)
+
+    return Task(as_core(rate, (len(joints),), "rate"), rows)
 
 
 def DistanceTask(
@@ -216,8 +246,25 @@ def DistanceTask(
     >>> DistanceTask(0.1).level(load("planar_2r"), [0.3, 0.0]).J.round(12)
     array([[[0., 0.]]])
     """
-    rate = as_floats(rate, "rate")[..., None]
-    return Task(rate, partial(_distance_rows, first, second, length))
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        apart = dgm(model, q, second)[:, :3, 3] - dgm(model, q, first)[:, :3, 3]
+        distance = np.linalg.norm(apart, axis=-1)
+        inverse = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+        unit = apart * inverse[:, None]
+        J = (jacobian(model, q, second) - jacobian(model, q, first))[:, :3]
+        row = np.einsum("ki,kij->kj", unit, J)[:, None]
+        weights = np.array([1.0 / length_of(model, second, length)])
+        if v is None:
+            return row, None, weights
+        rates = (jacobian_rate(model, q, v, second) - jacobian_rate(model, q, v, first))[:, :3]
+        velocity = np.einsum("kij,kj->ki", J, v)
+        along = np.einsum("ki,ki->k", unit, velocity)
+        drift = np.einsum("ki,kij,kj->k", unit, rates, v)
+        drift += inverse * (np.einsum("ki,ki->k", velocity, velocity) - along**2)
+        return row, drift[:, None], weights
+
+    return Task(as_floats(rate, "rate")[..., None], rows)
 
 
 def FunctionTask(
@@ -250,7 +297,35 @@ def FunctionTask(
             f"gradient_rate: expected a function of q and v, got {type(gradient_rate).__name__}."
         )
     m = np.shape(rate)[-1] if np.ndim(rate) else 0
-    rows = partial(_function_rows, gradient, gradient_rate, _weights(weights, m))
+    factors = _weights(weights, m)
+
+    def checked(value: ArrayLike, q: Array, name: str) -> Array:
+        array = as_floats(value, f"the value of {name}")
+        if m == 1 and array.shape == q.shape:
+            return array[:, None]
+        shape = (len(q), m, q.shape[1])
+        if array.shape != shape:
+            raise ShapeError(
+                f"{name}: expected an array of shape {shape} (configurations, functions, joints) "
+                f"from the function, got {array.shape}."
+            )
+        return array
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        J = checked(gradient(q), q, "gradient")
+        if v is None:
+            return J, None, factors
+        if gradient_rate is not None:
+            rates = checked(gradient_rate(q, v), q, "gradient_rate")
+            return J, np.einsum("kij,kj->ki", rates, v), factors
+        speed = np.linalg.norm(v, axis=-1, keepdims=True)
+        h = _STEP * np.divide(v, speed, out=np.zeros_like(v), where=speed > 0.0)
+        slope = sum(
+            factor * checked(gradient(q + k * h), q, "gradient")
+            for k, factor in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
+        )
+        return J, np.einsum("kij,kj->ki", slope, v) * (speed / (12.0 * _STEP)), factors
+
     return Task(as_floats(rate, "rate"), rows)
 
 
@@ -271,12 +346,27 @@ def LinearTask(
     >>> task.level(load("rx90"), [0.0] * 6).rate
     array([[0.]])
     """
-    J = as_floats(J, "J")
+    J = read_only(as_floats(J, "J"))
     if J.ndim < 2:
         raise ShapeError(f"J: expected shape (..., m, n), got {J.shape}.")
     m = J.shape[-2]
-    drift = np.zeros(m) if drift is None else as_core(drift, (m,), "drift")
-    rows = partial(_linear_rows, read_only(J), read_only(drift), _weights(weights, m))
+    given = read_only(np.zeros(m) if drift is None else as_core(drift, (m,), "drift"))
+    factors = _weights(weights, m)
+
+    def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:
+        n = J.shape[-1]
+        if n != model.n:
+            raise ShapeError(f"J: expected {model.n} columns, one for each joint, got {n}.")
+        try:
+            each = np.broadcast_to(J.reshape(-1, m, n), (len(q), m, n))
+            drifts = np.broadcast_to(given.reshape(-1, m), (len(q), m))
+        except ValueError:
+            raise ShapeError(
+                f"J, drift: expected one for each of the {len(q)} configurations or one for all, "
+                f"got shapes {J.shape} and {given.shape}."
+            ) from None
+        return each, None if v is None else drifts, factors
+
     return Task(as_core(rate, (m,), "rate"), rows)
 
 
@@ -292,142 +382,16 @@ def _weights(weights: ArrayLike | None, m: int) -> Array:
     return weights
 
 
-def _twist_rows(
-    frame: str | int | None,
-    reference: Reference,
-    asked: NDArray[np.int64],
-    length: float | None,
-    model: RobotModel,
-    q: Array,
-    v: Array | None,
-) -> Rows:
-    weights = np.repeat([1.0 / length_of(model, frame, length), 1.0], 3)[asked]
-    J = jacobian(model, q, frame, reference)[:, asked]
-    if v is None:
-        return J, None, weights
-    rates = jacobian_rate(model, q, v, frame, reference)[:, asked]
-    return J, np.einsum("kij,kj->ki", rates, v), weights
-
-
-def _point_rows(
-    frame: str | int | None,
-    point: Array,
-    asked: NDArray[np.int64],
-    length: float | None,
-    model: RobotModel,
-    q: Array,
-    v: Array | None,
-) -> Rows:
-    from ...kernels.poses import accelerations, jacobians
-
-    path, rotation, position = model.twin.frame(frame).kernel_arguments
-    place = path, rotation, position + rotation @ point
-    J, drift = np.empty((len(q), 6, model.n)), np.empty((len(q), 6))
-    jacobians(q, model.chain, *place, 0, J)
-    if v is not None:
-        accelerations(q, v, np.zeros_like(q), model.chain, *place, 0, drift)
-    weights = np.full(len(asked), 1.0 / length_of(model, frame, length))
-    return J[:, asked], None if v is None else drift[:, asked], weights
-
-
-def _joint_rows(
-    joints: tuple[int | str, ...],
-    length: float | None,
-    model: RobotModel,
-    q: Array,
-    v: Array | None,
-) -> Rows:
+def _column(model: RobotModel, joint: int | str) -> int:
+    """Column of q of a joint given by number or name."""
     names = model.table.joint_names
-    columns = []
-    for joint in joints:
-        column = joint
-        if isinstance(joint, str):
-            column = names.index(joint) if joint in names else -1
-        if not 0 <= int(column) < model.n:
-            raise InvalidValueError(
-                f"joints: the robot has no joint {joint!r}; give columns of q, 0 to "
-                f"{model.n - 1}, or names: {', '.join(names)}."
-            )
-        columns.append(int(column))
-    if len(set(columns)) < len(columns):
-        raise InvalidValueError(f"joints: {joints} names a joint twice.")
-    J = np.tile(np.eye(model.n)[columns], (len(q), 1, 1))
-    slides = model.table.sigma[model.table.joint_rows][columns] == PRISMATIC
-    return J, None, np.where(slides, 1.0 / length_of(model, None, length), 1.0)
-
-
-def _distance_rows(
-    first: str | int,
-    second: str | int | None,
-    length: float | None,
-    model: RobotModel,
-    q: Array,
-    v: Array | None,
-) -> Rows:
-    apart = dgm(model, q, second)[:, :3, 3] - dgm(model, q, first)[:, :3, 3]
-    distance = np.linalg.norm(apart, axis=-1)
-    inverse = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
-    unit = apart * inverse[:, None]
-    J = (jacobian(model, q, second) - jacobian(model, q, first))[:, :3]
-    row = np.einsum("ki,kij->kj", unit, J)[:, None]
-    weights = np.array([1.0 / length_of(model, second, length)])
-    if v is None:
-        return row, None, weights
-    rate = (jacobian_rate(model, q, v, second) - jacobian_rate(model, q, v, first))[:, :3]
-    velocity = np.einsum("kij,kj->ki", J, v)
-    along = np.einsum("ki,ki->k", unit, velocity)
-    drift = np.einsum("ki,kij,kj->k", unit, rate, v)
-    drift += inverse * (np.einsum("ki,ki->k", velocity, velocity) - along**2)
-    return row, drift[:, None], weights
-
-
-def _function_rows(
-    gradient: Callable[[Array], ArrayLike],
-    gradient_rate: Callable[[Array, Array], ArrayLike] | None,
-    weights: Array,
-    model: RobotModel,
-    q: Array,
-    v: Array | None,
-) -> Rows:
-    shape = (len(q), len(weights), model.n)
-
-    def checked(value: ArrayLike, name: str) -> Array:
-        array = as_floats(value, f"the value of {name}")
-        if len(weights) == 1 and array.shape == q.shape:
-            return array[:, None]
-        if array.shape != shape:
-            raise ShapeError(
-                f"{name}: expected an array of shape {shape} (configurations, functions, joints) "
-                f"from the function, got {array.shape}."
-            )
-        return array
-
-    J = checked(gradient(q), "gradient")
-    if v is None:
-        return J, None, weights
-    if gradient_rate is not None:
-        return J, np.einsum("kij,kj->ki", checked(gradient_rate(q, v), "gradient_rate"), v), weights
-    speed = np.linalg.norm(v, axis=-1, keepdims=True)
-    h = _STEP * np.divide(v, speed, out=np.zeros_like(v), where=speed > 0.0)
-    slope = sum(
-        factor * checked(gradient(q + k * h), "gradient")
-        for k, factor in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
-    )
-    return J, np.einsum("kij,kj->ki", slope, v) * (speed / (12.0 * _STEP)), weights
-
-
-def _linear_rows(
-    J: Array, drift: Array, weights: Array, model: RobotModel, q: Array, v: Array | None
-) -> Rows:
-    m, n = J.shape[-2:]
-    if n != model.n:
-        raise ShapeError(f"J: expected {model.n} columns, one for each joint, got {n}.")
-    try:
-        J = np.broadcast_to(J.reshape(-1, m, n), (len(q), m, n))
-        drift = np.broadcast_to(drift.reshape(-1, m), (len(q), m))
-    except ValueError:
-        raise ShapeError(
-            f"J, drift: expected one for each of the {len(q)} configurations or one for all, got "
-            f"shapes {J.shape} and {drift.shape}."
-        ) from None
-    return J, None if v is None else drift, weights
+    if isinstance(joint, str):
+        column = names.index(joint) if joint in names else -1
+    else:
+        column = int(joint)
+    if not 0 <= column < model.n:
+        raise InvalidValueError(
+            f"joints: the robot has no joint {joint!r}; give columns of q, 0 to {model.n - 1}, or "
+            f"names: {', '.join(names)}."
+        )
+    return column

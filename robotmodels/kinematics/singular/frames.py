@@ -138,11 +138,11 @@ def simplest_frame(
 def check_frames(task: SingularTask, axes: int | None, point: int | None) -> None:
     """Refuse frames in which lost directions cannot be given."""
     known = [0, *(int(j) for j in task.model.twin.frame(task.frame).path)]
-    for asked in (axes, point):
-        if asked is not None and asked not in known:
+    for selected in (axes, point):
+        if selected is not None and selected not in known:
             raise FrameNotFoundError(
-                "frame number", asked, map(str, known),
-                "Lost directions are given in frames from the base to the one asked about.",
+                "frame number", selected, map(str, known),
+                "Lost directions are given in frames from the base to that of the task.",
             )  # fmt: skip
     if point is not None and not task.is_whole:
         raise InvalidValueError(

@@ -55,13 +55,13 @@ def singular_sets(
 ) -> tuple[SingularSet, ...]:
     """Singular sets at or near a configuration, the nearest first."""
     n = len(q)
-    home, free = q / task.joint_scale, np.full(n, np.inf)
-    space = SearchSpace(task, dimension, task.joint_scale, home, -free, free)
-    aside = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(
+    start, free = q / task.joint_scale, np.full(n, np.inf)
+    space = SearchSpace(task, dimension, task.joint_scale, start, -free, free)
+    perturbation = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(
         task.moving, _PERTURBATION, 0.0
     )
-    x = to_set(space, home + aside, 25)
-    away = np.linalg.norm(x - home, axis=1)
+    x = to_set(space, start + perturbation, 25)
+    away = np.linalg.norm(x - start, axis=1)
     _, weakest, G = on_set(space, x)
     keep = (weakest < _ON_SET) & (away < _AWAY)
     x, G = x[keep][order := np.argsort(away[keep])], G[keep][order]
@@ -144,7 +144,7 @@ def _cause(
     holding: NDArray[np.bool_],
     G: Array,
 ) -> SingularSet:
-    """What makes the conditions of the set at one of its points, and how far home is from it."""
+    """Events of the set at one of its points, and the distance of the configuration from it."""
     sigma = np.linalg.svd(task_jacobians(space.task, x * space.unit), compute_uv=False)
     top = float(sigma[0]) or 1.0
     named: list[Name] = []
@@ -165,14 +165,14 @@ def _cause(
             continue
         kind = event.kind or arm.kind_of_joints(_joints(space, arm, new))
         named.append((kind, event.sentence))
-        off = arm.residuals(event, (space.home * space.unit)[None])[0]
+        off = arm.residuals(event, (space.start * space.unit)[None])[0]
         distances.append(float(np.linalg.norm(off)) / size)
         spanned = np.vstack([spanned, new])
     known = len(spanned) == len(normals)
     if len(spanned) < len(normals):
         others = _span(normals - normals @ spanned.T @ spanned, 1e-3)
         named.append((arm.kind_of_joints(_joints(space, arm, others)), _NOTHING_SPECIAL))
-        distances.append(float(np.linalg.norm(others @ (space.home - x))))
+        distances.append(float(np.linalg.norm(others @ (space.start - x))))
     slope, away = float(np.linalg.norm(G, 2)) / top, float(np.linalg.norm(distances))
     weak = away**2 if slope < _FLAT else slope * away
     return SingularSet(tuple(named), len(normals), weak, known)

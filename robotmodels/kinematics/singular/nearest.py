@@ -104,8 +104,8 @@ class NearestSingularities(Rebuilt):
     residual : ndarray, shape (S,)
         Weakest singular value over the largest: 0 is exactly singular.
     stationarity : ndarray, shape (S,)
-        Part of the way home that lies along the set, in units of distance: 0 is nearest;
-        infinite where sets cross.
+        Part of the difference to ``home`` that lies along the set, in units of distance: 0 is
+        nearest; infinite where sets cross.
     status : ndarray of int8, shape (S,)
         Codes of `NearestStatus`.
     outcome : SearchOutcome
@@ -261,7 +261,7 @@ def nearest_singularity(
         task=task,
         dimension=whole.dimension,
         unit=unit,
-        home=home / unit,
+        start=home / unit,
         lower=model.lower / unit if limits else -free,
         upper=model.upper / unit if limits else free,
     )
@@ -270,7 +270,7 @@ def nearest_singularity(
         return _result(space, home, None, [])
     found = _confirmed(space, nearest_points(space, first), bool(limits), most)
     rows = _distinct(space, found, bool(limits), most)
-    if rows and np.linalg.norm(found.x[rows[0]] - space.home) < _ALREADY:
+    if rows and np.linalg.norm(found.x[rows[0]] - space.start) < _ALREADY:
         found, rows = _with_crossings(space, first, found, rows, bool(limits), most)
     return _result(space, home, found, rows)
 
@@ -283,11 +283,11 @@ def _with_crossings(
     Their nearest points are likely to be where they meet it, and there they have no tangent.
     Seen from a little beside the set they are ordinary.
     """
-    seen_from = replace(space, home=space.home + _ASIDE * found.escape[rows[0]])
+    seen_from = replace(space, start=space.start + _ASIDE * found.escape[rows[0]])
     others = _confirmed(seen_from, nearest_points(seen_from, first), limits, most)
     away = np.linalg.norm(others.x[:, None] - found.x[rows][None], axis=2)
     others = _picked(others, away.min(axis=1) > 10.0 * _ASIDE)
-    # what is not exactly stationary from home is marked by infinity, and so are these
+    # points that are not exactly stationary are marked by infinity, as these are
     others = replace(others, tangential=np.full(len(others.x), np.inf))
     both = FoundPoints(
         *(
@@ -318,7 +318,7 @@ def _distinct(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -
     model = space.task.model
     turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
     turn = np.where(turning, 2.0 * pi / space.unit, np.inf)
-    distance = np.linalg.norm(found.x - space.home, axis=1)
+    distance = np.linalg.norm(found.x - space.start, axis=1)
     # converged ones come first among equals, so that a stray copy does not stand for them
     order = np.lexsort((found.tangential, distance.round(6)))
     kept: list[int] = []
@@ -384,10 +384,10 @@ def _result(
     crossing = np.isinf(found.tangential)
     rows = [i for i in rows if stationary[i] or crossing[i] or not known.issuperset(named[i])]
     x = found.x[rows]
-    distance = np.linalg.norm(x - space.home, axis=1)
+    distance = np.linalg.norm(x - space.start, axis=1)
     apart = distance > 1e-9
     size = np.where(apart, distance, 1.0)[:, None]
-    direction = np.where(apart[:, None], (x - space.home) / size, 0.0) * space.unit
+    direction = np.where(apart[:, None], (x - space.start) / size, 0.0) * space.unit
     status = np.where(
         stationary[rows],
         np.where(found.held[rows].any(axis=1), NearestStatus.AT_LIMIT, NearestStatus.NEAREST),

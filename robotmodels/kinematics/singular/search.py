@@ -30,7 +30,7 @@ class SearchSpace:
     task: SingularTask
     dimension: int
     unit: Array
-    home: Array
+    start: Array
     lower: Array
     upper: Array
 
@@ -59,12 +59,12 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
         x[good] = _polished(space, _descended(space, x[good], 30))
     held = _held(space, x)
     _, weakest, G = on_set(space, x)
-    rest = np.where(held, 0.0, space.home - x)
+    rest = np.where(held, 0.0, space.start - x)
     normals, _ = normals_of(np.where(held[:, None], 0.0, G))
     across = np.einsum("ari,ai->ar", normals, rest)
     tangent = rest - np.einsum("ari,ar->ai", normals, across)
     every, codimension = normals_of(G)
-    towards = space.home - x
+    towards = space.start - x
     escape = np.einsum("ari,ar->ai", every, np.einsum("ari,ai->ar", every, towards))
     size = np.linalg.norm(escape, axis=1)
     near = size < 1e-9
@@ -136,7 +136,7 @@ def to_set(space: SearchSpace, x: Array, steps: int) -> Array:
 
 
 def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
-    """Points of the set moved along it towards home, as long as this shortens the way."""
+    """Points of the set moved along it towards the start, as long as this shortens the distance."""
     pace = np.ones(len(x))
     for _ in range(steps):
         if not len(x):
@@ -146,7 +146,7 @@ def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
         if (length * (pace > 1e-3) < 1e-7).all():
             break
         there = to_set(space, x + pace[:, None] * tangent, 12)
-        now, then = (np.linalg.norm(p - space.home, axis=1) for p in (x, there))
+        now, then = (np.linalg.norm(p - space.start, axis=1) for p in (x, there))
         better = (then < now - 1e-4 * pace * length**2) & (on_set(space, there)[1] < 1e-9)
         x = np.where(better[:, None], there, x)
         pace = np.where(better, np.minimum(1.0, 2.0 * pace), 0.25 * pace)
@@ -154,7 +154,7 @@ def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
 
 
 def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
-    """Joints at a limit beyond which the set comes nearer to home."""
+    """Joints at a limit beyond which the set comes nearer to the start."""
     tight = 1e-9
     low, high = x <= space.lower + tight, x >= space.upper - tight
     held = low | high
@@ -164,7 +164,7 @@ def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
             break
         # multipliers of the set from the joints that are free; then each limit must push inwards
         normals = np.where(held[:, None], 0.0, G)
-        back = x - space.home
+        back = x - space.start
         inverse = np.linalg.pinv(normals, rcond=_WEAK)
         lam = -np.einsum("aie,ai->ae", inverse, np.where(held, 0.0, back))
         push = back + np.einsum("aei,ae->ai", G, lam)
@@ -176,13 +176,13 @@ def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
 
 
 def _tangent(space: SearchSpace, x: Array) -> Array:
-    """The way home along the set and inside the limits."""
+    """The difference to the start along the set and inside the limits."""
     G = on_set(space, x)[2]
     held = np.zeros(x.shape, dtype=bool)
     tangent = np.zeros(x.shape)
     for _ in range(x.shape[1] + 1):
         normals, _ = normals_of(np.where(held[:, None], 0.0, G))
-        back = np.where(held, 0.0, space.home - x)
+        back = np.where(held, 0.0, space.start - x)
         tangent = back - np.einsum("ari,ar->ai", normals, np.einsum("ari,ai->ar", normals, back))
         leaves = ~held & (
             ((x <= space.lower) & (tangent < 0.0)) | ((x >= space.upper) & (tangent > 0.0))
@@ -223,13 +223,13 @@ def _polished(space: SearchSpace, x: Array) -> Array:
 
 
 def _conditions(space: SearchSpace, x: Array, held: NDArray[np.bool_]) -> Array:
-    """What must vanish, (N, n): the way home along the set plus the step to the set."""
+    """What must vanish, (N, n): the difference to the start along the set plus the step to it."""
     S, _, G = on_set(space, x)
     G = np.where(held[:, None], 0.0, G)
     U, size, Vt = np.linalg.svd(G, full_matrices=False)
     counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
     inverse = np.where(counts, 1.0 / np.where(counts, size, 1.0), 0.0)
     to_set = np.einsum("ari,ar->ai", Vt, inverse * np.einsum("aer,ae->ar", U, S))
-    back = np.where(held, 0.0, x - space.home)
+    back = np.where(held, 0.0, x - space.start)
     across = np.einsum("ari,ar->ai", Vt, counts * np.einsum("ari,ai->ar", Vt, back))
     return back - across + to_set

@@ -1,4 +1,4 @@
-"""The task whose rank is asked for: which frame, which components, and in which units they compare.
+"""The task of a rank: frame, components, and the units in which they compare.
 
 Rows of a Jacobian are in metres and radians per unit of a joint, and joints turn or slide. Singular
 values mean something only once they are numbers without a unit: linear rows are divided by a

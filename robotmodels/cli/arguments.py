@@ -1,8 +1,11 @@
-"""Lists of numbers on the command line: ``--q 0.1 -0.5``, ``--q 0.1,-0.5`` and ``--q=-0.5,0.1``."""
+"""Arguments that commands share: the robot, numbers and postures, columns and units of files."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +13,53 @@ from .._arrays import Array
 from ..errors import InvalidValueError, nearest_names
 from ..geometry import REVOLUTE
 from ..model import RobotModel
+from ..robots import load
+from ..symoro import read_par
+
+
+def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
+    """Add the argument that names a robot, and the options for URDF files."""
+    text = "a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
+    if option:
+        parser.add_argument("--robot", required=True, help=text)
+    else:
+        parser.add_argument("robot", help=text)
+    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
+    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
+    parser.add_argument(
+        "--package-dir", action="append", default=[], metavar="FOLDER",
+        help="URDF only: folder that holds packages with meshes; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--mimic", action="store_true",
+                        help="URDF only: mimic joints follow their masters; without it they move "
+                        "by themselves")  # fmt: skip
+
+
+def robot_of(arguments: argparse.Namespace) -> RobotModel:
+    """Load the robot of the command line."""
+    name = arguments.robot
+    suffix = Path(name).suffix.lower()
+    if suffix != ".par" and Path(name).is_dir():
+        raise InvalidValueError(f"{name!r} is a folder; give a robot's name or file.")
+    if suffix == ".par":
+        return read_par(name)
+    if suffix in (".urdf", ".xml", ".xacro"):
+        return RobotModel.from_urdf(
+            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir,
+            mimic=arguments.mimic,
+        )  # fmt: skip
+    if arguments.base_link or arguments.tip_link or arguments.package_dir or arguments.mimic:
+        raise InvalidValueError(
+            f"--base-link, --tip-link, --package-dir and --mimic are for URDF files; {name!r} is a "
+            "name of the catalogue."
+        )
+    if suffix and Path(name).exists():
+        raise InvalidValueError(
+            f"{name!r}: robots are read from files named .urdf, .xml, .xacro or .par; to see the "
+            "names of the catalogue run robotmodels robots."
+        )
+    return load(name)
+
 
 NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
@@ -96,3 +146,37 @@ def _is_list(word: str) -> bool:
         return bool([float(number) for number in _words(word)])
     except ValueError:
         return False
+
+
+def column(word: str) -> int | str:
+    """Column by its number or its name."""
+    return int(word) if word.lstrip("-").isdecimal() else word
+
+
+def columns(words: list[str] | None) -> list[int | str] | None:
+    """Columns of an option that may be missing."""
+    return None if words is None else [column(word) for word in words]
+
+
+def add_units(files: Any) -> None:
+    """Add the options for the units of angles and lengths."""
+    for option, units, of in (
+        ("--angles", ("rad", "deg"), "angles"),
+        ("--lengths", ("m", "mm"), "lengths, also of prismatic joints,"),
+    ):
+        files.add_argument(option, choices=units, default=units[0],
+                           help=f"unit of {of} in the files (default: %(default)s)")  # fmt: skip
+
+
+def add_delimiter(files: Any) -> None:
+    """Add the option of the delimiter."""
+    files.add_argument("--delimiter", type=_character, metavar="CHARACTER",
+                       help=r"between cells, \t for a tab (default: ; tab or , as "
+                       "found)")  # fmt: skip
+
+
+def _character(text: str) -> str:
+    text = text.replace(r"\t", "\t")
+    if len(text) != 1:
+        raise argparse.ArgumentTypeError(f"expected one character, got {text!r}")
+    return text

@@ -1,4 +1,4 @@
-"""What a call asks of an inverse model, checked at the border: mask, tolerances, locked joints."""
+"""Checks of the arguments of an inverse model: poses, mask, tolerances, locked joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from operator import index
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_floats
@@ -22,8 +22,6 @@ FARTHEST = 1e6
 """Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
 FARTHEST_POSITION = 1e100
 """Largest coordinate of a position [m]: beyond, squares of squares of lengths are no numbers."""
-IMPROPER = -1000
-"""What the kernel of plans says of a pose or reference that the border has to look at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,25 +33,6 @@ class Task:
     locks: tuple[tuple[int, float], ...] = ()
     by_arm_angle: bool = False
     relations: tuple[tuple[tuple[float, ...], float], ...] = ()
-
-
-def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
-    """The components asked for."""
-    if mask is None:
-        return np.ones(6, dtype=np.bool_)
-    given = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
-    flags = given or (isinstance(mask, (list, tuple)) and set(map(type, mask)) == {bool})
-    numbers = as_floats(np.asarray(mask, np.float64) if flags else mask, "mask")
-    if numbers.shape != (6,):
-        raise ShapeError(f"mask: expected six numbers x y z rx ry rz, got shape {numbers.shape}.")
-    if not np.isin(numbers, (0.0, 1.0)).all():
-        raise InvalidValueError(
-            f"mask: expected zeros and ones, got {numbers.tolist()}; a component is either asked "
-            "for or not, it has no weight."
-        )
-    if not numbers.any():
-        raise InvalidValueError("mask: all six are 0, so nothing is asked for.")
-    return numbers == 1.0
 
 
 def poses_of(T: ArrayLike) -> Array:

@@ -1,11 +1,11 @@
-"""Expressions in print: text that is Python as well, and LaTeX, ordered as the book orders them."""
+"""Expressions in print: text that is Python as well, ordered as the book orders them."""
 
 from __future__ import annotations
 
 from itertools import groupby
 
 from .expressions import ONE, Expression, Graph, Kind
-from .prose import number as number_line
+from .typeset import number
 
 _RANK = {Kind.ONE: 0, Kind.JOINT: 1, Kind.NAMED: 1, Kind.POSE: 2, Kind.CONSTANT: 3, Kind.PRODUCT: 4,
          Kind.SUM: 5}  # fmt: skip
@@ -14,8 +14,8 @@ _RANK = {Kind.ONE: 0, Kind.JOINT: 1, Kind.NAMED: 1, Kind.POSE: 2, Kind.CONSTANT:
 class Writer:
     """Writes the expressions of one graph."""
 
-    def __init__(self, graph: Graph, latex: bool) -> None:
-        self.graph, self.latex = graph, latex
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
 
     def __call__(self, e: Expression) -> str:
         """An expression."""
@@ -36,14 +36,12 @@ class Writer:
         if e == (-1.0, ONE):
             return f"-{symbol}"
         terms = self._terms(e)
-        times = r" \, " if self.latex else "*"
         if len(terms) == 1:
             sign, words = terms[0]
-            return f"{'-' if sign < 0 else ''}{words}{times}{symbol}"
-        left, right = (r"\left(", r"\right)") if self.latex else ("(", ")")
+            return f"{'-' if sign < 0 else ''}{words}*{symbol}"
         sign = "-" if all(sign < 0 for sign, _ in terms) else ""
         inner = self((-e[0], e[1])) if sign else self(e)
-        return f"{sign}{left}{inner}{right}{times}{symbol}"
+        return f"{sign}({inner})*{symbol}"
 
     def sum(self, terms: list[tuple[Expression, str]]) -> str:
         """Expressions times symbols (1 for an empty one), added."""
@@ -110,26 +108,14 @@ class Writer:
             Kind.SUM, Kind.PRODUCT
         ) else []  # fmt: skip
 
-    def _term(self, number: float, node: int) -> str:
+    def _term(self, factor: float, node: int) -> str:
         item = self.graph.nodes[node]
         factors = [n for _, n in item.parts] if item.kind is Kind.PRODUCT else [node]
         factors.sort(key=lambda n: (_RANK[self.graph.nodes[n].kind], self.graph.nodes[n].name, n))
-        words = []
-        if number != 1.0 or node == ONE:
-            printed = number_line(number)
-            words.append(printed.latex if self.latex else printed.text)
+        words = [number(factor)] if factor != 1.0 or node == ONE else []
         for n, equal in groupby(n for n in factors if n != ONE):
+            of = self.graph.nodes[n]
+            text = f"({self((1.0, n))})" if of.kind is Kind.SUM else of.name
             power = len(list(equal))
-            words.append(self._factor(n, power))
-        return (r" \, " if self.latex else "*").join(words)
-
-    def _factor(self, n: int, power: int) -> str:
-        node = self.graph.nodes[n]
-        if node.kind is Kind.SUM:
-            left, right = (r"\left(", r"\right)") if self.latex else ("(", ")")
-            text = f"{left}{self((1.0, n))}{right}"
-        else:
-            text = node.latex if self.latex else node.name
-        if power == 1:
-            return text
-        return f"{text}^{{{power}}}" if self.latex else f"{text}**{power}"
+            words.append(text if power == 1 else f"{text}**{power}")
+        return "*".join(words)

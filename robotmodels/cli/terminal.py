@@ -1,4 +1,4 @@
-"""Standard output and error: terminals without Unicode, readers that stop, warnings in one line."""
+"""The command's ends at the terminal: exit statuses, streams, warnings, interrupts."""
 
 from __future__ import annotations
 
@@ -7,11 +7,54 @@ import contextlib
 import io
 import os
 import sys
+import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from enum import IntEnum
 from typing import Any
 
 from ..errors import RobotModelsWarning
+
+
+class ExitStatus(IntEnum):
+    """The number that a command returns to the shell."""
+
+    DONE = 0
+    NOT_REACHED = 1
+    WRONG_INPUT = 2
+    BUG = 70
+    INTERRUPTED = 130
+
+    @property
+    def sentence(self) -> str:
+        """What the number means, in words."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    ExitStatus.DONE: "done",
+    ExitStatus.NOT_REACHED: "the mathematics has no answer: a pose out of reach, a fit that has "
+    "not converged or predicts badly, no motion within the limits",
+    ExitStatus.WRONG_INPUT: "an argument or a file is wrong, or an optional package is missing",
+    ExitStatus.BUG: "an error inside robotmodels; --traceback shows where",
+    ExitStatus.INTERRUPTED: "interrupted (Ctrl-C)",
+}
+
+
+def statuses() -> str:
+    """Every exit status with its meaning, for ``robotmodels --help``."""
+    lines = (
+        textwrap.fill(f"  {one.value:<4} {one.sentence}", 78, subsequent_indent=" " * 7)
+        for one in ExitStatus
+    )
+    return "\n".join(["exit status:", *lines])
+
+
+def ending(examples: str, not_reached: str | None = None) -> str:
+    """End of a command's help: examples and exit statuses."""
+    middle = "" if not_reached is None else f"1 {not_reached}, "
+    return f"{examples}\n\nExit status: 0 done, {middle}2 an argument or a file is wrong."
+
 
 _PLAIN = str.maketrans(
     {"│": "|", "─": "-", "σ": "s", "α": "a", "β": "b", "γ": "g", "μ": "m", "θ": "t", "π": "pi",
@@ -69,3 +112,23 @@ def give_up_output() -> None:
     """Nothing more can be written: keep Python from complaining about it at exit."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextlib.contextmanager
+def noticed() -> Iterator[Callable[[], bool]]:
+    """Context that raises interrupts which Python would only print."""
+    lost = False
+    before = sys.unraisablehook
+
+    def hook(unraisable: Any) -> None:
+        nonlocal lost
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            lost = True
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield lambda: lost
+    finally:
+        sys.unraisablehook = before
