@@ -26,7 +26,6 @@ from benchmarks.igm_peers import Peer, peers_of
 from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
 from benchmarks.measure import Contestant, in_turns, loop
-from robotmodels.igm.by_plan import TOLERANCES
 from robotmodels.igm.known import known_arm
 
 Array = NDArray[np.float64]
@@ -88,21 +87,16 @@ def kernel(model: rm.RobotModel, T: Array) -> Callable[[], object] | None:
 
     None for arms that Paul's method does not serve.
     """
-    from robotmodels.igm._regular import regular_postures
-
     arm = known_arm(model)
-    plan, numbers = arm.plan, arm.numbers
-    if plan is None:
+    if arm.kernel is None:
         return None
-    N, S, n = len(T), plan.most, model.n
+    N, S, n = len(T), arm.most, model.n
     poses, references = np.ascontiguousarray(T), np.zeros((N, n))
     q, residual = np.empty((N, S, n)), np.empty((N, S))
-    flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
-    status = np.empty(N, np.int8)
-    return lambda: regular_postures(
-        plan.instructions, numbers, TOLERANCES, poses, references, False, plan.branch_of_way,
-        arm.joints, False, q, residual, flags, code, status,
-    )  # fmt: skip
+    marks = np.empty((N, 2 + 2 * S), np.int64)
+    return lambda: arm.kernel(
+        arm.instructions, arm.numbers, poses, references, 0, q, residual, marks
+    )
 
 
 # --- rows ----------------------------------------------------------------------------------------

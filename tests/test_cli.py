@@ -11,7 +11,7 @@ import pytest
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.cli import main
-from robotmodels.cli.numbers import joined, numbers
+from robotmodels.cli.arguments import joined, numbers
 from robotmodels.cli.option_words import in_options
 from robotmodels.cli.program import parser_of
 from robotmodels.minimal_parameters import uniform_bodies
@@ -542,7 +542,7 @@ def test_choices_are_those_of_the_package():
     """The commands list them without importing the rooms that define them."""
     from robotmodels.calibration.parameters import Compliance
     from robotmodels.cli import calibrate
-    from robotmodels.cli.identify import options
+    from robotmodels.cli import identify_options as options
     from robotmodels.estimation.losses import Loss
     from robotmodels.identification import method_names
     from robotmodels.identification.forms import EquationForm

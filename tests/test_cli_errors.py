@@ -19,9 +19,8 @@ import pytest
 import robotmodels as rm
 from robotmodels.cli import main
 from robotmodels.cli import robots as robots_command
-from robotmodels.cli.exit_status import ExitStatus
-from robotmodels.cli.output import print_json
-from robotmodels.cli.progress import progress
+from robotmodels.cli.output import print_json, progress
+from robotmodels.cli.terminal import ExitStatus
 from robotmodels.errors import UrdfWarning
 
 COMMAND = [sys.executable, "-m", "robotmodels"]
@@ -236,7 +235,7 @@ def test_the_bar_grows_and_is_taken_away(monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     with progress(SimpleNamespace(quiet=False), "fits") as bar:
         bar.steps(0, 4, "first")
-        monkeypatch.setattr("robotmodels.cli.progress._OFTEN", 0.0)
+        monkeypatch.setattr("robotmodels.cli.output._OFTEN", 0.0)
         bar.steps(2, 4, "second")
         bar.fraction(1.0)
         bar.fraction(2.0)
@@ -277,7 +276,8 @@ def test_json_of_robots_and_info(run):
         assert (data["transmission"] is None) == (model.transmission is None)
         known = model.inertia.values.any()
         assert data["total_mass"] == (model.inertia.mass.sum() if known else None)
-        assert data["frames"] == list(model.frame_names)
+        assert (data["tip"], data["frames"]) == (model.tip, list(model.frame_names))
+        np.testing.assert_array_equal([data["base"], data["tool"]], [model.base, model.tool])
 
 
 def test_json_has_no_token_that_readers_refuse(capsys):

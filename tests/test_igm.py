@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import robotmodels as rm
+from robotmodels import se3
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.igm.solutions import posture_distance
 
@@ -186,6 +187,38 @@ def test_batches_single_poses_and_nothing():
     assert pickle.loads(pickle.dumps(found)).branch.tolist() == found.branch.tolist()
     with pytest.raises(ValueError, match="read-only"):
         found.q[...] = 0
+
+
+@pytest.mark.parametrize("tolerance", [1e-9, 1.1e-9], ids=["by the plan", "by another method"])
+@pytest.mark.parametrize("given", [True, False], ids=["reference", "no reference"])
+@pytest.mark.parametrize("name", ["ur5", "lab_rrt", "planar_3r"])
+def test_solutions_within_limits_are_all_solutions_turned_and_sorted(name, given, tolerance):
+    model, rng = rm.load(name), np.random.default_rng(3)
+    low, high = -rng.uniform(1.0, 6.0, model.n), rng.uniform(1.0, 6.0, model.n)
+    model = model.with_table(model.table.replace(lower=low, upper=high))
+    T, turning = rm.dgm(model, random_q(model, 30)), model.table.sigma == 0
+    reference = rng.uniform(low, high) if given else None
+    every = rm.igm(model, T, reference, position_tolerance=tolerance)
+    found = rm.igm(model, T, reference, limits=True, position_tolerance=tolerance)
+    goal = reference if given else 0.5 * (low + high)
+    for rows, ours in zip(every.q, found.q, strict=True):
+        shortest = [distance(model, q, goal) if given else 0.0 for q in rows]
+        assert not given or np.all(np.diff([d for d in shortest if d == d]) >= 0.0)
+        expected = []
+        for q in rows[np.isfinite(rows[:, 0])].copy():
+            # of all values inside the limits the nearest to the goal
+            for j in np.flatnonzero(turning):
+                same = q[j] + 2.0 * np.pi * np.arange(-3, 4)
+                same = same[(same >= low[j]) & (same <= high[j])]
+                q[j] = same[np.abs(same - goal[j]).argmin()] if same.size else np.nan
+            if ((low <= q) & (q <= high)).all():
+                expected.append(q)
+        if given:
+            expected.sort(key=lambda q: np.linalg.norm(q - goal))
+        ours = ours[np.isfinite(ours[:, 0])]
+        np.testing.assert_allclose(ours, np.reshape(expected, ours.shape), rtol=0, atol=1e-9)
+    assert np.array_equal(found.within_limits, found.valid)
+    assert (found.count < every.count).any()
 
 
 def test_limits_shift_by_whole_turns_and_drop():
@@ -451,3 +484,50 @@ def test_a_family_whose_curve_does_not_close():
     found = checked(model, T, rm.igm(model, T, q))
     assert found.status == rm.IGMStatus.REACHED_FAMILY
     assert distance(model, found.q[0], q) < 1e-6
+
+
+def test_a_path_through_the_solutions_is_continuous():
+    model = rm.load("rx90")
+    start = [0.3, 0.4, 1.2, 0.3, 0.9, 0.3]
+    q = start + np.linspace(0.0, 1.0, 50)[:, None] * [7.0, 0.2, 0.3, -9.0, 0.3, 3.0]
+    found = rm.igm(model, rm.dgm(model, q))
+    np.testing.assert_allclose(found.path(q[0]), q, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.path(q[0] + 0.2), q, rtol=0, atol=1e-9)
+    assert found.path(q[0] + 2.0 * np.pi)[0, 0] == pytest.approx(q[0, 0] + 2.0 * np.pi)
+    T = rm.dgm(model, q)
+    T[7, :3, 3] = 9.0
+    with pytest.raises(InvalidValueError, match=r"pose 7 has no solution: .* too far"):
+        rm.igm(model, T).path(q[0])
+    with pytest.raises(ShapeError, match="poses of shape"):
+        rm.igm(model, T[0]).path(q[0])
+
+
+@pytest.mark.parametrize(
+    ("word", "mask"),
+    [
+        ("position", (1, 1, 1, 0, 0, 0)),
+        ("xyz", (1, 1, 1, 0, 0, 0)),
+        ("orientation", (0, 0, 0, 1, 1, 1)),
+    ],
+)
+def test_masks_in_words(word, mask):
+    model = rm.load("lab_trr")
+    T = rm.dgm(model, [0.1, 0.2, 0.3])
+    if word == "orientation":
+        with pytest.raises(InvalidValueError, match="position"):
+            rm.igm(model, T, mask="positions")
+        found, same = (rm.igm_numeric(model, T, mask=m, rng=1) for m in (word, mask))
+    else:
+        found, same = (rm.igm(model, T, mask=m) for m in (word, mask))
+    assert found.mask.tolist() == list(map(bool, mask))
+    np.testing.assert_array_equal(found.q, same.q)
+
+
+def test_a_typed_rotation_is_refused_with_the_function_that_mends_it():
+    model = rm.load("rx90")
+    T = rm.dgm(model, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]).round(4)
+    with pytest.raises(NotARotationError, match=r"at most 1e-06 .* `se3.nearest_pose\(T\)`"):
+        rm.igm(model, T)
+    assert rm.igm(model, se3.nearest_pose(T)).count == 8
+    with pytest.raises(NotARotationError, match="no rounded rotation"):
+        se3.nearest_pose(np.diag([1.0, 1.0, 0.9, 1.0]))

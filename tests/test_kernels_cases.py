@@ -5,9 +5,7 @@ import pytest
 from numba import njit
 
 import robotmodels as rm
-from robotmodels.igm import _homing, _prismatic
-from robotmodels.igm._arrange import AT_LIMIT
-from robotmodels.igm._regular import ordered_rows
+from robotmodels.igm import _homing
 from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.erroneous_poses import erroneous_poses
@@ -21,11 +19,10 @@ from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
 
 # Python cannot call what is inside kernels, unless it calls nothing: then as it is written
-eliminated, least_of_square, size_of, three_lengths = (
+eliminated, least_of_square, size_of = (
     getattr(kernel, "py_func", kernel)
-    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of,
-                   _prismatic.three_lengths)
-)  # fmt: skip
+    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of)
+)
 
 
 @njit
@@ -36,13 +33,6 @@ def shortest(r, m, x, work):
 @njit
 def nearest(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R):
     return nearest_inside(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R)
-
-
-@njit
-def ordered(marks, labels, references, given, joints, boxed, q, errors, flags, code, status):
-    return ordered_rows(
-        marks, labels, references, given, joints, boxed, q, errors, flags, code, status
-    )
 
 
 def accelerations_of(mass, tau):
@@ -306,20 +296,6 @@ def test_the_size_of_an_error_is_the_larger_part_that_is_asked_for():
         assert size_of(e, np.array(mask)) == size
 
 
-def test_lengths_along_three_directions(rng):
-    for _ in range(5):
-        Z, g, reference, r = rng.normal(size=(3, 3)), *rng.normal(size=(3, 3))
-        three_lengths(Z.copy(), g.copy(), reference, r)
-        np.testing.assert_allclose(r, np.linalg.solve(Z, g), rtol=1e-9, atol=1e-12)
-    # the first of two directions that are one takes its reference, the second makes up for it
-    for one, other in ((0, 1), (0, 2), (1, 2)):
-        Z, wanted = rng.normal(size=(3, 3)), rng.normal(size=3)
-        Z[:, one] = -2.0 * Z[:, other]
-        three_lengths(Z.copy(), Z @ wanted, reference, r)
-        np.testing.assert_allclose(Z @ r, Z @ wanted, rtol=0, atol=1e-12)
-        assert r[one] == reference[one]
-
-
 @pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])
 def test_velocities_inside_bounds_are_the_nearest_by_their_multipliers(rng, f, n):
     """What is missing of the wish is what the active bounds press, none of them outwards."""
@@ -392,62 +368,3 @@ def test_postures_go_on_where_they_change_least():
     q = np.array([[[0.0, 0.0], [3.1, 0.0], [1.0, 1.0]], [[0.3, 0.0], [-2.9, 0.0], [1.0, 1.3]]])
     following_postures(q, valid, periodic, 0.5, following)
     np.testing.assert_array_equal(following[0], [0, 1, 2])
-
-
-@pytest.mark.parametrize("named", [True, False], ids=["named", "not named"])
-@pytest.mark.parametrize("boxed", [False, True], ids=["free", "within limits"])
-@pytest.mark.parametrize("given", [True, False], ids=["reference", "no reference"])
-def test_postures_of_a_plan_are_ordered_as_they_are_sorted(rng, given, boxed, named):
-    N, S, n = 12, 5, 3
-    q = rng.uniform(-np.pi, np.pi, (N, S, n))
-    count = rng.integers(0, S + 1, N)
-    joints = np.array([[-2.0, -6.0, -1.0], [3.0, 6.0, 2.0], [1.0, 1.0, 0.0]])
-    references = rng.uniform(-6.0, 6.0, (N, n))
-    ways = np.array([rng.permutation(S) for _ in range(N)])
-    labels = np.array([7, 3, 9, 1, 5], np.int16) if named else np.empty(0, np.int16)
-    marks = np.column_stack((count, np.zeros(N, int), np.zeros((N, S), int), ways))
-    residual, flags = rng.random((N, S)), np.zeros((2, N, S), np.bool_)
-    code, status = np.zeros((N, S), np.int16), np.zeros(N, np.int8)
-    found, errors = q.copy(), residual.copy()
-    most = ordered(
-        marks, labels, references, int(given), joints, int(boxed), found, errors, flags, code,
-        status,
-    )  # fmt: skip
-    low, high, turns = joints[0], joints[1], joints[2] == 1.0
-    sizes = []
-    for p in range(N):
-        rows = []
-        for i in range(count[p]):
-            x = q[p, i].copy()
-            goal = references[p] if given else 0.5 * (low + high)
-            if boxed:
-                # of all values inside the limits the nearest to the goal
-                for j in np.flatnonzero(turns):
-                    same = x[j] + 2.0 * np.pi * np.arange(-3, 4)
-                    same = same[(same >= low[j] - AT_LIMIT) & (same <= high[j] + AT_LIMIT)]
-                    x[j] = same[np.abs(same - goal[j]).argmin()] if same.size else np.nan
-                if not ((x >= low - AT_LIMIT) & (x <= high + AT_LIMIT)).all():
-                    continue
-            way = x - references[p]
-            if not boxed:
-                way[turns] = np.angle(np.exp(1j * way[turns]))
-            key = np.linalg.norm(way) if given else 0.0
-            rows.append((key, labels[ways[p, i]] if named else 0, tuple(x), residual[p, i]))
-        rows.sort()
-        sizes.append(len(rows))
-        k = len(rows)
-        np.testing.assert_array_equal(flags[0, p], np.arange(S) < k)
-        if not rows:
-            continue
-        np.testing.assert_allclose(found[p, :k], [row[2] for row in rows], rtol=0, atol=1e-14)
-        np.testing.assert_array_equal(errors[p, :k], [row[3] for row in rows])
-        if named:
-            np.testing.assert_array_equal(code[p, :k], [row[1] for row in rows])
-        else:
-            ascending = sorted(row[2] for row in rows)
-            np.testing.assert_array_equal(code[p, :k], [ascending.index(row[2]) for row in rows])
-        inside = ((found[p, :k] >= low - AT_LIMIT) & (found[p, :k] <= high + AT_LIMIT)).all(axis=1)
-        np.testing.assert_array_equal(flags[1, p, :k], inside)
-        assert np.isnan(found[p, k:]).all()
-    # poses without a posture are left to others
-    assert most == -1 - max(sizes)

@@ -13,7 +13,7 @@ from robotmodels.kinematics import SingularityKind
 from robotmodels.symbolic import FormulaStatus, explain_singularities, singularity_map
 from robotmodels.symbolic.factoring import factored
 from robotmodels.symbolic.formula import formula
-from robotmodels.symbolic.polynomial_chain import PolynomialChain
+from robotmodels.symbolic.polynomials import PolynomialChain
 
 CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
 SIX = [name for name in CATALOGUE if rm.load(name).n == 6]

@@ -349,8 +349,8 @@ def test_side_joints_stand_still_on_a_path(name):
     q = start + np.linspace(0, 0.2, 15)[:, None]
     T, t = rm.dgm(tree, q), np.linspace(0, 1, 15)
     for begin in (start, None):
-        path = joint_path(tree, T, begin, t)
-        wanted = joint_path(alone, T, None if begin is None else begin[own], t)
+        path = joint_path(tree, T, begin, t=t)
+        wanted = joint_path(alone, T, None if begin is None else begin[own], t=t)
         np.testing.assert_allclose(path.q[:, own], wanted.q, atol=1e-6)
         assert np.array_equal(path.status, wanted.status)
         np.testing.assert_allclose(path.conditioning, wanted.conditioning, rtol=1e-6)

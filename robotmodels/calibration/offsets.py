@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_vector, read_only
+from .._arrays import Array, Rebuilt, as_mask, as_vector, read_only
 from ..errors import InvalidValueError
-from ..igm.asked import above_zero, mask_of
+from ..igm.request import above_zero
 from ..kinematics import dgm
 from .inverse import CorrectedSolutions, corrected_igm
 from .refinement import pose_error_slope, pose_errors
@@ -147,7 +147,7 @@ def joint_offsets(
     robot = as_calibrated(robot)
     n = robot.model.n
     commanded = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
-    requested = mask_of(mask)
+    requested = as_mask(mask)
     if not len(commanded):
         raise InvalidValueError("q: expected one configuration or more, got none.")
     wanted = dgm(robot.nominal, commanded)

@@ -11,14 +11,10 @@ from typing import TYPE_CHECKING, Any
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .columns import column, columns
-from .exit_status import ExitStatus, ending
-from .file_options import add_delimiter, add_units
-from .numbers import numbers
+from .arguments import add_delimiter, add_source, add_units, column, columns, numbers, robot_of
 from .option_words import in_options
-from .output import Report, add_output, check_output, hand_over, with_extra
-from .progress import progress
-from .source import add_source, robot_of
+from .output import Report, add_output, check_output, hand_over, progress, with_extra
+from .terminal import ExitStatus, ending
 
 if TYPE_CHECKING:
     from ..calibration import CalibrationResult, Measurement, ParameterPrior

@@ -7,8 +7,8 @@ import time
 from typing import Any
 
 from ..kernels.prepare import compile_all
-from .exit_status import ending
-from .progress import add_quiet, progress
+from .output import add_quiet, progress
+from .terminal import ending
 
 _EXAMPLES = """\
 examples:

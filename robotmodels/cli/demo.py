@@ -20,11 +20,10 @@ from ..kinematics import dgm, dkm, jacobian
 from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
-from .exit_status import ending
+from .igm import as_text
 from .info import pose_text
-from .output import check_output
-from .postures import as_text
-from .progress import add_quiet, progress
+from .output import add_quiet, check_output, progress
+from .terminal import ending
 
 _EXAMPLES = """\
 examples:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..datasets import Tx40Log
     from ..identification import IdentificationResult, Log
     from ..minimal_parameters import StandardParameters
-    from .progress import Bar
+    from .output import Bar
 
 _TERMINAL = 88  # columns, as the headings of the demonstration
 _PUBLISHED_RMSE = (6.40, 8.21, 4.13, 1.72, 2.65, 1.72)

@@ -10,11 +10,9 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .exit_status import ExitStatus, ending
-from .numbers import joint_numbers
-from .output import Report, add_output, check_output, hand_over, with_extra
-from .progress import progress
-from .source import add_source, robot_of
+from .arguments import add_source, joint_numbers, robot_of
+from .output import Report, add_output, check_output, hand_over, progress, with_extra
+from .terminal import ExitStatus, ending
 
 if TYPE_CHECKING:
     from ..identification.excitation import ExcitingTrajectory

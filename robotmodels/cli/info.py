@@ -12,9 +12,9 @@ from ..geometry import PRISMATIC
 from ..inertia import PARAMETERS
 from ..model import RobotModel
 from ..table_text import boxed, length_text
-from .exit_status import ending
+from .arguments import add_source, robot_of
 from .output import add_json, print_json
-from .source import add_source, robot_of
+from .terminal import ending
 
 _WIDTH = 88  # columns
 _EXAMPLES = """\

@@ -9,8 +9,8 @@ import textwrap
 from typing import Any
 
 from ..robots import robots, title
-from .exit_status import ending
 from .output import add_json, print_json
+from .terminal import ending
 
 _ANY = 10_000  # columns
 _PREFIX = "example-robot-data: "  # which the names say

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from .exit_status import ending
-from .numbers import posture
+from .arguments import add_source, posture, robot_of
 from .output import add_json, print_json
-from .source import add_source, robot_of
+from .terminal import ending
 
 _EXAMPLES = """\
 examples:
@@ -59,7 +58,7 @@ def add_command(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command: draw, save and open."""
     from ..viz import jog
-    from ..viz.stand_ins import with_stand_ins
+    from ..viz.meshes import with_stand_ins
 
     model = robot_of(arguments)
     q = None if arguments.q is None else posture(arguments.q, model, "--q", arguments.degrees)

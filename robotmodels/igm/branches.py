@@ -1,18 +1,23 @@
-"""Labels of postures: on which side of its shoulder, elbow and wrist singularity an arm stands."""
+"""Labels of IK solutions: the sides of the shoulder, elbow and wrist singularities."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import singledispatch
+from functools import lru_cache, singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Array
 from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
-from .fewer import FewerJoints
+from .loop import JointChain
+from .motion import axes_of
+from .reduced import FewerJoints
 from .solver import Found, Solver
 from .structure import Family
+
+Codes = NDArray[np.int16]
 
 SIDES = tuple(
     f"shoulder{shoulder} elbow{elbow} wrist{wrist}"
@@ -22,28 +27,25 @@ SIDES = tuple(
 )
 """Labels of six-joint arms with a closed form; the signs are those of three geometric products."""
 
+_POSES_AT_A_TIME = 1024
+
 
 @singledispatch
-def branches(solver: Solver, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    """Number the postures of each pose and name the numbers. Shapes: -> code (N, S)."""
+def branches(solver: Solver, found: Found) -> tuple[Codes, tuple[str, ...]]:
+    """Number the solutions of each pose and name the numbers. Shapes: -> code (N, S)."""
     return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
 
 
 @branches.register
-def _(solver: ClosedForm, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    from ._sides import sides
-
+def _(solver: ClosedForm, found: Found) -> tuple[Codes, tuple[str, ...]]:
     plan = solver.plan
-    code = np.empty(found.valid.shape, np.int16)
-    sides(
-        solver.chain.sigma, solver.chain.D, plan.order, int(plan.family is Family.PARALLEL),
-        found.q, found.valid, code,
-    )  # fmt: skip
-    return ranked(code, SIDES, found)
+    parallel = plan.family is Family.PARALLEL
+    signs = sides(solver.chain, [int(j) for j in plan.order], parallel, found.q[found.valid])
+    return ranked(_numbered(found, signs), SIDES, found)
 
 
 @branches.register
-def _(solver: FewerJoints, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+def _(solver: FewerJoints, found: Found) -> tuple[Codes, tuple[str, ...]]:
     way = solver.ways[0]
     if not isinstance(way.solver, ClosedForm):
         return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
@@ -54,33 +56,114 @@ def _(solver: FewerJoints, found: Found) -> tuple[NDArray[np.int16], tuple[str, 
 
 
 @branches.register
-def _(solver: ArmAngle, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    from ._sides import arm_sides
-
-    code = np.empty(found.valid.shape, np.int16)
-    arm_sides(solver.chain.D, found.q, found.valid, code)
-    return ranked(code, SIDES, found)
+def _(solver: ArmAngle, found: Found) -> tuple[Codes, tuple[str, ...]]:
+    signs = arm_angle_sides(solver.chain, found.q[found.valid])
+    return ranked(_numbered(found, signs), SIDES, found)
 
 
-def ranked(
-    code: NDArray[np.int16], labels: tuple[str, ...], found: Found
-) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    """Unique branch codes: postures of one code are ranked within each pose.
+def sides(chain: JointChain, order: list[int], parallel: bool, q: Array) -> tuple[Array, ...]:
+    """Products that vanish at the shoulder, elbow and wrist singularities.
+
+    Shapes: q (M, k) -> three of (M,). ``order``: three joints and three whose axes meet, or one,
+    three with parallel axes and two.
+    """
+    z, p = axes_of(chain, q)
+    a, b, c, d, e, f = order
+
+    def velocity(j: int, point: Array) -> Array:
+        return z[j] if chain.sigma[j] else _cross(z[j], point - p[j])
+
+    if parallel:
+        centre = _nearest_point(z[f], p[f], z[e], p[e])
+        elbow = _triple(z[b], p[c] - p[b], p[d] - p[c])
+        wrist = _triple(z[e], z[b], z[f])
+        return _dot(_cross(z[a], centre - p[a]), z[b]), elbow, wrist
+    centre = _nearest_point(z[d], p[d], z[e], p[e])
+    wrist = _triple(z[d], z[e], z[f])
+    u, v, w = (velocity(j, centre) for j in (a, b, c))
+    elbow = _triple(u, v, w)
+    if chain.sigma[a] or chain.sigma[b]:
+        return np.ones(len(q)), elbow, wrist
+    shoulder = _dot(u, z[b])
+    return shoulder, np.where(shoulder >= 0.0, elbow, -elbow), wrist
+
+
+@lru_cache(maxsize=64)
+def _samples(chain: JointChain) -> tuple[Array, tuple[Array, ...]]:
+    """Three angles, and the products of a shoulder, an elbow and a wrist at them.
+
+    Seven joints with a spherical shoulder (1 to 3) and wrist (5 to 7): each product depends on one
+    joint alone, as ``a + b cos q + c sin q``.
+    """
+    t: Array = 2.0 * np.pi / 3.0 * np.arange(3.0)
+    z, p = axes_of(chain, np.repeat(t[:, None], 7, axis=1))
+    shoulder = _nearest_point(z[1], p[1], z[2], p[2])
+    wrist = _nearest_point(z[5], p[5], z[4], p[4])
+    elbow = _triple(z[3], p[3] - shoulder, wrist - p[3])
+    return t, (_triple(z[0], z[1], z[2]), elbow, _triple(z[4], z[5], z[6]))
+
+
+def arm_angle_sides(chain: JointChain, q: Array) -> tuple[Array, ...]:
+    """The same for arms with an arm angle, by trigonometric interpolation in joints 2, 4, 6."""
+    t, products = _samples(chain)
+    return tuple(
+        values.sum() + 2.0 * np.cos(q[:, j, None] - t) @ values
+        for j, values in zip((1, 3, 5), products, strict=True)
+    )
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.einsum("ij,ij->i", a, b)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    i, j = [1, 2, 0], [2, 0, 1]
+    return a[:, i] * b[:, j] - a[:, j] * b[:, i]
+
+
+def _triple(a: Array, b: Array, c: Array) -> Array:
+    """``a . (b x c)``."""
+    return _dot(a, _cross(b, c))
+
+
+def _nearest_point(z: Array, p: Array, other_z: Array, other_p: Array) -> Array:
+    """Point of a line that is nearest to another; its origin if they are parallel."""
+    n = _cross(z, other_z)
+    size = _dot(n, n)
+    along = _triple(other_p - p, other_z, n) / np.where(size > 1e-12, size, np.inf)
+    return p + along[:, None] * z
+
+
+def _numbered(found: Found, products: tuple[Array, ...]) -> Codes:
+    """Number of the label in `SIDES`: 4 for shoulder-, 2 for elbow-, 1 for wrist-."""
+    code = np.full(found.valid.shape, -1, np.int16)
+    shoulder, elbow, wrist = (product < 0.0 for product in products)
+    code[found.valid] = 4 * shoulder + 2 * elbow + wrist
+    return code
+
+
+def ranked(code: Codes, labels: tuple[str, ...], found: Found) -> tuple[Codes, tuple[str, ...]]:
+    """Unique branch codes: solutions of one code are ranked by their joints within each pose.
 
     Shapes: code (N, S).
     """
-    from ._sides import ranks
-
-    if found.valid.shape[1] == 0:
-        return code, labels
-    rank = np.zeros(code.shape, np.int16)
-    ranks(found.q, found.valid, code, rank)
+    N, S = code.shape
+    rank = np.zeros(N * S, np.int64)
+    for start in range(0, N, _POSES_AT_A_TIME):
+        rows = slice(start, start + _POSES_AT_A_TIME)
+        there, q = found.valid[rows], found.q[rows]
+        same = there[:, :, None] & there[:, None] & (code[rows, :, None] == code[rows, None])
+        p, i, j = np.nonzero(same & ~np.eye(S, dtype=np.bool_))
+        # the first joint in which two solutions differ decides
+        delta = q[p, j] - q[p, i]
+        differs = np.abs(delta) > 1e-9
+        first = np.take_along_axis(delta, differs.argmax(axis=1)[:, None], axis=1)[:, 0]
+        lower = differs.any(axis=1) & (first < 0.0)
+        rank += np.bincount(((start + p) * S + i)[lower], minlength=N * S)
+    rank = rank.reshape(N, S)
     most = int(rank.max(initial=0))
-    bare = labels == ("",)
-    if bare:
+    if labels == ("",):
         named = tuple(str(r + 1) for r in range(most + 1))
     else:
         named = (*labels, *(f"{s} ({r + 1})" for r in range(1, most + 1) for s in labels))
-    unique = (code + len(labels) * rank).astype(np.int16)
-    unique[~found.valid] = -1
-    return unique, named
+    return np.where(found.valid, code + len(labels) * rank, -1).astype(np.int16), named

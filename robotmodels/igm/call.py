@@ -1,37 +1,60 @@
-"""What `igm` does: arguments checked, the family of the arm asked, the result put together."""
+"""The steps of an inverse model: check, solve by the plan or by another method, arrange."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core, as_vector, batch_rows, read_only
+from .._arrays import Array, as_core, as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .asked import FARTHEST, Task, above_zero, locks_of, mask_of, poses_of, relations_of
-from .by_plan import TOLERANCES
-from .known import known_arm, solver_for
-from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
-from .solutions import IGMSolutions
-from .solver import Tolerances
+from .arm_angle import ArmAngle, arm_angle_postures
+from .arrange import PlanRows, Rows, arranged, put, result_fields
+from .branches import branches
+from .chain import far_along_rails
+from .check import checked
+from .constraints import Components, asked_jacobians, constraints
+from .families import may_miss_solutions
+from .known import KnownArm, known_arm, solver_for
+from .loop import JointChain
+from .motion import lever
+from .paul.layout import GIVEN, IMPROPER, WITHIN_LIMITS
+from .postures import Postures
+from .redundant import Redundant
+from .request import FARTHEST, WHOLE_POSE, Task, above_zero, locks_of, poses_of, relations_of
+from .singular import complete
+from .solutions import IGMSolutions, later, of_fields
+from .solver import Found, Solver, Tolerances, nothing_found, postures
+from .status import IGMStatus
+from .unreachable import Diagnosis, diagnose
 
 NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
-"""What a result says of its method where there is none but the search."""
+"""Method of a result where there is none but the search."""
 
-_WHOLE, _EXACT = Task(), Tolerances()
 _FLOAT = np.dtype(np.float64)
-_ALL = read_only(np.ones(6), np.bool_)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """Checked request of one call."""
+
+    model: RobotModel
+    arm: KnownArm
+    task: Task
+    solver: Solver | None
+    given: bool
+    limits: bool
+    tolerances: Tolerances
 
 
 def solved(
     model: RobotModel,
     T: ArrayLike,
     q_ref: ArrayLike | None,
-    mask: ArrayLike | None,
+    mask: ArrayLike | str | None,
     mask_axes: str,
     limits: bool,
     lock: Mapping[int | str, float] | None,
@@ -41,132 +64,96 @@ def solved(
     relations: tuple[ArrayLike, ArrayLike] | None,
 ) -> IGMSolutions:
     """The inverse geometric model; see `igm`."""
+    quick = None
     if (
         mask is lock is arm_angle is relations is None
         and limits is False
         and mask_axes == "world"
         and position_tolerance == 1e-9 == orientation_tolerance
         and type(T) is np.ndarray
-        and T.shape == (4, 4)
         and type(model) is RobotModel
     ):
-        found = _single(model, T, q_ref)
-        if found is not None:
-            return found
+        quick = _unchecked(model, T, q_ref)
+        if quick is not None and quick.most >= 0:
+            return later(quick)
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     if mask_axes not in ("world", "tool"):
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
-    arm = known_arm(model)
-    extras = (mask, lock, arm_angle, relations)
-    ordinary = all(extra is None for extra in extras)
-    if ordinary and position_tolerance == 1e-9 == orientation_tolerance:
-        task, tolerances = _WHOLE, _EXACT
+    tolerances = Tolerances(
+        above_zero(position_tolerance, "position_tolerance"),
+        above_zero(orientation_tolerance, "orientation_tolerance"),
+    )
+    task = Task(
+        mask=tuple(as_mask(mask).tolist()),
+        in_tool_axes=mask_axes == "tool",
+        locks=locks_of(model, lock),
+        by_arm_angle=arm_angle is not None,
+        relations=relations_of(model, relations),
+    )
+    if relations is not None and not mask is lock is arm_angle is None:
+        raise InvalidValueError(
+            "relations: not together with mask, lock or arm_angle; a locked joint is a "
+            "relation too, with a single 1 in its row."
+        )
+    batch, poses, references = _checked(model, T, q_ref, bool(limits))
+    arm = known_arm(model, task == Task())
+    solver = solver_for(model, arm, task)
+    request = Request(model, arm, task, solver, q_ref is not None, bool(limits), tolerances)
+    periodic = arm.never if limits else arm.turns
+    if arm.plan is solver is not None and tolerances == Tolerances():
+        rows = _by_plan(request, poses, references, quick)
+    elif arm_angle is None:
+        rows = _by_family(request, poses, references)
     else:
-        tolerances = Tolerances(
-            above_zero(position_tolerance, "position_tolerance"),
-            above_zero(orientation_tolerance, "orientation_tolerance"),
-        )
-        task = Task(
-            mask=tuple(mask_of(mask).tolist()),
-            in_tool_axes=mask_axes == "tool",
-            locks=locks_of(model, lock),
-            by_arm_angle=arm_angle is not None,
-            relations=relations_of(model, relations),
-        )
-        if relations is not None and sum(extra is not None for extra in extras) > 1:
-            raise InvalidValueError(
-                "relations: not together with mask, lock or arm_angle; a locked joint is a "
-                "relation too, with a single 1 in its row."
-            )
-    given, limits = q_ref is not None, bool(limits)
-    solver = arm.plan if task is _WHOLE else None
-    rows = None
-    if solver is not None:
-        # proper arrays, which are nearly all, pass a quick look; others are told or mended
-        batch, poses, references = _as_they_are(model, T, q_ref, limits)
-        rows = rows_by_plan(arm, poses, references, given, limits)
-    if rows is None:
-        batch, poses, references = _checked(model, T, q_ref, limits)
-        solver = solver_for(model, arm, task)
-        if task is _WHOLE and solver is arm.plan is not None:
-            rows = rows_by_plan(arm, poses, references, given, limits)
-    if rows is None or rows.most < 0:
-        call = Call(model, arm, task, solver, given, limits, tolerances)
-        if rows is not None:
-            rows = rows_of_doubtful(call, poses, references, rows)
-        elif arm_angle is None:
-            rows = rows_by_family(call, poses, references)
-        else:
-            # every pose once for every angle, the angles behind
-            angles = as_core(arm_angle, (), "arm_angle")
-            psi = np.tile(angles.ravel(), poses.shape[0])
-            poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
-            batch = (*batch, *angles.shape)
-            rows = rows_by_family(call, poses, references, psi)
+        # every pose once for every angle, the angles behind
+        angles = as_core(arm_angle, (), "arm_angle")
+        psi = np.tile(angles.ravel(), poses.shape[0])
+        poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
+        batch = (*batch, *angles.shape)
+        rows = _by_family(request, poses, references, psi)
     method = NO_FAMILY if solver is None else solver.method
-    return _solutions(batch, rows, method, arm.never if limits else arm.turns, task)
+    return of_fields(result_fields(batch, rows, method, periodic, task.mask))
 
 
-def _single(model: RobotModel, T: Array, q_ref: ArrayLike | None) -> IGMSolutions | None:
-    """One pose by the plan of the arm, in as few steps as can be; None if it takes more."""
+def _unchecked(model: RobotModel, T: Array, q_ref: ArrayLike | None) -> PlanRows | None:
+    """Run the plan of the arm on arrays that are proper as they stand; None for others."""
     arm = known_arm(model)
-    kernel = arm.kernel
-    if kernel is None or T.dtype is not _FLOAT or not T.flags.c_contiguous:
+    if arm.kernel is None or T.dtype is not _FLOAT or not T.flags.c_contiguous:
         return None
-    if q_ref is None:
-        reference = arm.zero
-    elif type(q_ref) is np.ndarray and q_ref.dtype is _FLOAT and q_ref.shape == arm.turns.shape:
-        reference = np.ascontiguousarray(q_ref).reshape(1, -1)
+    if T.shape == (4, 4):
+        batch, poses = (), T.reshape(1, 4, 4)
+    elif T.shape[-2:] == (4, 4) and q_ref is None:
+        batch, poses = T.shape[:-2], T.reshape(-1, 4, 4)
     else:
         return None
-    S, n = arm.most, arm.turns.size
-    q, residual, flags = np.empty((1, S, n)), np.empty((1, S)), np.empty((2, 1, S), np.bool_)
-    code, status = np.empty((1, S), np.int16), np.empty(1, np.int8)
-    most = kernel(
-        arm.instructions, arm.numbers, TOLERANCES, T.reshape(1, 4, 4), reference,
-        q_ref is not None, arm.branch_of_way, arm.joints, False, q, residual, flags, code, status,
-    )  # fmt: skip
-    if most < 0:
-        return None
-    for array in (q, residual, flags, code, status):
-        array.setflags(write=False)
-    still = _small_still((most,))
-    loose = _small_still((most, n))
-    return IGMSolutions.checked_before(
-        q[0, :most], flags[0, 0, :most], residual[0, :most], flags[1, 0, :most], code[0, :most],
-        arm.labels, status.reshape(()), still, loose, loose, arm.method, arm.turns, _ALL, None,
-        None, None,
-    )  # fmt: skip
-
-
-def _as_they_are(
-    model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
-) -> tuple[tuple[int, ...], Array, Array]:
-    """Batch shape, poses (N, 4, 4), references (N, n); unchecked where that costs nothing."""
-    if (
-        not isinstance(T, np.ndarray)
-        or T.dtype != np.float64
-        or not T.flags.c_contiguous
-        or T.shape[-2:] != (4, 4)
-        or (q_ref is not None and T.ndim != 2)
-    ):
-        return _checked(model, T, q_ref, limits)
-    poses = T.reshape(-1, 4, 4)
     if q_ref is None:
-        return T.shape[:-2], poses, np.zeros((poses.shape[0], model.n))
-    q = np.asarray(q_ref)
-    if limits or q.dtype != np.float64 or q.shape != (model.n,) or not q.flags.c_contiguous:
-        return _checked(model, T, q_ref, limits)
-    return (), poses, q.reshape(1, -1)
+        references = arm.zero if len(poses) == 1 else np.zeros((len(poses), arm.turns.size))
+    elif type(q_ref) is np.ndarray and q_ref.dtype is _FLOAT and q_ref.shape == arm.turns.shape:
+        references = np.ascontiguousarray(q_ref).reshape(1, -1)
+    else:
+        return None
+    return _plan_rows(arm, batch, poses, references, 0 if q_ref is None else GIVEN)
+
+
+def _plan_rows(
+    arm: KnownArm, batch: tuple[int, ...], poses: Array, references: Array, mode: int
+) -> PlanRows:
+    """Run the plan. Shapes: poses (N, 4, 4), references (N, n)."""
+    N, S = len(poses), arm.most
+    q, residual = np.empty((N, S, arm.turns.size)), np.empty((N, S))
+    marks = np.empty((N, 2 + 2 * S), np.int64)
+    assert arm.kernel is not None
+    most = arm.kernel(arm.instructions, arm.numbers, poses, references, mode, q, residual, marks)
+    return PlanRows(arm, batch, q, residual, marks, most, mode)
 
 
 def _checked(
     model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
 ) -> tuple[tuple[int, ...], Array, Array]:
-    """The same, checked, or an error."""
+    """Batch shape, poses (N, 4, 4), references (N, n)."""
     poses = poses_of(T)
     flat = poses.reshape(*poses.shape[:-2], 16)
     reference = np.zeros(model.n) if q_ref is None else as_vector(q_ref, model.n, "q_ref")
@@ -181,62 +168,168 @@ def _checked(
     return batch, rows.reshape(-1, 4, 4), references
 
 
-def _solutions(
-    batch: tuple[int, ...], rows: Rows, method: str, periodic: NDArray[np.bool_], task: Task
-) -> IGMSolutions:
-    """The result of a call."""
-    most, n = rows.most, periodic.size
+def _by_plan(request: Request, poses: Array, references: Array, quick: PlanRows | None) -> Rows:
+    """Solutions by Paul's plan; poses that it is not sure of by the arm's other method."""
+    if quick is None or quick.most == IMPROPER:
+        mode = GIVEN * request.given | WITHIN_LIMITS * request.limits
+        quick = _plan_rows(request.arm, (), poses, references, mode)
+    if quick.most >= 0:
+        return quick.rows()
+    if quick.most == IMPROPER:
+        return _by_family(request, poses, references)
+    doubtful = np.flatnonzero(quick.marks[:, 1] == IGMStatus.NOT_CONVERGED)
+    part = _by_family(request, poses[doubtful], references[doubtful])
+    if doubtful.size == len(poses):
+        return part
+    return put(quick._replace(most=-1 - quick.most).rows(), doubtful, part)
 
-    def cut(array: NDArray[Any] | None, *core: int) -> NDArray[Any]:
-        shape = (*batch, most, *core)
-        if array is None:
-            return _still(shape)
-        if most < array.shape[1]:
-            array = np.ascontiguousarray(array[:, :most])
-        return frozen(array, shape)
 
-    def frozen(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-        array = array.reshape(shape)
-        array.setflags(write=False)
-        return array
+def _by_family(request: Request, poses: Array, references: Array, psi: Array | None = None) -> Rows:
+    """Solutions by the arm's solver; a numeric search gives the reason where there is none.
 
-    return IGMSolutions.checked_before(
-        cut(rows.q, n),
-        cut(rows.valid),
-        cut(rows.residual),
-        cut(rows.inside),
-        cut(rows.code),
-        rows.labels,
-        frozen(rows.status, batch),
-        cut(rows.double),
-        cut(rows.free, n),
-        cut(rows.family, n),
-        method,
-        periodic,
-        _mask_array(task.mask),
-        None,
-        None if rows.closest is None else frozen(rows.closest, (*batch, n)),
-        None if rows.missing is None else frozen(rows.missing, (*batch, 6)),
+    Shapes: poses (N, 4, 4), references (N, n), psi (N,).
+    """
+    model, arm, task = request.model, request.arm, request.task
+    U = np.ascontiguousarray(arm.to_base @ poses)
+    # locked joints are not solved for: like joints off the path they keep their reference
+    locked = [column for column, _ in task.locks]
+    if locked:
+        references = references.copy()
+        references[:, locked] = [value for _, value in task.locks]
+    columns = arm.columns[~np.isin(arm.columns, locked)]
+    found = _solved_chain(request, U, psi, np.ascontiguousarray(references[:, columns]))
+    rows = _laid_out(request, found, references, columns)
+    if request.solver is not None:
+        missing = may_miss_solutions(request.solver, U, found, references[:, columns])
+        rows.status[missing & (rows.status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
+    reasons = diagnose(
+        model, task, request.solver is None, poses, references, request.limits,
+        request.tolerances, rows.status,
+    )  # fmt: skip
+    if reasons is None:
+        return rows
+    whole = request.solver is not None and task == Task(locks=task.locks)
+    members = reasons.met & reasons.family.any(axis=1)
+    if whole and psi is None and not request.limits and members.any():
+        # the search came upon members of families: they are completed like others
+        at = reasons.rows[members]
+        part = _settled_members(
+            request, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
+        )
+        rows = _laid_out(request, found.put(at, part), references, columns)
+    lost = ~rows.valid[reasons.rows].any(axis=1)
+    rows.status[reasons.rows[lost]] = reasons.status[lost]
+    # a solution that the search came upon all the same
+    chosen = reasons.met & lost
+    if chosen.any():
+        rows = put(rows, reasons.rows[chosen], _alone(rows, reasons, chosen, model))
+    return rows._replace(closest=reasons.closest, missing=reasons.missing)
+
+
+def _alone(rows: Rows, found: Diagnosis, chosen: NDArray[np.bool_], model: RobotModel) -> Rows:
+    """Solutions of the search, one for each pose."""
+    q = found.closest[found.rows[chosen]]
+    there = np.ones((len(q), 1), np.bool_)
+    none = np.zeros((len(q), 1, q.shape[1]), np.bool_)
+    return Rows(
+        q=q[:, None],
+        valid=there,
+        residual=found.residual[chosen, None],
+        inside=np.all((model.lower <= q) & (q <= model.upper), axis=1)[:, None],
+        code=np.zeros(there.shape, np.int16),
+        status=found.status[chosen],
+        labels=rows.labels,
+        double=~there,
+        free=none,
+        family=found.family[chosen, None],
     )
 
 
-def _still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Flags none of which is set; those of a single pose are kept."""
-    return _small_still(shape) if len(shape) < 3 else _new_still(shape)
+def _laid_out(
+    request: Request, found: Postures, references: Array, columns: NDArray[np.int64]
+) -> Rows:
+    """Solutions of a chain as rows of a result, in the columns of the model."""
+    code, labels = branches(request.solver, found)
+    joints, limits = request.arm.joints, request.limits
+    return arranged(found, code, labels, columns, references, request.given, joints, limits)
 
 
-def _new_still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    # zeros that nobody touches take no time
-    flags = np.zeros(shape, np.bool_)
-    flags.setflags(write=False)
-    return flags
+def _settled_members(request: Request, U: Array, q: Array, references: Array) -> Postures:
+    """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
+    assert request.solver is not None
+    chain, there = request.solver.chain, np.ones((len(U), 1), np.bool_)
+    found = checked(chain, U, q[:, None], there, request.tolerances)
+    found.family[...] = found.valid
+    return complete(chain, U, found, references, request.tolerances)
 
 
-@lru_cache(maxsize=256)
-def _small_still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    return _new_still(shape)
+def _solved_chain(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain; poses far along rails at its base are solved beside the origin."""
+    task, solver = request.task, request.solver
+    if solver is None or task.relations or not all(task.mask[:3]):
+        return _settled(request, U, psi, references)
+    chain = solver.chain
+    moved, poses = far_along_rails(chain, U)
+    if not moved.any():
+        return _settled(request, U, psi, references)
+    found = _settled(request, poses, psi, references - moved)
+    n, s = np.nonzero(found.valid)
+    wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
+    q, residual, valid = found.q + moved[:, None], found.residual.copy(), found.valid.copy()
+    residual[n, s], valid[n, s] = wanted.met(U[n], q[n, s], request.tolerances)
+    return replace(found, q=q, residual=residual, valid=valid)
 
 
-@lru_cache(maxsize=64)
-def _mask_array(mask: tuple[bool, ...]) -> NDArray[np.bool_]:
-    return read_only(mask, np.bool_)
+def _settled(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain, infinite families settled and double roots marked."""
+    solver, tolerances = request.solver, request.tolerances
+    if solver is None:
+        found = nothing_found(len(U), 1, references.shape[1])
+    elif psi is not None:
+        if not isinstance(solver, ArmAngle):
+            if request.task.locks or request.task.mask != WHOLE_POSE:
+                raise InvalidValueError(
+                    "arm_angle: not together with a locked joint or a mask; each of them already "
+                    "says which of the infinitely many postures are meant."
+                )
+            raise InvalidValueError(
+                "arm_angle: this arm has none, which takes seven revolute joints with three axes "
+                "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
+                f"seven. It is solved by: {solver.method}."
+            )
+        found = arm_angle_postures(solver, U, psi, references, tolerances)
+        # the angle is given, so that only joints that took a reference are free
+        found.family[...] = found.free.any(axis=-1)
+    else:
+        found = postures(solver, U, references, tolerances)
+    whole = request.task.mask == WHOLE_POSE
+    if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
+        return complete(solver.chain, U, found, references, tolerances)
+    moving = np.zeros(found.q.shape, np.bool_)
+    if solver is not None and psi is None and whole:
+        from ._moving import moving_joints
+
+        chain = solver.chain
+        length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
+        sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
+        moving_joints(sigma, chain.D, length, found.q, rows, moving)
+    if solver is not None and not whole:
+        moving |= moving_for_mask(solver.chain, request.task, U, found)
+    moving |= found.free
+    return replace(found, moving=moving)
+
+
+def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
+    """Joints that move along the families of a masked task, shape (N, S, k)."""
+    moving = np.zeros(found.q.shape, np.bool_)
+    n, s = np.nonzero(found.family & found.valid)
+    if n.size == 0:
+        return moving
+    components = Components(task.mask, task.in_tool_axes)
+    J = asked_jacobians(chain, U[n], found.q[n, s], components)
+    J[:, : sum(task.mask[:3])] /= lever(chain)
+    _, sizes, rows = np.linalg.svd(J)
+    rank = np.sum(sizes > 1e-6 * sizes[:, :1], axis=1)
+    null = np.where((np.arange(chain.k) >= rank[:, None])[..., None], rows, 0.0)
+    moving[n, s] = np.abs(null).max(axis=1) > 1e-6
+    return moving

@@ -96,7 +96,8 @@ def closed_form_postures(
             pose = se3.inverse(poses[rows]) if plan.inverted else poses[rows]
             links[:, plan.slot] = plan.left @ pose @ plan.right
             concurrent_postures(
-                links, first_three, plan.meeting, plan.size, slack,
+                links, se3.inverse(plan.constants[1::-1]), int(plan.backwards), first_three,
+                plan.meeting, plan.size, slack,
                 loop_references[rows], found, marks, counts,
             )  # fmt: skip
         else:

@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, read_only
+from .chain import canonical_frames
 from .check import checked
 from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
-from .self_motion import singular_postures
-from .shortened import shortened
+from .singular import singular_postures
 from .solver import Found, Tolerances, postures
 
 MOST = 16  # solutions a six-joint arm can have at one pose
@@ -87,7 +87,7 @@ def prepare_elimination(chain: JointChain) -> EliminationArm | None:
 
 def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
     """An arm with forms that were chosen for another of the same structure."""
-    D, unit = shortened(chain)
+    D, unit = canonical_frames(chain)
     scaled = JointChain(chain.columns, read_only(chain.sigma, np.int64), read_only(D), chain.base)
     return EliminationArm(chain, scaled, unit, forms)
 

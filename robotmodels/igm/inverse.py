@@ -15,7 +15,7 @@ def igm(
     model: RobotModel,
     T: ArrayLike,
     q_ref: ArrayLike | None = None,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: str = "world",
     limits: bool = False,
     lock: Mapping[int | str, float] | None = None,
@@ -28,10 +28,10 @@ def igm(
 
     Looks at the table once, picks the family of the arm and keeps what it prepared for the next
     call with the same model: Paul's equations where they suffice; three axes that meet or three
-    that are parallel, wherever they stand in the chain; three or two prismatic joints; arms that
-    are one of these up to calibration errors; elimination to up to 16 postures for other six-joint
-    arms; virtual joints for arms of fewer joints and for masks; the arm angle or locked joints
-    for seven joints and more. ``print(found.method)`` says which.
+    that are parallel, wherever they stand in the chain; arms that are one of these up to
+    calibration errors; elimination to up to 16 postures for other six-joint arms; virtual joints
+    for arms of fewer joints and for masks; the arm angle or locked joints for seven joints and
+    more; a numeric search from many starts for the rest. ``print(found.method)`` says which.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ def igm(
         The robot.
     T : array_like, shape (..., 4, 4)
         World poses of the tool [m]. A rotation that is off by no more than 1e-6 is projected onto
-        a proper one.
+        a proper one; `se3.nearest_pose` does so for matrices with fewer digits.
     q_ref : array_like, shape (..., n), optional
         Reference postures [rad or m]; the leading axes broadcast with those of ``T``. Solutions
         are ordered by their distance to it, and joints that a pose leaves free take its value
         (0 without it; where no posture exists at that value, the nearest one where one does).
         Joints that do not move the tool keep its value (0 without it, within limits if asked for);
         they are no redundancy: the others are solved as if they were the whole arm.
-    mask : array_like, shape (6,), optional
+    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
         Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.
     mask_axes : {"world", "tool"}
@@ -90,7 +90,11 @@ def igm(
     Regular poses of an arm with a closed form take microseconds. At singular positions and beside
     them (within some 1e-6) candidates are gathered from several sides and infinite families are
     walked to the reference, which takes milliseconds. Redundant arms are quick at a ``q_ref`` from
-    which the pose can be reached; finding the nearest value that can takes a search.
+    which the pose can be reached; else the nearest value of the first free joint is searched, in
+    some 0.2 s a pose. Status ``INCOMPLETE`` says that solutions or a nearer value may be missing:
+    after that search, with relations between several joints, and where neither a closed form nor
+    elimination serves (masks that free two rotations, unless the arm turns about the asked axis
+    only; some arms with two prismatic joints).
     Poses without one are given to a short numeric search, `igm_numeric`, which says why: too far,
     too near, or the orientation not available there. An arm outside every family (more joints
     than can be solved, or a degenerate one) gets the single posture of that search, and

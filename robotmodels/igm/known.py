@@ -13,10 +13,10 @@ from .. import se3
 from .._arrays import Array, read_only
 from ..geometry import REVOLUTE
 from ..model import RobotModel
-from .asked import Task
-from .by_plan import ByPlan, numbers_for_world, plan_kernel, prepare_by_plan
+from .by_plan import ByPlan, prepare_by_plan
 from .families import prepare_task
 from .loop import joint_chain
+from .request import Task
 from .solver import Solver
 
 KEPT_TASKS = 32
@@ -39,7 +39,6 @@ class KnownArm:
     numbers: Array | None
     kernel: Callable[..., int] | None
     instructions: NDArray[np.uint32] | None
-    branch_of_way: NDArray[np.int16] | None
     labels: tuple[str, ...]
     most: int
     method: str
@@ -48,15 +47,15 @@ class KnownArm:
 
 
 # by identity: a model's hash reads all of its numbers
-_ARMS: dict[int, tuple[weakref.ref[RobotModel], KnownArm]] = {}
+_ARMS: dict[tuple[int, bool], tuple[weakref.ref[RobotModel], KnownArm]] = {}
 
 
-def known_arm(model: RobotModel) -> KnownArm:
-    """Cached solvers of a model, created on first use."""
-    key = id(model)
+def known_arm(model: RobotModel, whole: bool = True) -> KnownArm:
+    """Cached solvers of a model, created on first use; for whole poses with the plan."""
+    key = id(model), whole
     entry = _ARMS.get(key)
     if entry is None or entry[0]() is not model:
-        entry = (weakref.ref(model, lambda _: _ARMS.pop(key, None)), _prepared(model))
+        entry = (weakref.ref(model, lambda _: _ARMS.pop(key, None)), _prepared(model, whole))
         _ARMS[key] = entry
     return entry[1]
 
@@ -70,29 +69,32 @@ def solver_for(model: RobotModel, arm: KnownArm, task: Task) -> Solver | None:
     return arm.solvers[task]
 
 
-def _prepared(model: RobotModel) -> KnownArm:
+def _prepared(model: RobotModel, for_whole_poses: bool) -> KnownArm:
     chain = joint_chain(model)
     turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
     to_base = read_only(se3.inverse(model.base))
     whole = Task()
-    family = prepare_task(chain, whole)
+    family = prepare_task(chain, whole) if for_whole_poses else None
     plan = None
     if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
         plan = prepare_by_plan(chain, family)
+    joints = read_only(np.array([model.lower, model.upper, turns]))
+    numbers = None
+    if plan is not None:
+        numbers = plan.program.adapted(to_base, joints, plan.branch_of_way)
     return KnownArm(
         columns=chain.columns,
         to_base=to_base,
         turns=read_only(turns, np.bool_),
         never=read_only(np.zeros(model.n), np.bool_),
-        joints=read_only(np.array([model.lower, model.upper, turns])),
+        joints=joints,
         plan=plan,
-        numbers=None if plan is None else numbers_for_world(plan.plan, to_base),
-        kernel=None if plan is None else plan_kernel(),
-        instructions=None if plan is None else plan.instructions,
-        branch_of_way=None if plan is None else plan.branch_of_way,
+        numbers=numbers,
+        kernel=None if plan is None else plan.program.kernel,
+        instructions=None if plan is None else plan.program.plan,
         labels=() if plan is None else plan.labels,
         most=0 if plan is None else plan.most,
         method="" if plan is None else plan.method,
         zero=read_only(np.zeros((1, model.n))),
-        solvers={whole: family if plan is None else plan},
+        solvers={whole: family if plan is None else plan} if for_whole_poses else {},
     )

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import as_vector, batch_rows
+from .._arrays import as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
-from .asked import above_zero, mask_of
 from .loop import joint_chain
 from .pose_search import SearchSpace, SearchTask, pose_search, search_space
+from .request import above_zero
 from .solutions import IGMSolutions
 from .solver import Tolerances
 
@@ -29,7 +29,7 @@ def igm_numeric(
     model: RobotModel,
     T: ArrayLike,
     q0: ArrayLike | None = None,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: Literal["world", "tool"] = "world",
     position_tolerance: float = 1e-6,
     orientation_tolerance: float = 1e-6,
@@ -57,7 +57,7 @@ def igm_numeric(
         Where to start, rad or m; broadcasts with the poses. The solution found from it is usually
         near it. Joints that do not move the tool keep its value. Without it nothing is
         preferred, and such joints stay at 0 (with ``limits`` at the nearest value inside them).
-    mask : array_like, shape (6,), optional
+    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
         Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.
     mask_axes : {"world", "tool"}
@@ -125,7 +125,7 @@ def igm_numeric(
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     T = se3.as_pose(T)
-    asked = mask_of(mask)
+    asked = as_mask(mask)
     if mask_axes not in ("world", "tool"):
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
     tolerances = Tolerances(

@@ -4,21 +4,35 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import degrees, hypot
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_shape, read_only
+from .._arrays import Array, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from .status import IGMStatus
 
 _WHOLE_POSE = (True,) * 6
 _SHOWN = 8
+_WITH_SOLUTIONS = (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY, IGMStatus.INCOMPLETE)
+
+
+class _Rows(Protocol):
+    """Rows of a solver from which the fields of a result are made."""
+
+    def fields(self) -> tuple[Any, ...]: ...
+
+
+class _Later:
+    """Place of the rows of a result whose fields are made when the first of them is read."""
+
+    __slots__ = ("_rows",)
+    _rows: _Rows | None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class IGMSolutions:
+class IGMSolutions(_Later):
     """Postures that reach the poses of one call. Read-only, picklable.
 
     The leading axes are those of the poses. S is the number of rows kept for each pose: the most
@@ -125,17 +139,18 @@ class IGMSolutions:
                 raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
             object.__setattr__(self, name, array)
 
-    @classmethod
-    def checked_before(cls, *values: Any) -> Self:
-        """Build from fields, in their order, that are read-only and fit each other already.
+    if not TYPE_CHECKING:
 
-        A single pose is solved in a few microseconds; looking at every field again would cost
-        more than that.
-        """
-        result = object.__new__(cls)
-        for put, value in zip(_PUT, values, strict=True):
-            put(result, value)
-        return result
+        def __getattr__(self, name: str) -> Any:
+            # a slot without a value is a field that is not made yet
+            if name not in _PUT:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            rows = self._rows
+            if rows is not None:
+                for put, value in zip(_PUT.values(), rows.fields(), strict=True):
+                    put(self, value)
+                _PUT_ROWS(self, None)  # after the fields, for threads that read the same result
+            return object.__getattribute__(self, name)
 
     @property
     def branch(self) -> NDArray[np.str_]:
@@ -177,7 +192,7 @@ class IGMSolutions:
         """
         status, at = self._status(i)
         lacking = self.missing if self.error is None else self.error[..., 0, :]
-        if lacking is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
+        if lacking is None or status in _WITH_SOLUTIONS:
             return status.sentence
         missing = np.where(self.mask, lacking[at], 0.0)
         metres = f"{hypot(*missing[:3]):.4g} m"
@@ -229,6 +244,63 @@ class IGMSolutions:
         distance = posture_distance(rows, q[..., None, :], self.periodic)
         best = np.where(self.valid, distance, np.inf).argmin(axis=-1)
         return np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+
+    def path(self, q0: ArrayLike) -> Array:
+        """One continuous path of joint positions through the solutions of a path of poses.
+
+        Parameters
+        ----------
+        q0 : array_like, shape (n,)
+            Posture before the first pose, rad or m.
+
+        Returns
+        -------
+        ndarray, shape (N, n)
+            The solution of each pose that is nearest to the one before, as in `nearest`. Revolute
+            joints are given by the angle nearest to the one before, so that they make no jumps of
+            whole turns, unless limits were asked for.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Solutions of a single pose or of more batch axes than one; a pose without a solution;
+            ``q0`` of the wrong length, or with NaN or infinity.
+
+        See Also
+        --------
+        robotmodels.trajectories.joint_path : the same with a report of jumps and singularities.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from robotmodels.igm import igm
+        >>> from robotmodels.kinematics import dgm
+        >>> from robotmodels.robots import load
+        >>> arm, t = load("rx90"), np.linspace(0.0, 1.0, 40)[:, None]
+        >>> q = [0.0, 0.4, 1.2, 0.3, 0.9, 0.0] + t * [7.0, 0.2, 0.2, -9.0, 0.3, 1.0]
+        >>> bool(np.abs(igm(arm, dgm(arm, q)).path(q[0]) - q).max() < 1e-9)
+        True
+        """
+        if self.status.ndim != 1:
+            raise ShapeError(
+                f"path: expected the solutions of poses of shape (N, 4, 4), got poses of shape "
+                f"{(*self.status.shape, 4, 4)}."
+            )
+        lost = np.flatnonzero(self.count == 0)
+        if lost.size:
+            raise InvalidValueError(
+                f"path: pose {lost[0]} has no solution: {self.reason(int(lost[0]))} "
+                "`trajectories.joint_path` reports such poses and goes on."
+            )
+        q = as_exact(q0, self.q.shape[-1:], "q0")
+        out = np.empty((len(self.q), q.size))
+        turn = 2.0 * np.pi
+        for i, (rows, valid) in enumerate(zip(self.q, self.valid, strict=True)):
+            distance = posture_distance(rows, q, self.periodic)
+            best = rows[np.where(valid, distance, np.inf).argmin()]
+            turns = np.where(self.periodic, np.round((q - best) / turn), 0.0)
+            q = out[i] = best + turn * turns
+        return out
 
     def __repr__(self) -> str:
         poses = int(self.status.size)
@@ -285,14 +357,28 @@ def _named(what: str, joints: NDArray[np.bool_]) -> str:
     return f", {what}: " + " ".join(f"q[{m}]" for m in np.flatnonzero(joints))
 
 
-_NAMES = tuple(field.name for field in fields(IGMSolutions))
 # the slots themselves: quicker than by name
-_PUT = tuple(getattr(IGMSolutions, name).__set__ for name in _NAMES)
+_PUT = {field.name: getattr(IGMSolutions, field.name).__set__ for field in fields(IGMSolutions)}
+_PUT_ROWS = vars(_Later)["_rows"].__set__
+
+
+def of_fields(values: tuple[Any, ...]) -> IGMSolutions:
+    """A result of fields, in their order, that are read-only and fit each other already."""
+    result = object.__new__(IGMSolutions)
+    for put, value in zip(_PUT.values(), values, strict=True):
+        put(result, value)
+    return result
+
+
+def later(rows: _Rows) -> IGMSolutions:
+    """A result whose fields are made when one is read: that takes longer than to solve a pose."""
+    result = object.__new__(IGMSolutions)
+    _PUT_ROWS(result, rows)
+    return result
 
 
 def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:
     """Distance between postures; periodic joints by the shorter way round."""
-    way = a - b
-    turn = 2.0 * np.pi
-    way = np.where(periodic, way - turn * np.round(way / turn), way)
-    return np.sqrt((way * way).sum(axis=-1))
+    delta, turn = a - b, 2.0 * np.pi
+    delta = np.where(periodic, delta - turn * np.round(delta / turn), delta)
+    return np.sqrt((delta * delta).sum(axis=-1))

@@ -50,6 +50,8 @@ class LoopPlan:
     sigma: NDArray[np.int64]
     meeting: Array
     size: float
+    backwards: bool = False
+    """Whether the first three joints are solved from their other end, where two axes are simple."""
 
 
 def plan_loop(chain: JointChain) -> LoopPlan | None:
@@ -62,7 +64,7 @@ def plan_loop(chain: JointChain) -> LoopPlan | None:
             plan = _loop(chain, shift, reverse)
             for rank, found in ((0, _concurrent(plan)), (1, _parallel(plan))):
                 # plain order and a wrist at the end are preferred: fewer moves to explain
-                cost = 100 * rank + 20 * shift
+                cost = 100 * rank + 10 * (found is not None and found.backwards) + 20 * shift
                 cost += 5 * reverse
                 if found is not None and (best is None or cost < best[0]):
                     best = cost, found
@@ -114,7 +116,8 @@ def _concurrent(plan: LoopPlan) -> LoopPlan | None:
     slots = {0: plan.slot == 0, 1: plan.slot == 1}
     if (first is None and not slots[0]) or (second is None and not slots[1]):
         return None
-    return replace(plan, meeting=np.array([on_first[1], on_last[1]]))
+    backwards = not (first or slots[0]) and bool(second) and not slots[1]
+    return replace(plan, meeting=np.array([on_first[1], on_last[1]]), backwards=backwards)
 
 
 def _meets_z(point: Array, direction: Array) -> tuple[float, float] | None:

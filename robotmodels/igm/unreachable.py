@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from .. import se3
 from .._arrays import Array
 from ..model import RobotModel
-from .asked import Task
-from .lock import locked_chain
+from .chain import locked_chain
 from .loop import joint_chain
 from .pose_search import SearchTask, pose_search, search_space
+from .request import Task
 from .solver import Tolerances
 from .status import IGMStatus
 

@@ -3,7 +3,7 @@
 Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
 """
 
-from .checks import ROTATION_TOLERANCE, as_pose, as_single_pose
+from .checks import ROTATION_TOLERANCE, as_pose, as_single_pose, nearest_pose
 from .matlab import poses_from_matlab, poses_to_matlab
 from .motions import inverse, rotation, skew, translation
 from .roll_pitch_yaw import from_rpy, to_rpy
@@ -14,6 +14,7 @@ __all__ = [
     "as_single_pose",
     "from_rpy",
     "inverse",
+    "nearest_pose",
     "poses_from_matlab",
     "poses_to_matlab",
     "rotation",

@@ -11,6 +11,8 @@ from ..errors import NotARotationError, ShapeError
 
 ROTATION_TOLERANCE = 1e-6
 """Largest entry of ``R R^T - 1`` (and of ``det R - 1``) that still counts as a rotation."""
+_ROUNDED = 0.1
+"""Largest deviation of ``R R^T`` from 1 that `nearest_pose` takes for rounding."""
 
 
 def as_pose(T: Any, name: str = "T") -> Array:
@@ -62,8 +64,8 @@ def as_pose(T: Any, name: str = "T") -> Array:
         raise NotARotationError(
             f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by "
             f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
-            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Make it one first, for "
-            "example with scipy.spatial.transform.Rotation.from_matrix(R).as_matrix()."
+            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. `se3.nearest_pose(T)` makes a "
+            "typed or rounded matrix a pose."
         )
     T = T.copy()
     T[..., 3, :] = 0.0, 0.0, 0.0, 1.0
@@ -71,6 +73,43 @@ def as_pose(T: Any, name: str = "T") -> Array:
         U, _, Vt = np.linalg.svd(R)
         T[..., :3, :3] = np.where((off > 4e-15)[..., None, None], U @ Vt, R)
     return T
+
+
+def nearest_pose(T: Any) -> Array:
+    """The poses nearest to matrices with rounded rotations: typed, read from a file, averaged.
+
+    Parameters
+    ----------
+    T : array_like, shape (..., 4, 4)
+        Matrices whose 3x3 blocks are rotations to 0.1 (entries of ``R R^T - 1``), last row
+        0 0 0 1 to `ROTATION_TOLERANCE`.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        Poses with the nearest rotation (polar decomposition); positions are unchanged.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        No matrices, or too far from a rotation to be a rounded one.
+
+    Examples
+    --------
+    >>> typed = [[0.707, -0.707, 0, 0.1], [0.707, 0.707, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    >>> nearest_pose(typed)[0].round(6)
+    array([ 0.707107, -0.707107,  0.      ,  0.1     ])
+    """
+    T = as_core(getattr(T, "homogeneous", T), (4, 4), "T").copy()
+    U, sizes, Vt = np.linalg.svd(T[..., :3, :3])
+    off = float(np.abs(sizes**2 - 1.0).max(initial=0.0))
+    if off > _ROUNDED:
+        raise NotARotationError(
+            f"T: the 3x3 block is no rounded rotation: R R^T differs from 1 by {off:.2g}, "
+            f"expected at most {_ROUNDED:g}."
+        )
+    T[..., :3, :3] = U @ Vt
+    return as_pose(T)
 
 
 def as_single_pose(T: Any, name: str) -> Array:

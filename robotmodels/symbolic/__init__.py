@@ -3,11 +3,11 @@
 Seed book sections 1.2.1 and 1.3.1.3.
 """
 
-from .conditions import SingularityCondition
 from .dgm import DirectModelExplanation, SymbolicTransform, explain_dgm
 from .factor import SingularityFactor
 from .jacobian import JacobianExplanation, explain_jacobian
-from .singularities import FormulaStatus, SingularityExplanation, explain_singularities
+from .singularities import explain_singularities
+from .singularity_explanation import FormulaStatus, SingularityCondition, SingularityExplanation
 from .singularity_map import SingularityMap, singularity_map
 
 __all__ = [

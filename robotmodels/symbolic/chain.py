@@ -1,20 +1,200 @@
-"""The chain of a robot in symbols: its nodes, and the motions and products between them."""
+"""The chain of a robot in symbols: elementary motions, and their products.
+
+Rotations by multiples of a right angle are moved to the right end of a chain (they only permute
+the axes of the motions that they pass), so that rotations about parallel axes become neighbours
+and their angles add before any sine or cosine is written: C23 arises by construction and nothing
+is simplified afterwards. The chain is then multiplied out from the right, vector by vector, which
+gives the nested formulas of the book.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from math import hypot, pi
 from typing import Any
 
-from ..geometry import PRISMATIC
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import se3
+from .._arrays import Array
+from ..geometry import PRISMATIC, REVOLUTE, DHTable
 from ..model import FrameOfInterest, RobotModel
-from .moves import Move, multiplied_out, pose_moves, row_moves
+from .angles import ROUNDING, Angle
 from .notation import Notation
 
+PLANES = ((1, 2), (2, 0), (0, 1))
+"""The axes that a rotation about x, y, z mixes."""
+_GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta^{0}"}
 WORLD, TOOL = -1, -2
 """Numbers of the two nodes that are no frames of the table."""
 _ANGLES_OF_A_FORMULA = 8
 """Angles between nodes, right ones not counted, up to which products are expanded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Rot(axis, amount) if amount is an angle, Trans(axis, amount) if it is a length."""
+
+    axis: int
+    amount: Any
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a rotation."""
+        return isinstance(self.amount, Angle)
+
+    def inverse(self) -> Move:
+        """The opposite motion."""
+        return Move(self.axis, self.amount.times(-1) if self.turns else -self.amount)
+
+
+@dataclass(slots=True)
+class _Group:
+    """Successive rotations about one axis, as total angles, each followed by a translation."""
+
+    axis: int
+    stops: list[tuple[Angle, list[Any]]]
+
+
+def _normal_form(
+    moves: Iterable[Move],
+) -> tuple[list[Any], list[_Group], NDArray[np.int64]]:
+    """First translation, groups of rotations, and the rotation by right angles at the end."""
+    import sympy
+
+    start: list[Any] = [sympy.S.Zero] * 3
+    groups: list[_Group] = []
+    right = np.eye(3, dtype=np.int64)
+    for move in moves:
+        image = right[:, move.axis]
+        axis = int(np.flatnonzero(image)[0])
+        sign = int(image[axis])
+        if not move.turns:
+            offset = groups[-1].stops[-1][1] if groups else start
+            offset[axis] += sign * move.amount
+            continue
+        count = move.amount.quarters
+        if count is not None:
+            right = right @ _right_angles(move.axis, count)
+            continue
+        angle = move.amount.times(sign)
+        if not groups or groups[-1].axis != axis:
+            groups.append(_Group(axis, []))
+        stops = groups[-1].stops
+        total = stops[-1][0].plus(angle) if stops else angle
+        if stops and not any(stops[-1][1]):
+            stops.pop()
+        stops.append((total, [sympy.S.Zero] * 3))
+        # two constant angles may make a right angle, or cancel
+        if len(stops) == 1 and total.quarters is not None:
+            groups.pop()
+            right = _right_angles(axis, total.quarters) @ right
+    return start, groups, right
+
+
+def _right_angles(axis: int, count: int) -> NDArray[np.int64]:
+    i, j = PLANES[axis]
+    turn = np.eye(3, dtype=np.int64)
+    turn[i, i] = turn[j, j] = 0
+    turn[i, j], turn[j, i] = -1, 1
+    return np.linalg.matrix_power(turn, count)
+
+
+def multiplied_out(moves: Iterable[Move], notation: Notation) -> Any:
+    """Product of a chain as a 4 by 4 matrix, from the right, each column on its own."""
+    import sympy
+
+    start, groups, right = _normal_form(moves)
+    columns = [[sympy.Integer(int(v)) for v in right[:, k]] for k in range(3)]
+    point: list[Any] = [sympy.S.Zero] * 3
+    for number, group in reversed(list(enumerate(groups))):
+        *between, (angle, offset) = group.stops
+        columns = [_rotated(group.axis, angle, column, notation) for column in columns]
+        point = _rotated(group.axis, angle, _sum(offset, point), notation)
+        for angle, offset in between:
+            point = _sum(point, _rotated(group.axis, angle, offset, notation))
+        if number:
+            columns = [[notation.shortened(v) for v in column] for column in columns]
+            point = [notation.shortened(v) for v in point]
+    columns.append(_sum(start, point))
+    rows = [[column[i] for column in columns] for i in range(3)]
+    return sympy.ImmutableDenseMatrix([*rows, [0, 0, 0, 1]])
+
+
+def _sum(u: Sequence[Any], v: Sequence[Any]) -> list[Any]:
+    return [a + b for a, b in zip(u, v, strict=True)]
+
+
+def _rotated(axis: int, angle: Angle, v: Sequence[Any], notation: Notation) -> list[Any]:
+    i, j = PLANES[axis]
+    out = list(v)
+    if v[i] != 0 or v[j] != 0:
+        C, S = notation.cos_sin(angle)
+        out[i] = notation.times(C, v[i]) + notation.times(-S, v[j])
+        out[j] = notation.times(S, v[i]) + notation.times(C, v[j])
+    return out
+
+
+def row_moves(table: DHTable, j: int, notation: Notation) -> list[Move]:
+    """Elementary motions of a row, eq. [1.3] with gamma, b and beta; none that is 1."""
+    sigma = table.sigma[j - 1]
+
+    def constant(column: str, name: str) -> Any:
+        value = float(getattr(table, column)[j - 1])
+        own = (name == "TH" and sigma == REVOLUTE) or (name == "RL" and sigma == PRISMATIC)
+        joint = {"theta": f"θ{j}"}.get(column, f"{column}{j}")
+        meaning = f"the constant part of {joint}" if own else f"{column}{j}"
+        text = table.symbols.get((column, j), "")
+        meaning += f" = {text}" if text and f"{name}{j}" not in notation.new_names else ""
+        if name in _GREEK:
+            return notation.angle(f"{name}{j}", f"{_GREEK[name]}_{{{j}}}", value, meaning)
+        return notation.length(f"{name}{j}", f"{name}_{{{j}}}", value, meaning)
+
+    gamma, b, beta = constant("gamma", "G"), constant("b", "BL"), constant("beta", "B")
+    alpha, d = constant("alpha", "A"), constant("d", "D")
+    theta, r = constant("theta", "TH"), constant("r", "RL")
+    if sigma == REVOLUTE:
+        theta = notation.joint_angle(j).plus(theta)
+    elif sigma == PRISMATIC:
+        r = notation.stroke(j) + r
+    return _moves("zzyxxzz", [gamma, b, beta, alpha, d, theta, r])
+
+
+def pose_moves(R: Array, p: Array, suffix: str, of: str, notation: Notation) -> list[Move]:
+    """A constant pose as Trans(x) Trans(y) Trans(z) Rot(z) Rot(y) Rot(x); none that is 1."""
+    if hypot(R[0, 0], R[1, 0]) <= ROUNDING:  # pitch 90 degrees: the yaw is free, 0 is simplest
+        up = float(np.sign(-R[2, 0]))
+        angles = np.arctan2(-R[1, 2], R[1, 1]), up * pi / 2, 0.0
+    else:
+        angles = se3.to_rpy(R)
+    amounts: list[Any] = []
+    for axis, value in zip("xyz", p, strict=True):
+        name = f"{axis.upper()}{suffix}", f"{axis.upper()}_{{{suffix}}}"
+        amounts.append(notation.length(*name, value, f"{axis} of the {of}"))
+    for axis, value in zip("zyx", angles[::-1], strict=True):
+        name = f"A{axis.upper()}{suffix}", rf"\alpha_{{{axis}{suffix}}}"
+        amounts.append(notation.angle(*name, float(value), f"angle about {axis} of the {of}"))
+    return _moves("xyzzyx", amounts)
+
+
+def _moves(axes: str, amounts: Sequence[Any]) -> list[Move]:
+    zero = Angle()
+    both = zip(axes, amounts, strict=True)
+    return [Move("xyz".index(axis), x) for axis, x in both if x not in (0, zero)]
+
+
+def motion_text(moves: Sequence[Move], notation: Notation) -> str:
+    """A chain in words, such as ``Rot(z, θ1) Trans(z, RL1)``."""
+    words = (
+        f"Rot({'xyz'[m.axis]}, {m.amount.text()})"
+        if m.turns
+        else f"Trans({'xyz'[m.axis]}, {notation.text(m.amount)})"
+        for m in moves
+    )
+    return " ".join(words) or "1"
 
 
 class Chain:

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_vector
 from ..latex_text import table_latex
 from ..model import RobotModel
-from .chain import TOOL, Chain
+from .chain import TOOL, Chain, Move, motion_text, multiplied_out
 from .explanation import Document, Explanation, FormulaNumbers, frame_label
-from .moves import Move, motion_text, multiplied_out
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from ..model import RobotModel
 from .angles import greek
 from .explanation import FormulaNumbers
 from .formula import formula
-from .polynomial_chain import PolynomialChain
-from .ring import Poly
+from .polynomials import Poly, PolynomialChain
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -64,9 +63,9 @@ class SingularityFactor:
     latex: str
     expression: Any
     joints: tuple[int, ...]
-    power: int
     unit: str
     numbers: FormulaNumbers
+    power: int = 1
     meaning: str = ""
     solved_joint: int | None = None
     solution: str = ""
@@ -124,7 +123,7 @@ class _Equation:
     C: Poly
 
 
-def factor_of(p: Poly, power: int, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
+def factor_of(p: Poly, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
     """The factor without its meaning, and the sign that was taken out of it."""
     notation = chain.notation
     expression = formula(p, chain)
@@ -137,7 +136,6 @@ def factor_of(p: Poly, power: int, chain: PolynomialChain) -> tuple[SingularityF
         latex=notation.tex(text),
         expression=expression,
         joints=tuple(chain.joints[j] for j in chain.joints_of(p)),
-        power=power,
         unit=unit_text(_length_degree(p, chain)),
         numbers=numbers_of(chain, [expression]),
     )
@@ -177,7 +175,6 @@ def long_factor(M: tuple[tuple[Poly, ...], ...], chain: PolynomialChain) -> Sing
         latex=rf"\text{{{text}}}",
         expression=None,
         joints=tuple(sorted(chain.joints[j] for j in joints)),
-        power=1,
         unit="",
         numbers=numbers_of(chain, [entries]),
         matrix=entries,

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
-from .polynomial_chain import PolynomialChain
-from .ring import Poly
+from .polynomials import Poly, PolynomialChain
 
 _LONGEST = 200
 """Polynomials of more terms are not factored beyond their sines, cosines and strokes."""

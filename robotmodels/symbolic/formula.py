@@ -9,8 +9,7 @@ from math import prod
 from typing import Any
 
 from .angles import Angle
-from .polynomial_chain import PolynomialChain
-from .ring import Poly
+from .polynomials import Poly, PolynomialChain
 
 _LONGEST = 150
 """Polynomials with more terms are written in one form only."""

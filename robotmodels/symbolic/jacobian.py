@@ -19,7 +19,7 @@ from .explanation import Document, Explanation, FormulaNumbers, aligned, equatio
 from .factor import numbers_of
 from .formula import formulas
 from .minors import ROWS, filled_entries
-from .polynomial_chain import PolynomialChain
+from .polynomials import PolynomialChain
 
 _COMPARED = 6
 """So many pairs of frames, those with the most zeros, are written out to choose among."""

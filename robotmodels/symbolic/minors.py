@@ -1,4 +1,4 @@
-"""The rows and columns of the third matrix that decide, and the frames in which they are simplest.
+"""Minors of the third matrix: those that decide about rank, and the factors that make all vanish.
 
 The determinant of a sparse square part is the product of those of the diagonal blocks of its
 block triangular form (A. L. Dulmage and N. S. Mendelsohn, "Coverings of bipartite graphs", 1958).
@@ -6,11 +6,11 @@ block triangular form (A. L. Dulmage and N. S. Mendelsohn, "Coverings of biparti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,14 @@ from ..kinematics.singular.events import random_postures
 from ..kinematics.singular.task import position_decides
 from ..model import RobotModel
 from .chain import TOOL, Chain
+from .factoring import factored
+from .polynomials import Poly, PolynomialChain
 
 ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _ZERO = 1e-11
 """Entries that stay below this in random configurations are zero."""
 _MOST_MINORS = 60
+_MOST_SETS = 300
 
 Pattern = NDArray[np.bool_]
 
@@ -182,3 +185,80 @@ def task_of(patterns: Patterns) -> Task:
 def _row_words(rows: Sequence[int]) -> str:
     *first, last = (ROWS[r] for r in rows)
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def smallest_sets(
+    minors: Sequence[Sequence[Any]],
+    chain: PolynomialChain,
+    impossible: Callable[[frozenset[Any]], bool],
+) -> list[frozenset[Any]] | None:
+    """Smallest sets of factors whose zeros are zeros of every minor; None if they are too many.
+
+    A factor is a polynomial, or the entries of a matrix whose determinant is not written out.
+    """
+    cases: list[frozenset[Any]] = [frozenset()]
+    reduced = _Reduced(chain)
+    for minor in sorted(minors, key=lambda factors: sum(map(_length, factors))):
+        grown: set[frozenset[Any]] = set()
+        for case in cases:
+            parts = [reduced(p, case) for p in minor]
+            if None in parts:
+                grown.add(case)
+            else:
+                grown |= {case | {part} for found in parts for part in found or ()}
+        grown = {option for option in grown if not impossible(option)}
+        cases = [s for s in grown if not any(other < s for other in grown)]
+        if len(cases) > _MOST_SETS:
+            return None
+    return cases
+
+
+def _length(p: Any) -> int:
+    return 10**6 if isinstance(p, tuple) else len(p)
+
+
+class _Reduced:
+    """Factors of a polynomial where some sines, cosines and strokes are zero."""
+
+    def __init__(self, chain: PolynomialChain) -> None:
+        self.chain = chain
+        self._known: dict[Any, tuple[Poly, ...] | None] = {}
+        self._partner = {a: b for pair in chain.ring.pairs for a, b in (pair, pair[::-1])}
+
+    def __call__(self, p: Any, case: frozenset[Any]) -> tuple[Any, ...] | None:
+        """Factors of which one has to vanish for p to vanish; None if p vanishes already."""
+        if p in case:
+            return None
+        if isinstance(p, tuple):
+            return (p,)
+        zeros = frozenset(k for factor in case if (k := self._generator(factor)) is not None)
+        present = self.chain.ring.occurring(p)
+        zeros &= present | {self._partner[k] for k in present if k in self._partner}
+        if not zeros:
+            return (p,)
+        if (p, zeros) not in self._known:
+            self._known[p, zeros] = self._factors(p, zeros)
+        parts = self._known[p, zeros]
+        return None if parts is None or any(part in case for part in parts) else parts
+
+    def _generator(self, p: Any) -> int | None:
+        """Number of the sine, cosine or stroke that p is."""
+        if isinstance(p, tuple) or len(p) != 1:
+            return None
+        (monomial,) = p
+        return monomial.index(1) if sum(monomial) == 1 else None
+
+    def _factors(self, p: Poly, zeros: frozenset[int]) -> tuple[Poly, ...] | None:
+        ring = self.chain.ring
+        # where a sine is zero the cosine is 1 or -1, so that its square is 1
+        units = {self._partner[k] for k in zeros if k in self._partner}
+        left = {m: c for m, c in p.items() if not any(m[k] for k in zeros)}
+        out = ring.ring(left) if left else ring.zero
+        for k in units:
+            out = ring.replaced(out, k, ring.one)
+        if not out:
+            return None
+        found = factored(out, self.chain)
+        if not found.constant:
+            return None
+        return tuple(q for q, _ in found.factors if self._generator(q) not in units)

@@ -4,30 +4,25 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector
-from ..errors import InvalidValueError
 from ..kinematics import SingularityKind
 from ..kinematics.singular.events import ArmGeometry
 from ..model import RobotModel, check_model
 from .chain import TOOL
-from .conditions import SingularityCondition, smallest_sets
-from .explanation import Document, Explanation, FormulaNumbers, equation, frame_label, prose
+from .explanation import Document, equation, frame_label, prose
 from .factor import SingularityFactor, factor_of, long_factor, numbers_of, unit_text, with_meaning
 from .factoring import factored
 from .formula import formula, formulas
 from .jacobian import reduced_name
-from .minors import ROWS, Block, Minor, Patterns, Task, task_of, triangular_blocks
+from .minors import ROWS, Block, Minor, Patterns, Task, smallest_sets, task_of, triangular_blocks
 from .notation import checked_names
-from .polynomial_chain import PolynomialChain
-from .ring import Poly
+from .polynomials import Poly, PolynomialChain
+from .singularity_explanation import FormulaStatus, SingularityCondition, SingularityExplanation
 
 _MOST_TERMS = 600
 """Determinants with more terms are not written out."""
@@ -35,143 +30,6 @@ _MOST_MINORS = 40
 _LONGEST = 300
 """Minors beyond this number, and factors with more characters, are not printed."""
 _ORDER = {kind: place for place, kind in enumerate(SingularityKind)}
-
-
-class FormulaStatus(Enum):
-    """How far the formulas go; the value is a sentence.
-
-    Examples
-    --------
-    >>> FormulaStatus.FACTORED.value
-    'The determinant is the product of the factors.'
-    """
-
-    FACTORED = "The determinant is the product of the factors."
-    NOT_FACTORED = "The determinant does not factor: it is given as the polynomial it is."
-    NOT_SOLVED = (
-        "The determinant is the product of the factors, but one of them cannot be solved for a "
-        "joint in closed form."
-    )
-    MINORS = (
-        "The matrix is not square: it loses rank where all its minors vanish, that is where every "
-        "factor of one of the conditions does."
-    )
-    TOO_LONG = (
-        "A determinant has too many terms to be written out; the factor that stands for it is "
-        "computed from its matrix."
-    )
-    TOO_MANY_FAMILIES = (
-        "The matrix is not square, and the ways in which all its minors vanish are too many to be "
-        "followed."
-    )
-    NEVER_FULL_RANK = (
-        "The matrix has less than full rank in every position: some joints move the frame alike "
-        "wherever they stand."
-    )
-    TOO_MANY_JOINTS = "The robot has so many joints that its minors are too many to be written out."
-    NO_JOINTS = "No joint moves the frame."
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SingularityExplanation(Explanation):
-    """The singular positions of a robot as formulas, made by `explain_singularities`.
-
-    Parameters
-    ----------
-    robot, frame : str
-        Names of the robot and of the frame whose motion it is.
-    status : FormulaStatus
-        How far the formulas go.
-    task : str
-        Which rows of the third matrix count, in words.
-    numbers : FormulaNumbers
-        Variables, abbreviations and the constants of this robot.
-    factors : tuple of SingularityFactor
-        Each once; for a matrix that is not square, those of the conditions.
-    conditions : tuple of SingularityCondition
-        The families of singular positions.
-    constant : float
-        ``determinant = constant * product of factor**power``; NaN for a matrix that is not square.
-    unit : str
-        Of the determinant.
-    projection, intermediate : str
-        Names of the frames i and j of the third matrix; empty where each minor has its own.
-    matrix : sympy.ImmutableDenseMatrix, shape (rows, columns), or None
-        The rows that count of the third matrix.
-    rows : tuple of int
-        Which those are, 0 to 5 for ``[v; w]``; empty where each minor has its own.
-    text, latex : str
-        All of it for people.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> rx90 = explain_singularities(load("rx90"))
-    >>> [(f.kind.value, f.text) for f in rx90.factors]
-    [('shoulder', 'S23*RL4 - C2*D3'), ('elbow', 'C3'), ('wrist', 'S5')]
-    >>> rx90.values(np.zeros((4, 6))).shape
-    (4, 3)
-    """
-
-    robot: str
-    frame: str
-    status: FormulaStatus
-    task: str
-    numbers: FormulaNumbers
-    factors: tuple[SingularityFactor, ...] = ()
-    conditions: tuple[SingularityCondition, ...] = ()
-    constant: float = float("nan")
-    unit: str = "1"
-    projection: str = ""
-    intermediate: str = ""
-    matrix: Any = None
-    rows: tuple[int, ...] = ()
-    text: str = ""
-    latex: str = ""
-
-    def values(self, q: ArrayLike) -> Array:
-        """All factors (..., number of factors) at q (..., n), each in its unit."""
-        q = as_vector(q, len(self.numbers.variables), "q")
-        if not self.factors:
-            return np.zeros((*q.shape[:-1], 0))
-        return np.stack([factor.values(q) for factor in self.factors], axis=-1)
-
-    def determinant(self, q: ArrayLike) -> Array:
-        """Determinant (...) of the square matrix that decides, at q (..., n), from the formulas.
-
-        For six joints it is the determinant of the Jacobian, sign included, for any frames, as the
-        first two of the three matrices have the determinant 1. For fewer it is that of the rows
-        that ``task`` names, in the axes of R_i. It is zero where the matrix has never full rank,
-        and an error if the matrix is not square.
-        """
-        q = as_vector(q, len(self.numbers.variables), "q")
-        if np.isnan(self.constant):
-            raise InvalidValueError(
-                f"{self.robot}: there is no determinant ({self.status.value}) Use values(q), or a "
-                "factor."
-            )
-        out = np.full(q.shape[:-1], self.constant)
-        for factor in self.factors:
-            out = out * factor.values(q) ** factor.power
-        return out
-
-    def factor(self, kind: SingularityKind) -> SingularityFactor:
-        """The only factor of a kind; an error if there is none or several."""
-        if not isinstance(kind, SingularityKind):
-            raise InvalidValueError(
-                f"kind: expected a SingularityKind such as SingularityKind.ELBOW, got {kind!r}."
-            )
-        found = [factor for factor in self.factors if factor.kind is kind]
-        if len(found) == 1:
-            return found[0]
-        known = ", ".join(f"{f.kind.value} ({f.text:.60})" for f in self.factors) or "none"
-        raise InvalidValueError(
-            f"{self.robot} has {len(found)} factors of the kind {kind.value!r}; take one of "
-            f".factors instead: {known}."
-        )
-
-    def __repr__(self) -> str:
-        return f"<SingularityExplanation of {self.robot}: {len(self.factors)} factors>"
 
 
 def explain_singularities(
@@ -327,20 +185,19 @@ class _Factors:
 
     def __init__(self, chain: PolynomialChain, arm: ArmGeometry, square: bool) -> None:
         self.chain, self.arm, self.square = chain, arm, square
-        self.signs: dict[Any, int] = {}  # taken out of each
-        self._formulas: dict[Any, SingularityFactor] = {}
+        self._drafts: dict[Any, tuple[SingularityFactor, int]] = {}
         self._complete: dict[Any, SingularityFactor] = {}
 
-    def formula(self, p: Any, power: int = 1) -> SingularityFactor:
-        """Without its meaning."""
-        if p not in self._formulas:
-            made = (long_factor(p, self.chain), 1) if isinstance(p, tuple) else None
-            self._formulas[p], self.signs[p] = made or factor_of(p, power, self.chain)
-        return self._formulas[p]
+    def draft(self, p: Any) -> tuple[SingularityFactor, int]:
+        """The factor without its meaning, and the sign that was taken out of it."""
+        if p not in self._drafts:
+            long = isinstance(p, tuple)
+            self._drafts[p] = (long_factor(p, self.chain), 1) if long else factor_of(p, self.chain)
+        return self._drafts[p]
 
-    def __call__(self, p: Any, power: int = 1) -> SingularityFactor:
+    def __call__(self, p: Any) -> SingularityFactor:
         if p not in self._complete:
-            draft = self.formula(p, power)
+            draft, _ = self.draft(p)
             self._complete[p] = with_meaning(draft, self.chain, self.arm, self.square)
         return self._complete[p]
 
@@ -354,7 +211,7 @@ class _Factors:
         for p in factors:
             if isinstance(p, tuple) or len(self.chain.joints_of(p)) != 1:
                 continue
-            factor = self.formula(p)
+            factor, _ = self.draft(p)
             if factor.never_zero:
                 return True
             if factor.solved_joint is None:
@@ -376,13 +233,13 @@ def _explained(
     arm: ArmGeometry,
 ) -> SingularityExplanation:
     book = _Factors(chain, arm, task.square)
-    constant, sets = None, None
+    constant, powers = None, {}
     expressions: list[Any] = []
     if task.square:
         ((minor, factor, powers),) = products
-        keys = [p for p, power in powers.items() if book(p, power)]
+        keys = list(powers)
         sets = [frozenset({p}) for p in keys if not book(p).never_zero]
-        signed = factor * int(np.prod([book.signs[p] ** k for p, k in powers.items()]))
+        signed = factor * int(np.prod([book.draft(p)[1] ** k for p, k in powers.items()]))
         constant = formula(signed, chain)
         expressions.append(_matrix(minor, chain))
         names = [draft.frame if node == TOOL else f"R_{node}" for node in minor[2:]]
@@ -399,7 +256,8 @@ def _explained(
             [list(product.factors) for product in products], chain, book.impossible
         )
         keys = list(dict.fromkeys(p for s in sets or () for p in s))
-    factors = tuple(book(p) for p in sorted(keys, key=book.order))
+    ordered = sorted(keys, key=book.order)
+    factors = tuple(replace(book(p), power=powers.get(p, 1)) for p in ordered)
     chain.notation.check_new_names()
     expressions += [f.expression for f in factors if f.expression is not None]
     draft = replace(
@@ -467,7 +325,7 @@ def _minor_text(product: Product, book: _Factors, chain: PolynomialChain) -> str
     name = f"rows {', '.join(ROWS[r] for r in minor.rows)}"
     if left_out:
         name = f"without joint{'s' if len(left_out) > 1 else ''} {' and '.join(left_out)}"
-    texts = [(book.formula(p).text, power) for p, power in product.factors.items()]
+    texts = [(book.draft(p)[0].text, power) for p, power in product.factors.items()]
     short = [(t if len(t) <= _LONGEST else "a long polynomial", k) for t, k in texts]
     return f"{name}: {_joined([_power(t, k) for t, k in short] or ['1'])}"
 

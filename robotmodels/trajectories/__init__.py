@@ -21,11 +21,12 @@ from .point_to_point import (
     Synchronisation,
     along_line,
     bang_bang,
+    cubic,
     linear,
+    quintic,
     smoothed_trapezoidal,
     trapezoidal,
 )
-from .polynomials import cubic, quintic
 from .pose_trajectory import PoseSamples, PoseTrajectory
 from .resolved_motion import ResolvedMotion, resolved_motion
 from .sampled import cartesian_trajectory, joint_trajectory

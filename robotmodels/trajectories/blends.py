@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .asked import ROUNDING, checked_limits, given_durations, refuse_jointless
+from .checks import ROUNDING, checked_limits, given_durations, refuse_jointless
 from .limits import MotionLimits
+from .number_text import least_shown
 from .piecewise import PiecewisePolynomial
-from .shown import least_shown
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5

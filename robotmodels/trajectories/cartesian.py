@@ -1,8 +1,35 @@
 """Motions of the tool in space: lines, circles and blended lines through poses, under limits.
 
-Seed book section 4.3. Limits are those of two quantities: translation in m, then rotation in rad,
-for instance ``MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])``; they bound the lengths
-of the vectors of velocity, acceleration and jerk.
+Parameters
+----------
+T0, T1 : array_like, shape (4, 4)
+    First and last pose, m.
+poses : array_like, shape (m, 4, 4)
+    Corners of `blended_poses`, at least two, m.
+duration : float, optional
+    Seconds; default the least that the limits allow.
+limits : MotionLimits, optional
+    Of two quantities: translation in m, then rotation in rad, for instance
+    ``MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])``; they bound the lengths of the
+    vectors of velocity, acceleration and jerk. On a circle the parts along it and towards its
+    centre are bounded together.
+law : TimeLaw or str
+    How the motion is distributed over the time; a member or its name.
+
+Returns
+-------
+PoseTrajectory
+    The motion, from rest to rest.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arrays that are no poses; neither duration nor limits; a duration below the least, which is in
+    the message; limits that the law cannot keep.
+
+References
+----------
+Seed book section 4.3.
 """
 
 from __future__ import annotations
@@ -17,17 +44,16 @@ from .._arrays import Array, as_exact, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
-from .asked import ROUNDING, given_durations, limits_along, refuse_short
 from .blends import PARABOLA, QUARTIC, schedule
+from .checks import ROUNDING, given_durations, limits_along, refuse_short
 from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits
-from .paths import BlendedPoses, FixedAxisPath, arc, line
+from .number_text import least_shown
+from .paths import BlendedPoses, FixedAxisPath, arc, line, rotation_about
 from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line, assembled, stretched
 from .pose_trajectory import PoseTrajectory
-from .rotations import rotation_about
-from .shown import least_shown
 from .trajectory import Trajectory
 
 _MOVES = ("translation", "rotation")
@@ -52,32 +78,6 @@ def straight_line(
     Also called ``ctraj``, linear interpolation with slerp, MOVEL. One law of time moves the
     position and the orientation.
 
-    Parameters
-    ----------
-    T0, T1 : array_like, shape (4, 4)
-        First and last pose, m.
-    duration : float, optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Of translation and rotation.
-    law : TimeLaw or str
-        How the motion is distributed over the time; a member or its name.
-
-    Returns
-    -------
-    PoseTrajectory
-        From ``T0`` to ``T1``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        What are no poses; neither duration nor limits; a duration below the least, which the
-        message tells; limits that the law cannot keep.
-
-    References
-    ----------
-    Seed book section 4.3.
-
     Examples
     --------
     >>> from robotmodels.se3 import rotation, translation
@@ -100,33 +100,9 @@ def circular_arc(
 ) -> PoseTrajectory:
     """Arc of the circle through three points, with a rotation about a fixed axis.
 
-    Also called MOVEC. The orientation goes from the first to the last by the shorter way,
-    whatever the arc.
-
-    Parameters
-    ----------
-    T0, T1 : array_like, shape (4, 4)
-        First and last pose, m.
-    through : array_like, shape (3,)
-        Position on the arc between them, m.
-    duration : float, optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Of translation and rotation, as in `circle`.
-    law : TimeLaw or str
-        How the motion is distributed over the time; a member or its name.
-
-    Returns
-    -------
-    PoseTrajectory
-        From ``T0`` to ``T1``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        As `straight_line`; three points on one line, or two that are the same. So near to a line
-        that the arc stands off it by less than 1e-9 of its longest side, or by less than the
-        rounding of the points, it has no plane to speak of.
+    Also called MOVEC. ``through (3,)`` is the position on the arc between the poses, m. The
+    orientation takes the shorter rotation from the first to the last. Points that are on a line to
+    within 1e-9 of their longest side, or to within their rounding, are an error.
 
     Examples
     --------
@@ -173,36 +149,9 @@ def circle(
 ) -> PoseTrajectory:
     """Circle about an axis, any angle.
 
-    Parameters
-    ----------
-    T0 : array_like, shape (4, 4)
-        First pose, m.
-    centre : array_like, shape (3,)
-        A point of the axis, m.
-    axis : array_like, shape (3,)
-        Direction of the axis, about which the tool goes round to the right.
-    angle : float
-        How far, rad.
-    duration : float, optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Of translation and rotation. Those of acceleration and jerk bound what is along the circle
-        and what is towards its centre together; the motion is the quickest of its law that keeps
-        them.
-    law : TimeLaw or str
-        How the motion is distributed over the time; a member or its name.
-    turning : bool
-        Whether the tool turns with the circle, instead of keeping its orientation.
-
-    Returns
-    -------
-    PoseTrajectory
-        From ``T0`` round the axis.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        As `straight_line`; an axis of no length, a pose on the axis.
+    The axis goes through ``centre (3,)``, m, in the direction of ``axis (3,)``; the tool turns
+    about it to the right by ``angle``, rad. With ``turning`` the orientation turns with it, instead
+    of being kept. A pose on the axis is an error.
 
     Examples
     --------
@@ -240,32 +189,12 @@ def blended_poses(
     duration: float | None = None,
     smooth: bool = False,
 ) -> PoseTrajectory:
-    """Straight lines through poses, joined by blends that leave the inner poses aside.
+    """Straight lines through poses, joined by blends that do not meet the inner poses.
 
     Position and orientation follow the same lines and the same blends. The motion passes an inner
-    position at a distance of ``blend time * change of velocity / 8`` (3/32 of it when smooth).
-
-    Parameters
-    ----------
-    poses : array_like, shape (m, 4, 4)
-        Corners, at least two, m.
-    limits : MotionLimits
-        Of the velocity and acceleration of translation and rotation.
-    duration : float, optional
-        Seconds; longer than the least, it slows the whole motion down evenly.
-    smooth : bool
-        Whether the acceleration is continuous.
-
-    Returns
-    -------
-    PoseTrajectory
-        From the first pose to the last.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Fewer than two poses, or what are none; limits of velocity or acceleration that are
-        missing or zero; a limit of jerk; a duration below the least, which the message tells.
+    position at a distance of ``blend time * change of velocity / 8`` (3/32 of it with ``smooth``
+    blends, whose acceleration is continuous). A longer ``duration`` slows the whole motion down
+    evenly; limits of jerk are refused.
 
     Examples
     --------

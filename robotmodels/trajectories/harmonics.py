@@ -89,20 +89,7 @@ class FourierSeries:
         return np.asarray(self.period * self.periods)
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives at any times.
-
-        Parameters
-        ----------
-        t : ndarray, shape (N,)
-            Times, s.
-        orders : tuple of int
-            0 position, 1 velocity, and so on.
-
-        Returns
-        -------
-        list of ndarray, shapes (N, n)
-            One for each order.
-        """
+        """Derivatives (N, n) of the orders at times t (N,), s."""
         H = len(self.a)
         c, s = _waves(t, self.period, H)
         k = (2.0 * np.pi / self.period * np.arange(1, H + 1))[:, None]
@@ -117,19 +104,11 @@ class FourierSeries:
         return out
 
     def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value of a derivative over a period, shapes (n,).
+        """Least and greatest value (n,) of a derivative over a period.
 
-        Parameters
-        ----------
-        order : int
-            0 position, 1 velocity, and so on.
-
-        Returns
-        -------
-        lower, upper : ndarray, shapes (n,)
-            At the zeros of the next derivative, which are the roots of a polynomial in
-            ``exp(i w t)``. Its last harmonics below the rounding of its largest would spoil the
-            roots: they are left out of it, and the values widened by all that this may move them.
+        They are at the zeros of the next derivative, the roots of a polynomial in ``exp(i w t)``.
+        Its last harmonics below the rounding of its largest would spoil the roots: they are left
+        out, and the values widened by their possible effect.
         """
         H, w = len(self.a), 2.0 * np.pi / self.period
         k = np.arange(1, H + 1)

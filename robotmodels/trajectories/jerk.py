@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .asked import (
+from .checks import (
     ROUNDING,
     checked_limits,
     given_durations,
@@ -25,9 +25,9 @@ from .asked import (
 )
 from .laws import TimeLaw
 from .limits import MotionLimits
+from .number_text import least_shown
 from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line
-from .shown import least_shown
 from .trajectory import Trajectory
 
 _PHASES = 9  # two that bring a start back inside the limits, and seven

@@ -16,14 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, read_only
+from .._arrays import Array, as_exact, as_floats, as_mask, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
 from ..model import RobotModel
 from .follow import continuous, follow, follow_singly
-from .path_events import PathEvent, PathEventKind, path_events
-from .path_task import Task
+from .path_events import PathEvent, PathEventKind, Task, path_events
 from .pose_trajectory import PoseTrajectory
 
 
@@ -82,18 +81,7 @@ class JointPath:
         return not any(event.kind in stops for event in self.events)
 
     def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
-        """The events of one kind.
-
-        Parameters
-        ----------
-        kind : PathEventKind
-            Which.
-
-        Returns
-        -------
-        tuple of PathEvent
-            In the order of the path.
-        """
+        """The events of a kind, in the order of the path."""
         return tuple(event for event in self.events if event.kind is kind)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
@@ -112,9 +100,10 @@ def joint_path(
     model: RobotModel,
     poses: Any,
     q_start: ArrayLike | None = None,
+    q_near: ArrayLike | None = None,
     t: ArrayLike | None = None,
     samples: int = 1000,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: Literal["world", "tool"] = "world",
     position_tolerance: float = 1e-9,
     orientation_tolerance: float = 1e-9,
@@ -139,11 +128,14 @@ def joint_path(
         Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
         value (without it 0, or the nearest value inside their limits). A
         first posture that is more than 0.1 away from it is reported as a jump.
+    q_near : array_like, shape (n,), optional
+        A guess instead of ``q_start``: the path begins with the solution of the first pose that is
+        nearest to it, however far that is.
     t : array_like, shape (N,), optional
         Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
         Into how many poses a `PoseTrajectory` is divided.
-    mask : array_like, shape (6,), optional
+    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
         Ones for the components ``x y z rx ry rz`` that are asked for, as in `igm`.
     mask_axes : {"world", "tool"}
         Axes of the components.
@@ -181,7 +173,10 @@ def joint_path(
     """
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    if q_start is not None and q_near is not None:
+        raise InvalidValueError("q_near: it takes the place of q_start; give one of them.")
     start = None if q_start is None else as_exact(q_start, (model.n,), "q_start")
+    near = start if q_near is None else as_exact(q_near, (model.n,), "q_near")
     motion = poses if isinstance(poses, PoseTrajectory) else None
     twists = None
     if motion is not None:
@@ -196,6 +191,7 @@ def joint_path(
         times = np.full(len(T), np.nan) if t is None else as_exact(t, (len(T),), "t")
         if (np.diff(times) <= 0.0).any():
             raise InvalidValueError("t: expected times that ascend.")
+    mask = None if mask is None else as_mask(mask)
     singular_below = float(as_floats(singular_below, "singular_below"))
     tolerances = {
         "position_tolerance": position_tolerance,
@@ -216,21 +212,20 @@ def joint_path(
             **tolerances,  # type: ignore[arg-type]
         )
 
-    asked = 6 if mask is None else int(np.count_nonzero(mask))
     columns = joint_chain(model).columns
     found = None
-    if columns.size <= asked:
+    if columns.size <= (6 if mask is None else np.count_nonzero(mask)):
         # without a reference postures come in the order of their branches
         found = solve(T, None)
     if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
-        rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
+        rows = follow(model, T, found, near, lambda i, near: solve(T[i], near))
     else:
-        rows = follow_singly(model, len(T), start, lambda i, near: solve(T[i], near), go_on)
+        rows = follow_singly(model, len(T), near, lambda i, near: solve(T[i], near), go_on)
     # joints that do not move the tool stand still: at the start, else near zero
     still = np.setdiff1d(np.arange(model.n), columns)
-    rest = np.clip(np.zeros(model.n), model.lower, model.upper) if start is None else start
+    rest = np.clip(np.zeros(model.n), model.lower, model.upper) if near is None else near
     rows.q[np.ix_(rows.reached, still)] = rest[still]
-    q = continuous(model, rows.q, rows.reached, start)
+    q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
     if twists is not None and task.square:
         v = task.rates(twists)
@@ -238,7 +233,7 @@ def joint_path(
         v = _differences(times, q, rows.reached)
     events = list(path_events(model, times, q, v, rows, task, singular_below, start))
     if motion is not None:
-        known = partial(_reached, motion, lambda pose: solve(pose, start))
+        known = partial(_reached, motion, lambda pose: solve(pose, near))
         events = [_located(event, times, known) for event in events]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 

@@ -89,26 +89,7 @@ class MotionLimits:
     def of_model(
         cls, model: RobotModel, acceleration: ArrayLike = np.inf, jerk: ArrayLike = np.inf
     ) -> Self:
-        """Limits of a robot: positions and velocities from its table, the others as given.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        acceleration, jerk : array_like, shape () or (n,)
-            Which a table does not hold, rad/s^2 and rad/s^3, or m.
-
-        Returns
-        -------
-        MotionLimits
-            Of n joints.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> MotionLimits.of_model(load("rx90"), acceleration=10.0).jerk.shape
-        (6,)
-        """
+        """Limits of a robot: positions and velocities from its table, the others as given."""
         return cls(
             velocity=model.table.velocity,
             acceleration=as_reals(acceleration, "acceleration"),
@@ -118,28 +99,7 @@ class MotionLimits:
         )
 
     def for_joints(self, n: int) -> Self:
-        """The same limits, one for each of n joints.
-
-        Parameters
-        ----------
-        n : int
-            Number of joints.
-
-        Returns
-        -------
-        MotionLimits
-            Its arrays have shape (n,).
-
-        Raises
-        ------
-        ShapeError
-            They are limits of another number of joints.
-
-        Examples
-        --------
-        >>> MotionLimits(2.0).for_joints(3).velocity
-        array([2., 2., 2.])
-        """
+        """The same limits as arrays (n,); an error if they are of another number of joints."""
         if self.velocity.shape not in ((), (1,), (n,)):
             raise ShapeError(
                 f"limits: expected limits of {n} joints, got limits of {self.velocity.size}."
@@ -153,18 +113,7 @@ class MotionLimits:
         return result
 
     def without_jerk(self) -> Self:
-        """The same limits but none of jerk, for laws whose acceleration jumps.
-
-        Returns
-        -------
-        MotionLimits
-            Of as many joints.
-
-        Examples
-        --------
-        >>> MotionLimits(1.0, 2.0, 10.0).without_jerk().jerk
-        array(inf)
-        """
+        """The same limits but none of jerk, for laws whose acceleration jumps."""
         free = np.full(self.jerk.shape, np.inf)
         return replace(self, jerk=free, jerk_lower=-free)
 
@@ -213,13 +162,7 @@ class LimitsReport:
         return need
 
     def violations(self) -> tuple[str, ...]:
-        """The limits that are not kept, one sentence each.
-
-        Returns
-        -------
-        tuple of str
-            Empty if all are kept.
-        """
+        """The limits that are not kept, one sentence each."""
         found = []
         for name, low, high, least, most in self._rows():
             n = low.shape[-1]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..se3 import skew
 from ..se3.orientation import rotation_vectors_of
-from .rotations import axis_and_angle, rotation_about
 
 
 class PosePath(Protocol):
@@ -177,3 +177,19 @@ def arc(T0: Array, T1: Array, centre: Array, normal: Array, sweep: float) -> Fix
 def _turn(T0: Array, T1: Array) -> tuple[Array, float]:
     axis, angle = axis_and_angle(rotation_vectors_of(T1[:3, :3] @ T0[:3, :3].T))
     return axis, float(angle)
+
+
+def rotation_about(axis: Array, angle: Array) -> Array:
+    """Rotations by an angle about a unit axis (Rodrigues' formula, seed eq. [1.9])."""
+    K = skew(axis)
+    angle = np.asarray(angle, dtype=np.float64)[..., None, None]
+    # 1 - cos by the half angle, which keeps its digits at small angles
+    return np.eye(3) + np.sin(angle) * K + (2.0 * np.sin(0.5 * angle) ** 2) * (K @ K)
+
+
+def axis_and_angle(vector: Array) -> tuple[Array, Array]:
+    """Unit axis and angle of rotation vectors; the axis of no rotation is z."""
+    angle = np.linalg.norm(vector, axis=-1)
+    turns = (angle > 0.0)[..., None]
+    axis = np.where(turns, vector / np.where(turns, angle[..., None], 1.0), (0.0, 0.0, 1.0))
+    return axis, angle

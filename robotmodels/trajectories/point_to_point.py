@@ -1,4 +1,46 @@
-"""Joint motions from rest to rest on the straight line between two postures."""
+"""Joint motions between two states: six laws of time, coordinated or of the same time.
+
+Every function of this file returns the motion by one law. ``linear``, ``bang_bang``,
+``trapezoidal`` and ``smoothed_trapezoidal`` go from rest to rest on the straight line between two
+configurations; ``cubic`` and ``quintic`` may have other states at their ends, which give every
+joint its own polynomial of the same duration.
+
+Parameters
+----------
+law : TimeLaw or str
+    Of `along_line`: a member or its name.
+q0, q1 : array_like, shape () or (..., n)
+    Positions at the ends, rad or m; leading axes are motions of their own.
+duration : array_like, shape () or (...), optional
+    Seconds; default the least with which the law keeps the limits. A longer one slows the quickest
+    motion down evenly.
+limits : MotionLimits, optional
+    Of velocity, acceleration, jerk and position, kept inside the motion; they may be asymmetric.
+    Coordinated joints share the law that none of them exceeds. Independent joints that arrive
+    early have the end of their law inside the motion: limits that its jump does not keep are
+    refused.
+synchronisation : Synchronisation or str
+    How the joints are kept in step; a member or its name.
+v0, v1, a0, a1 : array_like, shape () or (..., n)
+    Velocities and accelerations at the ends, rad or m, per s and s^2.
+
+Returns
+-------
+Trajectory
+    Of n joints, or scalar.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Vectors that do not fit, NaN; neither duration nor limits; a duration with which the limits are
+    not kept (the message has the least that keeps them, or that none does); a limit of zero for a
+    joint that has to move; a limit of jerk for ``bang_bang`` and ``trapezoidal``.
+
+References
+----------
+Seed book section 4.2. Khalil and Dombre, Modeling, identification and control of robots, section
+13.3.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +52,19 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .asked import (
+from .between_states import motion_between
+from .checks import (
     checked_limits,
     given_durations,
     joint_vectors,
     limits_along,
-    refuse_rates,
+    refuse_extremes,
     refuse_short,
 )
 from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .trajectory import Trajectory
-
-_LONGEST = 1e300
-"""Of a way, so that ten times its polynomial's largest coefficient is a number."""
 
 
 class Synchronisation(Enum):
@@ -50,33 +90,7 @@ def linear(
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Constant velocity. It jumps at both ends: no acceleration limit holds there.
-
-    Parameters
-    ----------
-    q0, q1 : array_like, shape () or (..., n)
-        Postures, rad or m; leading axes are motions of their own.
-    duration : array_like, shape () or (...), optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Kept inside the motion, so that of velocity alone tells here.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors that do not fit, NaN; neither duration nor limits; a duration below the least,
-        which the message tells; a limit of zero for a joint that has to move.
-
-    References
-    ----------
-    Khalil and Dombre, Modeling, identification and control of robots, section 13.3.1.
+    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there.
 
     Examples
     --------
@@ -93,36 +107,10 @@ def bang_bang(
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Constant acceleration, then constant deceleration, with no cruise between them.
+    """Constant acceleration, then constant deceleration, without a cruise between them.
 
-    Parameters, errors and result as `linear`. With asymmetric limits the two parts share the
-    time so that both accelerations are used in full; without limits they are equal. A limit of
-    velocity slows the whole motion down; one of jerk is refused.
-
-    Parameters
-    ----------
-    q0, q1 : array_like, shape () or (..., n)
-        Postures, rad or m.
-    duration : array_like, shape () or (...), optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Of velocity and acceleration.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `linear`; a limit of jerk.
-
-    References
-    ----------
-    Khalil and Dombre, section 13.3.3.
+    With asymmetric limits the two parts share the time so that both accelerations are used in
+    full; without limits they are equal.
 
     Examples
     --------
@@ -141,37 +129,8 @@ def trapezoidal(
 ) -> Trajectory:
     """Trapezoidal velocity: the quickest motion under limits of velocity and acceleration.
 
-    Also called linear segment with parabolic blends, ``lspb``, ``trapezoidal``. A duration
-    longer than the least slows the quickest motion down evenly. Without limits the ramps take a
+    Also called linear segment with parabolic blends, ``lspb``. Without limits the ramps take a
     third of the duration each.
-
-    Parameters
-    ----------
-    q0, q1 : array_like, shape () or (..., n)
-        Postures, rad or m; leading axes are motions of their own.
-    duration : array_like, shape () or (...), optional
-        Seconds; default the least that the limits allow.
-    limits : MotionLimits, optional
-        Of velocity and acceleration, which may be asymmetric. Coordinated joints share the law
-        that none of them exceeds.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors that do not fit, NaN; neither duration nor limits; a duration below the least,
-        which the message tells; a limit of zero for a joint that has to move; a limit of jerk,
-        which no jump of acceleration keeps.
-
-    References
-    ----------
-    Seed book section 4.2.2. Khalil and Dombre, section 13.3.4.
 
     Examples
     --------
@@ -193,32 +152,7 @@ def smoothed_trapezoidal(
     """Smoothed trapezoidal velocity: ramps whose acceleration is a parabola of time.
 
     The acceleration is continuous, also at the ends. A ramp to the velocity V takes
-    ``1.5 V / acceleration``, or longer where a limit of jerk asks for it.
-
-    Parameters
-    ----------
-    q0, q1 : array_like, shape () or (..., n)
-        Postures, rad or m; leading axes are motions of their own.
-    duration : array_like, shape () or (...), optional
-        Seconds; default the least that the limits allow with this law.
-    limits : MotionLimits, optional
-        Of velocity, acceleration and jerk.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `trapezoidal`, but limits of jerk are kept.
-
-    References
-    ----------
-    Seed book section 4.2.3. Khalil and Dombre, section 13.3.5.
+    ``1.5 V / acceleration``, or longer where a limit of jerk needs it.
 
     Examples
     --------
@@ -227,6 +161,69 @@ def smoothed_trapezoidal(
     4.00...
     """
     return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
+
+
+def cubic(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+) -> Trajectory:
+    """Third-order polynomials with given velocities at the ends.
+
+    Examples
+    --------
+    >>> cubic([0.0, 1.0], [1.0, 0.0], duration=1.0).v(0.5)
+    array([ 1.5, -1.5])
+    >>> cubic(0.0, 1.0, limits=MotionLimits(velocity=0.75)).duration
+    2.00...
+    """
+    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
+    states |= {"a0": np.zeros_like(states["q0"]), "a1": np.zeros_like(states["q0"])}
+    if not (states["v0"].any() or states["v1"].any()):
+        return _from_rest(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
+    return motion_between(3, states, batch, scalar, duration, limits)
+
+
+def quintic(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    a0: ArrayLike = 0.0,
+    a1: ArrayLike = 0.0,
+) -> Trajectory:
+    """Fifth-order polynomials with given velocities and accelerations at the ends.
+
+    Examples
+    --------
+    >>> move = quintic([0.0, 0.0], [1.0, 2.0], duration=2.0)
+    >>> move.v(1.0), move.a(2.0)
+    (array([0.9375, 1.875 ]), array([0., 0.]))
+    >>> quintic(0.0, 1.0, limits=MotionLimits(velocity=1.875, acceleration=5.0)).duration
+    1.0745...
+    """
+    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
+    if not any(states[name].any() for name in ("v0", "v1", "a0", "a1")):
+        return _from_rest(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
+    return motion_between(5, states, batch, scalar, duration, limits)
+
+
+def _from_rest(
+    law: TimeLaw,
+    states: dict[str, Array],
+    batch: tuple[int, ...],
+    scalar: bool,
+    duration: ArrayLike | None,
+    limits: MotionLimits | None,
+) -> Trajectory:
+    shape = (*batch, states["q0"].shape[-1])
+    q0, q1 = states["q0"].reshape(shape), states["q1"].reshape(shape)
+    return Trajectory(along_line(law, q0, q1, duration, limits).motion, scalar)
 
 
 def along_line(
@@ -238,31 +235,6 @@ def along_line(
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Motion from rest to rest by any law, for programs that choose it.
-
-    Parameters
-    ----------
-    law : TimeLaw or str
-        How the motion is distributed over the time; a member or its name.
-    q0, q1 : array_like, shape () or (..., n)
-        Postures, rad or m.
-    duration : array_like, shape () or (...), or None
-        Seconds.
-    limits : MotionLimits or None
-        Kept inside the motion. Independent joints that arrive early have the end of their law
-        inside it, with the jump that a linear, cubic, bang-bang or trapezoidal law ends with:
-        limits that the jump does not keep are refused there.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `trapezoidal`.
 
     Examples
     --------
@@ -280,15 +252,11 @@ def along_line(
     bounds = checked_limits(limits, n, start, end)
     together = bounds is None or synchronisation is Synchronisation.COORDINATED
     # one law for all joints of a motion, or one law each
-    with np.errstate(over="ignore"):  # refused below
-        difference = end - start
+    refuse_extremes({"q0": start, "q1": end} | ({} if T is None else {"duration": T}), bounds)
+    difference = np.where(np.abs(end - start) < 1e-50, 0.0, end - start)
     way = difference[:, None, :] if together else difference[:, :, None]
     laws = 1 if together else n  # of each motion
     length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
-    if (length > _LONGEST).any():
-        raise InvalidValueError(
-            f"q0, q1: a way of {length.max():.3g} is too long for its polynomial to have numbers."
-        )
     with np.errstate(invalid="ignore", divide="ignore"):
         direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
     if bounds is None:
@@ -303,7 +271,6 @@ def along_line(
         if T is None and synchronisation is Synchronisation.INDEPENDENT:
             _refuse_waiting(law, along, totals)
     refuse_short(T, least, length.reshape(R, laws))
-    refuse_rates(length.reshape(R, laws), least if T is None else T)
     pieces = stretched(pieces, T, least, synchronisation, laws)
     return assembled(pieces, laws, start, direction, batch, scalar, T)
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, read_only
 from ..errors import ShapeError
+from .number_text import seconds_shown
 from .paths import PosePath
-from .shown import seconds_shown
 from .trajectory import Trajectory
 
 
@@ -73,30 +73,9 @@ class PoseTrajectory:
         return float(self.law.duration)
 
     def pose(self, t: ArrayLike) -> Array:
-        """World poses.
+        """World poses (t.shape..., 4, 4) at times t, m.
 
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s; the tool rests before and after the motion.
-
-        Returns
-        -------
-        ndarray, shape (t.shape..., 4, 4)
-            Poses, m.
-
-        Raises
-        ------
-        InvalidValueError
-            NaN, or a time outside of a motion that does not rest there.
-
-        Examples
-        --------
-        >>> from robotmodels.se3 import translation
-        >>> from robotmodels.trajectories import straight_line
-        >>> move = straight_line(np.eye(4), translation(0.2, 0, 0), duration=1.0)
-        >>> move.pose(0.5)[:3, 3]
-        array([0.1, 0. , 0. ])
+        The tool rests before and after the motion; where it does not, such a time is an error.
         """
         s = self.law.q(t)
         return self._poses(np.asarray(t, dtype=np.float64), s)
@@ -107,56 +86,18 @@ class PoseTrajectory:
         return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
 
     def twist(self, t: ArrayLike) -> Array:
-        """Velocities; arguments and errors as `pose`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (t.shape..., 6)
-            ``[v; w]`` of the tool's origin, world axes, m/s and rad/s.
-        """
+        """Velocities (t.shape..., 6), ``[v; w]`` of the tool's origin in world axes."""
         s, v = self.law.q(t), self.law.v(t)
         return self.path.rates(s.reshape(-1))[0].reshape(*s.shape, 6) * v[..., None]
 
     def acceleration(self, t: ArrayLike) -> Array:
-        """Accelerations; arguments and errors as `pose`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (t.shape..., 6)
-            Derivative of the twist, m/s^2 and rad/s^2.
-        """
+        """Derivatives (t.shape..., 6) of the twist, m/s^2 and rad/s^2."""
         s, v, a = self.law.q(t), self.law.v(t), self.law.a(t)
         rate, change = (x.reshape(*s.shape, 6) for x in self.path.rates(s.reshape(-1)))
         return rate * a[..., None] + change * (v * v)[..., None]
 
     def at(self, t: ArrayLike) -> PoseSamples:
-        """Poses, twists and accelerations together.
-
-        Parameters
-        ----------
-        t : array_like, shape (N,)
-            Times, s.
-
-        Returns
-        -------
-        PoseSamples
-            With the times.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Times of another shape; as `pose`.
-        """
+        """Poses, twists and accelerations together at times t (N,)."""
         times = as_floats(t, "t")
         if times.ndim != 1:
             raise ShapeError(f"t: expected shape (N,), got {times.shape}.")
@@ -166,25 +107,7 @@ class PoseTrajectory:
         return PoseSamples(times, self._poses(times, s), rate * v, rate * a + change * (v * v))
 
     def resample(self, samples: int | None = None, period: float | None = None) -> PoseSamples:
-        """The motion on a regular grid of time.
-
-        Parameters
-        ----------
-        samples : int, optional
-            How many, from 0 to the duration.
-        period : float, optional
-            Seconds between them instead, as in `Trajectory.resample`.
-
-        Returns
-        -------
-        PoseSamples
-            With the times.
-
-        Raises
-        ------
-        InvalidValueError
-            As `Trajectory.resample`.
-        """
+        """The motion on a regular grid of time, as `Trajectory.resample`."""
         return self.at(self.law.grid(samples, period))
 
     def __repr__(self) -> str:

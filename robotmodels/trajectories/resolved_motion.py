@@ -25,9 +25,9 @@ from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
-from .asked import ROUNDING
+from .checks import ROUNDING
+from .number_text import counted, greatest_shown, most_shown, seconds_shown
 from .pose_trajectory import PoseTrajectory
-from .shown import counted, greatest_shown, most_shown, seconds_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)

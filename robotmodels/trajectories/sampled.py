@@ -14,8 +14,9 @@ from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 from .laws import TimeLaw, law_of_duration
+from .paths import axis_and_angle, rotation_about
 from .piecewise import PiecewisePolynomial
-from .rotations import axis_and_angle, rotation_about
+from .point_to_point import quintic
 from .trajectory import Samples, Trajectory
 
 _MOST = 10**9
@@ -137,8 +138,6 @@ def joint_trajectory(
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
             raise InvalidValueError("N: expected a number of samples or times that ascend.")
-    from .polynomials import quintic
-
     start, duration = (float(t[0]), float(t[-1] - t[0])) if t.size else (0.0, 1.0)
     moves = quintic(q0, q1, duration or 1.0, v0=v0, v1=v1)
     times = t - start

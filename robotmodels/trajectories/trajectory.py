@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError
 from .limits import LimitsReport, MotionLimits
-from .shown import counted, greatest_shown, seconds_shown
+from .number_text import counted, greatest_shown, seconds_shown
 
 
 class Motion(Protocol):
@@ -132,103 +132,27 @@ class Trajectory:
         return duration.copy() if self.motion.batch else float(duration)
 
     def q(self, t: ArrayLike) -> Array:
-        """Positions.
+        """Positions (..., t.shape..., n) at times t, rad or m; scalar ones without the last axis.
 
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (..., t.shape..., n)
-            rad or m; without the last axis for a scalar trajectory. Leading axes are those of a
-            batch of motions.
-
-        Raises
-        ------
-        InvalidValueError
-            NaN, or a time outside of a motion that does not rest there.
-
-        Examples
-        --------
-        >>> from robotmodels.trajectories import quintic
-        >>> quintic([0.0, 0.0], [1.0, 2.0], duration=2.0).q([0.0, 1.0, 2.0])
-        array([[0. , 0. ],
-               [0.5, 1. ],
-               [1. , 2. ]])
+        Leading axes are those of a batch of motions. A time outside of a motion that does not rest
+        there is an error.
         """
         return self._at(t, (0,))[0]
 
     def v(self, t: ArrayLike) -> Array:
-        """Velocities; arguments, shape and errors as `q`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (..., t.shape..., n)
-            rad/s or m/s.
-        """
+        """Velocities, rad/s or m/s, as `q`."""
         return self._at(t, (1,))[0]
 
     def a(self, t: ArrayLike) -> Array:
-        """Accelerations; arguments, shape and errors as `q`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (..., t.shape..., n)
-            rad/s^2 or m/s^2. Where it jumps, the value after the jump.
-        """
+        """Accelerations, rad/s^2 or m/s^2, as `q`; where they jump, the value after the jump."""
         return self._at(t, (2,))[0]
 
     def jerk(self, t: ArrayLike) -> Array:
-        """Derivatives of the accelerations; arguments, shape and errors as `q`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (..., t.shape..., n)
-            rad/s^3 or m/s^3, without the pulses where the acceleration jumps.
-        """
+        """Derivatives of the accelerations, as `q`, without the pulses where those jump."""
         return self._at(t, (3,))[0]
 
     def at(self, t: ArrayLike) -> Samples:
-        """Positions and derivatives together.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        Samples
-            The times with q, v, a and jerk.
-
-        Raises
-        ------
-        InvalidValueError
-            As `q`.
-
-        Examples
-        --------
-        >>> from robotmodels.trajectories import quintic
-        >>> quintic(0.0, 1.0, duration=1.0).at([0.0, 0.5]).v
-        array([0.   , 1.875])
-        """
+        """Positions and derivatives together at times t."""
         t = read_only(as_floats(t, "t"))
         values = self._at(t, (0, 1, 2, 3))
         for value in values:
@@ -236,55 +160,14 @@ class Trajectory:
         return Samples(t, *values)
 
     def resample(self, samples: int | None = None, period: float | None = None) -> Samples:
-        """The motion on a regular grid of time.
-
-        Parameters
-        ----------
-        samples : int, optional
-            How many, from 0 to the duration.
-        period : float, optional
-            Seconds between them instead: from 0 to the first multiple at or after the duration,
-            or to the last one before it where the motion does not end at rest.
-
-        Returns
-        -------
-        Samples
-            Times and q, v, a, jerk.
-
-        Raises
-        ------
-        InvalidValueError
-            Not exactly one of the two; less than one sample; a period that is not positive; a
-            batch of motions, which has no common grid.
-
-        Examples
-        --------
-        >>> from robotmodels.trajectories import quintic
-        >>> quintic(0.0, 1.0, duration=1.0).resample(period=0.3).t
-        array([0. , 0.3, 0.6, 0.9, 1.2])
-        """
+        """The motion on the regular grid of time of `grid`."""
         return self.at(self.grid(samples, period))
 
     def grid(self, samples: int | None = None, period: float | None = None) -> Array:
-        """The times of `resample`; arguments and errors as there.
+        """Times (N,): ``samples`` from 0 to the duration, or multiples of ``period``, s.
 
-        Parameters
-        ----------
-        samples : int, optional
-            How many, from 0 to the duration.
-        period : float, optional
-            Seconds between them instead.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Times, s.
-
-        Examples
-        --------
-        >>> from robotmodels.trajectories import quintic
-        >>> quintic(0.0, 1.0, duration=1.0).grid(3)
-        array([0. , 0.5, 1. ])
+        Those end at or after the duration, or before it where the motion does not end at rest. A
+        batch of motions has no common grid.
         """
         if (samples is None) == (period is None):
             raise InvalidValueError("resample: give either samples or period.")
@@ -308,29 +191,7 @@ class Trajectory:
     def check(self, limits: MotionLimits, tolerance: float = 1e-9) -> LimitsReport:
         """Compare the motion with limits, everywhere on it and not at samples only.
 
-        Parameters
-        ----------
-        limits : MotionLimits
-            Of the same joints.
-        tolerance : float
-            Relative overshoot that is put down to rounding.
-
-        Returns
-        -------
-        LimitsReport
-            Extreme values, `kept`, and what is exceeded by which joint.
-
-        Raises
-        ------
-        ShapeError
-            Limits of another number of joints.
-
-        Examples
-        --------
-        >>> from robotmodels.trajectories import MotionLimits, quintic
-        >>> quintic(0.0, 1.0, duration=1.0).check(MotionLimits(velocity=1.5))
-        <LimitsReport: limits are exceeded
-          joint 1: velocity 1.875, allowed 1.5>
+        ``tolerance`` is the relative overshoot that counts as rounding.
         """
         q, v, a, jerk = (np.stack(self.motion.extremes(order)) for order in range(4))
         return LimitsReport(limits.for_joints(self.n), q, v, a, jerk, tolerance)

@@ -30,7 +30,7 @@ from ...kernels._compile import (
     Ints,
     compiled,
 )
-from .._check import forward
+from .chain import forward
 
 ORDER = types.Array(types.int64, 2, "C")
 START_DAMPING = 0.1  # of the first step, in units of the cost

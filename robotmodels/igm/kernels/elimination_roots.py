@@ -25,7 +25,7 @@ from ...kernels._compile import (
     Ints,
     compiled,
 )
-from .._check import forward, jacobian, missing, wrapped
+from .chain import forward, jacobian, pose_error, wrapped
 from .elimination import LINKS, ORDERS, at_angle, factor, move_line, solve, turn_line
 
 FLOAT = types.float64
@@ -150,7 +150,7 @@ def newton(sigma: Ints, D: Floats, U: Floats, tolerance: Floats, q: Floats) -> b
     least, met, worse = np.inf, False, 0
     for count in range(40):
         forward(sigma, D, q, T, lines)
-        position, angle = missing(U, T, e)
+        position, angle = pose_error(U, T, e)
         error = max(position, angle)
         if error > 0.7 * least:
             worse += 1

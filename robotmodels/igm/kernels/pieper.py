@@ -16,6 +16,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from ...kernels._compile import (
+    INT,
     INTS,
     MATRIX,
     NOTHING,
@@ -27,7 +28,7 @@ from ...kernels._compile import (
     Ints,
     compiled,
 )
-from .._check import wrapped
+from .chain import wrapped
 from .equations import (
     ANY,
     polynomial_roots,
@@ -355,9 +356,11 @@ def wrist_postures(
 FLOAT = types.float64
 
 
-@compiled(NOTHING(LINKS, INTS, VECTOR, FLOAT, FLOAT, MATRIX, OUT3, MARKS, COUNTS))
+@compiled(NOTHING(LINKS, STACK, INT, INTS, VECTOR, FLOAT, FLOAT, MATRIX, OUT3, MARKS, COUNTS))
 def concurrent_postures(
     links: Floats,
+    pair: Floats,
+    backwards: int,
     kinds: Ints,
     meeting: Floats,
     size: float,
@@ -370,9 +373,11 @@ def concurrent_postures(
     """Candidates ``q (N, 8, 6)`` of loops ``M_0 E_0 ... M_5 E_5 = 1`` whose axes 3, 4, 5 meet.
 
     Shapes: links (N, 6, 4, 4); ``meeting`` holds the height of the point on axis 3 and on axis 5.
+    ``backwards`` solves the first three joints from the other end, with the links ``pair``.
     """
     x, marks = np.zeros((8, 3)), np.zeros(8, np.int64)
     y, wrist_marks = np.zeros((2, 3)), np.zeros(2, np.int64)
+    order, reference = np.zeros(3, np.int64), np.zeros(3)
     w, p = np.zeros(3), np.zeros(3)
     unit = np.zeros((3, 4))
     P, Q, M = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 3))
@@ -385,10 +390,18 @@ def concurrent_postures(
             p[i] = E[5, 2, i] * meeting[1]
             for j in range(3):
                 p[i] -= E[5, j, i] * E[5, j, 3]
+        for i in range(3):
+            order[i] = kinds[2 - i if backwards else i]
+            reference[i] = -references[n, 2 - i] if backwards else references[n, i]
+        if backwards:
+            m = point_solutions(order, pair[0], pair[1], p, w, size, slack, reference, x, marks)
+        else:
+            m = point_solutions(order, E[0], E[1], w, p, size, slack, reference, x, marks)
         count = 0
-        for i in range(
-            point_solutions(kinds, E[0], E[1], w, p, size, slack, references[n], x, marks)
-        ):
+        for i in range(m):
+            if backwards:
+                x[i, 0], x[i, 1], x[i, 2] = -x[i, 2], -x[i, 1], -x[i, 0]
+                marks[i] = ((marks[i] & 1) << 2) | (marks[i] & 2) | (marks[i] >> 2)
             advance(unit, kinds[0] == 0, x[i, 0], E[0], P)
             advance(P, kinds[1] == 0, x[i, 1], E[1], Q)
             advance(Q, kinds[2] == 0, x[i, 2], E[2], P)
@@ -398,8 +411,8 @@ def concurrent_postures(
             for j in range(wrist_postures(E[3], E[4], M, slack, references[n, 3:], y, wrist_marks)):
                 if count == 8:
                     break
-                for m in range(3):
-                    q[n, count, m], q[n, count, 3 + m] = x[i, m], y[j, m]
+                for r in range(3):
+                    q[n, count, r], q[n, count, 3 + r] = x[i, r], y[j, r]
                 free[n, count] = marks[i] | (wrist_marks[j] << 3)
                 count += 1
         counts[n] = count

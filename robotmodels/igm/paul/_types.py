@@ -1,11 +1,13 @@
-"""Solutions of the equations of Paul's catalogue.
+"""Solutions of the equations of Paul's catalogue, one lane (pose) at a time.
 
-Every function writes up to four solutions to a column of ``found``, six rows for each: value,
-cosine and sine of the first unknown (a length has its value and 1, 0), then of the second. It
-returns how many and a bit field: 1 double root or overshoot, 2 first unknown free, 4 second unknown
-free, 8 small amplitude. What is free takes its reference. ``slack`` is the overshoot beside the
-amplitude that still counts as a double root; ``small`` the amplitude beside which rounding of the
-coefficients shows.
+Each solver takes the coefficients ``g`` of its equation, the tolerances ``eps`` and the references
+of its two unknowns. It writes up to four solutions into a column of ``found``, six rows for each:
+value, cosine and sine of the first unknown, then of the second; angles by cosine and sine up to a
+factor, lengths by their value. It returns the number of solutions and a bit field (`layout`). An
+undetermined unknown takes its reference.
+
+``eps``: overshoot, beside the amplitude, that still counts as a double root; amplitude below which
+an angle is undetermined; amplitude below which digits are lost.
 """
 
 from __future__ import annotations
@@ -16,8 +18,11 @@ import numpy as np
 
 from ...kernels._compile import Floats, compiled
 from ..kernels.equations import polynomial_roots, trigonometric_roots
+from . import layout
 
-DOUBLE, FREE_1, FREE_2, SMALL = 1, 2, 4, 8
+Tolerances = tuple[float, float, float]
+Pair = tuple[float, float]
+Result = tuple[int, int]
 
 _TAN_EIGHTH = 0.41421356237309503  # tan(pi / 8)
 
@@ -53,247 +58,241 @@ def atan2(y: float, x: float) -> float:
 
 
 @compiled()
-def put_angle(
-    found: Floats, o: int, i: int, at: int, lane: int, value: float, C: float, S: float
-) -> None:
-    """Solution i of an angle."""
-    row = o + 6 * i + at
+def put(found: Floats, row: int, lane: int, value: float, C: float, S: float) -> None:
+    """Write one unknown of one solution."""
     found[row, lane], found[row + 1, lane], found[row + 2, lane] = value, C, S
 
 
 @compiled()
-def put_free(found: Floats, o: int, i: int, at: int, lane: int, value: float) -> None:
-    """An angle that takes its reference."""
-    put_angle(found, o, i, at, lane, value, cos(value), sin(value))
+def put_free(found: Floats, row: int, lane: int, value: float) -> None:
+    """Write an angle that takes its reference."""
+    put(found, row, lane, value, cos(value), sin(value))
 
 
 @compiled()
-def put_length(found: Floats, o: int, i: int, at: int, lane: int, value: float) -> None:
-    """Solution i of a length."""
-    put_angle(found, o, i, at, lane, value, 1.0, 0.0)
+def angles(
+    code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """``X S = g0, X C = g1`` with ``X > 0``, or with X of any sign: the opposite angle as well."""
+    rho = sqrt(g[0] * g[0] + g[1] * g[1])
+    if rho <= eps[1]:
+        put_free(found, o, lane, wanted[0])
+        return 1, layout.FREE_1
+    put(found, o, lane, 0.0, g[1], g[0])
+    put(found, o + 6, lane, 0.0, -g[1], -g[0])
+    return 1 + code, layout.SMALL if rho <= eps[2] else 0
 
 
 @compiled()
-def type_1(
-    X: float,
-    Y: float,
-    zero: float,
-    small: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
-    """``X r = Y``."""
-    if abs(X) <= zero:
-        put_length(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    put_length(found, o, 0, 0, lane, Y / X)
-    return 1, SMALL if abs(X) <= small else 0
-
-
-@compiled()
-def type_2_zero(
-    X: float,
-    Y: float,
-    zero: float,
-    small: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
-    """``X S + Y C = 0``: ``theta = atan2(-Y, X)`` and ``theta + pi``."""
-    rho = sqrt(X * X + Y * Y)
-    if rho <= zero:
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    value, C, S = atan2(-Y, X), X / rho, -Y / rho
-    put_angle(found, o, 0, 0, lane, value, C, S)
-    put_angle(found, o, 1, 0, lane, value - pi if value > 0.0 else value + pi, -C, -S)
-    return 2, SMALL if rho <= small else 0
-
-
-@compiled()
-def type_2(
-    X: float,
-    Y: float,
-    Z: float,
-    slack: float,
-    zero: float,
-    small: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
+def one_equation(
+    g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
     """``X S + Y C = Z``, example 1.3 of the book with its misprint corrected.
 
     ``S = (X Z + e Y sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` and
     ``C = (Y Z - e X sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` with e = +-1.
     """
+    X, Y, Z = g[0], g[1], g[2]
+    slack, zero, small = eps
     square = X * X + Y * Y
     rho = sqrt(square)
     if rho <= zero:
         if abs(Z) > max(zero, slack):
-            return 0, SMALL
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    flags = SMALL if rho <= small else 0
+            return 0, layout.SMALL
+        put_free(found, o, lane, wanted[0])
+        return 1, layout.FREE_1
+    count, flags = 2, layout.SMALL if rho <= small else 0
     room = (rho - Z) * (rho + Z)
     if room <= 1e-12 * square:
-        # the two solutions fall together, or miss each other by rounding
+        # the two solutions coincide, or are missed by rounding
         if abs(Z) - rho > slack * rho:
-            return 0, flags | (SMALL if abs(Z) - rho < 1e-6 * rho else 0)
+            return 0, flags | (layout.SMALL if abs(Z) - rho < 1e-6 * rho else 0)
+        flags |= layout.DOUBLE
         if room <= 0.0:
-            sign = 1.0 if Z >= 0.0 else -1.0
-            C, S = sign * Y / rho, sign * X / rho
-            put_angle(found, o, 0, 0, lane, atan2(S, C), C, S)
-            return 1, flags | DOUBLE
-        flags |= DOUBLE
-    root = sqrt(room)
-    scale = 1.0 / square
-    S, C = (X * Z + Y * root) * scale, (Y * Z - X * root) * scale
-    put_angle(found, o, 0, 0, lane, atan2(S, C), C, S)
-    S, C = (X * Z - Y * root) * scale, (Y * Z + X * root) * scale
-    put_angle(found, o, 1, 0, lane, atan2(S, C), C, S)
-    return 2, flags
+            count, room = 1, 0.0
+    root, scale = sqrt(room), 1.0 / square
+    put(found, o, lane, 0.0, (Y * Z - X * root) * scale, (X * Z + Y * root) * scale)
+    put(found, o + 6, lane, 0.0, (Y * Z + X * root) * scale, (X * Z - Y * root) * scale)
+    return count, flags
 
 
 @compiled()
-def type_3_direct(
-    A: float,
-    B: float,
-    zero: float,
-    small: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
-    """``X1 S = A, X1 C = B`` with ``X1 > 0``."""
-    rho = sqrt(A * A + B * B)
-    if rho <= zero:
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    scale = 1.0 / rho
-    put_angle(found, o, 0, 0, lane, atan2(A, B), B * scale, A * scale)
-    return 1, SMALL if rho <= small else 0
-
-
-@compiled()
-def type_3(
-    X1: float,
-    Y1: float,
-    Z1: float,
-    X2: float,
-    Y2: float,
-    Z2: float,
-    zero: float,
-    small: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
+def two_equations(
+    g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
     """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``."""
+    X1, Y1, Z1, X2, Y2, Z2 = g[0], g[1], g[2], g[3], g[4], g[5]
+    _, zero, small = eps
     det = X1 * Y2 - X2 * Y1
-    size = sqrt((X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
-    if size <= zero * zero:
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    if abs(det) <= 1e-12 * size:
-        # they say the same twice: the stronger one alone
-        if X1 * X1 + Y1 * Y1 >= X2 * X2 + Y2 * Y2:
-            count, flags = type_2(X1, Y1, Z1, 1e-9, zero, small, reference, found, o, lane)
-        else:
-            count, flags = type_2(X2, Y2, Z2, 1e-9, zero, small, reference, found, o, lane)
-        return min(count, 1), flags | SMALL
+    one, two = X1 * X1 + Y1 * Y1, X2 * X2 + Y2 * Y2
+    size = sqrt(one * two)
+    if size > zero * zero and abs(det) <= 1e-12 * size:
+        # dependent equations: the stronger one alone
+        if two > one:
+            g[0], g[1], g[2] = X2, Y2, Z2
+        count, flags = one_equation(g, (1e-9, zero, small), wanted, found, o, lane)
+        return min(count, 1), flags | layout.SMALL
     sign = 1.0 if det > 0.0 else -1.0
     S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
     rho = sqrt(S * S + C * C)
-    if rho <= zero * zero:
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    put_angle(found, o, 0, 0, lane, atan2(S, C), C / rho, S / rho)
-    return 1, SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
+    if size <= zero * zero or rho <= zero * zero:
+        put_free(found, o, lane, wanted[0])
+        return 1, layout.FREE_1
+    put(found, o, lane, 0.0, C, S)
+    return 1, layout.SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
 
 
 @compiled()
-def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> tuple[int, int]:
-    """``a r^2 + 2 h r + c = 0``: solutions and flags."""
+def two_angles(
+    g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``.
+
+    One equation in i: ``B1 Si + B2 Ci = B3``, ``B1 = 2 (Z1 Y + Z2 X)``, ``B2 = 2 (Z1 X - Z2 Y)``,
+    ``B3 = W1^2 + W2^2 - X^2 - Y^2 - Z1^2 - Z2^2``; then both equations give j.
+    """
+    W1, W2, X, Y, Z1, Z2, sense = g[0], g[1], g[2], g[3], g[4], g[5], g[6]
+    slack, zero, small = eps
+    square = W1 * W1 + W2 * W2
+    W = sqrt(square)
+    # half of B1, B2, B3
+    g[0], g[1] = Z1 * Y + Z2 * X, Z1 * X - Z2 * Y
+    g[2] = 0.5 * (square - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
+    limits = (slack, max(zero * W, zero * zero), small * W)
+    count, flags = one_equation(g, limits, wanted, found, o, lane)
+    for row in range(o, o + 6 * count, 6):
+        C, S = found[row + 1, lane], found[row + 2, lane]
+        one = X * C + Y * S + Z1
+        two = sense * (X * S - Y * C + Z2)
+        Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
+        if sqrt(Sj * Sj + Cj * Cj) <= zero * zero:
+            put_free(found, row + 3, lane, wanted[1])
+            flags |= layout.FREE_2
+        else:
+            put(found, row + 3, lane, 0.0, Cj, Sj)
+    return count, flags
+
+
+@compiled()
+def length(g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int) -> Result:
+    """``g0 r = g1``."""
+    size = abs(g[0])
+    if size <= eps[1]:
+        put(found, o, lane, wanted[0], 1.0, 0.0)
+        return 1, layout.FREE_1
+    put(found, o, lane, g[1] / g[0], 1.0, 0.0)
+    return 1, layout.SMALL if size <= eps[2] else 0
+
+
+@compiled()
+def solve(
+    code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """Solutions of one step: the common equations."""
+    if code <= layout.OPPOSITE_ANGLES:
+        return angles(code, g, eps, wanted, found, o, lane)
+    if code == layout.ONE_EQUATION:
+        return one_equation(g, eps, wanted, found, o, lane)
+    if code == layout.TWO_EQUATIONS:
+        return two_equations(g, eps, wanted, found, o, lane)
+    if code == layout.TWO_ANGLES:
+        return two_angles(g, eps, wanted, found, o, lane)
+    return length(g, eps, wanted, found, o, lane)
+
+
+@compiled()
+def length_times_angle(
+    g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """``X1 r S = Y1, X2 r C = Y2``: ``r = +-sqrt((Y1 / X1)^2 + (Y2 / X2)^2)``, then the angle."""
+    least = min(abs(g[0]), abs(g[2]))
+    if least <= eps[1]:
+        return 0, layout.SMALL
+    A, B = g[1] / g[0], g[3] / g[2]
+    r = sqrt(A * A + B * B)
+    put(found, o, lane, r, 1.0, 0.0)
+    put(found, o + 6, lane, -r, 1.0, 0.0)
+    if r <= eps[1]:
+        put_free(found, o + 3, lane, wanted[1])
+        return 1, layout.FREE_2
+    put(found, o + 3, lane, 0.0, B, A)
+    put(found, o + 9, lane, 0.0, -B, -A)
+    return 2, layout.SMALL if r <= eps[2] or least <= eps[2] else 0
+
+
+@compiled()
+def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> Result:
+    """``a r^2 + 2 h r + c = 0``."""
     room, size = h * h - a * c, h * h + abs(a * c)
     if room < -slack * size:
-        return 0, SMALL if room > -1e-6 * size else 0
+        return 0, layout.SMALL if room > -1e-6 * size else 0
     if room <= 0.0:
         roots[0] = -h / a
-        return 1, DOUBLE
+        return 1, layout.DOUBLE
     whole = -(h + (sqrt(room) if h >= 0.0 else -sqrt(room)))
     roots[0], roots[1] = whole / a, c / whole if whole != 0.0 else 0.0
-    return 2, DOUBLE if room <= 1e-12 * size else 0
+    return 2, layout.DOUBLE if room <= 1e-12 * size else 0
 
 
 @compiled()
-def quartic(
-    a0: float,
-    a1: float,
-    a2: float,
-    a3: float,
-    a4: float,
-    slack: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
-    """``a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0``."""
-    g, roots = np.empty(5), np.empty(4)
-    g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
-    size = max(max(abs(a0), abs(a1)), max(abs(a2), max(abs(a3), abs(a4))))
-    if size == 0.0:
-        put_free(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    count, flags = trigonometric_roots(g, roots, slack * size), 0
+def length_and_angle(
+    g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length, then an angle."""
+    least = min(abs(g[0]), abs(g[3]))
+    if least <= eps[1]:
+        return 0, layout.SMALL
+    u0, u1, v0, v1 = g[1] / g[0], g[2] / g[0], g[4] / g[3], g[5] / g[3]
+    a = u1 * u1 + v1 * v1
+    if a <= eps[1]:
+        return 0, layout.SMALL
+    roots = np.empty(2)
+    count, flags = quadratic(a, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0, eps[0], roots)
     for i in range(count):
-        put_free(found, o, i, 0, lane, roots[i])
-        for m in range(i):
-            gap = abs(roots[i] - roots[m])
-            if min(gap, abs(gap - 2.0 * pi)) < 1e-3:
-                flags |= DOUBLE
-    if count % 2 == 1:
-        flags |= DOUBLE
-    return count, flags
+        r = roots[i]
+        put(found, o + 6 * i, lane, r, 1.0, 0.0)
+        put(found, o + 6 * i + 3, lane, 0.0, v0 + v1 * r, u0 + u1 * r)
+    return count, flags | (layout.SMALL if least <= eps[2] else 0)
 
 
 @compiled()
 def polynomial(
-    a0: float,
-    a1: float,
-    a2: float,
-    a3: float,
-    a4: float,
-    slack: float,
-    reference: float,
-    found: Floats,
-    o: int,
-    lane: int,
-) -> tuple[int, int]:
-    """``a0 + a1 r + a2 r^2 + a3 r^3 + a4 r^4 = 0``."""
-    roots = np.empty(4)
-    if a3 == 0.0 and a4 == 0.0 and a2 != 0.0:
-        count, flags = quadratic(a2, 0.5 * a1, a0, slack, roots)
-        for i in range(count):
-            put_length(found, o, i, 0, lane, roots[i])
-        return count, flags
-    g = np.empty(5)
-    g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
-    if a0 == a1 == a2 == a3 == a4 == 0.0:
-        put_length(found, o, 0, 0, lane, reference)
-        return 1, FREE_1
-    count, flags = polynomial_roots(g, roots), 0
+    code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """``g0 + g1 r + ... + g4 r^4 = 0``, or ``g0 + g1 C + g2 S + g3 cos(2 x) + g4 sin(2 x) = 0``."""
+    roots, size, count, flags = np.empty(4), 0.0, 0, 0
+    for i in range(5):
+        size = max(size, abs(g[i]))
+    if size == 0.0:
+        put_free(found, o, lane, wanted[0])
+        return 1, layout.FREE_1
+    if code == layout.QUARTIC:
+        count = trigonometric_roots(g, roots, eps[0] * size)
+        flags = layout.DOUBLE * (count % 2)
+    elif g[3] == 0.0 and g[4] == 0.0 and g[2] != 0.0:
+        count, flags = quadratic(g[2], 0.5 * g[1], g[0], eps[0], roots)
+    else:
+        count = polynomial_roots(g, roots)
     for i in range(count):
-        put_length(found, o, i, 0, lane, roots[i])
+        put_free(found, o + 6 * i, lane, roots[i])
         for m in range(i):
-            if abs(roots[i] - roots[m]) < 1e-3 * (1.0 + abs(roots[i])):
-                flags |= DOUBLE
+            gap = abs(roots[i] - roots[m])
+            if code == layout.QUARTIC:
+                gap = min(gap, abs(gap - 2.0 * pi))
+            else:
+                gap /= 1.0 + abs(roots[i])
+            if gap < 1e-3:
+                flags |= layout.DOUBLE
     return count, flags
+
+
+@compiled()
+def solve_rare(
+    code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
+) -> Result:
+    """Solutions of one step: the equations that few arms need."""
+    if code == layout.LENGTH_TIMES_ANGLE:
+        return length_times_angle(g, eps, wanted, found, o, lane)
+    if code == layout.LENGTH_AND_ANGLE:
+        return length_and_angle(g, eps, wanted, found, o, lane)
+    return polynomial(code, g, eps, wanted, found, o, lane)

@@ -9,10 +9,10 @@ from itertools import combinations, permutations
 import numpy as np
 
 from ..._arrays import Array
-from .equation_type import EquationType
 from .equations import Equation
-from .expressions import ZERO, Expression, Graph, Kind, negative
-from .polynomials import part
+from .expressions import ONE, ZERO, Expression, Graph, Kind, negative
+from .polynomials import cosine, length, part, sine
+from .types import EquationType
 from .unknowns import Joints
 
 
@@ -28,7 +28,6 @@ class Candidate:
     unknowns: tuple[int, ...]
     coefficients: tuple[Expression, ...]
     equations: tuple[Equation, ...]
-    cost: tuple[float, ...]
 
 
 _WEAK = 1e-6
@@ -38,7 +37,6 @@ _MOST_ROWS = 8
 
 def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]:
     """Everything of the catalogue that is found among equations."""
-    graph = joints.graph
     single: dict[int, list[Equation]] = {}
     double: dict[object, list[Equation]] = {}
     for equation in equations:
@@ -60,21 +58,22 @@ def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]
                 for i, j in ((a, b), (b, a)):
                     found = find(i, j, first, second, joints)
                     if found is not None:
-                        out.append(_costed(found, graph, joints))
+                        out.append(found)
         if out:
             return out
     return out
 
 
-def _costed(c: Candidate, graph: Graph, joints: Joints) -> Candidate:
-    """A candidate with its price: few unknowns, position, one solution, short formulas."""
+def cost(c: Candidate, joints: Joints) -> tuple[float, ...]:
+    """Price of a candidate: few unknowns, position, one solution, short formulas."""
+    graph = joints.graph
     items = [joints.unknowns[u] for u in c.unknowns]
     order = _ORDER[c.type]
     if c.type is EquationType.TYPE_3 and not graph.is_constant(_determinant(c, graph)):
         order = 1
     if c.type is EquationType.TYPE_1 and not graph.is_constant(c.coefficients[0]):
         order = 4
-    cost = (
+    return (
         len(frozenset().union(*(e.unknowns for e in c.equations))),
         any(not _is_position(e, joints) for e in c.equations),
         order,
@@ -84,7 +83,6 @@ def _costed(c: Candidate, graph: Graph, joints: Joints) -> Candidate:
         sum(graph.leaves(x) for x in c.coefficients),
         sum(e.split.s - e.split.p for e in c.equations),
     )
-    return Candidate(c.type, c.unknowns, c.coefficients, c.equations, tuple(map(float, cost)))
 
 
 _ORDER = {
@@ -122,22 +120,21 @@ def _strong(graph: Graph, *parts: Expression) -> bool:
 
 
 def _lengths(number: int, group: list[Equation], joints: Joints) -> Iterable[Candidate]:
-    graph, r = joints.graph, 2 * number
+    graph, r = joints.graph, length(number)
     for e in group:
         p = e.polynomial
         degree = max(len(m) for m in p)
         if degree == 1 and _strong(graph, part(p, r)):
             found = Candidate(EquationType.TYPE_1, (number,), (part(p, r), negative(part(p))),
-                              (e,), ())  # fmt: skip
-            yield _costed(found, graph, joints)
+                              (e,))  # fmt: skip
+            yield found
         elif 1 < degree <= 4:
             powers = tuple(part(p, *[r] * i) for i in range(5))
-            yield _costed(Candidate(EquationType.POLYNOMIAL, (number,), powers, (e,), ()), graph,
-                          joints)  # fmt: skip
+            yield Candidate(EquationType.POLYNOMIAL, (number,), powers, (e,))  # fmt: skip
 
 
 def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Candidate]:
-    graph, C, S = joints.graph, 2 * number, 2 * number + 1
+    graph, C, S = joints.graph, cosine(number), sine(number)
     rows: list[tuple[Equation, Expression, Expression, Expression]] = []
     for e in group:
         found = _rows(e, S, C)
@@ -148,11 +145,11 @@ def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Cand
             continue
         rows.append((e, X, Y, negative(k)))
         if k[0]:
-            one = Candidate(EquationType.TYPE_2, (number,), (X, Y, negative(k)), (e,), ())
+            one = Candidate(EquationType.TYPE_2, (number,), (X, Y, negative(k)), (e,))
         else:
             signed = _signed(number, X, Y, joints)
-            one = Candidate(EquationType.TYPE_2_ZERO, (number,), signed, (e,), ())
-        yield _costed(one, graph, joints)
+            one = Candidate(EquationType.TYPE_2_ZERO, (number,), signed, (e,))
+        yield one
     rows.sort(key=lambda row: (not _is_position(row[0], joints), row[0].length))
     for a, b in combinations(rows[:_MOST_ROWS], 2):
         (_, X1, Y1, Z1), (_, X2, Y2, Z2) = a, b
@@ -168,11 +165,11 @@ def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Cand
             if turned is not None:
                 direct, pair = turned, (b[0], a[0])
         one = (
-            Candidate(EquationType.TYPE_3, (number,), (X1, Y1, Z1, X2, Y2, Z2), pair, ())
+            Candidate(EquationType.TYPE_3, (number,), (X1, Y1, Z1, X2, Y2, Z2), pair)
             if direct is None
-            else Candidate(EquationType.TYPE_3_DIRECT, (number,), direct, pair, ())
+            else Candidate(EquationType.TYPE_3_DIRECT, (number,), direct, pair)
         )
-        yield _costed(one, graph, joints)
+        yield one
 
 
 def _direct(
@@ -241,15 +238,15 @@ def _products(
     i: int, j: int, first: Equation, second: Equation, joints: Joints
 ) -> Candidate | None:
     """Type 4: an angle i and a length j that multiplies its sine and cosine."""
-    r, C, S = 2 * j, 2 * i, 2 * i + 1
+    r, C, S = length(j), cosine(i), sine(i)
     p, q = first.polynomial, second.polynomial
-    sine, cosine = tuple(sorted((r, S))), tuple(sorted((r, C)))
-    if not {sine, ()}.issuperset(p) or not {cosine, ()}.issuperset(q):
+    with_sine, with_cosine = tuple(sorted((r, S))), tuple(sorted((r, C)))
+    if not {with_sine, ()}.issuperset(p) or not {with_cosine, ()}.issuperset(q):
         return None
-    coefficients = (p[sine], negative(part(p)), q[cosine], negative(part(q)))
+    coefficients = (p[with_sine], negative(part(p)), q[with_cosine], negative(part(q)))
     if not _strong(joints.graph, coefficients[0]) or not _strong(joints.graph, coefficients[2]):
         return None
-    return Candidate(EquationType.TYPE_4, (j, i), coefficients, (first, second), ())
+    return Candidate(EquationType.TYPE_4, (j, i), coefficients, (first, second))
 
 
 def _length_and_angle(
@@ -257,7 +254,7 @@ def _length_and_angle(
 ) -> Candidate | None:
     """Length i and angle j: type 5, or the polynomial of degree two in the length."""
     graph = joints.graph
-    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i) for e in (first, second))
+    one, two = (_rows(e, sine(j), cosine(j), length(i)) for e in (first, second))
     if one is None or two is None:
         return None
     ((s1, c1, r1), k1), ((s2, c2, r2), k2) = one, two
@@ -265,7 +262,7 @@ def _length_and_angle(
         return None
     if not c1[0] and not s2[0] and _strong(graph, s1) and _strong(graph, c2):
         values = (s1, negative(k1), negative(r1), c2, negative(k2), negative(r2))
-        return Candidate(EquationType.TYPE_5, (i, j), values, (first, second), ())
+        return Candidate(EquationType.TYPE_5, (i, j), values, (first, second))
     return None
 
 
@@ -274,7 +271,7 @@ def _two_angles(
 ) -> Candidate | None:
     """Types 6 to 8, or a quartic in angle i."""
     graph = joints.graph
-    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i + 1, 2 * i) for e in (first, second))
+    one, two = (_rows(e, sine(j), cosine(j), sine(i), cosine(i)) for e in (first, second))
     if one is None or two is None:
         return None
     ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
@@ -294,11 +291,11 @@ def _two_angles(
         if not cj1[0] and not sj[0] and sj1 == cj:
             positive = 1.0 if sj1[0] > 0 else -1.0
             values = tuple((positive * f, n) for f, n in (sj1, *right))
-            return Candidate(EquationType.TYPE_6, (i, j), values, pair, ())
+            return Candidate(EquationType.TYPE_6, (i, j), values, pair)
         for sense in (1.0, -1.0):
             if sj == (sense * cj1[0], cj1[1]) and cj == (-sense * sj1[0], sj1[1]):
-                values = (cj1, sj1, *right, (sense, 0))
-                return Candidate(EquationType.TYPE_7, (i, j), values, pair, ())
+                values = (cj1, sj1, *right, (sense, ONE))
+                return Candidate(EquationType.TYPE_7, (i, j), values, pair)
     return None
 
 
@@ -327,7 +324,7 @@ def _type_8(
     sign = 1.0 if first[2][0] > 0 else -1.0
     terms = (first[2], first[0], negative(first[4]), negative(second[4]))
     values = tuple((sign * f, n) for f, n in terms)
-    return Candidate(EquationType.TYPE_8, (i, j), values, pair, ())
+    return Candidate(EquationType.TYPE_8, (i, j), values, pair)
 
 
 def _polynomial(
@@ -346,7 +343,7 @@ def _in_a_length(
 ) -> Candidate | None:
     """Degree two in the length i."""
     graph = joints.graph
-    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i) for e in (first, second))
+    one, two = (_rows(e, sine(j), cosine(j), length(i)) for e in (first, second))
     if one is None or two is None:
         return None
     ((s1, c1, r1), k1), ((s2, c2, r2), k2) = one, two
@@ -358,10 +355,10 @@ def _in_a_length(
     u = [add((product(c2, x), negative(product(c1, y)))) for x, y in ((k1, k2), (r1, r2))]
     v = [add((product(s1, y), negative(product(s2, x)))) for x, y in ((k1, k2), (r1, r2))]
     a0 = add((product(u[0], u[0]), product(v[0], v[0]), negative(product(det, det))))
-    a1 = add((product((2.0, 0), u[0], u[1]), product((2.0, 0), v[0], v[1])))
+    a1 = add((product((2.0, ONE), u[0], u[1]), product((2.0, ONE), v[0], v[1])))
     a2 = add((product(u[1], u[1]), product(v[1], v[1])))
     powers = (a0, a1, a2, ZERO, ZERO)
-    return Candidate(EquationType.POLYNOMIAL, (i,), powers, (first, second), ())
+    return Candidate(EquationType.POLYNOMIAL, (i,), powers, (first, second))
 
 
 def _in_an_angle(
@@ -369,7 +366,7 @@ def _in_an_angle(
 ) -> Candidate | None:
     """A quartic in the angle i."""
     graph = joints.graph
-    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i + 1, 2 * i) for e in (first, second))
+    one, two = (_rows(e, sine(j), cosine(j), sine(i), cosine(i)) for e in (first, second))
     if one is None or two is None:
         return None
     ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
@@ -384,9 +381,9 @@ def _in_an_angle(
         u.append(add((product(cj2, x), negative(product(cj1, y)))))
         v.append(add((product(sj1, y), negative(product(sj2, x)))))
     dot = lambda m, n: (product(u[m], u[n]), product(v[m], v[n]))  # noqa: E731
-    half = lambda m, n: [product((0.5, 0), e) for e in dot(m, n)]  # noqa: E731
-    twice = lambda m, n: [product((2.0, 0), e) for e in dot(m, n)]  # noqa: E731
+    half = lambda m, n: [product((0.5, ONE), e) for e in dot(m, n)]  # noqa: E731
+    twice = lambda m, n: [product((2.0, ONE), e) for e in dot(m, n)]  # noqa: E731
     a0 = add((*dot(0, 0), *half(1, 1), *half(2, 2), negative(product(det, det))))
     a3 = add((*half(1, 1), *map(negative, half(2, 2))))
     quartic = (a0, add(twice(0, 1)), add(twice(0, 2)), a3, add(dot(1, 2)))
-    return Candidate(EquationType.QUARTIC, (i,), quartic, pair, ())
+    return Candidate(EquationType.QUARTIC, (i,), quartic, pair)

@@ -138,35 +138,24 @@ class Arm:
         T = self.frames(q)[-1]
         return T if self.E is None else T @ _number(self.E, self.graph)
 
-    def chain(self, start: int, stop: int) -> list[Item]:
-        """``K_j M_j`` of the joints after start up to stop."""
-        return [item for j in range(start, stop) for item in (self.K[j], Motion(j, 1))]
-
-    def inverse_chain(self, start: int, stop: int) -> list[Item]:
-        """The inverse of the same."""
-        return [item for j in reversed(range(start, stop))
-                for item in (Motion(j, -1), self.K[j].inverse(self.graph))]  # fmt: skip
-
-    def sides(self, split: Split) -> tuple[list[Item], list[Item]]:
-        """Matrices on the side of the pose and on the other."""
-        k, tool = self.form.k, [] if self.E is None else [self.E]
-        untool = [E.inverse(self.graph) for E in tool]
-        middle, unmiddle = self.chain(split.s, split.p), self.inverse_chain(split.s, split.p)
-        before, after = self.chain(0, split.s), self.chain(split.p, k)
-        unbefore = self.inverse_chain(0, split.s)
-        unafter = self.inverse_chain(split.p, k)
-        if split.tool:
-            middle, unmiddle = [*middle, *tool], [*untool, *unmiddle]
-        else:
-            after, unafter = [*after, *tool], [*untool, *unafter]
-        if split.twist:
-            K = middle.pop(0)
-            assert isinstance(K, Fixed)
-            unmiddle.pop()
-            before, unbefore = [*before, K], [K.inverse(self.graph), *unbefore]
+    def sides(self, split: Split, K: list[Fixed] | None = None) -> tuple[list[Item], list[Item]]:
+        """Matrices on the side of the pose and on the other; ``K`` replaces the constants."""
+        K = K or self.K
+        parts = [item for j in range(self.form.k) for item in (K[j], Motion(j, 1))]
+        parts += [] if self.E is None else [self.E]
+        first = 2 * split.s + split.twist
+        last = len(parts) if split.tool else 2 * split.p
+        before, middle, after = parts[:first], parts[first:last], parts[last:]
         if split.inverse:
-            return [*after, self.U0_inverse, *before], unmiddle
-        return [*unbefore, self.U0, *unafter], middle
+            return [*after, self.U0_inverse, *before], self._inverted(middle)
+        return [*self._inverted(before), self.U0, *self._inverted(after)], middle
+
+    def _inverted(self, items: list[Item]) -> list[Item]:
+        """Factors of the inverse of a product."""
+        return [
+            Motion(item.joint, -item.sign) if isinstance(item, Motion) else item.inverse(self.graph)
+            for item in reversed(items)
+        ]
 
     def splits(self, inverse: bool) -> Iterator[Split]:
         """Ways to write the equation while some joints are known; simplest first."""
@@ -188,8 +177,8 @@ class Arm:
     def equations(self, inverse: bool = False) -> list[Equation]:
         """Elements of all matrix equations that have one or two unknowns."""
         found: list[Equation] = []
-        for near in (True, False) if self.joints.tied else (False,):
-            self.joints.near = near
+        for shortest in (True, False) if self.joints.has_alternatives else (False,):
+            self.joints.shortest = shortest
             found += self._written(inverse)
         return found
 

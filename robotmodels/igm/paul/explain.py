@@ -9,25 +9,9 @@ from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
-from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
-from .whole import whole
-from .wording import Wording
-
-
-@dataclass(frozen=True, slots=True)
-class ExplainedStep:
-    """One step of the derivation."""
-
-    joints: tuple[str, ...]
-    type: EquationType
-    matrix_equation: str
-    equations: tuple[str, ...]
-    formulas: tuple[str, ...]
-    undetermined: str
-    branches: int
-    text: str
-    latex: str
+from .render import render
+from .steps import ExplainedStep, PlanText
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -122,22 +106,13 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     check_model(model)
     chain = joint_chain(model)
     plan = derive_plan(chain, [int(model.table.joint_rows[c]) + 1 for c in chain.columns])
-    words = Wording(plan)
-    steps = []
-    for number, step in enumerate(plan.steps):
-        told = words.step(number, step)
-        steps.append(
-            ExplainedStep(
-                told.names, step.type, told.matrix_equation, told.equations, told.formulas,
-                told.undetermined, step.type.branches, told.text, told.latex,
-            )
-        )  # fmt: skip
+    words = PlanText(plan)
+    steps = tuple(words.step(number, step) for number, step in enumerate(plan.steps))
     remaining = tuple(words.variable(j) for j in plan.remaining)
     takes_over = "" if plan.complete else _successor(plan.chain)
-    told = [(step.text, step.latex) for step in steps]
-    text, latex = whole(model, words, told, takes_over)
+    text, latex = render(model, words, steps, takes_over)
     return InverseModelExplanation(
-        model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
+        model.name, steps, plan.complete, remaining, takes_over, plan, text, latex
     )
 
 

@@ -49,7 +49,6 @@ class Node:
     parts: tuple[Expression, ...]
     values: Array
     name: str = ""
-    latex: str = ""
 
 
 class Graph:
@@ -59,6 +58,7 @@ class Graph:
         self.samples = samples
         self.nodes: list[Node] = [Node(Kind.ONE, (), np.ones(samples))]
         self.strict = False  # keep sums that are zero at every posture that meets its pose
+        self.latex: dict[str, str] = {}  # of the names
         self._known: dict[object, int] = {}
 
     def values(self, e: Expression) -> Array:
@@ -78,11 +78,13 @@ class Graph:
 
     def symbol(self, kind: Kind, name: str, latex: str, values: Array) -> Expression:
         """A symbol; one name is one symbol."""
-        return 1.0, self._new((kind, name), Node(kind, (), np.asarray(values), name, latex))
+        self.latex[name] = latex
+        return 1.0, self._new((kind, name), Node(kind, (), np.asarray(values), name))
 
     def named(self, name: str, latex: str, meaning: Expression) -> Expression:
         """A name for an expression."""
-        node = Node(Kind.NAMED, (meaning,), self.values(meaning), name, latex)
+        self.latex[name] = latex
+        node = Node(Kind.NAMED, (meaning,), self.values(meaning), name)
         return 1.0, self._new((Kind.NAMED, name, meaning), node)
 
     def product(self, *factors: Expression) -> Expression:

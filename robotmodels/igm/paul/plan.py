@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from ...errors import InvalidValueError
 from ..loop import JointChain
-from .catalogue import Candidate, candidates
-from .equation_type import EquationType
+from .catalogue import Candidate, candidates, cost
 from .equations import Arm, Split
 from .expressions import Expression
 from .normal_form import NormalForm, normal_form
-from .program import Program, lowered
+from .program import Program, compile_plan
+from .types import EquationType
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,11 +78,11 @@ def derive_plan(chain: JointChain, frames: Sequence[int] = ()) -> PaulPlan:
                 tuple((e.row, e.column) for e in best.equations),
             )
         )  # fmt: skip
-        for number in best.unknowns[: _given(best.type)]:
+        for number in best.unknowns:
             joints.settle(number)
         solved += [j for j in everyone if joints.knows(j) and j not in solved]
     remaining = tuple(j for j in everyone if not joints.knows(j))
-    program = None if remaining else lowered(arm, steps)
+    program = None if remaining else compile_plan(arm, steps)
     return PaulPlan(chain, arm.form, tuple(steps), tuple(solved), remaining, arm, program)
 
 
@@ -90,11 +90,5 @@ def _best(arm: Arm) -> Candidate | None:
     for inverse in (False, True):
         found = candidates(arm.equations(inverse), arm.joints)
         if found:
-            return min(found, key=lambda c: c.cost)
+            return min(found, key=lambda c: cost(c, arm.joints))
     return None
-
-
-def _given(type_: EquationType) -> int:
-    """How many unknowns a step gives."""
-    single = (EquationType.POLYNOMIAL, EquationType.QUARTIC)
-    return 1 if type_ in single else 2

@@ -1,8 +1,7 @@
 """Polynomials in the unknown sines, cosines and lengths; their coefficients are known expressions.
 
-A monomial is a sorted tuple of atoms. Atom ``2 i`` is the cosine of unknown i (or the length, for a
-sliding joint), atom ``2 i + 1`` its sine. What has more than two unknowns is of no use to any
-equation of the catalogue and is not kept: None stands for it.
+A monomial is a sorted tuple of atoms: cosine, sine or length of an unknown. A polynomial in more
+than two unknowns is of no use to any equation of the catalogue: None stands for it.
 """
 
 from __future__ import annotations
@@ -14,6 +13,20 @@ Polynomial = dict[Monomial, Expression] | None
 Vector = list[Polynomial]
 
 MOST_UNKNOWNS = 2
+
+
+def cosine(unknown: int) -> int:
+    """Atom of the cosine of an unknown angle."""
+    return 2 * unknown
+
+
+def sine(unknown: int) -> int:
+    """Atom of the sine of an unknown angle."""
+    return 2 * unknown + 1
+
+
+length = cosine
+"""Atom of an unknown length."""
 
 
 def constant(e: Expression) -> Polynomial:

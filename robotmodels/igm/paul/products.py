@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from .expressions import UNIT, ZERO, Expression, Graph, negative
 from .polynomials import Vector, constant, minus, plus, scaled, times
-from .unknowns import Joints, Span
+from .unknowns import Joints, JointSum
 
 Rotation = list[list[Expression]]
 
@@ -47,10 +47,10 @@ Item = Motion | Fixed
 class _Segment:
     """Turns about parallel axes that follow each other, what they carry, then a fixed rotation."""
 
-    span: Span | None
-    way: float
+    span: JointSum | None
+    sign: float
     rotation: Rotation
-    carried: list[tuple[Span | None, Vector]]
+    carried: list[tuple[JointSum | None, Vector]]
 
 
 def _identity() -> Rotation:
@@ -99,21 +99,21 @@ def _segments(items: Sequence[Item], joints: Joints) -> list[_Segment]:
         along = now.rotation[2][2]
         parallel = along[1] == 0 and abs(along[0]) == 1.0
         if now.span is not None and parallel and now.span.group == group and now.span.b == start:
-            now.span = Span(group, now.span.a, end)
+            now.span = JointSum(group, now.span.a, end)
             continue
         if now.span or now.carried or now.rotation != _identity():
             out.append(now)
-        # way: the sense of the group as the axes of this frame have it
-        now = _Segment(Span(group, start, end), sense, _identity(), [])
+        # sign: the sense of the group as the axes of this frame have it
+        now = _Segment(JointSum(group, start, end), sense, _identity(), [])
     out.append(now)
     return out
 
 
-def _turned(segment: _Segment, span: Span | None, v: Vector, joints: Joints) -> Vector:
+def _turned(segment: _Segment, span: JointSum | None, v: Vector, joints: Joints) -> Vector:
     if span is None or (v[0] == {} and v[1] == {}):
         return v
     graph = joints.graph
-    C, S = joints.cos_sin(span, segment.way)
+    C, S = joints.cos_sin(span, segment.sign)
     return [
         plus(graph, times(graph, C, v[0]), minus(times(graph, S, v[1]))),
         plus(graph, times(graph, S, v[0]), times(graph, C, v[1])),

@@ -6,7 +6,7 @@ share their first joints share everything computed from them, the check of the p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,27 +14,68 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, read_only
-from .equation_type import EquationType
+from . import layout
 from .equations import Arm, Split
-from .expressions import ONE, ZERO, Expression, Graph, Kind
+from .expressions import ONE, Expression, Graph, Kind
 from .polynomials import part
 from .products import Fixed, product
 
 if TYPE_CHECKING:
     from .plan import Step
 
-_HEAD = 13
-STEP = 24
-"""Numbers per step: type, registers of the results (2 x 3), references (2), coefficients (15)."""
+SLACK = 1e-9
+"""Overshoot beside the amplitude that is tried as a double root."""
+ZERO_AMPLITUDE = 1e-13
+"""Amplitudes beside their usual size that leave a joint undetermined."""
+SMALL_AMPLITUDE = 1e-4
+"""Amplitudes beside their usual size below which a pose is left to a more careful method."""
+ACCEPTED = 1e-9
+"""Largest error of a posture of the plan [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """Plan for the kernel, packed into two arrays."""
+    """Plan for the kernel: instructions (`layout`), numbers, most postures, whether it is rare."""
 
     plan: NDArray[np.uint32]
     numbers: Array
     branches: int
+    rare: bool
+
+    @property
+    def kernel(self) -> Callable[..., int]:
+        """The compiled function that runs it, imported when it is needed."""
+        from ._kernel import solve_poses, solve_poses_rare
+
+        return solve_poses_rare if self.rare else solve_poses
+
+    def adapted(
+        self, to_base: Array, joints: Array, labels: NDArray[np.int16] | tuple[()] = ()
+    ) -> Array:
+        """Numbers for poses in the world, with joint limits and branch codes.
+
+        Shapes: to_base (4, 4), joints (3, k): lower and upper limits, 1 for revolute.
+        """
+        numbers = np.array(self.numbers)
+        at, limits = int(self.plan[layout.SIDES]), int(self.plan[layout.LIMITS])
+        before = numbers[at : at + 12].reshape(3, 4)
+        before[...] = before @ to_base
+        numbers[limits:] = np.ravel(joints)
+        return read_only(np.concatenate([numbers, labels]))
+
+    def run(
+        self, numbers: Array, poses: Array, references: Array
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Postures in the order of the tree, unchecked poses.
+
+        Shapes: poses (N, 4, 4), references (N, k) -> q (N, S, k), residual (N, S),
+        marks (N, 2 + 2 S): count, flags, bits of free unknowns, bits of branches.
+        """
+        (N, k), S = references.shape, self.branches
+        q, residual = np.empty((N, S, k)), np.empty((N, S))
+        marks = np.empty((N, 2 + 2 * S), np.int64)
+        self.kernel(self.plan, numbers, poses, references, layout.UNORDERED, q, residual, marks)
+        return q, residual, marks
 
 
 class _Registers:
@@ -150,86 +191,71 @@ class _Registers:
         self.add(level, (to, self.of[a], self.of[b], self.of[c], self.of[e]), (f, g))
 
 
-def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
+def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
     """Program of a complete plan."""
-    graph, joints, form = arm.graph, arm.joints, arm.form
+    graph, form = arm.graph, arm.form
     table = _Registers(graph)
     for j in range(4):
         for i in range(3):
             e = arm.U0.R[i][j] if j < 3 else arm.U0.p[i]
             table.give(e, 0, table.new())
-    rows = np.zeros((len(steps), STEP), dtype=np.int64)
+    rows = np.zeros((len(steps), layout.STEP), dtype=np.int64)
     references: list[Array] = []
     values: dict[int, Expression] = {}
     for n, step in enumerate(steps):
-        rows[n, 0] = step.type.code
+        rows[n, layout.CODE] = step.type.kernel
         for m, number in enumerate(step.unknowns):
-            if m and step.type in (EquationType.POLYNOMIAL, EquationType.QUARTIC):
-                break
-            value = graph.symbol(Kind.JOINT, f"value of unknown {number}", "",
-                                 joints.samples(number))  # fmt: skip
-            C, S = joints.symbols(number)
-            if joints.unknowns[number].slides:
-                value = C
-            register = table.new()
-            for _ in range(2):
-                table.new()
-            table.give(value, n + 1, register)
-            if not joints.unknowns[number].slides:
-                table.give(C, n + 1, register + 1)
-                table.give(S, n + 1, register + 2)
-            values[number] = value
-            rows[n, 1 + 3 * m : 4 + 3 * m] = register, register + 1, register + 2
-            rows[n, 7 + m] = len(references)
+            values[number], rows[n, layout.FIRST + m] = _unknown(arm, number, table, n + 1)
+            rows[n, layout.REFERENCE + m] = len(references)
             references.append(_reference(arm, number))
-        for m, e in enumerate(_for_kernel(step)):
-            rows[n, 9 + m] = table.expression(e)[0]
+        for m, e in enumerate(step.type.arguments(*step.coefficients)):
+            rows[n, layout.COEFFICIENTS + m] = table.expression(e)[0]
     results = [table.expression(_joint_value(arm, j, values))[0] for j in range(form.k)]
     reached = np.cumprod([1, *(step.type.branches for step in steps)])
-    nominal = arm.K
-    arm.K = [_as_is(arm, j) for j in range(form.k)]
-    sides = min((_check(arm, s, table, reached) for s in range(form.k + 1)), key=lambda c: c[0])[1]
-    arm.K = nominal
-    results += [table.expression(e)[0] for e in sides]
-    order = sorted(range(len(table.operations)), key=lambda i: max(table.operations[i][0], 0))
-    operations = [table.operations[i] for i in order]
-    levels = np.array([max(level, 0) for level, _, _ in operations], dtype=np.int64)
-    starts = np.searchsorted(levels, np.arange(len(steps) + 2))
-    branches = int(reached[-1])
-    parts = [rows, starts, np.array([w for _, w, _ in operations]), results, form.sigma]
-    places = np.cumsum([_HEAD, *(np.size(p) for p in parts)])
-    factors = np.array([f for _, _, f in operations])
-    sides = [form.before[:3], form.after[:3], form.lever, [_scale(step, graph) for step in steps]]
-    spans = np.cumsum([factors.size, len(table.initial), np.size(references)])
-    head = [form.k, len(steps), *places[:5], len(table.initial), len(references), branches, *spans]
-    whole = np.concatenate([np.ravel(p) for p in (head, *parts)])
-    numbers = [np.ravel(p) for p in (factors, table.initial, references, *sides)]
+    exact = [_as_is(arm, j) for j in range(form.k)]
+    checks = (_check(arm, exact, s, table, reached) for s in range(form.k + 1))
+    results += [table.expression(e)[0] for e in min(checks, key=lambda check: check[0])[1]]
+    operations = sorted(table.operations, key=lambda operation: max(operation[0], 0))
+    levels = [max(level, 0) for level, _, _ in operations]
+    starts = np.searchsorted(np.array(levels, np.int64), np.arange(len(steps) + 2))
+    parts = [rows, starts, [where for _, where, _ in operations], results, form.sigma]
+    places = np.cumsum([layout.HEAD, *(np.size(p) for p in parts)])
+    factors = [f for _, _, f in operations]
+    scales = [_scale(step, graph) for step in steps]
+    numbers = [
+        factors, table.initial, references, form.before[:3], form.after, form.lever, scales,
+        [SLACK, ZERO_AMPLITUDE, SMALL_AMPLITUDE, ACCEPTED], np.zeros(3 * form.k),
+    ]  # fmt: skip
+    spans = np.delete(np.cumsum([np.size(p) for p in numbers]), layout.LEVER - layout.INITIAL)
+    branches, registers = int(reached[-1]), len(table.initial)
+    head = [form.k, len(steps), registers, len(references), branches, *places[:5], *spans]
     return Program(
-        plan=read_only(whole, np.uint32),
-        numbers=read_only(np.concatenate(numbers)),
+        plan=read_only(np.concatenate([np.ravel(p) for p in (head, *parts)]), np.uint32),
+        numbers=read_only(np.concatenate([np.ravel(p) for p in numbers])),
         branches=branches,
+        rare=any(step.type.kernel in layout.RARE for step in steps),
     )
 
 
-def _for_kernel(step: Step) -> tuple[Expression, ...]:
-    """Coefficients as the kernel takes them: types 6 and 7 are one."""
-    if step.type is EquationType.TYPE_6:
-        # W Sj and W Cj are W1 Cj + W2 Sj and -(W1 Sj - W2 Cj) with W1 = 0
-        return ZERO, *step.coefficients, (-1.0, ONE)
-    if step.type is EquationType.TYPE_3_DIRECT:
-        return step.coefficients[1:]
-    return step.coefficients
+def _unknown(arm: Arm, number: int, table: _Registers, level: int) -> tuple[Expression, int]:
+    """Registers for value, cosine and sine of an unknown; its value, and the first of them."""
+    item, register = arm.joints.unknowns[number], table.new()
+    table.new()
+    table.new()
+    C, S = arm.joints.symbols(number)
+    if item.slides:
+        table.give(C, level, register)
+        return C, register
+    samples = arm.joints.samples(number)
+    value = arm.graph.symbol(Kind.JOINT, f"value of unknown {number}", "", samples)
+    for i, e in enumerate((value, C, S)):
+        table.give(e, level, register + i)
+    return value, register
 
 
 def _scale(step: Step, graph: Graph) -> float:
-    """Usual size of what must not be zero for the step to have an answer."""
-    of = {
-        EquationType.TYPE_1: (0,), EquationType.TYPE_2: (0, 1), EquationType.TYPE_2_ZERO: (0, 1),
-        EquationType.TYPE_3: (0, 1, 3, 4), EquationType.TYPE_3_DIRECT: (0,),
-        EquationType.TYPE_4: (0, 2), EquationType.TYPE_5: (0, 3), EquationType.TYPE_6: (0,),
-        EquationType.TYPE_7: (0, 1), EquationType.TYPE_8: (0, 1),
-    }.get(step.type, ())  # fmt: skip
-    return max((graph.size(step.coefficients[i]) for i in of), default=1.0)
+    """Usual size of the coefficients that must not all be zero for the step to have an answer."""
+    return max((graph.size(step.coefficients[i]) for i in step.type.amplitude), default=1.0)
 
 
 def _reference(arm: Arm, number: int) -> Array:
@@ -249,9 +275,9 @@ def _joint_value(arm: Arm, j: int, values: dict[int, Expression]) -> Expression:
         return arm.graph.sum((joints.lengths[j], offset))
     sense = joints.group[j][2]
     terms = []
-    for solved, way in joints.path(joints.span_of(j)):
+    for solved, sign in joints.path(joints.sum_of(j)):
         factor, node = values[solved.unknown]
-        terms.append((sense * way * joints.sense(solved.span) * factor, node))
+        terms.append((sense * sign * joints.sense(solved.span) * factor, node))
     return arm.graph.sum((*terms, offset))
 
 
@@ -267,7 +293,7 @@ def _as_is(arm: Arm, j: int) -> Fixed:
 
 
 def _check(
-    arm: Arm, s: int, table: _Registers, reached: NDArray[np.int64]
+    arm: Arm, K: list[Fixed], s: int, table: _Registers, reached: NDArray[np.int64]
 ) -> tuple[float, list[Expression]]:
     """Both sides of the matrix equation split after joint s, and how many operations they take.
 
@@ -276,7 +302,7 @@ def _check(
     graph = arm.graph
     split = Split(s, arm.form.k, arm.E is not None)
     graph.strict = True
-    left, right = (product(side, arm.joints) for side in arm.sides(split))
+    left, right = (product(side, arm.joints) for side in arm.sides(split, K))
     graph.strict = False
     sides = [part(side[j][i] or {}) for side in (left, right) for j in range(4) for i in range(3)]
     trial = table.trial()

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..._arrays import Array
-from .expressions import UNIT, ZERO, Expression, Graph, Kind, negative
+from .expressions import ONE, UNIT, ZERO, Expression, Graph, Kind, negative
 from .normal_form import NormalForm, Row
-from .polynomials import Polynomial, constant, plus, scaled
+from .polynomials import Polynomial, constant, cosine, length, plus, scaled, sine
 
 CosSin = tuple[Expression, Expression]
 
 
-class Span(NamedTuple):
+class JointSum(NamedTuple):
     """A sum of angles: the difference of two running sums of a group."""
 
     group: int
@@ -36,7 +36,7 @@ class Unknown:
     ``terms`` are the joints whose variables add up to it, with their signs.
     """
 
-    span: Span | None
+    span: JointSum | None
     terms: tuple[tuple[int, float], ...]
     slides: bool
     name: str
@@ -47,7 +47,7 @@ class Unknown:
 class Solved:
     """A span whose angle a step gave: the symbols of its cosine and sine."""
 
-    span: Span
+    span: JointSum
     unknown: int
     cos: Expression
     sin: Expression
@@ -66,8 +66,8 @@ class Joints:
         self.group: dict[int, tuple[int, int, float]] = {}  # joint: group, place, sense
         self.members: list[list[int]] = []
         self._grouped(rotations)
-        self._rep = [list(range(len(m) + 1)) for m in self.members]
-        self.near = False  # write an unknown angle by the shortest sum, or from the first joint
+        self._root = [list(range(len(m) + 1)) for m in self.members]
+        self.shortest = False  # write an unknown angle by the shortest sum, or from the first joint
 
     def _grouped(self, rotations: list[list[list[Expression]]]) -> None:
         sense = 1.0
@@ -87,20 +87,20 @@ class Joints:
             self.group[j] = len(self.members) - 1, len(self.members[-1]) - 1, sense
             between = np.eye(3)
 
-    def sense(self, span: Span) -> float:
+    def sense(self, span: JointSum) -> float:
         """Sense of the first joint of a span within its group."""
         return self.group[self.members[span.group][min(span.a, span.b)]][2]
 
-    def terms(self, span: Span) -> tuple[tuple[int, float], ...]:
+    def terms(self, span: JointSum) -> tuple[tuple[int, float], ...]:
         """Joints of a span a < b with their signs, the first one positive."""
         joints = self.members[span.group][span.a : span.b]
         first = self.sense(span)
         return tuple((j, first * self.group[j][2]) for j in joints)
 
-    def span_of(self, j: int) -> Span:
-        """Span of one revolute joint."""
+    def sum_of(self, j: int) -> JointSum:
+        """JointSum of one revolute joint."""
         group, place, _ = self.group[j]
-        return Span(group, place, place + 1)
+        return JointSum(group, place, place + 1)
 
     def frame(self, j: int) -> int:
         """Number of a joint's frame in the table."""
@@ -121,10 +121,10 @@ class Joints:
             out += (minus or (between if out else "")) + str(self.frame(j))
         return out
 
-    def unknown(self, key: Span | int) -> int:
+    def unknown(self, key: JointSum | int) -> int:
         """Number of the unknown of a span (a < b) or of a sliding joint."""
         if key not in self._numbers:
-            if isinstance(key, Span):
+            if isinstance(key, JointSum):
                 terms = self.terms(key)
                 letters = self._letters(terms)
                 item = Unknown(key, terms, False, letters, self._letters(terms, latex=True))
@@ -160,18 +160,18 @@ class Joints:
             self.lengths[item.terms[0][0]] = C
             return
         self.solved.append(Solved(item.span, number, C, S))
-        rep = self._rep[item.span.group]
-        low, high = sorted((rep[item.span.a], rep[item.span.b]))
-        self._rep[item.span.group] = [low if r == high else r for r in rep]
+        root = self._root[item.span.group]
+        low, high = sorted((root[item.span.a], root[item.span.b]))
+        self._root[item.span.group] = [low if r == high else r for r in root]
 
     def knows(self, j: int) -> bool:
         """Whether a joint is known by itself."""
         if self.row(j).sigma:
             return j in self.lengths
         group, place, _ = self.group[j]
-        return self._rep[group][place] == self._rep[group][place + 1]
+        return self._root[group][place] == self._root[group][place + 1]
 
-    def path(self, span: Span) -> list[tuple[Solved, float]]:
+    def path(self, span: JointSum) -> list[tuple[Solved, float]]:
         """Solved spans that add up to a known one, with their signs in the sense of the group."""
         seen: dict[int, list[tuple[Solved, float]]] = {span.a: []}
         waiting = [span.a]
@@ -180,26 +180,26 @@ class Joints:
             for solved in self.solved:
                 if solved.span.group != span.group:
                     continue
-                for start, end, way in ((solved.span.a, solved.span.b, 1.0),
+                for start, end, sign in ((solved.span.a, solved.span.b, 1.0),
                                         (solved.span.b, solved.span.a, -1.0)):  # fmt: skip
                     if start == at and end not in seen:
-                        seen[end] = [*seen[at], (solved, way)]
+                        seen[end] = [*seen[at], (solved, sign)]
                         waiting.append(end)
         return seen[span.b]
 
-    def _known(self, span: Span) -> CosSin:
+    def _known(self, span: JointSum) -> CosSin:
         """Cosine and sine of ``Phi_b - Phi_a``, which is known, in the sense of the group."""
         if span.a == span.b:
             return UNIT, ZERO
         if span.a > span.b:
-            C, S = self._known(Span(span.group, span.b, span.a))
+            C, S = self._known(JointSum(span.group, span.b, span.a))
             return C, negative(S)
         sense, sums, products = self.sense(span), self.graph.sum, self.graph.product
         C, S = UNIT, ZERO
         path = self.path(span)
-        for solved, way in path:
-            way *= self.sense(solved.span)
-            c, s = solved.cos, (way * solved.sin[0], solved.sin[1])
+        for solved, sign in path:
+            sign *= self.sense(solved.span)
+            c, s = solved.cos, (sign * solved.sin[0], solved.sin[1])
             C, S = (
                 sums((products(C, c), negative(products(S, s)))),
                 sums((products(S, c), products(C, s))),
@@ -212,47 +212,46 @@ class Joints:
             S = (sense * S[0], S[1])
         return C, S
 
-    def cos_sin(self, span: Span, way: float) -> tuple[Polynomial, Polynomial]:
-        """Cosine and sine of ``way (Phi_b - Phi_a)`` as polynomials."""
-        rep = self._rep[span.group]
-        ra, rb = rep[span.a], rep[span.b]
+    def cos_sin(self, span: JointSum, sign: float) -> tuple[Polynomial, Polynomial]:
+        """Cosine and sine of ``sign (Phi_b - Phi_a)`` as polynomials."""
+        root = self._root[span.group]
+        ra, rb = root[span.a], root[span.b]
         if ra == rb:
             C, S = self._known(span)
-            return constant(C), constant((way * S[0], S[1]))
-        if self.near:
-            ends = ((abs(a - b), a, b) for a in range(len(rep)) for b in range(len(rep))
-                    if rep[a] == ra and rep[b] == rb)  # fmt: skip
+            return constant(C), constant((sign * S[0], S[1]))
+        if self.shortest:
+            ends = ((abs(a - b), a, b) for a in range(len(root)) for b in range(len(root))
+                    if root[a] == ra and root[b] == rb)  # fmt: skip
             _, ra, rb = min(ends)
-        key = Span(span.group, min(ra, rb), max(ra, rb))
+        key = JointSum(span.group, min(ra, rb), max(ra, rb))
         number = self.unknown(key)
         turn = self.sense(key) * (1.0 if ra < rb else -1.0)
-        c: Polynomial = {(2 * number,): UNIT}
-        s: Polynomial = {(2 * number + 1,): (turn, 0)}
+        c: Polynomial = {(cosine(number),): UNIT}
+        s: Polynomial = {(sine(number),): (turn, ONE)}
         # the rest, Phi_b - Phi_rb + Phi_ra - Phi_a, is known
         g, products = self.graph, self.graph.product
-        C1, S1 = self._known(Span(span.group, rb, span.b))
-        C2, S2 = self._known(Span(span.group, span.a, ra))
+        C1, S1 = self._known(JointSum(span.group, rb, span.b))
+        C2, S2 = self._known(JointSum(span.group, span.a, ra))
         C = g.sum((products(C1, C2), negative(products(S1, S2))))
         S = g.sum((products(S1, C2), products(C1, S2)))
-        cosine = plus(g, scaled(g, C, c), scaled(g, negative(S), s))
-        sine = plus(g, scaled(g, C, s), scaled(g, S, c))
-        return cosine, scaled(g, (way, 0), sine)
+        total = plus(g, scaled(g, C, s), scaled(g, S, c))
+        return plus(g, scaled(g, C, c), scaled(g, negative(S), s)), scaled(g, (sign, ONE), total)
 
     def length(self, j: int) -> Polynomial:
         """Length of a sliding joint."""
         if j in self.lengths:
             return constant(self.lengths[j])
-        return {(2 * self.unknown(j),): UNIT}
+        return {(length(self.unknown(j)),): UNIT}
 
     @property
-    def tied(self) -> bool:
+    def has_alternatives(self) -> bool:
         """Whether unknown angles can be written in more than one way."""
-        return any(1 < len(set(rep)) < len(rep) for rep in self._rep)
+        return any(1 < len(set(root)) < len(root) for root in self._root)
 
     def is_free_of(self, number: int) -> bool:
         """Whether an unknown is still one: neither solved nor tied by what has been."""
         item = self.unknowns[number]
         if item.span is None:
             return item.terms[0][0] not in self.lengths
-        rep = self._rep[item.span.group]
-        return rep[item.span.a] != rep[item.span.b]
+        root = self._root[item.span.group]
+        return root[item.span.a] != root[item.span.b]

@@ -1,0 +1,182 @@
+"""Arguments that commands share: the robot, numbers and postures, columns and units of files."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError, nearest_names
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+from ..robots import load
+from ..symoro import read_par
+
+
+def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
+    """Add the argument that names a robot, and the options for URDF files."""
+    text = "a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
+    if option:
+        parser.add_argument("--robot", required=True, help=text)
+    else:
+        parser.add_argument("robot", help=text)
+    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
+    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
+    parser.add_argument(
+        "--package-dir", action="append", default=[], metavar="FOLDER",
+        help="URDF only: folder that holds packages with meshes; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--mimic", action="store_true",
+                        help="URDF only: mimic joints follow their masters; without it they move "
+                        "by themselves")  # fmt: skip
+
+
+def robot_of(arguments: argparse.Namespace) -> RobotModel:
+    """Load the robot of the command line."""
+    name = arguments.robot
+    suffix = Path(name).suffix.lower()
+    if suffix != ".par" and Path(name).is_dir():
+        raise InvalidValueError(f"{name!r} is a folder; give a robot's name or file.")
+    if suffix == ".par":
+        return read_par(name)
+    if suffix in (".urdf", ".xml", ".xacro"):
+        return RobotModel.from_urdf(
+            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir,
+            mimic=arguments.mimic,
+        )  # fmt: skip
+    if arguments.base_link or arguments.tip_link or arguments.package_dir or arguments.mimic:
+        raise InvalidValueError(
+            f"--base-link, --tip-link, --package-dir and --mimic are for URDF files; {name!r} is a "
+            "name of the catalogue."
+        )
+    if suffix and Path(name).exists():
+        raise InvalidValueError(
+            f"{name!r}: robots are read from files named .urdf, .xml, .xacro or .par; to see the "
+            "names of the catalogue run robotmodels robots."
+        )
+    return load(name)
+
+
+NUMBER_OPTIONS = (
+    "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
+    "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
+    "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band", "--kp", "--kd", "--delay",
+    "--dt", "--cutoff", "--edges", "--test-share",
+    "--held-out", "--duration", "--rate",
+)  # fmt: skip
+"""Options that take numbers, which may be negative."""
+
+
+def joined(argv: Sequence[str]) -> list[str]:
+    """Put the numbers behind an option into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``."""
+    words: list[str] = []
+    rest = list(argv)
+    while rest:
+        word = rest.pop(0)
+        taken: list[str] = []
+        if word in NUMBER_OPTIONS:
+            while rest and _is_list(rest[0]):
+                taken.append(rest.pop(0))
+        words.append(f"{word}={','.join(taken)}" if taken else word)
+    return words
+
+
+def numbers(text: str, count: int | Sequence[int], option: str, positive: bool = False) -> Array:
+    """Numbers of an option. Shapes: -> (count,)."""
+    counts = (count,) if isinstance(count, int) else tuple(count)
+    try:
+        values = np.array([float(word) for word in _words(text)])
+    except ValueError:
+        values = np.empty(0)
+    if values.size not in counts or not np.isfinite(values).all():
+        wanted = " or ".join(map(str, counts))
+        what = "finite number" + "s" * (counts != (1,))
+        raise InvalidValueError(f"{option}: expected {wanted} {what}, got {text!r}.")
+    if positive and not (values > 0.0).all():
+        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
+    return values
+
+
+def joint_numbers(
+    text: str | None, n: int, option: str, positive: bool = False
+) -> Array | float | None:
+    """One number for all joints, or one for each."""
+    if text is None:
+        return None
+    values = numbers(text, sorted({1, n}), option, positive)
+    return float(values[0]) if len(values) == 1 else values
+
+
+def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
+    """Joint variables from numbers, or from the name of a configuration of the robot."""
+    named = model.configurations.get(text)
+    if named is not None:
+        return named
+    try:
+        q = numbers(text, model.n, option)
+    except InvalidValueError:
+        names = ", ".join(model.configurations)
+        near = nearest_names(text, model.configurations)
+        meant = f" Did you mean {near[0]!r}?" if near else ""
+        raise InvalidValueError(
+            f"{option}: expected {model.n} numbers, or the name of a configuration ({names}), "
+            f"got {text!r}.{meant}"
+        ) from None
+    return np.deg2rad(q, out=q, where=revolute(model)) if degrees else q
+
+
+def revolute(model: RobotModel) -> np.ndarray:
+    """Which joints are revolute, whose variables may be in degrees."""
+    return model.table.sigma[model.table.joint_rows] == REVOLUTE
+
+
+def _words(text: str) -> list[str]:
+    for mark in "[],":
+        text = text.replace(mark, " ")
+    return text.split()
+
+
+def _is_list(word: str) -> bool:
+    """Whether a word of the command line holds nothing but numbers."""
+    try:
+        return bool([float(number) for number in _words(word)])
+    except ValueError:
+        return False
+
+
+def column(word: str) -> int | str:
+    """Column by its number or its name."""
+    return int(word) if word.lstrip("-").isdecimal() else word
+
+
+def columns(words: list[str] | None) -> list[int | str] | None:
+    """Columns of an option that may be missing."""
+    return None if words is None else [column(word) for word in words]
+
+
+def add_units(files: Any) -> None:
+    """Add the options for the units of angles and lengths."""
+    for option, units, of in (
+        ("--angles", ("rad", "deg"), "angles"),
+        ("--lengths", ("m", "mm"), "lengths, also of prismatic joints,"),
+    ):
+        files.add_argument(option, choices=units, default=units[0],
+                           help=f"unit of {of} in the files (default: %(default)s)")  # fmt: skip
+
+
+def add_delimiter(files: Any) -> None:
+    """Add the option of the delimiter."""
+    files.add_argument("--delimiter", type=_character, metavar="CHARACTER",
+                       help=r"between cells, \t for a tab (default: ; tab or , as "
+                       "found)")  # fmt: skip
+
+
+def _character(text: str) -> str:
+    text = text.replace(r"\t", "\t")
+    if len(text) != 1:
+        raise argparse.ArgumentTypeError(f"expected one character, got {text!r}")
+    return text

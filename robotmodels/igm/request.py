@@ -1,0 +1,118 @@
+"""Checks of the arguments of an inverse model: poses, mask, tolerances, locked joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite
+from numbers import Real
+from operator import index
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, as_floats
+from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..model import RobotModel
+
+WHOLE_POSE = (True,) * 6
+FARTHEST = 1e6
+"""Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
+FARTHEST_POSITION = 1e100
+"""Largest coordinate of a position [m]: beyond, squares of squares of lengths are no numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Mask, locks and options of a call, which select the solver."""
+
+    mask: tuple[bool, ...] = WHOLE_POSE
+    in_tool_axes: bool = False
+    locks: tuple[tuple[int, float], ...] = ()
+    by_arm_angle: bool = False
+    relations: tuple[tuple[tuple[float, ...], float], ...] = ()
+
+
+def poses_of(T: ArrayLike) -> Array:
+    """Poses of the tool, checked."""
+    poses = se3.as_pose(T)
+    farthest = float(np.abs(poses[..., :3, 3]).max(initial=0.0))
+    if farthest > FARTHEST_POSITION:
+        raise InvalidValueError(
+            f"T: expected positions within +-{FARTHEST_POSITION:g} m, got {farthest:g}; lengths "
+            "like this leave no digits for an arm."
+        )
+    return poses
+
+
+def above_zero(value: Any, name: str) -> float:
+    """A finite number above 0, or an error that names the argument."""
+    if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
+        raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
+    number = float(value)
+    if not 0.0 < number < inf:
+        raise InvalidValueError(f"{name}: expected a finite number above 0, got {number}.")
+    return number
+
+
+def locks_of(
+    model: RobotModel, lock: Mapping[int | str, float] | None
+) -> tuple[tuple[int, float], ...]:
+    """Columns and values of locked joints."""
+    if lock is None:
+        return ()
+    if not isinstance(lock, Mapping):
+        raise InvalidValueError(
+            f"lock: expected a mapping from joints to values, such as {{2: 0.5}}, got {lock!r}."
+        )
+    rows = model.table.joint_rows
+    names = [str(model.table.names[row]) for row in rows]
+    columns: dict[int, float] = {}
+    for joint, value in lock.items():
+        if isinstance(joint, str):
+            if joint not in names:
+                near = nearest_names(joint, names) or names
+                raise InvalidValueError(
+                    f"lock: no joint is called {joint!r}; there is {', '.join(near)}."
+                )
+            column = names.index(joint)
+        else:
+            try:
+                column = index(joint)
+            except TypeError:
+                raise InvalidValueError(
+                    f"lock: expected columns of q or names of joints, got {joint!r}."
+                ) from None
+            if isinstance(joint, (bool, np.bool_)) or not 0 <= column < model.n:
+                raise InvalidValueError(
+                    f"lock: columns of q run from 0 to {model.n - 1}, got {joint!r}."
+                )
+        if column in columns:
+            raise InvalidValueError(f"lock: joint {joint!r} is given twice.")
+        if not isinstance(value, (Real, np.number)) or not isfinite(value):
+            raise InvalidValueError(
+                f"lock: expected one finite number for joint {joint!r}, got {value!r}."
+            )
+        columns[column] = float(value)
+    return tuple(sorted(columns.items()))
+
+
+def relations_of(
+    model: RobotModel, relations: tuple[ArrayLike, ArrayLike] | None
+) -> tuple[tuple[tuple[float, ...], float], ...]:
+    """Rows of added relations between joints."""
+    if relations is None:
+        return ()
+    if not isinstance(relations, tuple) or len(relations) != 2:
+        raise InvalidValueError(
+            "relations: expected a pair (A, b) of A q = b, A of shape (m, n) and b of shape (m,)."
+        )
+    A, b = as_floats(relations[0], "relations: A"), as_floats(relations[1], "relations: b")
+    if A.ndim != 2 or A.shape[1] != model.n or b.shape != A.shape[:1]:
+        raise ShapeError(
+            f"relations: expected A of shape (m, {model.n}) and b of shape (m,), got {A.shape} "
+            f"and {b.shape}."
+        )
+    return tuple((tuple(row), right) for row, right in zip(A.tolist(), b.tolist(), strict=True))

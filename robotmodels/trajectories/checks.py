@@ -1,0 +1,155 @@
+"""What is asked of a motion, checked once: vectors, durations and limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats
+from ..errors import InvalidValueError, ShapeError
+from .laws import LineLimits
+from .limits import MotionLimits
+from .number_text import least_shown
+
+ROUNDING = 1e-12
+"""Relative shortfall of a given duration that is put down to rounding."""
+
+_EXTREME = 1e50
+"""Largest size of states, durations and limits: cubes of their ratios are floats."""
+
+
+def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
+    """Check positions and rates given for the same joints and give them one shape.
+
+    Shapes: **given () or (..., n) -> arrays (R, n).
+    """
+    arrays = {name: as_floats(value, name) for name, value in given.items()}
+    scalar = all(array.ndim == 0 for array in arrays.values())
+    try:
+        shape = np.broadcast_shapes((1,), *(array.shape for array in arrays.values()))
+    except ValueError:
+        got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
+    n = shape[-1]
+    refuse_jointless(n, " and ".join(tuple(given)[:2]))
+    rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
+    return rows, shape[:-1], scalar
+
+
+def refuse_jointless(n: int, name: str) -> None:
+    """Refuse motions of no joints, which have no duration of their own."""
+    if n == 0:
+        raise InvalidValueError(
+            f"{name}: expected positions of at least one joint, got none; a model without joints "
+            "has no motion."
+        )
+
+
+def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] = ()) -> LineLimits:
+    """Limits of the coordinate that several joints share.
+
+    Shapes: direction (R, 1, n) or (R, n, 1).
+    """
+    own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
+    u = direction[..., 0] if own else direction[..., 0, :]
+    size = np.where(u != 0.0, np.abs(u), 1.0)
+
+    def along(name: str, least: Array, most: Array, needed: bool = True) -> Array:
+        """The bound that stops the coordinate from growing."""
+        bound = np.where(u > 0.0, most, -least)
+        zero = (u != 0.0) & (bound == 0.0)
+        if needed and zero.any():
+            j = int(np.argwhere(zero)[0][-1])
+            if names:
+                raise InvalidValueError(
+                    f"limits: the {name} of {names[j]} is limited to 0, but the path asks for "
+                    f"{names[j]}; any other limit will do, or poses without {names[j]}."
+                )
+            raise InvalidValueError(
+                f"limits: a limit of {name} of joint {j + 1} is 0, but it has to move; any "
+                "other limit will do, or leave the joint where it is."
+            )
+        with np.errstate(over="ignore"):
+            bound = np.where(u != 0.0, bound / size, np.inf)
+        return bound.reshape(-1) if own else bound.min(axis=-1)
+
+    least_v, least_a = limits.velocity_lower, limits.acceleration_lower
+    return LineLimits(
+        along("velocity", least_v, limits.velocity),
+        along("acceleration", least_a, limits.acceleration),
+        along("acceleration", -limits.acceleration, -least_a),
+        along("jerk", limits.jerk_lower, limits.jerk),
+        along("jerk", -limits.jerk, -limits.jerk_lower),
+        along("velocity", -limits.velocity, -least_v, needed=False),
+    )
+
+
+def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
+    """Checked durations, shape (R,), one per motion."""
+    if duration is None:
+        return None
+    T = as_floats(duration, "duration")
+    if (T < 0.0).any():
+        raise InvalidValueError(f"duration: expected seconds of at least 0, got {T.min():g}.")
+    try:
+        return np.broadcast_to(T, batch).reshape(-1)
+    except ValueError:
+        raise ShapeError(
+            f"duration: expected one number or one per motion {batch}, got shape {T.shape}."
+        ) from None
+
+
+def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> MotionLimits | None:
+    """Limits of n joints, within which the postures are. Shapes: *postures (R, n)."""
+    if limits is None:
+        return None
+    if not isinstance(limits, MotionLimits):
+        raise InvalidValueError(
+            f"limits: expected MotionLimits, got {type(limits).__name__}; write for instance "
+            "MotionLimits(velocity=2.0, acceleration=10.0)."
+        )
+    limits = limits.for_joints(n)
+    slack = 1e-9
+    for q in postures:
+        outside = (q < limits.lower - slack) | (q > limits.upper + slack)
+        if outside.any():
+            j = int(np.argwhere(outside)[0][-1])
+            raise InvalidValueError(
+                f"Joint {j + 1} is asked to be at {q[outside].ravel()[0]:.6g}, outside its limits "
+                f"{limits.lower[j]:.6g} to {limits.upper[j]:.6g}."
+            )
+    return limits
+
+
+def refuse_short(T: Array | None, least: Array, length: Array) -> None:
+    """Refuse durations below the least feasible ones. Shapes: T, least (R,); length (R, ...)."""
+    if T is None:
+        return
+    short = least * (1.0 - ROUNDING) > T
+    if short.any():
+        i = int(short.argmax())
+        raise InvalidValueError(
+            f"duration: {T[i]:.9g} s is too short for the limits; the least is "
+            f"{least_shown(least[i])} s."
+        )
+    if ((T == 0.0) & (length > 0.0).any(axis=-1)).any():
+        raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
+
+
+def refuse_extremes(states: dict[str, Array], limits: MotionLimits | None) -> None:
+    """Refuse states, durations and limits whose powers overflow or underflow."""
+    bounds = {} if limits is None else {
+        f"limits: {name}": np.abs(getattr(limits, name))
+        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk",
+                     "jerk_lower")
+    }  # fmt: skip
+    for name, given in (*((k, np.abs(v)) for k, v in states.items()), *bounds.items()):
+        small = (given > 0.0) & (given < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
+        wrong = np.isfinite(given) & ((given > _EXTREME) | small)
+        if wrong.any():
+            raise InvalidValueError(
+                f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0), got "
+                f"{given[wrong][0]:.3g}; check the units."
+            )
