@@ -37,7 +37,7 @@ from benchmarks.igm_checks import (
 from benchmarks.igm_peers import PACKAGES, eaik
 from benchmarks.igm_postures import Kind, sample, sigma_of, uniform
 from benchmarks.machine import machine
-from robotmodels.igm.general import general_postures, prepare_general
+from robotmodels.igm.elimination import elimination_solutions, prepare_elimination
 from robotmodels.igm.loop import joint_chain
 
 Array = NDArray[np.float64]
@@ -333,20 +333,20 @@ def random_arms(count: int) -> Union:
 def random_arm(seed: int) -> tuple[int, int, bool, bool, bool]:
     """Postures found, those of all formulations, generating one lost, odd count, unreliable."""
     model = igm_arms.random_arm(seed)
-    solver = prepare_general(joint_chain(model))
+    solver = prepare_elimination(joint_chain(model))
     assert solver is not None
     q0 = uniform(model, 1, np.random.default_rng(seed + 10**6))
     U = rm.dgm(model, q0)
-    q, valid, double = general_postures(solver, U)
+    q, valid, double = elimination_solutions(solver, U)
     every = q[0][valid[0]]
-    for way in solver.representations:
-        alone, there, _ = general_postures(replace(solver, representations=(way,)), U)
+    for form in solver.forms:
+        alone, there, _ = elimination_solutions(replace(solver, forms=(form,)), U)
         for row in alone[0][there[0]]:
             if not len(every) or np.abs(difference(model, every, row)).max(axis=1).min() > 1e-5:
                 every = np.vstack([every, row])
     lost = not gaps(model, q, valid, q0)[0].min(initial=np.inf) < CLOSE
     uneven = bool(odd(model, q, valid, double)[0])
-    return int(valid.sum()), len(every), lost, uneven, not solver.reliable
+    return int(valid.sum()), len(every), lost, uneven, not solver.well_conditioned
 
 
 # --- report --------------------------------------------------------------------------------------

@@ -299,5 +299,7 @@ def __getattr__(name: str) -> Any:
         ):  # fmt: skip
             return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:
-            return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+            value = getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+            globals()[name] = value  # the next use is a plain attribute
+            return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -25,21 +25,22 @@ def residual(x, data, F, J):
             F[1] *= x[0] - r
 
 
+_, begin, trace, solutions = continuation.curves_of(residual)
+
+
 @njit
 def traced(kind, eps, roots, start, period, most, longest):
     """Points of the curve both ways, what is missing there, why it ends, and the solutions."""
     data, n, rows = (kind, eps, roots), 2, 400
     work, curve = continuation.workspace(n), continuation.curve_of(rows, n)
     limits = (1e-10, 1e-4, longest, most, 10.0)
-    beside = continuation.begin(residual, data, start, curve, rows // 2, work, 1e-10)
-    last, why = continuation.trace(residual, data, period, curve, rows // 2, 1, limits, work)
+    beside = begin(data, start, curve, rows // 2, work, 1e-10)
+    last, why = trace(data, period, curve, rows // 2, 1, limits, work)
     first, back = rows // 2, why
     if why != continuation.CLOSED:
-        first, back = continuation.trace(residual, data, period, curve, first, -1, limits, work)
+        first, back = trace(data, period, curve, first, -1, limits, work)
     found, double = np.zeros((16, n)), np.zeros(16, np.int64)
-    count = continuation.solutions_on(
-        residual, data, curve, first, last, 1e-15, found, double, work, 1e-10
-    )
+    count = solutions(data, curve, first, last, 1e-14, found, double, work, 1e-10)
     part = slice(first, last + 1)
     return beside, curve[0][part], curve[3][part], (back, why), found[:count], double[:count]
 

@@ -22,7 +22,7 @@ ROOMS = (
     "symbolic", "symoro", "trajectories", "urdf", "viz",
 )  # fmt: skip
 FOR_OTHER_ROOMS = {
-    "geometry": {"FIXED", "NOT_XML", "PRISMATIC", "REVOLUTE"},
+    "geometry": {"FIXED", "constant_names", "NOT_XML", "PRISMATIC", "REVOLUTE"},
     "inertia": {"PARAMETERS"},
     "model": {"FrameOfInterest", "GRAVITY", "PinocchioTwin", "check_model"},
     "se3": {"ROTATION_TOLERANCE"},

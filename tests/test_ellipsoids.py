@@ -17,15 +17,16 @@ from identities.random_robots import (
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.dexterity import Manipulability, manipulability
-from robotmodels.kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
-from robotmodels.kinematics.ellipsoids import (
+from robotmodels.kinematics import (
+    Ellipsoid,
+    EllipsoidQuantity,
+    ManipulabilityCriterion,
     OtherPart,
     TwistPart,
     force_ellipsoid,
+    manipulability,
     velocity_ellipsoid,
 )
-from robotmodels.kinematics.inverse.criteria.manipulability import ManipulabilityCriterion
 
 H = np.pi / 2
 PARTS = list(TwistPart)
@@ -106,22 +107,6 @@ def test_other_half_at_zero_is_a_cut(model, seed):
         assert found.volume <= free.volume * (1 + 1e-9) + 1e-12
 
 
-def test_a_wrist_turns_without_shifting_its_centre():
-    """RX-90: the tool at the wrist's centre shifts without turning only by the first three joints
-    with the wrist turning back; it turns without shifting by the wrist alone."""
-    arm = rm.load("rx90")
-    q = [0.1, 0.2, 0.9, 0.4, 0.5, 0.6]
-    found = velocity_ellipsoid(arm, q, TwistPart.ANGULAR, frame=4, other=OtherPart.ZERO)
-    # frame 4 has its origin at the wrist's centre and is before joints 5 and 6
-    assert int(found.rank) == 1
-    z4 = rm.link_poses(arm, q)[3, :3, 2]
-    close(np.abs(found.axes[:, 0] @ z4), 1.0, 1e-12)
-    close(found.radii, [1.0, 0.0, 0.0], 1e-12)
-    whole = velocity_ellipsoid(arm, q, TwistPart.ANGULAR, frame=6, other=OtherPart.ZERO)
-    J = rm.jacobian(arm, q, 6)[3:, 3:]
-    close(matrix(whole), J @ J.T, 1e-12)
-
-
 def test_a_planar_arm_by_hand():
     """Right angle between links of 0.3 and 0.2 m; and stretched out, where it is a segment."""
     arm = planar(0.3, 0.2)
@@ -149,30 +134,6 @@ def test_a_planar_arm_by_hand():
     assert np.isinf(force.volume)
     assert (force.quantity.unit, int(force.rank), float(force.isotropy)) == ("N", 1, 0.0)
     assert force_ellipsoid(arm, [H, 0.0], TwistPart.ANGULAR).quantity.unit == "N m"
-
-
-def test_a_gantry_is_a_ball():
-    """Three slides: a sphere of 1 m/s; with their limits a box's ellipsoid; it never turns."""
-    rows = [{"sigma": 1}, {"sigma": 1, "alpha": -H, "theta": H}, {"sigma": 1, "alpha": -H}]
-    gantry = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-    J = rm.jacobian(gantry, np.zeros(3))[:3]
-    close(J @ J.T, np.eye(3), 1e-15)
-    ball = velocity_ellipsoid(gantry, np.zeros(3))
-    close(ball.radii, np.ones(3), 1e-15)
-    close(ball.isotropy, 1.0, 1e-14)
-    close(ball.volume, 4 * np.pi / 3, 1e-14)
-    close(velocity_ellipsoid(gantry, np.zeros(3), other=OtherPart.ZERO).radii, np.ones(3), 1e-15)
-    limits = [0.5, 2.0, 1.0]
-    found = velocity_ellipsoid(gantry, np.zeros(3), joint_velocity=limits)
-    close(found.radii, [2.0, 1.0, 0.5], 1e-15)
-    close([found.radius_along(J[:, k]) for k in range(3)], limits, 1e-15)
-    still = velocity_ellipsoid(gantry, np.zeros((2, 3)), TwistPart.ANGULAR)
-    assert not still.radii.any()
-    assert not still.rank.any()
-    assert np.isinf(force_ellipsoid(gantry, np.zeros(3), TwistPart.ANGULAR).radii).all()
-    # a locked slide: the ball is flat
-    flat = velocity_ellipsoid(gantry, np.zeros(3), joint_velocity=[1.0, 0.0, 1.0])
-    close(flat.radii, [1, 1, 0], 1e-15)
 
 
 # ---------------------------------------------------------------- duality
@@ -206,37 +167,6 @@ def test_forces_are_dual_to_velocities(part, other, model, seed):
             )
 
 
-@given(model=any_models(), seed=seeds)
-def test_forces_of_the_boundary_take_torques_of_the_ball(model, seed):
-    rng = np.random.default_rng(seed)
-    q, _, _ = random_state(model, rng)
-    torque = rng.uniform(0.5, 20.0, size=model.n)
-    for part in PARTS:
-        found = force_ellipsoid(model, q, part, joint_torque=torque)
-        wrench = np.zeros((3, 6))
-        finite = np.isfinite(found.radii)
-        wrench[:, ROWS[part]] = (found.axes * np.where(finite, found.radii, 1.0)).T
-        tau = wrench @ rm.jacobian(model, q) / torque
-        size = np.linalg.norm(tau, axis=-1)
-        close(size, np.where(finite, 1.0, 0.0), 1e-6)
-
-
-def test_any_moment_helps_a_force(rng):
-    """With a free moment the most force is what the best moment allows: by minimisation."""
-    arm = rm.load("rx90")
-    q = [0.1, 0.2, 0.9, 0.4, 0.5, 0.6]
-    torque = np.array([200.0, 150.0, 80.0, 30.0, 20.0, 5.0])
-    free = force_ellipsoid(arm, q, joint_torque=torque, other=OtherPart.FREE)
-    none = force_ellipsoid(arm, q, joint_torque=torque)
-    B = rm.jacobian(arm, q).T / torque[:, None]
-    for f in rng.normal(size=(5, 3)):
-        f = f / np.linalg.norm(f)
-        moment, *_ = np.linalg.lstsq(B[:, 3:], -B[:, :3] @ f, rcond=None)
-        best = np.linalg.norm(B @ np.concatenate((f, moment)))
-        close(free.radius_along(f), 1 / best, 1e-9 / best)
-        assert free.radius_along(f) >= none.radius_along(f)
-
-
 # ---------------------------------------------------------------- invariance
 
 
@@ -263,85 +193,7 @@ def test_the_world_turns_axes_and_keeps_radii(other, model, seed):
         close(b.extent_along(R @ direction), a.extent_along(direction), 1e-8 * size)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_regular_arms_keep_every_number(seed):
-    """Random 6R and 7R arms in a moved and turned world: radii to rounding, force radii too."""
-    rng = np.random.default_rng(seed)
-    model = random_model(rng, f=6 + seed % 2, prismatic=seed % 3 == 0)
-    q, _, _ = random_state(model, rng)
-    moved = model.with_base(random_pose(rng) @ model.base)
-    for function in (velocity_ellipsoid, force_ellipsoid):
-        for part in PARTS:
-            for other in OTHERS:
-                a, b = (function(m, q, part, other=other) for m in (model, moved))
-                close(a.rank, b.rank, 0)
-                np.testing.assert_allclose(b.radii, a.radii, rtol=1e-8, atol=1e-13)
-                np.testing.assert_allclose(b.isotropy, a.isotropy, rtol=1e-8, atol=1e-13)
-                np.testing.assert_allclose(b.volume, a.volume, rtol=1e-8, atol=1e-13)
-
-
-def test_units_of_length_scale_radii():
-    """The same robot a thousand times larger: linear radii a thousand times, angular the same."""
-    rows = [{"sigma": 0, "d": d, "alpha": a} for d, a in ((0, 0), (0.2, H), (0.3, 0.4))]
-    small, large = (
-        rm.RobotModel.from_table(
-            rm.DHTable.from_rows([r | {"d": k * r["d"]} for r in rows]),
-            tool=se3.translation(0.1 * k, 0.05 * k, 0),
-        )
-        for k in (1.0, 1e3)
-    )
-    q = [0.3, 0.8, -0.4]
-    for other in OTHERS:
-        a, b = (velocity_ellipsoid(m, q, other=other) for m in (small, large))
-        np.testing.assert_allclose(b.radii, 1e3 * a.radii, rtol=1e-10)
-        close(a.rank, b.rank, 0)
-        a, b = (velocity_ellipsoid(m, q, TwistPart.ANGULAR, other=other) for m in (small, large))
-        np.testing.assert_allclose(b.radii, a.radii, rtol=1e-10)
-
-
 # ---------------------------------------------------------------- flat ones, directions, points
-
-
-@pytest.mark.parametrize("name", ["planar_2r", "planar_3r", "lab_rr", "lab_rrt", "cobra_s600"])
-def test_arms_with_few_joints_have_flat_ellipsoids(name, rng):
-    model = rm.load(name)
-    q, _, _ = random_state(model, rng, 30)
-    ranks = [np.linalg.matrix_rank(rm.jacobian(model, q)[:, ROWS[p]], tol=1e-9) for p in PARTS]
-    for part, rank in zip(PARTS, ranks, strict=True):
-        found = velocity_ellipsoid(model, q, part)
-        close(found.rank, rank, 0)
-        assert ((found.radii > 0).sum(axis=-1) == rank).all()
-        force = force_ellipsoid(model, q, part)
-        assert (np.isinf(force.radii).sum(axis=-1) == 3 - rank).all()
-
-
-@pytest.mark.parametrize("small", [0.0, 1e-15, 1e-12, 1e-7, 1e-4])
-def test_near_a_singular_position(small):
-    """An arm stretched but for a small angle: its short radius is small, not noise, then zero."""
-    arm = planar(0.3, 0.2)
-    found = velocity_ellipsoid(arm, [0.7, small])
-    expected = 0.06 * np.sin(small) / np.hypot(0.5, 0.2)
-    shown = expected if small > 1e-8 else 0.0
-    np.testing.assert_allclose(found.radii[1], shown, rtol=1e-6)
-    assert int(found.rank) == 1 + (shown > 0)
-    assert np.isinf(force_ellipsoid(arm, [0.7, small]).radii).sum() == 2 - (shown > 0)
-    # asked for, the small radius is shown
-    fine = velocity_ellipsoid(arm, [0.7, small], tolerance=1e-14)
-    assert int(fine.rank) == 1 + (small > 1e-13)
-
-
-def test_a_tool_on_the_last_axis_moves_by_rounding_only():
-    """All axes through the tool: the linear ellipsoid is a point, whatever rounding says."""
-    rows = [{"sigma": 0, "alpha": a} for a in (0.3, H, -H)]
-    base = se3.translation(123.4, -56.7, 8.9) @ se3.rotation("x", 1.1)
-    wrist = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), base=base)
-    found = velocity_ellipsoid(wrist, [0.3, 0.4, 0.5])
-    assert int(found.rank) == 0
-    assert not found.radii.any()
-    assert found.radius_along([1, 2, 3]) == 0.0
-    assert found.extent_along([1, 2, 3]) == 0.0
-    assert int(velocity_ellipsoid(wrist, [0.3, 0.4, 0.5], TwistPart.ANGULAR).rank) == 3
-    assert (force_ellipsoid(wrist, [0.3, 0.4, 0.5]).radius_along(np.eye(3)) == np.inf).all()
 
 
 def test_directions_in_and_out_of_a_flat_ellipsoid(rng):
@@ -407,21 +259,6 @@ def test_leading_axes_are_the_batch(function, batch, rng):
     found = manipulability(model, q)
     assert found.measure.shape == found.condition.shape == found.rank.shape == batch
     assert found.velocity_transmission(np.eye(6)[0]).shape == batch
-
-
-@pytest.mark.parametrize("rows", [[], [0], [1], [0, 0]], ids=str)
-def test_fewer_joints_than_directions(rows):
-    table = rm.DHTable.from_rows([{"sigma": s, "d": 0.3} for s in [*rows, 2]])
-    model = rm.RobotModel.from_table(table)
-    for q in (np.full(model.n, 0.4), np.full((2, model.n), 0.4)):
-        found = velocity_ellipsoid(model, q)
-        assert (found.rank == model.n).all()
-        assert (found.radii > 0).sum() == model.n * (q.ndim if q.ndim == 1 else 2)
-        assert (np.isinf(force_ellipsoid(model, q).radii).sum(axis=-1) == 3 - model.n).all()
-        values = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)
-        close(manipulability(model, q).measure, values.prod(axis=-1), 1e-14)
-        if model.n:
-            close(manipulability(model, q).condition, values[..., 0] / values[..., -1], 1e-12)
 
 
 def test_mistakes_are_named():
@@ -523,15 +360,6 @@ def test_measure_is_that_of_the_criterion(name):
     )
 
 
-def test_measure_of_two_links():
-    arm = rm.load("planar_2r")
-    assert manipulability(arm, [0.3, 0.5]).measure.round(3) == 1.109
-    assert np.isfinite(manipulability(arm, [0.3, 0.5]).condition)
-    position = [1, 1, 0, 0, 0, 0]
-    assert manipulability(arm, [0.3, 0.0], mask=position).measure == 0.0
-    assert manipulability(arm, [0.3, 0.0], mask=position).condition == np.inf
-
-
 def test_reprs_are_short():
     arm, q = rm.load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     one, many = velocity_ellipsoid(arm, q), force_ellipsoid(arm, np.tile(q, (4, 5, 1)))
@@ -573,22 +401,6 @@ def test_ratios_along_twists_and_wrenches(model, seed):
         assert found.rank < 6 or both * (w @ w) <= 1 + 1e-9
 
 
-def test_ratios_where_there_is_no_motion():
-    arm = planar(0.3, 0.2)
-    found = manipulability(arm, [[0.0, 0.0], [0.0, 0.5]], mask=[1, 1, 1, 0, 0, 0])
-    close(found.velocity_transmission([1.0, 0.0, 0.0])[0], 0.0, 0)
-    assert found.velocity_transmission([1.0, 0.0, 0.0])[1] > 0
-    assert (found.velocity_transmission([0.0, 0.0, 2.0]) == 0).all()
-    assert found.force_transmission([1.0, 0.0, 0.0])[0] == np.inf
-    assert np.isfinite(found.force_transmission([1.0, 0.0, 0.0])[1])
-    assert (found.force_transmission([0.0, 0.0, 1.0]) == np.inf).all()
-    # as the ellipsoids say
-    disc = velocity_ellipsoid(arm, [0.0, 0.5])
-    close(disc.radius_along([1, 0, 0]), found.velocity_transmission([1.0, 0, 0])[1], 1e-12)
-    force = force_ellipsoid(arm, [0.0, 0.5])
-    close(force.radius_along([1, 0, 0]), found.force_transmission([1.0, 0, 0])[1], 1e-12)
-
-
 def test_manipulability_names_mistakes():
     arm, q = planar(0.3, 0.2), [0.1, 0.2]
     for mask in ([0] * 6, [1, 1, 2, 0, 0, 0]):
@@ -604,5 +416,3 @@ def test_manipulability_names_mistakes():
     with pytest.raises(InvalidValueError, match="wrench"):
         found.force_transmission([0.0, 0.0])
     assert not found.jacobian.flags.writeable
-    with pytest.raises(ShapeError, match="weights"):
-        Manipulability(np.ones(2), np.int64(2), np.ones((2, 3)), np.ones(3))

@@ -14,7 +14,7 @@ FROZEN = json.loads(
 ROUNDING = 2
 """Of the 90 poses of an arm, those at which last digits may decide: another processor merges
 two solutions beside a singularity that this one keeps apart, or the other way round."""
-LOST: dict[str, int] = {}
+LOST: dict[str, int] = {"crx10ia": 1}
 """Further poses of an arm that may have fewer solutions than frozen, as README says."""
 
 

@@ -1,26 +1,13 @@
-"""Redundant arms: joints at the reference, the nearest value where it has no posture, relations."""
+"""Redundant arms: joints at the reference or the nearest value, relations, long slides, search."""
 
-import pickle
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 import pytest
 
-from robotmodels import se3
+import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.igm.arm_angle import ArmAngle
-from robotmodels.igm.closed_form import prepare_closed_form
-from robotmodels.igm.crossings import relations, solved_with_relations
-from robotmodels.igm.families import prepare
-from robotmodels.igm.general import GeneralArm
-from robotmodels.igm.lock import Locked, prepare_locked
-from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.motion import tool_poses
-from robotmodels.igm.redundant import Redundant, prepare_redundant
-from robotmodels.igm.relations import prepare_related, search_related
-from robotmodels.igm.solver import Tolerances, postures
-from robotmodels.igm.virtual import VirtualJoint, with_virtual_joints
-from robotmodels.robots import load
 
 ARMS = (
     "panda", "erd:xarm7", "erd:talos_left_arm", "erd:tiago_arm", "erd:z1", "erd:baxter_left_arm",
@@ -28,335 +15,282 @@ ARMS = (
 )  # fmt: skip
 
 
+def turns(model):
+    return model.table.sigma[model.table.joint_rows] == 0
+
+
+def drawn(model, N, seed=1):
+    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (N, model.n))
+    return np.where(turns(model), q, 0.1 * q)
+
+
+def delta(model, a, b):
+    d = a - b
+    return np.where(turns(model), (d + np.pi) % (2 * np.pi) - np.pi, d)
+
+
+def nearest(model, found, q):
+    """Distance of each configuration from the closest solution, (N,)."""
+    d = np.abs(delta(model, found.q, q[:, None])).max(axis=-1)
+    return np.where(found.valid, d, np.inf).min(axis=1, initial=np.inf)
+
+
+def met(model, found, T, accuracy=1e-11):
+    n, s = np.nonzero(found.valid)
+    assert np.abs(rm.dgm(model, found.q[n, s]) - T[n]).max(initial=0.0) <= accuracy
+    return found
+
+
 @cache
-def arm(name):
-    chain = joint_chain(load(name))
-    return chain, prepare_redundant(chain, prepare)
-
-
-def poses(chain, q):
-    """Tool in R_0 at ``q (..., k)``."""
-    return tool_poses(chain, q.reshape(-1, chain.k)).reshape(*q.shape[:-1], 4, 4)
-
-
-def way(chain, found, q):
-    """From ``q (N, k)`` to rows ``(N, S, k)``, angles by the shorter way round."""
-    d = found - q[:, None]
-    return np.where(chain.sigma == 0, (d + np.pi) % (2 * np.pi) - np.pi, d)
-
-
-def random_postures(chain, count, seed=1):
-    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, chain.k))
-    return np.where(chain.sigma == 0, q, 0.1 * q)
-
-
-def met(chain, found, U):
-    """Largest error of the rows that are used; rows are packed."""
-    there = found.valid
-    assert np.array_equal(np.isnan(found.q).all(axis=-1), ~there)
-    assert np.all(np.diff(there.astype(int), axis=1) <= 0)
-    error = np.abs(poses(chain, found.q) - U[:, None]).max(axis=(-1, -2))[there]
-    return error.max(initial=0.0)
-
-
-# --- joints at the reference ---------------------------------------------------------------------
+def random_arm(k, seed):
+    rng = np.random.default_rng(seed)
+    rows = [
+        {"alpha": a, "d": d, "theta": t, "r": r}
+        for a, d, t, r in rng.uniform(-1, 1, (k, 4)) * [1.6, 0.4, 1.0, 0.4]
+    ]
+    return rm.RobotModel.from_table(
+        rm.DHTable.from_rows(rows), tool=rm.se3.translation(0.1, 0, 0.2)
+    )
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_the_first_joints_take_the_reference(name):
-    chain, solver = arm(name)
-    assert isinstance(solver, Redundant)
-    assert solver.order == tuple(range(chain.k - 6))
-    q = random_postures(chain, 30)
-    U = poses(chain, q)
-    found = postures(solver, U, q, Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    assert np.nanmin(np.abs(way(chain, found.q, q)).max(axis=-1), axis=1).max() < 1e-6
-    first = list(solver.order)
-    assert np.abs(way(chain, found.q, q)[..., first][found.valid]).max() == 0.0
-    np.testing.assert_array_equal(found.family, found.valid)
-    expected = np.isin(np.arange(chain.k), first)
-    assert np.all(found.free[found.valid] == expected)
-    # the same as with those joints locked
-    for n in range(3):
-        locks = {j: q[n, j] for j in first}
-        locked = postures(
-            prepare_locked(chain, locks, prepare), U[n : n + 1], q[n : n + 1], Tolerances()
-        )
-        rows = found.q[n, found.valid[n]]
-        assert len(rows) == locked.valid.sum()
-        for row in rows:
-            assert np.abs(way(chain, locked.q, row[None]))[locked.valid].max(axis=-1).min() < 1e-8
+def test_the_first_joints_that_move_the_tool_take_the_reference(name):
+    model = rm.load(name)
+    q = drawn(model, 30)
+    T = rm.dgm(model, q)
+    found = met(model, rm.igm(model, T, q), T)
+    assert nearest(model, found, q).max() < 1e-6
+    free = found.free_joints[found.valid]
+    assert np.all(free == free[0])
+    first = np.flatnonzero(free[0])
+    moving = np.flatnonzero(free[0] | found.family_joints[found.valid].any(axis=0))
+    assert first.tolist() == moving[: len(first)].tolist()
+    d = delta(model, found.q, q[:, None])[..., first]
+    assert np.abs(d[found.valid]).max() < 1e-12
+    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
+    locked = rm.igm(model, T[0], q[0], lock={int(j): q[0, j] for j in first})
+    assert locked.count == found.count[0]
+    assert nearest(model, rm.igm(model, T[:1], q[:1]), locked.q[0][None]).max() < 1e-8
 
 
-@pytest.mark.parametrize("name", ["panda", "erd:talos_left_arm", "erd:z1"])
-def test_where_the_reference_has_no_posture_the_nearest_value_is_taken(name):
-    chain, solver = arm(name)
-    q = random_postures(chain, 24, seed=2)
-    U, zero = poses(chain, q), np.zeros_like(q)
-    found = postures(solver, U, zero, Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    assert found.valid.any(axis=1).all()
-    value = found.q[..., 0]
-    assert np.nanmax(np.nanmax(np.abs(value), axis=1) - np.nanmin(np.abs(value), axis=1)) < 1e-6
-    off = np.flatnonzero(np.nanmin(np.abs(value), axis=1) > 1e-9)
-    assert off.size >= 1
-    reached = np.nanmin(np.abs(value), axis=1)
+@pytest.mark.parametrize("name", ["panda", "erd:talos_left_arm", "7R"])
+def test_where_the_reference_has_no_solution_the_nearest_value_is_taken(name):
+    model = random_arm(7, 3) if name == "7R" else rm.load(name)
+    q = drawn(model, 16, seed=2)
+    T = rm.dgm(model, q)
+    found = met(model, rm.igm(model, T), T)
+    assert np.all(found.count > 0)
+    away = np.flatnonzero(np.nanmin(np.abs(found.q[..., 0]), axis=1) > 1e-9)
+    assert away.size >= 1
+    assert np.all(found.status[away] == rm.IGMStatus.INCOMPLETE)
+    assert "may be missing" in found.reason(int(away[0]))
+    assert np.all(found.free_joints[found.valid][:, 0])
+    for n in away[:2]:
+        value = found.q[n, 0, 0]
+        assert np.ptp(found.q[n, found.valid[n], 0]) < 1e-6
 
-    def exists(at, n):
-        """Rows with joint 1 locked, from a solver prepared for those values."""
-        solver = prepare_locked(chain, {0: at}, prepare)
-        tiled = np.repeat(U[n : n + 1], len(at), axis=0)
-        return postures(solver, tiled, np.zeros((len(at), chain.k)), Tolerances()).valid.any(axis=1)
+        def exists(at, n=n):
+            return rm.igm(model, T[n], lock={0: at}).status == rm.IGMStatus.REACHED
 
-    for n in off[:2]:
-        # nothing nearer on either side
-        nearer = reached[n] * np.array([0.02, 0.3, 0.6, 0.9, 0.99, 0.999, 1.0 - 1e-6])
-        assert not exists(np.concatenate((nearer, -nearer)), n).any()
-        # and something as near as rounding allows
-        beside = np.sign(value[n, 0]) * (reached[n] + 1e-7)
-        assert exists(np.array([beside]), n).all()
-
-
-def test_a_batch_gives_what_its_poses_give():
-    chain, solver = arm("panda")
-    q = random_postures(chain, 8, seed=3)
-    U = poses(chain, q)
-    references = np.zeros_like(q)
-    references[:4] = q[:4]
-    found = postures(solver, U, references, Tolerances())
-    again = pickle.loads(pickle.dumps(solver))
-    for n in range(8):
-        one = postures(again, U[n : n + 1], references[n : n + 1], Tolerances())
-        rows, alone = found.q[n, found.valid[n]], one.q[0, one.valid[0]]
-        assert rows.shape == alone.shape
-        for row in rows:
-            assert np.abs(way(chain, alone[None], row[None])).max(axis=-1).min() < 1e-9
-    empty = postures(solver, U[:0], references[:0], Tolerances())
-    assert empty.q.shape[0] == 0
-    assert empty.q.shape[2] == 7
+        # no solution at nearer values on either side, and one as near as rounding allows
+        for share in (0.02, 0.3, 0.6, 0.9, 0.999, 1.0 - 1e-6):
+            assert not exists(share * value)
+            assert not exists(-share * value)
+        assert exists(value + np.sign(value) * 1e-7)
+        alone = rm.igm(model, T[n])
+        np.testing.assert_allclose(alone.q, found.q[n, found.valid[n]], atol=1e-9)
 
 
-def test_out_of_reach():
-    chain, solver = arm("panda")
-    U = poses(chain, random_postures(chain, 3, seed=4))
-    U[:, :3, 3] += 4.0
-    assert not postures(solver, U, np.zeros((3, 7)), Tolerances()).valid.any()
+def test_a_planar_arm_of_four_joints():
+    """Joint 1 takes its reference, or the nearest value at which joints 2 and 3 reach the wrist."""
+    l1, l2, l3, l4 = 1.0, 0.6, 0.5, 0.2
+    rows = [{"d": length} for length in (0.0, l1, l2, l3)]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=rm.se3.translation(l4, 0, 0))
+    q = drawn(model, 6, seed=3)
+    T = rm.dgm(model, q)
+    found = met(model, rm.igm(model, T, q), T)
+    assert nearest(model, found, q).max() < 1e-6
+    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
+    assert np.all(found.free_joints[found.valid] == [True, False, False, False])
+    values = np.linspace(-np.pi, np.pi, 200001)
+    for reference in (0.0, 2.0):
+        found = met(model, rm.igm(model, T, [reference, 0, 0, 0]), T)
+        for n in range(len(T)):
+            wrist = T[n, :2, 3] - l4 * T[n, :2, 0]
+            reach = np.hypot(*(wrist - l1 * np.stack([np.cos(values), np.sin(values)], -1)).T)
+            there = values[(abs(l2 - l3) <= reach) & (reach <= l2 + l3)]
+            away = np.abs((there - reference + np.pi) % (2 * np.pi) - np.pi).min()
+            first = found.q[n, found.valid[n], 0]
+            assert first.size
+            d = np.abs((first - reference + np.pi) % (2 * np.pi) - np.pi)
+            assert np.abs(d - (away if away > 1e-4 else 0.0)).max() < 1e-4
+            assert (found.status[n] == rm.IGMStatus.INCOMPLETE) == (away > 1e-4)
 
 
-def test_spherical_shoulders_go_by_the_arm_angle():
-    assert isinstance(prepare_redundant(joint_chain(load("iiwa14")), prepare), ArmAngle)
-    assert prepare_redundant(joint_chain(load("rx90")), prepare) is None
+@pytest.mark.parametrize(("k", "poses"), [(7, 4), (8, 3)])
+def test_random_arms_answer_within_their_budget(k, poses):
+    model = random_arm(k, 5)
+    T = rm.dgm(model, drawn(model, poses, seed=6))
+    found, again = (met(model, rm.igm(model, T), T) for _ in range(2))
+    assert np.all(found.count > 0)
+    np.testing.assert_array_equal(found.q, again.q)
+    T[:, :3, 3] += 9.0
+    assert not rm.igm(model, T).valid.any()
 
 
-# --- virtual joints ------------------------------------------------------------------------------
+def test_a_point_for_an_arm_of_six_joints():
+    """Three joints are free, and a reference that does not reach the point is approached."""
+    model = rm.load("ur5")
+    q = drawn(model, 3, seed=12)
+    T = rm.dgm(model, q)
+    found = rm.igm(model, T, mask=[1, 1, 1, 0, 0, 0])
+    assert np.all(found.count > 0)
+    n, s = np.nonzero(found.valid)
+    assert np.abs(rm.dgm(model, found.q[n, s])[:, :3, 3] - T[n, :3, 3]).max() < 1e-9
+    assert np.all(found.free_joints[n, s].sum(axis=1) == 3)
 
 
-def test_virtual_joints_are_never_set():
-    """Pointing with an RX-90: its tool may turn about the tool's z axis."""
-    chain = joint_chain(load("rx90"))
-    frame = chain.D[6] @ se3.translation(0.1, 0.0, 0.05) @ se3.rotation("x", 0.4)
-    longer, _ = with_virtual_joints(chain, [VirtualJoint(6, frame, 0)])
-    solver = prepare_redundant(longer, prepare)
-    assert solver.order == (0,)
-    q = np.zeros((20, 7))
-    q[:, :6] = random_postures(chain, 20, seed=5)
-    U = poses(longer, q)
-    found = postures(solver, U, q, Tolerances())
-    assert met(longer, found, U) <= 1e-12
-    assert np.nanmin(np.abs(way(longer, found.q, q)).max(axis=-1), axis=1).max() < 1e-6
-    assert not found.free[..., 6].any()
-
-
-def test_a_virtual_joint_at_the_base_is_left_open_too():
-    """The height of the tool does not matter."""
-    chain = joint_chain(load("rx90"))
-    longer, places = with_virtual_joints(chain, [VirtualJoint(0, np.eye(4), 1)])
-    solver = prepare_redundant(longer, prepare)
-    assert solver.order == (int(places[1]),)  # joint 1 turns about the axis that is left open
-    q = np.zeros((12, 7))
-    q[:, places] = random_postures(chain, 12, seed=6)
-    U = poses(longer, q)
-    found = postures(solver, U, q, Tolerances())
-    assert met(longer, found, U) <= 1e-12
-    assert np.nanmin(np.abs(way(longer, found.q, q)).max(axis=-1), axis=1).max() < 1e-6
-    # at another reference joint 2 is taken along as near as it can be
-    other = postures(solver, U, q + 0.8, Tolerances())
-    assert met(longer, other, U) <= 1e-12
-    assert other.valid.any(axis=1).all()
-    gap = np.abs(way(longer, other.q, q + 0.8))[..., places[1]]
-    assert np.all(np.nanmax(gap, axis=1) <= 0.8 + 1e-9)
-
-
-def test_a_point_for_a_ur5_at_a_reference_that_does_not_reach_it():
-    """A spherical joint at the tool leaves the orientation open: three joints take part."""
-    chain = joint_chain(load("ur5"))
-    ball = [
-        VirtualJoint(6, chain.D[6] @ se3.rotation(axis, angle), 0)
-        for axis, angle in (("z", 0.0), ("x", np.pi / 2), ("y", np.pi / 2))
-    ]
-    longer, _ = with_virtual_joints(chain, ball)
-    solver = prepare_redundant(longer, prepare)
-    assert solver.order[:2] == (0, 1)
-    q = np.zeros((2, 9))
-    q[:, :6] = random_postures(chain, 2, seed=12)
-    q[:, 6:] = 0.4, 1.0, -0.3
-    U = poses(longer, q)
-    found = postures(solver, U, np.zeros_like(q), Tolerances())
-    assert met(longer, found, U) <= 1e-12
-    assert found.valid.any(axis=1).all()
-    assert not found.free[..., 6:].any()
-
-
-def test_a_joint_that_does_not_move_is_not_freed():
-    """Four parallel axes, joints 2 to 5, move among themselves while joint 1 stands still."""
-    D = np.tile(np.eye(4), (9, 1, 1))
-    D[1] = se3.rotation("x", 0.3)
-    for j in range(2, 5):
-        D[j, 0, 3] = 0.3  # four parallel axes: 2 to 5
-    D[5] = se3.translation(0.2, 0, 0) @ se3.rotation("x", 1.2)
-    D[6] = se3.translation(0.1, 0.2, 0) @ se3.rotation("y", 0.9)
-    D[7] = se3.translation(0.1, 0, 0.2) @ se3.rotation("x", -0.7)
-    chain = JointChain(np.arange(7), np.array([1, 0, 0, 0, 0, 0, 0]), D[:8], np.eye(4))
-    solver = prepare_redundant(chain, lambda rest: GeneralArm(rest, None))
-    assert solver.order == (1,)
-    # with joints 3 and 5 as the only ones that may be set
-    assert prepare_redundant(chain, lambda rest: GeneralArm(rest, None), [2, 4]).order == (2,)
-    assert prepare_redundant(chain, lambda rest: GeneralArm(rest, None), [0, 5, 6]) is None
-
-
-def test_an_arm_without_a_family_at_the_reference_is_found_from_other_joints():
-    """Only closed forms are allowed: the Panda without joint 1 has none, without others it has."""
-    chain, whole = arm("panda")
-    solver = prepare_redundant(chain, prepare_closed_form)
-    assert solver.order == (0,)
-    assert solver.sampled != (0,)
-    assert "found from joint" in solver.method
-    q = random_postures(chain, 6, seed=8)
-    U = poses(chain, q)
-    found = postures(solver, U, q, Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    expected = postures(whole, U, q, Tolerances())
-    both = 0
-    for n in range(6):
-        gap = np.abs(way(chain, found.q[n : n + 1], expected.q[n][expected.valid[n]][0][None]))
-        assert np.nanmax(np.nanmin(gap[..., 0], axis=1)) < 1e-9
-        for row in found.q[n, found.valid[n]]:
-            assert (
-                np.abs(way(chain, expected.q[n][None], row[None]))
-                .max(axis=-1)[expected.valid[n][None]]
-                .min()
-                < 1e-7
-            )
-        both += found.valid[n].sum()
-    assert both == expected.valid.sum()
-
-
-# --- relations between joints --------------------------------------------------------------------
-
-
-def found_by_newton(chain, U, A, b, starts=1500):
-    """Postures of one pose under relations from random starts; distinct to 1e-5."""
-    wanted = relations(chain, np.array(A, float), np.array(b, float))
-    q = np.random.default_rng(11).uniform(-np.pi, np.pi, (starts, chain.k))
-    q, converged = solved_with_relations(chain, U, wanted, q, np.zeros(starts, np.int64))
-    rows = []
-    for row in q[converged]:
-        row = (row + np.pi) % (2 * np.pi) - np.pi
-        if all(np.abs((row - r + np.pi) % (2 * np.pi) - np.pi).max() > 1e-5 for r in rows):
-            rows.append(row)
-    return np.array(rows)
-
+# --- relations ------------------------------------------------------------------------------------
 
 RELATIONS = [
     ("iiwa14", [1, 0, 1, 0, 0, 0, 0]),
     ("iiwa14", [0, 0, 1, 0, 1, 0, 0]),
-    ("panda", [1, 0, 1, 0, 0, 0, 0]),
     ("panda", [0.5, 0, 0, -0.3, 0, 0, 1.2]),
     ("erd:talos_left_arm", [0, 2, 0, 1, 0, 0, 0]),
 ]
 
 
+def relation_errors(A, b, q):
+    off = q @ A.T - b
+    if np.array_equal(A, np.round(A)):
+        off = (off + np.pi) % (2 * np.pi) - np.pi
+    return np.abs(off).max(initial=0.0)
+
+
 @pytest.mark.parametrize(("name", "row"), RELATIONS)
-def test_every_posture_that_obeys_a_relation(name, row):
-    chain = joint_chain(load(name))
-    A = np.array([row], float)
-    q = random_postures(chain, 3, seed=9)
+def test_solutions_that_obey_a_relation(name, row):
+    model, A = rm.load(name), np.array([row], float)
+    q = drawn(model, 3, seed=9)
+    T = rm.dgm(model, q)
     for n in range(3):
-        b = A @ q[n]
-        solver = prepare_related(chain, A, b, prepare)
-        U = poses(chain, q[n : n + 1])
-        found = postures(solver, U, np.zeros((1, 7)), Tolerances())
-        assert met(chain, found, U) <= 1e-12
-        rows = found.q[0, found.valid[0]]
-        off = rows @ A[0] - b
-        if np.array_equal(A, np.round(A)):
-            off = (off + np.pi) % (2 * np.pi) - np.pi
-        assert np.abs(off).max() < 1e-9
-        assert np.abs(way(chain, rows[None], q[n : n + 1])).max(axis=-1).min() < 1e-6
-        if n < 1:
-            independent = found_by_newton(chain, U, A, b, 400)
-            if not np.array_equal(A, np.round(A)):
-                independent = independent[np.abs(independent @ A[0] - b) < 1e-7]
-            assert len(independent) >= 4
-            gap = np.abs(
-                way(chain, np.broadcast_to(rows, (len(independent), *rows.shape)), independent)
-            )
-            assert gap.max(axis=-1).min(axis=-1).max() < 1e-5
-            assert len(rows) >= len(independent)
+        found = met(model, rm.igm(model, T[n : n + 1], relations=(A, A @ q[n])), T[n : n + 1])
+        assert relation_errors(A, A @ q[n], found.q[found.valid]) < 1e-9
+        assert nearest(model, found, q[n : n + 1]).max() < 1e-6
+        assert found.status == rm.IGMStatus.INCOMPLETE
+        # no random start of another method finds a solution more
+        near = rm.igm_numeric(model, np.repeat(T[n : n + 1], 40, axis=0), q0=drawn(model, 40, 3))
+        starts = near.q[near.valid][np.abs(near.q[near.valid] @ A[0] - A @ q[n]) < 0.05]
+        for start in starts:
+            other = rm.igm(model, T[n], start, relations=(A, A @ q[n]))
+            assert other.count == found.count[0]
 
 
 @pytest.mark.parametrize(("name", "joint"), [("iiwa14", 2), ("panda", 0), ("panda", 4)])
 def test_a_relation_of_one_joint_is_a_lock(name, joint):
-    chain = joint_chain(load(name))
-    q = random_postures(chain, 6, seed=10)
+    model = rm.load(name)
+    q = drawn(model, 6, seed=10)
     q[:, joint] = 0.3
-    U = poses(chain, q)
-    A = np.zeros((1, 7))
-    A[0, joint] = 2.0
-    locked = prepare_related(chain, A, [0.6], prepare)
-    assert isinstance(locked, Locked)
-    expected = postures(locked, U, q, Tolerances())
-    # and the search along the families finds the same
-    found = postures(search_related(chain, A / 2.0, np.array([0.3]), prepare), U, q, Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    np.testing.assert_array_equal(found.valid.sum(axis=1), expected.valid.sum(axis=1))
-    for n in range(6):
-        for row in expected.q[n, expected.valid[n]]:
-            assert np.nanmin(np.abs(way(chain, found.q[n][None], row[None])).max(axis=-1)) < 1e-6
+    T = rm.dgm(model, q)
+    row = 2.0 * np.eye(7)[[joint]]
+    found, locked = (
+        rm.igm(model, T, q, relations=(row, [0.6])),
+        rm.igm(model, T, q, lock={joint: 0.3}),
+    )
+    np.testing.assert_array_equal(found.count, locked.count)
+    np.testing.assert_allclose(found.q, locked.q, atol=1e-8)
+    assert np.all(found.status == rm.IGMStatus.REACHED)
 
 
 def test_two_relations_of_eight_joints():
-    baxter = load("erd:baxter")  # with a finger as the tip, which is the eighth joint
-    chain = joint_chain(baxter.with_tool(np.eye(4), tip=baxter.tip + 2))
-    rng = np.random.default_rng(12)
-    q = random_postures(chain, 3, seed=13)
-    A = np.zeros((2, 8))
-    A[0, :4], A[1, 4:] = rng.normal(size=4), rng.normal(size=4)
-    # one of them a lock: the other is searched along a family
-    A[0] = np.eye(8)[0]
-    solver = prepare_related(chain, A, A @ q[0], prepare)
-    assert isinstance(solver, Locked)
-    U = poses(chain, q[:1])
-    found = postures(solver, U, q[:1], Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    assert np.nanmin(np.abs(way(chain, found.q, q[:1])).max(axis=-1)) < 1e-6
-    # both of several joints: random starts, and the method says so
-    A[0] = [1, 0, -1, 0, 0, 0, 0, 0]
-    A[1] = [0, 0, 0, 0, 1, 0, 1, 0]
-    solver = prepare_related(chain, A, A @ q[1], prepare)
-    assert "may miss" in solver.method
-    U = poses(chain, q[1:2])
-    found = postures(solver, U, q[1:2], Tolerances())
-    assert met(chain, found, U) <= 1e-12
-    rows = found.q[0, found.valid[0]]
-    assert np.abs((rows @ A.T - A @ q[1] + np.pi) % (2 * np.pi) - np.pi).max() < 1e-9
-    assert np.abs(way(chain, rows[None], q[1:2])).max(axis=-1).min() < 1e-6
+    baxter = rm.load("erd:baxter")  # with a finger as the tip, which is the eighth joint
+    model = baxter.with_tool(np.eye(4), tip=baxter.tip + 2)
+    arm = np.flatnonzero(rm.igm(model, rm.dgm(model, np.zeros(model.n))).family_joints.any(axis=0))
+    q = drawn(model, 2, seed=13)
+    A = np.zeros((2, model.n))
+    # one of them a lock: the other is searched along the self-motion; then random starts
+    A[0, arm[0]], A[1, arm[4:6]] = 1.0, [1.0, -1.0]
+    for n in range(2):
+        T = rm.dgm(model, q[n : n + 1])
+        found = met(model, rm.igm(model, T, q[n], relations=(A, A @ q[n])), T)
+        assert relation_errors(A, A @ q[n], found.q[found.valid]) < 1e-9
+        if n == 0:
+            moved = np.abs(delta(model, found.q[0], q[0]))[:, arm].max(axis=-1)
+            assert np.nanmin(moved) < 1e-6
+        A[0, arm[2]] = -1.0
 
 
 def test_relations_that_are_none():
-    chain = joint_chain(load("panda"))
+    model = rm.load("panda")
     for A, b in (([[1, 0, 0]], [0.0]), ([[0] * 7], [0.0]), ([[np.nan] * 7], [0.0]), ([[1] * 7], 0)):
-        with pytest.raises((ShapeError, InvalidValueError), match="A"):
-            prepare_related(chain, A, b, prepare)
-    assert prepare_related(joint_chain(load("rx90")), np.ones((1, 6)), [0.0], prepare) is None
+        with pytest.raises((ShapeError, InvalidValueError), match="relations"):
+            rm.igm(model, np.eye(4), relations=(A, b))
+
+
+# --- slides ---------------------------------------------------------------------------------------
+
+
+@cache
+def sliding_arm(slides, seed):
+    rng = np.random.default_rng(seed)
+    rows = [
+        {"sigma": int(i in slides), "alpha": a, "d": d, "theta": t, "r": r}
+        for i, (a, d, t, r) in enumerate(rng.uniform(-1, 1, (6, 4)) * [1.5, 0.4, 3.0, 0.4])
+    ]
+    return rm.RobotModel.from_table(
+        rm.DHTable.from_rows(rows), tool=rm.se3.translation(0.1, 0, 0.2)
+    )
+
+
+@pytest.mark.parametrize(
+    "slides", [*combinations(range(6), 2)][::2] + [*combinations(range(6), 3)][::3]
+)
+def test_two_and_three_prismatic_joints(slides):
+    model = sliding_arm(slides, 21 + sum(slides))
+    q = drawn(model, 20)
+    T = rm.dgm(model, q)
+    found = met(model, rm.igm(model, T), T)
+    assert nearest(model, found, q).max() < 1e-6
+    if len(slides) == 3:
+        # a wrist reaches an orientation in two ways, and each leaves one set of lengths
+        assert np.all(found.count == 2)
+    elif "may be missing" not in found.method:
+        assert np.all((found.count + found.double.sum(axis=1)) % 2 == 0)
+
+
+RAIL = (
+    {"sigma": 1, "d": 0.2}, {"alpha": np.pi / 2, "d": 0.2}, {"alpha": -np.pi / 2},
+    {"alpha": np.pi / 2, "theta": np.pi / 2, "r": 0.25}, {"d": 0.2}, {"d": 0.2, "alpha": 0.7},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("far", [30.0, 1e3, -1e4])
+def test_how_far_a_rail_is_run_out_changes_nothing_else(far):
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(RAIL))
+    q = drawn(model, 12)
+    out = far * (~turns(model))
+    near, away = rm.igm(model, rm.dgm(model, q)), rm.igm(model, rm.dgm(model, q + out))
+    np.testing.assert_array_equal(near.count, away.count)
+    assert nearest(model, away, q + out).max() < 1e-7
+    n, s = np.nonzero(away.valid)
+    assert np.abs(rm.dgm(model, away.q[n, s]) - rm.dgm(model, q + out)[n]).max() < 1e-10
+    assert away.residual[n, s].max() < 1e-10
+    T = rm.dgm(model, q[0] + out)
+    pointed = rm.igm(model, T, q[0] + out + 0.01, mask=[1, 1, 1, 0, 1, 1], mask_axes="tool")
+    np.testing.assert_allclose(pointed.q[:, 0], (q[0] + out)[0] + 0.01, rtol=0, atol=1e-11)
+
+
+def test_a_rail_out_of_reach_of_its_reference_is_brought_as_near_as_it_gets():
+    """The rail slides across three parallel axes: 0 is too far, the nearest value is taken."""
+    rows = (
+        {"sigma": 1}, {"alpha": np.pi / 2, "d": 0.2}, {"d": 0.4}, {"alpha": np.pi / 2, "r": 0.3},
+        {"alpha": -np.pi / 2}, {"alpha": np.pi / 2},
+    )  # fmt: skip
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    T = rm.dgm(model, [100.5, -0.9, -1.8, -1.9, 1.25, 1.65])
+    found = rm.igm(model, T)
+    assert found.count == 2  # stretched out, the wrist either way
+    assert np.all(found.free_joints == [True, False, False, False, False, False])
+    assert np.all(found.family_joints == [False, True, True, True, True, True])
+    rail = found.q[0, 0]
+    assert rm.igm(model, T, lock={0: rail - 1e-3}).count == 0
+    assert rm.igm(model, T, lock={0: rail + 1e-3}).count > 0

@@ -1,5 +1,6 @@
 """Infinite families settled at the reference values, against independent searches."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,8 +8,9 @@ import pytest
 
 from robotmodels.igm.families import prepare
 from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.self_motion import Settled, double_roots, settle_families, singular_postures
-from robotmodels.igm.solver import Found, Tolerances, nothing_found, postures
+from robotmodels.igm.postures import no_postures
+from robotmodels.igm.singular import complete, singular_postures
+from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.robots import load
 from robotmodels.se3 import inverse
 
@@ -100,7 +102,7 @@ def settled(chain, solver, q, reference):
     references = np.full(q.shape, reference)
     found = postures(solver, U, references, TOLERANCES)
     found.family[...] |= singular_postures(chain, found)[1]
-    out = settle_families(chain, U, found, references, TOLERANCES)
+    out = complete(chain, U, found, references, TOLERANCES)
     assert np.all(np.diff(out.valid.astype(int), axis=1) <= 0)
     n, r = np.nonzero(out.valid)
     assert np.abs(missing(U[n], poses(chain, out.q[n, r]))).max() < 1e-12
@@ -157,15 +159,8 @@ def test_the_wrist_of_a_ur_frees_joint_two(rng):
     np.testing.assert_array_equal(np.unique(out.free[out.family], axis=0), [[0, 1, 0, 0, 0, 0]])
     np.testing.assert_array_equal(np.unique(out.moving[out.family], axis=0), [[0, 1, 1, 1, 0, 1]])
     # walking the curves from members elsewhere comes to the same postures
-    moved = Found(
-        q=found.q,
-        valid=found.valid,
-        residual=found.residual,
-        double=found.double,
-        free=np.zeros_like(found.free),
-        family=found.family,
-    )
-    again = settle_families(chain, U, moved, np.full((6, 6), 0.3), TOLERANCES)
+    moved = replace(found, free=np.zeros_like(found.free))
+    again = complete(chain, U, moved, np.full((6, 6), 0.3), TOLERANCES)
     at = np.abs(out.q[..., 1] - 0.3) < 1e-9
     assert at[out.family].any()
     for n in range(6):
@@ -276,9 +271,9 @@ def test_prismatic_joints_that_make_up_for_each_other(rng):
     D[1, :3, 3] = 0.1, 0.2, 0.3
     chain = JointChain(np.arange(3), np.array([1, 1, 0]), D, np.eye(4))
     q = np.array([[0.4, -0.3, 0.5]])
-    found = nothing_found(1, 2, 3)
+    found = no_postures(1, 2, 3)
     found.q[0, 0], found.valid[0, 0], found.family[0, 0], found.residual[0, 0] = q, True, True, 0.0
-    out = settle_families(chain, poses(chain, q), found, np.full((1, 3), 7.5), TOLERANCES)
+    out = complete(chain, poses(chain, q), found, np.full((1, 3), 7.5), TOLERANCES)
     np.testing.assert_allclose(out.q[0, 0], [7.5, -7.4, 0.5], atol=1e-12)
     assert out.valid.sum() == 1
     np.testing.assert_array_equal(out.free[0, 0], [1, 0, 0])
@@ -295,7 +290,7 @@ def test_double_roots(rng):
     q[2, 2], q[2, 4] = -np.pi / 2, 0.0  # and a wrist aligned: half of them are a family
     U = poses(chain, q)
     found = postures(solver, U, np.zeros((3, 6)), TOLERANCES)
-    double = double_roots(chain, found)
+    double = singular_postures(chain, found)[0]
     assert not double[~found.valid].any()
     assert not double[0].any()
     np.testing.assert_array_equal(double[1], found.valid[1])
@@ -303,7 +298,7 @@ def test_double_roots(rng):
     # a singular shoulder is a family, no double root
     q = shoulder_singular(chain, 2, rng)
     found = postures(solver, poses(chain, q), np.zeros((2, 6)), TOLERANCES)
-    assert not double_roots(chain, found).any()
+    assert not singular_postures(chain, found)[0].any()
 
 
 def test_no_family_costs_nothing(rng):
@@ -311,11 +306,10 @@ def test_no_family_costs_nothing(rng):
     q = draw(chain, 4, rng)
     U = poses(chain, q)
     found = postures(solver, U, np.zeros((4, 6)), TOLERANCES)
-    out = settle_families(chain, U, found, np.zeros((4, 6)), TOLERANCES)
-    assert isinstance(out, Settled)
+    out = complete(chain, U, found, np.zeros((4, 6)), TOLERANCES)
     assert out.q is found.q
     assert not out.moving.any()
-    empty = settle_families(chain, U[:0], nothing_found(0, 8, 6), np.zeros((0, 6)), TOLERANCES)
+    empty = complete(chain, U[:0], no_postures(0, 8, 6), np.zeros((0, 6)), TOLERANCES)
     assert empty.moving.shape == (0, 8, 6)
 
 
@@ -325,6 +319,6 @@ def test_a_wrong_mark_is_taken_back(rng):
     U = poses(chain, q)
     found = postures(solver, U, np.zeros((1, 6)), TOLERANCES)
     found.family[...] = found.valid
-    out = settle_families(chain, U, found, np.zeros((1, 6)), TOLERANCES)
+    out = complete(chain, U, found, np.zeros((1, 6)), TOLERANCES)
     assert not out.family.any()
     np.testing.assert_allclose(np.sort(out.q[0], axis=0), np.sort(found.q[0], axis=0), atol=1e-12)

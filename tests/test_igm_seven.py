@@ -1,17 +1,17 @@
 """Seven-joint arms: arm angle and locked joints against the direct model of the chain."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from robotmodels import se3
-from robotmodels.errors import InvalidValueError
+from robotmodels.igm import igm
 from robotmodels.igm.arm_angle import arm_angle_of, arm_angle_postures, prepare_arm_angle
-from robotmodels.igm.families import prepare
-from robotmodels.igm.lock import at_ends, locked_chain, prepare_locked
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.solver import Tolerances, postures
+from robotmodels.kinematics import dgm
 from robotmodels.robots import load
 
 ARMS = (
@@ -81,12 +81,27 @@ def gaps(found, q):
     return np.abs(turn(found - q[..., None, :])).max(axis=-1)
 
 
+def at_angles(solver, U, psi, references=None, tolerances=None):
+    """Solutions at every arm angle of an array: fields of shape (N, A, 8, ...)."""
+    N, psi = len(U), np.asarray(psi)
+    psi = np.broadcast_to(psi, (N, psi.shape[-1]))
+    A = psi.shape[1]
+    references = np.zeros((N, 7)) if references is None else references
+    found = arm_angle_postures(
+        solver, np.repeat(U, A, axis=0), psi.ravel(), np.repeat(references, A, axis=0),
+        tolerances or Tolerances(),
+    )  # fmt: skip
+    names = ("q", "valid", "residual", "double", "free", "family")
+    arrays = {name: getattr(found, name) for name in names}
+    return SimpleNamespace(**{k: v.reshape(N, A, *v.shape[1:]) for k, v in arrays.items()})
+
+
 def solved(name, q, psi=None, references=None, limit=1e-12):
     """Rows at the arm angles of q (or at psi); every one of them meets its pose and its angle."""
     chain, solver = arm(name)
     U = poses(chain, q)
     own = arm_angle_of(solver, q)[:, None] if psi is None else psi
-    found = arm_angle_postures(solver, U, own, references)
+    found = at_angles(solver, U, own, references)
     there = found.valid
     error = np.abs(poses(chain, found.q) - U[:, None, None]).max(axis=(-1, -2))[there]
     assert error.size
@@ -137,10 +152,10 @@ def test_arrays_of_arm_angles_and_batches_are_what_their_parts_are(name):
     found = solved(name, q, psi=psi)
     for n in (0, 7, 19):
         for a in (0, 6):
-            alone = arm_angle_postures(solver, poses(chain, q[n : n + 1]), [psi[n, a]])
+            alone = at_angles(solver, poses(chain, q[n : n + 1]), [psi[n, a]])
             np.testing.assert_array_equal(alone.q[0, 0], found.q[n, a])
             np.testing.assert_array_equal(alone.valid[0, 0], found.valid[n, a])
-    shared = arm_angle_postures(solver, poses(chain, q), psi[3])
+    shared = at_angles(solver, poses(chain, q), psi[3])
     np.testing.assert_array_equal(shared.q[3], found.q[3])
     # as a family: the reference says which arm angle
     family = postures(solver, poses(chain, q), q, Tolerances())
@@ -176,7 +191,7 @@ def test_the_arm_angle_goes_round_without_a_jump():
     chain, solver = arm("iiwa14")
     q = random_postures(30, seed=5)
     psi = np.linspace(-np.pi, np.pi, 721)
-    found = arm_angle_postures(solver, poses(chain, q), psi)
+    found = at_angles(solver, poses(chain, q), psi)
     # the same branch at the next angle is never far; at the end the circle closes
     step = gaps(found.q[:, 1:, :, None].swapaxes(2, 3), found.q[:, :-1]).min(axis=-1)
     assert np.median(step) < 0.02
@@ -280,7 +295,7 @@ def test_a_wrist_in_the_shoulder_keeps_the_upper_arm_at_the_reference():
     assert np.isclose(np.linalg.norm(s), np.linalg.norm(w), rtol=0, atol=1e-15)
     q = random_postures(20, seed=8)
     q[:, 3] = np.arctan2(s[1], s[0]) - np.arctan2(w[1], w[0])
-    found = arm_angle_postures(solver, poses(equal, q), [0.0, 1.0], q)
+    found = at_angles(solver, poses(equal, q), [0.0, 1.0], q)
     assert np.nanmin(gaps(found.q[:, 1], q), axis=1).max() < 1e-7
     assert found.free[found.valid][:, :3].all()
     np.testing.assert_array_equal(found.q[:, 0], found.q[:, 1])
@@ -295,14 +310,12 @@ def test_out_of_reach_and_not_finite():
     U = poses(chain, q)
     far = U.copy()
     far[:, :3, 3] += 5.0
-    assert not arm_angle_postures(solver, far, [0.0]).valid.any()
+    assert not at_angles(solver, far, [0.0]).valid.any()
     U[3, 0, 3], U[5, 1, 1] = np.nan, np.inf
-    found = arm_angle_postures(solver, U, [0.3])
+    found = at_angles(solver, U, [0.3])
     assert not found.valid[[3, 5]].any()
     assert found.valid[np.setdiff1d(np.arange(20), [3, 5])].all()
-    for count in (0, 3):
-        empty = arm_angle_postures(solver, U[:count], np.zeros((count, 0 if count else 4)))
-        assert empty.q.shape == ((count, 0, 8, 7) if count else (0, 4, 8, 7))
+    assert at_angles(solver, U[:0], np.zeros((0, 4))).q.shape == (0, 4, 8, 7)
 
 
 def test_stretched_within_the_tolerance_is_reached_and_beyond_is_not():
@@ -318,7 +331,7 @@ def test_stretched_within_the_tolerance_is_reached_and_beyond_is_not():
     ):  # fmt: skip
         V = U.copy()
         V[:, :3, 3] += overshoot * line
-        found = arm_angle_postures(solver, V, [0.4], q, Tolerances(tolerance, 1e-9))
+        found = at_angles(solver, V, [0.4], q, Tolerances(tolerance, 1e-9))
         assert found.valid.any(axis=-1).all() == reached
         assert found.valid.any() == reached
 
@@ -346,7 +359,7 @@ def test_a_rounded_table_counts_as_structured_and_is_solved_exactly():
     q = random_postures(400, seed=12)
     q = q[np.all(np.abs(np.sin(q[:, [1, 3, 5]])) > 0.2, axis=1)]
     U = poses(rounded, q)
-    found = arm_angle_postures(solver, U, arm_angle_of(solver, q)[:, None])
+    found = at_angles(solver, U, arm_angle_of(solver, q)[:, None])
     assert np.all(found.valid.sum(axis=-1) == 8)
     assert found.residual.max() < 1e-12
     assert np.nanmin(gaps(found.q[:, 0], q), axis=1).max() < 1e-4
@@ -363,66 +376,22 @@ LOCKED = [(name, joint) for name in ("iiwa14", "panda", "erd:xarm7") for joint i
 
 @pytest.mark.parametrize(("name", "joint"), LOCKED)
 def test_any_joint_may_be_locked(name, joint):
-    chain = joint_chain(load(name))
+    model = load(name)
     q = random_postures(40, seed=13)
     q[:, joint] = 0.7
-    U = poses(chain, q)
-    solver = prepare_locked(chain, {joint: 0.7}, prepare)
-    found = postures(solver, U, q, Tolerances())
-    there = found.valid
-    assert np.abs(poses(chain, found.q) - U[:, None])[there].max() <= 1e-12
-    assert np.all(found.q[there][:, joint] == 0.7)
+    T = dgm(model, q)
+    found = igm(model, T, q, lock={joint: 0.7})
+    n, s = np.nonzero(found.valid)
+    assert np.abs(dgm(model, found.q[n, s]) - T[n]).max() <= 1e-12
+    assert np.all(found.q[n, s, joint] == 0.7)
     assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    assert np.all((there.sum(axis=1) + found.double.sum(axis=1)) % 2 == 0)
-    assert not found.free[..., joint].any()
-
-
-def test_one_value_for_each_pose():
-    chain = joint_chain(load("panda"))
-    q = random_postures(12, seed=14)
-    q[:, 6] = np.array([0.3, -1.0, 2.0])[np.arange(12) % 3]
-    U = poses(chain, q)
-    many = prepare_locked(chain, {6: q[:, 6]}, prepare)
-    assert len(many.solvers) == 3
-    found = postures(many, U, q, Tolerances())
-    assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    for n in range(3):
-        one = postures(
-            prepare_locked(chain, {6: q[n, 6]}, prepare), U[n : n + 1], q[n : n + 1], Tolerances()
-        )
-        S = one.q.shape[1]
-        np.testing.assert_array_equal(found.q[n, :S], one.q[0])
-        assert not found.valid[n, S:].any()
+    assert np.all((found.count + found.double.sum(axis=1)) % 2 == 0)
+    assert not found.free_joints[..., joint].any()
 
 
 def test_two_locked_joints_leave_a_robot_of_five():
-    chain = joint_chain(load("iiwa14"))
+    model = load("iiwa14")
     q = random_postures(20, seed=15)
     q[:, [2, 5]] = 0.4, 0.8
-    solver = prepare_locked(chain, {5: 0.8, 2: 0.4}, prepare)
-    found = postures(solver, poses(chain, q), q, Tolerances())
+    found = igm(model, dgm(model, q), q, lock={5: 0.8, 2: 0.4})
     assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
-    assert "joints 3, 6 locked" in solver.method
-
-
-@pytest.mark.parametrize("sigma", [(0, 0, 0, 0, 0, 0, 0), (1, 0, 0, 1, 0, 0, 0)])
-def test_a_locked_joint_is_a_constant(sigma, rng):
-    chain = random_arm("random skew", seed=16)
-    chain = JointChain(np.array([4, 1, 0, 7, 9, 2, 3]), np.array(sigma), chain.D, np.eye(4))
-    q = rng.normal(size=(5, 7))
-    whole = poses(chain, q)
-    for n in range(5):
-        shorter = locked_chain(chain, {0: q[n, 0], 3: q[n, 3], 6: q[n, 6]})
-        assert shorter.columns.tolist() == [1, 0, 9, 2]
-        np.testing.assert_allclose(poses(shorter, q[n, [1, 2, 4, 5]]), whole[n], atol=1e-14)
-    inner, U = at_ends(chain, whole, q[:, :2], q[:, 6:])
-    assert inner.columns.tolist() == [0, 7, 9, 2]
-    np.testing.assert_allclose(poses(inner, q[:, 2:6]), U, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "locks", [{}, {7: 0.0}, {-1: 0.0}, {2: np.nan}, {1: [0.0, 1.0], 2: [0.0]}, {1: [[0.0]]}]
-)
-def test_locks_that_are_none(locks):
-    with pytest.raises(InvalidValueError, match="locks"):
-        prepare_locked(joint_chain(load("iiwa14")), locks, prepare)

@@ -14,22 +14,20 @@ from identities.random_robots import any_models, models, random_state, robot_siz
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.kernels.svd import decompositions
-from robotmodels.kinematics.inverse.bounds import JointBounds
-from robotmodels.kinematics.inverse.criteria.joint_limits import JointLimitCriterion
-from robotmodels.kinematics.inverse.ikm import ikm
-from robotmodels.kinematics.inverse.joint_task import JointTask
-from robotmodels.kinematics.inverse.methods import (
+from robotmodels.kinematics import (
     DampedInverse,
     Damping,
     FilteredInverse,
+    IKMSolution,
+    IKMStatus,
+    JointBounds,
+    JointTask,
     PseudoInverse,
+    dkm_second_order,
+    ikm,
+    ikm_second_order,
 )
-from robotmodels.kinematics.inverse.second_order import ikm_second_order
-from robotmodels.kinematics.inverse.solution import IKMSolution
-from robotmodels.kinematics.inverse.status import IKMStatus
-from robotmodels.kinematics.inverse.twist_task import TwistTask
 from robotmodels.kinematics.lengths import characteristic_length
-from robotmodels.kinematics.velocities import dkm_second_order
 
 REFERENCES = ("world_aligned", "local", "world")
 POSITION = [1, 1, 1, 0, 0, 0]
@@ -114,8 +112,8 @@ def check_decomposition(A, rank=None):
         close(np.swapaxes(X, 1, 2) @ X, np.tile(np.eye(k), (len(A), 1, 1)), 1e-13)
 
 
-@pytest.mark.parametrize("m", range(1, 9))
-@pytest.mark.parametrize("n", range(1, 11))
+@pytest.mark.parametrize("m", [1, 2, 6, 8])
+@pytest.mark.parametrize("n", [1, 2, 6, 9])
 def test_decomposition_of_any_shape(m, n, rng):
     check_decomposition(rng.normal(size=(40, m, n)))
 
@@ -148,11 +146,6 @@ def test_small_singular_values_keep_their_digits(step, m, n, rng):
     S = decomposed(grades[:, None] * X)[1]
     product = np.abs(np.linalg.det(X))
     np.testing.assert_allclose((S / grades).prod(axis=1), product, rtol=2e-12)
-
-
-def test_decomposition_of_nothing():
-    for shape in ((0, 6, 6), (3, 6, 0), (3, 0, 5)):
-        assert decomposed(np.empty(shape))[1].shape == (shape[0], min(shape[1:]))
 
 
 # --- first order against NumPy -----------------------------------------------------------------
@@ -220,25 +213,6 @@ def test_the_range_of_the_jacobian_is_told(model, seed):
     close(found.v[1], np.zeros(model.n), 0.0)
 
 
-@pytest.mark.parametrize("name", ["rx90", "puma560", "stanford_arm", "ur5", "iiwa14", "panda"])
-@pytest.mark.parametrize("reference", REFERENCES)
-def test_regular_positions_are_exact(name, reference, rng):
-    model = rm.load(name)
-    q = rng.uniform(-2.0, 2.0, (500, model.n))
-    twist = rng.normal(size=(500, 6))
-    found = ikm(model, q, twist, reference=reference)
-    regular = found.singular_values[:, -1] >= 0.02
-    assert regular.mean() > 0.5
-    assert (found.status[regular] == IKMStatus.MET).all()
-    assert (found.damping[regular] == 0).all()
-    close(found.error[regular], np.zeros((regular.sum(), 6)))
-    v = np.einsum("nij,nj->ni", np.linalg.pinv(rm.jacobian(model, q, None, reference)), twist)
-    if name != "stanford_arm":  # the usual weights of revolute joints are those of pinv
-        close(found.v[regular], v[regular], 1e-10)
-    assert (found.status == IKMStatus.IN_PART).any() or found.singular_values.min() > 0.003
-    assert (found.singular_values[found.status == IKMStatus.IN_PART, -1] < 0.003).all()
-
-
 def test_a_single_row_is_a_batch_of_one(rng):
     for name in ("rx90", "iiwa14", "planar_3r", "cobra_s600", "gantry"):
         model = rm.load(name)
@@ -303,27 +277,6 @@ def test_more_rows_than_one_chunk_of_the_kernel(rng):
         np.testing.assert_array_equal(whole.v[i], ikm(model, q[i], twist[i]).v)
 
 
-def test_arguments_stay_and_results_are_fresh(rng):
-    model = rm.load("iiwa14")
-    q, v, z = rng.normal(size=(3, 4, 7))
-    twist = rng.normal(size=(4, 6))
-    kept = [x.copy() for x in (q, v, z, twist)]
-    for call in (
-        lambda: ikm(model, q, twist, secondary=z),
-        lambda: ikm(model, q, twist, secondary=z, limits=True),
-        lambda: ikm_second_order(model, q, v, twist, secondary=z),
-    ):
-        first = call()
-        for x, copy in zip((q, v, z, twist), kept, strict=True):
-            np.testing.assert_array_equal(x, copy)
-            assert x.flags.writeable
-            for field in IKMSolution.__dataclass_fields__:
-                value = getattr(first, field)
-                if isinstance(value, np.ndarray):
-                    assert not value.flags.writeable
-                    assert not np.shares_memory(value, x)
-
-
 # --- scaling and weights -----------------------------------------------------------------------
 
 
@@ -362,20 +315,6 @@ def test_the_motion_does_not_depend_on_the_unit_of_length(model, seed):
     size = max(1.0, np.abs(a.v).max(initial=0.0))
     close(a.singular_values, b.singular_values, 1e-11)
     close(a.v, b.v / unit, 1e-5 * size)
-
-
-def test_the_length_of_a_robot_is_its_own(rng):
-    assert characteristic_length(rm.load("rx90")) == pytest.approx(0.9)
-    tool = np.eye(4)
-    tool[2, 3] = 0.3
-    assert characteristic_length(rm.load("rx90").with_tool(tool)) == pytest.approx(1.2)
-    assert characteristic_length(rm.load("rx90"), 3) == pytest.approx(0.45)
-    assert characteristic_length(rm.load("rx90"), 1) == 1.0
-    model = rm.load("rx90")
-    moved = model.with_base(np.array([[0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1.0]]))
-    assert characteristic_length(moved) == characteristic_length(model)
-    large, _ = in_millimetres(model)
-    assert characteristic_length(large) == pytest.approx(900.0)
 
 
 @given(model=models(tree=False, fixed=False), seed=seeds)
@@ -453,20 +392,6 @@ def approach(model, what, aways):
 
 
 @pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
-@pytest.mark.parametrize("name", ["default", "filtered", "weak", "smallest", "constant"])
-def test_speeds_are_bounded_all_the_way_through_a_singular_position(what, name, rng):
-    model, method = rm.load("rx90"), METHODS[name]
-    q = approach(model, what, np.linspace(-0.05, 0.05, 201))
-    twist = rng.normal(size=(20, 1, 6))
-    found = ikm(model, q, twist, method=method)
-    size = np.linalg.norm(scales(model)[0] * twist, axis=-1)
-    assert np.isfinite(method.gain)
-    assert (np.linalg.norm(found.v, axis=-1) <= method.gain * size * (1 + 1e-12)).all()
-    assert found.status[0, 100] == IKMStatus.SINGULAR
-    assert found.rank[0, 100] == 5
-
-
-@pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
 def test_at_a_singular_position_the_reachable_part_is_given(what, rng):
     model = rm.load("rx90")
     q, _ = rx90_near(what, 0.0)
@@ -491,14 +416,6 @@ def test_the_gain_is_a_bound(name, rng):
     assert most <= method.gain * (1 + 1e-12)
     if np.isfinite(method.gain) and method.gain < 100:
         assert most > 0.9 * method.gain
-
-
-def test_a_filter_is_smooth_at_its_threshold():
-    e = 0.1
-    method = FilteredInverse(e)
-    near = factors(method, np.array([e + 1e-6, e, e - 1e-6]))
-    assert np.diff(near) == pytest.approx([1e-6 / e**2] * 2, rel=1e-4)
-    assert factors(method, np.array([1.0, 0.0]))[1] == 0.0
 
 
 def bounded(J, b, speed):
@@ -544,21 +461,6 @@ def test_a_largest_speed_is_kept_at_the_least_error(speed, rng):
     assert at.rank == 5
 
 
-def test_no_damping_where_the_direction_asked_for_is_strong(rng):
-    """Next to the wrist's singular position a motion that is not the lost one stays exact."""
-    model = rm.load("rx90")
-    q, _ = rx90_near("wrist")
-    twist = rm.dkm(model, q, [0.1, -0.2, 0.3, 0.4, -0.1, 0.4])
-    found = ikm(model, q, twist)
-    J = scales(model)[0][:, None] * rm.jacobian(model, q)
-    U = np.linalg.svd(J)[0]
-    strong = (U[:, :5] @ U[:, :5].T @ (scales(model)[0] * twist)) / scales(model)[0]
-    found = ikm(model, q, strong)
-    assert found.status == IKMStatus.MET
-    assert found.damping > 0
-    close(found.error, np.zeros(6))
-
-
 # --- robots that cannot do everything ----------------------------------------------------------
 
 
@@ -583,17 +485,6 @@ def test_robots_of_few_joints_say_so(rng):
     assert planar.status == IKMStatus.MET
 
 
-def test_more_joints_than_freedom(rng):
-    """Seven parallel axes have rank three; it is their structure."""
-    table = rm.DHTable(antecedent=range(7), sigma=[0] * 7, d=[0, 0.3, 0.2, 0.25, 0.2, 0.1, 0.1])
-    model = rm.RobotModel.from_table(table)
-    found = ikm(model, rng.normal(size=(20, 7)), rng.normal(size=(20, 6)))
-    assert (found.rank == 3).all()
-    assert (found.status == IKMStatus.TOO_FEW_JOINTS).all()
-    close(found.reachable[:, [2, 3, 4]], np.zeros((20, 3)), 1e-13)
-    close(found.achieved, found.reachable, 1e-11)
-
-
 def test_no_joint_at_all():
     table = rm.DHTable.from_rows([{"sigma": 2, "d": 0.2}, {"sigma": 2, "r": 0.5}])
     model = rm.RobotModel.from_table(table)
@@ -602,15 +493,6 @@ def test_no_joint_at_all():
         assert (found.status == IKMStatus.TOO_FEW_JOINTS).all()
         assert (found.rank == 0).all()
     assert ikm(model, [], np.zeros(6)).status == IKMStatus.MET
-
-
-def test_joints_that_are_not_on_the_way_stay(rng):
-    model = rm.load("rx90")
-    found = ikm(model, rng.normal(size=6), rng.normal(size=6), frame=3, mask=POSITION)
-    np.testing.assert_array_equal(found.v[3:], np.zeros(3))
-    z = rng.normal(size=6)
-    found = ikm(model, rng.normal(size=6), rng.normal(size=6), frame=3, mask=POSITION, secondary=z)
-    close(found.v[3:], z[3:])
 
 
 # --- secondary motions -------------------------------------------------------------------------
@@ -650,19 +532,6 @@ def test_a_secondary_motion_never_disturbs_the_task(name, model, seed):
         close((found.v - without.v)[i], columns * (y - V @ (V.T @ y)), sure * np.abs(y).max() * 3)
 
 
-@pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
-def test_also_next_to_and_at_singular_positions(what, rng):
-    model = rm.load("rx90")
-    q = approach(model, what, [1e-2, 1e-4, 1e-8, 0.0])
-    twist, z = rng.normal(size=(4, 6)), rng.normal(size=6)
-    for method in METHODS.values():
-        a, b = (ikm(model, q, twist, method=method, secondary=x) for x in (None, z))
-        moved = np.einsum("nij,nj->ni", rm.jacobian(model, q), b.v - a.v)
-        close(moved, np.zeros((4, 6)), 1e-12)
-    # at the singular position the self-motion is free
-    assert np.linalg.norm(b.v[3] - a.v[3]) > 0.1
-
-
 class Towards:
     """A criterion: minus the distance from a posture."""
 
@@ -687,68 +556,7 @@ def test_criteria_and_sums_of_them(rng):
     assert ikm(model, q[0], twist, secondary=towards).v.shape == (3, 7)
 
 
-def test_criteria_of_this_package_improve(rng):
-    """A step along the null space brings the joints nearer to mid-range, the tool stays."""
-    model = rm.load("panda")
-    q = rng.uniform(0.8 * model.lower + 0.2 * model.upper, model.upper, (100, 7))
-    criterion = JointLimitCriterion(gain=1.0)
-    found = ikm(model, q, np.zeros(6), secondary=criterion)
-    close(found.achieved, np.zeros((100, 6)))
-    after = criterion.value(model, q + 1e-3 * found.v)
-    moving = np.linalg.norm(found.v, axis=1) > 1e-3
-    assert moving.sum() > 50
-    assert (after < criterion.value(model, q))[moving].all()
-
-
 # --- tasks and limits --------------------------------------------------------------------------
-
-
-def test_levels_alone_are_the_plain_solution(rng):
-    """A task that asks for what happens anyway changes nothing, whatever solves it."""
-    model = rm.load("iiwa14")
-    q, twist = rng.uniform(-2, 2, (50, 7)), rng.normal(size=(50, 6))
-    wide = JointBounds(velocity=1e9, lower=-1e9, upper=1e9)
-    z = rng.normal(size=(50, 7))
-    for method in (PseudoInverse(), DampedInverse(), DampedInverse(0.1, 0.05)):
-        for mask in (None, POSITION):
-            plain = ikm(model, q, twist, mask=mask, method=method, secondary=z)
-            found = ikm(model, q, twist, mask=mask, method=method, secondary=z, limits=wide)
-            size = np.maximum(np.abs(plain.v).max(axis=1, keepdims=True), 1.0)
-            close((found.v - plain.v) / size, np.zeros((50, 7)), 1e-8)
-            np.testing.assert_array_equal(found.status, plain.status)
-            np.testing.assert_array_equal(found.rank, plain.rank)
-            for name in ("achieved", "error", "reachable", "singular_values", "damping"):
-                close(getattr(found, name), getattr(plain, name), 1e-8)
-            assert not found.limited.any()
-            assert (found.scale == 1.0).all()
-
-
-def test_tasks_in_order_never_disturb_those_above(rng):
-    model = rm.load("iiwa14")
-    q = rng.uniform(-2, 2, (40, 7))
-    twist = rng.normal(size=(40, 6))
-    tasks = [
-        TwistTask(rng.normal(size=(40, 6)), frame=4, mask=[0, 0, 1, 0, 0, 0]),
-        JointTask(rng.normal(size=(40, 3)), joints=[0, 1, 2]),
-        JointTask(rng.normal(size=(40, 2)), joints=[5, 6]),
-    ]
-    J = rm.jacobian(model, q)[:, :3]
-    alone = ikm(model, q, twist, mask=POSITION)
-    errors = None
-    for count in range(1, 4):
-        found = ikm(model, q, twist, mask=POSITION, tasks=tasks[:count])
-        moved = np.einsum("nij,nj->ni", J, found.v - alone.v)
-        close(moved, np.zeros((40, 3)), 1e-11)
-        close(found.error, alone.error, 1e-11)
-        assert len(found.task_errors) == count
-        assert found.task_scales.shape == (40, count)
-        if errors is not None:
-            for before, after in zip(errors, found.task_errors, strict=False):
-                close(before, after, 1e-9)
-        errors = found.task_errors
-    regular = found.singular_values[:, -1] > 0.05
-    assert np.abs(found.task_errors[0][regular]).max(axis=1).min() < 1e-12
-    close(found.task_errors[1], tasks[1].rate - found.v[:, :3])
 
 
 def test_augmented_tasks_are_of_the_same_importance(rng):
@@ -867,42 +675,6 @@ def test_the_second_order_inverse_gives_the_acceleration(reference, model, seed)
     close(rate(twist), wanted, size * (1e-12 * speed**6 + 1e-11 * speed))
 
 
-@given(model=models(), seed=seeds)
-def test_second_order_is_first_order_of_what_is_left(model, seed):
-    rng = np.random.default_rng(seed)
-    q, v, z = random_state(model, rng, 3)
-    wanted = rng.normal(size=(3, 6))
-    drift = dkm_second_order(model, q, v, np.zeros_like(v))
-    options = {"mask": POSITION, "method": METHODS["weak"], "secondary": z}
-    found = ikm_second_order(model, q, v, wanted, **options)
-    plain = ikm(model, q, wanted - drift, **options)
-    close(found.a, plain.v, 1e-9 * max(1.0, np.abs(plain.v).max()))
-    np.testing.assert_array_equal(found.status, plain.status)
-    close(found.reachable, plain.reachable + drift * POSITION, 1e-9 * max(1, np.abs(drift).max()))
-    single = ikm_second_order(model, q[0], v[0], wanted[0], mask=POSITION, method=METHODS["weak"],
-                              secondary=z[0])  # fmt: skip
-    close(found.a[0], single.a, 1e-9 * max(1.0, np.abs(single.a).max()))
-
-
-def test_a_straight_line_with_accelerations(rng):
-    """A seven-joint arm follows a line under integrated accelerations, at rest at both ends."""
-    model = rm.load("iiwa14")
-    q, v, step = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.8, 0.1]), np.zeros(7), 2e-3
-    start = rm.dgm(model, q)[:3, 3]
-    way = np.array([-0.15, 0.2, -0.1])
-    for k in range(500):
-        t = k * step
-        s, ds, dds = t**3 * (10 - 15 * t + 6 * t**2), 30 * (t - t**2) ** 2, 60 * t * (1 - t) * (
-            1 - 2 * t)  # fmt: skip
-        behind = start + s * way - rm.dgm(model, q)[:3, 3]
-        slower = ds * way - rm.dkm(model, q, v)[:3]
-        wanted = np.r_[dds * way + 400 * behind + 40 * slower, -40 * rm.dkm(model, q, v)[3:]]
-        a = ikm_second_order(model, q, v, wanted, secondary=-5 * v).a
-        q, v = q + step * v + 0.5 * step**2 * a, v + step * a
-    close(rm.dgm(model, q)[:3, 3], start + way, 1e-3)
-    assert np.abs(v).max() < 0.02
-
-
 # --- the result --------------------------------------------------------------------------------
 
 
@@ -954,22 +726,6 @@ def test_every_row_has_a_sentence(rng):
             found.reason(wrong)
     with pytest.raises(InvalidValueError, match="one row"):
         found.reason()
-
-
-def test_fields_that_do_not_fit_are_refused(rng):
-    found = ikm(rm.load("rx90"), rng.normal(size=(3, 6)), np.ones(6))
-    fields = {name: getattr(found, name) for name in IKMSolution.__dataclass_fields__}
-    for name, value in (("status", np.zeros(2)), ("error", np.zeros((3, 5))),
-                        ("task_errors", (np.zeros((2, 1)),)), ("mask", np.ones(5))):  # fmt: skip
-        with pytest.raises(ShapeError, match=name):
-            IKMSolution(**{**fields, name: value})
-    values = np.zeros((3, 6))
-    made = IKMSolution(**{**fields, "v": values})
-    values[0] = 1.0
-    assert (made.v == 0).all()
-
-
-# --- mistakes ----------------------------------------------------------------------------------
 
 
 class Short:
@@ -1029,16 +785,3 @@ def test_mistakes_are_named():
     for call, error, words in cases:
         with pytest.raises(error, match=words):
             call()
-
-
-@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,)], ids=str)
-def test_accelerations_of_any_batch(batch, rng):
-    model = rm.load("stanford_arm")
-    q, v, a = rng.normal(size=(3, *batch, 6))
-    found = dkm_second_order(model, q, v, a)
-    assert found.shape == (*batch, 6)
-    assert found.flags.c_contiguous
-    assert found.flags.writeable
-    for index in np.ndindex(*batch):
-        close(found[index], dkm_second_order(model, q[index], v[index], a[index]))
-    assert dkm_second_order(model, q, v, np.zeros(6)).shape == (*batch, 6)

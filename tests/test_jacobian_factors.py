@@ -7,7 +7,7 @@ from identities.random_robots import models, random_model, random_state, robot_s
 
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.factors import jacobian_factors
+from robotmodels.kinematics import jacobian_factors
 
 
 def check(model, q, projection, intermediate, frame=None):

@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 import robotmodels as rm
-from robotmodels.igm import _homing, _prismatic
+from robotmodels.igm import _homing
 from robotmodels.igm._arrange import AT_LIMIT
 from robotmodels.igm._regular import ordered_rows
 from robotmodels.kernels.bounded_velocity import nearest_inside
@@ -21,11 +21,10 @@ from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
 
 # Python cannot call what is inside kernels, unless it calls nothing: then as it is written
-eliminated, least_of_square, size_of, three_lengths = (
+eliminated, least_of_square, size_of = (
     getattr(kernel, "py_func", kernel)
-    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of,
-                   _prismatic.three_lengths)
-)  # fmt: skip
+    for kernel in (_homing.eliminated, _homing.least_of_square, _homing.size_of)
+)
 
 
 @njit
@@ -305,19 +304,6 @@ def test_the_size_of_an_error_is_the_larger_part_that_is_asked_for():
     ]:  # fmt: skip
         assert size_of(e, np.array(mask)) == size
 
-
-def test_lengths_along_three_directions(rng):
-    for _ in range(5):
-        Z, g, reference, r = rng.normal(size=(3, 3)), *rng.normal(size=(3, 3))
-        three_lengths(Z.copy(), g.copy(), reference, r)
-        np.testing.assert_allclose(r, np.linalg.solve(Z, g), rtol=1e-9, atol=1e-12)
-    # the first of two directions that are one takes its reference, the second makes up for it
-    for one, other in ((0, 1), (0, 2), (1, 2)):
-        Z, wanted = rng.normal(size=(3, 3)), rng.normal(size=3)
-        Z[:, one] = -2.0 * Z[:, other]
-        three_lengths(Z.copy(), Z @ wanted, reference, r)
-        np.testing.assert_allclose(Z @ r, Z @ wanted, rtol=0, atol=1e-12)
-        assert r[one] == reference[one]
 
 
 @pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])

@@ -1,5 +1,8 @@
 """First steps and usual mistakes: each gives an answer, or the sentence that mends it."""
 
+import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -46,7 +49,7 @@ def test_a_file_is_loaded_like_a_name(as_path, tmp_path):
     par = Path(__file__).parent / "oracles"
     for path in sorted(par.rglob("*.par"))[:1]:
         assert rm.load(as_path(path)).n == rm.read_par(path).n
-    with pytest.raises(rm.errors.UrdfError, match="none.urdf"):
+    with pytest.raises(rm.errors.UrdfError, match=r"none\.urdf"):
         rm.load(as_path(tmp_path / "none.urdf"))
 
 
@@ -113,3 +116,80 @@ def test_logs_of_matlab_are_read_with_their_structures(tmp_path, rng, version):
     assert log.dt == pytest.approx(1e-3)
     with pytest.raises(rm.errors.InvalidValueError, match=r"log\.tau"):
         read_log(path, time="log.t", positions="log.q", torques="effort")
+
+
+def test_names_with_control_characters_are_refused_and_long_ones_cut():
+    table = rm.DHTable(antecedent=[0], sigma=[0])
+    for name in ("a\x1bb", "a\x7f", "a\x9b31m"):
+        with pytest.raises(rm.errors.InvalidValueError, match="control character"):
+            rm.RobotModel.from_table(table, name=name)
+        with pytest.raises(rm.errors.TableError, match="control character"):
+            rm.DHTable(antecedent=[0], sigma=[0], names=[name])
+    with pytest.raises(rm.errors.TableError) as refused:
+        rm.DHTable(antecedent=[0], sigma=[0], names=["x" * 10**6 + "\x00"])
+    assert len(str(refused.value)) < 300
+
+
+def test_a_name_with_a_comma_stays_one_cell_of_a_table(tmp_path):
+    import csv
+
+    from robotmodels.identification import write_trajectory
+
+    motion = rm.trajectories.quintic([0.0, 0.0], [1.0, 2.0], duration=1.0)
+    path = tmp_path / "move.csv"
+    write_trajectory(motion, path, rate=10.0, names=["a,=1+1", "b"])
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert len(head) == 7
+    assert head[1] == "q a,=1+1 (rad)"
+    assert all(len(row) == 7 for row in rows)
+    assert not any(cell.startswith(("=", "+", "-", "@")) for cell in head)
+
+
+def test_a_urdf_of_many_links_is_read_in_linear_time():
+    from time import process_time
+
+    def seconds(count):
+        links = "".join(
+            f"<link name='l{i}'/><joint name='j{i}' type='{'revolute' if i < 7 else 'fixed'}'>"
+            f"<parent link='l{i - 1}'/><child link='l{i}'/><origin xyz='0 0 0.1'/>"
+            "<axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+            for i in range(1, count + 1)
+        )
+        start = process_time()
+        read = rm.RobotModel.from_urdf(f"<robot name='r'><link name='l0'/>{links}</robot>")
+        assert read.n == 6
+        return process_time() - start
+
+    few = min(seconds(1000) for _ in range(3))
+    assert seconds(8000) < 20.0 * few
+
+
+COMPANIONS = (
+    "IPython", "jedi", "zmq", "tornado", "pyngrok", "embreex", "manifold3d", "vhacdx", "rtree",
+    "shapely", "lxml",
+)  # fmt: skip
+"""Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
+
+
+def test_companions_of_the_viewer_are_never_imported(tmp_path):
+    code = f"""
+import sys, numpy as np, robotmodels as rm
+arm = rm.load("ur5")
+rm.igm(arm, rm.dgm(arm, np.full(6, 0.3)))
+rm.viz.show(arm, np.zeros(6)).save({str(tmp_path / "ur5.html")!r})
+rm.viz.jog(arm).save({str(tmp_path / "jog.html")!r})
+print(sorted(set({COMPANIONS!r}) & set(sys.modules)))
+"""
+    # of meshes, trimesh reads some with what it finds installed; the package itself uses none
+    package = Path(rm.__file__).parent
+    found = {
+        name
+        for path in package.rglob("*.py")
+        for name in COMPANIONS
+        if re.search(rf"^\s*(import|from) {name}\b", path.read_text("utf-8"), re.MULTILINE)
+    }
+    assert found == set()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"

@@ -7,7 +7,6 @@ finite differences of fourth order, and the screw Jacobian as the other way to t
 import itertools
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from identities.random_robots import random_model, random_state, robot_size
 from scipy.spatial.transform import Rotation
@@ -20,23 +19,20 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
-from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
-from robotmodels.kinematics.coordinates.conversion import (
-    operational_coordinates,
-    pose_from_coordinates,
-)
-from robotmodels.kinematics.coordinates.jacobian import (
+from robotmodels.kinematics import (
+    OrientationKind,
+    continuous_coordinates,
     coordinate_jacobian,
     coordinate_jacobian_rate,
-)
-from robotmodels.kinematics.coordinates.kinds import OrientationKind, orientation_kind
-from robotmodels.kinematics.coordinates.rates import (
     coordinate_rates,
     coordinate_rates_rate,
     is_representation_singular,
+    operational_coordinates,
+    pose_from_coordinates,
     twist_from_rates,
 )
-from robotmodels.kinematics.coordinates.sequences import continuous_coordinates
+from robotmodels.kinematics.coordinates.orientations import orientation_kind
+from robotmodels.kinematics.coordinates.rates import SINGULAR
 
 EPS = np.finfo(float).eps
 THERE_AND_BACK = 3 * 2 * np.pi * EPS  # three angles up to pi, each with two roundings
@@ -124,18 +120,6 @@ def test_words_of_a_kind(kind):
     assert len(set(kind.labels)) == kind.dimension
 
 
-@pytest.mark.parametrize(
-    ("word", "kind"),
-    [
-        ("rpy", OrientationKind.ROLL_PITCH_YAW),
-        ("RPY URDF", OrientationKind.ROLL_PITCH_YAW_URDF),
-        ("euler-zxz", OrientationKind.EULER),
-    ],
-)
-def test_short_words(word, kind):
-    assert orientation_kind(word) is kind
-
-
 @pytest.mark.parametrize("word", ["eule", "", "quaternions", "eulerzyz", 3, None, b"rpy", ["rpy"]])
 def test_unknown_words_are_refused_with_the_known_ones(word):
     for call in (
@@ -165,13 +149,6 @@ def test_random_poses_come_back(kind, rng):
     back = pose_from_coordinates(x, kind)
     assert np.abs(back - T).max() < THERE_AND_BACK
     assert np.array_equal(back[:, 3], T[:, 3])
-
-
-@every_kind
-def test_special_rotations_come_back(kind, rng):
-    T = poses(np.array(list(special_rotations())), rng)
-    back = pose_from_coordinates(operational_coordinates(T, kind), kind)
-    assert np.abs(back - T).max() < THERE_AND_BACK
 
 
 @every_angle
@@ -219,17 +196,6 @@ def test_columns_are_those_of_the_book(rng):
     assert np.array_equal(operational_coordinates(T, "two axes"), np.concatenate([P, n, a], axis=1))
 
 
-def test_angles_are_those_of_the_products_of_rotations():
-    x, y, z = (lambda t, axis=axis: se3.rotation(axis, t) for axis in "xyz")
-    for kind, T in (
-        ("euler", z(0.3) @ x(0.2) @ z(0.1)),
-        ("euler zyz", z(0.3) @ y(0.2) @ z(0.1)),
-        ("rpy", z(0.3) @ y(0.2) @ x(0.1)),
-        ("rpy urdf", z(0.1) @ y(0.2) @ x(0.3)),
-    ):
-        same(operational_coordinates(T, kind)[3:], [0.3, 0.2, 0.1], 4 * EPS)
-
-
 def test_khalils_roll_is_about_z_and_urdfs_about_x(rng):
     for T in random_poses(rng, 50):
         khalil = operational_coordinates(T, "roll_pitch_yaw")[3:]
@@ -268,21 +234,6 @@ def test_half_turns_have_one_sign():
         same(operational_coordinates(T, "angle_axis")[3:], np.pi * np.array(axis), 0)
 
 
-@pytest.mark.parametrize("angle", [1e-300, 1e-200, 1e-100, 1e-20, 1e-9, 1e-3])
-def test_small_rotation_vectors_keep_their_digits(angle, rng):
-    v = rng.normal(size=(50, 3)) * angle
-    x = np.concatenate([np.zeros((50, 3)), v], axis=1)
-    y = operational_coordinates(pose_from_coordinates(x, "angle_axis"), "angle_axis")
-    np.testing.assert_allclose(y[:, 3:], v, rtol=0, atol=4 * EPS * np.abs(v).max())
-
-
-def test_angles_and_vectors_of_many_turns(rng):
-    x = np.concatenate([np.zeros((50, 3)), 20 * rng.normal(size=(50, 3))], axis=1)
-    for kind in (*ANGLES, OrientationKind.ANGLE_AXIS):
-        T = pose_from_coordinates(x, kind)
-        same(operational_coordinates(T, kind, near=x), x, 1e-13)
-
-
 # --- the border --------------------------------------------------------------------------------
 
 
@@ -316,48 +267,6 @@ def test_leading_axes_are_the_batch(kind, batch, rng):
 
 
 @every_kind
-def test_near_and_twist_broadcast(kind, rng):
-    T = random_poses(rng, 3, 2)
-    near = operational_coordinates(random_poses(rng, 2), kind)
-    twist = rng.normal(size=6)
-    for function in (
-        operational_coordinates,
-        coordinate_rates,
-        twist_from_rates,
-        is_representation_singular,
-        lambda T, kind, near: coordinate_rates_rate(T, twist, kind, near),
-    ):
-        many = function(T, kind, near)
-        for i, j in np.ndindex(3, 2):
-            same(many[i, j], function(T[i, j], kind, near[j]), 1e-14)
-        assert function(T[0, 0], kind, near).shape == many.shape[1:]
-        with pytest.raises(ShapeError, match="broadcast"):
-            function(T, kind, np.zeros((3, kind.dimension)) + near[0])
-
-
-@every_kind
-def test_results_are_fresh(kind, rng):
-    T = random_poses(rng, 4)
-    kept = T.copy()
-    x = operational_coordinates(T, kind)
-    for result in (x, operational_coordinates(T, kind, x), continuous_coordinates(T, kind)):
-        result[...] = 0.0
-    x = operational_coordinates(T, kind)
-    back = pose_from_coordinates(x, kind)
-    back[...] = 0.0
-    assert np.array_equal(T, kept)
-    assert np.array_equal(x, operational_coordinates(T, kind))
-
-
-def test_anything_like_a_pose_is_taken(rng):
-    T = random_poses(rng)
-    for given_pose in (T, T.tolist(), pin.SE3(T), np.asfortranarray(T)):
-        assert np.array_equal(
-            operational_coordinates(given_pose, "euler"), operational_coordinates(T, "euler")
-        )
-
-
-@every_kind
 def test_wrong_coordinates_are_refused(kind):
     m = kind.dimension
     good = operational_coordinates(np.eye(4), kind)
@@ -373,16 +282,6 @@ def test_wrong_coordinates_are_refused(kind):
             call(0.0)
         with pytest.raises(InvalidValueError, match="nan"):
             call(np.where(np.arange(m) == 4, np.nan, good))
-
-
-@pytest.mark.parametrize("bad", [np.zeros((4, 3)), np.diag([1.0, 1, -1, 1]), np.eye(4) * 1.1])
-def test_wrong_poses_are_refused(bad):
-    error = ShapeError if bad.shape != (4, 4) else NotARotationError
-    for function in (operational_coordinates, coordinate_rates, twist_from_rates):
-        with pytest.raises(error):
-            function(bad, "euler")
-    with pytest.raises(ShapeError, match="operational_coordinates"):
-        continuous_coordinates(np.eye(4), "euler")
 
 
 @pytest.mark.parametrize("kind", ["quaternion", "direction_cosines", "two_axes"])
@@ -402,11 +301,6 @@ def test_orientations_that_are_nearly_or_not_at_all_rotations(kind, rng):
     off[2, 3:] = 0.0
     with pytest.raises(NotARotationError):
         pose_from_coordinates(off, kind)
-
-
-def test_axes_that_mirror_are_refused():
-    with pytest.raises(NotARotationError, match="direction cosines"):
-        pose_from_coordinates([0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0, 1], "direction_cosines")
 
 
 # --- near --------------------------------------------------------------------------------------
@@ -478,24 +372,6 @@ def test_a_sequence_is_each_sample_near_the_one_before(kind, with_near, rng):
         assert np.abs(pose_from_coordinates(x, kind) - T).max() < turns * THERE_AND_BACK
 
 
-@every_kind
-def test_a_smooth_motion_has_smooth_coordinates(kind, rng):
-    """Steps shrink with the sampling: no jump of pi, 2 pi or a sign is left."""
-    T = wandering(rng, 20001)
-    x = continuous_coordinates(T, kind)
-    E = coordinate_rates(T, kind)[:, 3:, 3:]
-    turned = np.linalg.norm(Rotation.from_matrix(T[1:, :3, :3] @ T[:-1, :3, :3].swapaxes(1, 2))
-                            .as_rotvec(), axis=1)  # fmt: skip
-    fast = np.linalg.norm(E, axis=(1, 2))
-    if kind is OrientationKind.ANGLE_AXIS:
-        # its rates belong to the vectors of the sequence, which leave the ball of radius pi
-        fast = np.linalg.norm(coordinate_rates(T, kind, near=x)[:, 3:, 3:], axis=(1, 2))
-    usual = fast[1:] * turned < 0.05
-    assert usual.mean() > 0.95
-    steps = np.linalg.norm(np.diff(x[:, 3:], axis=0), axis=1)
-    assert (steps[usual] <= 1.1 * (fast[1:] * turned)[usual] + 1e-12).all()
-
-
 @every_angle
 def test_a_motion_straight_through_gimbal_lock_keeps_its_outer_angles(kind):
     theta = np.linspace(-0.5, 0.5, 11)
@@ -516,38 +392,6 @@ def test_a_sequence_that_begins_at_gimbal_lock_begins_with_the_angle_it_leaves_w
     x[:, 4] = np.abs(x[:, 4])
     x[:, 8 - first] = [0.1, 0.2, 0.3, 0.4, 0.5]
     same(continuous_coordinates(pose_from_coordinates(x, kind), kind), x, 1e-14)
-
-
-def test_a_sequence_that_stays_at_gimbal_lock():
-    """A SCARA robot: all rotations about the vertical."""
-    turning = np.linspace(0, 20, 500)
-    T = np.array([se3.rotation("z", t) for t in turning])
-    for kind in EULER:
-        x = continuous_coordinates(T, kind)
-        same(x[:, 3:5], np.zeros((500, 2)), 0)
-        same(x[:, 5], turning, 1e-13)
-    same(continuous_coordinates(T, "rpy")[:, 3], turning, 1e-13)
-    same(continuous_coordinates(T, "angle_axis")[:, 5], turning, 1e-13)
-
-
-@every_kind
-def test_sequences_combine_arms(kind, rng):
-    T = np.stack([wandering(rng, 40) for _ in range(6)], axis=1).reshape(40, 2, 3, 4, 4)
-    near = operational_coordinates(T[0], kind) + 0.5 * rng.normal(size=(2, 3, kind.dimension))
-    for start in (None, near, near[0, 0], near[:1]):
-        x = continuous_coordinates(T, kind, start)
-        assert x.shape == (40, 2, 3, kind.dimension)
-        assert x.flags.c_contiguous
-        for i, j in np.ndindex(2, 3):
-            own = None if start is None else np.broadcast_to(start, near.shape)[i, j]
-            assert np.array_equal(x[:, i, j], continuous_coordinates(T[:, i, j], kind, own))
-    for shape in ((0, 4, 4), (0, 3, 4, 4), (5, 0, 4, 4)):
-        empty = continuous_coordinates(np.zeros(shape), kind)
-        assert empty.shape == (*shape[:-2], kind.dimension)
-    assert continuous_coordinates(np.zeros((0, 4, 4)), kind, near[0, 0]).shape[0] == 0
-    assert continuous_coordinates(T[:1], kind).shape[0] == 1
-    with pytest.raises(ShapeError, match="near"):
-        continuous_coordinates(T, kind, near[:, :2])
 
 
 # --- rates -------------------------------------------------------------------------------------
@@ -635,17 +479,6 @@ def test_rates_of_rotation_vectors_of_every_length(angle, rng):
         same(dE, difference, 1e-9 if scale < 3 else 1e-4)
 
 
-def test_kinds_without_singularities(rng):
-    T = poses(np.array(list(special_rotations())), rng)
-    for kind in KINDS[4:]:
-        assert not is_representation_singular(T, kind).any()
-        assert np.isfinite(coordinate_rates(T, kind)).all()
-        B, E = twist_from_rates(T, kind), coordinate_rates(T, kind)
-        same(B @ E, np.broadcast_to(np.eye(6), (len(T), 6, 6)), 1e-14)
-        twist = rng.normal(size=(len(T), 6))
-        assert np.isfinite(coordinate_rates_rate(T, twist, kind)).all()
-
-
 @every_angle
 @pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-13, 2e-12, 1e-9])
 def test_rates_do_not_exist_at_gimbal_lock(kind, gap, rng):
@@ -667,19 +500,6 @@ def test_rates_do_not_exist_at_gimbal_lock(kind, gap, rng):
     B = twist_from_rates(T, kind)
     assert np.isfinite(B).all()
     assert (np.linalg.svd(B, compute_uv=False)[:, -1] < 2 * max(gap, EPS)).all()
-
-
-def test_rates_of_rotation_vectors_do_not_exist_at_whole_turns(rng):
-    v = rng.normal(size=(20, 3))
-    near = np.concatenate([np.zeros((20, 3)), v / np.linalg.norm(v, axis=1)[:, None]], axis=1)
-    T = np.broadcast_to(np.eye(4), (20, 4, 4))
-    assert not is_representation_singular(T, "angle_axis").any()
-    assert not is_representation_singular(T, "angle_axis", near=near).any()
-    for turns in (TURN, -2 * TURN):
-        assert is_representation_singular(T, "angle_axis", near=turns * near).all()
-        assert np.isnan(coordinate_rates(T, "angle_axis", turns * near)[:, 3:]).all()
-        dE = coordinate_rates_rate(T, np.ones(6), "angle_axis", turns * near)
-        assert np.isnan(dE[:, 3:]).all()
 
 
 # --- Jacobian of the coordinates ---------------------------------------------------------------
@@ -739,24 +559,6 @@ def test_batches_of_coordinate_jacobians(kind, batch):
         same(dJ[i], coordinate_jacobian_rate(model, q[i], v[i], kind), 1e-12)
 
 
-def test_broadcasting_of_coordinate_jacobians(rng):
-    model = rm.load("rx90")
-    q, v, _ = random_state(model, rng, 3)
-    near = operational_coordinates(rm.dgm(model, q), "euler") + rng.normal(size=(2, 3, 6))
-    J = coordinate_jacobian(model, q, "euler", near=near)
-    dJ = coordinate_jacobian_rate(model, q[0], v, "euler", near=near)
-    assert J.shape == dJ.shape == (2, 3, 6, 6)
-    for i, j in np.ndindex(2, 3):
-        same(J[i, j], coordinate_jacobian(model, q[j], "euler", near=near[i, j]), 1e-13)
-        one = coordinate_jacobian_rate(model, q[0], v[j], "euler", near=near[i, j])
-        same(dJ[i, j], one, 1e-11)
-    assert coordinate_jacobian(model, q[0], "euler", near=near).shape == (2, 3, 6, 6)
-    with pytest.raises(ShapeError, match="broadcast"):
-        coordinate_jacobian_rate(model, q, v[:2], "euler")
-    with pytest.raises(ShapeError, match="broadcast"):
-        coordinate_jacobian(model, q, "euler", near=near[:, :2])
-
-
 def test_mistakes_of_coordinate_jacobians():
     model = rm.load("rx90")
     with pytest.raises(ShapeError):
@@ -767,20 +569,6 @@ def test_mistakes_of_coordinate_jacobians():
         coordinate_jacobian(model, np.zeros(6), "euler", frame="nope")
     with pytest.raises(InvalidValueError, match="model"):
         coordinate_jacobian("rx90", np.zeros(6), "euler")
-
-
-@every_kind
-def test_a_joint_that_is_not_on_the_way_to_the_frame_has_a_zero_column(kind):
-    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 1, 0], alpha=[0.3, 0.4, 0.5], d=[0.1] * 3)
-    model = rm.RobotModel.from_table(table, base=se3.rotation("x", 1) @ se3.rotation("y", 1), tip=2)
-    q, v = [0.1, 0.2, 0.3], [1.0, 2.0, 3.0]
-    for frame, off in ((None, [2]), (3, [1]), (1, [1, 2]), (0, [0, 1, 2])):
-        for J in (
-            coordinate_jacobian(model, q, kind, frame),
-            coordinate_jacobian_rate(model, q, v, kind, frame),
-        ):
-            assert np.isfinite(J).all()
-            assert (J[:, off] == 0.0).all()
 
 
 def test_a_singular_representation_is_not_a_singular_robot():
@@ -797,27 +585,3 @@ def test_a_singular_representation_is_not_a_singular_robot():
         same(coordinate_jacobian(arm, q, kind)[:, :3], rm.jacobian(arm, q)[:, :3], 1e-15)
     J = coordinate_jacobian(arm, q, "rpy")
     same(J[:, 3:], np.broadcast_to([[1.0, 1], [0, 0], [0, 0]], (2, 3, 2)), 1e-15)
-
-
-def test_the_books_robot_at_its_singular_positions_has_finite_rates():
-    model = rm.load("rx90")
-    for q in (np.zeros(6), [0, 0.3, -np.pi / 2, 0.1, 0.2, 0.3], [0.1, 0.2, 0.3, 0.4, 0.0, 0.5]):
-        T, J = rm.dgm(model, q), rm.jacobian(model, q)
-        for kind in KINDS[4:]:
-            same(coordinate_jacobian(model, q, kind), coordinate_rates(T, kind) @ J, 1e-14)
-
-
-def test_the_sign_at_half_a_turn_does_not_hang_on_rounding(rng):
-    """The differentiated coordinates are those that the pose alone gives."""
-    model = rm.load("rx90")
-    quarters = rng.integers(-4, 5, size=(300, 6)) * np.pi / 4
-    step, v = 1e-6, rng.normal(size=(300, 6))
-    for kind in (OrientationKind.QUATERNION, OrientationKind.ANGLE_AXIS):
-        J = coordinate_jacobian(model, quarters, kind)
-        x = operational_coordinates(rm.dgm(model, quarters), kind)
-        ahead = operational_coordinates(rm.dgm(model, quarters + step * v), kind, near=x)
-        rates = np.einsum("kij,kj->ki", J, v)
-        regular = np.isfinite(rates).all(axis=1)
-        assert regular.mean() > 0.5
-        difference = (ahead - x) / step
-        assert np.allclose(rates[regular], difference[regular], atol=1e-3)

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from identities.random_robots import models, random_model, random_pose, random_state
+from identities.random_robots import models, random_pose, random_state
 
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics import jacobian_rank, operational_dimension
 from robotmodels.kinematics.lengths import characteristic_length
-from robotmodels.kinematics.singular.bases import sparse_basis
-from robotmodels.kinematics.singular.rank import jacobian_rank, operational_dimension
 from robotmodels.kinematics.singular.task import singular_task, task_derivatives, task_jacobians
 
 # robot: dimension, of position, of orientation, joints, what is never produced in world axes
@@ -64,30 +63,6 @@ def test_local_dimension_and_order():
     assert "3 to 5" in str(found)
     assert operational_dimension(arm).local_dimension is None
     assert operational_dimension(arm).singularity_order is None
-
-
-def test_parts_of_the_task():
-    arm = rm.load("planar_2r")
-    q = [[0.3, 0.0], [0.3, 1.0]]
-    np.testing.assert_array_equal(jacobian_rank(arm, q).rank, [2, 2])
-    np.testing.assert_array_equal(jacobian_rank(arm, q, mask=[1, 1, 1, 0, 0, 0]).rank, [1, 2])
-    np.testing.assert_array_equal(jacobian_rank(arm, q, mask=[0, 0, 0, 1, 1, 1]).rank, [1, 1])
-    pointing = operational_dimension(rm.load("rx90"), mask=[1, 1, 1, 1, 1, 0], mask_axes="tool")
-    assert (pointing.dimension, pointing.redundancy) == (5, 1)
-
-
-@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,), (2, 0)], ids=str)
-def test_batches(batch):
-    arm = random_model(np.random.default_rng(3), f=7, tree=True, fixed=True)
-    q = random_state(arm, np.random.default_rng(5), *batch)[0]
-    found = jacobian_rank(arm, q)
-    assert found.rank.shape == found.gap.shape == batch
-    assert found.singular_values.shape == (*batch, min(6, arm.n))
-    for i in np.ndindex(*batch):
-        one = jacobian_rank(arm, q[i])
-        assert one.rank == found.rank[i]
-        np.testing.assert_allclose(one.singular_values, found.singular_values[i], atol=1e-13)
-    assert not found.rank.flags.writeable
 
 
 @given(case=models(max_frames=8))
@@ -155,17 +130,6 @@ def test_derivatives_by_finite_differences(case):
             np.testing.assert_allclose(found[i], limit, rtol=0, atol=1e-9 * scale)
 
 
-def test_joints_of_another_branch_do_not_count():
-    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 0, 0], d=[0, 0.3, 0.2])
-    arm = rm.RobotModel.from_table(table, tool=se3.translation(0.1, 0, 0), tip=2)
-    found = operational_dimension(arm)
-    assert (found.joints, found.dimension, found.redundancy) == (2, 2, 0)
-    assert operational_dimension(arm, frame=1).joints == 1
-    base = operational_dimension(arm, frame=0, q=np.zeros(3))
-    assert (base.joints, base.dimension) == (0, 0)
-    assert base.local_dimension == 0
-
-
 def test_robot_without_a_moving_joint_before_the_frame():
     table = rm.DHTable(antecedent=[0, 1], sigma=[2, 0], d=[0.4, 0.3])
     arm = rm.RobotModel.from_table(table)
@@ -197,21 +161,6 @@ def test_characteristic_length():
     limited = rm.load("rx90")
     free = limited.with_table(limited.table.replace(lower=[-9.0] * 6, upper=[9.0] * 6))
     assert characteristic_length(free) == characteristic_length(limited)
-
-
-def test_sparse_basis_depends_on_the_space_alone():
-    rng = np.random.default_rng(0)
-    space = np.zeros((2, 7))
-    space[0, [2, 4]] = 1.0, -1.0
-    space[1, [0, 1, 3, 5]] = 0.3, 0.5, 1.0, -0.4
-    for _ in range(20):
-        found = sparse_basis(rng.normal(size=(2, 2)) @ space)
-        order = np.argsort((found != 0.0).sum(axis=1))
-        np.testing.assert_allclose(found[order], space, atol=1e-12)
-    wide = np.linalg.qr(rng.normal(size=(20, 10)))[0].T  # too many choices to try them all
-    found = sparse_basis(wide)
-    assert (found == 0.0).sum() == 90
-    assert np.linalg.matrix_rank(np.vstack([found, wide])) == 10
 
 
 def test_mistakes_are_refused():

@@ -7,7 +7,7 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.kinematics.inverse import IKMStatus, JointBounds, JointLimitCriterion
+from robotmodels.kinematics import IKMStatus, JointBounds, JointLimitCriterion
 from robotmodels.se3 import rotation
 from robotmodels.trajectories import straight_line
 from robotmodels.trajectories.resolved_motion import resolved_motion

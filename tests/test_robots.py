@@ -551,7 +551,7 @@ def test_a_misspelt_name_is_answered_with_near_ones(name, nearest):
         load(name)
     assert nearest in caught.value.nearest
     assert isinstance(caught.value, KeyError)
-    assert "from_urdf" in str(caught.value)
+    assert "urdf" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", [None, 3, "", "erd:"])

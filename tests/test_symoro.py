@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 import warnings
 from pathlib import Path
 
@@ -437,3 +438,28 @@ def test_bad_files_say_where_and_what(read, old, new, message):
 def test_antecedents_out_of_order_are_the_tables_error(read):
     with pytest.raises(TableError):
         read(open_symoro(TWO_JOINTS).replace("ant = {0,1}", "ant = {2,1}"))
+
+
+def test_symbols_keep_their_names_in_tables_and_formulas(tmp_path):
+    path = tmp_path / "elbow.par"
+    path.write_text(
+        "NL = 3\nNJ = 3\nNF = 3\nType = 0\nAnt = {0, 1, 2}\nSigma = {0, 0, 0}\nB = {0, 0, 0}\n"
+        "d = {0, L1, L1+L2}\nR = {H1, 0, 0}\ngamma = {0, 0, 0}\nAlpha = {0, Pi/2, 0}\n"
+        "Mu = {1, 1, 1}\nTheta = {t1, t2 + Pi/2, t3}\n"
+    )
+    arm = rm.read_par(path, values={"L1": 0.3, "L2": 0.2, "H1": 0.4})
+    assert dict(arm.table.symbols) == {("d", 2): "L1", ("d", 3): "L1+L2", ("r", 1): "H1"}
+    assert "0.3 (L1)" in str(arm.table)
+    assert "0.5 (L1+L2)" in str(arm.table)
+    text = rm.explain_dgm(arm).text
+    assert "H1 = 0.4 m (r1)" in text
+    assert "D3 = 0.5 m (d3 = L1+L2)" in text
+    assert "C1*(L1 - S2*D3)" in text
+    assert pickle.loads(pickle.dumps(arm)).table.symbols == arm.table.symbols
+    # another length is no longer the one that had the name
+    assert dict(arm.table.replace(d=[0, 0.1, 0.2]).symbols) == {("r", 1): "H1"}
+    heavy = arm.with_inertia(rm.InertialParameters(np.ones((3, 10))))
+    assert "L1" in str(rm.base_parameters(heavy, drive=False))
+    for wrong in ({("d", 4): "L"}, {("x", 1): "L"}, {("d", 1): "1L"}, {("d", 1): ""}, ["L1"]):
+        with pytest.raises(rm.errors.TableError, match="symbols"):
+            rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 0, 0], symbols=wrong)

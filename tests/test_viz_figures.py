@@ -1,468 +1,645 @@
-"""Every figure in print: units, size of texts, nothing over anything else, colours for all eyes."""
+"""Figures: their lines, limits, units and legends are those of the data, and nothing overlaps."""
 
 import io
-import re
-from collections.abc import Callable
-from functools import cache
+import pickle
+import subprocess
+import sys
 from itertools import combinations
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import Collection
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.text import Text
 
 import robotmodels as rm
-from robotmodels import calibration as cal
-from robotmodels import identification as idn
-from robotmodels import kinematics as kin
+from robotmodels import se3, simulation, viz
 from robotmodels import trajectories as tr
-from robotmodels.viz.figures import line_style
-from robotmodels.viz.palette import ALERT, BAND, GRID, INK, LINE_COLORS, PALE
+from robotmodels.errors import InvalidValueError, RobotModelsError, RobotModelsWarning, ShapeError
+from robotmodels.symbolic import SingularityMap
 
-SYMBOLS = {
-    "m", "mm", "µm", "rad", "mrad", "µrad", "deg", "s", "Hz", "N", "J", "mJ", "µJ", "nJ", "pJ",
-    "kg", "1", "%", "no", "unit", "or",
-}  # fmt: skip
-NUMBERS = {  # counts, ratios and scales that have no unit
-    "rows", "configuration", "configurations", "contacts", "iteration", "number of the pose",
-    "residual / standard deviation", "normal quantile", "condition number", "criterion",
-    "smooth condition number", "smooth criterion", "minus log det", "correlation", "value",
-    "autocorrelation", "least singular value", "no unit",
-    "bias / standard error", "equations / parameter",
-}  # fmt: skip
-
-
-# --- what is wrong with a figure ----------------------------------------------------------------
-
-
-def texts_drawn(figure, monkeypatch):
-    """Texts that are really drawn, with their boxes in pixels."""
-    seen = {}
-    draw = Text.draw
-
-    def noted(text, renderer, *args, **kwargs):
-        if text.get_visible() and text.get_text().strip():
-            seen[text] = text.get_window_extent(renderer)
-        return draw(text, renderer, *args, **kwargs)
-
-    figure.draw_without_rendering()  # the layout
-    with monkeypatch.context() as patch:
-        patch.setattr(Text, "draw", noted)
-        FigureCanvasAgg(figure).draw()
-    return seen
-
-
-def says_its_unit(label):
-    words = " ".join(label.split())
-    if words in NUMBERS or re.fullmatch(r"criterion \w+", words):
-        return True
-    unit = re.search(r"\(((?:[^()]|\([^()]*\))+)\)$", words)
-    found = re.findall(r"[^\W\d_²³]+|%|\b1\b", unit[1]) if unit else []
-    return bool(found) and set(found) <= SYMBOLS
-
-
-def is_number(text):
-    return re.fullmatch(r"[\d.,e+\N{MINUS SIGN}-]+|\$.*\$", text.strip()) is not None
-
-
-def without_units(figure):
-    """Axes whose ticks are numbers and whose label, or the one of its row or column, has no unit.
-
-    What a panel shows may stand over it instead, as its title.
-    """
-    wrong = []
-    shown = [axes for axes in figure.axes if axes.get_visible()]
-    for axes in shown:
-        for letter in "xyz" if axes.name == "3d" else "xy":
-            axis = getattr(axes, f"{letter}axis")
-            ticks = [tick.get_text() for tick in axis.get_ticklabels() if tick.get_visible()]
-            if not any(map(is_number, filter(None, ticks))) or not axes.axison:
-                continue
-            labels = [axis.label.get_text()]
-            box = axes.get_position()
-            for other in shown:
-                beside = other.get_position()
-                if letter == "x" and abs(beside.x0 - box.x0) < 0.02:
-                    labels.append(other.xaxis.label.get_text())
-                if letter == "y" and abs(beside.y0 - box.y0) < 0.02:
-                    labels.append(other.yaxis.label.get_text())
-            if letter == "y":
-                labels += [axes.get_title(loc=where) for where in ("left", "center")]
-                labels += [over.get_title(loc="left") for over in shown  # once for a column
-                           if abs(over.get_position().x0 - box.x0) < 0.02]  # fmt: skip
-            if not any(map(says_its_unit, labels)):
-                wrong.append(f"no unit: {letter} of {axes.get_title()!r}, {labels[0]!r}")
-    return wrong
-
-
-def over_each_other(boxes, figure):
-    """Texts that lie on other texts or leave the page."""
-    wrong = []
-    width, height = figure.bbox.x1, figure.bbox.y1
-    for text, box in boxes.items():
-        if min(box.x0, box.y0, width - box.x1, height - box.y1) < -1.0:
-            wrong.append(f"off the page: {text.get_text()!r}")
-    for (one, a), (two, b) in combinations(boxes.items(), 2):
-        wide = min(a.x1, b.x1) - max(a.x0, b.x0)
-        if wide > 1.0 and min(a.y1, b.y1) - max(a.y0, b.y0) > 1.0:
-            wrong.append(f"over each other: {one.get_text()!r} and {two.get_text()!r}")
-    for legend in [*figure.legends, *filter(None, (axes.get_legend() for axes in figure.axes))]:
-        a = legend.get_window_extent()
-        for axes in figure.axes:
-            b = axes.get_window_extent()
-            wide, high = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
-            if min(wide, high) > 2.0 and axes.get_visible() and axes.name != "3d":
-                wrong.append("a legend hides data")
-    return wrong
-
-
-PAPER = (1.0, 1.0, 1.0)
-ALLOWED = np.array([c[:3] for c in (*LINE_COLORS, INK, PALE, ALERT, BAND, GRID)] + [PAPER])
-
-
-def colors_and_widths(figure):
-    """Colours that are not the palette's, and lines too thin to print."""
-    found, widths = [], []
-    for artist in figure.findobj():
-        if not artist.get_visible():
-            continue
-        if isinstance(artist, Text):
-            found += [artist.get_color()] if artist.get_text().strip() else []
-        elif isinstance(artist, Line2D):
-            found.append(artist.get_color())
-            if artist.get_linestyle() not in ("None", "", " ") and np.size(artist.get_xdata()):
-                widths.append(artist.get_linewidth())
-        elif isinstance(artist, Collection):
-            if artist.get_array() is not None or not len(artist.get_paths()):
-                continue  # a map, or nothing
-            found += [*artist.get_facecolor(), *artist.get_edgecolor()]
-            if len(artist.get_edgecolor()):
-                widths += np.atleast_1d(artist.get_linewidth()).tolist()
-        elif isinstance(artist, Patch):
-            found += [artist.get_facecolor(), artist.get_edgecolor()]
-            if to_rgba(artist.get_edgecolor())[3] and artist.get_linewidth():
-                widths.append(artist.get_linewidth())
-    rgba = np.array([to_rgba(color) for color in found])
-    seen = np.unique(rgba[rgba[:, 3] > 0.0, :3], axis=0)
-    off = np.abs(seen[:, None] - ALLOWED).max(axis=-1).min(axis=1)
-    wrong = [f"not of the palette: {color.round(2)}" for color in seen[off > 0.005]]
-    return wrong + [f"a line of {w} points" for w in {*widths} if 0.0 < w < 0.799]
-
-
-def alike_in_grey(figure):
-    """More than four lines of one panel, and two of them with the same dashes and marks."""
-    wrong = []
-    for axes in figure.axes:
-        named = {str(line.get_label()): line for line in axes.get_lines()
-                 if not str(line.get_label()).startswith("_")}  # fmt: skip
-        looks = [(str(line._unscaled_dash_pattern), line.get_marker()) for line in named.values()]
-        if len(named) > 4 and len(set(looks)) < min(len(named), 7):
-            wrong.append(f"alike without colours: {list(named)}")
-    return wrong
-
-
-def complaints(figure, monkeypatch):
-    """All that is wrong with a figure, in words."""
-    boxes = texts_drawn(figure, monkeypatch)
-    small = [f"{text.get_size()} points: {text.get_text()!r}" for text in boxes
-             if text.get_size() < 8.0]  # fmt: skip
-    return [*small, *without_units(figure), *over_each_other(boxes, figure),
-            *colors_and_widths(figure), *alike_in_grey(figure)]  # fmt: skip
-
-
-# --- one or more of every kind ------------------------------------------------------------------
-
-RX90 = rm.load("rx90")
-Q = np.radians([20.0, 60.0, -110.0, 30.0, 50.0, -20.0])
-LIMITS = tr.MotionLimits(velocity=1.5, acceleration=6.0)
-
-
-@cache
-def calibrated():
-    rng = np.random.default_rng(3)
-    model = RX90.with_tool(rm.se3.translation(0.05, 0.02, 0.12))
-    q = rng.uniform(-2.0, 2.0, (40, 6))
-    T = rm.dgm(model, q + np.array([0, 2e-3, -1e-3, 1e-3, 0, 0]))
-    T[:, :3, 3] += 1e-4 * rng.normal(size=(40, 3))
-    T[7, :3, 3] += 0.02
-    return cal.fit(model, cal.Pose(q, T), folds=0, held_out=0.0)
-
-
-@cache
-def identified():
-    model = rm.load("lab_trr")
-    drive = rm.DriveParameters(*(np.full(3, x) for x in (0.1, 2.0, 1.0, 0.2)))
-    model = model.with_inertia(rm.uniform_bodies(model, 8.0)).with_drive(drive)
-    t, rng = np.arange(0.0, 12.0, 0.002)[:, None], np.random.default_rng(0)
-    w = 2.0 * np.pi * (0.2 + 0.07 * np.arange(3))
-    q, v, a = 0.6 * np.sin(w * t), 0.6 * w * np.cos(w * t), -0.6 * w * w * np.sin(w * t)
-    tau = rm.idm(model, q, v, a) + 0.1 * rng.normal(size=q.shape)
-    log = idn.Log(0.002, q + 1e-5 * rng.normal(size=q.shape), tau)
-    return idn.fit(model, log.rows(2000, 6000), test=log.rows(0, 2000), checked=False)
-
-
-@cache
-def excited():
-    return idn.exciting_trajectory(rm.load("ur10e"), starts=2, baseline=5, iterations=6, rng=0)
-
-
-@cache
-def selected():
-    return cal.select_configurations(
-        RX90, "position", 20, drawn=60, starts=1, rng=np.random.default_rng(0)
+H = np.pi / 2
+RX90 = rm.load("rx90").with_drive(
+    rm.DriveParameters(
+        Ia=np.full(6, 0.2), Fv=[20, 20, 10, 1, 1, 0.5], Fc=[20, 30, 20, 5, 3, 2], offset=np.ones(6)
     )
-
-
-@cache
-def fallen():
-    return rm.simulate(RX90, Q, np.zeros(6), t=np.linspace(0.0, 1.0, 60))
-
-
-def turned(limits=None):
-    goal = Q + np.array([0.5, 0.4, -0.3, 0.9, -0.6, 1.1])
-    return tr.trapezoidal(Q, goal, limits=limits or LIMITS)
-
-
-def line_in_space(duration=2.0):
-    start = rm.dgm(RX90, Q)
-    return tr.straight_line(start, rm.se3.translation(0.0, 0.1, -0.1) @ start, duration=duration)
-
-
-def across():
-    """Two inverse models near the wrist's singular position."""
-    off = np.linspace(-0.1, 0.1, 41)
-    rows = np.tile([0.3, 1.0, -1.8, 0.4, 0.0, -0.2], (41, 1))
-    rows[:, 4] += off
-    twist = [0.1, -0.05, 0.08, 0.2, 0.1, -0.15]
-    ways = {"pseudo-inverse": kin.PseudoInverse(), "damping": kin.DampedInverse()}
-    return off, {name: rm.ikm(RX90, rows, twist, method=way) for name, way in ways.items()}
-
-
-FIGURES: dict[str, dict[str, Callable[[], Figure]]] = {
-    "calibration_correlations": {"": lambda: rm.viz.plot_calibration_correlations(calibrated())},
-    "calibration_in_space": {"": lambda: rm.viz.plot_calibration_in_space(calibrated())},
-    "calibration_normality": {"": lambda: rm.viz.plot_calibration_normality(calibrated())},
-    "calibration_parameters": {
-        "": lambda: rm.viz.plot_calibration_parameters(calibrated(), title="A robot")
-    },
-    "calibration_residuals": {"": lambda: rm.viz.plot_calibration_residuals(calibrated())},
-    "ellipsoids": {
-        "two": lambda: rm.viz.plot_ellipsoids(
-            [rm.velocity_ellipsoid(RX90, Q), rm.force_ellipsoid(RX90, Q)], title="Both"
-        )
-    },
-    "energy": {"": lambda: rm.viz.plot_energy(fallen(), title="A falling arm")},
-    "excitation": {"": lambda: rm.viz.plot_excitation(excited())},
-    "identification_correlations": {
-        "": lambda: rm.viz.plot_identification_correlations(identified())
-    },
-    "identification_standard_errors": {
-        "": lambda: rm.viz.plot_identification_standard_errors(identified())
-    },
-    "identification_parameters": {"": lambda: rm.viz.plot_identification_parameters(identified())},
-    "identification_residuals": {"": lambda: rm.viz.plot_identification_residuals(identified())},
-    "identification_torques": {
-        "": lambda: rm.viz.plot_identification_torques(identified(), title="A robot")
-    },
-    "inertia_map": {
-        "line": lambda: rm.viz.plot_inertia_map(rm.simulation.dynamics_map(RX90, 2)),
-        "map": lambda: rm.viz.plot_inertia_map(
-            rm.simulation.dynamics_map(rm.load("panda"), (0, 3)), title="Panda"
-        ),
-    },
-    "inverse_velocities": {
-        "": lambda: rm.viz.plot_inverse_velocities(*across(), model=RX90, title="Wrist"),
-        "each joint": lambda: rm.viz.plot_inverse_velocities(
-            *across(), model=RX90, each_joint=True
-        ),
-    },
-    "joint_motion": {
-        "": lambda: rm.viz.plot_joint_motion(
-            rm.load("panda"),
-            np.linspace(0, 1, 20),
-            {
-                "with": np.outer(np.linspace(0, 1, 20), np.full(7, -0.5)),
-                "without": np.outer(np.linspace(0, 1, 20), np.full(7, -3.5)),
-            },
-        )
-    },
-    "joint_path": {
-        "": lambda: rm.viz.plot_joint_path(
-            tr.joint_path(RX90, line_in_space(), Q, samples=60), model=RX90, limits=LIMITS
-        )
-    },
-    "pose_path": {"": lambda: rm.viz.plot_pose_path(line_in_space(), title="A line")},
-    "processing": {
-        "": lambda: rm.viz.plot_processing(
-            identified().equations.log, identified().equations.processing, model=identified().model
-        ),
-        "result": lambda: rm.viz.plot_processing(identified(), title="Cutoffs"),
-    },
-    "profiles": {
-        side: lambda side=side: rm.viz.plot_profiles(
-            {
-                "smoothed trapezoidal": tr.smoothed_trapezoidal(0.0, 1.0, limits=LIMITS),
-                "bang-bang": tr.bang_bang(0.0, 1.0, limits=LIMITS),
-                "quintic": tr.quintic(0.0, 1.0, limits=LIMITS),
-            },
-            limits=LIMITS,
-            unit="deg",
-            side_by_side=bool(side),
-        )
-        for side in ("", "side by side")
-    },
-    "selection": {"": lambda: rm.viz.plot_selection(selected())},
-    "singularities": {
-        "": lambda: rm.viz.plot_singularities(
-            [
-                rm.symbolic.singularity_map(RX90, joints=pair, at=Q, factor=factor)
-                for pair, factor in zip(
-                    [(1, 2), (2, 4)], rm.explain_singularities(RX90).factors[:2], strict=True
-                )
-            ],
-            RX90,
-            q=Q,
-        )
-    },
-    "torque_parts": {"": lambda: rm.viz.plot_torque_parts(RX90, turned(), title="A move")},
-    "trajectory": {
-        "": lambda: rm.viz.plot_trajectory(turned(), LIMITS, model=RX90, title="RX-90"),
-        "seven": lambda: rm.viz.plot_trajectory(
-            tr.quintic(np.zeros(7), np.linspace(-1, 1, 7), duration=1.0), model=rm.load("panda")
-        ),
-        "two units": lambda: rm.viz.plot_trajectory(
-            tr.quintic([0, 0, 0], [0.2, 1.0, -1.0], duration=1.0), model=rm.load("lab_trr")
-        ),
-    },
+)
+SCARA = rm.RobotModel.from_table(
+    rm.DHTable.from_rows([
+        {"sigma": 0, "name": "waist", "lower": -2.0, "upper": 1.0}, {"sigma": 2, "d": 0.1},
+        {"sigma": 0, "d": 0.35, "name": "elbow", "velocity": 3.0},
+        {"sigma": 1, "d": 0.3, "alpha": np.pi, "lower": 0.0, "upper": 0.2, "name": "lift"},
+    ]),
+    rm.InertialParameters.from_com([3.0, 0.0, 2.0, 1.0], [[0.1, 0, 0]] * 3 + [[0, 0, 0]],
+                                   [0.02 * np.eye(3)] * 4),
+    name="scara",
+)  # fmt: skip
+Q = np.array([0.4, 0.7, 0.8, 0.4, 0.9, 0.6])
+MOVE = tr.quintic([0.0, 0.0, 0.0], [1.0, -1.0, 0.2], duration=2.0)
+SWING = tr.quintic(np.zeros(6), [1, -0.5, 0.8, 1, 0.5, 2], duration=1.0)
+LAWS = {
+    "bang-bang": tr.bang_bang(0.0, 1.0, limits=tr.MotionLimits(1.5, 4.0)),
+    "trapezoidal": tr.trapezoidal(0.0, 1.0, limits=tr.MotionLimits(1.5, 4.0)),
+    "quintic": tr.quintic(0.0, 1.0, limits=tr.MotionLimits(1.5, 4.0)),
 }
-CASES = [(kind, case) for kind, cases in FIGURES.items() for case in cases]
-
-
-def test_every_kind_of_figure_is_looked_at():
-    kinds = {name.removeprefix("plot_") for name in rm.viz.__all__ if name.startswith("plot_")}
-    assert kinds == set(FIGURES)
-
-
-@pytest.mark.parametrize(("kind", "case"), CASES)
-def test_nothing_is_wrong_with_it(kind, case, monkeypatch):
-    figure = FIGURES[kind][case]()
-    assert complaints(figure, monkeypatch) == []
-    assert 3.0 <= figure.get_figwidth() <= 7.2  # one column or two
-
-
-@pytest.mark.parametrize("form", ["pdf", "svg"])
-def test_it_is_saved_as_lines_and_letters(form):
-    file = io.BytesIO()
-    FIGURES["trajectory"][""]().savefig(file, format=form)
-    page = file.getvalue()
-    assert page.startswith({"pdf": b"%PDF", "svg": b"<?xml"}[form])
-    assert b"/Subtype /Image" not in page
-    assert b"<image" not in page
-
-
-# --- the checks see what is wrong ---------------------------------------------------------------
-
-
-def fault(figure, kind):
-    axes = figure.axes[0]
-    if kind == "no unit":
-        axes.set_ylabel("position")
-    elif kind == "7.0 points":
-        axes.xaxis.label.set_size(7.0)
-        figure.axes[-1].xaxis.label.set_size(7.0)
-    elif kind == "over each other":
-        axes.text(0.4, 0.5, "one remark", transform=axes.transAxes, size=8.0, color=INK)
-        axes.text(0.45, 0.52, "another", transform=axes.transAxes, size=8.0, color=INK)
-    elif kind == "off the page":
-        figure.text(0.9, 0.5, "a long remark at the edge", size=9.0, color=INK)
-    elif kind == "a legend hides data":
-        axes.legend(handles=axes.get_lines()[:1], loc="center", fontsize=8.0, labelcolor=INK)
-    elif kind == "not of the palette":
-        axes.get_lines()[0].set_color("lime")
-    elif kind == "a line of 0.4 points":
-        axes.get_lines()[0].set_linewidth(0.4)
-    else:
-        for line in axes.get_lines():
-            line.set_linestyle("-")
-
-
-@pytest.mark.parametrize(
-    "kind",
-    ["no unit", "7.0 points", "over each other", "off the page", "a legend hides data",
-     "not of the palette", "a line of 0.4 points", "alike without colours"],
+REST = np.array([0.0, 0.3, 0.5, 0.2, 0.4, 0.1])
+FALL = simulation.simulate(RX90, REST, np.zeros(6), t=np.linspace(0.0, 1.5, 60))
+WORKED = simulation.simulate(
+    RX90, REST, np.zeros(6), np.full(6, 5.0), wrench=[10.0, 0, 20.0, 0, 1.0, 0],
+    t=np.linspace(0.0, 0.5, 30),
 )  # fmt: skip
-def test_each_fault_is_found(kind, monkeypatch):
-    figure = FIGURES["trajectory"][""]()
-    fault(figure, kind)
-    found = complaints(figure, monkeypatch)
-    assert found
-    assert any(text.startswith(kind) for text in found), found
 
 
-@pytest.mark.parametrize(
-    ("label", "good"),
-    [("time (s)", True), ("velocity\n(rad/s²)", True), ("deviation (µrad/(N m))", True),
-     ("condition number", True), ("position", False), ("time (h)", False), ("rows ()", False)],
-)  # fmt: skip
-def test_a_unit_is_told_from_a_word(label, good):
-    assert says_its_unit(label) is good
+def eventful_path(timed=True):
+    """A path on which everything happens, without a robot that does it."""
+    N, kinds = 40, list(tr.PathEventKind)
+    t = np.linspace(0.0, 2.0, N) if timed else np.full(N, np.nan)
+    q = np.outer(np.linspace(0.0, 1.0, N), [1.0, -1.0, 0.1])
+    q[10:15] = np.nan
+    events = [tr.PathEvent(kinds[0], 10, 14, t[10] - 0.01, t[14] + 0.01)]
+    events += [tr.PathEvent(kind, 16 + 3 * k, 17 + 3 * k, t[16 + 3 * k], t[17 + 3 * k])
+               for k, kind in enumerate(kinds[1:])]  # fmt: skip
+    conditioning = np.linspace(0.3, 0.0, N)
+    codes = np.zeros(N, np.int8)
+    return tr.JointPath(t, q, 2.0 * q, codes, conditioning, np.full(N, "up"), tuple(events))
 
 
-# --- colours ------------------------------------------------------------------------------------
+def wrist_map(values=None, a=None, b=None, units=("rad", "rad", "m^3")):
+    a = np.linspace(-np.pi, np.pi, 41) if a is None else a
+    b = np.linspace(-2.0, 2.0, 31) if b is None else b
+    z = np.cos(a)[:, None] * np.sin(b) if values is None else values
+    return SingularityMap("rx90", np.array([2, 4]), ("elbow", "wrist"), a, b, z, "C3 S5", units)
 
-# Machado, Oliveira and Fernandes (2009), A physiologically-based model for simulation of color
-# vision deficiency, severity 1: what an eye without one kind of cones sees of linear RGB.
-EYES = {
-    "all cones": np.eye(3),
-    "protanopia": np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
-                            [-0.003882, -0.048116, 1.051998]]),
-    "deuteranopia": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
-                              [-0.011820, 0.042940, 0.968881]]),
-    "tritanopia": np.array([[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
-                            [0.004733, 0.691367, 0.303900]]),
+
+def crossing():
+    """Two inverse models on a way through the wrist singularity."""
+    d = np.linspace(-0.2, 0.2, 81)
+    q = np.tile([0.1, 0.2, 0.3, 0.4, 0.0, 0.6], (81, 1))
+    q[:, 4] = d
+    twist = np.array([0.1, 0.2, 0.05, 0.1, 0.3, 0.2])
+    found = {}
+    for name, damping in (("light", 0.01), ("strong", 0.1)):
+        J = rm.jacobian(RX90, q)
+        square = J @ J.swapaxes(1, 2) + damping**2 * np.eye(6)
+        v = (J.swapaxes(1, 2) @ np.linalg.solve(square, np.tile(twist, (81, 1))[..., None]))[..., 0]
+        found[name] = (v, twist - np.einsum("nij,nj->ni", J, v))
+    return d, q, twist, found
+
+
+D, ROWS, TWIST, FOUND = crossing()
+BOTH = [rm.velocity_ellipsoid(RX90, Q), rm.force_ellipsoid(RX90, Q)]
+LINE = tr.straight_line(se3.translation(0.5, 0.1, 0.2), se3.from_rpy((0.2, 1.0, 0.4)), duration=1.0)
+
+FIGURES = {
+    "one joint": lambda: viz.plot_trajectory(tr.bang_bang(0.0, 1.0, duration=1.0)),
+    "mixed": lambda: viz.plot_trajectory(MOVE, tr.MotionLimits([1.0, 2.0, 0.5]), model=SCARA,
+                                         title="A SCARA"),
+    "laws": lambda: viz.plot_profiles(LAWS, limits=tr.MotionLimits(1.5, 4.0), unit="rad"),
+    "side by side": lambda: viz.plot_profiles(LAWS, side_by_side=True, orders=(0, 2), title="Six"),
+    "path": lambda: viz.plot_joint_path(eventful_path(), model=SCARA, title="A path"),
+    "in space": lambda: viz.plot_pose_path(LINE, title="A line"),
+    "maps": lambda: viz.plot_singularities([wrist_map()] * 3, RX90, q=np.zeros((25, 6))),
+    "inverse": lambda: viz.plot_inverse_velocities(D, FOUND, model=RX90, title="Wrist"),
+    "by joint": lambda: viz.plot_inverse_velocities(D, FOUND, model=RX90, each_joint=True),
+    "joint motion": lambda: viz.plot_joint_motion(
+        rm.load("panda"), [0.0, 1.0], {"with": np.full((2, 7), -0.5), "without": np.ones((2, 7))}
+    ),
+    "ellipsoids": lambda: viz.plot_ellipsoids(BOTH, title="RX-90"),
+    "fall": lambda: viz.plot_energy(FALL, title="A falling arm"),
+    "torques": lambda: viz.plot_torque_parts(RX90, SWING, wrench=[0, 0, 9, 0, 0, 0]),
+    "inertia": lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, 1), title="SCARA"),
+    "inertia map": lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), of=2),
 }  # fmt: skip
-XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
-                [0.0193339, 0.1191920, 0.9503041]]) / [[0.95047], [1.0], [1.08883]]  # fmt: skip
 
 
-def lab(colors, eye):
-    """CIE L*a*b* (1976, white D65) of sRGB colours as an eye sees them."""
-    rgb = np.array([color[:3] for color in colors])
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    x, y, z = XYZ @ np.clip(EYES[eye] @ linear.T, 0.0, 1.0)
-    x, y, z = (np.where(c > 0.008856, np.cbrt(c), 7.787 * c + 16 / 116) for c in (x, y, z))
-    return np.stack((116 * y - 16, 500 * (x - y), 200 * (y - z)), axis=1)
+def lines(axes, label=None):
+    """The lines that a legend would name, or those of one label."""
+    if label is None:
+        return [x for x in axes.get_lines() if x.get_label()[0] != "_" and len(x.get_xdata())]
+    return [line for line in axes.get_lines() if line.get_label() == label]
 
 
-def nearest(colors, eye):
-    """Least distance of two of some colours, CIE 1976; 2 is just seen."""
-    seen = lab(colors, eye)
-    apart = np.linalg.norm(seen[:, None] - seen, axis=-1)
-    return apart[np.triu_indices(len(seen), 1)].min()
+def data(axes, label):
+    """Values of the only line with a label."""
+    (line,) = [line for line in lines(axes, label) if len(line.get_xdata())]
+    return np.asarray(line.get_ydata(), dtype=float)
 
 
-@pytest.mark.parametrize("eye", EYES)
-def test_lines_that_share_a_panel_differ_for_every_eye(eye):
-    lines = [line_style(k).color for k in range(8)]
-    assert nearest([*lines, INK, ALERT, PALE, PAPER], eye) > 17.0
-    assert lab(lines, eye)[:, 0].max() < 80.0  # dark enough for white paper
+def labels(figure):
+    return [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
 
 
-def test_lines_differ_in_print_without_colours():
-    for first in range(10):
-        dashes = [line_style(k).dashes for k in range(first, first + 7)]
-        assert len(set(dashes)) == 7
+def legend(figure):
+    return [text.get_text() for each in figure.legends for text in each.get_texts()]
 
 
-def test_the_simulation_of_eyes_sees_the_known_confusions():
-    red, green = to_rgba("#d62728"), to_rgba("#2ca02c")
-    assert nearest([red, green], "all cones") > 100.0
-    assert nearest([red, green], "deuteranopia") < 45.0
-    pair = [(0.80, 0.47, 0.65, 1.0), (0.62, 0.62, 0.62, 1.0)]  # a pink and a grey
-    assert nearest(pair, "all cones") > 25.0
-    assert nearest(pair, "deuteranopia") < 10.0
+def overlaps(figure):
+    """Panels, legends and texts that cover each other or leave the figure by more than 2 pixels."""
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
+    boxes = [
+        axes.get_tightbbox() for axes in figure.axes if axes.get_visible() and axes.name != "3d"
+    ]
+    boxes += [each.get_window_extent() for each in (*figure.legends, *figure.texts)]
+    width, height = figure.bbox.size
+    outside = [b for b in boxes if min(b.x0, b.y0, width - b.x1, height - b.y1) < -2.0]
+    pairs = [
+        (a, b)
+        for a, b in combinations(boxes, 2)
+        if min(min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)) > 2.0
+    ]
+    return outside + pairs
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_nothing_covers_anything_else_under_any_style(name):
+    with matplotlib.rc_context({"font.size": 30.0, "axes.facecolor": "black"}):
+        figure = FIGURES[name]()
+    assert overlaps(figure) == []
+    assert all(text.get_size() < 11.0 for text in figure.findobj(Text))
+
+
+def test_a_figure_shows_itself_and_leaves_pyplot_alone():
+    script = """
+import sys
+import robotmodels as rm
+from robotmodels.viz import plot_trajectory
+assert "matplotlib" not in sys.modules
+figure = plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
+assert figure._repr_png_().startswith(b"\\x89PNG")
+assert "matplotlib.pyplot" not in sys.modules
+sys.modules["matplotlib.style"] = None
+try:
+    plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
+except rm.errors.MissingExtraError as error:
+    print(error)
+"""
+    run = subprocess.run([sys.executable, "-W", "error", "-c", script], capture_output=True,
+                         text=True, timeout=120)  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert "pip install 'matplotlib" in run.stdout
+
+
+def test_a_figure_is_one_of_matplotlib_and_pickles():
+    figure = pickle.loads(pickle.dumps(FIGURES["one joint"]()))
+    assert isinstance(figure, Figure)
+    figure.savefig(file := io.BytesIO(), format="pdf")
+    assert file.getvalue().startswith(b"%PDF")
+    wide = viz.plot_trajectory(MOVE, size=(5.0, 4.0))
+    assert wide.get_size_inches().tolist() == [5.0, 4.0]
+
+
+# ---------------------------------------------------------------- trajectories
+
+
+def test_trajectory_is_drawn_as_it_is():
+    figure = viz.plot_trajectory(MOVE, model=SCARA, units=["deg", "rad", "mm"])
+    assert labels(figure)[:4] == ["position (deg)", "position (rad)", "position (mm)",
+                                  "velocity (deg/s)"]  # fmt: skip
+    factors = {"waist": 180.0 / np.pi, "elbow": 1.0, "lift": 1e3}
+    for order, of in enumerate((MOVE.q, MOVE.v, MOVE.a, MOVE.jerk)):
+        for j, (name, factor) in enumerate(factors.items()):
+            axes = figure.axes[3 * order + j]
+            t = lines(axes, name)[0].get_xdata()
+            assert (t[0], t[-1]) == (0.0, 2.0)
+            np.testing.assert_allclose(data(axes, name), factor * of(t)[:, j], atol=1e-9)
+    assert legend(figure) == list(factors)
+    samples = MOVE.resample(samples=7)
+    drawn = viz.plot_trajectory(samples, orders=(3,)).axes[0]
+    np.testing.assert_array_equal(data(drawn, "joint 2"), samples.jerk[:, 1])
+    one = viz.plot_trajectory(tr.Samples([0.0], [[2.0]], [[0.0]], [[0.0]], [[0.0]]))
+    assert one.axes[0].get_lines()[0].get_marker() == "o"
+
+
+def test_both_sides_of_a_jump_and_the_pieces_are_drawn():
+    axes = viz.plot_trajectory(tr.bang_bang(0.0, 1.0, duration=1.0), orders=(2,), units="m").axes[0]
+    t, a = axes.get_lines()[0].get_data()
+    at = np.flatnonzero(t == 0.5)[0]
+    np.testing.assert_allclose(a[at - 1 : at + 1], [4.0, -4.0])
+    assert lines(axes, "_break")[0].get_xdata() == [0.5, 0.5]
+    move = tr.trapezoidal([0.0, 0.0], [1.0, 0.1], limits=tr.MotionLimits(1.0, 4.0),
+                          synchronisation=tr.Synchronisation.INDEPENDENT)  # fmt: skip
+    for j, mark in enumerate(lines(viz.plot_trajectory(move, units="deg").axes[1], "_break")):
+        t, v = mark.get_data()
+        np.testing.assert_array_equal(t, np.unique(move.motion.breaks[j]))
+        np.testing.assert_allclose(v, np.degrees(move.v(t)[:, j]), atol=1e-12)
+
+
+def test_limits_are_dashed_lines_and_values_beyond_them_are_underlaid():
+    move = tr.trapezoidal([0, 0, 0], [1, -1, 0.2], limits=tr.MotionLimits(1.0, 4.0))
+    limits = tr.MotionLimits(velocity=[0.8, 2.0, np.inf], velocity_lower=[-0.7, -2.0, -np.inf],
+                             acceleration=[5.0, 5.0, 3.0], lower=[-3, -3, 0],
+                             upper=[3, 3, 0.5])  # fmt: skip
+    figure = viz.plot_trajectory(move, limits, units=["deg", "deg", "mm"], names=["a", "b", "c"])
+    for row, label, values in (
+        (0, "_limit of a and b", np.degrees([-3.0, 3.0])),
+        (1, "_limit of c", [0.0, 500.0]),
+        (2, "_limit of a", np.degrees([-0.7, 0.8])),
+        (2, "_limit of b", np.degrees([-2.0, 2.0])),
+        (5, "_limit of c", [-3000.0, 3000.0]),
+    ):
+        drawn = lines(figure.axes[row], label)
+        assert [line.get_ydata()[0] for line in drawn] == pytest.approx(values)
+        assert {line.get_linestyle() for line in drawn} == {"--"}
+    assert not lines(figure.axes[3], "_limit of c")  # infinite: no limit
+    y, beyond = data(figure.axes[2], "a"), data(figure.axes[2], "beyond it")
+    np.testing.assert_array_equal(np.isfinite(beyond), y > np.degrees(0.8))
+    assert legend(figure) == ["a", "b", "c", "limit", "beyond it"]
+    kept = tr.MotionLimits(velocity=[1.0, 2.0], acceleration=[3.0, 1.0])
+    exact = viz.plot_trajectory(tr.trapezoidal([0, 0], [1, 2], limits=kept), kept)
+    assert legend(exact) == ["joint 1", "joint 2", "limit"]  # limits that are just kept
+
+
+def test_profiles_carry_their_durations():
+    figure = viz.plot_profiles(LAWS, unit="deg", limits=tr.MotionLimits(1.5, 4.0))
+    names = [f"{name}, {move.duration:.4g} s" for name, move in LAWS.items()]
+    assert legend(figure) == [*names, "limit"]
+    for axes, order in zip(figure.axes, "qva", strict=False):
+        for name, move in zip(names, LAWS.values(), strict=True):
+            t = lines(axes, name)[0].get_xdata()
+            expected = np.degrees(getattr(move, order)(t))
+            np.testing.assert_allclose(data(axes, name), expected, atol=1e-9)
+    apart = viz.plot_profiles(list(LAWS.values()), names=list(LAWS), side_by_side=True, orders=[1])
+    titles = [" ".join(axes.get_title().split()) for axes in apart.axes]
+    assert titles == [name.replace(",", "") for name in names]
+    assert len({axes.get_ylim() for axes in apart.axes}) == 1  # common scales
+    third = viz.plot_profiles([MOVE], joint=2, limits=tr.MotionLimits([1.0, 2.0, 9.0]))
+    assert data(third.axes[0], "motion 1, 2 s")[-1] == pytest.approx(0.2)
+    assert sorted(x.get_ydata()[0] for x in lines(third.axes[1], "_limit of motion 1, 2 s")) == [
+        -9.0, 9.0,
+    ]  # fmt: skip
+
+
+# ---------------------------------------------------------------- paths
+
+
+def test_joint_path_has_a_row_for_each_kind_of_event():
+    path = eventful_path()
+    figure = viz.plot_joint_path(path, model=SCARA, units=["deg", "deg", "mm"])
+    assert labels(figure) == ["position (deg)", "position (mm)", "velocity (deg/s)",
+                              "velocity (mm/s)", "conditioning (1)", ""]  # fmt: skip
+    np.testing.assert_allclose(data(figure.axes[0], "elbow"), np.degrees(path.q[:, 1]))
+    np.testing.assert_allclose(data(figure.axes[3], "lift"), 1e3 * path.v[:, 2])
+    events = figure.axes[-1]
+    assert [text.get_text() for text in events.get_yticklabels()] == [
+        "out of reach", "outside limits", "singular", "posture changes", "jump", "too fast",
+    ]  # fmt: skip
+    for row, event in enumerate(path.events):
+        bar, _ = [x for x in events.get_lines() if x.get_ydata()[0] == row]
+        assert list(bar.get_xdata()) == [event.start, event.stop]
+    assert [patch.get_label() for patch in figure.axes[0].patches] == ["_out of reach", "_singular"]
+    assert len(lines(figure.axes[0], "_jump")) == len(lines(figure.axes[1], "_jump")) == 1
+    limits = lines(figure.axes[0], "_limit of waist")  # of the model
+    assert [x.get_ydata()[0] for x in limits] == pytest.approx(np.degrees([-2.0, 1.0]))
+    assert figure.axes[-2].get_yscale() == "log"  # the conditioning comes near zero
+    shown = data(figure.axes[-2], "_conditioning")
+    np.testing.assert_array_equal(shown[:-1], path.conditioning[:-1])
+    untimed = viz.plot_joint_path(eventful_path(timed=False), names=["a", "b", "c"])
+    assert labels(untimed) == ["position (rad or m)", "conditioning (1)", ""]
+    assert untimed.axes[-1].get_xlabel() == "number of the pose"
+    assert list(untimed.axes[-1].get_lines()[0].get_xdata()) == [10.0, 14.0]
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_pose_path_has_equal_scales_frames_and_events(unit):
+    T = np.stack(
+        [se3.from_rpy((0.1 * k, 0.0, 0.02 * k), (0.1 * k, 0.02 * k, 0.3)) for k in range(40)]
+    )
+    figure = viz.plot_pose_path(T, eventful_path(), frames=3, frame_size=0.1, unit=unit)
+    (axes,) = figure.axes
+    factor = 1.0 if unit == "m" else 1e3
+    assert axes.get_zlabel() == f"z ({unit})"
+    np.testing.assert_allclose(lines(axes, "path")[0].get_data_3d(), factor * T[:, :3, 3].T)
+    for k, name in enumerate("xyz"):
+        for i, line in zip((0, 20, 39), lines(axes, f"tool {name}"), strict=True):
+            start, tip = np.transpose(line.get_data_3d())
+            np.testing.assert_allclose(start, factor * T[i, :3, 3])
+            np.testing.assert_allclose(tip - start, factor * 0.1 * T[i, :3, k], atol=1e-9)
+    (run,) = lines(axes, "_out of reach")
+    np.testing.assert_allclose(run.get_data_3d(), factor * T[10:15, :3, 3].T)
+    spans = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()), np.ptp(axes.get_zlim())])
+    np.testing.assert_allclose(spans / axes._box_aspect, (spans / axes._box_aspect)[0])
+    assert {"path", "tool z", "start", "end", "out of reach", "too fast"} < set(legend(figure))
+    seen = viz.plot_pose_path(T, view=(0.5, 0.25)).axes[0]
+    assert np.radians([seen.azim, seen.elev]) == pytest.approx([0.5, 0.25])
+
+
+def test_joint_motion_fills_panels_with_the_range():
+    t = np.linspace(0.0, 2.0, 21)
+    inside = np.c_[-0.5 + np.sin(t), 5.0 * t, 0.1 + 0.05 * t]
+    outside = inside + np.array([0.0, 0.0, 0.1])
+    figure = viz.plot_joint_motion(SCARA, t, {"with": inside, "without": outside})
+    waist, elbow, lift, margin = figure.axes
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        "waist (deg)", "elbow (deg)", "lift (m)", "least margin (%)",
+    ]  # fmt: skip
+    np.testing.assert_allclose(data(waist, "with"), np.degrees(inside[:, 0]))
+    np.testing.assert_array_equal(data(lift, "without"), outside[:, 2])
+    assert waist.get_yticks() == pytest.approx(np.degrees([-2.0, -0.5, 1.0]))
+    assert lift.get_ylim()[1] > 0.3  # a joint beyond its limit is still to be seen
+    assert sorted(line.get_ydata()[0] for line in lines(lift, "limit")) == [0.0, 0.2]
+    assert (len(lift.patches), len(elbow.patches)) == (2, 0)  # no limits of the elbow
+    expected = np.minimum(
+        np.minimum(inside[:, 0] + 2.0, 1.0 - inside[:, 0]) / 1.5,
+        np.minimum(inside[:, 2], 0.2 - inside[:, 2]) / 0.1,
+    )
+    np.testing.assert_allclose(data(margin, "with"), 100.0 * expected, atol=1e-9)
+    assert legend(figure) == ["with", "without", "limit", "beyond it"]
+    seven = viz.plot_joint_motion(rm.load("panda"), t, np.zeros((21, 7)), columns=3, degrees=False)
+    assert sum(not axes.get_visible() for axes in seven.axes) == 1
+    assert sum(axes.get_xlabel() == "time (s)" for axes in seven.axes) == 3
+    assert seven.axes[0].get_title(loc="left").endswith("(rad)")
+
+
+# ---------------------------------------------------------------- velocities
+
+
+def zero_points(axes):
+    """Points of the bold lines and dots of a map, rad."""
+    drawn = [path.vertices for each in axes.collections[1:] for path in each.get_paths()]
+    drawn += [dots.get_xydata() for dots in lines(axes, "_zero")]
+    return np.radians(np.concatenate(drawn))
+
+
+def test_map_is_drawn_in_degrees_with_zero_in_the_middle():
+    grid = wrist_map()
+    figure = viz.plot_singularities(grid)
+    axes, bar = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("elbow (deg)", "wrist (deg)")
+    assert (axes.get_title(), bar.get_ylabel()) == ("C3 S5", "value (m³)")
+    image = axes.collections[0]
+    np.testing.assert_array_equal(image.get_array(), grid.values.T)
+    assert image.norm.vmin == -image.norm.vmax == -np.abs(grid.values).max()
+    assert axes.get_xlim() == pytest.approx((-180.0, 180.0))
+    # the bold line lies where cos(elbow) sin(wrist) is zero, and all of it is there
+    x, y = zero_points(axes).T
+    assert np.abs(np.cos(x) * np.sin(y)).max() < 5e-3
+    for at in (-H, H):
+        assert np.ptp(y[np.abs(x - at) < 0.02]) == pytest.approx(4.0, rel=0.02)
+    assert np.ptp(x[np.abs(y) < 0.02]) == pytest.approx(2.0 * np.pi, rel=0.02)
+    assert legend(figure) == ["singular: zero"]
+    assert viz.plot_singularities(grid, degrees=False).axes[0].get_xlabel() == "elbow (rad)"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_zeros_without_a_change_of_sign_are_drawn_as_well(sign):
+    a, b = np.linspace(-1.0, 1.0, 21), np.linspace(0.0, 0.5, 11)
+    touched = viz.plot_singularities(wrist_map(sign * (a[:, None] ** 2 + 0 * b), a, b)).axes[0]
+    points = zero_points(touched)
+    np.testing.assert_allclose(points[:, 0], 0.0, atol=1e-9)
+    assert np.ptp(points[:, 1]) == pytest.approx(0.5)
+    none = viz.plot_singularities(wrist_map(sign * (2.0 + a[:, None] + b), a, b))
+    assert legend(none) == []
+    zero = viz.plot_singularities(wrist_map(np.zeros((21, 11)), a, b))
+    assert "zero everywhere" in zero.axes[0].texts[0].get_text()
+    gaps = a[:, None] + b
+    gaps[:5] = np.nan
+    drawn = viz.plot_singularities(wrist_map(gaps, a, b)).axes[0]
+    np.testing.assert_array_equal(drawn.collections[0].get_array().mask, np.isnan(gaps.T))
+
+
+def test_maps_show_limits_and_postures():
+    rows = [{}, {}, {"lower": -4.0, "upper": 1.5}, {}, {"lower": 2.5}]
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    q = np.outer(np.linspace(0.0, 1.0, 24), np.arange(5.0))
+    figure = viz.plot_singularities([wrist_map(), wrist_map()], arm, q=q)
+    axes = figure.axes[0]
+    (limit,) = lines(axes, "_limit of elbow")  # the lower one is outside of the map
+    assert limit.get_xdata()[0] == pytest.approx(np.degrees(1.5))
+    assert len([patch for patch in axes.patches if patch.get_hatch()]) == 2
+    drawn = [np.radians(np.asarray(x)) for x in lines(axes, "postures")[0].get_data()]
+    np.testing.assert_allclose(drawn, q[:, [2, 4]].T)
+    assert legend(figure) == ["singular: zero", "outside joint limits", "postures"]
+
+
+def test_inverse_velocities_are_drawn_as_they_are():
+    limits = tr.MotionLimits([5, 5, 5, 6, 6, 6])
+    figure = viz.plot_inverse_velocities(D, FOUND, model=RX90, limits=limits)
+    assert labels(figure) == ["greatest joint speed (rad/s)", "missing linear velocity (m/s)",
+                              "missing angular velocity (rad/s)"]  # fmt: skip
+    speed, linear, angular = figure.axes
+    for name, (v, error) in FOUND.items():
+        np.testing.assert_allclose(lines(speed, name)[0].get_xdata(), np.degrees(D))
+        np.testing.assert_allclose(data(speed, name), np.abs(v).max(axis=1))
+        np.testing.assert_allclose(data(linear, f"_{name}"), np.linalg.norm(error[:, :3], axis=1))
+        np.testing.assert_allclose(data(angular, f"_{name}"), np.linalg.norm(error[:, 3:], axis=1))
+    drawn = {x.get_ydata()[0] for x in speed.get_lines() if x.get_label().startswith("_limit")}
+    assert drawn == {5.0, 6.0}
+    assert legend(figure) == ["light", "strong", "limit"]
+    each = viz.plot_inverse_velocities(D, FOUND, model=RX90, each_joint=True)
+    for axes, (name, (v, _)) in zip(each.axes, FOUND.items(), strict=False):
+        assert axes.get_title() == name
+        np.testing.assert_allclose([line.get_ydata() for line in lines(axes)], np.abs(v).T)
+    found = rm.ikm(RX90, ROWS, TWIST)
+    own = viz.plot_inverse_velocities(D, {"ikm": found}, distance_unit="rad")
+    assert labels(own)[-1] == "least singular value"
+    np.testing.assert_array_equal(data(own.axes[-1], "_ikm"), found.singular_values[:, -1])
+    masked = rm.ikm(RX90, ROWS, TWIST, mask=[1, 1, 1, 0, 0, 0])
+    assert not any("angular" in text for text in labels(viz.plot_inverse_velocities(D, [masked])))
+
+
+def test_scales_of_powers_where_apt():
+    near = np.geomspace(1e-4, 1.0, 41)
+    steep = (1.0 / near)[:, None] * np.ones(2)
+    stands = np.where(np.arange(41)[:, None] == 3, 0.0, steep)
+    cases = (
+        (near, steep, None, ("log", "log")),
+        (np.r_[-near[::-1], 0.0, near], np.ones((83, 1)), None, ("symlog", "linear")),
+        (np.linspace(0.01, 1, 41), steep, None, ("linear", "log")),
+        (near, steep, False, ("linear", "log")),
+        (near, stands, None, ("log", "symlog")),  # so that zero has a place
+    )
+    for distance, v, logarithmic, scales in cases:
+        (axes,) = viz.plot_inverse_velocities(
+            distance, {"a": (v, None)}, logarithmic=logarithmic
+        ).axes
+        assert (axes.get_xscale(), axes.get_yscale()) == scales
+
+
+def test_projections_are_the_widths_of_the_ellipsoid():
+    figure = viz.plot_ellipsoids(BOTH)
+    for row, ellipsoid in enumerate(BOTH):
+        for column, plane in enumerate(((0, 1), (0, 2), (1, 2))):
+            axes = figure.axes[3 * row + column]
+            points = axes.get_lines()[0].get_xydata()
+            for direction in np.eye(2):
+                world = np.zeros(3)
+                world[list(plane)] = direction
+                width = ellipsoid.extent_along(world)
+                assert (points @ direction).max() == pytest.approx(width, rel=1e-3)
+            assert axes.get_xlim()[1] > points[:, 0].max()
+            assert axes.get_ylabel() == f"${'vf'[row]}_{'xyz'[plane[1]]}$ ({['m/s', 'N'][row]})"
+    two = viz.plot_ellipsoids(rm.velocity_ellipsoid(RX90, [Q, Q + 0.3]), labels=["bent", "other"])
+    assert legend(two) == ["bent", "other"]
+
+
+def test_flat_and_unbounded_projections():
+    planar, bent = rm.load("planar_2r"), [0.4, 1.2]
+    velocity, force = rm.velocity_ellipsoid(planar, bent), rm.force_ellipsoid(planar, bent)
+    figure = viz.plot_ellipsoids([velocity, force])
+    flat = figure.axes[1].get_lines()[0].get_xydata()
+    assert np.abs(flat[:, 1]).max() < 1e-12
+    strip = figure.axes[4].get_lines()[0].get_xydata()
+    assert np.abs(strip[:, 1]).min() > 100 * figure.axes[4].get_ylim()[1]
+    np.testing.assert_allclose(np.abs(strip[:, 0]), force.extent_along([1, 0, 0]), rtol=1e-9)
+    assert len(lines(figure.axes[4], "_unbounded axis")) == 1
+
+
+# ---------------------------------------------------------------- dynamics
+
+
+def test_energy_lines_are_those_of_the_balance():
+    figure = viz.plot_energy(WORKED)
+    upper, lower = figure.axes
+    names = ["kinetic energy", "potential energy", "friction work", "work of the tool",
+             "\N{MINUS SIGN} control work"]  # fmt: skip
+    assert legend(figure) == [*names, "sum"]
+    assert upper.get_ylabel() == "energy (J)"
+    np.testing.assert_array_equal(data(upper, "kinetic energy"), WORKED.kinetic)
+    total = np.sum([data(upper, name) for name in names], axis=0)
+    np.testing.assert_allclose(data(upper, "sum"), total, atol=1e-9)
+    unit = lower.get_ylabel().removeprefix("drift (").removesuffix(")")
+    factor = {"J": 1.0, "mJ": 1e3, "µJ": 1e6, "nJ": 1e9, "pJ": 1e12}[unit]
+    np.testing.assert_allclose(data(lower, "_drift"), factor * WORKED.drift)
+    kinds = (simulation.SimulationEventKind.STUCK, simulation.SimulationEventKind.BROKE_AWAY)
+    marks = [line.get_xdata()[0] for line in lines(viz.plot_energy(FALL).axes[0], "_event")]
+    assert marks == [e.t for e in FALL.events if e.kind in kinds] != []
+    assert not lines(viz.plot_energy(FALL, events=False).axes[0], "_event")
+
+
+def test_torque_parts_add_up_to_the_torque_of_the_model():
+    wrench, friction = [0, 0, 9.0, 0, 0, 0], rm.friction.ViscousFriction(np.ones(6))
+    figure = viz.plot_torque_parts(RX90, SWING, wrench=wrench, friction=friction)
+    t = lines(figure.axes[0], "total")[0].get_xdata()
+    q, v, a = SWING.q(t), SWING.v(t), SWING.a(t)
+    tau = rm.idm(RX90, q, v, a, wrench=wrench, friction=friction)
+    names = ["inertia", "Coriolis and centrifugal", "gravity", "friction", "wrench of the tool"]
+    assert legend(figure) == [*names, "total"]
+    for axes in figure.axes:
+        j = int(axes.get_title(loc="left").removeprefix("joint_").removesuffix(" (N m)")) - 1
+        np.testing.assert_allclose(data(axes, "total"), tau[:, j], atol=1e-10)
+        parts = np.sum([data(axes, name) for name in names], axis=0)
+        np.testing.assert_allclose(parts, tau[:, j], atol=1e-10)
+    bare = viz.plot_torque_parts(RX90, SWING, drive=False, joints=[1])
+    assert legend(bare) == ["inertia", "Coriolis and centrifugal", "gravity", "total"]
+    gravity = rm.gravity_torque(RX90, q)[:, 1]
+    np.testing.assert_allclose(data(bare.axes[0], "gravity"), gravity, atol=1e-10)
+    worked = viz.plot_torque_parts(RX90, WORKED, joints=[1]).axes[0]
+    np.testing.assert_allclose(data(worked, "total"), 5.0)
+    lift = viz.plot_torque_parts(SCARA, tr.quintic([0, 0, 0], [1, 1, 0.2], duration=1.0)).axes[2]
+    assert lift.get_title(loc="left") == "lift (N)"
+
+
+def test_inertia_over_one_joint():
+    grid = simulation.dynamics_map(RX90, 2, samples=9)
+    figure = viz.plot_inertia_map(grid)
+    gravity, inertia, coupling = figure.axes
+    q = np.zeros(6)
+    q[2] = grid.ranges[0][3]
+    M = rm.mass_matrix(RX90, q)
+    for j, name in enumerate(RX90.table.names):
+        assert data(gravity, name)[3] == pytest.approx(rm.gravity_torque(RX90, q)[j])
+        assert data(inertia, name)[3] == pytest.approx(M[j, j])
+    assert gravity.get_lines()[0].get_xdata()[-1] == pytest.approx(180.0)
+    pair = data(coupling, "_joint_2 and joint_3")[3]
+    assert pair == pytest.approx(M[1, 2] / np.sqrt(M[1, 1] * M[2, 2]))
+    assert legend(figure)[0] == "joint_1 and joint_4" or "joint_2 and joint_3" in legend(figure)
+    mixed = viz.plot_inertia_map(simulation.dynamics_map(SCARA, 1))
+    assert labels(mixed)[0] == "gravity torque (N m or N)"
+
+
+def test_inertia_over_two_joints():
+    grid = simulation.dynamics_map(RX90, (1, 2), samples=(7, 5))
+    figure = viz.plot_inertia_map(grid, degrees=False)
+    found = [axes for axes in figure.axes if axes.get_title()]
+    expected = (grid.gravity[..., 1], grid.mass[..., 1, 1], grid.coupling[..., 1, 2])
+    for axes, values in zip(found, expected, strict=True):
+        np.testing.assert_allclose(axes.collections[0].get_array(), values.T, atol=1e-9)
+    assert [axes.get_ylabel() for axes in figure.axes if not axes.get_title()] == [
+        "(N m)", "(kg m²)", "no unit"]  # fmt: skip
+    assert found[0].get_xlabel() == "joint_2 (rad)"
+    assert found[0].get_ylabel() == "joint_3 (rad)"
+    other = viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), of=2, pair=(0, 1))
+    titles = [axes.get_title() for axes in other.axes if axes.get_title()]
+    assert "lift" in titles[0]
+    assert "waist, elbow" in titles[2]
+    with pytest.warns(RobotModelsWarning, match="no masses"):
+        grid = simulation.dynamics_map(rm.load("planar_2r"), (0, 1), samples=3)
+    massless = viz.plot_inertia_map(grid)
+    texts = [axes.texts[0].get_text() for axes in massless.axes if axes.texts]
+    assert texts == ["zero everywhere", "zero everywhere", "a joint moves\nno inertia"]
+
+
+# ---------------------------------------------------------------- mistakes
+
+T3 = np.broadcast_to(np.eye(4), (3, 4, 4))
+BATCH = tr.quintic(np.zeros((2, 3)), np.ones((2, 3)), duration=1.0)
+MISTAKES = (
+    (lambda: viz.plot_trajectory(BATCH), r"a batch of shape \(2,\)"),
+    (lambda: viz.plot_trajectory(BATCH.at([0.0, 1.0])), "samples of one motion"),
+    (lambda: viz.plot_trajectory(LINE), r"motion of the tool.*\.law"),
+    (lambda: viz.plot_trajectory(np.zeros(3)), "trajectory: expected a Trajectory.*got ndarray"),
+    (lambda: viz.plot_trajectory(MOVE.at([])), "no samples"),
+    (lambda: viz.plot_trajectory(MOVE, orders=(0, 4)), "orders: .* from 0 to 3, each once"),
+    (lambda: viz.plot_trajectory(MOVE, [1.0]), "limits: expected a MotionLimits, got list"),
+    (lambda: viz.plot_trajectory(MOVE, tr.MotionLimits([1.0, 2.0])), "limits of 3 joints"),
+    (lambda: viz.plot_trajectory(MOVE, size=(0.0, 1.0)), "size: expected positive inches"),
+    (
+        lambda: viz.plot_trajectory(MOVE, units="rad", model=SCARA),
+        "joint 3 is prismatic, got 'rad'",
+    ),
+    (lambda: viz.plot_trajectory(MOVE, units="mm", model=SCARA), "joint 1 is revolute, got 'mm'"),
+    (lambda: viz.plot_trajectory(MOVE, units="grad"), "expected one of 'rad', 'deg'"),
+    (lambda: viz.plot_trajectory(MOVE, units=["rad"]), "units: .* each of the 3 joints, got 1"),
+    (lambda: viz.plot_trajectory(MOVE, names="abc"), "names: expected a list of texts"),
+    (lambda: viz.plot_trajectory(MOVE, names=["a"]), "names: .* each of the 3 joints, got 1"),
+    (lambda: viz.plot_trajectory(MOVE, model=RX90), "got 'rx90' of 6"),
+    (lambda: viz.plot_trajectory(MOVE, model="rx90"), "model: expected a RobotModel, got str"),
+    (lambda: viz.plot_profiles([MOVE], joint=3), "joint: expected a number from 0 to 2"),
+    (lambda: viz.plot_profiles({}), "profiles: expected at least one motion"),
+    (lambda: viz.plot_profiles({"a": MOVE}, names=["b"]), "has its own names"),
+    (lambda: viz.plot_profiles(MOVE), "profiles: .* a list of them, got Trajectory"),
+    (lambda: viz.plot_profiles({"a": None}), "'a': expected a Trajectory"),
+    (lambda: viz.plot_joint_path(np.zeros((3, 6))), "path: expected a JointPath.*got ndarray"),
+    (lambda: viz.plot_pose_path(np.eye(4)), r"poses: expected shape \(N, 4, 4\)"),
+    (lambda: viz.plot_pose_path(T3, eventful_path()), "path: .* these 3 poses, got 40"),
+    (lambda: viz.plot_pose_path(T3, unit="rad"), "unit: expected a length"),
+    (lambda: viz.plot_pose_path(T3, frame_size=0.0), "frame_size: expected a positive length"),
+    (lambda: viz.plot_pose_path(T3, frames=-1), "frames: expected how many"),
+    (lambda: viz.plot_joint_motion(SCARA, [], np.zeros((0, 3))), r"t: expected shape \(N,\)"),
+    (lambda: viz.plot_joint_motion(SCARA, [0.0], {"a": [0.0]}), r"q of 'a': .* shape \(1, 3\)"),
+    (lambda: viz.plot_joint_motion(SCARA, [0.0], [[np.inf] * 3]), "finite positions"),
+    (lambda: viz.plot_joint_motion(SCARA, [0.0], np.zeros((1, 3)), columns=1.5), "columns"),
+    (lambda: viz.plot_singularities([]), "maps: expected one or several SingularityMap"),
+    (
+        lambda: viz.plot_singularities(wrist_map(np.ones((1, 31)), np.zeros(1))),
+        "at least two values",
+    ),
+    (lambda: viz.plot_singularities(wrist_map(np.full((41, 31), np.nan))), "no finite value"),
+    (lambda: viz.plot_singularities(wrist_map(), SCARA), "'scara' with its 3 joints"),
+    (lambda: viz.plot_singularities(wrist_map(), q=[0.0, 1.0]), "n at least 5"),
+    (lambda: viz.plot_inverse_velocities(D[::-1], FOUND), "distance: .* ascend"),
+    (lambda: viz.plot_inverse_velocities(D, {"a": (D[1:, None], None)}), r"shape \(81, n\)"),
+    (lambda: viz.plot_inverse_velocities(D, [(D[:, None], D)]), r"errors of shape \(81, 6\)"),
+    (lambda: viz.plot_inverse_velocities(D, {"a": D}), "IKMSolution or a pair"),
+    (lambda: viz.plot_inverse_velocities(D, [FOUND["light"]] * 2, ["a", "a"]), "a different one"),
+    (lambda: viz.plot_ellipsoids([]), "ellipsoids: expected at least one"),
+    (lambda: viz.plot_ellipsoids(BOTH, labels=["a", "b"]), "labels: .* each of the 1 ellipsoids"),
+    (lambda: viz.plot_energy(MOVE), "simulation: expected a Simulation"),
+    (lambda: viz.plot_torque_parts(SCARA, SWING), "motion: expected one of the 3 joints"),
+    (lambda: viz.plot_torque_parts(SCARA, FALL), "model: the simulation is one of 'rx90'"),
+    (lambda: viz.plot_torque_parts(RX90, FALL, drive=False), "motion: a simulation has its own"),
+    (lambda: viz.plot_torque_parts(RX90, SWING, joints=[6]), "joints: expected joints from 0"),
+    (lambda: viz.plot_inertia_map(FALL), "grid: expected a DynamicsMap"),
+    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, 1), of=1), "of, pair: these"),
+    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), of=6), "of: expected"),
+    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), pair=(1, 1)), "pair:"),
+)
+
+
+@pytest.mark.parametrize(("wrong", "message"), MISTAKES)
+def test_mistakes_are_named(wrong, message):
+    with pytest.raises(RobotModelsError, match=message) as caught:
+        wrong()
+    assert isinstance(caught.value, (InvalidValueError, ShapeError))

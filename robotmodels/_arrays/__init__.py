@@ -4,7 +4,18 @@ Leading axes are batch axes and broadcast against each other; the last axes are 
 """
 
 from .batch import batch_rows, batch_shape
-from .border import LARGEST, Array, as_bounded, as_core, as_exact, as_floats, as_reals, as_vector
+from .border import (
+    LARGEST,
+    Array,
+    as_bounded,
+    as_core,
+    as_exact,
+    as_floats,
+    as_mask,
+    as_number,
+    as_reals,
+    as_vector,
+)
 from .values import Frozen, Rebuilt, Value, read_only, same_value, value_hash
 
 __all__ = [
@@ -17,6 +28,8 @@ __all__ = [
     "as_core",
     "as_exact",
     "as_floats",
+    "as_mask",
+    "as_number",
     "as_reals",
     "as_vector",
     "batch_rows",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 LARGEST = 1e50
 """Of lengths, inertia and what else makes a model: products of several are floats."""
 _FLOAT64 = np.dtype(np.float64)
+_MASKS = {"position": (True, False), "xyz": (True, False), "orientation": (False, True)}
 _AT_A_TIME = 2**18
 """Numbers that are looked at together."""
 
@@ -89,6 +90,63 @@ def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     if array.shape != shape:
         raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
     return as_floats(array, name)
+
+
+def as_number(
+    value: ArrayLike,
+    name: str,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+) -> float:
+    """One finite number within bounds, such as a length or a tolerance."""
+    try:
+        number = float(as_exact(value, (), name))
+    except ValueError:
+        number = nan
+    bounds = [(above, "above {:g}"), (least, "of at least {:g}"), (below, "below {:g}")]
+    fits = (
+        isfinite(number)
+        and (above is None or number > above)
+        and (least is None or number >= least)
+        and (below is None or number < below)
+    )
+    if not fits:
+        words = " and ".join(text.format(bound) for bound, text in bounds if bound is not None)
+        raise InvalidValueError(f"{name}: expected a finite number {words}, got {value!r:.80}.")
+    return number
+
+
+def as_mask(
+    mask: ArrayLike | str | None,
+    components: tuple[str, ...] = ("x", "y", "z", "rx", "ry", "rz"),
+    name: str = "mask",
+) -> NDArray[np.bool_]:
+    """Which components count: zeros and ones, None for all, "position" or "xyz", "orientation"."""
+    k = len(components)
+    if mask is None:
+        return np.ones(k, dtype=np.bool_)
+    if isinstance(mask, str) and k == 6 and mask in _MASKS:
+        return np.repeat(_MASKS[mask], 3)
+    words = " ".join(components)
+    if isinstance(mask, str):
+        raise InvalidValueError(
+            f"{name}: expected zeros and ones for {words}, or a word ({', '.join(_MASKS)}), got "
+            f"{mask!r}."
+        )
+    given = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+    flags = given or (isinstance(mask, (list, tuple)) and set(map(type, mask)) == {bool})
+    numbers = as_floats(np.asarray(mask, np.float64) if flags else mask, name)
+    if numbers.shape != (k,):
+        raise ShapeError(f"{name}: expected {k} numbers {words}, got shape {numbers.shape}.")
+    if not np.isin(numbers, (0.0, 1.0)).all():
+        raise InvalidValueError(
+            f"{name}: expected zeros and ones for {words}, got {numbers.tolist()}; a component is "
+            "either asked for or not, it has no weight."
+        )
+    if not numbers.any():
+        raise InvalidValueError(f"{name}: all of {words} are 0, so nothing is asked for.")
+    return numbers == 1.0
 
 
 def _converted(value: ArrayLike, name: str) -> Array:

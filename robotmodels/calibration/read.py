@@ -17,7 +17,7 @@ from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, dgm, pose_from_coordinates
-from ..kinematics.coordinates.kinds import orientation_kind
+from ..kinematics.coordinates.orientations import orientation_kind
 from ..model import RobotModel, check_model
 from .extended_table import Frame
 from .joint_readings import beyond_limits, expected_joints_text

@@ -59,7 +59,7 @@ def add_command(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command: draw, save and open."""
     from ..viz import jog
-    from ..viz.stand_ins import with_stand_ins
+    from ..viz.meshes import with_stand_ins
 
     model = robot_of(arguments)
     q = None if arguments.q is None else posture(arguments.q, model, "--q", arguments.degrees)

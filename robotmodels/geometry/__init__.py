@@ -1,7 +1,7 @@
 """The geometric description: the Khalil-Kleinfinger table and the transforms it stands for."""
 
 from .joint_kinds import FIXED, PRISMATIC, REVOLUTE
-from .names import NOT_XML
+from .names import NOT_XML, constant_names
 from .table import DHTable
 from .transforms import constant_factors, link_transforms
 
@@ -12,5 +12,6 @@ __all__ = [
     "PRISMATIC",
     "REVOLUTE",
     "constant_factors",
+    "constant_names",
     "link_transforms",
 ]

@@ -19,7 +19,7 @@ from ..errors import TableError
 from ..table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 from .columns import check_structure, checked_limits, whole_numbers
 from .joint_kinds import FIXED, PRISMATIC
-from .names import checked_names, default_names
+from .names import checked_names, checked_symbols, default_names
 from .rows import columns_of_rows, unknown_name
 from .standard_rows import rows_of_standard
 
@@ -56,6 +56,9 @@ class DHTable:
         Limits of the joint variables in radians or metres, default minus and plus infinity.
     velocity, effort : array_like, shape (n,), optional
         Largest speed (rad/s, m/s) and torque or force (N m, N), default infinity.
+    symbols : mapping of (str, int) to str, optional
+        Names of geometric constants by column and row number, such as ``{("d", 3): "L1"}``: the
+        table prints them beside their numbers, and formulas use them.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class DHTable:
     upper: Array
     velocity: Array
     effort: Array
+    symbols: Mapping[tuple[str, int], str]
 
     def __init__(
         self,
@@ -109,6 +113,7 @@ class DHTable:
         upper: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         effort: ArrayLike | None = None,
+        symbols: Mapping[tuple[str, int], str] | None = None,
     ) -> None:
         ancestors = whole_numbers(antecedent, "antecedent")
         f = ancestors.size
@@ -137,6 +142,7 @@ class DHTable:
         )
         labels = default_names(kinds) if names is None else checked_names(names, f)
         object.__setattr__(self, "names", labels)
+        object.__setattr__(self, "symbols", checked_symbols(symbols, f))
         for key, value in values.items():
             object.__setattr__(self, key, read_only(value, value.dtype.type))
 
@@ -289,6 +295,9 @@ class DHTable:
         for column in columns:
             if column not in known:
                 raise TableError(unknown_name("column", column, known))
+        if "symbols" not in columns:  # a new number is no longer the one that had the name
+            kept = {key: name for key, name in self.symbols.items() if key[0] not in columns}
+            columns["symbols"] = kept  # type: ignore[assignment]
         return replace(self, **columns)  # type: ignore[arg-type]
 
     def __str__(self) -> str:
@@ -301,41 +310,50 @@ class DHTable:
         if (self.mu != (self.sigma != FIXED)).any():
             columns.append(("μj", [str(m) for m in self.mu]))
         if _shows(self.gamma) or _shows(self.b):
-            columns.append(("γj", [angle_text(v) for v in self.gamma]))
-            columns.append(("bj", [length_text(v) for v in self.b]))
+            columns.append(("γj", [self._text("gamma", j) for j in rows]))
+            columns.append(("bj", [self._text("b", j) for j in rows]))
         if _shows(self.beta):
-            columns.append(("βj", [angle_text(v) for v in self.beta]))
-        columns.append(("αj", [angle_text(v) for v in self.alpha]))
-        columns.append(("dj", [length_text(v) for v in self.d]))
+            columns.append(("βj", [self._text("beta", j) for j in rows]))
+        columns.append(("αj", [self._text("alpha", j) for j in rows]))
+        columns.append(("dj", [self._text("d", j) for j in rows]))
         columns.append(("θj", [self._own_text(j, "θ") for j in rows]))
         columns.append(("rj", [self._own_text(j, "r") for j in rows]))
         return boxed(columns)
 
+    def _text(self, column: str, row: int, size: bool = False) -> str:
+        """A constant, or its absolute value, with its symbol in brackets."""
+        value = float(getattr(self, column)[row])
+        text = length_text if column in ("b", "d", "r") else angle_text
+        symbol = self.symbols.get((column, row + 1))
+        return text(abs(value) if size else value) + (f" ({symbol})" if symbol else "")
+
     def _own_text(self, row: int, symbol: str) -> str:
         """Cell of the theta or r column: a constant, or the variable with its offset."""
-        offset = float(self.theta[row] if symbol == "θ" else self.r[row])
-        text = angle_text if symbol == "θ" else length_text
+        column = "theta" if symbol == "θ" else "r"
         variable = "r" if self.sigma[row] == PRISMATIC else "θ"
         if self.sigma[row] == FIXED or symbol != variable:
-            return text(offset)
-        return variable_text(symbol, row + 1, text(abs(offset)), offset < 0)
+            return self._text(column, row)
+        offset = self._text(column, row, size=True)
+        return variable_text(symbol, row + 1, offset, getattr(self, column)[row] < 0)
 
     def __repr__(self) -> str:
         return f"<DHTable: {self.f} frames, {self.n} joints>\n{self}"
 
     def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+        return type(self), (*self._values, dict(self.symbols))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, DHTable):
             return NotImplemented
-        return all(
-            same_value(getattr(self, field.name), getattr(other, field.name))
-            for field in fields(self)
-        )
+        return all(same_value(a, b) for a, b in zip(self._values, other._values, strict=True))
 
     def __hash__(self) -> int:
-        return value_hash(*(getattr(self, field.name) for field in fields(self)))
+        return value_hash(*self._values)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        """All fields but the symbols: tables of the same numbers are equal."""
+        return tuple(getattr(self, field.name) for field in fields(self)[:-1])
 
 
 def _shows(column: Array) -> bool:

@@ -1,13 +1,13 @@
 """Inverse geometric models: poses to joint variables, with a status for every pose.
 
-The way of a pose: `inverse` reads the call, and `call` the mask, limits and references (`asked`).
-`loop` writes the arm as a chain of joints; `families` chooses once what solves it (a `solver`):
-a plan of Paul's equations (`paul`, `closed_form`, `by_plan`), three prismatic joints
-(`prismatic`), any six joints (`general`) or their structured neighbour (`neighbour`), fewer
-joints than the task asks for (`fewer`), more of them (`redundant`, `arm_angle`, `mask`). Its
-candidate postures are improved and checked on the chain itself (`check`), infinite families come
-to rest at the references (`self_motion`), and the postures are labelled (`branches`), sorted and
-held in `solutions`; a pose without any is told `why`. `numeric` is the iterative inverse.
+`inverse` documents the call, `call` checks it (`asked`). `loop` writes the arm as a chain of
+joints, `chain` makes other chains of it; `families` chooses once which solver serves it: a plan of
+Paul's equations (`paul`, `closed_form`, `by_plan`), elimination for any six joints
+(`elimination`) or the nominal arm next to them (`nominal`), fewer joints or components
+(`reduced`, `position`), more of them (`redundant`, `relations`, `arm_angle`), numeric search for
+the rest (`search`). Candidates are refined and checked on the chain itself (`check`), self-motions
+are completed at the reference (`singular`), and the solutions are labelled (`branches`), sorted and
+held in `solutions`; `unreachable` says why a pose has none. `numeric` is the iterative inverse.
 """
 
 from .inverse import igm

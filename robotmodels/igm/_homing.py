@@ -31,7 +31,7 @@ from ..kernels._compile import (
 )
 from ..kernels._vectors import whole_matrix, whole_vector
 from ..kernels.svd import orthogonal_rows
-from .numeric._pose_error import Arm, Goal, error_jacobian, forward, missing
+from ._pose_error import Arm, Goal, error_jacobian, forward, missing
 
 __all__ = ["brought_home"]
 

@@ -13,14 +13,36 @@ import numpy as np
 from numba import types
 
 from ..kernels._compile import INT, MATRIX, OUT3, STACK, Floats, Ints, compiled
-from ._concurrent import advance, close_loop
-from ._equations import ANY, DOUBLE, NONE, type_2
-from ._point import roots_of_linear, turning_pair
+from .kernels.equations import ANY, DOUBLE, NONE, type_2
+from .kernels.pieper import advance, roots_of_linear, turning_pair
 
 _COUNTS = types.Array(types.int64, 1, "C")
 _MARKS = types.Array(types.int64, 2, "C")
 _ALIGNED = 1e-13  # sine between axis 5 and the three below which they count as parallel
 _SQUARE = 1e-9  # cosine between axes that count as square
+
+
+@compiled()
+def close_loop(left: Floats, pose: Floats, inverted: int, right: Floats, out: Floats) -> None:
+    """The constant that holds the pose: ``left pose right``, the pose inverted if asked."""
+    middle = np.zeros((4, 4))
+    middle[3, 3] = 1.0
+    for i in range(3):
+        for j in range(3):
+            middle[i, j] = pose[j, i] if inverted else pose[i, j]
+        if not inverted:
+            middle[i, 3] = pose[i, 3]
+    if inverted:
+        for i in range(3):
+            for j in range(3):
+                middle[i, 3] -= pose[j, i] * pose[j, 3]
+    for i in range(4):
+        for j in range(4):
+            total = 0.0
+            for m in range(4):
+                for k in range(4):
+                    total += left[i, m] * middle[m, k] * right[k, j]
+            out[i, j] = total
 
 
 @compiled()

@@ -6,17 +6,11 @@ how; those that do not are prepared as new.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import singledispatch
 
-import numpy as np
-
-from .. import se3
-from .._arrays import read_only
 from .closed_form import ClosedForm, prepare_closed_form
-from .general import GeneralArm
+from .elimination import EliminationArm, with_forms_of
 from .loop import JointChain
-from .shortened import shortened
 from .solver import Prepare, Solver
 
 
@@ -32,21 +26,5 @@ def _(known: ClosedForm, chain: JointChain, prepare: Prepare) -> Solver | None:
 
 
 @prepare_alike.register
-def _(known: GeneralArm, chain: JointChain, prepare: Prepare) -> Solver | None:
-    structured = prepare_closed_form(chain)
-    if structured is not None:
-        return structured
-    # the same representations of the loop, with this chain's links
-    D, unit = shortened(chain)
-    inverse = np.array([se3.inverse(T) for T in D])
-    ways = tuple(
-        replace(
-            way,
-            links=read_only(
-                np.array([D[j + 1] if way.direction == 1 else inverse[j] for j in way.joints])
-            ),
-        )
-        for way in known.solver.representations
-    )
-    solver = replace(known.solver, D=read_only(D), unit=unit, representations=ways)
-    return GeneralArm(chain, solver)
+def _(known: EliminationArm, chain: JointChain, prepare: Prepare) -> Solver | None:
+    return prepare_closed_form(chain) or with_forms_of(known.forms, chain)

@@ -1,13 +1,12 @@
 """Seven joints with a spherical shoulder, a revolute elbow and a spherical wrist, by arm angle.
 
-The elbow of such an arm swings about the line from shoulder to wrist while the tool stands still.
-The arm angle says where it is: it is the angle, about the line (positive by the right hand from
-shoulder to wrist), from the reference plane to the elbow. The reference plane holds the line
-and the z axis of R_0; at 0 the elbow is on the side to which z points. Where the line is parallel
-to z (sine below 1e-6) the x axis takes its place. The elbow is the foot of the shoulder on axis 4.
-An arm whose shoulder, elbow and wrist lie in a plane across axis 4 has its elbow on the line when
-it is stretched or folded; the angle is then that of an elbow which would bend towards
-``axis 4 x line``, so that the swing keeps its measure there.
+The elbow of such an arm rotates about the line from shoulder to wrist while the tool does not move.
+The arm angle is its angle about the line (positive by the right hand from shoulder to wrist) from
+the reference plane. That plane contains the line and the z axis of R_0; at 0 the elbow is on the
+side to which z points. Where the line is parallel to z (sine below 1e-6) the x axis replaces z.
+The elbow is the foot of the shoulder on axis 4. If shoulder, elbow and wrist lie in a plane
+perpendicular to axis 4, the elbow is on the line when the arm is stretched or folded; the angle is
+then that of an elbow which would bend towards ``axis 4 x line``: it is continuous there.
 
 Source: M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant
 manipulators with joint limits and its application to redundancy resolution", IEEE T-RO 24(5), 2008.
@@ -22,10 +21,9 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, read_only
+from .check import checked
 from .loop import JointChain
 from .solver import Found, Tolerances, nothing_found, postures
-
-__all__ = ["MOST", "ArmAngle", "arm_angle_of", "arm_angle_postures", "prepare_arm_angle"]
 
 MOST = 8
 """Postures at one arm angle."""
@@ -83,65 +81,53 @@ def prepare_arm_angle(chain: JointChain) -> ArmAngle | None:
 
 
 def arm_angle_of(solver: ArmAngle, q: ArrayLike) -> Array:
-    """Arm angle of postures. Shapes: q (..., 7)."""
-    from ._arm_angle import arm_angles
+    """Arm angle of configurations. Shapes: q (..., 7)."""
+    from .kernels.arm_angle import arm_angles
 
     q = np.asarray(q, dtype=np.float64)
-    psi = np.zeros(q.shape[:-1])
+    psi = np.zeros(q.size // 7)
     flat = np.ascontiguousarray(q.reshape(-1, 7))
-    out = np.zeros(flat.shape[0])
-    arm_angles(flat, solver.chain.D, solver.shoulder, solver.points, solver.flat, out)
-    psi[...] = out.reshape(psi.shape)
-    return psi
+    arm_angles(flat, solver.chain.D, solver.shoulder, solver.points, solver.flat, psi)
+    return psi.reshape(q.shape[:-1])
 
 
 def arm_angle_postures(
-    solver: ArmAngle,
-    U: ArrayLike,
-    psi: ArrayLike,
-    references: ArrayLike | None = None,
-    tolerances: Tolerances | None = None,
+    solver: ArmAngle, U: Array, psi: Array, references: Array, tolerances: Tolerances
 ) -> Found:
-    """All postures of poses at given arm angles.
+    """All solutions at one arm angle per pose. Shapes: U (N, 4, 4), psi (N,), references (N, 7)."""
+    from .kernels.arm_angle import STRAIGHT, arm_angle_candidates
 
-    Shapes: U (N, 4, 4), psi (N, A) or (A,), references (N, 7) or (7,).
-    """
-    from ._arm_angle import arm_angle_rows
-
-    poses = np.array(U, dtype=np.float64, order="C")
-    N = poses.shape[0]
-    angles = np.asarray(psi, dtype=np.float64)
-    angles = np.ascontiguousarray(np.broadcast_to(angles, (N, angles.shape[-1])))
-    A = angles.shape[1]
-    wanted = np.zeros((N, 7))
-    if references is not None:
-        wanted[:] = references
-    finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=1)
-    finite &= np.isfinite(angles).all(axis=1)
-    poses[~finite] = np.nan
-    limits = np.array(tolerances or Tolerances())
-    flat = nothing_found(N * A, MOST, 7)
-    q, free = flat.q.reshape(N, A, MOST, 7), flat.free.reshape(N, A, MOST, 7)
-    rows = (N, A, MOST)
-    valid, residual = flat.valid.reshape(rows), flat.residual.reshape(rows)
-    double = flat.double.reshape(rows)
-    if N * A:
-        arm_angle_rows(
-            poses, angles, wanted, np.ascontiguousarray(solver.chain.sigma), solver.chain.D,
-            solver.shoulder, solver.wrist, solver.points, solver.flat, limits,
-            q, valid, residual, double, free,
-        )  # fmt: skip
-    return Found(q, valid, residual, double, free, valid.copy())
+    candidates = nothing_found(len(U), MOST, 7)
+    arm_angle_candidates(
+        np.ascontiguousarray(U),
+        np.ascontiguousarray(psi),
+        np.ascontiguousarray(references),
+        solver.chain.D,
+        solver.shoulder,
+        solver.wrist,
+        solver.points,
+        solver.flat,
+        np.array(tolerances),
+        candidates.q,
+        candidates.valid,
+        candidates.free,
+    )
+    found = checked(
+        solver.chain, U, candidates.q, candidates.valid, tolerances, free=candidates.free
+    )
+    # two solutions in one where the elbow is stretched or folded
+    s, w = solver.points
+    straight = np.arctan2(s[1] * w[0] - s[0] * w[1], s[0] * w[0] + s[1] * w[1])
+    bend = np.where(found.valid, found.q[..., 3], straight + 1.0) - straight
+    found.double[...] |= np.abs(np.sin(bend)) < STRAIGHT
+    found.family[...] = found.valid
+    return found
 
 
 @postures.register
 def _(solver: ArmAngle, U: Array, references: Array, tolerances: Tolerances) -> Found:
     psi = arm_angle_of(solver, references)
-    found = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-    return Found(
-        found.q[:, 0], found.valid[:, 0], found.residual[:, 0], found.double[:, 0],
-        found.free[:, 0], found.family[:, 0],
-    )  # fmt: skip
+    return arm_angle_postures(solver, U, psi, references, tolerances)
 
 
 def _centre(E: Array, G: Array) -> float | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
-from .fewer import FewerJoints
+from .reduced import FewerJoints
 from .solver import Found, Solver
 from .structure import Family
 

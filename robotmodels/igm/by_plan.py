@@ -1,4 +1,4 @@
-"""Arms that Paul's method solves: its plan for the poses it is sure of, a family for the others."""
+"""Arms that Paul's method solves: its plan gives all candidates, at singular poses too."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from .branches import SIDES, branches, ranked
-from .check import checked
-from .closed_form import ClosedForm, closed_form_postures
-from .gather import assembled, rows_of
+from .closed_form import ClosedForm
 from .loop import JointChain
-from .motion import random_postures, tool_poses
+from .motion import lever, random_postures, tool_poses
 from .paul.plan import PaulPlan, derive_plan
 from .paul.postures import SLACK, SMALL, ZERO
-from .self_motion import singular_postures
-from .solver import Found, Solver, Tolerances, postures
-from .structure import Family
-from .thorough import MET, thorough_postures, two_singularities
+from .postures import Postures, difference
+from .singular import solve_singular
+from .solver import Solver, Tolerances, postures
 
 TESTS = 128
 """Random postures that a plan has to give back before it is used."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
+OVERSHOOT = 1e-5
+"""Overshoot tried as a double root at singular poses, beside the length of the arm."""
 ROUGH = 1e-2
-"""Errors up to which candidates at singular positions are improved [m, rad]."""
-TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
+"""Errors up to which candidates at singular poses are refined [m, rad]."""
+TOLERANCES = read_only([SLACK, ZERO, 1e-4, ACCEPTED])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,12 +76,12 @@ def prepare_by_plan(chain: JointChain, family: Solver) -> ByPlan | None:
     sure = marks[:, 1] == 0
     there = (np.arange(S) < marks[:, :1]) & sure[:, None]
     rows[~there] = np.nan
-    away = np.abs(_short(chain, rows - q[:, None])).max(axis=-1)
+    away = np.abs(difference(chain.sigma, rows, q[:, None])).max(axis=-1)
     given_back = np.any(away < 1e-6, axis=1)
     if np.sum(sure) < TESTS // 2 or not np.array_equal(given_back, sure):
         return None
     none = np.zeros((TESTS, S), np.bool_)
-    found = Found(rows, there, residual, none, np.zeros(rows.shape, np.bool_), none)
+    found = Postures(rows, there, residual, none, np.zeros(rows.shape, np.bool_), none)
     code, labels = branches(family, found)
     ways, codes = marks[:, 2 + S :][there], code[there]
     table = np.full(int(ways.max(initial=0)) + 1, -1, np.int16)
@@ -133,55 +132,38 @@ def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
 
 
 @postures.register
-def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Found:
-    if not isinstance(solver.family, ClosedForm) or max(tolerances) > ACCEPTED:
-        return postures(solver.family, U, references, tolerances)
-    chain, loop, plan = solver.chain, solver.family.plan, solver.plan
+def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Postures:
+    chain, plan = solver.chain, solver.plan
     assert plan.program is not None
     numbers = plan.program.numbers
+    slack = max(OVERSHOOT, tolerances.position / lever(chain), tolerances.orientation)
+    limits = np.array([slack, ZERO, SMALL, max(ROUGH, *tolerances)])
 
-    def candidates(poses: Array, wanted: Array, slack: float) -> tuple[Array, NDArray[np.bool_]]:
-        a, there, _ = closed_form_postures(loop, chain, poses, wanted, slack, ROUGH)
-        limits = np.array([slack, ZERO, SMALL, ROUGH])
-        b, _, marks = run(plan, numbers, poses, wanted, limits)
-        return (
-            np.concatenate([a, b], axis=1),
-            np.concatenate([there, np.arange(b.shape[1]) < marks[:, :1]], axis=1),
-        )
+    def candidates(
+        poses: Array, wanted: Array
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        q, _, marks = run(plan, numbers, poses, wanted, limits)
+        there = np.arange(q.shape[1]) < marks[:, :1]
+        return q, there, free_joints(plan, marks[:, 2 : 2 + q.shape[1]], there)
 
-    if loop.family is not Family.CONCURRENT:
-        # at a singular position the plan and the family do not lose the same digits
-        return thorough_postures(chain, candidates, U, references, tolerances)
-    # a wrist or shoulder that is aligned and nothing else is what the family is made for
-    q, valid, free = closed_form_postures(loop, chain, U, references)
-    found = checked(chain, U, q, valid, tolerances, free=free)
-    marks = run(plan, numbers, U, references)[2]
-    fewer = marks[:, 0] > found.valid.sum(axis=1)
-    rest = np.flatnonzero(fewer | ~_plain(chain, found))
-    if rest.size == 0:
-        return found
-    part = thorough_postures(chain, candidates, U[rest], references[rest], tolerances)
-    others = np.setdiff1d(np.arange(len(U)), rest)
-    return assembled(len(U), chain.k, [(others, rows_of(found, others)), (rest, part)])
+    return solve_singular(chain, candidates, U, references, tolerances)
+
+
+def free_joints(
+    plan: PaulPlan, bits: NDArray[np.int64], there: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Joints at their reference, from the bits of unknowns; of a sum of angles the first one."""
+    out = np.zeros((*bits.shape, plan.chain.k), np.bool_)
+    for n, step in enumerate(plan.steps):
+        for m, number in enumerate(step.unknowns[:2]):
+            joint = plan.arm.joints.unknowns[number].terms[0][0]
+            out[..., joint] |= there & ((bits >> (2 * n + m)) & 1 == 1)
+    return out
 
 
 @branches.register
-def _(solver: ByPlan, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+def _(solver: ByPlan, found: Postures) -> tuple[NDArray[np.int16], tuple[str, ...]]:
     if solver.branch_of_way.size == 0:
         # the sides of the family are not those of the plan: ranks serve both
         return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
     return branches(solver.family, found)
-
-
-def _plain(chain: JointChain, found: Found) -> NDArray[np.bool_]:
-    """Poses whose postures are met, and singular only where the family says so, shape (N,)."""
-    double, member = singular_postures(chain, found)
-    near = two_singularities(chain, found)
-    unsaid = double | (member != found.family) | (found.residual > MET)
-    return ~near & ~np.any(unsaid & found.valid, axis=1)
-
-
-def _short(chain: JointChain, way: Array) -> Array:
-    """Differences of postures, angles by the shorter way round."""
-    turn = 2.0 * np.pi
-    return np.where(chain.sigma == 0, way - turn * np.round(way / turn), way)

@@ -59,7 +59,6 @@ def solved(
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
-    arm = known_arm(model)
     extras = (mask, lock, arm_angle, relations)
     ordinary = all(extra is None for extra in extras)
     if ordinary and position_tolerance == 1e-9 == orientation_tolerance:
@@ -81,6 +80,7 @@ def solved(
                 "relations: not together with mask, lock or arm_angle; a locked joint is a "
                 "relation too, with a single 1 in its row."
             )
+    arm = known_arm(model, task == _WHOLE)
     given, limits = q_ref is not None, bool(limits)
     solver = arm.plan if task is _WHOLE else None
     rows = None

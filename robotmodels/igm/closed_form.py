@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import se3
 from .._arrays import Array
 from .check import checked
 from .loop import JointChain
@@ -66,9 +67,9 @@ def closed_form_postures(
 
     Shapes: U (N, 4, 4), references (N, 6) or (6,) -> q, free (N, 8, 6); valid (N, 8).
     """
-    from ._concurrent import concurrent_postures
     from ._parallel import parallel_postures
     from ._verify import verified_postures
+    from .kernels.pieper import concurrent_postures
 
     poses = np.array(U, dtype=np.float64, order="C")
     N = poses.shape[0]
@@ -91,8 +92,12 @@ def closed_form_postures(
         counts = np.zeros(size, np.int64)
         loop = (poses[rows], plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted))
         if plan.family is Family.CONCURRENT:
+            links = np.tile(plan.constants, (size, 1, 1, 1))
+            pose = se3.inverse(poses[rows]) if plan.inverted else poses[rows]
+            links[:, plan.slot] = plan.left @ pose @ plan.right
             concurrent_postures(
-                *loop, first_three, int(plan.backwards), plan.meeting, plan.size, slack,
+                links, se3.inverse(plan.constants[1::-1]), int(plan.backwards), first_three,
+                plan.meeting, plan.size, slack,
                 loop_references[rows], found, marks, counts,
             )  # fmt: skip
         else:

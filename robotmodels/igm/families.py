@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import numpy as np
+from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
 from ..errors import InvalidValueError
-from .asked import WHOLE_POSE, Task
+from .arm_angle import prepare_arm_angle
+from .asked import Task
+from .chain import locked_chain
 from .closed_form import prepare_closed_form
-from .dependent import prepare_dependent
-from .fewer import prepare_fewer
-from .general import GeneralArm, prepare_general
-from .lock import locked_chain
+from .constraints import WHOLE, Components, constraints
+from .elimination import prepare_elimination
 from .loop import JointChain
-from .many_starts import prepare_many_starts
-from .mask import prepare_masked
-from .neighbour import prepare_neighbour
-from .prismatic import prepare_prismatic
-from .redundant import prepare_redundant
-from .relations import prepare_related
+from .nominal import prepare_nominal
+from .postures import Postures, difference
+from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
+from .redundant import Redundant, prepare_redundant, redundant_joint
+from .relations import Related, prepare_related
+from .search import ManyStarts, prepare_many_starts
 from .solver import Solver
 
 
@@ -39,35 +43,61 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
             raise InvalidValueError(
                 "relations: a joint that does not move the tool cannot be part of one."
             )
-        return prepare_related(chain, A[:, chain.columns], [b for _, b in task.relations], prepare)
-    if task.mask != WHOLE_POSE:
-        return prepare_masked(chain, task.mask, task.in_tool_axes, prepare)
-    return prepare(chain)
+        b = np.array([b for _, b in task.relations])
+        return prepare_related(chain, A[:, chain.columns], b, prepare)
+    return prepare(chain, Components(task.mask, task.in_tool_axes))
 
 
-def prepare(chain: JointChain) -> Solver | None:
-    """Choose and prepare the solver of a chain."""
-    if chain.k < 6:
-        return prepare_fewer(chain, prepare)
-    if chain.k > 6:
-        return prepare_redundant(chain, prepare)
-    if chain.k == 6:
-        # an arm in a plane, say, whose joints are more than its freedoms
-        dependent = prepare_dependent(chain, prepare)
-        if dependent is not None:
-            return dependent
-        closed = prepare_closed_form(chain)
-        if closed is not None:
-            return closed
-        prismatic = prepare_prismatic(chain)
-        if prismatic is not None:
-            return prismatic
-        neighbour = prepare_neighbour(chain)
-        if neighbour is not None:
-            return neighbour
-        general = prepare_general(chain)
-        # with doubts at most poses it is slow, but all that counts is that nothing is missing
-        if general is not None and (general.reliable or general.misses == general.odd == 0):
-            return GeneralArm(chain, general)
-        return prepare_many_starts(chain)
-    return None
+def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
+    """Choose and prepare the solver of a chain for the asked components of a pose."""
+    if chain.k == 0:
+        return None
+    whole = all(components.asked)
+    components = WHOLE if whole else components
+    if whole and chain.k == 7 and np.all(chain.columns >= 0):
+        by_angle = prepare_arm_angle(chain)
+        if by_angle is not None:
+            return by_angle
+    joint = redundant_joint(chain, components)
+    if joint is not None:
+        return prepare_redundant(chain, components, joint, partial(prepare, components=components))
+    if whole and chain.k == 6:
+        return _of_six_joints(chain)
+    return prepare_reduced(chain, components, prepare, prepare_closed_form)
+
+
+def _of_six_joints(chain: JointChain) -> Solver | None:
+    """Closed forms first, then the structured neighbour, elimination and search."""
+    solver = prepare_closed_form(chain) or prepare_nominal(chain)
+    if solver is not None:
+        return solver
+    elimination = prepare_elimination(chain)
+    # accepted also where most poses need further forms: it is slow but complete
+    if elimination is not None and elimination.missed == 0:
+        return elimination
+    return prepare_many_starts(constraints(chain))
+
+
+def may_miss_solutions(
+    solver: Solver, U: Array, found: Postures, references: Array
+) -> NDArray[np.bool_]:
+    """Poses at which a method has no proof that its solutions are all, (N,)."""
+    if isinstance(solver, (ManyStarts, Related)):
+        return np.ones(len(U), np.bool_)
+    if isinstance(solver, OneAxis):
+        return ~is_aligned(solver, U)
+    if isinstance(solver, Masked):
+        return np.full(len(U), isinstance(solver.inner, ManyStarts))
+    if isinstance(solver, FewerJoints):
+        return np.full(len(U), isinstance(solver.ways[0].solver, ManyStarts))
+    if not isinstance(solver, Redundant):
+        return np.zeros(len(U), np.bool_)
+    joint, others = solver.joint, np.delete(np.arange(solver.chain.k), solver.joint)
+    rest = Postures(
+        found.q[..., others], found.valid, found.residual, found.double,
+        found.free[..., others], found.family,
+    )  # fmt: skip
+    out = may_miss_solutions(solver.inner, U, rest, references[:, others])
+    # a search found the nearest value of the joint
+    d = difference(solver.chain.sigma, found.q, references[:, None])[..., joint]
+    return out | np.any(found.free[..., joint] & (np.abs(d) > 1e-9), axis=1)

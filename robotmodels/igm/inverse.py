@@ -28,10 +28,10 @@ def igm(
 
     Looks at the table once, picks the family of the arm and keeps what it prepared for the next
     call with the same model: Paul's equations where they suffice; three axes that meet or three
-    that are parallel, wherever they stand in the chain; three or two prismatic joints; arms that
-    are one of these up to calibration errors; elimination to up to 16 postures for other six-joint
-    arms; virtual joints for arms of fewer joints and for masks; the arm angle or locked joints
-    for seven joints and more. ``print(found.method)`` says which.
+    that are parallel, wherever they stand in the chain; arms that are one of these up to
+    calibration errors; elimination to up to 16 postures for other six-joint arms; virtual joints
+    for arms of fewer joints and for masks; the arm angle or locked joints for seven joints and
+    more; a numeric search from many starts for the rest. ``print(found.method)`` says which.
 
     Parameters
     ----------
@@ -90,7 +90,11 @@ def igm(
     Regular poses of an arm with a closed form take microseconds. At singular positions and beside
     them (within some 1e-6) candidates are gathered from several sides and infinite families are
     walked to the reference, which takes milliseconds. Redundant arms are quick at a ``q_ref`` from
-    which the pose can be reached; finding the nearest value that can takes a search.
+    which the pose can be reached; else the nearest value of the first free joint is searched, in
+    some 0.2 s a pose. Status ``INCOMPLETE`` says that solutions or a nearer value may be missing:
+    after that search, with relations between several joints, and where neither a closed form nor
+    elimination serves (masks that free two rotations, unless the arm turns about the asked axis
+    only; some arms with two prismatic joints).
     Poses without one are given to a short numeric search, `igm_numeric`, which says why: too far,
     too near, or the orientation not available there. An arm outside every family (more joints
     than can be solved, or a degenerate one) gets the single posture of that search, and

@@ -48,15 +48,15 @@ class KnownArm:
 
 
 # by identity: a model's hash reads all of its numbers
-_ARMS: dict[int, tuple[weakref.ref[RobotModel], KnownArm]] = {}
+_ARMS: dict[tuple[int, bool], tuple[weakref.ref[RobotModel], KnownArm]] = {}
 
 
-def known_arm(model: RobotModel) -> KnownArm:
-    """Cached solvers of a model, created on first use."""
-    key = id(model)
+def known_arm(model: RobotModel, whole: bool = True) -> KnownArm:
+    """Cached solvers of a model, created on first use; for whole poses with the plan."""
+    key = id(model), whole
     entry = _ARMS.get(key)
     if entry is None or entry[0]() is not model:
-        entry = (weakref.ref(model, lambda _: _ARMS.pop(key, None)), _prepared(model))
+        entry = (weakref.ref(model, lambda _: _ARMS.pop(key, None)), _prepared(model, whole))
         _ARMS[key] = entry
     return entry[1]
 
@@ -70,12 +70,12 @@ def solver_for(model: RobotModel, arm: KnownArm, task: Task) -> Solver | None:
     return arm.solvers[task]
 
 
-def _prepared(model: RobotModel) -> KnownArm:
+def _prepared(model: RobotModel, for_whole_poses: bool) -> KnownArm:
     chain = joint_chain(model)
     turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
     to_base = read_only(se3.inverse(model.base))
     whole = Task()
-    family = prepare_task(chain, whole)
+    family = prepare_task(chain, whole) if for_whole_poses else None
     plan = None
     if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
         plan = prepare_by_plan(chain, family)
@@ -94,5 +94,5 @@ def _prepared(model: RobotModel) -> KnownArm:
         most=0 if plan is None else plan.most,
         method="" if plan is None else plan.method,
         zero=read_only(np.zeros((1, model.n))),
-        solvers={whole: family if plan is None else plan},
+        solvers={whole: family if plan is None else plan} if for_whole_poses else {},
     )

@@ -5,6 +5,8 @@ Plain array code: it runs when an arm is prepared and on the few postures that a
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,11 @@ def tool_poses(chain: JointChain, q: Array) -> Array:
 
 def jacobians(chain: JointChain, q: Array) -> Array:
     """Jacobians at the tool in the axes of R_0, rows ``[v; w]``. Shapes: q (N, k) -> (N, 6, k)."""
+    return poses_and_jacobians(chain, q)[1]
+
+
+def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
+    """Poses of the tool (N, 4, 4) and Jacobians (N, 6, k), axes of R_0."""
     U, axes, origins = _walk(chain, q)
     J = np.zeros((len(q), 6, chain.k))
     for m in range(chain.k):
@@ -27,7 +34,7 @@ def jacobians(chain: JointChain, q: Array) -> Array:
             J[:, 3:, m] = axes[m]
         else:
             J[:, :3, m] = axes[m]
-    return J
+    return U, J
 
 
 def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
@@ -40,6 +47,7 @@ def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> 
     )
 
 
+@lru_cache(maxsize=256)
 def lever(chain: JointChain) -> float:
     """A length of the arm [m]: the lever of its revolute joints about the tool, 1 without any."""
     turning = chain.sigma == 0

@@ -20,17 +20,15 @@ Rows = NDArray[np.int64] | NDArray[np.bool_] | tuple[NDArray[np.int64], ...]
 class Postures:
     """Postures of N poses in up to S rows each, in the order of the chain.
 
-    Shapes: q, free, moving (N, S, k); valid, residual, double, family (N, S). ``family``: member of
-    a self-motion; ``free``: joints at their reference; ``moving``: joints that move, the free ones
-    included.
+    Shapes: q, free, moving (N, S, k); valid, residual, double, family (N, S).
     """
 
     q: Array
     valid: NDArray[np.bool_]
     residual: Array
     double: NDArray[np.bool_]
-    free: NDArray[np.bool_]
-    family: NDArray[np.bool_]
+    free: NDArray[np.bool_]  # joints at their reference
+    family: NDArray[np.bool_]  # members of a self-motion; moving: joints that move with the free
     moving: NDArray[np.bool_] = field(default=None)  # pyright: ignore[reportAssignmentType]
 
     def __post_init__(self) -> None:

@@ -15,19 +15,19 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import IMPROPER, WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES, plan_kernel
-from .centred import Centred, centred, put_back
+from .chain import far_along_rails
 from .check import checked
-from .components import Components, asked_jacobians
-from .dependent import DependentJoints
-from .gather import MERGE
+from .constraints import Components, asked_jacobians, constraints
+from .families import may_miss_solutions
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled, settle_families, singular_postures
+from .postures import Postures
+from .redundant import Redundant
+from .singular import complete
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
-from .thorough import MET
-from .why import search
+from .unreachable import diagnose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,9 +77,13 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         references = references.copy()
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
-    found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
+    found = _solved(call, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(call, found, references, columns)
-    reasons = search(
+    if call.solver is not None:
+        missing = may_miss_solutions(call.solver, U, found, references[:, columns])
+        reached = rows.status <= IGMStatus.REACHED_FAMILY
+        rows.status[missing & reached] = IGMStatus.INCOMPLETE
+    reasons = diagnose(
         model, task, call.solver is None, poses, references, call.limits, call.tolerances,
         rows.status,
     )  # fmt: skip
@@ -113,7 +117,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     )
 
 
-def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np.int64]) -> Rows:
+def _laid_out(call: Call, found: Postures, references: Array, columns: NDArray[np.int64]) -> Rows:
     """Postures of a chain as rows of a result, in the columns of the model."""
     from ._arrange import arranged
 
@@ -134,18 +138,13 @@ def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np
     return Rows(q, valid, residual, inside, codes, status, labels, most, double, free, family)
 
 
-def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settled:
+def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Postures:
     """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
     assert call.solver is not None
-    chain, components = call.solver.chain, Components(WHOLE_POSE, in_tool_axes=False)
-    where = centred(chain, U, references, components)
-    if where is None:
-        where = Centred(U, references, np.zeros(references.shape))
-    goals, there = np.ascontiguousarray(where.U), np.ones((len(U), 1), np.bool_)
-    found = checked(chain, goals, (q - where.moved)[:, None], there, call.tolerances)
+    chain, there = call.solver.chain, np.ones((len(U), 1), np.bool_)
+    found = checked(chain, U, q[:, None], there, call.tolerances)
     found.family[...] = found.valid
-    settled = settle_families(chain, goals, found, where.references, call.tolerances)
-    return put_back(chain, U, references, where, settled, components, call.tolerances)
+    return complete(chain, U, found, references, call.tolerances)
 
 
 def rows_by_plan(
@@ -216,19 +215,24 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
     )
 
 
-def _near_or_far(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
-    """Postures of a chain; slides at its ends that are far out are brought back for it."""
+def _solved(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
+    """Postures of a chain; poses far along rails at its base are solved beside the origin."""
     task, solver = call.task, call.solver
-    components, where = Components(task.mask, task.in_tool_axes), None
-    if solver is not None and not task.relations:
-        where = centred(solver.chain, U, references, components)
-    if solver is None or where is None:
+    if solver is None or task.relations or not all(task.mask[:3]):
         return _settled(call, U, psi, references)
-    found = _settled(call, np.ascontiguousarray(where.U), psi, where.references)
-    return put_back(solver.chain, U, references, where, found, components, call.tolerances)
+    chain = solver.chain
+    moved, poses = far_along_rails(chain, U)
+    if not moved.any():
+        return _settled(call, U, psi, references)
+    found = _settled(call, poses, psi, references - moved)
+    n, s = np.nonzero(found.valid)
+    wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
+    q, residual, valid = found.q + moved[:, None], found.residual.copy(), found.valid.copy()
+    residual[n, s], valid[n, s] = wanted.met(U[n], q[n, s], call.tolerances)
+    return replace(found, q=q, residual=residual, valid=valid)
 
 
-def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Postures:
     """Postures of a chain, infinite families settled and double roots marked."""
     solver, tolerances = call.solver, call.tolerances
     if solver is None:
@@ -245,21 +249,14 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
                 "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
                 f"seven. It is solved by: {solver.method}."
             )
-        every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
-        found = every.take((np.arange(len(U)), np.zeros(len(U), np.int64)))
+        found = arm_angle_postures(solver, U, psi, references, tolerances)
         # the angle is given, so that only joints that took a reference are free
         found.family[...] = found.free.any(axis=-1)
     else:
         found = postures(solver, U, references, tolerances)
     whole = call.task.mask == WHOLE_POSE
-    if solver is not None and whole and solver.chain.k <= 6:
-        if isinstance(solver, DependentJoints):
-            # at a value that was only tried the family is not settled yet
-            way = found.q - references[:, None]
-            turns = np.where(solver.chain.sigma == 0, np.round(way / (2.0 * np.pi)), 0.0)
-            way = np.abs(way - 2.0 * np.pi * turns)
-            found.free[np.any(found.free & (way > MERGE), axis=-1)] = False
-        return _of_six(solver.chain, U, found, references, tolerances)
+    if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
+        return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:
         from ._moving import moving_joints
@@ -272,31 +269,6 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
     return replace(found, moving=moving)
-
-
-def _of_six(
-    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> Settled:
-    """Families settled at the reference, double roots marked."""
-    if chain.k < 6:
-        return settle_families(chain, U, found, references, tolerances)
-    double, member = singular_postures(chain, found)
-    found.double[...] |= double
-    # a double root good to half of its digits can hide that a wrist behind it is aligned
-    asked = replace(found, family=found.family | member)
-    settled = settle_families(chain, U, asked, references, tolerances)
-    # beside a family the reference may be only nearly as good as the posture itself
-    worse = _worst(settled) > np.maximum(_worst(found), MET)
-    rows = np.flatnonzero(worse)
-    if rows.size == 0:
-        return settled
-    part = settle_families(chain, U[rows], found.take(rows), references[rows], tolerances)
-    return settled.put(rows, part)
-
-
-def _worst(found: Found) -> Array:
-    """Largest error of the postures of each pose, shape (N,)."""
-    return np.where(found.valid, found.residual, 0.0).max(axis=1, initial=0.0)
 
 
 def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from .status import IGMStatus
 
 _WHOLE_POSE = (True,) * 6
 _SHOWN = 8
+_WITH_SOLUTIONS = (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY, IGMStatus.INCOMPLETE)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -177,7 +178,7 @@ class IGMSolutions:
         """
         status, at = self._status(i)
         lacking = self.missing if self.error is None else self.error[..., 0, :]
-        if lacking is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
+        if lacking is None or status in _WITH_SOLUTIONS:
             return status.sentence
         missing = np.where(self.mask, lacking[at], 0.0)
         metres = f"{hypot(*missing[:3]):.4g} m"

@@ -6,7 +6,7 @@ registers how poses are solved with it::
     @postures.register
     def _(solver: ClosedForm, U, references, tolerances): ...
 
-so that rooms which change the chain (a locked joint, a mask, a calibrated neighbour) call
+so that rooms which change the chain (a locked joint, a mask, a calibrated arm) call
 `postures` on whatever serves the chain they made.
 """
 

@@ -8,7 +8,8 @@ from .._outcomes import Outcome
 class IGMStatus(Outcome):
     """Outcome of an inverse geometric model for one pose; fits int8.
 
-    ``REACHED`` and ``REACHED_FAMILY`` come with solutions, the others say why there is none.
+    ``REACHED``, ``REACHED_FAMILY`` and ``INCOMPLETE`` come with solutions, the others say why
+    there is none.
 
     Attributes
     ----------
@@ -32,3 +33,4 @@ class IGMStatus(Outcome):
         5, "The position is reached, but the orientation is not available there.",
     )  # fmt: skip
     NOT_CONVERGED = 6, "No posture was found that meets the pose."
+    INCOMPLETE = 7, "The pose is reached; by this method other postures may be missing."

@@ -49,8 +49,9 @@ class LoopPlan:
     inverted: bool
     sigma: NDArray[np.int64]
     meeting: Array
-    backwards: bool
     size: float
+    backwards: bool = False
+    """Whether the first three joints are solved from their other end, where two axes are simple."""
 
 
 def plan_loop(chain: JointChain) -> LoopPlan | None:
@@ -95,7 +96,6 @@ def _loop(chain: JointChain, shift: int, reverse: bool) -> LoopPlan:
         inverted=not reverse,
         sigma=chain.sigma[order],
         meeting=np.zeros(2),
-        backwards=False,
         size=size,
     )
 

@@ -50,7 +50,7 @@ def compiled(*signature: Any, inlined: bool = False, cached: bool = True) -> Any
     """Decorator: compile a kernel for its declared signature at the first call.
 
     Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
-    puts its code into its callers, ``cached=False`` is for functions that take functions.
+    puts its code into its callers, ``cached=False`` is for functions made for a function.
     """
 
     def decorate(function: Any) -> Any:

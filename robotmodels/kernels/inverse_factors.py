@@ -21,19 +21,15 @@ _NEWTON_STEPS = 100
 
 
 @compiled()
-def squared_damping(
-    kind: int, threshold: float, largest: float, sigma: float, smallest: float, volume: float
-) -> float:
-    """Square of the damping of a direction whose singular value is sigma."""
+def squared_damping(kind: int, threshold: float, largest: float, value: float) -> float:
+    """Square of a damping that depends on a singular value or, for MANIPULABILITY, a product."""
     if kind == CONSTANT:
         return largest * largest
-    if kind == MANIPULABILITY:
-        below = 1.0 - volume / threshold if volume < threshold else 0.0
-        return largest * largest * below * below
-    value = sigma if kind == WEAK_DIRECTIONS else smallest
     if value >= threshold:
         return 0.0
     ratio = value / threshold
+    if kind == MANIPULABILITY:
+        return largest * largest * (1.0 - ratio) * (1.0 - ratio)
     return largest * largest * (1.0 - ratio * ratio)
 
 
@@ -49,50 +45,36 @@ def inverse_factors(
     zero: float,
     factors: Floats,
 ) -> float:
-    """Factors f by which ``y = sum f_i (u_i . b) v_i`` solves ``A y = b``."""
-    if k == 0:
-        return 0.0
-    first, last = sigma[0], sigma[k - 1]
-    if kind == PSEUDO_INVERSE:
-        for i in range(k):
-            factors[i] = 1.0 / sigma[i] if sigma[i] > max(threshold * first, zero) else 0.0
-        return 0.0
-    if kind == FILTERED:
-        for i in range(k):
-            if sigma[i] >= threshold and sigma[i] > zero:
-                factors[i] = 1.0 / sigma[i]
-            else:
-                ratio = min(sigma[i] / threshold, 1.0)
-                factors[i] = ratio * (3.0 - 2.0 * ratio) / threshold
-        return 0.0
-    volume = 1.0
+    """Factors f by which ``y = sum f_i (u_i . b) v_i`` solves ``A y = b``; the largest damping.
+
+    Within a bound of the speed |y| the error is least with one more damping mu of all directions,
+    where |y(mu)| is the bound: 1 / |y| is concave in mu, so Newton's steps from 0 never overshoot.
+    """
+    value = 1.0
     if kind == MANIPULABILITY:
         for i in range(k):
-            volume *= sigma[i]
-    damping, total = 0.0, 0.0
-    for i in range(k):
-        square = squared_damping(kind, threshold, largest, sigma[i], last, volume)
-        damping = max(damping, square)
-        if sigma[i] <= zero:
-            factors[i] = 0.0
-        elif square == 0.0:
-            factors[i] = 1.0 / sigma[i]
-        else:
-            factors[i] = sigma[i] / (sigma[i] * sigma[i] + square)
-        total += (factors[i] * inner[i]) ** 2
-    if not total > speed * speed:
-        return sqrt(damping)
-    # Least error among all speeds within the bound: one more damping mu for all directions, where
-    # |y(mu)| = speed. 1 / |y| is concave in mu, so Newton's steps from 0 never overshoot.
-    mu = 0.0
+            value *= sigma[i]
+    elif kind == SMALLEST_SINGULAR_VALUE and k > 0:
+        value = sigma[k - 1]
+    mu, damping, length = 0.0, 0.0, 0.0
     for _ in range(_NEWTON_STEPS):
-        total, slope = 0.0, 0.0
+        total, slope, damping = 0.0, 0.0, 0.0
         for i in range(k):
-            square = squared_damping(kind, threshold, largest, sigma[i], last, volume) + mu
-            if sigma[i] <= zero:
-                continue
-            bottom = sigma[i] * sigma[i] + square
-            factors[i] = sigma[i] / bottom
+            factors[i], bottom = 0.0, 1.0
+            if kind == FILTERED and (sigma[i] < threshold or sigma[i] <= zero):
+                ratio = min(sigma[i] / threshold, 1.0)
+                factors[i] = ratio * (3.0 - 2.0 * ratio) / threshold
+            elif sigma[i] > zero and kind <= FILTERED:
+                if kind == FILTERED or sigma[i] > threshold * sigma[0]:
+                    factors[i] = 1.0 / sigma[i]
+            elif kind > FILTERED:
+                if kind == WEAK_DIRECTIONS:
+                    value = sigma[i]
+                square = squared_damping(kind, threshold, largest, value) + mu
+                damping = max(damping, square)
+                if sigma[i] > zero:
+                    bottom = sigma[i] * sigma[i] + square
+                    factors[i] = sigma[i] / bottom if square > 0.0 else 1.0 / sigma[i]
             part = (factors[i] * inner[i]) ** 2
             total += part
             slope += part / bottom
@@ -101,7 +83,7 @@ def inverse_factors(
             break
         mu += (length / speed - 1.0) * total / slope
     if length > speed:
-        # what is left of rounding, so that the bound holds
+        # the rounding that remains, so that the bound holds
         for i in range(k):
             factors[i] *= speed / length * (1.0 - 4e-16)
-    return sqrt(damping + mu)
+    return sqrt(damping)

@@ -1,7 +1,7 @@
 """Joint velocities of twists, or joint accelerations, by the singular values of the Jacobian.
 
-The equations are ``A y = b``: rows that are not asked for are left out, linear rows are divided by
-a characteristic length (``row_scale``), columns by the square roots of the joints' weights
+The equations are ``A y = b``: rows of the task, divided by a characteristic length where they are
+linear (``row_scale``), and columns divided by the square roots of the joints' weights
 (``column_scale``), so that ``v = column_scale y``.
 """
 
@@ -27,10 +27,10 @@ from .inverse_factors import inverse_factors
 from .poses import jacobians
 from .svd import orthogonal_rows
 
-__all__ = ["inverse_of_rows", "inverse_velocities", "packed"]
+__all__ = ["inverse_velocities"]
 
 MET, IN_PART, SINGULAR = 0, 1, 2
-"""Codes of `robotmodels.kinematics.inverse.status.IKMStatus`."""
+"""Codes of `robotmodels.kinematics.IKMStatus`."""
 
 ZERO = 1e-13
 """Singular values up to this, beside the size of the Jacobian, are rounding errors of zeros."""
@@ -47,144 +47,15 @@ _CODES = types.Array(types.int8, 2, "C")
 _METHOD = (INT, types.float64, types.float64, types.float64)
 
 
-@compiled()
-def decompose(A: Floats, m: int, n: int, b: Floats, whole: int, B: Floats, sigma: Floats) -> None:
-    """Singular values of A (m, n), with vectors in B.
-
-    m <= n: row i of B is ``sigma_i v_i``, then ``u_i . b``, then (if whole) ``u_i``. m > n: row i
-    is ``sigma_i u_i``, then ``v_i``.
-    """
-    if m <= n:
-        for i in range(m):
-            for j in range(n):
-                B[i, j] = A[i, j]
-            B[i, n] = b[i]
-            if whole:
-                for j in range(m):
-                    B[i, n + 1 + j] = 1.0 if i == j else 0.0
-        orthogonal_rows(B, m, n, n + 1 + m if whole else n + 1, sigma)
-    else:
-        for i in range(n):
-            for j in range(m):
-                B[i, j] = A[j, i]
-            for j in range(n):
-                B[i, m + j] = 1.0 if i == j else 0.0
-        orthogonal_rows(B, n, m, m + n, sigma)
-
-
-@compiled()
-def solve_row(
-    A: Floats,
-    m: int,
-    n: int,
-    b: Floats,
-    size: float,
-    kind: int,
-    threshold: float,
-    largest: float,
-    speed: float,
-    others: int,
-    z: Floats,
-    work: Floats,
-    sigma: Floats,
-    y: Floats,
-    part: Floats,
-) -> tuple[int, float, int]:
-    """Solve ``A y = b``; returns rank, largest damping and status code.
-
-    Shapes: A (>= m, >= n), b (>= m,), z (>= n,).
-    """
-    k = min(m, n)
-    decompose(A, m, n, b, 0, work, sigma)
-    inner, factors = work[work.shape[0] - 1], work[work.shape[0] - 2]
-    wide = m <= n
-    rank = 0
-    for i in range(k):
-        if sigma[i] > RANK * size:
-            rank += 1
-        if wide:
-            inner[i] = work[i, n]
-        else:
-            total = 0.0
-            for j in range(m):
-                total += work[i, j] * b[j]
-            inner[i] = total / sigma[i] if sigma[i] > 0.0 else 0.0
-    damping = inverse_factors(
-        kind, threshold, largest, speed, sigma, inner, k, ZERO * size, factors
-    )
-    first = 0 if wide else m
-    for j in range(n):
-        y[j] = 0.0
-    whole, lost = 0.0, 0.0
-    for i in range(m):
-        whole += b[i] * b[i]
-    for i in range(k):
-        # rows of work have the length sigma where they are wide
-        unit = 1.0 / sigma[i] if wide and sigma[i] > 0.0 else 1.0
-        along = factors[i] * inner[i] * unit
-        for j in range(n):
-            y[j] += along * work[i, first + j]
-        if sigma[i] > RANK * size:
-            lost += ((1.0 - sigma[i] * factors[i]) * inner[i]) ** 2
-        if others and sigma[i] > NULL_SPACE * size:
-            total = 0.0
-            for j in range(n):
-                total += work[i, first + j] * z[j]
-            total *= unit * unit
-            for j in range(n):
-                z[j] -= total * work[i, first + j]
-    if others:
-        for j in range(n):
-            y[j] += z[j]
-    outside = 0.0
-    if rank == m:
-        for i in range(m):
-            part[i] = b[i]
-    else:
-        if wide:
-            # the left vectors, which regular rows do without
-            decompose(A, m, n, b, 1, work, sigma)
-        for i in range(m):
-            part[i] = 0.0
-        for i in range(rank):
-            along = work[i, n] if wide else inner[i] / sigma[i]
-            for j in range(m):
-                part[j] += along * work[i, n + 1 + j if wide else j]
-        for i in range(m):
-            outside += (b[i] - part[i]) ** 2
-    code = MET
-    if sqrt(outside) > NOTICED * sqrt(whole):
-        code = SINGULAR
-    elif sqrt(lost) > NOTICED * sqrt(whole):
-        code = IN_PART
-    return rank, damping, code
-
-
-def packed(
-    chain: Chain,
-    point: tuple[Ints, Floats, Floats],
-    asked: Ints,
-    row_scale: Floats,
-    column_scale: Floats,
-) -> tuple[Ints, Floats]:
-    """Robot, frame, task and scales as `inverse_velocities` takes them: integers and floats.
-
-    One pose spends 0.3 us on each array that is passed to a kernel.
-    """
-    path, *tool = point
-    sizes = chain.sigma.size, path.size, asked.size
-    whole = np.concatenate([sizes, *chain[:3], path, asked]).astype(np.int64)
-    numbers = [*chain[3:], *tool, row_scale, column_scale]
-    return whole, np.concatenate([array.ravel() for array in numbers])
-
-
-@compiled(NOTHING(INTS, VECTOR, MATRIX, MATRIX, MATRIX, INT, *_METHOD, OUT2, _CODES))
+@compiled(NOTHING(INTS, STACK, MATRIX, VECTOR, MATRIX, STACK, MATRIX, INT, *_METHOD, OUT2, _CODES))
 def inverse_velocities(
     whole: Ints,
-    numbers: Floats,
+    rotations: Floats,
+    positions: Floats,
+    scales: Floats,
     q: Floats,
-    twist: Floats,
-    secondary: Floats,
+    rows: Floats,
+    rate: Floats,
     reference: int,
     kind: int,
     threshold: float,
@@ -193,102 +64,107 @@ def inverse_velocities(
     out: Floats,
     codes: Ints,
 ) -> None:
-    """Joint velocities of twists; q (N, n), twist (N, 6), secondary (N, n) or (0, n).
+    """Joint velocities of the rates of M rows, by default of a twist (M = 6).
 
-    out (N, n + 19 + k): velocities, twist, error, reachable twist, k singular values, damping.
+    Shapes: whole, rotations (f + 2, 3, 3), positions (f + 2, 3), scales (M + n,) as `solver`
+    packs them; q (N, n); rows (N or 0, M, n); rate (N, M or M + n) -> out (N, n + 3 M + k + 1).
     """
     N, n = q.shape
+    M = scales.shape[0] - n
     f, steps, m = whole[0], whole[1], whole[2]
-    k = min(m, n)
-    at, E = 3 + 3 * f, 12 * f + 12
+    k, at = min(m, n), 3 + 3 * f
     chain = Chain(
-        whole[3 : 3 + f], whole[3 + f : 3 + 2 * f], whole[3 + 2 * f : at],
-        numbers[: 9 * f].reshape(f, 3, 3), numbers[9 * f : 12 * f].reshape(f, 3),
-        numbers[12 * f : 12 * f + 9].reshape(3, 3), numbers[12 * f + 9 : E],
+        whole[3 : 3 + f], whole[3 + f : 3 + 2 * f], whole[3 + 2 * f : at], rotations[:f],
+        positions[:f], rotations[f], positions[f],
     )  # fmt: skip
     path, asked = whole[at : at + steps], whole[at + steps :]
-    tool_rotation, tool_position = numbers[E : E + 9].reshape(3, 3), numbers[E + 9 : E + 12]
-    row_scale, column_scale = numbers[E + 12 : E + 18], numbers[E + 18 :]
-    J = np.empty((min(N, _CHUNK), 6, n))
-    A, b, part = np.empty((m, n)), np.empty(m), np.empty(m)
-    y, z = np.empty(n), np.empty(n)
-    values = np.empty(k + 1)
-    work = np.empty((k + 2, 2 * max(m, n) + 2))
-    others = 1 if secondary.shape[0] > 0 else 0
-    for start in range(0, N, _CHUNK):
-        stop = min(start + _CHUNK, N)
-        jacobians(
-            q[start:stop], chain, path, tool_rotation, tool_position, reference, J[: stop - start]
-        )
-        for i in range(start, stop):
-            c = i - start
-            size = 0.0
-            for r in range(6):
-                for j in range(n):
-                    size += (row_scale[r] * J[c, r, j] * column_scale[j]) ** 2
-            for r in range(m):
-                row = asked[r]
-                b[r] = row_scale[row] * twist[i, row]
-                for j in range(n):
-                    A[r, j] = row_scale[row] * J[c, row, j] * column_scale[j]
-            if others:
-                for j in range(n):
-                    z[j] = secondary[i, j] / column_scale[j]
-            codes[i, 1], out[i, n + 18 + k], codes[i, 0] = solve_row(
-                A, m, n, b, sqrt(size), kind, threshold, largest, speed, others, z, work, values,
-                y, part,
-            )  # fmt: skip
-            for j in range(n):
-                out[i, j] = column_scale[j] * y[j]
-            for j in range(k):
-                out[i, n + 18 + j] = values[j]
-            for r in range(18):
-                out[i, n + r] = 0.0
-            for r in range(m):
-                row = asked[r]
-                total = 0.0
-                for j in range(n):
-                    total += J[c, row, j] * out[i, j]
-                out[i, n + row] = total
-                out[i, n + 6 + row] = twist[i, row] - total
-                out[i, n + 12 + row] = part[r] / row_scale[row]
-
-
-@compiled(NOTHING(STACK, MATRIX, VECTOR, VECTOR, *_METHOD, OUT2, _CODES))
-def inverse_of_rows(
-    J: Floats,
-    rate: Floats,
-    size: Floats,
-    column_scale: Floats,
-    kind: int,
-    threshold: float,
-    largest: float,
-    speed: float,
-    out: Floats,
-    codes: Ints,
-) -> None:
-    """The same for given rows ``J v = rate``, which are comparable already.
-
-    Shapes: J (N, m, n), rate (N, m), size (N,) -> out (N, n + m + k + 1): velocities, reachable
-    rate, singular values, damping; codes (N, 2).
-    """
-    N, m, n = J.shape
-    k = min(m, n)
-    A, b, part = np.empty((m, n)), np.empty(m), np.empty(m)
-    y, z = np.empty(n), np.empty(n)
-    values = np.empty(k + 1)
-    work = np.empty((k + 2, 2 * max(m, n) + 2))
+    J = np.empty((min(N, _CHUNK), M, n))
+    work = np.empty((m + 6, n + m + 1))
+    sigma, inner, factors = work[m], work[m + 1], work[m + 2]
+    y, z, b = work[m + 3], work[m + 4], work[m + 5]
+    given, secondary = rows.shape[0] > 0, rate.shape[1] > M
     for i in range(N):
-        for r in range(m):
-            b[r] = rate[i, r]
+        c = i % _CHUNK
+        if given:
+            for r in range(M):
+                for j in range(n):
+                    J[c, r, j] = rows[i, r, j]
+        elif c == 0:
+            stop = min(i + _CHUNK, N)
+            jacobians(
+                q[i:stop], chain, path, rotations[f + 1], positions[f + 1], reference, J[: stop - i]
+            )
+        size = 0.0
+        for r in range(M):
             for j in range(n):
-                A[r, j] = J[i, r, j] * column_scale[j]
-        codes[i, 1], out[i, n + m + k], codes[i, 0] = solve_row(
-            A, m, n, b, size[i], kind, threshold, largest, speed, 0, z, work, values, y, part
+                J[c, r, j] *= scales[r] * scales[M + j]
+                size += J[c, r, j] * J[c, r, j]
+        size = sqrt(size)
+        length = 0.0
+        for r in range(m):
+            b[r] = scales[asked[r]] * rate[i, asked[r]]
+            length += b[r] * b[r]
+        # rows become sigma v; beside them u . b and, where the rank is not full, u
+        width, rank = n + 1, -1
+        while rank < 0 or (rank < m and width == n + 1):
+            width = n + 1 if rank < 0 else n + 1 + m
+            for r in range(m):
+                for j in range(n):
+                    work[r, j] = J[c, asked[r], j]
+                work[r, n] = b[r]
+                for j in range(n + 1, width):
+                    work[r, j] = 1.0 if j == n + 1 + r else 0.0
+            orthogonal_rows(work, m, n, width, sigma)
+            rank = 0
+            while rank < k and sigma[rank] > RANK * size:
+                rank += 1
+        for r in range(m):
+            inner[r] = work[r, n]
+        out[i, n + 3 * M + k] = inverse_factors(
+            kind, threshold, largest, speed, sigma, inner, k, ZERO * size, factors
         )
         for j in range(n):
-            out[i, j] = column_scale[j] * y[j]
+            y[j] = 0.0
+            z[j] = rate[i, M + j] / scales[M + j] if secondary else 0.0
+        lost, outside = 0.0, 0.0
         for r in range(m):
-            out[i, n + r] = part[r]
-        for j in range(k):
-            out[i, n + m + j] = values[j]
+            if r >= rank:
+                outside += inner[r] * inner[r]
+            else:
+                lost += ((1.0 - sigma[r] * factors[r]) * inner[r]) ** 2
+        for r in range(k):
+            if sigma[r] > 0.0:
+                along = factors[r] * inner[r] / sigma[r]
+                for j in range(n):
+                    y[j] += along * work[r, j]
+            if secondary and sigma[r] > NULL_SPACE * size:
+                along = 0.0
+                for j in range(n):
+                    along += z[j] * work[r, j]
+                along /= sigma[r] * sigma[r]
+                for j in range(n):
+                    z[j] -= along * work[r, j]
+        for j in range(n):
+            y[j] += z[j]
+            out[i, j] = scales[M + j] * y[j]
+        for r in range(k):
+            out[i, n + 3 * M + r] = sigma[r]
+        for r in range(3 * M):
+            out[i, n + r] = 0.0
+        for r in range(m):
+            row = asked[r]
+            done, part = 0.0, b[r]
+            for j in range(n):
+                done += J[c, row, j] * y[j]
+            if rank < m:
+                part = 0.0
+                for s in range(rank):
+                    part += inner[s] * work[s, n + 1 + r]
+            out[i, n + row] = done / scales[row]
+            out[i, n + M + row] = rate[i, row] - done / scales[row]
+            out[i, n + 2 * M + row] = part / scales[row]
+        codes[i, 0], codes[i, 1] = MET, rank
+        if sqrt(outside) > NOTICED * sqrt(length):
+            codes[i, 0] = SINGULAR
+        elif sqrt(lost) > NOTICED * sqrt(length):
+            codes[i, 0] = IN_PART

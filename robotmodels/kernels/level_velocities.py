@@ -29,32 +29,20 @@ _STUCK = 1e-12
 def decomposed(W: Floats, m: int, f: int, B: Floats, lengths: Floats, U: Floats, V: Floats) -> None:
     """Singular value decomposition of ``W (m, f)``: singular vectors as rows of U and V.
 
-    B is work. Rows of V are complete, an orthonormal basis, only where f < m.
+    B is work. Rows of V whose singular value is zero are zero.
     """
-    if m <= f:
-        for i in range(m):
-            for c in range(f):
-                B[i, c] = W[i, c]
-            for c in range(m):
-                B[i, f + c] = 1.0 if i == c else 0.0
-        orthogonal_rows(B, m, f, f + m, lengths)
-        for i in range(m):
-            for c in range(f):
-                V[i, c] = B[i, c] / lengths[i] if lengths[i] > 0.0 else 0.0
-            for c in range(m):
-                U[i, c] = B[i, f + c]
-        return
-    for i in range(f):
-        for c in range(m):
-            B[i, c] = W[c, i]
+    for i in range(m):
         for c in range(f):
-            B[i, m + c] = 1.0 if i == c else 0.0
-    orthogonal_rows(B, f, m, m + f, lengths)
-    for i in range(f):
+            B[i, c] = W[i, c]
         for c in range(m):
-            U[i, c] = B[i, c] / lengths[i] if lengths[i] > 0.0 else 0.0
+            B[i, f + c] = 1.0 if i == c else 0.0
+    orthogonal_rows(B, m, f, f + m, lengths)
+    for i in range(m):
+        for c in range(m):
+            U[i, c] = B[i, f + c]
+    for i in range(min(m, f)):
         for c in range(f):
-            V[i, c] = B[i, m + c]
+            V[i, c] = B[i, c] / lengths[i] if lengths[i] > 0.0 else 0.0
 
 
 @compiled()
@@ -134,7 +122,7 @@ def freed(F: Floats, f: int, stuck: Ints, V: Floats, G: Floats) -> int:
 @compiled(
     NOTHING(
         STACK, MATRIX, MATRIX, VECTOR, INTS, MATRIX, MATRIX, MATRIX, INT, VECTOR, VECTOR,
-        OUT2, OUT2, OUT2, OUT2, OUT2,
+        OUT2, OUT2, OUT2, OUT2,
     )
 )  # fmt: skip
 def level_velocities(
@@ -153,12 +141,11 @@ def level_velocities(
     scale: Floats,
     mixed: Floats,
     error: Floats,
-    singular_values: Floats,
 ) -> None:
     """Velocities of N rows: levels stacked, level l has the rows starts[l] to starts[l + 1].
 
     Shapes: J (N, M, n); rate, drift (N, M); row_weights (M,); starts (L + 1,); secondary, lower,
-    upper (N, n); method (4,) -> v (N, n); scale, mixed (N, L); error, singular_values (N, M).
+    upper (N, n); method (4,) -> v (N, n); scale, mixed (N, L); error (N, M).
     """
     N, M, n = J.shape
     L = starts.shape[0] - 1
@@ -212,8 +199,6 @@ def level_velocities(
             decomposed(W, m, f, B, sigma, U, V)
             k = min(m, f)
             rank = 0
-            for a in range(m):
-                singular_values[i, first + a] = sigma[a] if a < k else 0.0
             while rank < k and sigma[rank] > _NOTHING * longest:
                 rank += 1
             for a in range(rank):
@@ -224,8 +209,7 @@ def level_velocities(
             # relative to the level's own Jacobian, not to what is left of it
             none = max(_NOTHING, threshold if kind == PSEUDO_INVERSE else 0.0) * longest
             inverse_factors(kind, threshold, largest, speed, sigma, inner, rank, none, factors)
-            if m <= f:
-                complement(V, rank, f)
+            complement(V, rank, f)
             narrowed(F, V, f, G)
             # v = x + s w + (rows of F from the rank on)^T y
             for j in range(n):

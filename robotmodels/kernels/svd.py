@@ -17,15 +17,17 @@ __all__ = ["decompositions", "orthogonal_rows"]
 _EPS = 2.220446049250313e-16
 _SWEEPS = 60
 """Far more than are ever needed: six for matrices of Jacobians, some ten for difficult ones."""
+_NONE = 1e-60
+"""Squared length, beside the longest row, of rows beyond the number of dimensions."""
 
 
 @compiled()
-def descending(lengths: Floats, p: int) -> int:
-    """Index of the first of the p lengths that is followed by a longer one, -1 if none is."""
-    for i in range(p - 1):
-        if lengths[i] < lengths[i + 1]:
-            return i
-    return -1
+def squared_length(B: Floats, i: int, d: int) -> float:
+    """Sum of the squares of the first d entries of row i."""
+    total = 0.0
+    for c in range(d):
+        total += B[i, c] * B[i, c]
+    return total
 
 
 @compiled()
@@ -42,34 +44,27 @@ def sort_rows(B: Floats, p: int, w: int, lengths: Floats) -> None:
 
 @compiled()
 def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
-    """Turn the first p rows of B among each other until their first d entries are orthogonal.
+    """Rotate the first p rows of B among each other until their first d entries are orthogonal.
 
-    Shapes: B (>= p, >= w) -> lengths (>= p,).
+    Shapes: B (>= p, >= w) -> lengths (>= p,), descending; of p > d rows the last ones are zero.
     """
-    for i in range(p):
-        total = 0.0
-        for c in range(d):
-            total += B[i, c] * B[i, c]
-        lengths[i] = total
-    # long rows first: fewer sweeps, and graded rows keep their digits
-    sort_rows(B, p, w, lengths)
-    for sweep in range(_SWEEPS):
-        if sweep > 0:
-            for i in range(p):
-                total = 0.0
-                for c in range(d):
-                    total += B[i, c] * B[i, c]
-                lengths[i] = total
-        turned = False
+    for _ in range(_SWEEPS):
+        for i in range(p):
+            lengths[i] = squared_length(B, i, d)
+        # long rows first: fewer sweeps, and graded rows keep their digits
+        sort_rows(B, p, w, lengths)
+        # of more rows than dimensions the last ones shrink with every sweep
+        floor = _NONE * lengths[0] if p > d else 0.0
+        rotated = False
         for i in range(p - 1):
             for j in range(i + 1, p):
                 a, b = lengths[i], lengths[j]
                 inner = 0.0
                 for c in range(d):
                     inner += B[i, c] * B[j, c]
-                if abs(inner) <= _EPS * sqrt(a) * sqrt(b):
+                if abs(inner) <= _EPS * sqrt(a) * sqrt(b) or min(a, b) < floor:
                     continue
-                turned = True
+                rotated = True
                 if abs(b - a) > 2e9 * abs(inner):
                     # the limit of the formula, without its overflow
                     tangent = inner / (b - a)
@@ -84,22 +79,15 @@ def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
                     x, y = B[i, c], B[j, c]
                     B[i, c] = cosine * x - sine * y
                     B[j, c] = sine * x + cosine * y
-                # exact but for rounding; the next sweep starts from fresh sums. What cancels to
-                # less than nothing is taken from the row itself
-                lengths[i] = a - tangent * inner
-                lengths[j] = b + tangent * inner
-                for k in (i, j):
-                    if not lengths[k] > 1e-3 * min(a, b):
-                        total = 0.0
-                        for c in range(d):
-                            total += B[k, c] * B[k, c]
-                        lengths[k] = total
-        if not turned:
+                # exact but for rounding until the next sweep, unless digits cancel
+                least = 1e-3 * min(a, b)
+                a, b = a - tangent * inner, b + tangent * inner
+                lengths[i] = a if a > least else squared_length(B, i, d)
+                lengths[j] = b if b > least else squared_length(B, j, d)
+        if not rotated:
             break
     for i in range(p):
         lengths[i] = sqrt(lengths[i])
-    if descending(lengths, p) >= 0:
-        sort_rows(B, p, w, lengths)
 
 
 @compiled(NOTHING(STACK, OUT3, OUT2, OUT3))

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_core, as_exact, as_vector, batch_shape, read_only
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, Rebuilt, as_core, as_mask, as_number, as_vector, batch_shape, read_only
+from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .ellipsoid import in_range
 from .ellipsoids import joint_scale
-from .equilibrium import as_tolerance
 from .jacobians import Reference, jacobian
 from .lengths import length_of
 
@@ -39,11 +38,6 @@ class Manipulability(Rebuilt):
         What the rows were multiplied by to be comparable: 1 / length for linear ones next to
         angular ones, else 1.
 
-    Raises
-    ------
-    ShapeError
-        Fields that do not fit each other.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -57,38 +51,21 @@ class Manipulability(Rebuilt):
     jacobian: Array
     weights: Array
 
-    def __post_init__(self) -> None:
-        *batch, m = np.shape(self.singular_values)
-        shapes = {
-            "singular_values": (np.float64, (*batch, m)),
-            "rank": (np.int64, tuple(batch)),
-            "jacobian": (np.float64, (*batch, m, np.shape(self.jacobian)[-1])),
-            "weights": (np.float64, (m,)),
-        }
-        for name, (dtype, shape) in shapes.items():
-            array = read_only(getattr(self, name), dtype)
-            if array.shape != shape:
-                raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
-            object.__setattr__(self, name, array)
-
     @property
     def measure(self) -> Array:
         """Product of the k = min(m, n) singular values that can be, shape (...); 0 where rank < k.
 
-        Yoshikawa's manipulability ``sqrt(det(J J^T))`` where there are at least as many joints as
-        components, ``sqrt(det(J^T J))`` where there are fewer. With the components of the whole
-        twist and six joints or more its unit is (m/s)^3 (rad/s)^3 over that of the length cubed.
-        That of `ManipulabilityCriterion` of the same length, except for linear components alone
-        with a length other than 1: they are not divided by it here.
+        Yoshikawa's manipulability ``sqrt(det(J J^T))``, or ``sqrt(det(J^T J))`` with fewer joints
+        than components, of the rows times ``weights``.
         """
         return np.asarray(self._possible.prod(axis=-1))
 
     @property
     def condition(self) -> Array:
-        """Largest singular value over the k-th, shape (...): from 1, infinite where rank < k.
+        """Largest singular value over the k-th, shape (...), k as for `measure`.
 
-        k as for `measure`. It depends on the length that makes metres comparable with radians.
-        NaN for a robot without joints.
+        Infinite where rank < k, NaN without joints. It depends on the length that makes metres
+        comparable with radians.
         """
         s = self._possible
         if not s.shape[-1]:
@@ -109,28 +86,11 @@ class Manipulability(Rebuilt):
         )
 
     def velocity_transmission(self, twist: ArrayLike) -> Array:
-        """Largest multiple of a twist that joint velocities of the ball give.
+        """Largest multiple (...) of a twist (..., m) that joint velocities of the ball give.
 
-        Parameters
-        ----------
-        twist : array_like, shape (..., m)
-            The m components, m/s and rad/s, not all zero; what was masked out may be anything.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            ``1 / sqrt(x^T (J J^T)^-1 x)``; 0 for a twist that cannot be. The length does not
-            matter.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Not m numbers, NaN or infinity; zeros.
-
-        References
-        ----------
-        S. L. Chiu, "Task compatibility of manipulator postures", International Journal of Robotics
-        Research 7(5), 1988.
+        ``1 / sqrt(x^T (J J^T)^-1 x)`` with x in m/s and rad/s; 0 for a twist that cannot be.
+        Components that were masked out may be anything. S. L. Chiu, "Task compatibility of
+        manipulator postures", International Journal of Robotics Research 7(5), 1988.
         """
         x = self._component_vector(twist, "twist") * self.weights
         U, s = self._left()
@@ -143,27 +103,11 @@ class Manipulability(Rebuilt):
         return np.divide(1.0, size, out=np.zeros_like(size), where=possible & (size > 0))
 
     def force_transmission(self, wrench: ArrayLike) -> Array:
-        """Largest multiple of a wrench that the dual ball of joint torques balances.
+        """Largest multiple (...) of a wrench (..., m) that the dual ball of torques balances.
 
-        Parameters
-        ----------
-        wrench : array_like, shape (..., m)
-            The m components of force and moment, N and N m, not all zero; the others are zero.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            ``1 / sqrt(w^T J J^T w)`` for torques with ``sum_i (s_i tau_i)^2 <= 1``, s_i the joint
-            velocities of the ball; infinity for a wrench that the structure carries.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            As `velocity_transmission`.
-
-        References
-        ----------
-        Chiu 1988.
+        ``1 / sqrt(w^T J J^T w)``, w in N and N m, for torques with ``sum_i (s_i tau_i)^2 <= 1``,
+        s_i the joint velocities of the ball; infinity for a wrench that the structure carries. Chiu
+        1988.
         """
         w = self._component_vector(wrench, "wrench") / self.weights
         U, s = self._left()
@@ -189,7 +133,7 @@ def manipulability(
     q: ArrayLike,
     frame: str | int | None = None,
     reference: Reference = "world_aligned",
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     joint_velocity: ArrayLike | None = None,
     length: float = 1.0,
     tolerance: float = 1e-9,
@@ -198,17 +142,8 @@ def manipulability(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
-    frame : str or int, optional
-        Name or number of the frame; default the tool.
-    reference : {"world_aligned", "local", "world"}
-        Axes and point of the twist, as in `jacobian`.
-    mask : array_like, shape (6,), optional
-        Which components count: six 0/1 numbers ``[vx vy vz wx wy wz]``, at least one 1. Default
-        all; ``[1, 1, 1, 0, 0, 0]`` are the linear ones.
+    model, q, frame, reference, mask
+        See `robotmodels.kinematics`.
     joint_velocity : array_like, shape (n,), optional
         Half axes of the ball of joint velocities (rad/s, m/s), as in `velocity_ellipsoid`.
     length : float
@@ -221,15 +156,7 @@ def manipulability(
     -------
     Manipulability
         Its measure, condition, and ratios along twists and wrenches. For fewer joints than
-        components, measure and condition are those of ``J^T J``: of what the joints can do.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length or with NaN or infinity; a mask without a 1; a length that
-        is not positive.
-    FrameNotFoundError
-        No such frame.
+        components, measure and condition are those of ``J^T J``.
 
     References
     ----------
@@ -249,9 +176,9 @@ def manipulability(
     np.float64(0.03)
     """
     check_model(model)
-    rows = _asked_rows(mask)
+    rows = as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
     own = length_of(model, frame, None)
-    relative = as_tolerance(tolerance)
+    relative = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     scale = joint_scale(model, joint_velocity, "joint_velocity", 0.0)
     J = jacobian(model, as_vector(q, model.n, "q"), frame, reference) * scale
     size = np.linalg.norm(J[..., :3, :], axis=(-2, -1)) / own
@@ -263,7 +190,9 @@ def manipulability(
     J, weights = J[..., rows, :], weights[rows]
     _, s = _left_vectors(weights[:, None] * J)
     s = np.where(s > relative * unit * size[..., None], s, 0.0)
-    return Manipulability(s, (s > 0).sum(axis=-1), J, weights)
+    return Manipulability(
+        read_only(s), read_only((s > 0).sum(axis=-1), np.int64), read_only(J), read_only(weights)
+    )
 
 
 def _left_vectors(J: Array) -> tuple[Array, Array]:
@@ -272,15 +201,3 @@ def _left_vectors(J: Array) -> tuple[Array, Array]:
     padded = np.concatenate((J, np.zeros((*J.shape[:-1], max(m - n, 0)))), axis=-1)
     U, s, _ = np.linalg.svd(padded, full_matrices=False)
     return U, s
-
-
-def _asked_rows(mask: ArrayLike | None) -> NDArray[np.bool_]:
-    """Which of the six components count."""
-    if mask is None:
-        return np.ones(6, dtype=bool)
-    numbers = as_exact(np.asarray(mask, dtype=float), (6,), "mask")
-    if not np.isin(numbers, (0.0, 1.0)).all() or not numbers.any():
-        raise InvalidValueError(
-            f"mask: expected six numbers 0 or 1 and at least one 1, got {numbers.tolist()}."
-        )
-    return numbers == 1

@@ -17,12 +17,7 @@ _ON = 1e-12
 
 
 class EllipsoidQuantity(Enum):
-    """What the points of an ellipsoid are; the value names it.
-
-    Attributes
-    ----------
-    unit : str
-        Of the radii.
+    """Quantity that an ellipsoid shows: the value names it, ``unit`` is that of the radii.
 
     Examples
     --------
@@ -128,28 +123,11 @@ class Ellipsoid(Rebuilt):
         return np.where(whole, self.radii[..., 2], 0.0) / largest
 
     def radius_along(self, direction: ArrayLike) -> Array:
-        """Distance from the centre to the boundary, also called the transmission ratio.
+        """Largest velocity or force (...) along directions (..., 3) in world axes, not zero.
 
-        Parameters
-        ----------
-        direction : array_like, shape (..., 3)
-            World axes, of any length but zero; the leading axes broadcast.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            The largest velocity that is along ``direction`` alone, or force; 0 where a flat
-            ellipsoid has no such velocity, infinity where an open one has no bound. There a
-            direction within 1e-12 rad of an axis or of the plane of two is taken to be on it.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Not three numbers, NaN or infinity; a direction of no length.
-
-        References
-        ----------
-        S. L. Chiu, "Task compatibility of manipulator postures", International Journal of Robotics
+        0 where a flat ellipsoid has no such velocity, infinity where an open one has no bound.
+        There a direction within 1e-12 rad of an axis or of the plane of two counts as on it. S. L.
+        Chiu, "Task compatibility of manipulator postures", International Journal of Robotics
         Research 7(5), 1988.
         """
         c, r = self._components(direction), self.radii
@@ -162,23 +140,10 @@ class Ellipsoid(Rebuilt):
         return np.where(leaves, 0.0, radius)
 
     def extent_along(self, direction: ArrayLike) -> Array:
-        """Largest component along a direction of all points: half the width of the ellipsoid.
+        """Largest component (...) of all points along directions (..., 3): half the width.
 
-        Parameters
-        ----------
-        direction : array_like, shape (..., 3)
-            World axes, of any length but zero; the leading axes broadcast.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            At least `radius_along`; equal to it along the axes. The reciprocal of `radius_along`
-            of the dual ellipsoid.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            As `radius_along`.
+        At least `radius_along`, and equal to it along the axes; the reciprocal of `radius_along` of
+        the dual ellipsoid.
         """
         c, r = self._components(direction), self.radii
         open_ = ~np.isfinite(r)
@@ -186,24 +151,11 @@ class Ellipsoid(Rebuilt):
         return np.where(np.any((c != 0) & open_, axis=-1), np.inf, extent)
 
     def boundary(self, polar: int = 13, around: int = 24) -> Array:
-        """Points of the surface on a grid of polar angles and meridians about the third axis.
+        """Points of the surface in world axes, from the centre, shape (..., polar, around, 3).
 
-        Parameters
-        ----------
-        polar, around : int
-            Number of polar angles from 0 to pi (from 3) and of meridians from 0 to 2 pi (from 3),
-            both ends included: the last meridian is the first again.
-
-        Returns
-        -------
-        ndarray, shape (..., polar, around, 3)
-            Velocities or forces in world axes, from the centre. NaN for an ellipsoid with an
-            infinite radius, which has no such grid.
-
-        Raises
-        ------
-        InvalidValueError
-            Fewer than three.
+        A grid of ``polar`` angles from 0 to pi and ``around`` meridians from 0 to 2 pi about the
+        third axis, at least 3 each, both ends included. NaN for an ellipsoid with an infinite
+        radius.
         """
         if polar < 3 or around < 3:
             raise InvalidValueError(
@@ -219,18 +171,7 @@ class Ellipsoid(Rebuilt):
         return np.einsum("...ij,pkj->...pki", scaled, sphere)
 
     def at(self, index: int | slice | tuple[int, ...]) -> Self:
-        """The ellipsoids of some rows of a batch.
-
-        Parameters
-        ----------
-        index : int, slice or tuple of int
-            Into the leading axes.
-
-        Returns
-        -------
-        Ellipsoid
-            A single one where the index is complete.
-        """
+        """Ellipsoids of some rows of a batch; a single one where the index is complete."""
         fields = (self.centre, self.axes, self.radii, self.rank)
         centre, axes, radii, rank = (array[index] for array in fields)
         return replace(self, centre=centre, axes=axes, radii=radii, rank=rank)

@@ -12,12 +12,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_reals, as_vector
+from .._arrays import Array, as_number, as_reals, as_vector
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import Ellipsoid, EllipsoidQuantity
-from .equilibrium import as_tolerance
 from .jacobians import jacobian
 from .lengths import length_of
 from .poses import dgm
@@ -37,7 +36,7 @@ class TwistPart(Enum):
 
 
 class OtherPart(Enum):
-    """What is asked of the half of the twist or wrench that an ellipsoid does not show.
+    """Condition on the half of the twist or wrench that an ellipsoid does not show.
 
     Examples
     --------
@@ -73,27 +72,20 @@ def velocity_ellipsoid(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints; passive ones count as the others do.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
+    model, q, frame
+        See `robotmodels.kinematics`; passive joints count as the others do.
     part : TwistPart
         Whether linear or angular velocities are shown.
-    frame : str or int, optional
-        Name or number of the frame; default the tool.
     joint_velocity : array_like, shape (n,), optional
-        What each joint does alone (rad/s, m/s): half axes of the ellipsoid of joint velocities.
-        Default 1 rad/s and 1 m/s, which compares revolute with prismatic joints by their units;
-        ``model.table.velocity`` compares them by their limits. 0 locks a joint.
+        Half axes of the ellipsoid of joint velocities (rad/s, m/s): the velocity of each joint
+        alone. Default 1 rad/s and 1 m/s; ``model.table.velocity`` compares joints by their limits.
+        0 locks a joint.
     other : OtherPart
-        Whether the other half of the twist may be anything, or is zero: a tool that shifts
-        without turning, or turns about its origin.
-    length : float, optional
-        Metres that make linear velocities comparable with angular ones; it serves to tell a small
-        radius from a zero only. Default the size of the robot, from its table.
-    tolerance : float
-        Radii below this part of the size of the Jacobian, ``[J_v; length J_w] S`` for the linear
-        part, are zero.
+        Whether the other half of the twist may be anything or is zero, as of a tool that shifts
+        without turning.
+    length, tolerance : float, optional
+        Radii below ``tolerance`` of the size of the Jacobian, ``[J_v; length J_w] S`` for the
+        linear part, are zero.
 
     Returns
     -------
@@ -102,11 +94,9 @@ def velocity_ellipsoid(
 
     Raises
     ------
-    ShapeError, InvalidValueError
-        ``q`` or ``joint_velocity`` of the wrong length; NaN or infinity, which a joint without a
-        limit has; a negative velocity; no member of the enums; a length or tolerance that is none.
-    FrameNotFoundError
-        No such frame.
+    ShapeError, InvalidValueError, FrameNotFoundError
+        As `jacobian`; ``joint_velocity`` of the wrong length, negative, or infinite as that of a
+        joint without a limit; no member of the enums.
 
     References
     ----------
@@ -144,37 +134,26 @@ def force_ellipsoid(
 
     It has the axes and the reciprocal radii of the velocity ellipsoid with
     ``joint_velocity = 1 / joint_torque``: of that with all angular velocities for forces without a
-    moment, of that without angular velocity for forces with whatever moment costs least torque.
+    moment, of that without angular velocity for forces with the moment that costs least torque.
     Weight and friction are left out.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
+    model, q, frame, length, tolerance
+        As in `velocity_ellipsoid`, of the velocities dual to the forces.
     part : TwistPart
         Whether forces or moments are shown.
-    frame : str or int, optional
-        Name or number of the frame; default the tool.
     joint_torque : array_like, shape (n,), optional
-        What each joint gives alone (N m, N), above 0: half axes of the ellipsoid of torques.
+        Half axes of the ellipsoid of torques (N m, N), above 0: the torque of each joint alone.
         Default 1 N m and 1 N; ``model.table.effort`` are the limits.
     other : OtherPart
         Whether the other half of the wrench is zero or may be anything.
-    length, tolerance : float
-        As in `velocity_ellipsoid`, of the velocities dual to the forces.
 
     Returns
     -------
     Ellipsoid
         In N or N m, in world axes at the frame's origin. The radius is infinite along forces that
         the structure carries without torque.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `velocity_ellipsoid`; a torque of 0, which leaves no force at all in some directions.
 
     References
     ----------
@@ -211,7 +190,10 @@ def _principal(
     tolerance: float,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Axes, radii (zero below the threshold) and rank of a velocity ellipsoid."""
-    L, relative = length_of(model, frame, length), as_tolerance(tolerance)
+    L, relative = (
+        length_of(model, frame, length),
+        as_number(tolerance, "tolerance", above=0.0, below=1.0),
+    )
     J = jacobian(model, as_vector(q, model.n, "q"), frame) * scale
     # at least three columns, so that there are three singular values and vectors
     J = np.concatenate((J, np.zeros((*J.shape[:-1], max(3 - model.n, 0)))), axis=-1)

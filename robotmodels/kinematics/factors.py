@@ -22,8 +22,8 @@ from .poses import link_poses
 class JacobianFactors(Rebuilt):
     """The three matrices of the book: ``J = rotation transport reduced``.
 
-    The first two are invertible whatever the configuration, so that rank, singular positions and
-    (for six joints) the inverse are those of the third.
+    The first two are invertible at every configuration, so that rank, singular positions and (for
+    six joints) the inverse are those of the third.
 
     Parameters
     ----------
@@ -31,8 +31,7 @@ class JacobianFactors(Rebuilt):
         ``diag(R_i, R_i)``, the axes of the projection frame i in the world.
     transport : ndarray, shape (..., 6, 6)
         ``[1, -[L]x; 0, 1]`` with ``L`` from the origin of the intermediate frame j to that of the
-        frame whose Jacobian it is, in the axes of i, metres: from the velocity of the point of
-        the body at O_j to that at the frame's origin.
+        frame, in the axes of i, metres.
     reduced : ndarray, shape (..., 6, n)
         ``iJ_{n,j}``, rows ``[v; w]``: column k is ``[a_k; 0]`` if prismatic and
         ``[a_k x L_{k,j}; a_k]`` if revolute, in the axes of i, with ``L_{k,j}`` from O_k to O_j;
@@ -68,27 +67,10 @@ class JacobianFactors(Rebuilt):
         return self.rotation @ (self.transport @ self.reduced)
 
     def inverse_times(self, twist: ArrayLike) -> Array:
-        """Joint velocities of least norm whose twist is nearest the given one, matrix by matrix.
+        """Joint velocities (..., n) of least norm whose twist is nearest a given one (..., 6).
 
-        The inverses of the first two are written down (a transposed rotation, the opposite
-        lever); only the third is solved, which is why the book wants it simple. Where it is
-        singular nothing is damped: values below 1e-12 of the largest count as zero. Nearest is
-        meant in the components of the third matrix, metres and radians alike.
-
-        Parameters
-        ----------
-        twist : array_like, shape (..., 6)
-            ``[v; w]`` in world axes at the frame's origin, m/s and rad/s.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            Joint velocities, rad/s or m/s.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Not six finite numbers in each row.
+        The inverses of the first two matrices are written down; only the third is solved. Singular
+        values below 1e-12 of its largest count as zero, nothing is damped.
 
         Examples
         --------
@@ -119,28 +101,17 @@ def jacobian_factors(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
+    model, q, frame
+        See `robotmodels.kinematics`.
     projection, intermediate : str or int, optional
-        Names or numbers of the frames i, in whose axes the third matrix is, and j, at whose
-        origin; 0 is R_0. Any frame will do. Defaults as the book advises, halfway along the k
-        frames that carry ``frame``: i is number k/2 of them (R_3 of six) and j the next (R_4).
-    frame : str or int, optional
-        Frame whose Jacobian it is; default the tool.
+        Frames i, in whose axes the third matrix is, and j, at whose origin; 0 is R_0. Defaults as
+        the book advises, halfway along the k frames that carry ``frame``: i is number k/2 of them
+        (R_3 of six) and j the next (R_4).
 
     Returns
     -------
     JacobianFactors
         Their product is ``jacobian(model, q, frame)``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, or with NaN or infinity.
-    FrameNotFoundError
-        No such frame.
 
     References
     ----------

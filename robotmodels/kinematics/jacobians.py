@@ -36,12 +36,8 @@ def jacobian(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
+    model, q, frame
+        See `robotmodels.kinematics`.
     reference : {"world_aligned", "local", "world"}
         ``"world_aligned"``: velocity of the frame's origin and angular velocity in world axes;
         ``"local"``: the same in the frame's own axes; ``"world"``: the spatial Jacobian, velocity
@@ -54,10 +50,8 @@ def jacobian(
 
     Raises
     ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, or with NaN or infinity; an unknown reference.
-    FrameNotFoundError
-        No such frame.
+    ShapeError, InvalidValueError, FrameNotFoundError
+        ``q`` of the wrong length, or with NaN or infinity; an unknown reference or frame.
 
     References
     ----------
@@ -100,24 +94,13 @@ def jacobian_rate(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v : array_like, shape (..., n)
-        Joint variables (rad or m) and velocities; the leading axes broadcast.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    reference : {"world_aligned", "local", "world"}
-        As in `jacobian`.
+    model, q, v, frame, reference
+        See `robotmodels.kinematics`.
 
     Returns
     -------
     ndarray, shape (..., 6, n)
         ``dJ/dt``; the acceleration of the frame is ``J a + dJ/dt v`` for ``"world_aligned"``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `jacobian`.
 
     References
     ----------

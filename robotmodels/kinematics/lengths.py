@@ -12,8 +12,7 @@ from math import pi, tau
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, as_exact, as_floats
-from ..errors import InvalidValueError
+from .._arrays import Array, as_floats, as_number
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel, check_model
 from .jacobians import jacobian
@@ -50,10 +49,7 @@ def length_of(model: RobotModel, frame: str | int | None, length: float | None) 
     """The length a caller gave, or the characteristic one."""
     if length is None:
         return characteristic_length(model, frame)
-    value = float(as_exact(length, (), "length"))
-    if not value > 0:
-        raise InvalidValueError(f"length: expected metres above 0, got {value:g}.")
-    return value
+    return as_number(length, "length", above=0.0)
 
 
 def _reach(model: RobotModel, frame: str | int | None) -> float:

@@ -21,12 +21,8 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables in table order, rad or m.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
+    model, q, frame
+        See `robotmodels.kinematics`.
 
     Returns
     -------
@@ -35,10 +31,8 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     Raises
     ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, or with NaN or infinity.
-    FrameNotFoundError
-        No such frame; the nearest names are in the message.
+    ShapeError, InvalidValueError, FrameNotFoundError
+        ``q`` of the wrong length, or with NaN or infinity; no such frame.
 
     References
     ----------
@@ -71,26 +65,17 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
 
 def link_poses(model: RobotModel, q: ArrayLike) -> Array:
-    """World poses of all frames of the table, R_1 to R_f.
-
-    Also called ``fkine_all``. The tool is not among them: see `dgm`.
+    """World poses of all frames of the table, R_1 to R_f; the pose of the tool is `dgm`.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints and f frames.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
+    model, q
+        See `robotmodels.kinematics`.
 
     Returns
     -------
     ndarray, shape (..., f, 4, 4)
         Poses, positions in metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, or with NaN or infinity.
 
     References
     ----------

@@ -27,24 +27,13 @@ def dkm(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v : array_like, shape (..., n)
-        Joint variables (rad or m) and velocities; the leading axes broadcast.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    reference : {"world_aligned", "local", "world"}
-        As in `jacobian`.
+    model, q, v, frame, reference
+        See `robotmodels.kinematics`.
 
     Returns
     -------
     ndarray, shape (..., 6)
         Twist ``[v; w]`` in m/s and rad/s.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `jacobian`.
 
     References
     ----------
@@ -82,24 +71,13 @@ def dkm_second_order(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    reference : {"world_aligned", "local", "world"}
-        As in `jacobian`.
+    model, q, v, a, frame, reference
+        See `robotmodels.kinematics`.
 
     Returns
     -------
     ndarray, shape (..., 6)
-        Linear then angular part, m/s^2 and rad/s^2. Gravity is not in it.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `jacobian`.
+        Linear then angular part, m/s^2 and rad/s^2, without gravity.
 
     References
     ----------

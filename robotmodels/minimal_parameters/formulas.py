@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..drive import Drives
-from ..geometry import PRISMATIC, REVOLUTE
+from ..geometry import PRISMATIC, REVOLUTE, constant_names
 from ..model import RobotModel
 from ..symbolic.angles import exact_turns
 from . import rules
@@ -130,7 +130,12 @@ def _rows_of_symbols(
     table, length = model.table, tolerance * rules.reach(model)
     constants: dict[str, Constant] = {}
 
+    own = constant_names(table.symbols)
+
     def symbol(name: str, latex: str, value: float, unit: str) -> Any:
+        if name in own:
+            name = own[name]
+            latex = sympy.latex(sympy.Symbol(name))
         constants[name] = Constant(name, latex, value, unit)
         return sympy.Symbol(name)
 

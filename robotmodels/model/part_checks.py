@@ -26,9 +26,11 @@ def check_table(table: object) -> None:
 def check_name(name: object) -> None:
     """Refuse a name that a URDF cannot hold."""
     if not isinstance(name, str) or not name:
-        raise InvalidValueError(f"name: expected a text that is not empty, got {name!r}.")
+        raise InvalidValueError(f"name: expected a text that is not empty, got {name!r:.80}.")
     if NOT_XML.search(name):
-        raise InvalidValueError(f"name: {name!r} holds a control character; a URDF cannot hold it.")
+        raise InvalidValueError(
+            f"name: {name!r:.80} holds a control character; a URDF cannot hold it."
+        )
 
 
 def check_tip(tip: object, f: int) -> None:

@@ -147,6 +147,8 @@ def row_moves(table: DHTable, j: int, notation: Notation) -> list[Move]:
         own = (name == "TH" and sigma == REVOLUTE) or (name == "RL" and sigma == PRISMATIC)
         joint = {"theta": f"θ{j}"}.get(column, f"{column}{j}")
         meaning = f"the constant part of {joint}" if own else f"{column}{j}"
+        text = table.symbols.get((column, j), "")
+        meaning += f" = {text}" if text and f"{name}{j}" not in notation.new_names else ""
         if name in _GREEK:
             return notation.angle(f"{name}{j}", f"{_GREEK[name]}_{{{j}}}", value, meaning)
         return notation.length(f"{name}{j}", f"{name}_{{{j}}}", value, meaning)

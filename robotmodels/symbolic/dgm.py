@@ -155,7 +155,8 @@ def explain_dgm(
     sums have underscores: ``C2_3``. Constants that are not zero get symbols: ``Dj``, ``RLj`` and
     ``BLj`` for d, r and b of row j, and for angles that are no multiple of 30 or 45 degrees ``Aj``,
     ``Bj``, ``Gj`` and ``THj`` for alpha, beta, gamma and the constant part of theta
-    (``C2TH2 = cos(θ2 + TH2)``); ``C1p45 = cos(θ1 + 45°)``. The base is ``Z = Trans(X0, Y0, Z0)
+    (``C2TH2 = cos(θ2 + TH2)``); ``C1p45 = cos(θ1 + 45°)``. Names in ``DHTable.symbols``, such as
+    those of a ``.par`` file, replace these. The base is ``Z = Trans(X0, Y0, Z0)
     Rot(z, AZ0) Rot(y, AY0) Rot(x, AX0)``, the tool the same with E instead of 0. Partial results
     of more than 100 symbols (arms with many oblique axes) are named ``U1``, ``U2``, ...
 

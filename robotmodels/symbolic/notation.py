@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from ..errors import InvalidValueError, nearest_names
-from ..geometry import PRISMATIC, DHTable
+from ..geometry import PRISMATIC, DHTable, constant_names
 from .angles import ROUNDING, Angle, Term, exact_turns, greek, signed_sum, wrapped
 
 _LONGEST = 100
@@ -51,7 +51,8 @@ class Notation:
 
     def __init__(self, table: DHTable, new_names: Mapping[str, str] | None) -> None:
         self.separator = "_" if table.f > 9 else ""
-        self.new_names = checked_names(new_names)
+        self._given_names = checked_names(new_names)
+        self.new_names = dict(constant_names(table.symbols)) | self._given_names
         self.constants: list[Constant] = []
         self.abbreviations: dict[Any, Any] = {}
         self.meanings: dict[Any, str] = {}  # of abbreviations
@@ -184,7 +185,7 @@ class Notation:
     def check_new_names(self) -> None:
         """Refuse new names for symbols that do not occur, and names given twice."""
         known = tuple(self._symbols)
-        for name in self.new_names:
+        for name in self._given_names:
             if name not in known:
                 near = nearest_names(name, known)
                 hint = f" Did you mean {near[0]!r}?" if near else ""

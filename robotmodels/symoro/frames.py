@@ -85,6 +85,12 @@ def geometry(file: ParFile, numbers: Numbers, links: int, f: int) -> dict[str, A
                 offsets[key, j] if (key, j) in offsets else numbers.number(entry)
                 for j, entry in enumerate(rows[key])
             ]
+    columns["symbols"] = {
+        (key, j): entry.text
+        for key in GEOMETRY
+        for j, entry in enumerate(rows[key], start=1)
+        if (key, j - 1) not in offsets and entry.symbols and len(entry.text) <= 60
+    }
     return columns
 
 

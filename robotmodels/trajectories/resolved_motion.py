@@ -19,9 +19,8 @@ from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
 from ..kinematics.inverse.methods import InverseMethod
-from ..kinematics.inverse.request import Secondary
-from ..kinematics.inverse.solution import IKMSolution
-from ..kinematics.inverse.status import IKMStatus
+from ..kinematics.inverse.solution import IKMSolution, IKMStatus
+from ..kinematics.inverse.solver import Secondary
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model

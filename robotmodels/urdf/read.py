@@ -279,24 +279,26 @@ def _leaves(table: DHTable) -> list[int]:
 
 def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialParameters:
     """Each link's inertia moved to its frame; merged links add to the one that carries them."""
+    carried = [frame for frame in named if frame.parent > 0]
+    links = [tree.links[frame.name] for frame in carried]
     total = np.zeros((f, 10))
-    for frame in named:
-        link = tree.links[frame.name]
-        if frame.parent == 0:
-            continue
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):  # refused below
-                own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
-                total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
-            large = not np.isfinite(total[frame.parent - 1]).all()
-        except InvalidValueError:  # which does not know the link
-            large = True
-        if large:
-            raise UrdfError(
-                f"link {link.name!r}: its mass, its centre of mass or how far it is from its joint "
-                "is so large that its inertia there is no number."
-            )
-    return InertialParameters(total)
+    if not links:
+        return InertialParameters(total)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below
+            own = InertialParameters.from_com(
+                [link.mass for link in links],
+                [link.com for link in links],
+                [link.inertia for link in links],
+            ).moved(np.array([frame.pose for frame in carried]))
+            np.add.at(total, [frame.parent - 1 for frame in carried], own.values)
+        return InertialParameters(total)
+    except InvalidValueError:  # it does not name the link
+        largest = max(links, key=lambda link: max(abs(link.mass), *map(abs, link.com)))
+        raise UrdfError(
+            f"link {largest.name!r}: its mass, its centre of mass or how far it is from its joint "
+            "is so large that its inertia there is no number."
+        ) from None
 
 
 def _mimicry(joints: list[UrdfJoint]) -> Transmission | None:

@@ -1,8 +1,9 @@
-"""Mesh files (STL, Collada, OBJ and what else trimesh reads) as coloured triangles."""
+"""Mesh files (STL, Collada, OBJ and others that trimesh reads) as coloured triangles."""
 
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,34 +11,42 @@ from typing import Any
 import numpy as np
 
 from .._arrays import read_only
-from ..errors import MeshNotFoundError, MissingExtraError, UrdfError
-from ..visual import Color, Mesh
-from .nodes import Triangles
+from ..errors import MissingExtraError, UrdfError
+from ..model import RobotModel
+from ..visual import Color, Mesh, skeleton
+from .shapes import Triangles
 
-# Edges sharper than this stay sharp, gentler ones are shaded as one smooth surface.
-_CREASE = np.radians(35.0)
+_CREASE = np.radians(35.0)  # sharper edges stay sharp, others are shaded as one smooth surface
+
+
+def with_stand_ins(model: RobotModel) -> tuple[RobotModel, tuple[str, ...]]:
+    """Robot with a skeleton in place of missing mesh files, and the names of these files."""
+    missing = [
+        v
+        for v in model.visuals
+        if isinstance(v.shape, Mesh) and not (v.shape.path and v.shape.path.is_file())
+    ]
+    if not missing:
+        return model, ()
+    frames = {visual.frame for visual in missing}
+    bones = skeleton(model.table, model.tool, model.tip, axes=False)
+    kept = [visual for visual in model.visuals if visual not in missing]
+    names = dict.fromkeys(v.shape.filename for v in missing if isinstance(v.shape, Mesh))
+    visuals = (*kept, *(bone for bone in bones if bone.frame in frames))
+    return replace(model, visuals=visuals), tuple(names)
 
 
 def mesh_parts(mesh: Mesh) -> tuple[tuple[Triangles, Color | None], ...]:
-    """Read a mesh file: one surface for each of its colours."""
-    try:
-        if mesh.path is None:
-            raise FileNotFoundError(mesh.filename)
-        changed = mesh.path.stat().st_mtime_ns
-    except OSError:
-        raise MeshNotFoundError(
-            f"mesh {mesh.filename!r} was not found. Pass package_dirs=[...] to "
-            "RobotModel.from_urdf (the folders that contain the package's folder), or draw a "
-            "skeleton sized from the table with meshes=False."
-        ) from None
-    return _read(mesh.path, mesh.scale, changed)
+    """Surfaces of a mesh file, one for each of its colours."""
+    path = Path(mesh.path or mesh.filename)
+    return _read(path, mesh.scale, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
 def _read(
     path: Path, scale: tuple[float, float, float], changed: int
 ) -> tuple[tuple[Triangles, Color | None], ...]:
-    """`mesh_parts`, remembered until the file changes."""
+    """`mesh_parts`, cached until the file changes."""
     try:
         import trimesh
     except ImportError:
@@ -45,7 +54,7 @@ def _read(
             "drawing mesh files needs trimesh; run: pip install 'yourdfpy>=0.0.58'"
         ) from None
     try:
-        with warnings.catch_warnings():  # what its readers will have to change is not the caller's
+        with warnings.catch_warnings():  # deprecations in its readers do not concern the caller
             warnings.simplefilter("ignore", DeprecationWarning)
             scene = trimesh.load_scene(str(path), process=False)
         if scene.units is not None:
@@ -54,12 +63,10 @@ def _read(
         for node in scene.graph.nodes_geometry:
             T, name = scene.graph[node]
             geometry = scene.geometry[name]
-            if not isinstance(geometry, trimesh.Trimesh) or not len(geometry.faces):
-                continue
-            color = _color(geometry)
-            surface = geometry.copy()
-            surface.apply_transform(np.diag((*scale, 1.0)) @ T)
-            parts.append((_creased(surface), color))
+            if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
+                surface = geometry.copy()
+                surface.apply_transform(np.diag((*scale, 1.0)) @ T)
+                parts.append((_creased(surface), _color(geometry)))
     except Exception as error:  # each format's reader has errors of its own
         raise UrdfError(f"mesh file {path.name!r} cannot be read: {error}.") from error
     if not parts:
@@ -68,10 +75,7 @@ def _read(
 
 
 def _creased(surface: Any) -> Triangles:
-    """The triangles of a surface, cut along its sharp edges.
-
-    The viewer computes normals from shared vertices, so none need to be stored.
-    """
+    """Triangles of a surface, cut along its sharp edges: the viewer smooths shared vertices."""
     from trimesh.graph import connected_component_labels
 
     surface.merge_vertices(merge_norm=True, merge_tex=True)
@@ -81,13 +85,11 @@ def _creased(surface: Any) -> Triangles:
     meeting = np.asarray(surface.faces, dtype=np.int64) + len(surface.vertices) * patch[:, None]
     unique, faces = np.unique(meeting, return_inverse=True)
     points = np.asarray(surface.vertices)[unique % len(surface.vertices)]
-    vertices = read_only(points, np.float32)
-    dtype = np.uint16 if len(vertices) < 65536 else np.uint32
-    return Triangles(vertices, read_only(faces.reshape(-1, 3), dtype))
+    return Triangles(read_only(points, np.float32), read_only(faces.reshape(-1, 3), np.uint32))
 
 
 def _color(geometry: Any) -> Color | None:
-    """The colour of a surface, None if the file defines none."""
+    """Colour of a surface, None if the file defines none."""
     visual = geometry.visual
     if not visual.defined:
         return None

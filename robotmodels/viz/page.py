@@ -1,18 +1,16 @@
-"""One HTML page with meshcat's viewer and a scene in it: nothing is fetched, no server is needed.
+"""One HTML page with meshcat's viewer and a scene in it: no server, and nothing is loaded.
 
-meshcat's own ``static_html`` asks a server process for the same page. The page is written here
-instead, so that pictures leave no process and no port behind, and the same scene is the same text.
+meshcat's classes write their commands to a recorder instead of the window of a server; the page
+holds them in MessagePack, the format in which the viewer receives them.
 """
 
 from __future__ import annotations
 
-import base64
-import json
+from base64 import b64encode
 from collections.abc import Iterable
-from functools import lru_cache
 from html import escape
-from importlib.util import find_spec
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -23,12 +21,10 @@ from ..errors import MissingExtraError
 from ..visual import Box, Color, Cylinder, Sphere
 from .camera import ASPECT, FIELD_OF_VIEW, Camera
 from .motion import Motion
-from .nodes import Drawable, Label, Node, Segments, Triangles
-from .palette import Legend
-from .sliders import SliderPanel
-from .sliders_page import SCRIPT, STYLE, panel_html
+from .shapes import Label, Legend, Node, Segments, Triangles
 
 _SKY = ([0.86, 0.91, 0.97], [1.0, 1.0, 1.0])
+_NIGHT = ([0.05, 0.06, 0.09], [0.13, 0.15, 0.19])
 # Lights far away (directional), so that a gantry of ten metres is as bright as a finger.
 _LIGHTS = (
     ("Sky", "AmbientLight", 0.50, (0.0, 0.0, 1.0)),
@@ -36,130 +32,97 @@ _LIGHTS = (
     ("Fill", "DirectionalLight", 0.16, (-0.9, -0.5, 0.4)),
     ("Back", "DirectionalLight", 0.14, (0.1, 1.0, 0.5)),
 )
+_OTHER_LIGHTS = (
+    "SpotLight",
+    "PointLightNegativeX",
+    "PointLightPositiveX",
+    "AmbientLight",
+    "FillLight",
+)
 _MANY = 1_000_000_000
+_Y_TO_Z = se3.rotation("x", np.pi / 2)  # the viewer draws cylinders along y
 
-# three.js draws cylinders along y
-_Y_TO_Z = se3.rotation("x", np.pi / 2)
 
-_TEMPLATE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline';
- style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:">
-<title>{title}</title>
-<style>
-body {{ margin: 0; }}
-#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#legend {{ position: absolute; left: 10px; bottom: 10px; margin: 0; padding: 6px 10px;
- list-style: none; font: 13px/1.5 sans-serif; color: #222; background: rgba(255, 255, 255, 0.8);
- border-radius: 4px; }}
-#legend span {{ display: inline-block; width: 0.9em; height: 0.9em; margin-right: 0.5em;
- vertical-align: -0.1em; border-radius: 2px; }}
-.dg.main .close-button {{ background: none !important; color: #444 !important;
- text-align: right !important; padding-right: 8px; box-sizing: border-box; }}
-#message {{ display: none; margin: 2em; font-family: sans-serif; }}
-{style}</style>
-</head>
-<body>
-<p id="message">This picture needs WebGL, which this browser or its settings do not offer.</p>
-{panel}<div id="meshcat-pane"></div>
-{legend}<script>
-{viewer}
-</script>
-<script type="application/json" id="scene">
-{scene}
-</script>
-<script>
-(function () {{
-  var scene = JSON.parse(document.getElementById("scene").textContent);
-  var kinds = {{ Float32Array: Float32Array, Uint16Array: Uint16Array, Uint32Array: Uint32Array }};
-  var arrays = scene.arrays.map(function (a) {{
-    var bytes = Uint8Array.from(atob(a[1]), function (c) {{ return c.charCodeAt(0); }});
-    return new kinds[a[0]](bytes.buffer);
-  }});
-  scene.commands.forEach(function (command) {{
-    ((command.object || {{}}).geometries || []).forEach(function (geometry) {{
-      if (!geometry.data) return;
-      var parts = [geometry.data.attributes.position];
-      if (geometry.data.index) parts.push(geometry.data.index);
-      parts.forEach(function (part) {{ part.array = arrays[part.array]; }});
-    }});
-  }});
-  try {{
-    var viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-  }} catch (error) {{
-    document.getElementById("message").style.display = "block";
-    throw error;
-  }}
-  window.viewer = viewer;
-  scene.commands.forEach(function (command) {{ viewer.handle_command(command); }});
-  viewer.controls.target.fromArray(scene.target);
-  // In a picture narrower than the camera was placed for, step back until nothing is cut off:
-  // a point at depth z is seen if its distance from the axis is below slope (distance + z).
-  var pane = document.getElementById("meshcat-pane"), touched = false;
-  var eye = viewer.camera.position, target = viewer.controls.target;
-  var distance = eye.distanceTo(target);
-  function fit() {{
-    var across = pane.offsetWidth / window.innerHeight;
-    if (touched || !(across > 0)) return;
-    var wider = Math.max(scene.aspect / across, 1);
-    eye.sub(target).setLength(wider * distance + (wider - 1) * scene.depth).add(target);
-    viewer.set_dirty();
-  }}
-  ["pointerdown", "wheel"].forEach(function (event) {{
-    pane.addEventListener(event, function () {{ touched = true; }}, true);
-  }});
-  window.addEventListener("resize", fit);
-  fit();
-  viewer.set_3d_pane_size();
-}})();
-</script>
-{script}</body>
-</html>
-"""
+class Recorder:
+    """A window of meshcat that keeps commands; geometries that repeat are kept once."""
+
+    def __init__(self) -> None:
+        self.commands: list[dict[str, Any]] = []
+        self.geometries: dict[bytes, int] = {}
+
+    def send(self, command: Any) -> None:
+        """Record a command of meshcat's classes."""
+        from umsgpack import packb
+
+        data = command.lower()
+        found = data.get("object", {})
+        if found.get("geometries"):
+            # meshcat's random names would make each page of the same scene another text
+            (geometry,), (material,) = found.pop("geometries"), found["materials"]
+            geometry["uuid"], material["uuid"] = "geometry", "material"
+            found["object"] |= {
+                "uuid": data["path"],
+                "geometry": "geometry",
+                "material": "material",
+            }
+            key = packb(geometry)
+            data["geometry"] = self.geometries.setdefault(key, len(self.geometries))
+        self.commands.append(data)
 
 
 def page(
     title: str,
     nodes: Iterable[Node],
     camera: Camera,
-    motion: Motion | None,
+    motion: Motion | None = None,
     legend: Legend = (),
-    sliders: SliderPanel | None = None,
+    panel: dict[str, Any] | None = None,
+    dark: bool = False,
 ) -> str:
-    """Write a scene as one HTML page."""
-    store = _ArrayStore()
-    commands = list(_stage(camera))
+    """A scene as one HTML page; the panel of sliders is given as data for its script."""
+    try:
+        import meshcat
+        from umsgpack import packb, unpackb
+    except ImportError:
+        raise MissingExtraError(
+            "pictures need meshcat; run: pip install 'meshcat>=0.3.2'"
+        ) from None
+    recorder = Recorder()
+    root = meshcat.Visualizer(window=recorder)["/"]
+    _set_stage(root, recorder, camera, dark)
+    labels = []
     for node in nodes:
-        if node.shape is not None:
-            commands.append(_set_object(node.path, node.shape, node.color, store))
-        commands.append(_set_transform(node.path, node.pose))
+        if isinstance(node.shape, Label):
+            labels.append([node.path, node.shape.text, node.shape.large])
+        elif node.shape is not None:
+            root[node.path].set_object(_object(node))
+        turned = node.pose @ _Y_TO_Z if isinstance(node.shape, Cylinder) else node.pose
+        root[node.path].set_transform(np.round(turned, 9) + 0.0)
     if motion is not None and motion.tracks:
-        commands.append(_set_animation(motion))
-    # the viewer has no command for the point that the camera turns about
-    content = {"arrays": store.arrays, "commands": commands,
-               "target": _y_upwards(camera.target), "aspect": ASPECT,
-               "depth": round(camera.depth, 6)}  # fmt: skip
-    scene = json.dumps(content, separators=(",", ":"))
-    # a "<" could end the script element or open a comment in it
-    return _TEMPLATE.format(
-        title=escape(title), viewer=_viewer_script(), scene=scene.replace("<", "\\u003c"),
-        legend=_legend_list(legend), style="" if sliders is None else STYLE,
-        panel="" if sliders is None else panel_html(title, sliders) + "\n",
-        script="" if sliders is None else f"<script>\n{SCRIPT}</script>\n",
-    )  # fmt: skip
-
-
-def _legend_list(legend: Legend) -> str:
-    """A list of coloured squares with their texts, or nothing."""
-    if not legend:
-        return ""
-    items = [
+        root.set_animation(_animation(motion), repetitions=_MANY if motion.loop else 1)
+    scene = {
+        "commands": recorder.commands,
+        "geometries": [unpackb(geometry) for geometry in recorder.geometries],
+        "labels": labels,
+        "target": _y_upwards(camera.target),
+        "aspect": ASPECT,
+        "depth": round(camera.depth, 6),
+        "panel": panel,
+    }
+    viewer = Path(str(meshcat.__file__)).parent / "viewer" / "dist" / "main.min.js"
+    items = (
         f'<li><span style="background: #{_rgb(color):06x}"></span>{escape(text)}</li>'
         for text, color in legend
-    ]
-    return "\n".join(('<ul id="legend">', *items, "</ul>\n"))
+    )
+    template = Path(__file__).with_name("page.html").read_text(encoding="utf-8")
+    return Template(template).substitute(
+        title=escape(title),
+        theme="dark" if dark else "",
+        viewer=viewer.read_text(encoding="utf-8"),
+        scene=b64encode(packb(scene)).decode("ascii"),
+        legend=f'<ul id="legend">{"".join(items)}</ul>' if legend else "",
+        panel='<div id="panel"></div>\n' if panel else "",
+    )
 
 
 def _rgb(color: Color) -> int:
@@ -168,168 +131,82 @@ def _rgb(color: Color) -> int:
     return (r << 16) + (g << 8) + b
 
 
-class _ArrayStore:
-    """Arrays as text, each once, however many postures or robots show the same mesh."""
+def _set_stage(root: Any, recorder: Recorder, camera: Camera, dark: bool) -> None:
+    """Background, lights and camera in place of meshcat's."""
+    from meshcat.geometry import PerspectiveCamera
 
-    def __init__(self) -> None:
-        self.arrays: list[tuple[str, str]] = []
-        self._known: dict[tuple[str, str], int] = {}
-
-    def add(self, array: np.ndarray, kind: str) -> int:
-        dtype = {"Float32Array": "<f4", "Uint16Array": "<u2", "Uint32Array": "<u4"}[kind]
-        text = base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")
-        if (kind, text) not in self._known:
-            self._known[kind, text] = len(self.arrays)
-            self.arrays.append((kind, text))
-        return self._known[kind, text]
-
-
-def _stage(camera: Camera) -> Iterable[dict[str, Any]]:
-    """Background, lights and camera; meshcat's grid and axes give way to ours."""
-    for key, value in zip(("top_color", "bottom_color"), _SKY, strict=True):
-        yield _set_property("Background", key, value)
+    top, bottom = _NIGHT if dark else _SKY
+    root["Background"].set_property("top_color", top)
+    root["Background"].set_property("bottom_color", bottom)
     for path in ("Grid", "Axes"):
-        yield _set_property(path, "visible", False)
-    for name in ("SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight",
-                 "FillLight"):  # fmt: skip
-        yield {"type": "delete", "path": f"Lights/{name}"}
+        root[path].set_property("visible", False)
+    for name in _OTHER_LIGHTS:
+        root[f"Lights/{name}"].delete()
     for name, kind, intensity, position in _LIGHTS:
-        path = f"Lights/{name}"
-        yield {"type": "set_object", "path": path, "object": {
+        matrix = se3.translation(*position).T.ravel().tolist()
+        light = {"uuid": name, "type": kind, "color": 0xFFFFFF, "intensity": intensity}
+        lamp = {
             "metadata": {"version": 4.5, "type": "Object"},
-            "object": {"uuid": path, "type": kind, "color": 0xFFFFFF, "intensity": intensity,
-                       "matrix": _numbers(se3.translation(*position).T)},
-        }}  # fmt: skip
+            "object": light | {"matrix": matrix},
+        }
+        path = f"/Lights/{name}"
+        recorder.commands.append({"type": "set_object", "path": path, "object": lamp})
         # the viewer lets every object that it loads cast shadows
-        yield _set_property(f"{path}/<object>", "castShadow", False)
-    far = max(camera.distance, 1.0)
-    yield {"type": "set_object", "path": "Cameras/default/rotated", "object": {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "object": {"uuid": "camera", "type": "PerspectiveCamera", "fov": FIELD_OF_VIEW,
-                   "aspect": 1.0, "near": camera.distance / 200.0, "far": 50.0 * far, "zoom": 1.0},
-    }}  # fmt: skip
-    yield _set_property("Cameras/default/rotated/<object>", "position", _y_upwards(camera.position))
+        _set(recorder, f"{path}/<object>", "castShadow", False)
+    near, far = camera.distance / 200.0, 50.0 * max(camera.distance, 1.0)
+    lens = PerspectiveCamera(FIELD_OF_VIEW, 1, near, far)  # type: ignore[arg-type]
+    lens.uuid = "camera"
+    root["Cameras/default/rotated"].set_object(lens)
+    position = _y_upwards(camera.position)
+    _set(recorder, "/Cameras/default/rotated/<object>", "position", position)
+
+
+def _set(recorder: Recorder, path: str, name: str, value: Any) -> None:
+    """Record a property; meshcat's own command writes its name in small letters."""
+    recorder.commands.append(
+        {"type": "set_property", "path": path, "property": name, "value": value}
+    )
 
 
 def _y_upwards(point: Array) -> list[float]:
-    """A point of the world in the axes that the camera lives in."""
+    """A point of the world in the axes of the viewer's camera."""
     x, y, z = (round(float(v), 6) for v in point)
     return [x, z, -y]
 
 
-def _set_transform(path: str, pose: Array) -> dict[str, Any]:
-    return {"type": "set_transform", "path": path, "matrix": _numbers(pose.T)}
+def _object(node: Node) -> Any:
+    """The shape of a node as an object of meshcat."""
+    import meshcat.geometry as g
 
-
-def _set_property(path: str, key: str, value: Any) -> dict[str, Any]:
-    return {"type": "set_property", "path": path, "property": key, "value": value}
-
-
-def _set_object(path: str, shape: Drawable, color: Color, store: _ArrayStore) -> dict[str, Any]:
-    data: dict[str, Any] = {"metadata": {"version": 4.5, "type": "Object"}}
-    thing: dict[str, Any] = {"uuid": path, "material": "material"}
-    data["materials"] = [_material(shape, color)]
-    match shape:
-        case Label(text, size):
-            thing |= {"type": "Sprite", "matrix": _numbers(np.diag((size, size, 1.0, 1.0)))}
-            # canvas of the viewer: 256 pixels square
-            data["textures"] = [{"uuid": "text", "type": "_text", "text": text, "font_size": 48,
-                                 "font_face": "sans-serif"}]  # fmt: skip
-        case Segments():
-            thing |= {"type": "LineSegments", "geometry": "geometry"}
-            data["geometries"] = [_geometry(shape, store)]
-        case _:
-            thing |= {"type": "Mesh", "geometry": "geometry"}
-            if isinstance(shape, Cylinder):
-                thing["matrix"] = _numbers(_Y_TO_Z.T)
-            data["geometries"] = [_geometry(shape, store)]
-    data["object"] = thing
-    return {"type": "set_object", "path": path, "object": data}
-
-
-def _geometry(shape: Drawable, store: _ArrayStore) -> dict[str, Any]:
-    match shape:
+    look = {"color": _rgb(node.color), "opacity": float(node.color[3])}
+    # a transparent surface hides nothing behind it; both sides of meshes are drawn
+    solid = g.MeshPhongMaterial(
+        **look, side=2, specular=0x1C1C1C, shininess=40, depthWrite=node.color[3] > 0.2
+    )
+    match node.shape:
         case Box(size):
-            a, b, c = (float(v) for v in size)
-            return {"uuid": "geometry", "type": "BoxGeometry", "width": a, "height": b, "depth": c}
+            return g.Mesh(g.Box([float(v) for v in size]), solid)
         case Cylinder(radius, length):
-            return {"uuid": "geometry", "type": "CylinderGeometry", "radiusTop": float(radius),
-                    "radiusBottom": float(radius), "height": float(length),
-                    "radialSegments": 32}  # fmt: skip
+            return g.Mesh(g.Cylinder(float(length), float(radius)), solid)
         case Sphere(radius):
-            return {"uuid": "geometry", "type": "SphereGeometry", "radius": float(radius),
-                    "widthSegments": 32, "heightSegments": 24}  # fmt: skip
-        case Segments(points):
-            return {"uuid": "geometry", "type": "BufferGeometry",
-                    "data": {"attributes": {"position": _position(points, store)}}}  # fmt: skip
+            return g.Mesh(g.Sphere(float(radius)), solid)
         case Triangles(vertices, faces):
-            kind = "Uint16Array" if len(vertices) < 65536 else "Uint32Array"
-            index = {"type": kind, "array": store.add(faces.ravel(), kind)}
-            return {"uuid": "geometry", "type": "BufferGeometry",
-                    "data": {"attributes": {"position": _position(vertices, store)},
-                             "index": index}}  # fmt: skip
-        case Label():
-            return {}
+            return g.Mesh(g.TriangularMeshGeometry(vertices, faces), solid)
+        case Segments(points):
+            thin: Any = g.LineBasicMaterial(**look)
+            return g.LineSegments(g.PointsGeometry(points.T), thin)
 
 
-def _position(points: np.ndarray, store: _ArrayStore) -> dict[str, Any]:
-    return {"itemSize": 3, "type": "Float32Array", "normalized": False,
-            "array": store.add(points, "Float32Array")}  # fmt: skip
+def _animation(motion: Motion) -> Any:
+    """Turns about and shifts along z of the joints, at common times."""
+    from meshcat.animation import Animation, AnimationClip, AnimationTrack
+    from meshcat.path import Path as NodePath
 
-
-def _material(shape: Drawable, color: Color) -> dict[str, Any]:
-    material: dict[str, Any] = {
-        "uuid": "material",
-        "color": _rgb(color),
-        "transparent": color[3] < 1.0,
-        "opacity": float(color[3]),
-    }
-    match shape:
-        case Label():
-            # drawn over everything, as large as its distance makes it
-            return material | {"type": "SpriteMaterial", "map": "text", "transparent": True,
-                               "depthTest": False}  # fmt: skip
-        case Segments():
-            return material | {"type": "LineBasicMaterial"}
-        case _:
-            # both sides: a mesh may be mirrored or have holes
-            return material | {"type": "MeshPhongMaterial", "specular": 0x1C1C1C, "shininess": 40,
-                               "side": 2, "depthWrite": color[3] > 0.2}  # fmt: skip
-
-
-def _set_animation(motion: Motion) -> dict[str, Any]:
-    animations = [
-        {
-            "path": track.path,
-            "clip": {
-                # one frame a second makes the keys' times seconds
-                "fps": 1, "name": "default",
-                "tracks": [{
-                    "name": ".position[z]" if track.prismatic else ".rotation[z]",
-                    "type": "number",
-                    "times": np.round(track.times, 5).tolist(),
-                    "values": np.round(track.values, 6).tolist(),
-                }],
-            },
-        }
-        for track in motion.tracks
-    ]  # fmt: skip
-    options = {"play": True, "repetitions": _MANY if motion.loop else 1}
-    return {"type": "set_animation", "path": "", "animations": animations, "options": options}
-
-
-def _numbers(matrix: Array) -> list[float]:
-    """Column-major numbers of a matrix given transposed, without digits nobody can see."""
-    return (np.round(matrix, 9) + 0.0).ravel().tolist()
-
-
-@lru_cache(maxsize=1)
-def _viewer_script() -> str:
-    """The viewer that meshcat ships."""
-    found = find_spec("meshcat")
-    folders = list(found.submodule_search_locations or []) if found else []
-    for folder in folders:
-        path = Path(folder) / "viewer" / "dist" / "main.min.js"
-        if path.is_file():
-            return path.read_text(encoding="utf-8")
-    raise MissingExtraError("pictures need meshcat; run: pip install 'meshcat>=0.3.2'")
+    clips = {}
+    for track in motion.tracks:
+        name = "position[z]" if track.prismatic else "rotation[z]"
+        times, values = np.round(track.times, 5).tolist(), np.round(track.values, 6).tolist()
+        # one frame a second makes the frames' numbers times
+        clip = AnimationClip({name: AnimationTrack(name, "number", times, values)}, fps=1)
+        clips[NodePath(tuple(track.path.split("/")))] = clip
+    return Animation(clips)

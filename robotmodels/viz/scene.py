@@ -11,9 +11,8 @@ from .._arrays import Array
 from ..errors import FrameNotFoundError
 from .camera import Camera
 from .motion import Motion
-from .nodes import Node
 from .page import page
-from .palette import Legend
+from .shapes import Legend, Node
 from .sliders import SliderPanel
 
 
@@ -26,17 +25,19 @@ class Scene:
     title : str
         Of the page.
     nodes : tuple of Node
-        What is drawn; upper nodes first.
+        The drawn shapes as a tree; upper nodes first.
     camera : Camera
-        Where it is seen from at first; the mouse turns, shifts and zooms.
+        The first view; the mouse turns, shifts and zooms.
     motion : Motion or None
-        What is played.
+        The motion that is played.
     height : int
         Pixels in a notebook.
     legend : tuple of (str, Color)
-        What the colours stand for, listed in a corner.
+        Texts and the colours they explain, listed in a corner.
     sliders : SliderPanel or None
-        What the reader moves.
+        The joints that the reader moves.
+    dark : bool
+        Whether the background is dark.
 
     Examples
     --------
@@ -55,6 +56,7 @@ class Scene:
     height: int = 480
     legend: Legend = ()
     sliders: SliderPanel | None = None
+    dark: bool = False
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -100,7 +102,8 @@ class Scene:
         MissingExtraError
             meshcat is not installed.
         """
-        return page(self.title, self.nodes, self.camera, self.motion, self.legend, self.sliders)
+        panel = None if self.sliders is None else self.sliders.data()
+        return page(self.title, self.nodes, self.camera, self.motion, self.legend, panel, self.dark)
 
     def save(self, path: str | Path) -> Path:
         """Write the picture as one offline page, with its animation.

@@ -1,23 +1,88 @@
-"""A still picture of robots."""
+"""Pictures of robots: still, moving, with sliders.
+
+Options of all of them:
+
+Parameters
+----------
+frames : bool
+    Whether the axes of every frame R_j are drawn (x red, y green, z blue).
+names : bool
+    Whether the names of the frames are written beside them.
+tool : bool
+    Whether the axes of the tool are drawn.
+meshes : bool
+    Whether the shapes of the source URDF are used, with a skeleton and a warning for mesh files
+    that are missing; otherwise a skeleton sized from the table, as for robots without shapes.
+color : array_like, shape (3,) or (4,), optional
+    Of the links: red, green, blue and opacity in [0, 1].
+opacity : float
+    Of the links, in [0, 1].
+box : array_like, shape (6,), optional
+    Workspace to draw: ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, metres.
+grid : bool
+    Whether the floor z = 0 and the axes of the world are drawn.
+view : array_like, shape (2,), optional
+    Azimuth and elevation of the camera seen from the robot, radians; default obliquely.
+height : int
+    Of the picture in a notebook, pixels.
+dark : bool
+    Whether the background is dark.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Wrong joint variables or options; a motion that is none of joints; coupled joints at values
+    that contradict their coupling.
+UrdfError
+    A mesh file cannot be read.
+MissingExtraError
+    A package that draws is not installed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import index
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector
+from .. import se3
+from .._arrays import Array, as_exact, as_floats, as_vector
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics import link_poses
 from ..kinematics.ellipsoid import Ellipsoid
-from ..model import RobotModel
-from ..visual import Color
-from .beside import FROM_THE_FRONT, beside
-from .compose import as_color, as_many, as_models, as_opacity, compose, unique_names
-from .ellipsoid import as_ellipsoids, draw_ellipsoids
-from .nodes import Node
-from .palette import PALETTE, as_legend
-from .robot import DrawnRobot, Look, draw_robot
+from ..model import RobotModel, check_model
+from ..trajectories.joint_path import JointPath
+from ..trajectories.resolved_motion import ResolvedMotion
+from ..trajectories.trajectory import Samples, Trajectory
+from ..visual import Color, characteristic_length
+from .camera import framed
+from .motion import Motion, Track, keyframes, timed_samples
+from .over_time import is_prismatic
+from .robot import MESH_COLOR, RobotDrawing, RobotStyle, draw_robot
 from .scene import Scene
+from .shapes import (
+    Label,
+    Legend,
+    Node,
+    as_ellipsoids,
+    draw_ellipsoids,
+    floor_grid,
+    path_node,
+    workspace_box,
+)
+from .sliders import coupled_posture, coupling, slider_panel
+from .style import PALETTE, as_texts
+
+Moving = ArrayLike | Trajectory | Samples | JointPath | ResolvedMotion
+
+_SEEN = 60  # configurations of a motion that the picture is made to hold
+_FROM_THE_FRONT = (np.radians(-78.0), np.radians(32.0))  # azimuth, elevation
+# The picture has room for each joint turned by this much to either side, rad, or moved by this part
+# of the way to the ends of its stroke.
+_TURN, _STROKE = np.radians(25.0), 0.4
 
 
 def show(
@@ -38,6 +103,7 @@ def show(
     legend: Sequence[str] | None = None,
     ellipsoids: Ellipsoid | Sequence[Ellipsoid] | None = None,
     ellipsoid_scale: float | None = None,
+    dark: bool = False,
 ) -> Scene:
     """Draw a robot, several postures of it over each other, or several robots; also called plot.
 
@@ -48,28 +114,10 @@ def show(
     q : array_like, shape (n,) or (N, n), optional
         Joint variables in radians or metres; with N > 1 the postures are drawn together, each in
         a colour of its own. For several robots a list with an entry for each. Default zero.
-    frames : bool
-        Whether the axes of every frame R_j are drawn (x red, y green, z blue).
-    names : bool
-        Whether the names of the frames are written beside them.
-    tool : bool
-        Whether the axes of the tool are drawn.
-    meshes : bool
-        Whether the shapes of the source URDF are used; otherwise a skeleton sized from the table
-        is drawn, as for robots that have none.
+    frames, names, tool, meshes, opacity, box, grid, view, height, dark
+        As at the head of `robotmodels.viz.show`.
     color : array_like, shape (3,) or (4,), optional
-        Of the links: red, green, blue and opacity in [0, 1]. For several postures or robots also
-        a list with an entry for each.
-    opacity : float
-        Of the links, in [0, 1].
-    box : array_like, shape (6,), optional
-        Workspace to draw: ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, metres.
-    grid : bool
-        Whether the floor z = 0 and the axes of the world are drawn.
-    view : array_like, shape (2,), optional
-        Azimuth and elevation of the camera seen from the robot, radians; default obliquely.
-    height : int
-        Of the picture in a notebook, pixels.
+        Of the links. For several postures or robots also a list with an entry for each.
     columns : int, optional
         Postures of one robot beside each other, so many in a row, numbered from 1; without it
         they stand over each other, where those that differ only by the turn of a link hide one
@@ -79,24 +127,15 @@ def show(
         picture with its colour.
     ellipsoids : Ellipsoid or sequence of Ellipsoid, optional
         Of velocities or forces, drawn at the tools they belong to; a batch gives one for each
-        posture. Flat ones are discs or bars; infinite ones are cut, with dashes where they go on.
+        posture. Flat ones are discs or bars; unbounded ones are cut, with dashes beyond.
     ellipsoid_scale : float, optional
         Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m. By default a round number for each quantity
-        that fits the robot. The legend tells it.
+        that fits the robot. The legend gives it.
 
     Returns
     -------
     Scene
         Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong joint variables or options.
-    MeshNotFoundError
-        A mesh of the source URDF is not where it was looked for.
-    MissingExtraError
-        A package that draws is not installed.
 
     Examples
     --------
@@ -105,38 +144,267 @@ def show(
     >>> show(arm, [[0.0, 0.5], [0.4, -0.5]], frames=True)
     <Scene 'robot': 29 shapes>
     """
-    models = as_models(model)
+    models = _as_models(model)
     postures = [
         _as_postures(value, item)
-        for item, value in zip(models, as_many(q, model, len(models), "q"), strict=True)
+        for item, value in zip(models, _as_many(q, model, len(models)), strict=True)
     ]
     colors = _colors(color, [len(p) for p in postures])
-    look = Look(bool(frames), bool(names), bool(tool), bool(meshes), as_opacity(opacity))
-    title = ", ".join(unique_names(models))
-    key = as_legend(legend, [c for each in colors for c in each])
-    drawn, numbers = list(models), list[Node]()
+    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
+    title = ", ".join(_unique_names(models))
+    key = _as_legend(legend, [c for each in colors for c in each])
+    drawn, extra = list(models), list[Node]()
     if columns is not None:
-        if len(drawn) > 1:
+        if len(drawn) > 1 or ellipsoids is not None:
             raise InvalidValueError(
                 "columns: the postures of one robot stand beside each other; several robots stand "
-                "where their bases are, see RobotModel.with_base."
+                "where their bases are (see RobotModel.with_base), and ellipsoids where the robot "
+                "is."
             )
-        drawn, numbers = beside(drawn[0], postures[0], columns)
-        if ellipsoids is not None:
-            raise InvalidValueError(
-                "ellipsoids: they are where the robot is, not beside it; leave columns out."
-            )
-        view = FROM_THE_FRONT if view is None else view
+        drawn, extra = _side_by_side(drawn[0], postures[0], columns)
+        view = _FROM_THE_FRONT if view is None else view
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
-        draw_robot(item, p, f"robots/{label}", look, c)
-        for item, p, label, c in zip(drawn, postures, unique_names(drawn), colors, strict=True)
+        draw_robot(item, p, f"robots/{label}", style, c)
+        for item, p, label, c in zip(drawn, postures, _unique_names(drawn), colors, strict=True)
     ]
-    shown = draw_ellipsoids(
-        as_ellipsoids(ellipsoids), max(robot.size for robot in robots), ellipsoid_scale
-    )
-    robots.append(DrawnRobot(shown.nodes, shown.points, (), 0.0))
-    return compose(title, robots, numbers, box, grid, view, height, legend=(*key, *shown.legend))
+    size = max(robot.size for robot in robots)
+    nodes, points, more = draw_ellipsoids(as_ellipsoids(ellipsoids), size, ellipsoid_scale)
+    robots.append(RobotDrawing(tuple(nodes), points, (), 0.0))
+    return _scene(title, robots, extra, box, grid, view, height, dark, legend=(*key, *more))
+
+
+def animate(
+    model: RobotModel | Sequence[RobotModel],
+    q: Moving | Sequence[Moving],
+    dt: float | None = None,
+    fps: float | None = None,
+    *,
+    path: bool = False,
+    loop: bool = True,
+    frames: bool = False,
+    names: bool = False,
+    tool: bool = True,
+    meshes: bool = True,
+    color: ArrayLike | None = None,
+    opacity: float = 1.0,
+    box: ArrayLike | None = None,
+    grid: bool = True,
+    view: ArrayLike | None = None,
+    height: int = 480,
+    dark: bool = False,
+) -> Scene:
+    """Draw a robot, or several, that moves; also called play.
+
+    More than 30 samples a second are interpolated at 30 a second, the two ends included.
+
+    Parameters
+    ----------
+    model : RobotModel or sequence of RobotModel
+        The robot, or R robots.
+    q : array_like, shape (N, n), or Trajectory, Samples, JointPath or ResolvedMotion
+        Joint variables in radians or metres, N >= 2, or a motion with its own times; for several
+        robots a list of them. A trajectory is sampled at the frame rate.
+    dt : float, optional
+        Seconds from one sample to the next; they replace the times of samples that have some.
+    fps : float, optional
+        Samples a second, instead of ``dt``; default 30.
+    path : bool
+        Whether the path of the tool is drawn.
+    loop : bool
+        Whether the motion starts again at its end.
+    frames, names, tool, meshes, color, opacity, box, grid, view, height, dark
+        As at the head of `robotmodels.viz.show`.
+
+    Returns
+    -------
+    Scene
+        ``.motion`` has the duration and the number of keyframes.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> q = np.linspace([0.0, 0.0], [1.0, 0.5], 1001)
+    >>> animate(arm, q, dt=0.002)
+    <Scene 'robot': 11 shapes, 2 s from 1001 samples in 122 keyframes>
+    >>> from robotmodels.trajectories import quintic
+    >>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
+    1.5
+    """
+    models = _as_models(model)
+    values = _as_many(q, model, len(models))
+    samples = [timed_samples(v, m.n, dt, fps, "q") for m, v in zip(models, values, strict=True)]
+    rgba = None if color is None else _as_color(color)
+    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
+    labels = _unique_names(models)
+    robots: list[RobotDrawing] = []
+    tracks: list[Track] = []
+    paths: list[Node] = []
+    for item, (times, motion), label in zip(models, samples, labels, strict=True):
+        some = motion[np.unique(np.linspace(0, len(motion) - 1, _SEEN).astype(int))]
+        robot = draw_robot(item, motion[:1], f"robots/{label}", style, [rgba], some)
+        t, kept = keyframes(times, motion)
+        slides = is_prismatic(item).tolist()
+        tracks += map(Track, robot.joints, slides, [t] * item.n, kept.T)
+        if path:
+            tips = link_poses(item, kept)[:, item.tip - 1] @ item.tool
+            paths += path_node(label, tips[:, :3, 3], robot.size)
+        robots.append(robot)
+    count = max(len(motion) for _, motion in samples)
+    end = max(float(times[-1]) for times, _ in samples)
+    played = Motion(tuple(tracks), count, end, bool(loop))
+    return _scene(", ".join(labels), robots, paths, box, grid, view, height, dark, motion=played)
+
+
+def jog(
+    model: RobotModel,
+    q: ArrayLike | None = None,
+    *,
+    frames: bool = False,
+    names: bool = False,
+    tool: bool = True,
+    meshes: bool = True,
+    color: ArrayLike | None = None,
+    opacity: float = 1.0,
+    box: ArrayLike | None = None,
+    grid: bool = True,
+    view: ArrayLike | None = None,
+    height: int = 640,
+    dark: bool = False,
+) -> Scene:
+    """Draw a robot with a slider for each joint; also called teach, teach panel, joint sliders.
+
+    The page needs no server. Its panel has a slider and a number for each joint (degrees or
+    metres) with the joint's limits, the named configurations, and the pose of the tool or of
+    another frame. A joint without limits has a slider from -180 to 180 degrees or -1 to 1 m, and
+    the panel says so. Numbers outside the limits may be typed; they are marked. Joints that a
+    transmission couples (mimic joints) have no slider and follow the others.
+
+    The address of the page may hold a posture, ``arm.html#q=10,-20,0.3``, in the order and the
+    units of the sliders; the page keeps it there, so that a link shows a posture.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : array_like, shape (n,), optional
+        The first posture, and that of Reset: joint variables in radians or metres; default zero.
+    frames, names, tool, meshes, color, opacity, box, grid, view, height, dark
+        As at the head of `robotmodels.viz.show`.
+
+    Returns
+    -------
+    Scene
+        Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], d=[0, 0.3]))
+    >>> jog(arm, [0.5, 0.1])
+    <Scene 'robot': 12 shapes, 2 sliders>
+    """
+    check_model(model)
+    start = coupled_posture(model, None if q is None else as_exact(q, (model.n,), "q"))
+    rgba = None if color is None else _as_color(color)
+    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
+    (label,) = _unique_names((model,))
+    seen = _neighbourhood(model, start)
+    robot = draw_robot(model, start[None], f"robots/{label}", style, [rgba], seen)
+    panel = slider_panel(model, start, robot.joints, robot.frames)
+    return _scene(model.name, [robot], [], box, grid, view, height, dark, sliders=panel)
+
+
+def _scene(
+    title: str,
+    robots: Sequence[RobotDrawing],
+    extra: Sequence[Node],
+    box: ArrayLike | None,
+    grid: bool,
+    view: ArrayLike | None,
+    height: int,
+    dark: bool,
+    **options: Any,
+) -> Scene:
+    """Robots, extra nodes and what stands around them as a scene that they fill."""
+    points: Array = np.concatenate([robot.points for robot in robots])
+    nodes = [node for robot in robots for node in robot.nodes]
+    nodes += extra
+    if box is not None:
+        box_nodes, corners = workspace_box(box)
+        nodes += box_nodes
+        points = np.concatenate((points, corners))
+    if grid:
+        nodes += floor_grid(points, dark)
+    angles = None if view is None else as_exact(view, (2,), "view").tolist()
+    camera = framed(points, angles)
+    return Scene(title, tuple(nodes), camera, height=height, dark=bool(dark), **options)
+
+
+def _side_by_side(model: RobotModel, q: Array, columns: int) -> tuple[list[RobotModel], list[Node]]:
+    """Copies of the robot, one for each posture, in rows with numbers. Shapes: q (N, n)."""
+    try:
+        wide = 0 if isinstance(columns, bool) else index(columns)
+    except TypeError:
+        wide = 0
+    if wide < 1:
+        raise InvalidValueError(
+            f"columns: expected how many postures stand in a row, 1 or more, got {columns!r}."
+        )
+    size = characteristic_length(model.table, model.tool)
+    poses = link_poses(model, q)
+    ends = poses[:, model.tip - 1] @ model.tool
+    points = np.concatenate((poses[..., :3, 3].reshape(-1, 3), ends[:, :3, 3], [model.base[:3, 3]]))
+    low, high = points.min(axis=0), points.max(axis=0)
+    step = high - low + 0.25 * size
+    step[1] = max(step[1], 1.2 * (high[2] - low[2]))  # or a row would hide the one behind it
+    robots, numbers = [], []
+    for k in range(len(q)):
+        row, column = divmod(k, wide)
+        shift = se3.translation(column * step[0], -row * step[1], 0.0)
+        robots.append(model.with_base(shift @ model.base))
+        foot = shift @ se3.translation(*(model.base[:3, 3] - (0.0, 0.32 * size, 0.0)))
+        numbers.append(Node(f"numbers/{k + 1}", foot, Label(str(k + 1), large=True)))
+    return robots, numbers
+
+
+def _neighbourhood(model: RobotModel, start: Array) -> Array:
+    """Named configurations, and the first one with each joint moved a little. Shapes: -> (M, n)."""
+    independent, matrix, _ = coupling(model)
+    moved = [start, *model.configurations.values()]
+    slides = is_prismatic(model)
+    for limit, sign in ((model.lower, -1.0), (model.upper, 1.0)):
+        to_limit = np.where(np.isfinite(limit), limit - start, 0.0)
+        step = np.where(slides, _STROKE * to_limit, sign * _TURN)
+        moved += [start + matrix[:, k] * step[i] for k, i in enumerate(independent)]
+    return np.stack(moved)
+
+
+def _as_models(model: object) -> tuple[RobotModel, ...]:
+    """One model or several, as a tuple."""
+    models = (model,) if isinstance(model, RobotModel) else model
+    if not isinstance(models, (tuple, list)) or not models:
+        raise InvalidValueError(
+            f"model: expected a RobotModel or a list of them, got {type(model).__name__}."
+        )
+    for item in models:
+        if not isinstance(item, RobotModel):
+            raise InvalidValueError(
+                f"model: expected a RobotModel, got {type(item).__name__} in the list."
+            )
+    return tuple(models)
+
+
+def _as_many(value: Any, model: object, count: int) -> tuple[Any, ...]:
+    """An entry of q for each robot: the value itself for one model, its items for several."""
+    if isinstance(model, RobotModel):
+        return (value,)
+    if value is None:
+        return (None,) * count
+    if not hasattr(value, "__len__") or len(value) != count:
+        raise ShapeError(f"q: expected a list with one entry for each of the {count} robots.")
+    return tuple(value)
 
 
 def _as_postures(value: ArrayLike | None, model: RobotModel) -> Array:
@@ -151,22 +419,59 @@ def _as_postures(value: ArrayLike | None, model: RobotModel) -> Array:
     return q.reshape(-1, model.n)
 
 
-def _colors(
-    color: ArrayLike | Sequence[ArrayLike] | None, counts: list[int]
-) -> list[list[Color | None]]:
+def _as_color(value: Any, name: str = "color") -> Color:
+    """A colour, checked. Shapes: value (3,) or (4,)."""
+    numbers = as_floats(value, name)
+    if numbers.shape not in ((3,), (4,)):
+        raise ShapeError(f"{name}: expected (r, g, b) or (r, g, b, a), got shape {numbers.shape}.")
+    if numbers.min() < 0 or numbers.max() > 1:
+        raise InvalidValueError(f"{name}: expected numbers from 0 to 1, got {numbers.tolist()}.")
+    r, g, b, a = (*numbers.tolist(), 1.0)[:4]
+    return r, g, b, a
+
+
+def _as_opacity(value: float) -> float:
+    """An opacity, checked."""
+    opacity = float(as_exact(value, (), "opacity"))
+    if not 0 <= opacity <= 1:
+        raise InvalidValueError(f"opacity: expected a number from 0 to 1, got {opacity}.")
+    return opacity
+
+
+def _colors(color: Any, counts: list[int]) -> list[list[Color | None]]:
     """A colour, or None for the links' own, for each posture of each robot."""
     if color is None:
         return [
             [None] if count == 1 else [PALETTE[k % len(PALETTE)] for k in range(count)]
             for count in counts
         ]
-    if hasattr(color, "__len__") and len(color) and hasattr(color[0], "__len__"):  # type: ignore[arg-type,index]
-        each = [as_color(c, f"color[{i}]") for i, c in enumerate(color)]  # type: ignore[arg-type]
-        if len(counts) > 1 and len(each) == len(counts):
-            return [[c] * count for c, count in zip(each, counts, strict=True)]
-        if len(counts) == 1 and len(each) == counts[0]:
-            return [list(each)]
-        wanted = f"{len(counts)} robots" if len(counts) > 1 else f"{counts[0]} postures"
-        raise ShapeError(f"color: expected one, or one for each of the {wanted}, got {len(each)}.")
-    same = as_color(color)  # type: ignore[arg-type]
-    return [[same] * count for count in counts]
+    if not (hasattr(color, "__len__") and len(color) and hasattr(color[0], "__len__")):
+        return [[_as_color(color)] * count for count in counts]
+    each = [_as_color(c, f"color[{i}]") for i, c in enumerate(color)]
+    if len(counts) > 1 and len(each) == len(counts):
+        return [[c] * count for c, count in zip(each, counts, strict=True)]
+    if len(counts) == 1 and len(each) == counts[0]:
+        return [list(each)]
+    wanted = f"{len(counts)} robots" if len(counts) > 1 else f"{counts[0]} postures"
+    raise ShapeError(f"color: expected one, or one for each of the {wanted}, got {len(each)}.")
+
+
+def _as_legend(texts: Any, colors: Sequence[Color | None]) -> Legend:
+    """Texts beside the colours they explain."""
+    if texts is None:
+        return ()
+    words = as_texts(texts, len(colors), "legend", "postures drawn")
+    return tuple(zip(words, (color or MESH_COLOR for color in colors), strict=True))
+
+
+def _unique_names(models: Sequence[RobotModel]) -> tuple[str, ...]:
+    """A name for each robot in the scene: its own, with a number if another one has it."""
+    names: list[str] = []
+    for model in models:
+        name = own = model.name.replace("/", "_")
+        k = 1
+        while name in names:
+            k += 1
+            name = f"{own}_{k}"
+        names.append(name)
+    return tuple(names)

@@ -1,46 +1,20 @@
-"""What joint sliders move: the independent joints of a robot, and the joints that follow them."""
+"""Joint sliders of a robot: its independent joints, those that follow them, and their panel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from ..geometry import PRISMATIC
 from ..model import RobotModel
+from .over_time import is_prismatic
 
-# A joint without a limit: half a turn to either side, or this many metres.
-_HALF_TURN, _HALF_STROKE = np.pi, 1.0
-
-# How far a joint may be from what its coupling says, rad or m.
-_COUPLED = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class Slider:
-    """Slider of a joint in the panel."""
-
-    name: str
-    path: str
-    prismatic: bool
-    passive: bool
-    lower: float
-    upper: float
-    ends: tuple[float, float]
-    follows: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Target:
-    """A frame whose pose the panel can show."""
-
-    name: str
-    path: str
-    pose: Array
+_COUPLED = 1e-6  # rad or m that a joint may be off its coupling
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,50 +24,68 @@ class SliderPanel:
     Shapes: independent, start (r,); matrix (n, r); offset (n,).
     """
 
-    joints: tuple[Slider, ...]
     independent: NDArray[np.int64]
     matrix: Array
     offset: Array
     start: Array
+    joints: tuple[dict[str, Any], ...]
     postures: tuple[tuple[str, Array], ...]
-    targets: tuple[Target, ...]
+    targets: tuple[tuple[str, str, Array], ...]
 
     @property
     def q(self) -> Array:
         """All n joint variables at first, rad or m."""
         return self.matrix @ self.start + self.offset
 
+    def data(self) -> dict[str, Any]:
+        """The panel as data for its script."""
+        return {
+            "joints": list(self.joints),
+            "matrix": self.matrix.tolist(),
+            "offset": self.offset.tolist(),
+            "start": self.start.tolist(),
+            "postures": [[name, x.tolist()] for name, x in self.postures],
+            "targets": [
+                {"name": name, "path": path, "pose": pose.T.ravel().tolist()}
+                for name, path, pose in self.targets
+            ],
+        }
+
 
 def slider_panel(
-    model: RobotModel, q: Array, moving: Sequence[str], frames: Sequence[str]
+    model: RobotModel, q: Array, paths: Sequence[str], frames: Sequence[str]
 ) -> SliderPanel:
-    """The sliders of a robot."""
+    """The sliders of a robot whose joints and frames are drawn at some paths."""
     independent, matrix, offset = coupling(model)
     postures = []
     for name, posture in model.configurations.items():
         x = posture[independent]
         kept = np.allclose(matrix @ x + offset, posture, rtol=0.0, atol=_COUPLED)
         postures.append((name if kept else f"{name} (coupled joints follow)", x))
-    joints = tuple(_slider(model, i, path, matrix, independent) for i, path in enumerate(moving))
-    tool = Target(model.frame_names[-1], frames[model.tip], model.tool)
-    targets = {tool.name: tool}
+    joints = tuple(_joint(model, i, path, matrix, independent) for i, path in enumerate(paths))
+    tool = model.frame_names[-1]
+    targets = {tool: (tool, frames[model.tip], model.tool)}
     for j, name in enumerate(model.table.names, start=1):
-        targets.setdefault(name, Target(name, frames[j], np.eye(4)))
+        targets.setdefault(name, (name, frames[j], np.eye(4)))
     # a link of the source URDF goes before a joint of the same name, as in dgm
-    targets |= {f.name: Target(f.name, frames[f.parent], f.pose) for f in model.frames}
-    targets[tool.name] = tool
+    links = {f.name: (f.name, frames[f.parent], f.pose) for f in model.frames if f.name != tool}
     return SliderPanel(
-        joints, independent, matrix, offset, q[independent], tuple(postures),
-        tuple(targets.values()),
-    )  # fmt: skip
+        independent=independent,
+        matrix=matrix,
+        offset=offset,
+        start=q[independent],
+        joints=joints,
+        postures=tuple(postures),
+        targets=tuple((targets | links).values()),
+    )
 
 
 def coupled_posture(model: RobotModel, q: Array | None) -> Array:
-    """Initial posture of the sliders."""
+    """Initial configuration of the sliders."""
     independent, matrix, offset = coupling(model)
-    asked = model.configurations["zero"] if q is None else q
-    coupled = matrix @ asked[independent] + offset
-    off = np.abs(asked - coupled)
+    given = model.configurations["zero"] if q is None else q
+    coupled = matrix @ given[independent] + offset
+    off = np.abs(given - coupled)
     if q is not None and (off > _COUPLED).any():
         j = int(off.argmax())
         raise InvalidValueError(
@@ -110,22 +102,16 @@ def coupling(model: RobotModel) -> tuple[NDArray[np.int64], Array, Array]:
     Shapes: -> independent (r,), matrix (n, r), offset (n,).
     """
     n = model.n
-    if model.transmission is None:
+    rank = n if model.transmission is None else np.linalg.matrix_rank(model.transmission.matrix)
+    if model.transmission is None or rank == n:
         return np.arange(n), np.eye(n), np.zeros(n)
     K, q_0 = model.transmission.matrix, model.transmission.offset
     # joints that an encoder of their own moves come first: they lead, the others mimic
-    order = sorted(range(n), key=lambda j: (K[j, j] == 0.0, j))
     chosen: list[int] = []
-    basis = np.zeros((0, n))
-    for j in order:
-        row = K[j] / (np.linalg.norm(K[j]) or 1.0)
-        rest = row - basis.T @ (basis @ row)
-        if np.linalg.norm(rest) > 1e-9:
+    for j in sorted(range(n), key=lambda j: (K[j, j] == 0.0, j)):
+        if np.linalg.matrix_rank(K[[*chosen, j]]) > len(chosen):
             chosen.append(j)
-            basis = np.vstack((basis, rest / np.linalg.norm(rest)))
     independent = np.array(sorted(chosen), dtype=np.int64)
-    if independent.size == n:
-        return independent, np.eye(n), np.zeros(n)
     C = K @ np.linalg.pinv(K[independent])
     C[np.abs(C) < 1e-14] = 0.0
     C[independent] = np.eye(independent.size)
@@ -134,25 +120,45 @@ def coupling(model: RobotModel) -> tuple[NDArray[np.int64], Array, Array]:
     return independent, C, offset
 
 
-def _slider(
+def _joint(
     model: RobotModel, i: int, path: str, matrix: Array, independent: NDArray[np.int64]
-) -> Slider:
-    table = model.table
-    names = table.joint_names
-    row = int(table.joint_rows[i])
-    prismatic = bool(table.sigma[row] == PRISMATIC)
-    leaders = () if i in independent else tuple(
-        names[k] for k, c in zip(independent, matrix[i], strict=True) if c
-    )  # fmt: skip
+) -> dict[str, Any]:
+    """A joint as data of the panel."""
+    table, names = model.table, model.table.joint_names
+    prismatic = bool(is_prismatic(model)[i])
     lower, upper = float(table.lower[i]), float(table.upper[i])
-    return Slider(
-        names[i], path, prismatic, not table.mu[row], lower, upper,
-        _ends(lower, upper, _HALF_STROKE if prismatic else _HALF_TURN), leaders,
-    )  # fmt: skip
+    half = 1.0 if prismatic else np.pi  # to either side where there is no limit
+    ends = (
+        lower if np.isfinite(lower) else min(-half, upper - 2.0 * half),
+        upper if np.isfinite(upper) else max(half, lower + 2.0 * half),
+    )
+    passive = not table.mu[table.joint_rows[i]]
+    note = _limits(lower, upper, ends, prismatic) + (", passive" if passive else "")
+    leads = bool(i in independent)
+    if not leads:
+        pairs = zip(independent, matrix[i], strict=True)
+        leaders = ", ".join(names[k] for k, c in pairs if c)
+        note = f"{f'follows {leaders}' if leaders else 'does not move'}; {note}"
+    return {
+        "name": names[i],
+        "path": path,
+        "prismatic": prismatic,
+        "lower": lower,
+        "upper": upper,
+        "ends": list(ends),
+        "leads": leads,
+        "note": note,
+    }
 
 
-def _ends(lower: float, upper: float, half: float) -> tuple[float, float]:
-    """The limits; where one is missing, as much as a joint without any has, beyond the other."""
-    low = lower if np.isfinite(lower) else min(-half, upper - 2.0 * half)
-    high = upper if np.isfinite(upper) else max(half, lower + 2.0 * half)
-    return low, high
+def _limits(lower: float, upper: float, ends: tuple[float, float], prismatic: bool) -> str:
+    """The limits in words; where one is missing, the range of the slider."""
+    unit, factor = ("m", 1.0) if prismatic else ("deg", 180.0 / np.pi)
+    low, high = (f"{end * factor:.5g}" for end in ends)
+    if np.isfinite(lower) and np.isfinite(upper):
+        return f"{low} to {high} {unit}"
+    if np.isfinite(lower):
+        return f"from {low} {unit}, no upper limit, slider to {high} {unit}"
+    if np.isfinite(upper):
+        return f"up to {high} {unit}, no lower limit, slider from {low} {unit}"
+    return f"no limits, slider {low} to {high} {unit}"

@@ -5,7 +5,9 @@
 Poses of eight arms, 60 of 100 of them singular or 1e-12 to 1e-3 rad beside a singularity, made by
 `benchmarks.igm_postures` with a fixed seed; and regular poses of every arm of the catalogue with
 at most seven joints. The postures are kept with the counts, so that neither file depends on the
-generator. Made with version 0.2.0 before the redesign of `igm`.
+generator. Made before the redesign of `igm`; 43 poses where two or three singularities come
+together, and two beside the folded elbow of the RX-90, were counted anew after it: members of one
+self-motion that stood there as separate solutions are one.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -112,8 +113,9 @@ def write_trajectory(
         for letter, per in (("q", ""), ("v", "/s"), ("a", "/s^2"))
         for name, unit in zip(names, units, strict=True)
     ]
-    rows, first = np.column_stack((t, q, v, a)), ",".join(header)
-    np.savetxt(path, rows, "%.12g", ",", header=first, comments="", encoding="utf-8")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow(header)  # names may hold commas
+        np.savetxt(file, np.column_stack((t, q, v, a)), "%.12g", ",")
 
 
 def excitation_data(result: ExcitingTrajectory) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 
 from ...kernels._compile import Floats, compiled
-from .._equations import polynomial_roots, trigonometric_roots
+from ..kernels.equations import polynomial_roots, trigonometric_roots
 
 DOUBLE, FREE_1, FREE_2, SMALL = 1, 2, 4, 8
 

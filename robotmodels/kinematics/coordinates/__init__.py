@@ -1,18 +1,18 @@
-"""Operational coordinates: ways to write a pose as numbers, and their rates.
+"""Operational coordinates: forms of a pose as numbers, and their rates.
 
 Seed book section 1.2.2, eq. [1.5] to [1.9], and section 1.3.1.1.
 """
 
-from .conversion import operational_coordinates, pose_from_coordinates
-from .jacobian import coordinate_jacobian, coordinate_jacobian_rate
-from .kinds import OrientationKind
+from .conversion import continuous_coordinates, operational_coordinates, pose_from_coordinates
+from .orientations import OrientationKind
 from .rates import (
+    coordinate_jacobian,
+    coordinate_jacobian_rate,
     coordinate_rates,
     coordinate_rates_rate,
     is_representation_singular,
     twist_from_rates,
 )
-from .sequences import continuous_coordinates
 
 __all__ = [
     "OrientationKind",

@@ -14,19 +14,22 @@ from ..._arrays import Array, as_vector
 from ...errors import NotARotationError, ShapeError
 from ...se3 import ROTATION_TOLERANCE, as_pose
 from ...se3.orientation import quaternions_of, rotation_vectors_of
-from ._angles import (
+from .orientations import (
     ANGLE_SEQUENCES,
+    OrientationKind,
     angles_near,
     angles_of,
-    rotation_of_angles,
-)
-from ._quaternions import (
+    continuous_angles,
+    continuous_quaternions,
+    continuous_vectors,
+    in_order,
+    orientation_kind,
     quaternions_near,
     quaternions_of_vectors,
+    rotation_of_angles,
     rotation_of_quaternions,
     vectors_near,
 )
-from .kinds import OrientationKind, orientation_kind
 
 
 def operational_coordinates(
@@ -39,13 +42,12 @@ def operational_coordinates(
     T : array_like, shape (..., 4, 4)
         Poses, metres.
     kind : OrientationKind or str
-        How the orientation is written; `OrientationKind` says in which order and what range.
-        **Khalil's roll is about z**; ``"rpy_urdf"`` is the order of URDF.
+        Form of the orientation. **Khalil's roll is about z**; ``"rpy_urdf"`` is the order of URDF.
     near : array_like, shape (..., m), optional
         Coordinates of the same kind, such as those of the sample before; the leading axes
         broadcast. Of all coordinates of the same pose the nearest to these are taken: the other
         solution of three angles, the opposite quaternion, whole turns; at gimbal lock the first
-        angle of ``near``, and the third takes what is left.
+        angle of ``near``.
 
     Returns
     -------
@@ -57,10 +59,9 @@ def operational_coordinates(
 
     Raises
     ------
-    InvalidValueError
-        An unknown kind; NaN or infinity.
-    ShapeError, NotARotationError
-        As `robotmodels.se3.as_pose`; ``near`` of the wrong length.
+    InvalidValueError, ShapeError, NotARotationError
+        An unknown kind; NaN or infinity; as `robotmodels.se3.as_pose`; ``near`` of the wrong
+        length.
 
     References
     ----------
@@ -82,30 +83,26 @@ def operational_coordinates(
 
 
 def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
-    """Poses of operational coordinates; the way back from `operational_coordinates`.
+    """Poses of operational coordinates, the inverse of `operational_coordinates`.
 
     Parameters
     ----------
     x : array_like, shape (..., m)
         Position in metres, then the orientation. Angles and rotation vectors may be any.
     kind : OrientationKind or str
-        How the orientation is written.
+        Form of the orientation.
 
     Returns
     -------
     ndarray, shape (..., 4, 4)
-        Poses. A quaternion, direction cosines or two axes that are off by more than rounding, but
-        no more than 1e-6, are brought onto the nearest rotation.
+        Poses. A quaternion, direction cosines or two axes that are off by no more than 1e-6 are
+        brought onto the nearest rotation.
 
     Raises
     ------
-    InvalidValueError
-        An unknown kind; NaN or infinity.
-    ShapeError
-        ``x`` of the wrong length.
-    NotARotationError
-        A quaternion that is not of unit length, or axes that are not of unit length, square and
-        right-handed.
+    InvalidValueError, ShapeError, NotARotationError
+        An unknown kind; NaN or infinity; ``x`` of the wrong length; a quaternion that is not of
+        unit length, or axes that are not of unit length, square and right-handed.
 
     References
     ----------
@@ -137,6 +134,68 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
         )
         T = as_pose(T, f"x ({kind.value.replace('_', ' ')})")
     return T
+
+
+def continuous_coordinates(
+    T: Any, kind: str | OrientationKind, near: ArrayLike | None = None
+) -> Array:
+    """Operational coordinates of a sequence of poses, without jumps between neighbours.
+
+    Each sample is what `operational_coordinates` gives near the one before it. Angles may leave
+    their range, and a quaternion may have a negative scalar.
+
+    Parameters
+    ----------
+    T : array_like, shape (N, ..., 4, 4)
+        Poses in their order along the first axis; further axes hold further sequences.
+    kind : OrientationKind or str
+        Form of the orientation.
+    near : array_like, shape (..., m), optional
+        Coordinates that the first sample is near to. Default: as `operational_coordinates` gives
+        it; a sequence that begins at gimbal lock begins with the first angle that it has when it
+        leaves.
+
+    Returns
+    -------
+    ndarray, shape (N, ..., m)
+        The coordinates. Where a motion passes a singularity of the representation at a small
+        distance, its angles turn quickly.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation
+    >>> T = np.array([rotation("z", angle) for angle in (3.0, 3.1, 3.2, 3.3)])
+    >>> continuous_coordinates(T, "rpy")[:, 3]
+    array([3. , 3.1, 3.2, 3.3])
+    """
+    kind = orientation_kind(kind)
+    T = as_pose(T)
+    if T.ndim < 3:
+        raise ShapeError(
+            "T: expected a sequence of poses, shape (N, ..., 4, 4), got one pose; for one pose "
+            "call operational_coordinates(T, kind, near)."
+        )
+    count, *others = T.shape[:-2]
+    start = None
+    if near is not None:
+        start = in_order(kind, as_coordinates(near, kind, "near")[..., 3:])
+        try:
+            start = np.broadcast_to(start, (*others, start.shape[-1]))
+        except ValueError:
+            raise ShapeError(
+                f"near: expected coordinates for each sequence, shape {(*others, kind.dimension)}"
+                f" or one for all, got leading axes {start.shape[:-1]}."
+            ) from None
+        start = start.reshape(-1, start.shape[-1])
+    rows = int(np.prod(others))
+    R = np.swapaxes(T[..., :3, :3].reshape(count, rows, 3, 3), 0, 1)
+    out = np.empty((count, rows, kind.dimension - 3))
+    for i in range(rows):
+        out[:, i] = _continuous(
+            np.ascontiguousarray(R[i]), kind, None if start is None else start[i]
+        )
+    out = in_order(kind, out).reshape(count, *others, kind.dimension - 3)
+    return np.concatenate([T[..., :3, 3], out], axis=-1)
 
 
 def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) -> Array:
@@ -195,15 +254,6 @@ def near_coordinates(
     return checked
 
 
-def in_order(kind: OrientationKind, orientation: Array) -> Array:
-    """Three angles from the order in which they are listed to that of the rotations, or back.
-
-    Shapes: orientation (..., k) -> (..., k).
-    """
-    sequence = ANGLE_SEQUENCES.get(kind)
-    return orientation[..., ::-1] if sequence and sequence.backwards else orientation
-
-
 def columns_of(R: Array, kind: OrientationKind) -> Array:
     """The columns s, n, a of matrices, or n and a, one behind the other.
 
@@ -227,3 +277,13 @@ def _unit(Q: Array) -> Array:
             "rounded away. Divide it by its length if it is meant as a direction."
         )
     return Q / length
+
+
+def _continuous(R: Array, kind: OrientationKind, near: Array | None) -> Array:
+    if kind in ANGLE_SEQUENCES:
+        return continuous_angles(ANGLE_SEQUENCES[kind], R, near)
+    if kind is OrientationKind.QUATERNION:
+        return continuous_quaternions(quaternions_of(R), near)
+    if kind is OrientationKind.ANGLE_AXIS:
+        return continuous_vectors(R, near)
+    return columns_of(R, kind)

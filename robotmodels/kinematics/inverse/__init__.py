@@ -13,19 +13,18 @@ from .criteria import (
     ObstacleCriterion,
     PostureCriterion,
 )
-from .distance_task import DistanceTask
-from .function_task import FunctionTask
-from .ikm import ikm
-from .joint_task import JointTask
-from .levels import Level, LevelVelocities, level_velocities
-from .linear_task import LinearTask
+from .ikm import ikm, ikm_second_order
 from .methods import DampedInverse, Damping, FilteredInverse, InverseMethod, PseudoInverse
-from .position_task import PositionTask
-from .second_order import ikm_second_order
-from .solution import IKMSolution
-from .status import IKMStatus
-from .tasks import Task
-from .twist_task import TwistTask
+from .solution import IKMSolution, IKMStatus
+from .tasks import (
+    DistanceTask,
+    FunctionTask,
+    JointTask,
+    LinearTask,
+    PositionTask,
+    Task,
+    TwistTask,
+)
 
 __all__ = [
     "Criterion",
@@ -40,8 +39,6 @@ __all__ = [
     "JointBounds",
     "JointLimitCriterion",
     "JointTask",
-    "Level",
-    "LevelVelocities",
     "LinearTask",
     "ManipulabilityCriterion",
     "NearLimitCriterion",
@@ -55,5 +52,4 @@ __all__ = [
     "TwistTask",
     "ikm",
     "ikm_second_order",
-    "level_velocities",
 ]

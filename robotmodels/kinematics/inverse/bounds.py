@@ -13,11 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_reals, as_vector, batch_rows, batch_shape, read_only
+from ..._arrays import (
+    Array,
+    Rebuilt,
+    as_number,
+    as_reals,
+    as_vector,
+    batch_rows,
+    batch_shape,
+    read_only,
+)
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel, check_model
-
-__all__ = ["JointBounds"]
 
 _ROUNDING = 1e-6
 """Part of the width of bounds by which others may miss them before that is a conflict."""
@@ -34,12 +41,12 @@ class JointBounds(Rebuilt):
     lower, upper : array_like, shape (n,) or (), optional
         Position limits, rad or m. Default the robot's.
     acceleration : array_like, shape (n,) or (), optional
-        Largest accelerations, rad/s^2 or m/s^2: joints near a limit are only as fast as lets them
-        brake before it. Default none: they may stop at once.
+        Largest accelerations, rad/s^2 or m/s^2: a joint near a limit is only as fast as lets it
+        brake before it. Default none: it may stop at once.
     step : float, optional
         Time for which a command is held, s: positions after it are inside the limits. Default
         none: a joint may move towards its limit until it is there (with ``acceleration``: as fast
-        as it can brake in time), and no further. Bounds of accelerations need a step.
+        as it can brake in time). Bounds of accelerations need a step.
 
     Raises
     ------
@@ -68,17 +75,9 @@ class JointBounds(Rebuilt):
     step: float | None = None
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
         for name in ("velocity", "lower", "upper", "acceleration"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = as_reals(value, name)
-            if array.ndim > 1:
-                raise ShapeError(f"{name}: expected shape (n,) or a number, got {array.shape}.")
-            if np.isnan(array).any():
-                raise InvalidValueError(f"{name}: NaN is no limit; infinity is none at all.")
-            set_(self, name, read_only(array))
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_limit(getattr(self, name), name))
         if self.velocity is not None and not (self.velocity >= 0.0).all():
             raise InvalidValueError(f"velocity: expected speeds, got {self.velocity}.")
         if self.acceleration is not None and not (self.acceleration > 0.0).all():
@@ -86,43 +85,17 @@ class JointBounds(Rebuilt):
                 f"acceleration: expected positive numbers, got {self.acceleration}."
             )
         if self.step is not None:
-            step = as_reals(self.step, "step")
-            if step.ndim or not 0.0 < step < np.inf:
-                raise InvalidValueError(
-                    f"step: expected a positive number of seconds, got {self.step!r}."
-                )
-            set_(self, "step", float(step))
+            object.__setattr__(self, "step", as_number(self.step, "step", above=0.0))
 
     def velocity_bounds(
         self, model: RobotModel, q: ArrayLike, v: ArrayLike | None = None
     ) -> tuple[Array, Array]:
-        """Bounds of the velocities at a configuration.
+        """Bounds of the velocities (..., n), rad/s or m/s, infinite where there are none.
 
         A joint outside its position limits may only move back, and with a step it has to: to the
-        limit in one step, or at its largest speed. Limits on ``|v|`` hold before all others, the
-        acceleration from a given ``v`` even before them: `conflicts` says where they exclude
-        others.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q : array_like, shape (..., n)
-            Joint variables, rad or m.
-        v : array_like, shape (..., n), optional
-            Velocities of the moment, from which ``acceleration`` allows a change in one step.
-            Default: any change.
-
-        Returns
-        -------
-        lower, upper : ndarray, shape (..., n)
-            Bounds, rad/s or m/s, infinite where there are none; ``lower <= upper``.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Limits for another number of joints or in the wrong order; velocities without an
-            acceleration and a step.
+        limit in one step, or at its largest speed. A present velocity ``v (..., n)`` adds what
+        ``acceleration`` allows in one step. Speeds take precedence over positions, accelerations
+        over both: see `conflicts`.
 
         Examples
         --------
@@ -133,34 +106,16 @@ class JointBounds(Rebuilt):
         >>> bounds.velocity_bounds(load("planar_2r"), [2.02, 0.0])
         (array([-1., -1.]), array([-0.2,  1. ]))
         """
-        low, high, _ = self._velocities(model, q, v)
-        return low, high
+        return self._velocities(model, q, v)[:2]
 
     def acceleration_bounds(
         self, model: RobotModel, q: ArrayLike, v: ArrayLike
     ) -> tuple[Array, Array]:
-        """Bounds of the accelerations, held for one step, at a state.
+        """Bounds of the accelerations (..., n), held for one step, rad/s^2 or m/s^2.
 
         They leave the joint inside its limits at the end of the step, slow enough to stop before
-        its position limits with the same bounds ever after. Largest accelerations hold before all
-        others: `conflicts` says where they exclude others.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q, v : array_like, shape (..., n)
-            Joint variables (rad or m) and velocities; the leading axes broadcast.
-
-        Returns
-        -------
-        lower, upper : ndarray, shape (..., n)
-            Bounds, rad/s^2 or m/s^2, infinite where there are none; ``lower <= upper``.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Limits for another number of joints or in the wrong order; no step.
+        its position limits with the same bounds ever after. Accelerations take precedence over all
+        others: see `conflicts`.
 
         Examples
         --------
@@ -169,23 +124,10 @@ class JointBounds(Rebuilt):
         >>> bounds.acceleration_bounds(load("planar_2r"), [0.0, 0.0], [0.8, -1.0])
         (array([-5., 0.]), array([2., 5.]))
         """
-        low, high, _ = self._accelerations(model, q, v)
-        return low, high
+        return self._accelerations(model, q, v)[:2]
 
     def outside(self, model: RobotModel, q: ArrayLike) -> NDArray[np.bool_]:
-        """Joints that are outside their position limits.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q : array_like, shape (..., n)
-            Joint variables, rad or m.
-
-        Returns
-        -------
-        ndarray of bool, shape (..., n)
-            Whether each is.
+        """Joints outside their position limits (..., n).
 
         Examples
         --------
@@ -193,9 +135,9 @@ class JointBounds(Rebuilt):
         >>> JointBounds(upper=[1.0, 2.0]).outside(load("planar_2r"), [1.5, 1.5])
         array([ True, False])
         """
-        limits = self._limits(model)
+        _, lower, upper, _ = self._limits(model)
         q = as_vector(q, model.n, "q")
-        return (q < limits[1]) | (q > limits[2])
+        return (q < lower) | (q > upper)
 
     def conflicts(
         self,
@@ -205,21 +147,7 @@ class JointBounds(Rebuilt):
         *,
         accelerations: bool = False,
     ) -> NDArray[np.bool_]:
-        """Joints whose limits cannot all be kept: those that give way are left.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q, v : array_like, shape (..., n)
-            As in `velocity_bounds` or `acceleration_bounds`.
-        accelerations : bool
-            Whether the bounds of accelerations are meant, or those of velocities.
-
-        Returns
-        -------
-        ndarray of bool, shape (..., n)
-            Whether position limits give way to speeds or accelerations, or speeds to these.
+        """Joints (..., n) whose limits cannot all be kept, of velocities or of accelerations.
 
         Examples
         --------
@@ -230,11 +158,11 @@ class JointBounds(Rebuilt):
         >>> bounds.conflicts(load("planar_2r"), [0.99, 0.0], [1.0, 1.0])
         array([ True, False])
         """
-        if accelerations:
-            if v is None:
-                raise InvalidValueError("v: bounds of accelerations need the velocities.")
-            return self._accelerations(model, q, v)[2]
-        return self._velocities(model, q, v)[2]
+        if not accelerations:
+            return self._velocities(model, q, v)[2]
+        if v is None:
+            raise InvalidValueError("v: bounds of accelerations need the velocities.")
+        return self._accelerations(model, q, v)[2]
 
     def _velocities(
         self, model: RobotModel, q: ArrayLike, v: ArrayLike | None
@@ -248,8 +176,8 @@ class JointBounds(Rebuilt):
             return low, high, conflict
         if self.acceleration is None or self.step is None:
             raise InvalidValueError(
-                "v: what can be reached from these velocities is known only with an acceleration "
-                "and a step; give JointBounds both, or leave v out."
+                "v: the velocities that can be reached from these depend on an acceleration and a "
+                "step; give JointBounds both, or leave v out."
             )
         v = as_vector(v, model.n, "v")
         batch_shape((q, v), ("q", "v"))
@@ -289,24 +217,43 @@ class JointBounds(Rebuilt):
             "upper": (self.upper, model.upper),
             "acceleration": (self.acceleration, np.inf),
         }
-        arrays = []
-        for name, (own, robots) in given.items():
-            array = np.asarray(robots if own is None else own, dtype=np.float64)
-            if array.shape not in ((), (model.n,)):
-                raise ShapeError(
-                    f"{name}: expected shape ({model.n},), one for each joint of the robot, got "
-                    f"{array.shape}."
-                )
-            arrays.append(np.broadcast_to(array, (model.n,)))
-        speed, lower, upper, acceleration = arrays
-        wrong = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
-        if wrong.size:
-            j = int(wrong[0])
-            raise InvalidValueError(
-                f"lower, upper: expected lower <= upper with room between them, got "
-                f"[{lower[j]}, {upper[j]}] for joint {j} ({model.table.joint_names[j]!r})."
-            )
+        speed, lower, upper, acceleration = (
+            for_joints(model, usual if own is None else own, name)
+            for name, (own, usual) in given.items()
+        )
+        check_order(model, lower, upper, ~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
         return speed, lower, upper, acceleration
+
+
+def as_limit(value: ArrayLike, name: str) -> Array:
+    """A limit of the joints: a number or a vector, maybe infinite."""
+    array = as_reals(value, name)
+    if array.ndim > 1:
+        raise ShapeError(f"{name}: expected shape (n,) or a number, got {array.shape}.")
+    if np.isnan(array).any():
+        raise InvalidValueError(f"{name}: NaN is no limit; give infinity where there is none.")
+    return read_only(array)
+
+
+def for_joints(model: RobotModel, limit: ArrayLike, name: str) -> Array:
+    """One value of a limit for each joint of a robot."""
+    array = np.asarray(limit, dtype=np.float64)
+    if array.shape not in ((), (model.n,)):
+        raise ShapeError(
+            f"{name}: expected shape ({model.n},), one for each joint of the robot, got "
+            f"{array.shape}."
+        )
+    return np.broadcast_to(array, (model.n,))
+
+
+def check_order(model: RobotModel, low: Array, high: Array, wrong: NDArray[np.bool_]) -> None:
+    """Refuse limits of the joints marked as wrong."""
+    if wrong.any():
+        j = int(wrong.argmax())
+        raise InvalidValueError(
+            f"lower, upper: expected lower <= upper with room between them, got [{low[j]}, "
+            f"{high[j]}] for joint {j} ({model.table.joint_names[j]!r})."
+        )
 
 
 def _fastest(room: Array, acceleration: Array, step: float | None, back: float) -> Array:

@@ -1,27 +1,23 @@
-"""Inverse kinematic model: joint velocities that give a twist.
+"""Inverse kinematic models: joint velocities of a twist, joint accelerations of its rate.
 
 Seed book section 1.3.2. Everything about one row happens in one compiled pass: Jacobian from the
-chain, its singular values, the inverse by them, and what the result misses.
+chain, its singular values, the inverse by them, and the part of the twist that is missing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from ..._arrays import as_vector
 from ...model import RobotModel, check_model
 from ..jacobians import Reference
+from .bounds import JointBounds
 from .methods import InverseMethod
-from .request import Request, Secondary
 from .solution import IKMSolution
-from .solve import check_size, solved, solved_alone
-
-if TYPE_CHECKING:
-    from .bounds import JointBounds
-    from .tasks import Task
+from .solver import Request, Secondary, check_size, solved, solved_alone
+from .tasks import Task
 
 
 def ikm(
@@ -30,7 +26,7 @@ def ikm(
     twist: ArrayLike,
     frame: str | int | None = None,
     reference: Reference = "world_aligned",
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     method: InverseMethod | None = None,
     joint_weights: ArrayLike | None = None,
     length: float | None = None,
@@ -43,37 +39,27 @@ def ikm(
 
     Also called inverse velocity kinematics, resolved motion rate control. Exact away from singular
     positions, ``J v = twist`` with the least weighted norm; bounded near them, where only the
-    directions that the robot is about to lose are slowed down; what is missing is in ``error``.
+    weak directions are slowed down; the missing part of the twist is in ``error``.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
+    model, frame, reference, mask, length
+        See `robotmodels.kinematics`. The length matters for compromises between rows, singular
+        values and damping only: where the twist is met it changes nothing.
     q : array_like, shape (..., n)
         Joint variables, rad or m; its leading axes broadcast with those of ``twist``.
     twist : array_like, shape (..., 6)
         Velocity of the frame, linear then angular [m/s, rad/s].
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    reference : {"world_aligned", "local", "world"}
-        Axes and point of the twist, as in `jacobian`.
-    mask : array_like, shape (6,), optional
-        Ones for the rows of the twist that are asked for, zeros for those that may be anything, in
-        the axes of ``reference``; default all.
     method : PseudoInverse, FilteredInverse or DampedInverse, optional
-        What to do near singular positions; default ``DampedInverse()``.
+        Treatment of singular positions; default ``DampedInverse()``.
     joint_weights : array_like, shape (n,), optional
         Positive; redundant robots take the ``v`` of least ``sum(joint_weights v^2)``. Default 1
         for revolute joints and ``1 / length^2`` for prismatic ones, so that the motion does not
         depend on the unit of length. ``ones(n)`` gives the plain pseudo-inverse.
-    length : float, optional
-        Metres: a velocity of one length per second counts like a turn of 1 rad/s where a compromise
-        between rows, a singular value or a damping is concerned. Default
-        `characteristic_length`, the reach of the frame. Where the twist is met it changes nothing.
     secondary : array_like, shape (..., n), criterion, or sequence of them, optional
-        Joint velocities that a redundant robot may have besides, as far as they do not disturb the
-        twist: ``(I - J^+ J) z``, exactly, also where J is damped. A criterion is an object whose
-        ``gradient(model, q)`` is taken; those of a sequence are summed.
+        Joint velocities z for the freedom of a redundant robot, ``(I - J^+ J) z``, exactly, also
+        where J is damped. Of a criterion the ``gradient(model, q)``; those of a sequence are
+        summed.
     augmented : sequence of Task
         More rows, of the same importance as the twist (task augmentation).
     tasks : sequence of Task
@@ -89,11 +75,9 @@ def ikm(
 
     Raises
     ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong shape, with NaN or infinity; an unknown reference; a mask that asks
-        for nothing; weights or a length that are not positive.
-    FrameNotFoundError
-        No such frame.
+    ShapeError, InvalidValueError, FrameNotFoundError
+        Arguments of the wrong shape, with NaN or infinity; an unknown reference or frame; a mask
+        that asks for nothing; weights or a length that are not positive.
 
     References
     ----------
@@ -108,8 +92,8 @@ def ikm(
     >>> found.reason(), bool(abs(found.error).max() < 1e-12)
     ('The motion is met.', True)
 
-    A straight line in 1 s, followed by integrating joint velocities: the position that is due
-    minus the position that is, added to the twist, keeps the integration from drifting.
+    A straight line in 1 s by integrating joint velocities. The position error added to the twist
+    keeps the integration from drifting:
 
     >>> import numpy as np
     >>> from robotmodels.kinematics import dgm
@@ -134,6 +118,77 @@ def ikm(
         model,
         Request(
             q, twist, None, frame, reference, mask, method, joint_weights, length, secondary,
+            augmented, tasks, limits,
+        ),
+    )  # fmt: skip
+
+
+def ikm_second_order(
+    model: RobotModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    acceleration: ArrayLike,
+    frame: str | int | None = None,
+    reference: Reference = "world_aligned",
+    mask: ArrayLike | str | None = None,
+    method: InverseMethod | None = None,
+    joint_weights: ArrayLike | None = None,
+    length: float | None = None,
+    secondary: Secondary | None = None,
+    augmented: Sequence[Task] = (),
+    tasks: Sequence[Task] = (),
+    limits: JointBounds | bool | None = None,
+) -> IKMSolution:
+    """Second order inverse kinematic model: joint accelerations for the rate of a twist.
+
+    Solves ``J a = acceleration - dJ/dt v`` as `ikm` solves ``J v = twist``. A redundant robot whose
+    null space is left to the least acceleration keeps the self-motion it has: give
+    ``secondary=-k * v`` to bring it to rest.
+
+    Parameters
+    ----------
+    model, frame, reference, mask, method, joint_weights, length, augmented, tasks, limits
+        As in `ikm`, for accelerations.
+    q, v : array_like, shape (..., n)
+        Joint variables (rad or m) and velocities; leading axes broadcast with ``acceleration``.
+    acceleration : array_like, shape (..., 6)
+        Time derivative of the frame's twist, entry by entry [m/s^2, rad/s^2], as
+        `dkm_second_order` gives it.
+    secondary : array_like, shape (..., n), criterion, or sequence of them, optional
+        Joint accelerations for the null space; gradients are taken as such.
+
+    Returns
+    -------
+    IKMSolution
+        With ``a (..., n)``, the joint accelerations; ``v`` as given. ``achieved``, ``error`` and
+        ``reachable`` are accelerations of the frame, the first and last with ``dJ/dt v``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        As `ikm`.
+
+    References
+    ----------
+    Seed book section 1.3.2 (differentiated); J. Luh, M. Walker and R. Paul 1980.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics import dkm_second_order
+    >>> arm, q, v = load("rx90"), [0.1, 0.2, 1.3, 0.4, 0.5, 0.6], [1.0, 0.5, -0.3, 0.1, 0.7, -1.0]
+    >>> found = ikm_second_order(arm, q, v, [0.1, 0.0, -0.2, 0.0, 0.0, 0.3])
+    >>> dkm_second_order(arm, q, v, found.a).round(12) + 0.0
+    array([ 0.1,  0. , -0.2,  0. ,  0. ,  0.3])
+    """
+    check_model(model)
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    acceleration = as_vector(acceleration, 6, "acceleration")
+    check_size(acceleration, "acceleration")
+    return solved(
+        model,
+        Request(
+            q, acceleration, v, frame, reference, mask, method, joint_weights, length, secondary,
             augmented, tasks, limits,
         ),
     )  # fmt: skip

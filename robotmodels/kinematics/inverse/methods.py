@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import inf, isfinite, sqrt
+from math import inf, sqrt
 
+from ..._arrays import as_number
 from ..._choices import chosen
 from ...errors import InvalidValueError
 
@@ -72,9 +73,7 @@ class PseudoInverse:
     tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        _set_number(self, "tolerance", 0.0)
-        if self.tolerance >= 1.0:
-            raise InvalidValueError(f"tolerance: expected less than 1, got {self.tolerance!r}.")
+        _set(self, "tolerance", least=0.0, below=1.0)
 
     @property
     def gain(self) -> float:
@@ -118,7 +117,7 @@ class FilteredInverse:
     threshold: float = THRESHOLD
 
     def __post_init__(self) -> None:
-        _set_number(self, "threshold", 0.0, above=True)
+        _set(self, "threshold", above=0.0)
 
     @property
     def gain(self) -> float:
@@ -181,10 +180,10 @@ class DampedInverse:
     def __post_init__(self) -> None:
         object.__setattr__(self, "damping", chosen(Damping, self.damping, "damping"))
         by_product = self.damping is Damping.MANIPULABILITY
-        _set_number(self, "threshold", 0.0, above=by_product)
-        _set_number(self, "largest", 0.0)
+        _set(self, "threshold", **{"above" if by_product else "least": 0.0})
+        _set(self, "largest", least=0.0)
         if self.largest_speed is not None:
-            _set_number(self, "largest_speed", 0.0, above=True)
+            _set(self, "largest_speed", above=0.0)
 
     @property
     def gain(self) -> float:
@@ -227,16 +226,9 @@ def as_method(method: InverseMethod | None) -> InverseMethod:
     return method
 
 
-def _set_number(owner: object, name: str, lowest: float, above: bool = False) -> None:
-    value = getattr(owner, name)
-    try:
-        number = float(value) if not isinstance(value, (bool, str)) else None
-    except (TypeError, ValueError):
-        number = None
-    if number is None or not isfinite(number) or number < lowest or (above and number == lowest):
-        wanted = f"above {lowest:g}" if above else f"of at least {lowest:g}"
-        raise InvalidValueError(f"{name}: expected a finite number {wanted}, got {value!r}.")
-    object.__setattr__(owner, name, number)
+def _set(method: object, name: str, **bounds: float) -> None:
+    """Replace a field by a finite number within bounds."""
+    object.__setattr__(method, name, as_number(getattr(method, name), name, **bounds))
 
 
 _DEFAULT = DampedInverse()

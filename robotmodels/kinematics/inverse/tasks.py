@@ -1,110 +1,433 @@
-"""Tasks of a redundant robot: what is asked of its joint velocities beside the main twist.
+"""Tasks of a redundant robot beside the twist: rows ``J v = rate`` of its joint velocities.
 
-A task is a value with two methods, `Task.level` and `Task.acceleration_level`, that give its rows
-at configurations. Seed book section 1.3.2.4.
+Seed book section 1.3.2.4; J. Baillieul 1985 (functions of the configuration). Tasks are given to
+`ikm` as ``augmented`` or ``tasks``. In `ikm_second_order` they ask for accelerations,
+``J a + dJ/dt v = rate``.
+
+Parameters
+----------
+rate : array_like, shape (..., m)
+    Rates wanted of the m components (m/s, rad/s; accelerations for `ikm_second_order`); the
+    leading axes broadcast with those of the configurations.
+frame, first, second : str or int, optional
+    Names or numbers of frames; default the tool.
+mask : array_like, optional
+    Ones for the components that are asked for; default all.
+length : float, optional
+    Metres that count as one radian; default `characteristic_length` of the frame, as in `ikm`.
+weights : array_like, shape (m,), optional
+    Positive factors that make the rows comparable; default 1.
+
+Returns
+-------
+Task
+    A value for ``augmented`` or ``tasks``.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Numbers of the wrong shape or not finite, a mask without a 1; what does not fit the robot is
+    refused when it is known.
 """
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_floats, as_vector
+from ..._arrays import (
+    Array,
+    Rebuilt,
+    as_core,
+    as_exact,
+    as_floats,
+    as_mask,
+    as_vector,
+    read_only,
+)
 from ...errors import InvalidValueError, ShapeError
+from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
-from .levels import Level
+from ..jacobians import Reference, jacobian, jacobian_rate, reference_of
+from ..lengths import length_of
+from ..poses import dgm
 
-__all__ = ["Task", "rates_of_rows", "rows_of", "task_length"]
+_STEP = 1e-3
+"""Step of the differences of fourth order, rad or m: truncation and rounding are near 1e-13."""
+
+Rows = tuple[Array, Array | None, Array]
+"""J (N, m, n), ``dJ/dt v`` (N, m) or None for zero, and weights (m,)."""
 
 
-@runtime_checkable
-class Task(Protocol):
-    """Anything that gives rows of a level. Its rates broadcast against the configurations.
+class Level(NamedTuple):
+    """Rows ``J v = rate - drift`` of one priority.
+
+    Shapes: J (N, m, n); rate, drift (N, m); weights (m,), positive factors of the rows.
+    """
+
+    J: Array
+    rate: Array
+    drift: Array
+    weights: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task(Rebuilt):
+    """Rates that are asked for, and the function that gives their rows.
+
+    Parameters
+    ----------
+    rate : array_like, shape (..., m)
+        Rates wanted.
+    rows : callable
+        ``rows(model, q, v)`` with q (N, n), and v (N, n) or None where velocities are asked for,
+        gives J (N, m, n), ``dJ/dt v`` (N, m) or None for zero, and the weights (m,).
 
     Examples
     --------
-    >>> from robotmodels.kinematics.inverse.joint_task import JointTask
-    >>> isinstance(JointTask([0.0], joints=[0]), Task)
-    True
+    The difference of two joints is to decrease:
+
+    >>> from robotmodels import ikm, load
+    >>> row = np.array([[[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]]])
+    >>> task = Task([-0.1], lambda model, q, v: (np.repeat(row, len(q), 0), None, np.ones(1)))
+    >>> v = ikm(load("panda"), [0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7], np.zeros(6), tasks=[task]).v
+    >>> float((v[0] - v[6]).round(12))
+    -0.1
     """
 
-    def level(self, model: RobotModel, q: ArrayLike) -> Level:
-        """Rows that ask for velocities.
+    rate: Array
+    rows: Callable[[RobotModel, Array, Array | None], Rows]
 
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q : array_like, shape (..., n)
-            Joint variables, rad or m.
+    def __post_init__(self) -> None:
+        rate = as_floats(self.rate, "rate")
+        if rate.ndim == 0:
+            raise ShapeError("rate: expected shape (..., m), got (); one component is [rate].")
+        object.__setattr__(self, "rate", read_only(rate))
 
-        Returns
-        -------
-        Level
-            N rows, the product of the leading axes of q; a single configuration is one row.
-        """
-        ...
-
-    def acceleration_level(self, model: RobotModel, q: ArrayLike, v: ArrayLike) -> Level:
-        """Rows that ask for accelerations: the task's rates are those, the drift is ``dJ/dt v``.
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot, n joints.
-        q, v : array_like, shape (..., n)
-            Joint variables (rad or m) and velocities, of the same shape.
-
-        Returns
-        -------
-        Level
-            N rows, the product of the leading axes of q.
-        """
-        ...
-
-
-def rows_of(
-    model: RobotModel, q: ArrayLike, v: ArrayLike | None = None
-) -> tuple[tuple[int, ...], Array, Array]:
-    """Configurations and velocities as rows, with the leading axes that they had.
-
-    Shapes: q, v (..., n) -> q, v (N, n).
-    """
-    check_model(model)
-    q = as_vector(q, model.n, "q")
-    v = np.zeros_like(q) if v is None else as_vector(v, model.n, "v")
-    if q.shape != v.shape:
-        raise ShapeError(
-            f"v: expected the shape of q, {q.shape}, got {v.shape}; broadcast them before."
+    def level(self, model: RobotModel, q: ArrayLike, v: ArrayLike | None = None) -> Level:
+        """Rows at configurations: N is the product of the leading axes of q."""
+        check_model(model)
+        q = as_vector(q, model.n, "q")
+        batch, N, m = q.shape[:-1], int(np.prod(q.shape[:-1])), self.rate.shape[-1]
+        speeds = None if v is None else as_vector(v, model.n, "v")
+        if speeds is not None and speeds.shape != q.shape:
+            raise ShapeError(f"v: expected the shape of q, {q.shape}, got {speeds.shape}.")
+        flat = (
+            None if x is None else np.ascontiguousarray(x).reshape(N, model.n) for x in (q, speeds)
         )
-    size = (int(np.prod(q.shape[:-1], dtype=np.int64)), model.n)
-    return (
-        q.shape[:-1],
-        np.ascontiguousarray(q).reshape(size),
-        np.ascontiguousarray(v).reshape(size),
+        J, drift, weights = self.rows(model, *flat)  # type: ignore[arg-type]
+        try:
+            rate = np.broadcast_to(self.rate, (*batch, m)).reshape(N, m)
+        except ValueError:
+            raise ShapeError(
+                f"rate: its shape {self.rate.shape} does not broadcast to {(*batch, m)}: the "
+                f"leading axes of the configurations and the {m} components of the task."
+            ) from None
+        J = as_exact(J, (N, m, model.n), "J")
+        return Level(J, rate, np.zeros((N, m)) if drift is None else drift, weights)
+
+
+def TwistTask(
+    rate: ArrayLike,
+    frame: str | int | None = None,
+    reference: Reference = "world_aligned",
+    mask: ArrayLike | str | None = None,
+    length: float | None = None,
+) -> Task:
+    """Twist ``[v; w]`` of a frame, or some of its six components.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> task = TwistTask([0, 0, 0.1, 0, 0, 0], frame=3, mask=[1, 1, 1, 0, 0, 0])
+    >>> task.level(load("rx90"), [0.1] * 6).J.shape
+    (1, 3, 6)
+    """
+    reference_of(reference)
+    asked = np.flatnonzero(as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz")))
+    rate = as_core(rate, (6,), "rate")[..., asked]
+    return Task(rate, partial(_twist_rows, frame, reference, asked, length))
+
+
+def PositionTask(
+    rate: ArrayLike,
+    frame: str | int | None = None,
+    point: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    length: float | None = None,
+) -> Task:
+    """Velocity in world axes of a point given in a frame (shape (3,), m; default its origin).
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> elbow = PositionTask([0, 0, 0.1], frame=4, mask=[0, 0, 1])
+    >>> elbow.level(load("panda"), np.zeros((5, 7))).J.shape
+    (5, 1, 7)
+    """
+    asked = np.flatnonzero(as_mask(mask, ("x", "y", "z")))
+    rate = as_core(rate, (3,), "rate")[..., asked]
+    point = np.zeros(3) if point is None else as_exact(point, (3,), "point")
+    return Task(rate, partial(_point_rows, frame, point, asked, length))
+
+
+def JointTask(rate: ArrayLike, joints: Sequence[int | str], length: float | None = None) -> Task:
+    """Velocities of k joints, given as columns of q (from 0) or by name.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> JointTask([0.1], joints=[2]).level(load("rx90"), [0.0] * 6).J
+    array([[[0., 0., 1., 0., 0., 0.]]])
+    """
+    if isinstance(joints, (str, int)):
+        raise InvalidValueError(
+            f"joints: expected a sequence, got {joints!r}; one joint is [{joints!r}]."
+        )
+    joints = tuple(joints)
+    for joint in joints:
+        if isinstance(joint, bool) or not isinstance(joint, (str, int, np.integer)):
+            raise InvalidValueError(
+                f"joints: expected columns of q or names of joints, got {joint!r}."
+            )
+    if not joints or len(set(joints)) < len(joints):
+        raise InvalidValueError(f"joints: expected different joints, got {joints}.")
+    return Task(as_core(rate, (len(joints),), "rate"), partial(_joint_rows, joints, length))
+
+
+def DistanceTask(
+    rate: ArrayLike,
+    first: str | int = 0,
+    second: str | int | None = None,
+    length: float | None = None,
+) -> Task:
+    """Rate (shape (...), m/s) of the distance between the origins of two frames.
+
+    Where the origins coincide the distance has no derivative, and the row of J is zero.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> DistanceTask(0.1).level(load("planar_2r"), [0.3, 0.0]).J.round(12)
+    array([[[0., 0.]]])
+    """
+    rate = as_floats(rate, "rate")[..., None]
+    return Task(rate, partial(_distance_rows, first, second, length))
+
+
+def FunctionTask(
+    gradient: Callable[[Array], ArrayLike],
+    rate: ArrayLike,
+    gradient_rate: Callable[[Array, Array], ArrayLike] | None = None,
+    weights: ArrayLike | None = None,
+) -> Task:
+    """Rates of m functions of the configuration by their gradients, ``gradient(q)`` (N, m, n).
+
+    ``gradient_rate(q, v)`` gives their time derivatives; by default differences of the gradient
+    along the motion, over 1e-3 of joint travel. One function may give (N, n).
+
+    Examples
+    --------
+    The sum of two joints stays:
+
+    >>> from robotmodels.robots import load
+    >>> task = FunctionTask(lambda q: np.broadcast_to([0.0, 1, 1, 0, 0, 0], q.shape), rate=[0.0])
+    >>> task.level(load("rx90"), np.zeros((4, 6))).J.shape
+    (4, 1, 6)
+    """
+    if not callable(gradient):
+        raise InvalidValueError(
+            f"gradient: expected a function of q, got {type(gradient).__name__}; arrays are given "
+            "to LinearTask."
+        )
+    if gradient_rate is not None and not callable(gradient_rate):
+        raise InvalidValueError(
+            f"gradient_rate: expected a function of q and v, got {type(gradient_rate).__name__}."
+        )
+    m = np.shape(rate)[-1] if np.ndim(rate) else 0
+    rows = partial(_function_rows, gradient, gradient_rate, _weights(weights, m))
+    return Task(as_floats(rate, "rate"), rows)
+
+
+def LinearTask(
+    J: ArrayLike,
+    rate: ArrayLike,
+    drift: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+) -> Task:
+    """Rows given as arrays: J (..., m, n) and, for accelerations, ``dJ/dt v`` as drift (..., m).
+
+    Examples
+    --------
+    Two joints that move alike:
+
+    >>> from robotmodels.robots import load
+    >>> task = LinearTask(J=[[0, 1, -1, 0, 0, 0]], rate=[0.0])
+    >>> task.level(load("rx90"), [0.0] * 6).rate
+    array([[0.]])
+    """
+    J = as_floats(J, "J")
+    if J.ndim < 2:
+        raise ShapeError(f"J: expected shape (..., m, n), got {J.shape}.")
+    m = J.shape[-2]
+    drift = np.zeros(m) if drift is None else as_core(drift, (m,), "drift")
+    rows = partial(_linear_rows, read_only(J), read_only(drift), _weights(weights, m))
+    return Task(as_core(rate, (m,), "rate"), rows)
+
+
+def _weights(weights: ArrayLike | None, m: int) -> Array:
+    if weights is None:
+        return np.ones(m)
+    weights = as_exact(weights, (m,), "weights")
+    if not (weights > 0.0).all():
+        raise InvalidValueError(
+            f"weights: expected positive numbers, got {weights}; leave rows out that should have "
+            "none."
+        )
+    return weights
+
+
+def _twist_rows(
+    frame: str | int | None,
+    reference: Reference,
+    asked: NDArray[np.int64],
+    length: float | None,
+    model: RobotModel,
+    q: Array,
+    v: Array | None,
+) -> Rows:
+    weights = np.repeat([1.0 / length_of(model, frame, length), 1.0], 3)[asked]
+    J = jacobian(model, q, frame, reference)[:, asked]
+    if v is None:
+        return J, None, weights
+    rates = jacobian_rate(model, q, v, frame, reference)[:, asked]
+    return J, np.einsum("kij,kj->ki", rates, v), weights
+
+
+def _point_rows(
+    frame: str | int | None,
+    point: Array,
+    asked: NDArray[np.int64],
+    length: float | None,
+    model: RobotModel,
+    q: Array,
+    v: Array | None,
+) -> Rows:
+    from ...kernels.poses import accelerations, jacobians
+
+    path, rotation, position = model.twin.frame(frame).kernel_arguments
+    place = path, rotation, position + rotation @ point
+    J, drift = np.empty((len(q), 6, model.n)), np.empty((len(q), 6))
+    jacobians(q, model.chain, *place, 0, J)
+    if v is not None:
+        accelerations(q, v, np.zeros_like(q), model.chain, *place, 0, drift)
+    weights = np.full(len(asked), 1.0 / length_of(model, frame, length))
+    return J[:, asked], None if v is None else drift[:, asked], weights
+
+
+def _joint_rows(
+    joints: tuple[int | str, ...],
+    length: float | None,
+    model: RobotModel,
+    q: Array,
+    v: Array | None,
+) -> Rows:
+    names = model.table.joint_names
+    columns = []
+    for joint in joints:
+        column = joint
+        if isinstance(joint, str):
+            column = names.index(joint) if joint in names else -1
+        if not 0 <= int(column) < model.n:
+            raise InvalidValueError(
+                f"joints: the robot has no joint {joint!r}; give columns of q, 0 to "
+                f"{model.n - 1}, or names: {', '.join(names)}."
+            )
+        columns.append(int(column))
+    if len(set(columns)) < len(columns):
+        raise InvalidValueError(f"joints: {joints} names a joint twice.")
+    J = np.tile(np.eye(model.n)[columns], (len(q), 1, 1))
+    slides = model.table.sigma[model.table.joint_rows][columns] == PRISMATIC
+    return J, None, np.where(slides, 1.0 / length_of(model, None, length), 1.0)
+
+
+def _distance_rows(
+    first: str | int,
+    second: str | int | None,
+    length: float | None,
+    model: RobotModel,
+    q: Array,
+    v: Array | None,
+) -> Rows:
+    apart = dgm(model, q, second)[:, :3, 3] - dgm(model, q, first)[:, :3, 3]
+    distance = np.linalg.norm(apart, axis=-1)
+    inverse = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+    unit = apart * inverse[:, None]
+    J = (jacobian(model, q, second) - jacobian(model, q, first))[:, :3]
+    row = np.einsum("ki,kij->kj", unit, J)[:, None]
+    weights = np.array([1.0 / length_of(model, second, length)])
+    if v is None:
+        return row, None, weights
+    rate = (jacobian_rate(model, q, v, second) - jacobian_rate(model, q, v, first))[:, :3]
+    velocity = np.einsum("kij,kj->ki", J, v)
+    along = np.einsum("ki,ki->k", unit, velocity)
+    drift = np.einsum("ki,kij,kj->k", unit, rate, v)
+    drift += inverse * (np.einsum("ki,ki->k", velocity, velocity) - along**2)
+    return row, drift[:, None], weights
+
+
+def _function_rows(
+    gradient: Callable[[Array], ArrayLike],
+    gradient_rate: Callable[[Array, Array], ArrayLike] | None,
+    weights: Array,
+    model: RobotModel,
+    q: Array,
+    v: Array | None,
+) -> Rows:
+    shape = (len(q), len(weights), model.n)
+
+    def checked(value: ArrayLike, name: str) -> Array:
+        array = as_floats(value, f"the value of {name}")
+        if len(weights) == 1 and array.shape == q.shape:
+            return array[:, None]
+        if array.shape != shape:
+            raise ShapeError(
+                f"{name}: expected an array of shape {shape} (configurations, functions, joints) "
+                f"from the function, got {array.shape}."
+            )
+        return array
+
+    J = checked(gradient(q), "gradient")
+    if v is None:
+        return J, None, weights
+    if gradient_rate is not None:
+        return J, np.einsum("kij,kj->ki", checked(gradient_rate(q, v), "gradient_rate"), v), weights
+    speed = np.linalg.norm(v, axis=-1, keepdims=True)
+    h = _STEP * np.divide(v, speed, out=np.zeros_like(v), where=speed > 0.0)
+    slope = sum(
+        factor * checked(gradient(q + k * h), "gradient")
+        for k, factor in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
     )
+    return J, np.einsum("kij,kj->ki", slope, v) * (speed / (12.0 * _STEP)), weights
 
 
-def rates_of_rows(rate: Array, batch: tuple[int, ...], m: int) -> Array:
-    """Rates of a task at the rows of `rows_of`. Shapes: rate (..., m) -> (N, m)."""
+def _linear_rows(
+    J: Array, drift: Array, weights: Array, model: RobotModel, q: Array, v: Array | None
+) -> Rows:
+    m, n = J.shape[-2:]
+    if n != model.n:
+        raise ShapeError(f"J: expected {model.n} columns, one for each joint, got {n}.")
     try:
-        return np.broadcast_to(rate, (*batch, m)).reshape(int(np.prod(batch, dtype=np.int64)), m)
+        J = np.broadcast_to(J.reshape(-1, m, n), (len(q), m, n))
+        drift = np.broadcast_to(drift.reshape(-1, m), (len(q), m))
     except ValueError:
         raise ShapeError(
-            f"rate: its shape {rate.shape} does not broadcast to {(*batch, m)}: the leading "
-            f"axes of the configurations and the {m} components of the task."
+            f"J, drift: expected one for each of the {len(q)} configurations or one for all, got "
+            f"shapes {J.shape} and {drift.shape}."
         ) from None
-
-
-def task_length(model: RobotModel, frame: str | int | None, length: float | None) -> float:
-    """The length that makes metres comparable with radians in a task."""
-    from ..lengths import characteristic_length
-
-    if length is None:
-        return characteristic_length(model, frame)
-    value = as_floats(length, "length")
-    if value.ndim or not value > 0.0:
-        raise InvalidValueError(f"length: expected a positive number of metres, got {length!r}.")
-    return float(value)
+    return J, None if v is None else drift, weights

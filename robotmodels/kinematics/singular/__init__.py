@@ -1,17 +1,19 @@
-"""Rank and singular configurations: what is lost, what still moves, where the next one is.
+"""Rank and singular configurations: lost directions, self-motions, the nearest ones.
 
 Seed book sections 1.3.1.4 and 1.3.2.3.
 """
 
-from .boundary import WorkspaceSide
-from .classification import classify_singularity
-from .flags import SingularityFlags, SingularityStatus, singularity_flags
 from .frames import LostDirections
-from .motion import SelfMotion, SelfMotionKind
-from .nearest import nearest_singularity
-from .nearest_result import NearestSingularities, NearestStatus, SearchOutcome
+from .nearest import NearestSingularities, NearestStatus, SearchOutcome, nearest_singularity
 from .rank import JacobianRank, OperationalDimension, jacobian_rank, operational_dimension
-from .report import SingularityReport
+from .report import (
+    SingularityFlags,
+    SingularityReport,
+    SingularityStatus,
+    classify_singularity,
+    singularity_flags,
+)
+from .self_motion import SelfMotion, SelfMotionKind, WorkspaceSide
 
 __all__ = [
     "JacobianRank",

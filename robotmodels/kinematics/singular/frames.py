@@ -14,7 +14,7 @@ import numpy as np
 from ..._arrays import Array, Rebuilt, read_only
 from ...errors import FrameNotFoundError, InvalidValueError
 from ..poses import dgm, link_poses
-from .bases import normalised, sparse_basis
+from .rank import combination_text, normalised, sparse_basis
 from .task import SingularTask
 
 WORLD = -1
@@ -30,21 +30,19 @@ class LostDirections(Rebuilt):
 
     Parameters
     ----------
-    axes : int or None
-        Number of the frame whose axes the components are in; 0 is R_0, `WORLD` the world, None
-        the frame that was asked for (the tool).
-    point : int or None
-        Number of the frame at whose origin they are taken; None the same.
+    axes, point : int or None
+        Numbers of the frames in whose axes and at whose origin they are; 0 is R_0, -1 the world,
+        None the frame of the task (the tool).
     wrenches : ndarray, shape (p, 6)
         Rows ``c = [f; m]``: ``c . [v; w] = 0`` for every twist the joints can produce, and by
-        duality the wrench c is carried without any joint torque. Largest component 1, forces in
-        N for moments in N m.
+        duality the wrench c needs no joint torque. Largest component 1, forces in N for moments in
+        N m.
     twists : ndarray, shape (p, 6)
-        Rows ``[v; w]``, m/s and rad/s: the twists that have nothing of what can be produced,
-        orthogonal to it when metres are divided by the characteristic length. Where a wrench is
-        a pure force or a pure moment, its twist has the same numbers whatever that length is.
+        Rows ``[v; w]``, m/s and rad/s, orthogonal to all twists that can be produced when metres
+        are divided by the characteristic length. Where a wrench is a pure force or a pure moment,
+        its twist has the same numbers whatever that length is.
     frame : str
-        What the frame that was asked for is called, such as ``"the tool"``.
+        Name of the frame of the task, such as ``"the tool"``.
 
     Examples
     --------
@@ -68,24 +66,7 @@ class LostDirections(Rebuilt):
         return f"axes of {axes}, at the origin of {point}"
 
     def rounded(self, least: float) -> tuple[str, ...]:
-        """Combinations without what is small beside their largest coefficient, in words.
-
-        Parameters
-        ----------
-        least : float
-            Coefficients below this are left out.
-
-        Returns
-        -------
-        tuple of str
-            One for each row of ``wrenches``.
-
-        Examples
-        --------
-        >>> row = np.array([[0.0, 1e-3, 1.0, 0.0, 0.0, 0.0]])
-        >>> LostDirections(4, 4, row, row).rounded(0.01)
-        ('vz',)
-        """
+        """Combinations in words, without coefficients below ``least``."""
         rows = np.where(np.abs(self.wrenches) < least, 0.0, self.wrenches)
         return tuple(combination_text(row, _VELOCITY) for row in rows)
 
@@ -180,18 +161,6 @@ def frame_words(frame: str | int | None) -> str:
     if frame is None:
         return "the tool"
     return f"frame {frame!r}" if isinstance(frame, str) else f"R{frame}"
-
-
-def combination_text(row: Array, names: tuple[str, ...]) -> str:
-    """A linear combination in words. Shapes: row (m,)."""
-    text = ""
-    for value, name in zip(row, names, strict=True):
-        if abs(value) < 1e-9:
-            continue
-        size = "" if abs(abs(value) - 1.0) < 1e-12 else f"{abs(value):.4g} "
-        sign = "-" if value < 0 else "+"
-        text += f" {sign} {size}{name}" if text else f"{'-' * int(value < 0)}{size}{name}"
-    return text
 
 
 def _has_vectors(task: SingularTask) -> bool:

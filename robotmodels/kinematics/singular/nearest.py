@@ -5,36 +5,190 @@ Seed book section 1.3.2.3: the solution near singular positions needs to know wh
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from math import pi
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_exact, read_only
+from ..._outcomes import Outcome
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
-from .causes import arm_geometry
-from .classification import names_of
+from ...table_text import boxed
+from ..singularity_kind import SingularityKind
 from .frames import frame_words
-from .nearest_result import NearestSingularities, NearestStatus, SearchOutcome
-from .rank import OperationalDimension, operational_dimension
+from .names import arm_geometry, names_at, singular_sets
+from .rank import operational_dimension
 from .search import FoundPoints, SearchSpace, nearest_points, slope_along
 from .task import (
     MaskAxes,
     SingularTask,
+    counting_lines,
     deciding_mask,
     generator_of,
     singular_task,
     whole_number,
 )
 
+_WIDTH = 100
 _ON_SET = 1e-10
 _STATIONARY = 1e-7
 _SAME = 1e-5
 _BESIDE = 8
 _ALREADY, _ASIDE, _FLAT = 1e-9, 1e-4, 3e-6
+
+
+class NearestStatus(Outcome):
+    """Status of one found configuration; fits int8. Each member has a ``sentence``.
+
+    Examples
+    --------
+    >>> NearestStatus.NEAREST.sentence
+    'Singular, and none of the same kind in its neighbourhood is nearer.'
+    """
+
+    NEAREST = 0, "Singular, and none of the same kind in its neighbourhood is nearer."
+    AT_LIMIT = 1, "Singular, and none that respects the joint limits is nearer there."
+    NOT_STATIONARY = 2, "Singular, but a nearer one in its neighbourhood is not excluded."
+    CROSSING = (
+        3, "Singular in another way than the given configuration, and the nearest to within 1e-4.",
+    )  # fmt: skip
+
+
+class SearchOutcome(Outcome):
+    """Outcome of a search; each member has a ``sentence``.
+
+    Examples
+    --------
+    >>> SearchOutcome.NONE_FOUND.name
+    'NONE_FOUND'
+    """
+
+    FOUND = 0, "Singular configurations were found."
+    ALREADY_SINGULAR = 1, "The given configuration is singular itself."
+    NONE_FOUND = 2, "No singular configuration was found from any start."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NearestSingularities(Rebuilt):
+    """Singular configurations by their distance from a given one. Read-only; `print` it.
+
+    S rows, the nearest first; none twice, also not by whole turns of a joint unless limits were
+    asked for.
+
+    Parameters
+    ----------
+    home : ndarray, shape (n,)
+        The given configuration, rad or m.
+    q : ndarray, shape (S, n)
+        Singular configurations, rad or m.
+    distance : ndarray, shape (S,)
+        From ``home``, weighted: ``sqrt(sum of w (dq)^2)``, strokes in units of ``length``.
+    direction : ndarray, shape (S, n)
+        ``(q - home) / distance``, rad or m per unit of distance; zero where the distance is.
+    escape : ndarray, shape (S, n)
+        Joint direction, rad or m per unit of distance, normal to the singular set there: the
+        weakest singular value rises along it. Towards ``home``.
+    slope : ndarray, shape (S,)
+        Of the weakest singular value along ``escape``, per unit of distance: nearly 0 where the
+        singular set is touched twice, or where two sets cross.
+    codimension : ndarray of int, shape (S,)
+        Number of conditions on the joints that the set makes there: 1 is a surface.
+    kind : tuple of tuple of SingularityKind
+        Names of each.
+    words : tuple of tuple of str
+        Sentences of each.
+    residual : ndarray, shape (S,)
+        Weakest singular value over the largest: 0 is exactly singular.
+    stationarity : ndarray, shape (S,)
+        Part of the way home that lies along the set, in units of distance: 0 is nearest;
+        infinite where sets cross.
+    status : ndarray of int8, shape (S,)
+        Codes of `NearestStatus`.
+    outcome : SearchOutcome
+        Of the whole search.
+    length : float
+        Characteristic length, metres.
+    mask : ndarray of bool, shape (6,)
+        Components that count.
+    frame : str
+        What the frame is called, such as ``"the tool"``.
+
+    Examples
+    --------
+    >>> from robotmodels import load, nearest_singularity
+    >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    >>> found.distance[:2], [kinds[0].name for kinds in found.kind[:2]]
+    (array([0.3894, 0.5   ]), ['SHOULDER', 'WRIST'])
+    """
+
+    home: Array
+    q: Array
+    distance: Array
+    direction: Array
+    escape: Array
+    slope: Array
+    codimension: NDArray[np.int64]
+    kind: tuple[tuple[SingularityKind, ...], ...]
+    words: tuple[tuple[str, ...], ...]
+    residual: Array
+    stationarity: Array
+    status: NDArray[np.int8]
+    outcome: SearchOutcome
+    length: float
+    mask: NDArray[np.bool_]
+    frame: str
+
+    @property
+    def count(self) -> int:
+        """Number of configurations found."""
+        return len(self.q)
+
+    def of(self, kind: SingularityKind) -> int | None:
+        """Row of the nearest configuration of a kind; None if there is none."""
+        return next((i for i, kinds in enumerate(self.kind) if kind in kinds), None)
+
+    def reason(self, i: int = 0) -> str:
+        """Sentence of the status of row i."""
+        return NearestStatus(int(self.status[i])).sentence
+
+    def __str__(self) -> str:
+        """Table of what was found, and what the kinds mean below it."""
+        lines = [self.outcome.sentence, *counting_lines(self.mask, self.frame)]
+        if not self.count:
+            return "\n".join(lines)
+        kinds = [", ".join(kind.value for kind in row) for row in self.kind]
+        joints = [(f"q{j + 1}", [_short(x) for x in self.q[:, j]]) for j in range(self.q.shape[1])]
+        fixed = [("distance", [f"{d:.4g}" for d in self.distance]), ("kind", kinds)]
+        words = list(dict.fromkeys(text for row in self.words for text in row))
+        said = [part for text in words for part in wrap(text, _WIDTH, subsequent_indent="  ")]
+        return "\n".join([*lines, *_tables(fixed, joints), *said])
+
+    def __repr__(self) -> str:
+        nearest = "".join(
+            f"; {kind.value} at {self.distance[i]:.4g}"
+            for kind in SingularityKind
+            if (i := self.of(kind)) is not None
+        )
+        return f"<NearestSingularities {self.outcome.name}: {self.count} found{nearest}>"
+
+
+def _short(x: float) -> str:
+    return f"{round(float(x), 5) + 0.0:.5g}"
+
+
+def _tables(fixed: list[tuple[str, list[str]]], joints: list[tuple[str, list[str]]]) -> list[str]:
+    """One table, or several one below the other where the joints do not fit abreast."""
+    count = len(joints)
+    while count > 1:
+        tables = [boxed([*fixed, *joints[k : k + count]]) for k in range(0, len(joints), count)]
+        if max(len(line) for table in tables for line in table.splitlines()) <= _WIDTH:
+            return tables
+        count -= 1
+    return [boxed([*fixed, *joints[k : k + 1]]) for k in range(len(joints))] or [boxed(fixed)]
 
 
 def nearest_singularity(
@@ -44,7 +198,7 @@ def nearest_singularity(
     limits: bool = False,
     weights: ArrayLike | None = None,
     length: float | None = None,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: MaskAxes = "world",
     starts: int = 48,
     most: int = 16,
@@ -54,33 +208,24 @@ def nearest_singularity(
 
     From several starts, Newton's iteration goes to where the rank drops below the dimension of
     the operational space, then along that set to the point nearest to the given configuration.
-    What comes out are local minima of the distance, the nearest first: usually one or two for
+    The results are local minima of the distance, the nearest first: usually one or two for
     each kind of singularity. That none was missed is not proven.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
+    model, frame, length
+        See `robotmodels.kinematics`.
     q : array_like, shape (n,)
         The given configuration, rad or m.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
     limits : bool
         Whether only configurations inside the joint limits count.
     weights : array_like, shape (n,), optional
         Of the squares of the joint differences, above 0; default 1. Strokes are in units of the
         characteristic length.
-    length : float, optional
-        Characteristic length, metres; default the reach, `characteristic_length`.
-    mask : array_like, shape (6,), optional
-        Ones for the components ``vx vy vz wx wy wz`` that count; default as
-        `classify_singularity`: all, or the position alone for up to three joints.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
-    starts : int
-        How many starts, the given configuration included.
-    most : int
-        How many configurations to keep.
+    mask, mask_axes : array_like, shape (6,), optional; {"world", "tool"}
+        Components that count and their axes, as in `classify_singularity`.
+    starts, most : int
+        Number of starts, the given configuration included, and of configurations to keep.
     rng : numpy.random.Generator or int, optional
         Generator or seed of the other starts; default a fixed seed.
 
@@ -88,12 +233,6 @@ def nearest_singularity(
     -------
     NearestSingularities
         Configurations, distances, directions, kinds; no row where none was found.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` or ``weights`` of the wrong length, NaN or infinity; weights, counts or a length
-        that are not above zero; no such frame.
 
     References
     ----------
@@ -128,12 +267,12 @@ def nearest_singularity(
     )
     first = _starts(task, home, count, bool(limits), generator_of(rng)) / unit
     if not task.moving.any() or whole.dimension == 0:  # it never moves: nothing to lose
-        return _result(space, home, None, [], whole)
+        return _result(space, home, None, [])
     found = _confirmed(space, nearest_points(space, first), bool(limits), most)
     rows = _distinct(space, found, bool(limits), most)
     if rows and np.linalg.norm(found.x[rows[0]] - space.home) < _ALREADY:
         found, rows = _with_crossings(space, first, found, rows, bool(limits), most)
-    return _result(space, home, found, rows, whole)
+    return _result(space, home, found, rows)
 
 
 def _with_crossings(
@@ -227,7 +366,6 @@ def _result(
     home: Array,
     found: FoundPoints | None,
     rows: list[int],
-    whole: OperationalDimension,
 ) -> NearestSingularities:
     """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
     task, n = space.task, len(home)
@@ -236,8 +374,11 @@ def _result(
         empty = np.zeros(0, dtype=np.int64)
         number = np.zeros(0)
         found = FoundPoints(none, number, number, number, empty, none, none > 0.0)
-    arm = arm_geometry(task) if rows else None
-    named = {i: names_of(task, found.x[i] * space.unit, whole, 1e-9, arm) for i in rows}
+    named = {}
+    if rows:
+        arm = arm_geometry(task)
+        sets = (singular_sets(task, found.x[i] * space.unit, space.dimension, arm) for i in rows)
+        named = {i: names_at(each, 1e-9) for i, each in zip(rows, sets, strict=True)}
     stationary = found.tangential <= _STATIONARY
     known = {name for i in rows if stationary[i] for name in named[i]}
     crossing = np.isinf(found.tangential)
@@ -264,9 +405,7 @@ def _result(
         escape=read_only((found.escape[rows] * space.unit).reshape(len(rows), n)),
         slope=read_only([slope_along(space, found.x[i], found.escape[i]) for i in rows]),
         codimension=read_only(found.codimension[rows], np.int64),
-        kind=tuple(
-            tuple(dict.fromkeys(kind for kind, _ in named[i] if kind is not None)) for i in rows
-        ),
+        kind=tuple(tuple(dict.fromkeys(kind for kind, _ in named[i])) for i in rows),
         words=tuple(tuple(text for _, text in named[i]) for i in rows),
         residual=read_only(found.weakest[rows]),
         stationarity=read_only(found.tangential[rows]),

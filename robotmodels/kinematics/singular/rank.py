@@ -7,20 +7,20 @@ Jacobian: the local one at a configuration, the global one M at almost all of th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_floats, as_vector, read_only
+from ..._arrays import Array, Rebuilt, as_floats, as_number, as_vector, read_only
 from ...model import RobotModel
 from ..jacobians import jacobian
 from ..lengths import spread_configurations
-from .bases import normalised, sparse_basis
-from .frames import combination_text
 from .task import (
+    COMPONENTS,
     MaskAxes,
     SingularTask,
-    above_zero,
     generator_of,
     singular_task,
     task_jacobians,
@@ -30,12 +30,12 @@ from .task import (
 TOLERANCE = 1e-9
 """Singular values below this fraction of the largest are zero."""
 
-_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
+_MOST_CHOICES = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JacobianRank(Rebuilt):
-    """Ranks of the Jacobians of one call, with what they were decided by. Read-only.
+    """Ranks of the Jacobians of one call. Read-only.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class JacobianRank(Rebuilt):
     singular_values : ndarray, shape (..., k)
         Descending, k the smaller of the number of components and n; no unit.
     gap : ndarray, shape (...)
-        Smallest singular value that counts over the largest that does not; infinite if none is
-        left, or if it is exactly zero. The larger, the clearer the decision; it has no scale.
+        Smallest singular value that counts over the largest that does not, a measure of how clear
+        the decision is; infinite if none is left, or if it is exactly zero.
     length : float
         Characteristic length, metres.
     tolerance : float
@@ -67,33 +67,28 @@ class JacobianRank(Rebuilt):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperationalDimension(Rebuilt):
-    """How many independent motions a frame of a robot has. Read-only.
+    """Number of independent motions of a frame of a robot. Read-only.
 
     Parameters
     ----------
     dimension : int
         Global rank M: dimension of the operational space, global number of degrees of freedom.
     position_dimension, orientation_dimension : int
-        Of the velocity of the origin alone, and of the angular velocity alone (of what the mask
-        leaves of them).
+        Of the velocity of the origin alone, and of the angular velocity alone (within the mask).
     joints : int
         Joints between the base and the frame.
     redundancy : int
         ``joints - M``, order of redundancy.
     singular_values : ndarray, shape (k,)
         The largest found of each, relative to the first at its configuration: those beyond M
-        are rounding, and a small one among the first M is a freedom the robot hardly has.
+        are rounding, and a small one among the first M is a weak freedom.
     gap : float
         The M-th of them over the next; infinite if there is none.
-    missing_in_world : ndarray, shape (k, 6)
-        Combinations of the twist that no configuration can produce, in world axes at the frame's
-        origin: rows ``c`` with ``c . [v; w] = 0`` whatever the joints do, a basis with many zeros,
-        largest entry 1. Read as wrenches ``[f; m]`` no motor ever feels them. Only what is the
-        same at all configurations is here: the full number is 6 - M.
-    missing_in_frame : ndarray, shape (k', 6)
-        The same in the frame's own axes.
-    never_in_world, never_in_frame : str
-        The two in words.
+    missing_in_world, missing_in_frame : ndarray, shape (k, 6)
+        Combinations of the twist that no configuration can produce, at the frame's origin in world
+        axes and in the frame's own: rows ``c`` with ``c . [v; w] = 0`` whatever the joints do, a
+        basis with many zeros, largest entry 1; as wrenches ``[f; m]`` they need no torque. Only
+        what is the same at all configurations is here: the full number is 6 - M.
     length : float
         Characteristic length, metres.
     local : JacobianRank or None
@@ -163,27 +158,15 @@ def jacobian_rank(
     frame: str | int | None = None,
     length: float | None = None,
     tolerance: float = TOLERANCE,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: MaskAxes = "world",
 ) -> JacobianRank:
     """Rank of the Jacobian at configurations: their local number of degrees of freedom.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q : array_like, shape (..., n)
-        Joint variables, rad or m.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    length : float, optional
-        Characteristic length L in metres: linear rows are divided by it, strokes of prismatic
-        joints count in it. Default the reach of the frame, `characteristic_length`.
-    tolerance : float
-        Singular values below this fraction of the largest are zero.
-    mask : array_like, shape (6,), optional
-        Ones for the components ``vx vy vz wx wy wz`` that count; default all. ``[1, 1, 1, 0, 0,
-        0]`` is position alone.
+    model, q, frame, length, tolerance, mask
+        See `robotmodels.kinematics`.
     mask_axes : {"world", "tool"}
         Axes of the components: the world's, or the frame's own.
 
@@ -191,12 +174,6 @@ def jacobian_rank(
     -------
     JacobianRank
         Rank, singular values and gap of each.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` or ``mask`` of the wrong length, NaN or infinity; a length or tolerance that is not
-        above zero; no such frame.
 
     References
     ----------
@@ -210,7 +187,7 @@ def jacobian_rank(
     array([6, 5])
     """
     task = singular_task(model, frame, mask, mask_axes, length)
-    return task_rank(task, as_vector(q, model.n, "q"), above_zero(tolerance, "tolerance"))
+    return task_rank(task, as_vector(q, model.n, "q"), as_number(tolerance, "tolerance", above=0.0))
 
 
 def operational_dimension(
@@ -219,7 +196,7 @@ def operational_dimension(
     q: ArrayLike | None = None,
     length: float | None = None,
     tolerance: float = TOLERANCE,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: MaskAxes = "world",
     samples: int = 64,
     rng: np.random.Generator | int | None = None,
@@ -227,22 +204,14 @@ def operational_dimension(
     """Dimension of the operational space of a robot: the rank its Jacobian has almost everywhere.
 
     The rank is the highest found over random configurations inside the limits: almost all have
-    it, since where it drops is a set without volume.
+    it, since the set where it drops has no volume.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
+    model, frame, length, tolerance, mask, mask_axes
+        As in `jacobian_rank`.
     q : array_like, shape (..., n), optional
-        Configurations at which the local number of degrees of freedom is asked for, rad or m.
-    length : float, optional
-        Characteristic length, metres; as `jacobian_rank`.
-    tolerance : float
-        Singular values below this fraction of the largest are zero.
-    mask, mask_axes : array_like, shape (6,), optional; {"world", "tool"}
-        Components that count; as `jacobian_rank`.
+        Configurations whose local number of degrees of freedom is wanted too, rad or m.
     samples : int
         Number of random configurations.
     rng : numpy.random.Generator or int, optional
@@ -251,12 +220,7 @@ def operational_dimension(
     Returns
     -------
     OperationalDimension
-        Dimension, order of redundancy, what is never produced.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `jacobian_rank`.
+        Dimension, order of redundancy, combinations that are never produced.
 
     References
     ----------
@@ -270,7 +234,7 @@ def operational_dimension(
     (6, 1, array(3), array(3))
     """
     task = singular_task(model, frame, mask, mask_axes, length)
-    tolerance = above_zero(tolerance, "tolerance")
+    tolerance = as_number(tolerance, "tolerance", above=0.0)
     count = whole_number(samples, "samples", 1)
     spread = spread_configurations(model, count, generator_of(rng))
     if q is not None:
@@ -347,4 +311,61 @@ def _never(task: SingularTask, q: Array, own: bool, tolerance: float) -> Array:
 
 
 def _listed(twists: Array) -> str:
-    return ", ".join(combination_text(row, _NAMES) for row in twists)
+    return ", ".join(combination_text(row, COMPONENTS) for row in twists)
+
+
+def sparse_basis(vectors: Array, tolerance: float = 1e-9) -> Array:
+    """Basis of a row space with many zeros, each vector normalised to its largest entry.
+
+    Shapes: vectors (k, m) -> (k, m).
+    """
+    k = vectors.shape[0]
+    if k == 0:
+        return vectors.copy()
+    if k == 1:
+        return normalised(vectors[0])[None]
+    orthonormal = np.linalg.qr(vectors.T)[0].T
+    choices = _pivot_choices(orthonormal)
+    blocks = orthonormal[:, choices].transpose(1, 0, 2)
+    weakest = np.linalg.svd(blocks, compute_uv=False)[:, -1]
+    choices = [c for c, weak in zip(choices, weakest, strict=True) if weak > 0.02]
+    if not choices:
+        return np.array([normalised(row) for row in orthonormal])
+    blocks, weakest = blocks[weakest > 0.02], weakest[weakest > 0.02]
+    bases = np.linalg.solve(blocks, np.broadcast_to(orthonormal, (len(choices), *vectors.shape)))
+    sizes = np.abs(bases)
+    zeros = (sizes < tolerance * sizes.max(axis=2, keepdims=True)).sum(axis=(1, 2))
+    # of equally sparse ones the best conditioned; rounding must not decide
+    best = bases[np.lexsort((-weakest.round(6), -zeros))[0]]
+    return np.array([normalised(row) for row in best])
+
+
+def normalised(vector: Array, rounding: float = 1e-13) -> Array:
+    """A vector divided by its entry of largest magnitude, its rounding errors set to zero."""
+    size = np.abs(vector)
+    pivot = int(np.argmax(size > (1.0 - 1e-9) * size.max()))
+    row = vector / vector[pivot]
+    row[np.abs(row) < rounding] = 0.0
+    return row
+
+
+def _pivot_choices(basis: Array) -> list[list[int]]:
+    k, m = basis.shape
+    if comb(m, k) <= _MOST_CHOICES:
+        return [list(choice) for choice in combinations(range(m), k)]
+    from scipy.linalg import qr
+
+    # too many: the pivots of a pivoted factorisation, which are well conditioned
+    return [[int(i) for i in qr(basis, pivoting=True)[-1][:k]]]
+
+
+def combination_text(row: Array, names: tuple[str, ...]) -> str:
+    """A linear combination in words. Shapes: row (m,)."""
+    text = ""
+    for value, name in zip(row, names, strict=True):
+        if abs(value) < 1e-9:
+            continue
+        size = "" if abs(abs(value) - 1.0) < 1e-12 else f"{abs(value):.4g} "
+        sign = "-" if value < 0 else "+"
+        text += f" {sign} {size}{name}" if text else f"{'-' * int(value < 0)}{size}{name}"
+    return text

@@ -1,28 +1,104 @@
-"""What a configuration has lost and gained beside a regular one."""
+"""Singular configurations: lost directions, self-motions and names.
+
+Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
+surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators, ASME J.
+Mechanisms 110, 1988, for the second-order test of a boundary.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt
+from ..._arrays import Array, Rebuilt, as_exact, as_floats, as_number, as_vector, read_only
+from ..._outcomes import Outcome
+from ...model import RobotModel
 from ...table_text import length_text
 from ..singularity_kind import SingularityKind
-from .boundary import WorkspaceSide
-from .flags import SingularityStatus
-from .frames import LostDirections
-from .motion import SelfMotion
-from .task import counting_lines
+from .frames import LostDirections, check_frames, frame_words, lost_in_task_axes, simplest_frame
+from .names import arm_geometry, names_at, names_near, singular_sets
+from .rank import TOLERANCE, OperationalDimension, operational_dimension, task_rank
+from .self_motion import SelfMotion, WorkspaceSide, self_motions, workspace_side
+from .task import (
+    MaskAxes,
+    SingularTask,
+    counting_lines,
+    deciding_mask,
+    outside,
+    singular_task,
+    task_jacobians,
+)
 
 SMALL = 0.02
 """Parts of a weak direction below this are left out of its words."""
 
 
+class SingularityStatus(Outcome):
+    """Status of a configuration; fits int8. Each member has a ``sentence``.
+
+    Examples
+    --------
+    >>> SingularityStatus.SINGULAR.sentence
+    'Singular: the robot has lost freedoms.'
+    """
+
+    REGULAR = 0, "Regular: all freedoms of the robot are there."
+    NEAR_SINGULAR = 1, "Near a singular configuration: one freedom is weak."
+    SINGULAR = 2, "Singular: the robot has lost freedoms."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SingularityFlags(Rebuilt):
+    """Statuses of the configurations of one call. Read-only.
+
+    Parameters
+    ----------
+    status : ndarray of int8, shape (...)
+        Codes of `SingularityStatus`.
+    rank, order : ndarray of int, shape (...)
+        Local number of degrees of freedom r, and ``M - r``.
+    weakest : ndarray, shape (...)
+        The M-th singular value over the first, the distance from singular; no unit.
+    dimension : int
+        M, the global number of degrees of freedom.
+    mask : ndarray of bool, shape (6,)
+        Components that count.
+    frame : str
+        Name of the frame in sentences, such as ``"the tool"``.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> singularity_flags(load("rx90"), np.zeros((2, 6))).order
+    array([1, 1])
+    """
+
+    status: NDArray[np.int8]
+    rank: NDArray[np.int64]
+    order: NDArray[np.int64]
+    weakest: Array
+    dimension: int
+    mask: NDArray[np.bool_]
+    frame: str
+
+    def __repr__(self) -> str:
+        counts = ", ".join(
+            f"{int((self.status == s).sum())} {s.name.lower().replace('_', ' ')}"
+            for s in SingularityStatus
+        )
+        what = "".join(f"; {line}" for line in counting_lines(self.mask, self.frame))
+        return f"<SingularityFlags {self.status.shape}: {counts}; dimension {self.dimension}{what}>"
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status of configuration i (left out for a single one)."""
+        return SingularityStatus(int(self.status[i])).sentence
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularityReport(Rebuilt):
-    """One configuration: what it has lost, what it has gained. Read-only; `print` it.
+    """One configuration: lost directions and self-motions. Read-only; `print` it.
 
     Parameters
     ----------
@@ -48,7 +124,7 @@ class SingularityReport(Rebuilt):
         Combinations that are weak but not lost, where they have the most small parts: those of
         singular values between ``tolerance`` and ``near``.
     side : WorkspaceSide
-        Boundary or interior, of what the robot reaches near this configuration.
+        Boundary or interior, of the poses reached near this configuration.
     lost : LostDirections
         Combinations that cannot be produced, where they have the most zeros.
     lost_in_world : LostDirections
@@ -58,13 +134,13 @@ class SingularityReport(Rebuilt):
         At a boundary: the lost direction towards the side that is open, ``[v; w]`` in the axes of
         ``lost_in_world``, unit length when metres are divided by ``length``.
     self_motions : tuple of SelfMotion
-        Joint motions that leave the frame still.
+        Joint motions without velocity of the frame.
     gained : int
         How many more of them than at regular configurations.
     mask : ndarray of bool, shape (6,)
         Components that count.
     length, tolerance : float
-        Characteristic length in metres, and what counts as zero.
+        Characteristic length in metres, and the relative size of zero.
 
     Examples
     --------
@@ -122,3 +198,191 @@ class SingularityReport(Rebuilt):
         if self.self_motions:
             lines.append(f"Self-motions gained beside a regular configuration: {self.gained}")
         return "\n".join(lines)
+
+
+def singularity_flags(
+    model: RobotModel,
+    q: ArrayLike,
+    frame: str | int | None = None,
+    length: float | None = None,
+    tolerance: float = TOLERANCE,
+    near: float = 1e-2,
+    mask: ArrayLike | str | None = None,
+    mask_axes: MaskAxes = "world",
+) -> SingularityFlags:
+    """Status of configurations in batch: regular, near singular, singular.
+
+    Parameters
+    ----------
+    model, q, frame, length, tolerance, near, mask, mask_axes
+        As in `classify_singularity`, with ``q (..., n)``.
+
+    Returns
+    -------
+    SingularityFlags
+        Status, rank, order and measure of each.
+
+    References
+    ----------
+    Seed book section 1.3.1.4.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> q = [[0.1, 0.2, 0.3, 0.4, x, 0.6] for x in (0.5, 1e-3, 0.0)]
+    >>> singularity_flags(load("rx90"), q).status
+    array([0, 1, 2], dtype=int8)
+    """
+    mask = deciding_mask(model, frame, mask)
+    task = singular_task(model, frame, mask, mask_axes, length)
+    q = as_vector(q, model.n, "q")
+    tolerance, near = as_number(tolerance, "tolerance", above=0.0), as_number(near, "near", 0.0)
+    M = operational_dimension(model, frame, None, task.length, TOLERANCE, mask, mask_axes).dimension
+    found = task_rank(task, q, tolerance)
+    rank = np.minimum(found.rank, M)
+    weakest = np.zeros(rank.shape)
+    if M:
+        sigma = found.singular_values
+        top = sigma[..., 0]
+        weakest = np.divide(sigma[..., M - 1], top, out=weakest, where=top > 0.0)
+    status = np.where(weakest < near, SingularityStatus.NEAR_SINGULAR, SingularityStatus.REGULAR)
+    status = np.where(rank < M, SingularityStatus.SINGULAR, status if M else 0)
+    return SingularityFlags(
+        status=read_only(status, np.int8),
+        rank=read_only(rank, np.int64),
+        order=read_only(M - rank, np.int64),
+        weakest=read_only(weakest),
+        dimension=M,
+        mask=task.mask,
+        frame=frame_words(frame),
+    )
+
+
+def classify_singularity(
+    model: RobotModel,
+    q: ArrayLike,
+    frame: str | int | None = None,
+    length: float | None = None,
+    tolerance: float = TOLERANCE,
+    near: float = 1e-2,
+    mask: ArrayLike | str | None = None,
+    mask_axes: MaskAxes = "world",
+    axes: int | None = None,
+    point: int | None = None,
+) -> SingularityReport:
+    """Freedoms lost and gained at a configuration, in numbers and in words.
+
+    Parameters
+    ----------
+    model, frame, length
+        See `robotmodels.kinematics`.
+    q : array_like, shape (n,)
+        One configuration, rad or m.
+    tolerance : float
+        Singular values below this fraction of the largest are zero. A wider one classifies a
+        configuration near a singular one as if it were there: the components that are then
+        small are given as they are.
+    near : float
+        Fraction below which a singular value that is not zero is called weak.
+    mask : array_like, shape (6,), optional
+        Components that count. Default all; the position alone for a frame moved by at most three
+        joints whose position has as many freedoms as they are, as in `explain_singularities`.
+    mask_axes : {"world", "tool"}
+        Axes of the components.
+    axes, point : int, optional
+        Numbers of the frames in whose axes and at whose origin the lost directions are
+        given, the projection and the intermediate frame of the book; 0 is R_0. Default: where
+        they have the most zeros.
+
+    Returns
+    -------
+    SingularityReport
+        Lost directions, self-motions, kind, side of the workspace.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        ``q`` of the wrong length; a length, tolerance or mask that cannot be; no such frame.
+
+    References
+    ----------
+    Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3; Oblak and Kohli 1988.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> print(classify_singularity(load("rx90"), [0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6]))
+    Singular: the robot has lost freedoms.
+    Rank 5 of 6, weakest singular value ... of the largest (length 0.9 m)
+    elbow: the wrist centre is in the plane of axes 2 and 3: the arm is stretched or folded
+    Cannot be produced, axes of R4, at the origin of R4:
+      vz = 0 whatever the joints do
+      carried without torque: fz
+    On a boundary: along the lost direction the tool can move to one side only.
+    ...
+    """
+    mask = deciding_mask(model, frame, mask)
+    task = singular_task(model, frame, mask, mask_axes, length)
+    check_frames(task, axes, point)
+    q = as_exact(q, (model.n,), "q")
+    tolerance, near = as_number(tolerance, "tolerance", above=0.0), as_number(near, "near", 0.0)
+    whole = operational_dimension(model, frame, None, task.length, TOLERANCE, mask, mask_axes)
+    M = whole.dimension
+    U, values, Vt = np.linalg.svd(task_jacobians(task, q))
+    sigma = as_floats(values, "sigma")
+    top = float(sigma.max(initial=0.0))
+    r = min(int((sigma > tolerance * top).sum()), M)
+    strong = int((sigma[:M] > near * top).sum())
+    weakest = float(sigma[M - 1] / top) if M and top > 0.0 else 0.0
+    zero = max(1e-9, 10.0 * float(sigma[r]) / top) if r < min(M, len(sigma)) and top else 1e-9
+    missing = _missing(task, whole)
+    lost, weak = (
+        outside(U[:, a:b], missing) if a < min(b, M) else np.zeros((task.rows, 0))
+        for a, b in ((r, task.rows), (strong, r))
+    )
+    null = outside(Vt[r:].T, np.eye(model.n)[:, ~task.moving])
+    motions = self_motions(task, q, lost, null, zero)
+    side, opening = workspace_side(task, q, lost, null, motions, missing)
+    sets = singular_sets(task, q, M, arm_geometry(task)) if min(r, strong) < M else ()
+    named = names_at(sets, tolerance) if r < M else ()
+    nearby = names_near(sets, named, tolerance, near) if strong < r else ()
+    status = SingularityStatus.REGULAR
+    if r < M:
+        status = SingularityStatus.SINGULAR
+    elif weakest < near and M:
+        status = SingularityStatus.NEAR_SINGULAR
+    open_twist = None
+    if opening is not None:
+        open_twist = np.zeros(6)
+        open_twist[task.mask] = opening / task.row_scale
+    nothing = lost_in_task_axes(task, np.zeros((task.rows, 0)))
+    return SingularityReport(
+        status=status,
+        q=read_only(q),
+        dimension=M,
+        rank=r,
+        order=M - r,
+        singular_values=read_only(sigma),
+        weakest=weakest,
+        gap=float(task_rank(task, q, tolerance).gap),
+        kinds=tuple(dict.fromkeys(kind for kind, _ in named)),
+        words=tuple(text for _, text in named),
+        near_kinds=tuple(dict.fromkeys(kind for kind, _ in nearby)),
+        near_words=tuple(text for _, text in nearby),
+        weak=simplest_frame(task, q, weak, missing, SMALL, axes, point) if strong < r else nothing,
+        side=side,
+        lost=simplest_frame(task, q, lost, missing, zero, axes, point) if r < M else nothing,
+        lost_in_world=lost_in_task_axes(task, lost),
+        open_twist=None if open_twist is None else read_only(open_twist),
+        self_motions=motions,
+        gained=M - r,
+        mask=task.mask,
+        length=task.length,
+        tolerance=tolerance,
+    )
+
+
+def _missing(task: SingularTask, whole: OperationalDimension) -> Array:
+    """Orthonormal directions without units that no configuration has, shape (m, s)."""
+    rows = whole.missing_in_frame if task.mask_axes == "tool" else whole.missing_in_world
+    return np.linalg.qr((rows[:, task.mask] / task.row_scale).T)[0]

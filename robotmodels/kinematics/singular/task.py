@@ -8,14 +8,13 @@ characteristic length L, and a prismatic joint counts its stroke in units of L.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from operator import index
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, read_only
+from ..._arrays import Array, as_mask, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
@@ -26,7 +25,7 @@ from .events import random_postures
 MaskAxes = Literal["world", "tool"]
 
 _REFERENCES: dict[MaskAxes, Reference] = {"world": "world_aligned", "tool": "local"}
-_COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
+COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _SEED = 20
 
 
@@ -57,7 +56,7 @@ class SingularTask:
 def singular_task(
     model: RobotModel,
     frame: str | int | None = None,
-    mask: ArrayLike | None = None,
+    mask: ArrayLike | str | None = None,
     mask_axes: MaskAxes = "world",
     length: float | None = None,
 ) -> SingularTask:
@@ -66,17 +65,10 @@ def singular_task(
     path = model.twin.frame(frame).path
     if mask_axes not in _REFERENCES:
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
-    asked = np.ones(6) if mask is None else np.asarray(mask)
-    asked = as_exact(asked.astype(float) if asked.dtype == bool else asked, (6,), "mask")
-    if not np.isin(asked, (0.0, 1.0)).all() or not asked.any():
-        raise InvalidValueError(
-            f"mask: expected zeros and ones for vx vy vz wx wy wz, at least one of them 1, "
-            f"got {asked.tolist()}."
-        )
+    keep = as_mask(mask, COMPONENTS)
     length = length_of(model, frame, length)
     on_path = np.zeros(model.f + 1, dtype=bool)
     on_path[path] = True
-    keep = asked.astype(bool)
     scale = np.repeat([1.0 / length, 1.0], 3)[keep]
     kinds = model.table.sigma[model.table.joint_rows]
     return SingularTask(
@@ -106,8 +98,8 @@ def position_decides(model: RobotModel, frame: str | int | None = None) -> bool:
 
 
 def deciding_mask(
-    model: RobotModel, frame: str | int | None, mask: ArrayLike | None
-) -> ArrayLike | None:
+    model: RobotModel, frame: str | int | None, mask: ArrayLike | str | None
+) -> ArrayLike | str | None:
     """The mask that was given, or that of the position where `position_decides`."""
     if mask is None and position_decides(model, frame):
         return (1, 1, 1, 0, 0, 0)
@@ -118,7 +110,7 @@ def counting_lines(mask: NDArray[np.bool_], frame: str) -> list[str]:
     """Line that names the components of the task, where it is not the whole twist."""
     if mask.all():
         return []
-    names = ", ".join(n for n, on in zip(_COMPONENTS, mask, strict=True) if on)
+    names = ", ".join(n for n, on in zip(COMPONENTS, mask, strict=True) if on)
     what = "the motion"
     if not mask[3:].any():
         what = "the position"
@@ -144,12 +136,10 @@ def task_derivatives(task: SingularTask, q: Array) -> Array:
     return rates[..., task.mask, :] * (task.row_scale[:, None] * task.joint_scale)
 
 
-def above_zero(value: float, name: str) -> float:
-    """A finite number above zero, such as a tolerance."""
-    number = float(as_exact(value, (), name))
-    if not (number > 0.0 and isfinite(number)):
-        raise InvalidValueError(f"{name}: expected a finite number above 0, got {value!r}.")
-    return number
+def outside(space: Array, part: Array) -> Array:
+    """Orthonormal basis of the part of a space (columns) that is orthogonal to another one."""
+    U, sigma, _ = np.linalg.svd(space - part @ (part.T @ space), full_matrices=False)
+    return U[:, sigma > 0.5]
 
 
 def whole_number(value: int, name: str, least: int) -> int:

@@ -1,0 +1,140 @@
+"""All IK solutions of a general six-joint arm, up to 16, by Raghavan and Roth's elimination.
+
+The method needs no special axes, and is the worse the more special they are: with a spherical
+wrist or three parallel axes its equations become dependent. Pieper's and Paul's methods serve
+those arms; `EliminationArm.well_conditioned` tests whether this one may. Near singular poses
+solutions may be missing: the partner of a fold is predicted, self-motions are not followed.
+
+References
+----------
+M. Raghavan and B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages",
+J. Mechanical Design 115(3):502-508, 1993.
+D. Manocha and J. F. Canny, "Efficient inverse kinematics for general 6R manipulators", IEEE
+Trans. Robotics and Automation 10(5):648-657, 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, read_only
+from .chain import canonical_frames
+from .check import checked
+from .elimination_forms import Form, Roots, ranked_forms, solve_form
+from .loop import JointChain
+from .motion import jacobians, random_postures, tool_poses
+from .singular import singular_postures
+from .solver import Found, Tolerances, postures
+
+MOST = 16  # solutions a six-joint arm can have at one pose
+CHUNK = 256  # poses worked on at a time: 2 MB of equations
+TESTS = 48  # random poses of the self-test
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EliminationArm:
+    """Six-joint arm solved by elimination, with the results of its self-test.
+
+    ``scaled`` is the chain with frames slid together, in units of ``unit`` metres.
+    """
+
+    chain: JointChain
+    scaled: JointChain
+    unit: float
+    forms: tuple[Form, ...]
+    conditioning: float = np.inf
+    doubtful: int = 0
+    missed: int = 0
+
+    @property
+    def method(self) -> str:
+        """The solver in words."""
+        return "any six joints: elimination to 16 postures (Raghavan and Roth)"
+
+    @property
+    def well_conditioned(self) -> bool:
+        """Whether the self-test found every solution, and most with the first form."""
+        return self.missed == 0 and 4 * self.doubtful <= TESTS and self.conditioning < 1e-6
+
+
+def prepare_elimination(chain: JointChain) -> EliminationArm | None:
+    """Choose the best forms of a six-joint arm and test them on random configurations."""
+    if chain.k != 6 or int(np.sum(chain.sigma == 1)) > 1:
+        return None
+    rng = np.random.default_rng(0)
+    arm = with_forms_of((), chain)
+    few, many = (random_postures(arm.scaled, N, rng) for N in (8, TESTS))
+    forms = ranked_forms(arm.scaled, arm.unit, tool_poses(arm.scaled, few))
+    if not forms:
+        return None
+    arm, poses = replace(arm, forms=forms), tool_poses(arm.scaled, many)
+    doubtful, moved = solve_form(arm.scaled, arm.unit, forms[0], poses, Roots(TESTS))
+    found = _solved(arm, poses)
+    away = found.q - many[:, None]
+    away -= 2.0 * np.pi * np.where(chain.sigma == 0, np.rint(away / (2.0 * np.pi)), 0.0)
+    nearest = np.min(np.where(found.present, np.abs(away).max(axis=2), np.inf), axis=1)
+    odd = (found.count + np.sum(found.double, axis=1)) % 2 == 1
+    return replace(
+        arm,
+        conditioning=float(np.sort(moved)[(9 * TESTS) // 10]),
+        doubtful=int(np.sum(doubtful)),
+        missed=int(np.sum((nearest > 1e-5) | odd)),
+    )
+
+
+def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
+    """An arm with forms that were chosen for another of the same structure."""
+    D, unit = canonical_frames(chain)
+    scaled = JointChain(chain.columns, read_only(chain.sigma, np.int64), read_only(D), chain.base)
+    return EliminationArm(chain, scaled, unit, forms)
+
+
+def elimination_solutions(
+    arm: EliminationArm, U: ArrayLike
+) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """All solutions of poses. Shapes: U (N, 4, 4) -> q (N, 16, 6); valid, double (N, 16)."""
+    poses = np.array(U, dtype=np.float64, order="C")
+    poses[:, :3, 3] /= arm.unit
+    N = poses.shape[0]
+    q = np.full((N, MOST, 6), np.nan)
+    valid, double = np.zeros((N, MOST), np.bool_), np.zeros((N, MOST), np.bool_)
+    for first in range(0, N, CHUNK):
+        rows = slice(first, first + CHUNK)
+        found = _solved(arm, poses[rows])
+        for n in np.flatnonzero(found.count > MOST):
+            # members of self-motions go first
+            s = np.linalg.svd(jacobians(arm.scaled, found.q[n, : found.count[n]]))[1][:, -1]
+            best = np.sort(np.argsort(-s, kind="stable")[:MOST])
+            found.q[n, :MOST], found.double[n, :MOST] = found.q[n, best], found.double[n, best]
+        present = found.present[:, :MOST]
+        valid[rows], double[rows] = present, found.double[:, :MOST] & present
+        q[rows][present] = found.q[:, :MOST][present]
+    q[:, :, arm.chain.sigma == 1] *= arm.unit
+    return q, valid, double
+
+
+@postures.register
+def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    q, valid, double = elimination_solutions(solver, U)
+    found = checked(solver.chain, U, q, valid, tolerances, double=double)
+    found.family[...] = singular_postures(solver.chain, found)[1]
+    return found
+
+
+def _solved(arm: EliminationArm, poses: Array) -> Roots:
+    """Solutions by the first form, and by others where some may be missing."""
+    found = Roots(len(poses))
+    doubtful = np.ones(len(poses), np.bool_)
+    for form in arm.forms:
+        rows = np.flatnonzero(doubtful)
+        if rows.size == 0:
+            break
+        part = Roots(0)
+        part.q, part.count, part.double = found.q[rows], found.count[rows], found.double[rows]
+        doubtful[rows] = solve_form(arm.scaled, arm.unit, form, poses[rows], part)[0]
+        found.q[rows], found.count[rows], found.double[rows] = part.q, part.count, part.double
+    found.double &= found.present
+    return found

@@ -1,0 +1,186 @@
+"""Compiled: real roots of the equations in one joint variable that closed forms come down to.
+
+An equation in an angle is a row of coefficients over 1, cos, sin, cos of twice, sin of twice; one
+in a length is a row over its powers.
+"""
+
+from __future__ import annotations
+
+from math import atan, atan2, cos, hypot, pi, sin, sqrt
+
+import numpy as np
+
+from ...kernels._compile import Floats, compiled
+
+NONE, DOUBLE, TWO, ANY = 0, 1, 2, 3
+ROUNDING = 1e-13  # value beside the terms of a polynomial that rounding leaves at a root
+
+
+@compiled()
+def type_2(X: float, Y: float, Z: float, slack: float, zero: float) -> tuple[int, float, float]:
+    """Roots of ``X sin + Y cos = Z``, type 2 of Paul's method.
+
+    ``theta = atan2(X, Y) +- atan2(sqrt(X^2 + Y^2 - Z^2), Z)``. An overshoot up to ``slack`` of the
+    amplitude is a double root; an amplitude below ``zero`` leaves the angle free, if Z agrees.
+    """
+    rho = hypot(X, Y)
+    if rho <= zero:
+        return (ANY if abs(Z) <= max(zero, slack) else NONE), 0.0, 0.0
+    middle = atan2(X, Y)
+    square = (rho - Z) * (rho + Z)
+    if square <= 0.0:
+        if abs(Z) - rho > slack:
+            return NONE, 0.0, 0.0
+        half = atan2(0.0, Z)
+        return DOUBLE, middle + half, middle + half
+    half = atan2(sqrt(square), Z)
+    return TWO, middle + half, middle - half
+
+
+@compiled()
+def quadratic_roots(a: float, b: float, c: float, roots: Floats) -> int:
+    """Real roots of ``a r^2 + b r + c`` without cancellation; a double one within rounding."""
+    room = b * b - 4.0 * a * c
+    scale = b * b + abs(4.0 * a * c)
+    if room < -1e-9 * scale:
+        return 0
+    if room <= 0.0:
+        roots[0] = -0.5 * b / a
+        return 1
+    half = -0.5 * (b + (sqrt(room) if b >= 0.0 else -sqrt(room)))
+    roots[0] = half / a
+    roots[1] = c / half if half != 0.0 else 0.0
+    return 2
+
+
+@compiled()
+def value_at(c: Floats, degree: int, x: float) -> tuple[float, float]:
+    """Value and derivative of a polynomial at x."""
+    value, slope = c[degree], 0.0
+    for i in range(degree - 1, -1, -1):
+        slope = slope * x + value
+        value = value * x + c[i]
+    return value, slope
+
+
+@compiled()
+def root_between(c: Floats, degree: int, a: float, b: float, rises: bool) -> float:
+    """Root of a polynomial between a and b, where it has opposite signs: Newton and bisection."""
+    x = 0.5 * (a + b)
+    for _ in range(100):
+        value, slope = value_at(c, degree, x)
+        if (value > 0.0) == rises:
+            b = x
+        else:
+            a = x
+        step = x - value / slope
+        if not a < step < b:
+            step = 0.5 * (a + b)
+        moved = abs(step - x)
+        x = step
+        if moved <= 1e-14 * abs(x):
+            break
+    return x
+
+
+@compiled()
+def real_roots(c: Floats, degree: int, slack: float, roots: Floats) -> int:
+    """Real roots of ``c[0] + ... + c[degree] x^degree``; double roots once. Returns their number.
+
+    Between the roots of its derivative a polynomial has one root at most. An extremum of the other
+    sign that reaches zero but for ``slack (1 + x^2)^(degree / 2)`` is a double root.
+    """
+    bound, size = 0.0, 0.0
+    for i in range(degree):
+        bound = max(bound, abs(c[i] / c[degree]))
+    bound += 1.0
+    ends, d, count = np.empty(6), np.empty(5), 0
+    if degree > 2:
+        # the quadratic derivative, but for the factor degree - 2
+        count = quadratic_roots(
+            0.5 * degree * (degree - 1) * c[degree],
+            (degree - 1) * c[degree - 1],
+            c[degree - 2],
+            roots,
+        )
+        if count == 2 and roots[0] > roots[1]:
+            roots[0], roots[1] = roots[1], roots[0]
+    # derivatives of rising degree n, the last one the polynomial itself
+    for n in range(3 if degree > 2 else 1, degree + 1):
+        for i in range(n + 1):
+            d[i] = c[i + degree - n]
+            for m in range(degree - n):
+                d[i] *= i + degree - n - m
+        for i in range(count):
+            ends[1 + i] = roots[i]
+        ends[0], ends[count + 1] = -bound, bound
+        last, count = count + 1, 0
+        before = value_at(d, n, ends[0])[0]
+        for i in range(1, last + 1):
+            x = ends[i]
+            value = value_at(d, n, x)[0]
+            if n == degree and i < last:
+                size = 0.0
+                for m in range(n, -1, -1):
+                    size = size * abs(x) + abs(d[m])
+                following = value_at(d, n, ends[i + 1])[0]
+                touches = abs(value) <= max(
+                    slack * (1.0 + x * x) ** (0.5 * degree), ROUNDING * size
+                )
+                # an extremum towards zero, from either side, or the middle of a triple root
+                if abs(value) <= ROUNDING * size or (
+                    touches and value * before > 0.0 and abs(value) < abs(following)
+                ):
+                    roots[count] = x
+                    count += 1
+                    before = following
+                    continue
+            if (value > 0.0) != (before > 0.0):
+                roots[count] = root_between(d, n, ends[i - 1], x, value > 0.0)
+                count += 1
+            before = value
+    return count
+
+
+@compiled()
+def polynomial_roots(g: Floats, roots: Floats) -> int:
+    """Real roots of ``g0 + g1 r + g2 r^2 + g3 r^3 + g4 r^4``. Returns how many."""
+    size = 0.0
+    for i in range(5):
+        size = max(size, abs(g[i]))
+    degree = 4
+    while degree > 0 and abs(g[degree]) <= 1e-13 * size:
+        degree -= 1
+    if degree == 2:
+        return quadratic_roots(g[2], g[1], g[0], roots)
+    return real_roots(g, degree, 1e-9 * size, roots)
+
+
+@compiled()
+def trigonometric_roots(g: Floats, roots: Floats, slack: float) -> int:
+    """Real roots of a trigonometric polynomial of degree two: Pieper's quartic. Returns how many.
+
+    The quartic is in the tangent of half the angle, measured from a direction opposite to which
+    the polynomial is large, so that no root is at infinity.
+    """
+    size, largest, turn = 0.0, -1.0, 0.0
+    for i in range(5):
+        size = max(size, abs(g[i]))
+    if size == 0.0:
+        return 0
+    c, s, half = 1.0, 0.0, sqrt(0.5)
+    for k in range(8):
+        value = g[0] + g[1] * c + g[2] * s + g[3] * (c * c - s * s) + g[4] * 2.0 * s * c
+        if abs(value) > largest:
+            largest, turn = abs(value), 0.25 * pi * k - pi
+        c, s = half * (c - s), half * (c + s)
+    c, s, c2, s2 = cos(turn), sin(turn), cos(2.0 * turn), sin(2.0 * turn)
+    h1, h2 = g[1] * c + g[2] * s, g[2] * c - g[1] * s
+    h3, h4 = g[3] * c2 + g[4] * s2, g[4] * c2 - g[3] * s2
+    q = np.empty(5)
+    q[0], q[1], q[2] = g[0] + h1 + h3, 2.0 * h2 + 4.0 * h4, 2.0 * g[0] - 6.0 * h3
+    q[3], q[4] = 2.0 * h2 - 4.0 * h4, g[0] - h1 + h3
+    count = real_roots(q, 4, max(slack, 1e-9 * size), roots)
+    for i in range(count):
+        roots[i] = turn + 2.0 * atan(roots[i])
+    return count

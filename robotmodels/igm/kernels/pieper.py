@@ -1,0 +1,525 @@
+"""Compiled: three joints that bring a point to a place, three that reach an orientation (Pieper).
+
+The first: ``M_a E_1 M_b E_2 M_c w = p``. Joint a is eliminated by what it leaves alone (height and
+distance if it turns, two coordinates if it slides); joint b by its sine and cosine, which leaves
+an equation in joint c: of type 2 where the first two axes meet or are parallel, else a quartic.
+
+D. L. Pieper, "The kinematics of manipulators under computer control", 1968.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, sin, sqrt
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from ...kernels._compile import (
+    INT,
+    INTS,
+    MATRIX,
+    NOTHING,
+    OUT2,
+    OUT3,
+    STACK,
+    VECTOR,
+    Floats,
+    Ints,
+    compiled,
+)
+from .._check import wrapped
+from .equations import (
+    ANY,
+    polynomial_roots,
+    quadratic_roots,
+    trigonometric_roots,
+    type_2,
+)
+
+LINKS = types.Array(types.float64, 4, "C", readonly=True)
+COUNTS, MARKS = types.Array(types.int64, 1, "C"), types.Array(types.int64, 2, "C")
+FLAGS, JOINT_FLAGS = (types.Array(types.boolean, ndim, "C") for ndim in (2, 3))
+RANK = 1e-9  # coefficients of an unknown below which an equation is free of it
+ALIGNED = 4e-13  # sine between axes below which any first angle is good to 1e-12
+EXACT = 1e-13  # error of a point beside the length of the arm above which Newton steps follow
+STEPS = 8  # at most
+MERGE = 1e-6  # solutions closer than this in every joint are the same [rad, m]
+
+
+@compiled()
+def advance(P: Floats, turning: bool, x: float, E: Floats, out: Floats) -> None:
+    """``out = P M(x) E`` for poses as 3x4 arrays."""
+    c, s = (cos(x), sin(x)) if turning else (1.0, 0.0)
+    r = 0.0 if turning else x
+    for i in range(3):
+        a, b, d = c * P[i, 0] + s * P[i, 1], c * P[i, 1] - s * P[i, 0], P[i, 2]
+        for j in range(4):
+            out[i, j] = a * E[0, j] + b * E[1, j] + d * E[2, j]
+        out[i, 3] += r * d + P[i, 3]
+
+
+@compiled()
+def add_product(a: Floats, b: Floats, turning: bool, out: Floats) -> None:
+    """Add the product of two functions of the last joint to ``out``.
+
+    Over 1, cos, sin they give 1, cos, sin, cos 2, sin 2; over 1, r, r^2 the powers up to r^4.
+    """
+    if turning:
+        cc, ss, cs = a[1] * b[1], a[2] * b[2], a[1] * b[2] + a[2] * b[1]
+        out[0] += a[0] * b[0] + 0.5 * (cc + ss)
+        out[1] += a[0] * b[1] + a[1] * b[0]
+        out[2] += a[0] * b[2] + a[2] * b[0]
+        out[3] += 0.5 * (cc - ss)
+        out[4] += 0.5 * cs
+    else:
+        for i in range(3):
+            for j in range(3):
+                out[i + j] += a[i] * b[j]
+
+
+@compiled()
+def value(a: Floats, turning: bool, x: float) -> float:
+    """Value at x of a function of the last joint."""
+    if turning:
+        return a[0] + a[1] * cos(x) + a[2] * sin(x)
+    return a[0] + x * (a[1] + x * a[2])
+
+
+@compiled()
+def roots_of_product(g: Floats, turning: bool, roots: Floats, slack: float) -> int:
+    """Roots of a product of two functions of the last joint."""
+    return trigonometric_roots(g, roots, slack) if turning else polynomial_roots(g, roots)
+
+
+@compiled()
+def roots_of_linear(a: Floats, turning: bool, roots: Floats, slack: float, zero: float) -> int:
+    """Roots of a function of the last joint itself; -1 if every value is one."""
+    if turning:
+        kind, roots[0], roots[1] = type_2(a[2], a[1], -a[0], slack, zero)
+        return -1 if kind == ANY else kind
+    if abs(a[2]) > zero:
+        return quadratic_roots(a[2], a[1], a[0], roots)
+    if abs(a[1]) > zero:
+        roots[0] = -a[0] / a[1]
+        return 1
+    return -1 if abs(a[0]) <= slack else 0
+
+
+@compiled()
+def point_solutions(
+    kinds: Ints,
+    E1: Floats,
+    E2: Floats,
+    w: Floats,
+    p: Floats,
+    size: float,
+    slack: float,
+    reference: Floats,
+    x: Floats,
+    free: Ints,
+) -> int:
+    """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``. Returns how many.
+
+    ``size``: length of the arm; ``slack``: relative overshoot of a double root; ``free[i]`` gets a
+    bit (1, 2, 4) for each joint whose value was taken from ``reference``.
+    """
+    last, middle, first = kinds[2] == 0, kinds[1] == 0, kinds[0] == 0
+    zero = 1e-11 * size
+    # f = E_2 M_c w and its squared length, functions of the last joint
+    f, length = np.zeros((3, 3)), np.zeros(5)
+    for i in range(3):
+        f[i, 0] = E2[i, 2] * w[2] + E2[i, 3]
+        if last:
+            f[i, 1] = E2[i, 0] * w[0] + E2[i, 1] * w[1]
+            f[i, 2] = E2[i, 1] * w[0] - E2[i, 0] * w[1]
+        else:
+            f[i, 0] += E2[i, 0] * w[0] + E2[i, 1] * w[1]
+            f[i, 1] = E2[i, 2]
+        add_product(f[i], f[i], last, length)
+    # two equations row.y + lam |y|^2 = k in y = M_b f, free of the first joint
+    row, k, lam = np.zeros((2, 3)), np.zeros(2), 0.0
+    if first:
+        lam, k[0] = 1.0 / (2.0 * size), p[2] - E1[2, 3]
+        for i in range(3):
+            row[0, i] = E1[2, i]
+            k[1] += (p[i] * p[i] - E1[i, 3] * E1[i, 3]) * lam
+            for j in range(3):
+                row[1, j] += E1[i, j] * E1[i, 3] / size
+    else:
+        for i in range(2):
+            k[i] = p[i] - E1[i, 3]
+            for j in range(3):
+                row[i, j] = E1[i, j]
+    # what is left of k without the parts that the middle joint does not change
+    b = np.zeros((2, 3))
+    for i in range(2):
+        b[i, 0] = k[i]
+        for m in range(3):
+            b[i, m] -= row[i, 2] * f[2, m] + (lam * length[m] if i == 1 else 0.0)
+    found, marks = np.zeros((8, 2)), np.zeros(8, np.int64)
+    if middle:
+        count = turning_pair(row, b, f, last, size, slack, zero, reference, found, marks)
+    else:
+        for i in range(2):
+            for m in range(3):
+                b[i, m] -= row[i, 0] * f[0, m] + row[i, 1] * f[1, m]
+        count = sliding_pair(row, b, lam, f, last, size, slack, zero, reference, found, marks)
+    for i in range(count):
+        xc, xb = found[i, 0], found[i, 1]
+        y0, y1, y2 = value(f[0], last, xc), value(f[1], last, xc), value(f[2], last, xc)
+        if middle:
+            c, s = cos(xb), sin(xb)
+            y0, y1 = c * y0 - s * y1, s * y0 + c * y1
+        else:
+            y2 += xb
+        x[i, 1], x[i, 2], free[i] = xb, xc, marks[i]
+        if not first:
+            x[i, 0] = p[2] - (E1[2, 0] * y0 + E1[2, 1] * y1 + E1[2, 2] * y2 + E1[2, 3])
+        elif hypot(p[0], p[1]) <= zero:
+            # asked of the goal: there two solutions merge, and joints are good to half the digits
+            x[i, 0] = reference[0]
+            free[i] |= 1
+        else:
+            h0 = E1[0, 0] * y0 + E1[0, 1] * y1 + E1[0, 2] * y2 + E1[0, 3]
+            h1 = E1[1, 0] * y0 + E1[1, 1] * y1 + E1[1, 2] * y2 + E1[1, 3]
+            x[i, 0] = atan2(p[1], p[0]) - atan2(h1, h0)
+    return count
+
+
+@compiled()
+def turning_pair(
+    row: Floats,
+    b: Floats,
+    f: Floats,
+    last: bool,
+    size: float,
+    slack: float,
+    zero: float,
+    reference: Floats,
+    found: Floats,
+    marks: Ints,
+) -> int:
+    """Two equations in two joints, ``row_i . Rot(x_b) (f_x, f_y) = b_i``: eliminate the turn x_b.
+
+    ``b`` and ``f`` are functions of the other joint x_c. Writes pairs (x_c, x_b) to ``found``,
+    bits 4 and 2 to ``marks`` where they are free; returns how many.
+    """
+    n0, n1 = hypot(row[0, 0], row[0, 1]), hypot(row[1, 0], row[1, 1])
+    det = row[0, 0] * row[1, 1] - row[0, 1] * row[1, 0]
+    roots, count = np.zeros(8), 0
+    if abs(det) > RANK * max(n0, n1):
+        # |B b|^2 = f_x^2 + f_y^2 with B the inverse of the two rows: Pieper's quartic
+        u, v, g, minus = np.zeros(3), np.zeros(3), np.zeros(5), np.zeros(5)
+        for m in range(3):
+            u[m] = (row[1, 1] * b[0, m] - row[0, 1] * b[1, m]) / det
+            v[m] = (row[0, 0] * b[1, m] - row[1, 0] * b[0, m]) / det
+        for i in range(2):
+            add_product(u if i == 0 else v, u if i == 0 else v, last, g)
+            add_product(f[i], f[i], last, minus)
+        for m in range(5):
+            g[m] -= minus[m]
+        for i in range(roots_of_product(g, last, roots, slack * size * size)):
+            xc = roots[i]
+            fx, fy = value(f[0], last, xc), value(f[1], last, xc)
+            found[count, 0], found[count, 1], marks[count] = xc, reference[1], 2
+            if hypot(fx, fy) > zero:
+                found[count, 1] = atan2(value(v, last, xc), value(u, last, xc)) - atan2(fy, fx)
+                marks[count] = 0
+            count += 1
+        return count
+    # the rows are parallel (axes that meet, or are parallel): one combination of the equations
+    # is free of the second joint
+    main = 0 if n0 >= n1 else 1
+    other = 1 - main
+    amplitude = max(n0, n1)
+    if amplitude <= RANK:
+        return 0  # the first two axes coincide: the arm is redundant here
+    ratio = (row[other, 0] * row[main, 0] + row[other, 1] * row[main, 1]) / amplitude**2
+    a = np.zeros(3)
+    for m in range(3):
+        a[m] = b[other, m] - ratio * b[main, m]
+    outer = roots_of_linear(a, last, roots, slack * size, zero)
+    mark = 0
+    if outer < 0:
+        roots[0], outer, mark = reference[2], 1, 4
+    for i in range(outer):
+        xc = roots[i]
+        fx, fy = value(f[0], last, xc), value(f[1], last, xc)
+        # row . (c f_x - s f_y, s f_x + c f_y) = b
+        X = row[main, 1] * fx - row[main, 0] * fy
+        Y = row[main, 0] * fx + row[main, 1] * fy
+        kind, t0, t1 = type_2(X, Y, value(b[main], last, xc), slack * size, zero)
+        for j in range(1 if kind == ANY else kind):
+            found[count, 0], found[count, 1], marks[count] = xc, t0 if j == 0 else t1, mark
+            if kind == ANY:
+                found[count, 1], marks[count] = reference[1], mark | 2
+            count += 1
+    return count
+
+
+@compiled()
+def sliding_pair(
+    row: Floats,
+    b: Floats,
+    lam: float,
+    f: Floats,
+    last: bool,
+    size: float,
+    slack: float,
+    zero: float,
+    reference: Floats,
+    found: Floats,
+    marks: Ints,
+) -> int:
+    """The same with a sliding joint x_b: ``row_i z x_b + lam_i (2 f_z x_b + x_b^2) = b_i``.
+
+    Only the second equation has the quadratic term, and only if the first joint turns.
+    """
+    roots, lengths = np.zeros(8), np.zeros(4)
+    count, mark = 0, 0
+    main = 0 if lam > 0.0 or abs(row[0, 2]) >= abs(row[1, 2]) else 1
+    other = 1 - main
+    if abs(row[main, 2]) > RANK:
+        # the slide from the main equation into the other one
+        slide, linear, scaled, g = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(5)
+        for m in range(3):
+            slide[m] = b[main, m] / row[main, 2]
+            linear[m] = 2.0 * lam * f[2, m] + (row[other, 2] if m == 0 else 0.0)
+            scaled[m] = lam * slide[m]
+            g[m] = -b[other, m]
+        if lam > 0.0:
+            add_product(linear, slide, last, g)
+            add_product(scaled, slide, last, g)
+            outer = roots_of_product(g, last, roots, slack * size)
+        else:
+            for m in range(3):
+                linear[m] = b[other, m] - row[other, 2] * slide[m]
+            outer = roots_of_linear(linear, last, roots, slack * size, zero)
+        if outer < 0:
+            roots[0], outer, mark = reference[2], 1, 4
+        for i in range(outer):
+            found[i, 0], found[i, 1], marks[i] = roots[i], value(slide, last, roots[i]), mark
+        return outer
+    if lam == 0.0:
+        return 0  # both joints slide along the same line: redundant
+    # the first equation is free of the slide: it gives the last joint, the second the slide
+    outer = roots_of_linear(b[main], last, roots, slack * size, zero)
+    if outer < 0:
+        roots[0], outer, mark = reference[2], 1, 4
+    for i in range(outer):
+        xc = roots[i]
+        linear_z = row[other, 2] + 2.0 * lam * value(f[2], last, xc)
+        for j in range(quadratic_roots(lam, linear_z, -value(b[other], last, xc), lengths)):
+            found[count, 0], found[count, 1], marks[count] = xc, lengths[j], mark
+            count += 1
+    return count
+
+
+@compiled()
+def wrist_postures(
+    A: Floats, B: Floats, M: Floats, slack: float, reference: Floats, x: Floats, free: Ints
+) -> int:
+    """The (at most two) ``x (m, 3)`` with ``Rz(x_0) A Rz(x_1) B Rz(x_2) = M``. Returns how many.
+
+    The first angle comes from the last axis, the others by substitution, so that any first angle is
+    exact where it is free (``free[i] = 1``, value from ``reference``): first and last axis aligned.
+    """
+    m0, m1, m2 = M[0, 2], M[1, 2], M[2, 2]
+    n0, n1, n2 = B[0, 2], B[1, 2], B[2, 2]
+    X = A[0, 2] * m1 - A[1, 2] * m0
+    Y = A[0, 2] * m0 + A[1, 2] * m1
+    kind, first, second = type_2(X, Y, n2 - A[2, 2] * m2, max(slack, 1e-9), ALIGNED)
+    count = 1 if kind == ANY else kind
+    R = np.empty((3, 3))
+    for i in range(count):
+        a = reference[0] if kind == ANY else (first if i == 0 else second)
+        free[i] = 1 if kind == ANY else 0
+        c, s = cos(a), sin(a)
+        # R = A^T Rz(-a) M, whose last column is Rz(b) n
+        for j in range(3):
+            u, v = c * M[0, j] + s * M[1, j], c * M[1, j] - s * M[0, j]
+            for r in range(3):
+                R[r, j] = A[0, r] * u + A[1, r] * v + A[2, r] * M[2, j]
+        b = atan2(R[1, 2], R[0, 2]) - atan2(n1, n0)
+        c, s = cos(b), sin(b)
+        # the first column of B^T Rz(-b) R = Rz(c) is enough
+        u, v = c * R[0, 0] + s * R[1, 0], c * R[1, 0] - s * R[0, 0]
+        x[i, 0], x[i, 1] = a, b
+        x[i, 2] = atan2(
+            B[0, 1] * u + B[1, 1] * v + B[2, 1] * R[2, 0],
+            B[0, 0] * u + B[1, 0] * v + B[2, 0] * R[2, 0],
+        )
+    return count
+
+
+FLOAT = types.float64
+
+
+@compiled(NOTHING(LINKS, STACK, INT, INTS, VECTOR, FLOAT, FLOAT, MATRIX, OUT3, MARKS, COUNTS))
+def concurrent_postures(
+    links: Floats,
+    pair: Floats,
+    backwards: int,
+    kinds: Ints,
+    meeting: Floats,
+    size: float,
+    slack: float,
+    references: Floats,
+    q: Floats,
+    free: Ints,
+    counts: Ints,
+) -> None:
+    """Candidates ``q (N, 8, 6)`` of loops ``M_0 E_0 ... M_5 E_5 = 1`` whose axes 3, 4, 5 meet.
+
+    Shapes: links (N, 6, 4, 4); ``meeting`` holds the height of the point on axis 3 and on axis 5.
+    ``backwards`` solves the first three joints from the other end, with the links ``pair``.
+    """
+    x, marks = np.zeros((8, 3)), np.zeros(8, np.int64)
+    y, wrist_marks = np.zeros((2, 3)), np.zeros(2, np.int64)
+    order, reference = np.zeros(3, np.int64), np.zeros(3)
+    w, p = np.zeros(3), np.zeros(3)
+    unit = np.zeros((3, 4))
+    P, Q, M = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 3))
+    for i in range(3):
+        unit[i, i] = 1.0
+    for n in range(links.shape[0]):
+        E = links[n]
+        for i in range(3):
+            w[i] = E[2, i, 2] * meeting[0] + E[2, i, 3]
+            p[i] = E[5, 2, i] * meeting[1]
+            for j in range(3):
+                p[i] -= E[5, j, i] * E[5, j, 3]
+        for i in range(3):
+            order[i] = kinds[2 - i if backwards else i]
+            reference[i] = -references[n, 2 - i] if backwards else references[n, i]
+        if backwards:
+            m = point_solutions(order, pair[0], pair[1], p, w, size, slack, reference, x, marks)
+        else:
+            m = point_solutions(order, E[0], E[1], w, p, size, slack, reference, x, marks)
+        count = 0
+        for i in range(m):
+            if backwards:
+                x[i, 0], x[i, 1], x[i, 2] = -x[i, 2], -x[i, 1], -x[i, 0]
+                marks[i] = ((marks[i] & 1) << 2) | (marks[i] & 2) | (marks[i] >> 2)
+            advance(unit, kinds[0] == 0, x[i, 0], E[0], P)
+            advance(P, kinds[1] == 0, x[i, 1], E[1], Q)
+            advance(Q, kinds[2] == 0, x[i, 2], E[2], P)
+            for r in range(3):
+                for s in range(3):
+                    M[r, s] = P[0, r] * E[5, s, 0] + P[1, r] * E[5, s, 1] + P[2, r] * E[5, s, 2]
+            for j in range(wrist_postures(E[3], E[4], M, slack, references[n, 3:], y, wrist_marks)):
+                if count == 8:
+                    break
+                for r in range(3):
+                    q[n, count, r], q[n, count, 3 + r] = x[i, r], y[j, r]
+                free[n, count] = marks[i] | (wrist_marks[j] << 3)
+                count += 1
+        counts[n] = count
+
+
+@compiled()
+def improved_point(
+    D: Floats, kinds: Ints, p: Floats, size: float, x: Floats
+) -> tuple[float, float]:
+    """Newton steps on the position of a point, in place; error, and determinant of the Jacobian."""
+    T, trial = np.empty((4, 3, 4)), np.empty(3)
+    J, e = np.empty((3, 3)), np.empty(3)
+    least, least_det = np.inf, 0.0
+    for i in range(3):
+        trial[i] = x[i]
+        for j in range(4):
+            T[0, i, j] = D[0, i, j]
+    for _ in range(STEPS):
+        error, det = 0.0, 0.0
+        for k in range(3):
+            advance(T[k], kinds[k] == 0, trial[k], D[k + 1], T[k + 1])
+        for i in range(3):
+            e[i] = p[i] - T[3, i, 3]
+            error += e[i] * e[i]
+        error = sqrt(error)
+        if not error < least:
+            break
+        for k in range(3):
+            x[k], trial[k] = trial[k], 0.0
+            # column k: z x (P - O), or z
+            for i in range(3):
+                j, m = (i + 1) % 3, (i + 2) % 3
+                J[i, k] = T[k, i, 2]
+                if kinds[k] == 0:
+                    J[i, k] = T[k, j, 2] * (T[3, m, 3] - T[k, m, 3])
+                    J[i, k] -= T[k, m, 2] * (T[3, j, 3] - T[k, j, 3])
+        # Cramer's rule
+        for k in range(3):
+            j, m = (k + 1) % 3, (k + 2) % 3
+            for i in range(3):
+                r, s = (i + 1) % 3, (i + 2) % 3
+                cofactor = J[r, j] * J[s, m] - J[s, j] * J[r, m]
+                trial[k] += cofactor * e[i]
+                det += cofactor * J[i, k] / 3.0
+        least, least_det = error, det
+        if error <= EXACT * size or abs(det) <= 1e-12:
+            break
+        for k in range(3):
+            trial[k] = x[k] + trial[k] / det
+    return least, least_det
+
+
+@compiled(
+    NOTHING(INTS, STACK, MATRIX, MATRIX, FLOAT, FLOAT, FLOAT, OUT3, FLAGS, OUT2, FLAGS, JOINT_FLAGS)
+)
+def position_solutions(
+    kinds: Ints,
+    D: Floats,
+    points: Floats,
+    references: Floats,
+    size: float,
+    slack: float,
+    tolerance: float,
+    q: Floats,
+    valid: NDArray[np.bool_],
+    residual: Floats,
+    double: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+) -> None:
+    """Configurations of three joints that bring the tool's origin to points ``(N, 3)`` of R_0.
+
+    Shapes: D (4, 4, 4), references (N, 3) -> q, free (N, 4, 3); valid, residual, double (N, 4).
+    """
+    x, marks = np.zeros((8, 3)), np.zeros(8, np.int64)
+    w, p = np.zeros(3), np.zeros(3)
+    turning = 0
+    for i in range(3):
+        w[i] = D[3, i, 3]
+        turning += 1 - kinds[i]
+    for n in range(points.shape[0]):
+        for i in range(3):
+            p[i] = 0.0
+            for j in range(3):
+                p[i] += D[0, j, i] * (points[n, j] - D[0, j, 3])
+        count = 0
+        found = point_solutions(kinds, D[1], D[2], w, p, size, slack, references[n], x, marks)
+        for i in range(found):
+            error, det = improved_point(D, kinds, points[n], size, x[i])
+            if not error <= tolerance:
+                continue
+            same = -1
+            for k in range(3):
+                x[i, k] = wrapped(x[i, k]) if kinds[k] == 0 else x[i, k]
+            for r in range(count):
+                gap = 0.0
+                for k in range(3):
+                    d = x[i, k] - q[n, r, k]
+                    gap = max(gap, abs(wrapped(d) if kinds[k] == 0 else d))
+                if gap < MERGE:
+                    same = r
+            if same >= 0:
+                double[n, same] = True
+            elif count < 4:
+                for k in range(3):
+                    q[n, count, k] = x[i, k]
+                    free[n, count, k] = (marks[i] >> k & 1) == 1
+                residual[n, count], valid[n, count] = error, True
+                # two solutions in one: an isolated singular configuration
+                double[n, count] = marks[i] == 0 and abs(det) <= MERGE * size**turning
+                count += 1

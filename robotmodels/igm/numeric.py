@@ -1,0 +1,207 @@
+"""The numeric inverse geometric model: any robot, any mask, one configuration a pose."""
+
+from __future__ import annotations
+
+import weakref
+from operator import index
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import as_vector, batch_rows
+from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+from .asked import above_zero, mask_of
+from .loop import joint_chain
+from .pose_search import SearchSpace, SearchTask, pose_search, search_space
+from .solutions import IGMSolutions
+from .solver import Tolerances
+
+METHOD = "numeric (Levenberg-Marquardt)"
+"""Name of the method in results."""
+_SEED = 20
+
+
+def igm_numeric(
+    model: RobotModel,
+    T: ArrayLike,
+    q0: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    mask_axes: Literal["world", "tool"] = "world",
+    position_tolerance: float = 1e-6,
+    orientation_tolerance: float = 1e-6,
+    rng: np.random.Generator | int | None = None,
+    limits: bool = False,
+    restarts: int = 100,
+    iterations: int = 40,
+) -> IGMSolutions:
+    """Numeric inverse geometric model: one posture that brings the tool to each pose.
+
+    Also called inverse kinematics, ``ikine``, ``ik_LM``, CLIK. For any robot: any number of
+    joints, any tree, redundant or with fewer joints than the task has components. It
+    starts from ``q0`` if given, then from postures spread over the joint ranges, those whose pose
+    is nearest first. A solution is a posture whose pose was computed again and is met within both
+    tolerances.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    T : array_like, shape (..., 4, 4)
+        World poses of the tool, metres. A rotation that is off by less than 1e-6 is rounded to
+        the nearest one.
+    q0 : array_like, shape (..., n), optional
+        Where to start, rad or m; broadcasts with the poses. The solution found from it is usually
+        near it. Joints that do not move the tool keep its value. Without it nothing is
+        preferred, and such joints stay at 0 (with ``limits`` at the nearest value inside them).
+    mask : array_like, shape (6,), optional
+        Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
+        default all. Rotations are the components of ``log(R_desired R^T)``.
+    mask_axes : {"world", "tool"}
+        Axes of the components: the world's, or those of the tool at the desired pose. Pointing
+        the tool's z axis is ``[1, 1, 1, 1, 1, 0]`` in tool axes.
+    position_tolerance : float
+        Metres, on the length of the asked-for translation that is missing.
+    orientation_tolerance : float
+        Radians, on the asked-for rotation that is missing. For poses given with few digits take
+        wider tolerances.
+    rng : numpy.random.Generator or int, optional
+        Generator or seed of the spread starts; default a fixed seed. The starts are the same for
+        all poses of a call, so that a batch gives what its poses give one by one.
+    limits : bool
+        Whether solutions must lie within the joint limits. Angles are then shifted by whole turns
+        to be nearest to ``q0`` (else to mid-range) inside the limits; otherwise they are in
+        (-pi, pi].
+    restarts : int
+        How many starts to try beside ``q0``; 0 needs a ``q0``.
+    iterations : int
+        Most steps from one start.
+
+    Returns
+    -------
+    IGMSolutions
+        With one row (S = 1) for every pose, its ``error`` per component, and ``closest``: the
+        posture the search ended with, also where it is no solution. Then ``status`` tells whether
+        limits are the reason; whether the position is met but the orientation is not (``closest``
+        is where the remaining angle is least); or whether the position is too far or too near.
+        These are findings of the search, not proofs.
+        Postures of redundant arms are marked as members of an infinite family, with
+        the joints that move along it; double roots and families at singular postures are not
+        looked for.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        ``T`` that are not poses, ``q0`` or ``mask`` of the wrong length, NaN or infinity; a mask
+        that is not of zeros and ones or that leaves nothing; an unknown option.
+
+    References
+    ----------
+    The exercise, section 4.3 (``ikine`` and its mask). T. Sugihara, Solvability-unconcerned
+    inverse kinematics by the Levenberg-Marquardt method, IEEE T-RO 27(5), 2011.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics import dgm
+    >>> arm = load("panda")
+    >>> T = dgm(arm, [0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7])
+    >>> found = igm_numeric(arm, T, limits=True)
+    >>> bool(found.within_limits[0]), bool(np.allclose(dgm(arm, found.q[0]), T, atol=1e-6))
+    (True, True)
+
+    The exercise's pose B: its position is reached, its orientation cannot be.
+
+    >>> trr = load("lab_trr")
+    >>> B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
+    >>> igm_numeric(trr, B, mask=[1, 1, 1, 0, 0, 0]).reason()
+    'The pose is reached.'
+    >>> igm_numeric(trr, B).reason()
+    'The position is reached, but the orientation is not available there. It is off by 180 deg.'
+    """
+    if not isinstance(model, RobotModel):
+        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    T = se3.as_pose(T)
+    asked = mask_of(mask)
+    if mask_axes not in ("world", "tool"):
+        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
+    tolerances = Tolerances(
+        above_zero(position_tolerance, "position_tolerance"),
+        above_zero(orientation_tolerance, "orientation_tolerance"),
+    )
+    restarts = _whole(restarts, "restarts", 0)
+    iterations = _whole(iterations, "iterations", 1)
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
+    if restarts == 0 and q0 is None:
+        raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
+    space = _search_space(model, bool(limits), restarts, rng)
+    columns, n = space.chain.columns, model.n
+    middle = np.zeros(n)
+    if limits:
+        middle[columns] = space.middle
+    first = middle if q0 is None else as_vector(q0, n, "q0")
+    flat = T.reshape(*T.shape[:-2], 16)
+    batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
+    closest = np.clip(first, model.lower, model.upper) if limits else np.array(first)
+    U = se3.inverse(model.base) @ targets.reshape(-1, 4, 4)
+    task = SearchTask(asked, mask_axes == "tool", tolerances, restarts, iterations)
+    found = pose_search(space, task, U, closest[:, columns], q0 is not None)
+    closest[:, columns] = found.q
+    family = np.zeros(closest.shape, np.bool_)
+    family[:, columns] = found.family
+    inside = np.all((closest >= model.lower) & (closest <= model.upper), axis=1)
+    rows, valid = (*batch, 1), found.valid
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    return IGMSolutions(
+        q=np.where(valid[:, None], closest, np.nan).reshape(*rows, n),
+        valid=valid.reshape(rows),
+        residual=found.residual.reshape(rows),
+        within_limits=(inside & valid).reshape(rows),
+        code=np.where(valid, 0, -1).reshape(rows),
+        labels=("",),
+        status=found.status.reshape(batch),
+        double=np.zeros(rows, np.bool_),
+        free_joints=np.zeros((*rows, n), np.bool_),
+        family_joints=family.reshape(*rows, n),
+        method=METHOD,
+        periodic=revolute & (not limits),
+        mask=asked,
+        error=found.error.reshape(*rows, 6),
+        closest=closest.reshape(*batch, n),
+    )
+
+
+# by identity: a model's hash reads all of its numbers
+_SPACES: dict[tuple[int, bool, int], tuple[weakref.ref[RobotModel], SearchSpace]] = {}
+
+
+def _search_space(model: RobotModel, limits: bool, restarts: int, rng: Any) -> SearchSpace:
+    """Starts of a model; those of the fixed seed are kept with it."""
+    key = (id(model), limits, restarts)
+    entry = _SPACES.get(key)
+    if rng is None and entry is not None and entry[0]() is model:
+        return entry[1]
+    seed = _SEED if rng is None else rng
+    if not isinstance(seed, np.random.Generator):
+        seed = np.random.default_rng(_whole(seed, "rng", 0))
+    chain = joint_chain(model)
+    lower, upper = model.lower[chain.columns], model.upper[chain.columns]
+    space = search_space(chain, lower, upper, limits, restarts, seed)
+    if rng is None:
+        _SPACES[key] = weakref.ref(model, lambda _: _SPACES.pop(key, None)), space
+    return space
+
+
+def _whole(value: Any, name: str, least: int) -> int:
+    """A whole number, or an error that names the argument."""
+    try:
+        number = index(value)
+    except TypeError:
+        raise InvalidValueError(f"{name}: expected a whole number, got {value!r}.") from None
+    if isinstance(value, (bool, np.bool_)) or number < least:
+        raise InvalidValueError(f"{name}: expected a whole number >= {least}, got {value!r}.")
+    return number

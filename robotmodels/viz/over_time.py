@@ -1,0 +1,277 @@
+"""Signals of joints over time: units, sampled trajectories, lines with their limits and breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError, ShapeError
+from ..geometry import PRISMATIC
+from ..model import RobotModel
+from ..trajectories.limits import MotionLimits
+from ..trajectories.piecewise import PiecewisePolynomial
+from ..trajectories.pose_trajectory import PoseTrajectory
+from ..trajectories.trajectory import Samples, Trajectory
+from . import style
+from .style import ALERT, BEYOND, DASHED, INK, LIMIT, PALE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+_SAMPLES = 601
+_BEFORE = 1e-9  # of the duration: where the value before a jump is read
+_ROUNDING = 1e-9
+
+
+class Unit(Enum):
+    """Units of a joint in a figure; data are in SI units and radians always.
+
+    Examples
+    --------
+    >>> Unit.DEGREE.of(2), round(Unit.DEGREE.factor, 3)
+    ('deg/s²', 57.296)
+    """
+
+    RADIAN = "rad"
+    DEGREE = "deg"
+    METRE = "m"
+    MILLIMETRE = "mm"
+    NONE = "1"
+    UNSTATED = "rad or m"
+
+    @property
+    def factor(self) -> float:
+        """Factor from SI units and radians."""
+        factors = {Unit.DEGREE: 180.0 / np.pi, Unit.MILLIMETRE: 1e3}
+        return factors.get(self, 1.0)
+
+    def of(self, order: int) -> str:
+        """Unit of a derivative by time.
+
+        Parameters
+        ----------
+        order : int
+            0 position, 1 velocity, to 3 jerk.
+
+        Returns
+        -------
+        str
+            Such as ``rad/s²``.
+        """
+        per = ("", "/s", "/s²", "/s³")[order]
+        return " or ".join(part + per for part in self.value.split(" or "))
+
+
+def is_prismatic(model: RobotModel) -> Array:
+    """Joints that slide. Shapes: -> (n,) bool."""
+    return model.table.sigma[model.table.joint_rows] == PRISMATIC
+
+
+def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = None) -> list[str]:
+    """Names of joints for a legend."""
+    _check_model(model, n)
+    if names is not None:
+        return style.as_texts(names, n, "names", "joints")
+    if model is None:
+        return [f"joint {j + 1}" for j in range(n)]
+    return [str(name) for name in model.table.joint_names]
+
+
+def joint_units(
+    units: Unit | str | Sequence[Unit | str] | None, n: int, model: RobotModel | None = None
+) -> list[Unit]:
+    """Units of joints for their axes."""
+    _check_model(model, n)
+    lengths = [None] * n if model is None else is_prismatic(model).tolist()
+    if units is None:
+        default = {None: Unit.UNSTATED, True: Unit.METRE, False: Unit.RADIAN}
+        return [default[long] for long in lengths]
+    given = [units] * n if isinstance(units, (Unit, str)) else list(units)
+    if len(given) != n:
+        raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
+    kinds = [as_unit(unit) for unit in given]
+    wrong = {True: (Unit.RADIAN, Unit.DEGREE), False: (Unit.METRE, Unit.MILLIMETRE), None: ()}
+    for j, (unit, long) in enumerate(zip(kinds, lengths, strict=True)):
+        if unit in wrong[long]:
+            kind = "prismatic" if long else "revolute"
+            raise InvalidValueError(f"units: joint {j + 1} is {kind}, got {unit.value!r}.")
+    return kinds
+
+
+def joints_by_unit(kinds: Sequence[Unit]) -> dict[Unit, list[int]]:
+    """Numbers of the joints of each unit."""
+    return {u: [j for j, kind in enumerate(kinds) if kind is u] for u in dict.fromkeys(kinds)}
+
+
+def as_unit(unit: Unit | str) -> Unit:
+    """A unit from itself or its symbol."""
+    try:
+        return Unit(unit)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in Unit)
+        raise InvalidValueError(f"units: expected one of {known}, got {unit!r}.") from None
+
+
+def as_limits(limits: MotionLimits | None, n: int) -> MotionLimits | None:
+    """Limits of n joints, checked."""
+    return (
+        None
+        if limits is None
+        else style.as_instance(limits, MotionLimits, "limits", "").for_joints(n)
+    )
+
+
+def as_orders(orders: Sequence[int]) -> list[int]:
+    """Quantities to draw, checked."""
+    what = "some of position (0), velocity, acceleration and jerk (3)"
+    return style.as_choice(orders, 4, "orders", what)
+
+
+def _check_model(model: Any, n: int) -> None:
+    if model is not None and style.as_instance(model, RobotModel, "model", "").n != n:
+        raise ShapeError(f"model: expected a robot of {n} joints, got {model.name!r} of {model.n}.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled:
+    """Positions and derivatives of n joints at the times of a figure.
+
+    Shapes: t (N,), values (4, N, n).
+    """
+
+    t: Array
+    values: Array
+    breaks: tuple[Array, ...]
+    duration: float
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.values.shape[-1]
+
+
+def sampled(trajectory: Any, name: str = "trajectory") -> Sampled:
+    """Dense samples of a trajectory, with both sides of every jump."""
+    if isinstance(trajectory, Samples):
+        return _of_samples(trajectory, name)
+    if isinstance(trajectory, PoseTrajectory):
+        raise InvalidValueError(
+            f"{name}: this is a motion of the tool. Draw its law of time with `.law`, its path "
+            "with plot_pose_path, or the joints that joint_path finds."
+        )
+    motion = style.as_instance(trajectory, Trajectory, name, "joints").motion
+    if motion.batch:
+        raise InvalidValueError(
+            f"{name}: expected one motion, got a batch of shape {motion.batch}; draw one of them "
+            "as Samples(t, q[i], v[i], a[i], jerk[i]) of trajectory.at(t)."
+        )
+    T = float(motion.duration)
+    pieces = motion.breaks if isinstance(motion, PiecewisePolynomial) else ()
+    breaks = tuple(np.unique(row) for row in pieces)
+    times = np.concatenate((np.linspace(0.0, T, _SAMPLES), *breaks))
+    times = np.concatenate((times, *(row - _BEFORE * T for row in breaks)))
+    times = np.unique(times[(times >= 0.0) & (times <= T)])
+    return _of_samples(trajectory.at(times), name, breaks, T)
+
+
+def _of_samples(
+    samples: Samples, name: str, breaks: tuple[Array, ...] = (), T: float | None = None
+) -> Sampled:
+    t = samples.t.reshape(-1)
+    if not t.size:
+        raise InvalidValueError(f"{name}: there are no samples to draw.")
+    rows = [samples.q, samples.v, samples.a, samples.jerk]
+    if samples.q.shape == samples.t.shape:  # a scalar trajectory
+        rows = [row[..., None] for row in rows]
+    if any(row.ndim != 2 or len(row) != t.size for row in rows):
+        raise ShapeError(
+            f"{name}: expected samples of one motion, q of shape ({t.size}, n), got "
+            f"{samples.q.shape}."
+        )
+    return Sampled(t, np.stack(rows), breaks, float(t[-1] - t[0]) if T is None else T)
+
+
+def lines_over_time(
+    axes: Axes,
+    t: Array,
+    values: Array,
+    names: Sequence[str],
+    numbers: Sequence[int] | None = None,
+    lower: Array | None = None,
+    upper: Array | None = None,
+) -> None:
+    """Lines of k signals in the styles of some numbers, with limits and values beyond them.
+
+    Shapes: t (N,), values (N, k), lower and upper (k,).
+    """
+    numbers = range(len(names)) if numbers is None else numbers
+    marker = "" if len(t) > 1 else "o"
+    for y, name, k in zip(values.T, names, numbers, strict=True):
+        axes.plot(t, y, label=name, marker=marker, **style.line(k))
+    if lower is None or upper is None:
+        return
+    slack = _ROUNDING * np.maximum(1.0, np.abs(values).max(axis=0, initial=0.0))
+    beyond = (values > upper + slack) | (values < lower - slack)
+    for j in np.flatnonzero(beyond.any(axis=0)):
+        y = np.where(beyond[:, j], values[:, j], np.nan)
+        axes.plot(t, y, color=ALERT, alpha=0.35, linewidth=5.2, zorder=1.8, label=BEYOND)
+    limit_lines(axes, lower, names, numbers)
+    limit_lines(axes, upper, names, numbers)
+
+
+def limit_lines(
+    axes: Axes, limits: Array, names: Sequence[str], numbers: Sequence[int] | None = None
+) -> None:
+    """Dashed lines in the colours of the joints; one grey line where all share a limit."""
+    common = bool(np.isfinite(limits).all() and np.ptp(limits) == 0.0)
+    for k, limit in enumerate(limits[: 1 if common else None]):
+        if np.isfinite(limit):
+            color = PALE if common else INK if numbers is None else style.line(numbers[k])["color"]
+            label = f"_limit of {' and '.join(names) if common else names[k]}"
+            axes.axhline(float(limit), color=color, zorder=1.5, label=label, **DASHED)
+            axes.plot([], [], color=PALE, label=LIMIT, **DASHED)
+
+
+def quantity_over_time(
+    axes: Axes,
+    motion: Sampled,
+    order: int,
+    joints: Sequence[int],
+    unit: Unit,
+    names: Sequence[str] | Mapping[int, str],
+    limits: MotionLimits | None,
+    numbers: Sequence[int] | None = None,
+) -> None:
+    """Position, velocity, acceleration or jerk of some joints, with their limits."""
+    lower = upper = None
+    if limits is not None:
+        lower, upper = (
+            (limits.lower, limits.upper),
+            (limits.velocity_lower, limits.velocity),
+            (limits.acceleration_lower, limits.acceleration),
+            (-limits.jerk, limits.jerk),
+        )[order]
+        lower, upper = unit.factor * lower[joints], unit.factor * upper[joints]
+    values = unit.factor * motion.values[order][:, joints]
+    some = [names[j] for j in joints]
+    lines_over_time(axes, motion.t, values, some, numbers or joints, lower, upper)
+    axes.set_ylabel(f"{QUANTITIES[order]}\n({unit.of(order)})")
+
+
+def mark_breaks(axes: Axes, motion: Sampled, order: int, joints: Sequence[int], unit: Unit) -> None:
+    """Times at which pieces meet: lines where all joints share them, else dots on the lines."""
+    if len(motion.breaks) == 1:
+        for time in motion.breaks[0][1:-1]:
+            axes.axvline(time, color=PALE, linewidth=0.8, zorder=1.2, label="_break")
+        return
+    for j in joints if motion.breaks else ():
+        at = np.searchsorted(motion.t, motion.breaks[j]).clip(max=len(motion.t) - 1)
+        y = unit.factor * motion.values[order, at, j]
+        color = style.line(j)["color"]
+        axes.plot(motion.t[at], y, "o", color=color, markersize=2.4, label="_break")

@@ -1,0 +1,227 @@
+"""Reports with their figures as one HTML file, readable offline and on paper.
+
+References
+----------
+Seed book sections 1.4 and 1.6.5.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable, Iterable
+from functools import partial
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING
+
+from ..calibration.report import report_sections as calibration_sections
+from ..calibration.result import CalibrationResult
+from ..errors import InvalidValueError
+from ..identification.report import report_sections as identification_sections
+from ..identification.result import IdentificationResult
+from ..logs import Log
+from ..minimal_parameters import StandardParameters
+from ..table_text import ReportSection, ReportTable
+from . import calibration, identification
+from .processing import plot_processing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawing = tuple[Callable[..., "Figure"], str]
+"""A function that draws a figure of a result, and the caption of the figure."""
+
+
+def html_report(result: CalibrationResult, path: str | Path) -> None:
+    """Write the report on a calibration with its figures into one file that needs no network.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of `calibration.fit`.
+    path : str or Path
+        The HTML file.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a result.
+    MissingExtraError
+        Matplotlib is not installed.
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import numpy as np
+    >>> import robotmodels as rm
+    >>> from robotmodels.calibration import Pose, fit
+    >>> arm, q = rm.load("rx90"), np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> result = fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     html_report(result, Path(folder) / "report.html")
+    ...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
+    5
+    """
+    found = calibration.as_result(result)
+    figures: list[Drawing] = [
+        (
+            calibration.plot_calibration_residuals,
+            "Residuals (predicted minus measured) of each row over the number of the "
+            "configuration, before (nominal table, base and tool fitted) and after; the scales of "
+            "both sides differ.",
+        ),
+        (
+            calibration.plot_calibration_in_space,
+            "Errors of position where they were made, magnified as stated; crosses are outliers.",
+        ),
+        (
+            calibration.plot_calibration_parameters,
+            "Corrections of the parameters with their intervals.",
+        ),
+        (calibration.plot_calibration_correlations, "Correlations of the estimates."),
+        (
+            calibration.plot_calibration_normality,
+            "Residuals in standard deviations: Gaussian ones follow the curve and the line.",
+        ),
+    ]
+    title = f"Geometric calibration of {found.nominal.name}"
+    _write(path, title, calibration_sections(found), figures, found)
+
+
+def identification_html(
+    result: IdentificationResult,
+    path: str | Path,
+    test: Log | None = None,
+    robot: StandardParameters | None = None,
+) -> None:
+    """Write the report on an identification with its figures into one file that needs no network.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Result of `identification.fit`.
+    path : str or Path
+        The HTML file.
+    test : Log, optional
+        Held-out log, for the figures; the result contains its errors only.
+    robot : StandardParameters, optional
+        Result of `consistent_robot`; the increase of its residuals is reported.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Not a result; not a log of its joints.
+    MissingExtraError
+        Matplotlib is not installed.
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> result = fit(*example_log())
+    >>> with TemporaryDirectory() as folder:
+    ...     identification_html(result, Path(folder) / "report.html")
+    ...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
+    6
+    """
+    found = identification.as_result(result, test)
+    figures: list[Drawing] = [
+        (
+            partial(identification.plot_identification_torques, test=test),
+            "Measured and predicted torques and their difference, with its size relative to the "
+            "measured torque; grey: the joint is in its dead band.",
+        ),
+        (
+            identification.plot_identification_residuals,
+            "Residuals of the fitted equations, with two standard deviations, and their "
+            "autocorrelation, with the 95 % band of white residuals.",
+        ),
+        (
+            partial(identification.plot_identification_residuals, test=test),
+            "The same for the held-out log.",
+        ),
+        (
+            identification.plot_identification_parameters,
+            "Parameters with 95 % intervals, as their contributions to the torques of the log.",
+        ),
+        (
+            identification.plot_identification_standard_errors,
+            "Relative standard errors; above the dashed line (30 %) the log does not determine the "
+            "parameter.",
+        ),
+        (identification.plot_identification_correlations, "Correlations of the estimates."),
+        (
+            plot_processing,
+            "Spectra of positions and torques, kept and cut off as noise (grey); below, the "
+            "criteria: the bias that noise of the positions causes, and the number of equations.",
+        ),
+    ]
+    if test is None:
+        del figures[2]
+    title = f"Dynamic identification of {found.model.name}"
+    _write(path, title, identification_sections(found, robot), figures, found)
+
+
+def _write(
+    path: str | Path,
+    title: str,
+    sections: Iterable[ReportSection],
+    figures: Iterable[Drawing],
+    result: object,
+) -> None:
+    """Write a report with its figures into one file that needs no network."""
+    template = Template(Path(__file__).with_name("report.html").read_text(encoding="utf-8"))
+    text = template.substitute(
+        title=escape(title),
+        sections="\n".join(map(_section, sections)),
+        figures="\n".join(_figure(draw, caption, result) for draw, caption in figures),
+    )
+    Path(path).write_text(text, encoding="utf-8")
+
+
+def _figure(draw: Callable[..., Figure], caption: str, result: object) -> str:
+    """A figure of a result as an embedded image with its caption."""
+    buffer = BytesIO()
+    try:
+        draw(result).savefig(buffer, format="svg", metadata={"Date": None})
+    except InvalidValueError as reason:  # such as arrows in space where no position is measured
+        return f"<p>{escape(str(reason).removeprefix('result: '))}</p>"
+    image = "data:image/svg+xml;base64," + b64encode(buffer.getvalue()).decode("ascii")
+    return (
+        f'<figure><img alt="{escape(caption)}" src="{image}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def _section(section: ReportSection) -> str:
+    """A title with paragraphs, list items and tables."""
+    body = []
+    for part in section.body:
+        if isinstance(part, ReportTable):
+            body.append(_table(part))
+        elif part.startswith("* "):
+            body.append(f"<p>&bull; {escape(part[2:])}</p>")
+        else:
+            body.append(f"<p>{escape(part)}</p>")
+    return f"<h2>{escape(section.title)}</h2>\n" + "\n".join(body)
+
+
+def _table(table: ReportTable) -> str:
+    """A table that scrolls in its own box."""
+    head = "".join(f"<th>{escape(name)}</th>" for name, _ in table.columns)
+    rows = (
+        "<tr>" + "".join(f"<td>{escape(cells[i])}</td>" for _, cells in table.columns) + "</tr>"
+        for i in range(table.rows)
+    )
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n'
+        + "\n".join(rows)
+        + "\n</tbody></table></div>"
+    )

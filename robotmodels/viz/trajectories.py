@@ -1,0 +1,505 @@
+"""Figures of motions: over time, as laws of motion, along paths of poses, within joint limits.
+
+Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
+(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
+that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
+``size`` its width and height in inches, shape (2,).
+
+Parameters
+----------
+model : RobotModel, optional
+    The robot, n joints.
+names : sequence of str, length n, optional
+    Of the joints; default those of the model, else ``joint 1`` and so on.
+units : Unit or str, or sequence of them, length n, optional
+    ``rad``, ``deg``, ``m``, ``mm`` for the axes; default rad or m by the joint types of the model,
+    and "rad or m" without one.
+limits : MotionLimits, optional
+    Drawn as dashed lines, in the colour of their joint or grey where all joints share them; values
+    beyond them are underlaid in red.
+
+Returns
+-------
+matplotlib.figure.Figure
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, as_exact, as_floats, as_reals
+from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel
+from ..trajectories.joint_path import JointPath
+from ..trajectories.limits import MotionLimits
+from ..trajectories.path_events import PathEventKind
+from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
+from ..trajectories.trajectory import Samples, Trajectory
+from . import over_time, style
+from .over_time import Sampled, Unit
+from .space import across, fill_cells, space
+from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALETTE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_EVENTS: dict[PathEventKind, tuple[str, Any, str]] = {
+    PathEventKind.OUT_OF_REACH: ("out of reach", PALETTE[4], "o"),
+    PathEventKind.OUTSIDE_LIMITS: ("outside limits", PALETTE[1], "s"),
+    PathEventKind.SINGULAR: ("singular", PALETTE[0], "D"),
+    PathEventKind.CHANGES_POSTURE: ("posture changes", PALETTE[2], "^"),
+    PathEventKind.JUMP: ("jump", PALETTE[3], "X"),
+    PathEventKind.TOO_FAST: ("too fast", PALETTE[6], "v"),
+}
+_RUNS = (PathEventKind.OUT_OF_REACH, PathEventKind.SINGULAR)
+_SEEN_ON_LINES = (PathEventKind.OUTSIDE_LIMITS, PathEventKind.TOO_FAST)
+_LEAST = 1e-6  # conditioning that is drawn
+_MARGIN = 0.12  # of the range of a joint, shown beyond either limit
+_POSES = 301
+_STILL = 1e-3  # m: a tool that moves less turns on the spot
+
+
+@style.plot
+def plot_trajectory(
+    trajectory: Trajectory | Samples,
+    limits: MotionLimits | None = None,
+    names: Sequence[str] | None = None,
+    units: Unit | str | Sequence[Unit | str] | None = None,
+    *,
+    model: RobotModel | None = None,
+    orders: Sequence[int] = (0, 1, 2, 3),
+    breakpoints: bool = True,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Position, velocity, acceleration and jerk of every joint over time.
+
+    Joints of different units stand in columns of their own. Both sides of a jump are drawn.
+
+    Parameters
+    ----------
+    trajectory : Trajectory or Samples
+        One motion of n joints; rad or m, and per s.
+    orders : sequence of int
+        Which panels: 0 position, 1 velocity, 2 acceleration, 3 jerk.
+    breakpoints : bool
+        Whether the times at which pieces meet are marked: by thin lines where all joints change
+        pieces together, else by dots on the lines of the joints.
+
+    Examples
+    --------
+    >>> from robotmodels.trajectories import MotionLimits, trapezoidal
+    >>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
+    >>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], limits=limits), limits, units="rad")
+    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
+    ['position (rad)', 'velocity (rad/s)']
+    """
+    motion = over_time.sampled(trajectory)
+    n = motion.n
+    labels, kinds = over_time.joint_names(names, n, model), over_time.joint_units(units, n, model)
+    bounds, shown, columns = (
+        over_time.as_limits(limits, n),
+        over_time.as_orders(orders),
+        over_time.joints_by_unit(kinds),
+    )
+    if n == 1 and names is None and model is None:
+        labels = ["_joint"]  # one line needs no legend
+    width, height = COLUMN if len(columns) == 1 else PAGE, 0.55 + 1.05 * len(shown) + 0.02 * n
+    figure, grid = style.panels(width, height, size, len(shown), len(columns), sharex=True)
+    for column, (unit, joints) in enumerate(columns.items()):
+        for row, order in enumerate(shown):
+            over_time.quantity_over_time(
+                grid[row, column], motion, order, joints, unit, labels, bounds
+            )
+            if breakpoints:
+                over_time.mark_breaks(grid[row, column], motion, order, joints, unit)
+        grid[-1, column].set_xlabel("time (s)")
+    return style.finished(figure, title, labels)
+
+
+@style.plot
+def plot_profiles(
+    profiles: Mapping[str, Trajectory | Samples] | Sequence[Trajectory | Samples],
+    names: Sequence[str] | None = None,
+    joint: int = 0,
+    limits: MotionLimits | None = None,
+    unit: Unit | str = Unit.UNSTATED,
+    *,
+    side_by_side: bool = False,
+    orders: Sequence[int] = (0, 1, 2, 3),
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """One joint's position, velocity, acceleration and jerk under several laws of motion.
+
+    Parameters
+    ----------
+    profiles : mapping of str to Trajectory, or sequence of Trajectory
+        The motions by their names; `Samples` may stand for a trajectory. The legend gives their
+        durations.
+    names : sequence of str, optional
+        Of the motions of a sequence; default ``motion 1`` and so on.
+    joint : int
+        Which joint, from 0.
+    unit : Unit or str
+        ``rad``, ``deg``, ``m`` or ``mm`` for the axes.
+    side_by_side : bool
+        Whether each motion stands in a column of its own, with common scales, instead of all
+        motions over each other.
+
+    Examples
+    --------
+    >>> from robotmodels.trajectories import bang_bang, cubic
+    >>> laws = {"bang-bang": bang_bang(0, 1, duration=1.0), "cubic": cubic(0, 1, duration=1.2)}
+    >>> figure = plot_profiles(laws, unit="rad")
+    >>> [line.get_label() for line in figure.axes[0].get_lines()]
+    ['bang-bang, 1 s', 'cubic, 1.2 s']
+    """
+    named = style.as_named(profiles, names, "profiles", "motion")
+    motions = {name: over_time.sampled(motion, repr(name)) for name, motion in named.items()}
+    least = min(motion.n for motion in motions.values())
+    (j,) = style.as_choice([joint], least, "joint", "a number")
+    shown, kind = over_time.as_orders(orders), over_time.as_unit(unit)
+    columns = len(motions) if side_by_side else 1
+    width, height = COLUMN if columns == 1 else PAGE, 0.75 + 1.05 * len(shown)
+    figure, grid = style.panels(width, height, size, len(shown), columns, sharex=True, sharey="row")
+    for k, (name, motion) in enumerate(motions.items()):
+        column = k if side_by_side else 0
+        bounds, duration = over_time.as_limits(limits, motion.n), f"{motion.duration:.4g} s"
+        label = {j: f"{'_' * side_by_side}{name}, {duration}"}
+        for row, order in enumerate(shown):
+            over_time.quantity_over_time(
+                grid[row, column], motion, order, [j], kind, label, bounds, [k]
+            )
+        if side_by_side:
+            grid[0, column].set_title(style.wrapped(f"{name}\n{duration}", width / columns))
+        grid[-1, column].set_xlabel("time (s)")
+    for axes in grid.flat:
+        axes.label_outer()
+    return style.finished(figure, title)
+
+
+@style.plot
+def plot_joint_path(
+    path: JointPath,
+    names: Sequence[str] | None = None,
+    units: Unit | str | Sequence[Unit | str] | None = None,
+    *,
+    model: RobotModel | None = None,
+    limits: MotionLimits | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Joints along a path of poses, their velocities, the conditioning, and the events.
+
+    The lowest panel has a row for every kind of event on the path. In its colour the other panels
+    are shaded where the path leaves the reach or stays singular, and have a thin line where it is
+    singular at one pose, where the posture changes and where it jumps.
+
+    Parameters
+    ----------
+    path : JointPath
+        From `joint_path`; drawn over time, or over the number of the pose if it has no times.
+    limits : MotionLimits, optional
+        Of position and velocity; default those of the model, if given.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import cartesian_trajectory, joint_path
+    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
+    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 9), q)
+    >>> [axes.get_xlabel() for axes in plot_joint_path(path, model=arm).axes]
+    ['', '', 'number of the pose']
+    """
+    if not len(style.as_instance(path, JointPath, "path", "joint_path").q):
+        raise InvalidValueError("path: there are no poses to draw.")
+    n = path.q.shape[1]
+    labels, kinds = over_time.joint_names(names, n, model), over_time.joint_units(units, n, model)
+    if limits is None and model is not None:
+        limits = MotionLimits.of_model(model)
+    bounds = over_time.as_limits(limits, n)
+    timed = not np.isnan(path.t).any()
+    x = path.t if timed else np.arange(len(path.q), dtype=float)
+    motion = Sampled(x, np.stack((path.q, path.v)), (), 0.0)
+    columns = over_time.joints_by_unit(kinds).items()
+    rows = [(order, *column) for order in range(1 + timed) for column in columns]
+    happens = [kind for kind in PathEventKind if path.of_kind(kind)]
+    heights = [1.1] * len(rows) + [0.8, 0.16 + 0.17 * max(len(happens), 1)]
+    width = COLUMN if n < 5 else 0.5 * (COLUMN + PAGE)
+    figure, grid = style.panels(
+        width, 1.0 + sum(heights), size, len(heights), sharex=True, height_ratios=heights
+    )
+    *above, lowest = grid[:, 0]
+    for axes, (order, unit, joints) in zip(above, rows, strict=False):
+        over_time.quantity_over_time(axes, motion, order, joints, unit, labels, bounds)
+    _draw_conditioning(above[-1], x, path.conditioning)
+    lowest.set_yticks(range(len(happens)), [_EVENTS[kind][0] for kind in happens])
+    lowest.set_ylim(max(len(happens), 1) - 0.4, -0.6)
+    lowest.grid(False, axis="y")
+    lowest.tick_params(axis="y", length=0.0)
+    for row, kind in enumerate(happens):
+        for event in path.of_kind(kind):
+            ends = (event.start, event.stop) if timed else (event.first, event.last)
+            _draw_event(lowest, above, row, kind, ends)
+    if not happens:
+        style.note(lowest, "no events on the path")
+    lowest.set_xlabel("time (s)" if timed else "number of the pose")
+    return style.finished(figure, title, labels)
+
+
+def _draw_conditioning(axes: Axes, x: Array, conditioning: Array) -> None:
+    """The conditioning, on a logarithmic scale where it comes near zero."""
+    axes.plot(x, np.maximum(conditioning, _LEAST), color=INK, linewidth=1.0, label="_conditioning")
+    axes.set_ylabel("conditioning\n(1)")
+    least = float(np.nanmin(conditioning)) if np.isfinite(conditioning).any() else 1.0
+    if least < 0.02:
+        axes.set_yscale("log")
+        axes.set_ylim(max(0.5 * least, _LEAST), 1.5)
+    else:
+        axes.set_ylim(0.0, None)
+
+
+def _draw_event(
+    axes: Axes, above: Sequence[Axes], row: int, kind: PathEventKind, span: tuple[float, float]
+) -> None:
+    """A bar with marked ends, and shades or lines in the panels above."""
+    text, color, marker = _EVENTS[kind]
+    start, stop = span
+    axes.plot(span, (row, row), color=color, linewidth=4.0, alpha=0.55, solid_capstyle="butt")
+    axes.plot(span, (row, row), marker, color=color, markersize=3.6, markeredgewidth=0.0)
+    for panel in above:
+        if kind in _RUNS and stop > start:
+            panel.axvspan(start, stop, color=color, alpha=0.2, linewidth=0.0, label=f"_{text}")
+        elif kind not in _SEEN_ON_LINES:
+            middle = 0.5 * (start + stop)
+            panel.axvline(middle, color=color, linewidth=0.8, zorder=1.2, label=f"_{text}")
+
+
+@style.plot
+def plot_pose_path(
+    poses: PoseTrajectory | PoseSamples | ArrayLike,
+    path: JointPath | None = None,
+    *,
+    frames: int = 6,
+    frame_size: float | None = None,
+    unit: Unit | str = Unit.METRE,
+    view: ArrayLike | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Path of the tool in space, with its frame at some poses and equal scales.
+
+    Parameters
+    ----------
+    poses : PoseTrajectory, PoseSamples or array_like, shape (N, 4, 4)
+        World poses of the tool, m.
+    path : JointPath, optional
+        Result of `joint_path` for these poses; its events are marked.
+    frames : int
+        At how many poses the axes of the tool are drawn, the two ends included; they are evenly
+        spaced in the numbers of the samples, so in time.
+    frame_size : float, optional
+        Length of the axes, m; default a tenth of the extent of the path.
+    unit : Unit or str
+        ``m`` or ``mm`` for the axes.
+    view : array_like, shape (2,), optional
+        Azimuth and elevation from which the path is seen, rad; default obliquely, across its
+        longest horizontal direction.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> from robotmodels.trajectories import straight_line
+    >>> move = straight_line(np.eye(4), translation(0.2, 0.1, 0), duration=1.0)
+    >>> plot_pose_path(move).axes[0].get_xlabel()
+    'x (m)'
+    """
+    if path is not None:
+        style.as_instance(path, JointPath, "path", "joint_path")
+    T = _poses(poses, path)
+    length = over_time.as_unit(unit)
+    if length not in (Unit.METRE, Unit.MILLIMETRE):
+        raise InvalidValueError(f"unit: expected a length, 'm' or 'mm', got {length.value!r}.")
+    if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 0:
+        raise InvalidValueError(f"frames: expected how many are drawn, from 0, got {frames!r}.")
+    if path is not None and len(path.q) != len(T):
+        raise ShapeError(f"path: expected the joints of these {len(T)} poses, got {len(path.q)}.")
+    k = length.factor
+    points = k * T[:, :3, 3]
+    extent = float(np.ptp(points, axis=0).max())
+    arm = 0.1 * (extent if extent > _STILL * k else k)
+    if frame_size is not None:
+        arm = k * float(as_exact(frame_size, (), "frame_size"))
+        if arm <= 0.0:
+            raise InvalidValueError(f"frame_size: expected a positive length, got {arm / k:g} m.")
+    angles = across(points) if view is None else as_exact(view, (2,), "view")
+    some = np.unique(np.linspace(0, len(T) - 1, int(frames)).round().astype(int))
+    tips = points[some, None] + arm * np.swapaxes(T[some, :3, :3], 1, 2)
+    figure, _ = style.panels(COLUMN, 0.92 * COLUMN, size, rows=0)
+    every = np.concatenate((points, tips.reshape(-1, 3)))
+    axes = space(figure, (1, 1, 1), every, length, angles)
+    axes.plot(*points.T, color=INK, label="path")
+    for a, (color, dashes) in enumerate(((1, "-"), (2, (0, (3.0, 1.0))), (0, (0, (1.0, 0.8))))):
+        for i, tip in zip(some, tips[:, a], strict=True):
+            ends = np.stack((points[i], tip)).T
+            axes.plot(
+                *ends,
+                color=PALETTE[color],
+                linestyle=dashes,
+                linewidth=1.2,
+                label=f"tool {'xyz'[a]}",
+            )
+    for i, marker, text in ((0, "o", "start"), (-1, "s", "end")):
+        axes.plot(*points[i], marker, color=INK, markersize=4.0, label=text)
+    for event in () if path is None else path.events:
+        text, color, marker = _EVENTS[event.kind]
+        run = points[event.first : event.last + 1]
+        axes.plot(*run.T, color=color, linewidth=4.0, alpha=0.45, label=f"_{text}")
+        axes.plot(*run[[0, -1]].T, marker, color=color, markersize=4.5, label=text)
+    style.finished(figure, title)
+    figure.draw_without_rendering()
+    tops = [legend.get_window_extent().y0 for legend in figure.legends]
+    fill_cells(figure, [(axes, (0.0, 0.0, 1.0, min(tops) / figure.bbox.height), "")])
+    return figure
+
+
+def _poses(poses: Any, path: JointPath | None) -> Array:
+    if isinstance(poses, PoseTrajectory):
+        if path is not None and not np.isnan(path.t).any():
+            return poses.pose(path.t)
+        poses = poses.resample(_POSES if path is None else len(path.q))
+    T = se3.as_pose(poses.T if isinstance(poses, PoseSamples) else poses, "poses")
+    if T.ndim != 3 or not len(T):
+        raise ShapeError(f"poses: expected shape (N, 4, 4) with N at least 1, got {T.shape}.")
+    return T
+
+
+@style.plot
+def plot_joint_motion(
+    model: RobotModel,
+    t: ArrayLike,
+    q: ArrayLike | Mapping[str, ArrayLike],
+    *,
+    degrees: bool = True,
+    columns: int | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Positions of all joints within their limits, and the margin that is left.
+
+    Every joint has a panel that is as high as its range, so that heights compare between joints;
+    values beyond the limits are shaded. The last panel, if any joint has both limits, has the least
+    margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
+    at a limit.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    t : array_like, shape (N,)
+        Times, s.
+    q : array_like, shape (N, n), or mapping of str to such arrays
+        Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
+    degrees : bool
+        Whether angles are in degrees instead of radians.
+    columns : int, optional
+        How many panels stand in a row; default one, or two from five joints on.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], lower=[-1.0, 0.0],
+    ...                                     upper=[1.0, 0.5]))
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> figure = plot_joint_motion(arm, t, np.c_[np.sin(t), 0.3 * t])
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['joint_1 (deg)', 'joint_2 (m)', 'least margin (%)']
+    """
+    style.as_instance(model, RobotModel, "model", "")
+    times = as_floats(t, "t")
+    if times.ndim != 1 or not times.size:
+        raise ShapeError(f"t: expected shape (N,) with N at least 1, got {times.shape}.")
+    motions = _motions(q, times.size, model.n)
+    labels = list(motions) if len(motions) > 1 else ["_motion"]
+    names, units = (
+        over_time.joint_names(None, model.n, model),
+        over_time.joint_units(None, model.n, model),
+    )
+    if degrees:
+        units = [Unit.DEGREE if unit is Unit.RADIAN else unit for unit in units]
+    bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
+    count = model.n + bool(bounded.any())
+    wide = style.as_columns(columns, count, 1 if count < 6 else 2)
+    figure, order = style.panel_list(count, wide, 0.95, size)
+    for j, (axes, unit) in enumerate(zip(order, units, strict=False)):
+        k = unit.factor
+        over_time.lines_over_time(
+            axes, times, k * np.stack([v[:, j] for v in motions.values()], 1), labels
+        )
+        _draw_range(axes, k * float(model.lower[j]), k * float(model.upper[j]))
+        axes.set_title(f"{names[j]} ({unit.value})", loc="left")
+    if bounded.any():
+        lower, upper = model.lower[bounded], model.upper[bounded]
+        inside = np.stack([values[:, bounded] for values in motions.values()], axis=1)
+        margin = np.minimum(inside - lower, upper - inside) / (0.5 * (upper - lower))
+        axes = order[-1]
+        over_time.lines_over_time(axes, times, 100.0 * margin.min(axis=2), labels)
+        axes.set_title("least margin (%)", loc="left")
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -0.08 * max(high, 1.0)), high)
+        _shade_beyond(axes, 0.0, np.inf)
+    return style.finished(figure, title, labels)
+
+
+def _draw_range(axes: Axes, lower: float, upper: float) -> None:
+    """The range of a joint from one limit to the other, with shades beyond."""
+    low, high = axes.get_ylim()
+    if np.isfinite(lower) and np.isfinite(upper) and upper > lower:
+        margin = _MARGIN * (upper - lower)
+        low = min(lower - margin, axes.dataLim.y0 - 0.3 * margin)
+        high = max(upper + margin, axes.dataLim.y1 + 0.3 * margin)
+        axes.set_yticks([lower, 0.5 * (lower + upper), upper])
+        axes.yaxis.set_major_formatter(lambda x, _: f"{x:.3g}".replace("-", "\N{MINUS SIGN}"))
+    else:  # a limit that is far away, or none, is no reason to make the line flat
+        low = lower if np.isfinite(lower) and lower > low else low
+        high = upper if np.isfinite(upper) and upper < high else high
+    axes.set_ylim(low, high)
+    _shade_beyond(axes, lower, upper)
+
+
+def _shade_beyond(axes: Axes, lower: float, upper: float) -> None:
+    """Shades from the limits to the edges, and lines at the limits."""
+    low, high = axes.get_ylim()
+    for limit, edge in ((lower, low), (upper, high)):
+        if low <= limit <= high:
+            ends = sorted((limit, edge))
+            axes.axhspan(*ends, facecolor=ALERT, alpha=0.16, linewidth=0.0, label=BEYOND)
+            axes.axhline(limit, color=INK, zorder=1.5, label=LIMIT, **DASHED)
+    axes.set_ylim(low, high)
+
+
+def _motions(q: Any, N: int, n: int) -> dict[str, Array]:
+    """Positions of each motion, NaN where they are missing. Shapes: -> (N, n) each."""
+    motions = {}
+    for name, values in style.as_named(
+        q if isinstance(q, Mapping) else [q], None, "q", "motion"
+    ).items():
+        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
+        array = as_reals(values, where)
+        if array.shape != (N, n):
+            raise ShapeError(
+                f"{where}: expected positions of shape ({N}, {n}) for {N} times and {n} joints, "
+                f"got {array.shape}."
+            )
+        if np.isinf(array).any():
+            raise InvalidValueError(f"{where}: expected finite positions, or NaN for a gap.")
+        motions[name] = array
+    return motions

@@ -1,0 +1,480 @@
+"""Figures of velocities: inverse models near singularities, ellipsoids, maps of singularities.
+
+Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
+(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
+that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
+``size`` its width and height in inches, shape (2,).
+
+Returns
+-------
+matplotlib.figure.Figure
+
+References
+----------
+Seed book sections 1.3.1.3 and 1.3.2; Khalil and Dombre, section 5.8.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats, as_reals
+from ..errors import InvalidValueError, ShapeError
+from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
+from ..kinematics.inverse.solution import IKMSolution
+from ..model import RobotModel
+from ..symbolic import SingularityMap
+from ..trajectories.limits import MotionLimits
+from . import over_time, style
+from .over_time import Unit
+from .shapes import as_ellipsoids
+from .style import COLUMN, DASHED, INK, LIMIT, PAGE, PALE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_DECADES = 30.0  # ratio from which on a scale of powers shows more
+_LEAST = 1e-6  # beside the greatest: smaller values are drawn as zero
+_BELOW = {
+    1: "missing linear\nvelocity (m/s)",
+    2: "missing angular\nvelocity (rad/s)",
+    3: "least singular\nvalue",
+}
+_PLANES = ((0, 1), (0, 2), (1, 2))
+_SYMBOLS = {
+    EllipsoidQuantity.LINEAR_VELOCITY: "v",
+    EllipsoidQuantity.ANGULAR_VELOCITY: "ω",
+    EllipsoidQuantity.FORCE: "f",
+    EllipsoidQuantity.MOMENT: "m",
+}
+_MARGIN = 1.15
+_LONGEST = 8.0  # extent shown of an unbounded ellipsoid, in its least radii
+_FAR = 1e3  # times the extent: unbounded axes are drawn up to there
+
+
+@style.plot
+def plot_inverse_velocities(
+    distance: ArrayLike,
+    solutions: Mapping[str, Any] | Sequence[Any],
+    names: Sequence[str] | None = None,
+    *,
+    model: RobotModel | None = None,
+    units: Unit | str | Sequence[Unit | str] | None = None,
+    limits: MotionLimits | None = None,
+    each_joint: bool = False,
+    distance_unit: Unit | str = Unit.DEGREE,
+    distance_name: str = "distance from the singular position",
+    logarithmic: bool | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Joint speeds and task error of several methods across a singular position.
+
+    Panels: speeds; the missing linear and angular velocity, for those rows that were requested;
+    the least singular value, where it is known.
+
+    Parameters
+    ----------
+    distance : array_like, shape (N,)
+        Distance from the singular position, rad or m, ascending; it may have a sign.
+    solutions : mapping of str to IKMSolution, or sequence
+        Result of each method at these distances, by its name: an `IKMSolution` of N rows, or a
+        pair of arrays, the joint velocities (N, n) and the error of the twist (N, 6) or None,
+        linear then angular. NaN rows leave a gap.
+    names : sequence of str, optional
+        Of the methods of a sequence; default ``method 1`` and so on.
+    model : RobotModel, optional
+        The robot, n joints: their names and units.
+    units : Unit or str, or sequence of them, length n, optional
+        Of the joints, as in `plot_trajectory`; joints of different units have panels of their own.
+    limits : MotionLimits, optional
+        Whose velocities are drawn as dashed lines (the greater of both directions).
+    each_joint : bool
+        Whether each method has a column with the speeds of all joints, instead of lines for the
+        greatest speed of each method.
+    distance_unit : Unit or str
+        ``deg``, ``rad``, ``m`` or ``mm`` for the axis.
+    distance_name : str
+        Name of the axis.
+    logarithmic : bool, optional
+        Whether the distance is on a scale of powers, linear around zero where it has a sign;
+        default where most of the samples are near zero.
+
+    Examples
+    --------
+    >>> d = np.linspace(-0.1, 0.1, 11)
+    >>> bounded = d[:, None] / (d[:, None] ** 2 + 1e-3)
+    >>> missing = np.c_[np.zeros((11, 5)), 1e-3 / (d**2 + 1e-3)]
+    >>> figure = plot_inverse_velocities(d, {"damped": (bounded, missing)}, units="rad")
+    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes][::2]
+    ['greatest joint speed (rad/s)', 'missing angular velocity (rad/s)']
+    """
+    x = as_floats(distance, "distance")
+    if x.ndim != 1 or not x.size or (np.diff(x) <= 0.0).any():
+        raise InvalidValueError("distance: expected a vector of distances that ascend.")
+    named = style.as_named(solutions, names, "solutions", "method")
+    methods = {name: _method(each, name, x.size) for name, each in named.items()}
+    counts = sorted({method[0].shape[1] for method in methods.values()})
+    if len(counts) > 1:
+        raise ShapeError(f"solutions: expected one robot, got {counts} joints.")
+    n = counts[0]
+    joints, kinds = over_time.joint_names(None, n, model), over_time.joint_units(units, n, model)
+    speeds = over_time.joints_by_unit(kinds)
+    bounds, unit = over_time.as_limits(limits, n), over_time.as_unit(distance_unit)
+    x = unit.factor * x
+    below = [k for k in _BELOW if any(method[k] is not None for method in methods.values())]
+    rows, columns = len(speeds) + len(below), len(methods) if each_joint else 1
+    width = COLUMN if columns == 1 else PAGE
+    figure, grid = style.panels(
+        width, 0.75 + 1.05 * rows, size, rows, columns, sharex=True, sharey="row"
+    )
+    for m, (name, method) in enumerate(methods.items()):
+        column = grid[:, m if each_joint else 0]
+        for axes, (kind, some) in zip(column, speeds.items(), strict=False):
+            speed, names, numbers = kind.factor * np.abs(method[0][:, some]), [name], [m]
+            if each_joint:
+                names, numbers = [joints[j] for j in some], some
+            else:
+                speed = speed.max(axis=1, keepdims=True)
+            over_time.lines_over_time(axes, x, speed, names, numbers)
+            if bounds is not None:
+                most = np.maximum(bounds.velocity[some], -bounds.velocity_lower[some])
+                which = [joints[j] for j in some]
+                over_time.limit_lines(axes, kind.factor * most, which, some if each_joint else None)
+        for axes, k in zip(column[len(speeds) :], below, strict=True):
+            if method[k] is not None:
+                look = {"color": INK} if each_joint else style.line(m)
+                axes.plot(x, method[k], label=f"_{name}", **look)
+        if each_joint:
+            column[0].set_title(style.wrapped(name, width / columns))
+    labels = [f"{'' if each_joint else 'greatest '}joint\nspeed ({k.of(1)})" for k in speeds]
+    for row, label in zip(grid, labels + [_BELOW[k] for k in below], strict=True):
+        row[0].set_ylabel(label)
+        if "missing" not in label:
+            _set_powers(row[0], "y")
+    near = np.median(np.abs(x)) < 0.25 * np.abs(x).max() if logarithmic is None else logarithmic
+    for axes in grid[-1]:
+        axes.set_xlabel(style.wrapped(f"{distance_name} ({unit.value})", width / columns))
+        if near:
+            _set_powers(axes, "x")
+    return style.finished(figure, title, joints if each_joint else list(methods))
+
+
+def _method(solution: Any, name: str, N: int) -> tuple[Array, Any, Any, Any]:
+    """Joint velocities (N, n); norms of the missing velocities and least singular values (N,)."""
+    mask, least = np.ones(6, dtype=bool), None
+    if isinstance(solution, IKMSolution):
+        if solution.a is not None:
+            raise InvalidValueError(f"{name!r}: these are accelerations, not velocities.")
+        v, error, mask = solution.v, solution.error, solution.mask
+        least = solution.singular_values[..., -1] if solution.singular_values.size else None
+    elif isinstance(solution, tuple) and len(solution) == 2:
+        v, error = solution
+    else:
+        raise InvalidValueError(
+            f"{name!r}: expected an IKMSolution or a pair (velocities, error), got "
+            f"{type(solution).__name__}."
+        )
+    v = as_reals(v, f"velocities of {name!r}")
+    if v.ndim != 2 or len(v) != N or not v.shape[1]:
+        raise ShapeError(f"{name!r}: expected velocities of shape ({N}, n), got {v.shape}.")
+    if error is None:
+        return v, None, None, least
+    error = as_reals(error, f"error of {name!r}")
+    if error.shape != (N, 6):
+        raise ShapeError(f"{name!r}: expected errors of shape ({N}, 6), got {error.shape}.")
+    linear, angular = (
+        np.linalg.norm(error[:, rows], axis=1) if mask[rows].any() else None
+        for rows in (slice(0, 3), slice(3, 6))
+    )
+    return v, linear, angular, least
+
+
+def _set_powers(axes: Any, which: str) -> None:
+    """A scale of powers where values differ by more than a decade or two; linear around zero."""
+    drawn = [each for each in axes.get_lines() if LIMIT not in str(each.get_label())]
+    data = [np.asarray(getattr(each, f"get_{which}data")(), dtype=float) for each in drawn]
+    values = np.concatenate(data or [np.empty(0)])
+    values = values[np.isfinite(values)]
+    most = float(np.abs(values).max(initial=0.0))
+    some = np.abs(values)[np.abs(values) > _LEAST * most]
+    if not some.size or most < _DECADES * some.min():
+        return
+    if (values > _LEAST * most).all():
+        axes.set(**{f"{which}scale": "log"})
+        return
+    signed = bool((values < 0.0).any())
+    least = 10.0 ** np.floor(np.log10(float(some.min())))
+    style.powers_around_zero(axes, which, most, least, 2 if signed else 5)
+    if not signed:
+        axes.set(**{f"{which}lim": (0.0, 1.5 * most)})
+
+
+@style.plot
+def plot_ellipsoids(
+    ellipsoids: Ellipsoid | Sequence[Ellipsoid],
+    *,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Projections of ellipsoids on the planes xy, xz and yz of the world, a row for each quantity.
+
+    A projection shows the largest component along every direction of the plane. The principal axes
+    are drawn in it, unbounded ones as dashes to the border of the picture.
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoid or sequence of Ellipsoid
+        One, several, or batches, which are taken apart.
+    labels : sequence of str, optional
+        Texts of the legend: the first is for the first ellipsoid of every quantity, and so on.
+        Default numbers, if a quantity has several.
+
+    Examples
+    --------
+    >>> egg = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), [20.0, 10.0, 5.0], 3)
+    >>> figure = plot_ellipsoids(egg)
+    >>> [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes][1]
+    ('$f_x$ (N)', '$f_z$ (N)')
+    """
+    given = as_ellipsoids(ellipsoids)
+    if not given:
+        raise InvalidValueError("ellipsoids: expected at least one, got none.")
+    rows = [[e for e in given if e.quantity is quantity] for quantity in EllipsoidQuantity]
+    rows = [own for own in rows if own]
+    count = max(map(len, rows))
+    names = [str(k + 1) for k in range(count)] if count > 1 else ["_"]
+    if labels is not None:
+        names = style.as_texts(labels, count, "labels", "ellipsoids of a kind")
+    figure, grid = style.panels(PAGE, 0.35 + 2.35 * len(rows), size, len(rows), len(_PLANES))
+    for row, own in zip(grid, rows, strict=True):
+        quantity = own[0].quantity
+        half = _shown(np.array([e.radii for e in own]))
+        for axes, plane in zip(row, _PLANES, strict=True):
+            for k, ellipsoid in enumerate(own):
+                _draw_projection(axes, ellipsoid, plane, half, k, names[k])
+            x, y = (f"${_SYMBOLS[quantity]}_{'xyz'[i]}$ ({quantity.unit})" for i in plane)
+            axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel=x, ylabel=y)
+            axes.locator_params(nbins=5)
+    return style.finished(figure, title)
+
+
+def _shown(radii: Array) -> float:
+    """Half the width of a picture that holds the bounded radii."""
+    finite = radii[np.isfinite(radii) & (radii > 0)]
+    if not finite.size:
+        return 1.0
+    longest = float(finite.max())
+    if not np.isfinite(radii).all():
+        longest = min(longest, _LONGEST * float(finite.min()))
+    return _MARGIN * longest
+
+
+def _draw_projection(
+    axes: Axes, ellipsoid: Ellipsoid, plane: tuple[int, int], half: float, k: int, label: str
+) -> None:
+    """Border, area and principal axes of the projection on a plane."""
+    U, r = ellipsoid.axes[list(plane)], ellipsoid.radii
+    unbounded = ~np.isfinite(r)
+    points = _border(U, r, unbounded, half)
+    color = style.line(k)["color"]
+    axes.plot(*points.T, zorder=3, linewidth=1.2, label=label, **style.line(k))
+    axes.fill(*points.T, facecolor=color, alpha=0.10, linewidth=0.0, zorder=2)
+    for u, radius, endless in zip(U.T, r, unbounded, strict=True):
+        if np.linalg.norm(u) > 1e-6 and radius > 0.0:
+            x, y = np.outer(u, (-1.0, 1.0)) * (_FAR * half if endless else radius)
+            dashes = (0, (6.0, 3.0)) if endless else "-"
+            name = "_unbounded axis" if endless else "_axis"
+            axes.plot(x, y, color=color, linestyle=dashes, linewidth=0.8, alpha=0.8, label=name)
+    if not (r > 0).any():
+        axes.plot(0.0, 0.0, "o", color=INK, label="_no motion")
+
+
+def _border(U: Array, r: Array, unbounded: Array, half: float) -> Array:
+    """Border of the projection (k, 2): an ellipse, or the strip or plane of unbounded axes.
+
+    Its point with the normal n is ``Q n / sqrt(n^T Q n)``, Q the sum of ``r_i^2 u_i u_i^T``.
+    """
+    t = np.linspace(0.0, 2.0 * np.pi, 181)
+    n = np.stack((np.cos(t), np.sin(t)), axis=-1)
+    Q = (U * np.where(unbounded, 0.0, r) ** 2) @ U.T
+    lengths = np.linalg.norm(U, axis=0)
+    long = [U[:, i] / lengths[i] for i in np.flatnonzero(unbounded & (lengths > 1e-6))]
+    if not long:
+        width = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", n, Q, n), 0.0))
+        return (n @ Q) / np.maximum(width, 1e-9 * half)[:, None]
+    side = np.array((-long[0][1], long[0][0]))
+    far = _FAR * half
+    crossed = max((abs(float(side @ u)) for u in long[1:]), default=0.0) > 1e-6
+    wide = far if crossed else float(np.sqrt(max(side @ Q @ side, 0.0)))
+    corners = np.array(((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)), float)
+    return corners * (far, wide) @ np.array((long[0], side))
+
+
+@style.plot
+def plot_singularities(
+    maps: SingularityMap | Sequence[SingularityMap],
+    model: RobotModel | None = None,
+    *,
+    q: ArrayLike | None = None,
+    degrees: bool = True,
+    columns: int | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Maps of singular factors, or of the determinant, over two joints.
+
+    The robot is singular where they are zero, drawn as bold lines: where the values change sign,
+    and where they are zero on the grid itself (dots). A zero between grid points at which the sign
+    does not change is not found.
+
+    Parameters
+    ----------
+    maps : SingularityMap or sequence of them
+        From `singularity_map`; several stand beside each other.
+    model : RobotModel, optional
+        The robot: areas outside its joint limits are hatched.
+    q : array_like, shape (n,) or (N, n), optional
+        Postures to mark, rad or m; several are joined by a line in their order. A map shows their
+        two joints only.
+    degrees : bool
+        Whether angles are in degrees on the axes instead of radians.
+    columns : int, optional
+        How many maps stand in a row; default two, or one for a single map.
+
+    Examples
+    --------
+    >>> a = b = np.linspace(-1.0, 1.0, 21)
+    >>> wrist = SingularityMap("arm", np.array([2, 4]), ("joint_3", "joint_5"), a, b,
+    ...                        np.sin(a)[:, None] * np.cos(b), "S3 C5", ("rad", "rad", "1"))
+    >>> figure = plot_singularities(wrist)
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_title()
+    ('joint_3 (deg)', 'S3 C5')
+    """
+    given = [maps] if isinstance(maps, SingularityMap) else maps
+    kinds = isinstance(given, Sequence) and all(isinstance(m, SingularityMap) for m in given)
+    if not kinds or not given:
+        raise InvalidValueError(
+            f"maps: expected one or several SingularityMap of singularity_map, got {maps!r:.60}."
+        )
+    postures = None if q is None else np.atleast_2d(as_floats(q, "q"))
+    for grid in given:
+        _check(grid, model, postures)
+    wide = style.as_columns(columns, len(given), 2)
+    rows = -(-len(given) // wide)
+    width = COLUMN if wide == 1 else PAGE
+    height = 0.35 + rows * min(0.85 * width / wide, 3.0)
+    figure, places = style.panels(width, height, size, rows, wide)
+    for axes in places.flat[len(given) :]:
+        axes.set_visible(False)
+    for axes, grid in zip(places.flat, given, strict=False):
+        scales = [_scale(grid, i, degrees) for i in (0, 1)]
+        _draw_map(figure, axes, grid, scales)
+        if model is not None:
+            _hatch_outside(axes, grid, model, scales)
+        if postures is not None:
+            x, y = (k * postures[:, grid.joints[i]] for i, (k, _) in enumerate(scales))
+            every = max(1, len(x) // 10)
+            axes.plot(
+                x,
+                y,
+                color=INK,
+                linewidth=1.0,
+                marker="o",
+                markersize=3.6,
+                zorder=4.0,
+                markerfacecolor="white",
+                markevery=every,
+                label="postures",
+            )
+        axes.set_title(style.wrapped(grid.label, width / wide))
+    return style.finished(figure, title)
+
+
+def _draw_map(
+    figure: Figure, axes: Axes, grid: SingularityMap, scales: list[tuple[float, str]]
+) -> None:
+    """Colours for the values, bold lines where they are zero."""
+    from matplotlib.ticker import MaxNLocator
+
+    x, y = (k * axis for (k, _), axis in zip(scales, (grid.first, grid.second), strict=True))
+    unit = grid.units[2].replace("^2", "²").replace("^3", "³")
+    label = "value" if unit == "1" else f"value ({unit})"
+    most = style.color_map(figure, axes, x, y, grid.values, True, label)
+    for axis, name, (_, symbol) in zip((axes.xaxis, axes.yaxis), grid.names, scales, strict=True):
+        axis.set_label_text(f"{name} ({symbol})")
+        steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if symbol == "deg" else None
+        axis.set_major_locator(MaxNLocator(6, steps=steps))
+    if most == 0.0:
+        style.note(axes, "zero everywhere:\nsingular in all\nof these postures")
+        return
+    # exact zeros (to rounding) become a tiny value of the sign of a neighbour, so that lines cross
+    z = np.where(np.abs(grid.values) <= 1e-12 * most, 0.0, grid.values)
+    zero = z == 0.0
+    if zero.any():
+        i, j = np.nonzero(zero)
+        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, label="_zero")
+    z = np.ma.masked_invalid(np.where(zero, 1e-12 * most, z).T)
+    if (z > 0.0).any() and (z < 0.0).any():
+        axes.contour(x, y, z, levels=[0.0], colors=[INK], linewidths=2.0)
+    if zero.any() or ((z > 0.0).any() and (z < 0.0).any()):
+        axes.plot([], [], color=INK, linewidth=2.0, label="singular: zero")
+
+
+def _hatch_outside(
+    axes: Axes, grid: SingularityMap, model: RobotModel, scales: list[tuple[float, str]]
+) -> None:
+    """Hatches outside the joint limits, and lines at them."""
+    box = {
+        "facecolor": (1.0, 1.0, 1.0, 0.55),
+        "edgecolor": PALE,
+        "hatch": "////",
+        "linewidth": 0.0,
+        "zorder": 2.4,
+        "label": "outside joint limits",
+    }
+    lines, areas = (axes.axvline, axes.axhline), (axes.axvspan, axes.axhspan)
+    for i, values in enumerate((grid.first, grid.second)):
+        j, k = int(grid.joints[i]), scales[i][0]
+        first, last = k * values[[0, -1]]
+        lower, upper = np.clip((k * model.lower[j], k * model.upper[j]), first, last)
+        for limit, edge in ((lower, first), (upper, last)):
+            if limit != edge:
+                lines[i](limit, color=INK, zorder=2.5, label=f"_limit of {grid.names[i]}", **DASHED)
+                areas[i](*sorted((limit, edge)), **box)
+
+
+def _scale(grid: SingularityMap, i: int, degrees: bool) -> tuple[float, str]:
+    """Factor and symbol of the unit of an axis."""
+    unit = over_time.as_unit(grid.units[i])
+    if unit is Unit.RADIAN and degrees:
+        unit = Unit.DEGREE
+    return unit.factor, unit.value
+
+
+def _check(grid: SingularityMap, model: RobotModel | None, q: Array | None) -> None:
+    """Raise unless a map can be drawn, with the limits of a robot and configurations."""
+    shape = (grid.first.size, grid.second.size)
+    if grid.values.shape != shape or min(shape) < 2:
+        raise ShapeError(
+            f"maps: {grid.label!r} needs at least two values of each joint and a value for each "
+            f"pair, got {shape} and {grid.values.shape}."
+        )
+    if not np.isfinite(grid.values).any():
+        raise InvalidValueError(f"maps: {grid.label!r} has no finite value.")
+    least = 1 + int(grid.joints.max())
+    if model is not None and model.n < least:
+        raise ShapeError(
+            f"model: {grid.label!r} is a map over joints {grid.joints.tolist()} (from 0), which "
+            f"{model.name!r} with its {model.n} joints does not have."
+        )
+    if q is not None and (q.ndim > 2 or q.shape[-1] < least):
+        raise ShapeError(
+            f"q: expected one posture (n,) or several (N, n), n at least {least}, got {q.shape}."
+        )

@@ -1,0 +1,591 @@
+"""Scenes: shapes at their poses, motions, sliders, and the page. No browser, server or network."""
+
+import base64
+import re
+import subprocess
+import sys
+import threading
+import webbrowser
+
+import numpy as np
+import pytest
+import umsgpack
+from identities.random_robots import random_model, random_state
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels import trajectories as tr
+from robotmodels.cli import main
+from robotmodels.errors import RobotModelsError, RobotModelsWarning, UrdfError
+from robotmodels.kinematics.ellipsoids import OtherPart, TwistPart
+from robotmodels.viz.camera import FIELD_OF_VIEW, framed
+from robotmodels.viz.shapes import Label, Segments, Triangles, apply
+
+H = np.pi / 2
+Q = np.array([0.4, 0.7, 0.8, 0.4, 0.9, 0.6])
+RX90 = rm.load("rx90")
+PLANAR = rm.load("planar_2r")
+SCARA = rm.RobotModel.from_table(
+    rm.DHTable.from_rows([
+        {"sigma": 0, "r": 0.4}, {"sigma": 0, "d": 0.35},
+        {"sigma": 1, "d": 0.3, "alpha": np.pi, "lower": 0.0, "upper": 0.2},
+    ]),
+    base=se3.translation(0.1, 0.2, 0.3), name="scara",
+)  # fmt: skip
+TREE = rm.RobotModel.from_table(
+    rm.DHTable(
+        antecedent=[0, 1, 2, 1, 4], sigma=[0, 0, 2, 1, 0], gamma=[0, 0, 0, np.pi, 0],
+        b=[0, 0.1, 0, 0, 0], alpha=[0, H, 0.3, H, -H], d=[0, 0.2, 0.3, 0.2, 0.1],
+        r=[0.5, 0, 0.1, 0.2, 0],
+    ),
+    tool=se3.translation(0.0, 0.0, 0.1), name="tree",
+)  # fmt: skip
+MIMIC = TREE.with_transmission(
+    rm.Transmission([[1, 0, 0, 0], [0, 0, 0, 0], [0, 0.5, 0, 0], [3, 0, 0, 0]], [0, 0.1, 0.2, 0.3])
+)
+TRIANGLE = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\n" \
+    "endloop\nendfacet\nendsolid one\n"  # fmt: skip
+
+
+def urdf(mesh, scale="1 1 1", material=""):
+    return f"""<robot name="one"><link name="base"/><link name="arm"><visual>
+    <origin xyz="0.1 0 0"/><geometry><mesh filename="{mesh}" scale="{scale}"/></geometry>{material}
+    </visual></link><joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
+    <origin xyz="0 0 0.5"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+def content(scene):
+    """The data of the page: commands, geometries, labels, camera and panel."""
+    (text,) = re.findall(r'atob\("([^"]*)"\)', scene.html())
+    return umsgpack.unpackb(base64.b64decode(text))
+
+
+def commands(scene, kind):
+    return {c["path"]: c for c in content(scene)["commands"] if c["type"] == kind}
+
+
+def frame_path(scene, name):
+    """The node that moves with a frame of the table."""
+    (path,) = [p for p in scene.paths if p.split("/")[-1] == name]
+    return f"{path}/q" if f"{path}/q" in scene.paths else path
+
+
+def shapes(scene):
+    return [node for node in scene.nodes if node.shape is not None]
+
+
+def links(scene):
+    return [node for node in scene.nodes if "/shape:" in node.path]
+
+
+# ---------------------------------------------------------------- shapes and their poses
+
+
+@pytest.mark.parametrize("model", [RX90, SCARA, TREE], ids=lambda m: m.name)
+def test_scene_and_page_hold_the_poses_of_the_model(model, rng):
+    q = rng.uniform(-1.0, 1.0, model.n)
+    scene = rm.viz.show(model, q, frames=True, names=True)
+    for name, T in zip(model.table.names, rm.link_poses(model, q), strict=True):
+        path = frame_path(scene, name)
+        np.testing.assert_allclose(scene.pose(path), T, atol=1e-14)
+        z = scene.pose(f"{path}/R{model.table.names.index(name) + 1}:z")  # the blue axis
+        np.testing.assert_allclose(z[:3, 2], T[:3, 2], atol=1e-14)
+    sent = commands(scene, "set_transform")
+    path = frame_path(scene, model.table.names[model.tip - 1])
+    T, names = np.eye(4), path.split("/")
+    for k in range(1, len(names)):
+        matrix = sent["/" + "/".join(names[: k + 1])]["matrix"]
+        T = T @ np.reshape(matrix, (4, 4)).T  # the viewer reads column by column
+    np.testing.assert_allclose(T @ model.tool, rm.dgm(model, q), atol=1e-8)
+    assert [text for _, text, _ in content(scene)["labels"]] == list(model.table.names)
+    zero = rm.viz.show(model)
+    np.testing.assert_allclose(
+        zero.pose(frame_path(zero, model.table.names[-1])),
+        rm.link_poses(model, np.zeros(model.n))[-1], atol=1e-14,
+    )  # fmt: skip
+
+
+def test_frames_tool_names_and_grid_are_optional():
+    def count(**options):
+        return len(shapes(rm.viz.show(RX90, **options)))
+
+    bare = count(tool=False, grid=False)
+    assert count(grid=False) == bare + 3
+    assert count(tool=False, grid=False, frames=True) == bare + 3 * 6
+    assert count(tool=False, grid=False, names=True) == bare + 6
+    assert count(tool=False) == bare + 1 + 3  # the grid and the world's axes
+
+
+def test_postures_over_each_other_and_beside_each_other():
+    q = np.linspace(np.zeros(6), np.ones(6), 16)
+    scene = rm.viz.show(RX90, q, opacity=0.5, legend=[str(k) for k in range(16)])
+    for k, posture in enumerate(q):
+        (path,) = [p for p in scene.paths if f"posture_{k + 1}/" in p and p.endswith("joint_6/q")]
+        T = rm.link_poses(RX90, posture)[5]
+        np.testing.assert_allclose(scene.pose(path), T, atol=1e-14)
+    colors = {node.color for node in links(scene) if "posture" in node.path}
+    assert len(colors) == len({color for _, color in scene.legend}) == 16
+    assert {color[3] for color in colors} == {0.5}
+    five = np.array([[0.1, 0.5, 0.1], [0.9, -0.7, 0.0], [-1, 0.2, 0.2], [2.0, 1.0, 0.1], [0, 0, 0]])
+    beside = rm.viz.show(SCARA, five, columns=2)
+    shifts = []
+    for k, posture in enumerate(five):
+        root = "robots/scara" + (f"_{k + 1}" if k else "")
+        shifts.append(beside.pose(root)[:3, 3] - SCARA.base[:3, 3])
+        path = next(p for p in beside.paths if p.startswith(root + "/") and p.endswith("joint_3/q"))
+        T = rm.link_poses(SCARA, posture)
+        np.testing.assert_allclose(beside.pose(path)[:3, 3], T[2, :3, 3] + shifts[k], atol=1e-14)
+    assert shifts[1][0] > 0.5
+    assert shifts[2][1] < -0.5
+    np.testing.assert_allclose(shifts[3], shifts[1] + shifts[2], atol=1e-14)
+    numbers = [n.shape.text for n in beside.nodes if isinstance(n.shape, Label)]
+    assert numbers == ["1", "2", "3", "4", "5"]
+
+
+def test_colors_and_legend():
+    q = np.zeros((2, 6))
+    red = rm.viz.show(RX90, q[0], color=(1, 0, 0))
+    assert {node.color for node in links(red)} == {(1.0, 0.0, 0.0, 1.0)}
+    two = rm.viz.show(RX90, q, color=[(1, 0, 0), (0, 0, 1, 0.5)], legend=["<up> & away", "down"])
+    colors = {node.color for node in links(two) if "posture" in node.path}
+    assert colors == {(1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)}
+    text = two.html()
+    assert '#ff0000"></span>&lt;up&gt; &amp; away</li>' in text
+    assert "<up>" not in text
+    each = rm.viz.show([RX90, SCARA], color=[(1, 0, 0), (0, 1, 0)], legend=["one", "two"])
+    assert {n.color[1] for n in links(each) if "scara/" in n.path} == {1.0}
+    assert [color[1] for _, color in each.legend] == [0.0, 1.0]
+    assert each.title == "rx90, scara"
+    twins = rm.viz.show([RX90, RX90.with_base(se3.translation(0, 1, 0))])
+    assert len(set(twins.paths)) == len(twins.paths)
+
+
+def test_workspace_box_and_slides():
+    scene = rm.viz.show(SCARA, box=(0.0, 0.5, -0.2, 0.2, 0.1, 0.4))
+    faces, edges = (
+        next(n for n in scene.nodes if n.path == f"box/{x}") for x in ("faces", "edges")
+    )
+    np.testing.assert_allclose(faces.shape.size, (0.5, 0.4, 0.3))
+    np.testing.assert_allclose(scene.pose("box/faces")[:3, 3], (0.25, 0.0, 0.25))
+    lengths = np.linalg.norm(edges.shape.points[0::2] - edges.shape.points[1::2], axis=1)
+    np.testing.assert_allclose(lengths.sum(), 4 * 1.2)
+    free = rm.RobotModel.from_table(
+        rm.DHTable.from_rows([{"sigma": 0, "r": 0.5}, {"sigma": 1, "alpha": H}])
+    )
+    bars = [n.shape.size for n in links(rm.viz.show(free, [0.0, 2.0])) if hasattr(n.shape, "size")]
+    assert np.max(bars) == pytest.approx(2.0)  # a slide without limits reaches the posture
+
+
+def in_picture(points, camera):
+    """Tangents of the directions to points, across and upwards, over that of half the picture."""
+    back = (camera.position - camera.target) / camera.distance
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    relative = points - camera.position
+    depth = -relative @ back * np.tan(np.radians(FIELD_OF_VIEW / 2))
+    assert (depth > 0).all()
+    return np.abs(relative @ right) / depth, np.abs(relative @ np.cross(back, right)) / depth
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 30.0])
+def test_camera_sees_all_and_is_near(size, rng):
+    points = size * rng.uniform(-1, 1, (50, 3)) + np.array((5.0, -2.0, 1.0))
+    across, high = in_picture(points, framed(points))
+    assert 0.8 < max(across.max() / 1.15, high.max()) <= 1.0001
+    q = np.linspace(np.zeros(6), (0, 1.5, 0, 0, 0, 0), 200)
+    across, high = in_picture(rm.dgm(RX90, q)[:, :3, 3], rm.viz.animate(RX90, q).camera)
+    assert max(across.max() / 1.15, high.max()) < 1.0
+    camera = rm.viz.show(RX90, view=(0.0, 0.0)).camera
+    np.testing.assert_allclose((camera.position - camera.target)[1:], 0, atol=1e-12)
+    x, y, z = camera.target
+    sent = content(rm.viz.show(RX90, view=(0, 0)))["target"]
+    np.testing.assert_allclose(sent, (x, z, -y), atol=1e-6)  # the y axis of the viewer is upwards
+
+
+# ---------------------------------------------------------------- animation
+
+
+def played(scene, name, t):
+    """The motion of a joint in the page: straight lines between its keyframes."""
+    found = next(c for c in content(scene)["commands"] if c["type"] == "set_animation")
+    track = next(a for a in found["animations"] if a["path"].endswith(f"{name}/q"))["clip"]
+    assert track["fps"] == 1  # times in seconds
+    keys = track["tracks"][0]["keys"]
+    return np.interp(t, [key["time"] for key in keys], [key["value"] for key in keys])
+
+
+def test_animation_plays_every_motion_at_its_own_times():
+    t = np.linspace(0.0, 8.0, 4001)
+    q = np.sin(2.0 * t[:, None] + [0.0, 1.0, 2.0]) * (2.0, 1.0, 0.1) + (8.0, 0, 0.1)
+    scene = rm.viz.animate(SCARA, q, dt=t[1])
+    assert scene.motion.samples == 4001
+    assert scene.motion.keyframes == 3 * 241  # 30 a second
+    for j in range(3):
+        np.testing.assert_allclose(played(scene, f"joint_{j + 1}", t), q[:, j], atol=2e-3)
+        assert played(scene, f"joint_{j + 1}", 8.0) == pytest.approx(q[-1, j], abs=1e-6)
+    kinds = [a["clip"]["tracks"][0]["name"] for c in content(scene)["commands"]
+             if c["type"] == "set_animation" for a in c["animations"]]  # fmt: skip
+    assert kinds == [".rotation[z]", ".rotation[z]", ".position[z]"]
+    move = tr.quintic(Q, Q + 0.3, duration=1.71)
+    line = tr.straight_line(rm.dgm(RX90, Q), rm.dgm(RX90, Q + 0.1), duration=0.8)
+    path = tr.joint_path(RX90, line, Q, samples=50)
+    untimed = tr.joint_path(RX90, line.resample(31).T, Q)
+    uneven = move.at([1.0, 1.1, 1.5, 1.7])
+    for value, options, samples, duration in (
+        (move, {}, 53, 1.71),
+        (move, {"fps": 10}, 19, 1.71),
+        (uneven, {}, 4, 0.7),
+        (uneven, {"dt": 1.0}, 4, 3.0),
+        (path, {}, 50, 0.8),
+        (untimed, {}, 31, 1.0),
+        (tr.resolved_motion(RX90, line, Q, samples=40), {}, 40, 0.8),
+        (np.zeros((31, 6)), {"fps": 10}, 31, 3.0),
+    ):
+        motion = rm.viz.animate(RX90, value, **options).motion
+        assert (motion.samples, motion.duration) == (samples, pytest.approx(duration))
+    scene = rm.viz.animate(RX90, uneven)
+    np.testing.assert_allclose(played(scene, "joint_1", uneven.t - 1.0), uneven.q[:, 0], atol=1e-6)
+    two = rm.viz.animate([RX90, SCARA], [move, q[:21]], fps=10, path=True)  # each in its own time
+    assert (len(two.motion.tracks), two.motion.duration) == (9, pytest.approx(2.0))
+    assert {"paths/rx90", "paths/scara"} <= set(two.paths)
+
+
+def test_animation_loops_unless_told_otherwise():
+    for loop, expected in ((True, 1_000_000_000), (False, 1)):
+        scene = rm.viz.animate(RX90, np.zeros((2, 6)), loop=loop)
+        found = next(c for c in content(scene)["commands"] if c["type"] == "set_animation")
+        assert found["options"] == {"play": True, "repetitions": expected}
+
+
+def test_tool_path_is_where_the_tool_goes():
+    q = np.linspace(np.zeros(6), (1.5, 0.5, 0.5, 0, 0, 0), 500)
+    scene = rm.viz.animate(RX90, q, path=True)
+    tube = next(n for n in scene.nodes if n.path == "paths/rx90").shape
+    rings = tube.vertices.reshape(-1, 9, 3)[:, :8]
+    centres, tips = rings.mean(axis=1), rm.dgm(RX90, q)[:, :3, 3]
+    np.testing.assert_allclose(centres[[0, -1]], tips[[0, -1]], atol=1e-6)
+    assert np.linalg.norm(centres[:, None] - tips, axis=-1).min(axis=1).max() < 1e-3
+    assert np.isfinite(rings).all()
+    still = rm.viz.animate(RX90, np.zeros((3, 6)), path=True)
+    assert not any(p.startswith("paths") for p in still.paths)
+
+
+# ---------------------------------------------------------------- sliders
+
+
+def test_sliders_are_the_independent_joints_in_their_limits():
+    for model in (RX90, SCARA, TREE, rm.load("tx40")):  # coupled motors leave joints independent
+        panel = rm.viz.jog(model).sliders
+        assert panel.independent.tolist() == list(range(model.n))
+    scene = rm.viz.jog(MIMIC)
+    panel = content(scene)["panel"]
+    assert [joint["leads"] for joint in panel["joints"]] == [True, False, True, False]
+    assert panel["matrix"] == [[1, 0], [0, 0], [0, 1], [3, 0]]
+    assert panel["offset"] == [0, 0.1, 0, 0.3]
+    assert panel["joints"][3]["note"].startswith("follows joint_1; ")
+    assert panel["joints"][1]["note"].startswith("does not move; ")
+    assert panel["postures"][0][0] == "zero (coupled joints follow)"
+    assert repr(scene).endswith(", 2 sliders>")
+    for name, T in zip(MIMIC.table.names, rm.link_poses(MIMIC, scene.sliders.q), strict=True):
+        np.testing.assert_allclose(scene.pose(frame_path(scene, name)), T, atol=1e-12)
+    table = rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0], mu=[1, 0, 1],
+                       lower=[-np.inf, -np.inf, 0.5], upper=[np.inf, -2.0, np.inf])  # fmt: skip
+    joints = content(rm.viz.jog(rm.RobotModel.from_table(table)))["panel"]["joints"]
+    ends = [joint["ends"] for joint in joints]
+    np.testing.assert_allclose(ends, [(-np.pi, np.pi), (-4.0, -2.0), (0.5, 0.5 + 2 * np.pi)])
+    assert [joint["note"] for joint in joints] == [
+        "no limits, slider -180 to 180 deg",
+        "up to -2 m, no lower limit, slider from -4 m, passive",
+        "from 28.648 deg, no upper limit, slider to 388.65 deg",
+    ]
+
+
+def test_coupled_joints_are_in_the_range_of_a_transmission(rng):
+    # any rank, any order: the sliders reach the same configurations as the encoders
+    for rank in (1, 2, 3):
+        K = rng.normal(size=(4, rank)) @ rng.normal(size=(rank, 4))
+        model = TREE.with_transmission(rm.Transmission(K, rng.normal(size=4)))
+        panel = rm.viz.jog(model).sliders
+        assert panel.independent.size == rank
+        q = model.transmission.to_joint(rng.normal(size=4))
+        assert np.allclose(panel.matrix @ q[panel.independent] + panel.offset, q, atol=1e-9)
+
+
+# ---------------------------------------------------------------- ellipsoids
+
+
+def surface(scene, path="ellipsoids/1/surface"):
+    """Points of a shape in the world."""
+    node = next(n for n in scene.nodes if n.path == path)
+    points = node.shape.vertices if isinstance(node.shape, Triangles) else node.shape.points
+    return apply(scene.pose(path), np.asarray(points, float))
+
+
+def scale_of(text):
+    return float(re.search(r": ([\d.e+-]+) m drawn per", text)[1])
+
+
+@pytest.mark.parametrize("part", list(TwistPart))
+@pytest.mark.parametrize("function", [rm.velocity_ellipsoid, rm.force_ellipsoid])
+def test_the_surface_is_the_ellipsoid_at_the_tool_to_scale(function, part):
+    model = RX90.with_base(se3.from_rpy([0.3, 0.2, 0.1], [0.5, 0.1, 0.2]))
+    ellipsoid = function(model, Q, part)
+    scene = rm.viz.show(model, Q, ellipsoids=ellipsoid)
+    ((text, _),) = scene.legend
+    assert text.startswith(f"{ellipsoid.quantity.value}: ")
+    for path in ("ellipsoids/1/surface", "ellipsoids/1/outline"):
+        points = (surface(scene, path) - rm.dgm(model, Q)[:3, 3]) @ ellipsoid.axes
+        inside = points / (scale_of(text) * ellipsoid.radii)
+        np.testing.assert_allclose(np.linalg.norm(inside, axis=-1), 1.0, atol=1e-5)
+        assert (np.abs([inside.min(axis=0), inside.max(axis=0)]) > 0.98).all()
+    asked = rm.viz.show(model, Q, ellipsoids=ellipsoid, ellipsoid_scale=0.37)
+    assert scale_of(asked.legend[0][0]) == 0.37
+
+
+@pytest.mark.parametrize(("q", "unbounded"), [([0.4, 1.2], 1), ([0.4, 0.0], 2), ([0.4, 0.02], 1)])
+def test_a_long_ellipsoid_is_cut_on_its_own_surface(q, unbounded):
+    ellipsoid = rm.force_ellipsoid(PLANAR, q)
+    assert np.isinf(ellipsoid.radii).sum() == unbounded
+    scene = rm.viz.show(PLANAR, q, ellipsoids=ellipsoid)
+    text = scene.legend[0][0]
+    assert "continues along the dashes" in text
+    points = (surface(scene) - ellipsoid.centre) @ ellipsoid.axes
+    inside = points / (scale_of(text) * ellipsoid.radii)
+    np.testing.assert_allclose(np.linalg.norm(inside, axis=-1), 1.0, atol=1e-5)
+    dashes = [path for path in scene.paths if "dash_" in path]
+    cut = {int(path.split("dash_")[1][0]) - 1 for path in dashes}
+    assert len(cut) == max(unbounded, 2 if q[1] == 0.02 else 0)
+    for path in dashes:
+        k = int(path.split("dash_")[1][0]) - 1
+        along = (surface(scene, path) - ellipsoid.centre) @ ellipsoid.axes[:, k]
+        assert np.abs(along).min() > np.abs(points[:, k]).max()
+
+
+def test_flat_ellipsoids_are_discs_bars_and_dots():
+    disc = rm.viz.show(PLANAR, [0.4, 1.2], ellipsoids=rm.velocity_ellipsoid(PLANAR, [0.4, 1.2]))
+    points = surface(disc)
+    assert np.ptp(points[:, 2]) < 1e-7 < 0.1 < np.ptp(points[:, 0])
+    line = rm.velocity_ellipsoid(PLANAR, [0.4, 0.0])
+    bar = rm.viz.show(PLANAR, [0.4, 0.0], ellipsoids=line)
+    assert "ellipsoids/1/surface" not in bar.paths
+    along = (surface(bar, "ellipsoids/1/axis_1") - line.centre) @ line.axes[:, 0]
+    assert along.max() == pytest.approx(scale_of(bar.legend[0][0]) * line.radii[0])
+    fixed = rm.velocity_ellipsoid(PLANAR, [0.4, 1.2], frame=0)
+    dot = rm.viz.show(PLANAR, [0.4, 1.2], ellipsoids=fixed)
+    np.testing.assert_allclose(dot.pose("ellipsoids/1/dot")[:3, 3], fixed.centre)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_robot_gives_a_page_and_a_figure(seed):
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=1 + seed, tree=True, fixed=True)
+    q, _, _ = random_state(model, rng)
+    kinds = [
+        function(model, q, part, other=other)
+        for function in (rm.velocity_ellipsoid, rm.force_ellipsoid)
+        for part in TwistPart
+        for other in OtherPart
+    ]
+    scene = rm.viz.show(model, q, ellipsoids=kinds)
+    for node in scene.nodes:
+        if isinstance(node.shape, (Triangles, Segments)):
+            assert np.isfinite(
+                getattr(node.shape, "vertices", getattr(node.shape, "points", 0))
+            ).all()
+    matrices = [c["matrix"] for c in content(scene)["commands"] if c["type"] == "set_transform"]
+    assert np.isfinite(matrices).all()
+    for axes in rm.viz.plot_ellipsoids(kinds).axes:
+        assert all(np.isfinite(line.get_xydata()).all() for line in axes.lines)
+
+
+# ---------------------------------------------------------------- the page
+
+
+def test_a_page_is_one_offline_file_the_same_each_time(tmp_path):
+    q = np.linspace(np.zeros(6), np.ones(6), 20)
+    scene = rm.viz.animate(RX90, q, frames=True, names=True)
+    text = scene.save(tmp_path / "arm.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text  # the browser itself is told to load nothing
+    outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.search(r"https?:", outside)
+    assert not re.search(r"""<(script|link|img|iframe)[^>]*\b(src|href)=""", text)
+    got = [text]
+    threads = [
+        threading.Thread(
+            target=lambda: got.append(rm.viz.animate(RX90, q, frames=True, names=True).html())
+        )
+        for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert got == [text] * 4
+    frame = rm.viz.show(RX90, height=321)._repr_html_()
+    assert frame.startswith('<iframe srcdoc="<!DOCTYPE html>')
+    assert "height: 321px" in frame
+    assert frame.count('"') == 4  # nothing inside the page ends the attribute
+
+
+def test_names_cannot_break_out_of_the_page():
+    table = rm.DHTable(antecedent=[0], sigma=[0], names=("</script><b>/x",))
+    model = rm.RobotModel.from_table(table, name="<b>&", configurations={"</select>": [0.1]})
+    for scene in (rm.viz.show(model, [0.1], names=True), rm.viz.jog(model)):
+        text = scene.html()
+        assert text.count("</script>") == 2
+        assert "<title>&lt;b&gt;&amp;</title>" in text
+        assert any(path.endswith("_script><b>_x/q") for path in scene.paths)
+
+
+def test_stage_and_dark_background():
+    bright, dark = (content(rm.viz.show(RX90, dark=d))["commands"] for d in (False, True))
+    top = [next(c["value"] for c in sent if c.get("property") == "top_color")
+           for sent in (bright, dark)]  # fmt: skip
+    assert np.mean(top[0]) > 0.8 > 0.2 > np.mean(top[1])
+    hidden = {c["path"] for c in bright if c["type"] == "set_property" and c["value"] is False}
+    assert {"/Grid", "/Axes"} <= hidden
+    assert "/Lights/PointLightPositiveX" in {c["path"] for c in bright if c["type"] == "delete"}
+    assert '<body class="dark">' in rm.viz.jog(RX90, dark=True).html()
+
+
+def test_nothing_heavy_is_imported_and_no_process_is_started(tmp_path):
+    code = f"""
+import subprocess, sys
+class Refuse(subprocess.Popen):
+    def __init__(self, *_, **__): raise AssertionError("a process was started")
+subprocess.Popen = Refuse
+import robotmodels as rm
+arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0], d=[0.3]))
+scene = rm.viz.show(arm, [0.2])
+assert not {{"meshcat", "trimesh", "zmq", "matplotlib"}} & set(sys.modules)
+scene.save(r"{tmp_path / "a.html"}")
+assert not {{"trimesh", "matplotlib"}} & set(sys.modules)
+sys.modules["meshcat"] = None
+try:
+    scene.html()
+except rm.errors.MissingExtraError as error:
+    print(error)
+"""
+    run = subprocess.run([sys.executable, "-c", code], check=True, timeout=60, capture_output=True,
+                         text=True)  # fmt: skip
+    assert "pip install 'meshcat" in run.stdout
+
+
+# ---------------------------------------------------------------- meshes
+
+
+def test_a_missing_mesh_is_a_skeleton_and_a_warning():
+    model = rm.RobotModel.from_urdf(urdf("package://nowhere/arm.stl"))
+    with pytest.warns(RobotModelsWarning, match=r"nowhere/arm\.stl.*package_dirs.*meshes=False"):
+        scene = rm.viz.show(model, [0.0])
+    assert links(scene)
+    assert links(rm.viz.show(model, [0.0], meshes=False))
+
+
+def test_a_mesh_has_its_place_scale_and_colour_and_is_in_the_page_once(tmp_path):
+    path = tmp_path / "arm.stl"
+    path.write_text(TRIANGLE)
+    blue = '<material name="blue"><color rgba="0 0 1 0.5"/></material>'
+    model = rm.RobotModel.from_urdf(urdf(str(path), "0.1 -0.1 0.1", blue))
+    scene = rm.viz.show(model, [H])
+    (node,) = [n for n in scene.nodes if isinstance(n.shape, Triangles)]
+    assert node.color == (0.0, 0.0, 1.0, 0.5)
+    corners = apply(scene.pose(node.path), node.shape.vertices)
+    expected = [[0.0, 0.1, 0.5], [0.0, 0.3, 0.5], [0.1, 0.1, 0.5]]
+    np.testing.assert_allclose(sorted(corners.tolist()), sorted(expected), atol=1e-7)
+    many = content(rm.viz.show(model, np.zeros((8, 1)), grid=False, tool=False))
+    assert len(many["geometries"]) == 1
+    assert sum("geometry" in command for command in many["commands"]) == 8
+    for name in ("bad.stl", "bad.dae"):
+        (tmp_path / name).write_text("this is no mesh")
+        with pytest.raises(UrdfError, match=name):
+            rm.viz.show(rm.RobotModel.from_urdf(urdf(str(tmp_path / name))), [0.0])
+
+
+def test_ur5_with_its_meshes():
+    pytest.importorskip("collada")
+    scene = rm.viz.show(rm.load("erd:ur5"), [0.3, -1.2, 1.4, -1.5, -1.57, 0.0])
+    nodes = [n for n in scene.nodes if isinstance(n.shape, Triangles)]
+    assert len({n.color for n in nodes}) > 3
+    points = np.concatenate([apply(scene.pose(n.path), n.shape.vertices) for n in nodes])
+    assert points[:, 2].min() > -0.1  # it stands on the floor, upright
+    assert 0.5 < points[:, 2].max() < 0.9
+
+
+# ---------------------------------------------------------------- mistakes, and the command
+
+QUINTIC = tr.quintic(np.zeros(6), np.ones(6), 1.0)
+STRAIGHT = tr.straight_line(np.eye(4), np.eye(4), duration=1.0)
+BALL = rm.velocity_ellipsoid(RX90, Q)
+MISTAKES = (
+    (lambda: rm.viz.show(RX90, [0.0] * 5), "q"),
+    (lambda: rm.viz.show(RX90, np.zeros((0, 6))), "q: expected one posture"),
+    (lambda: rm.viz.show(RX90, [0, 0, 0, np.nan, 0, 0]), "nan"),
+    (lambda: rm.viz.show([RX90, SCARA], [np.zeros(6)]), "each of the 2 robots"),
+    (lambda: rm.viz.show("rx90"), "model: expected a RobotModel"),
+    (lambda: rm.viz.show([RX90, None]), "got NoneType in the list"),
+    (lambda: rm.viz.show(RX90, box=(1, 0, 0, 1, 0, 1)), "box: .* x from 1"),
+    (lambda: rm.viz.show(RX90, opacity=1.5), "opacity"),
+    (lambda: rm.viz.show(RX90, color=(255, 0, 0)), "color: .* from 0 to 1"),
+    (lambda: rm.viz.show(RX90, np.zeros((2, 6)), color=[(1, 0, 0)] * 3), "the 2 postures"),
+    (lambda: rm.viz.show(RX90, view=(1,)), "view"),
+    (lambda: rm.viz.show(RX90, columns=1.5), "columns: expected how many"),
+    (lambda: rm.viz.show([RX90, SCARA], columns=2), "columns: .* several robots stand"),
+    (lambda: rm.viz.show(RX90, columns=2, ellipsoids=BALL), "columns: .* ellipsoids where"),
+    (lambda: rm.viz.show(RX90, np.zeros((2, 6)), legend="ab"), "legend: expected a list"),
+    (lambda: rm.viz.show(RX90, legend=["a", "b"]), "legend: .* the 1 postures drawn, got 2"),
+    (lambda: rm.viz.show(RX90, ellipsoids=[BALL, 3]), "ellipsoids"),
+    (lambda: rm.viz.show(RX90, ellipsoids=BALL, ellipsoid_scale=0.0), "ellipsoid_scale"),
+    (lambda: rm.viz.show(RX90).pose("robots/rx91"), "node"),
+    (lambda: rm.viz.animate(RX90, np.zeros(6)), "at least two samples"),
+    (lambda: rm.viz.animate(RX90, np.zeros((5, 3))), "q"),
+    (lambda: rm.viz.animate(RX90, np.zeros((5, 6)), dt=0.1, fps=10), "give one of them"),
+    (lambda: rm.viz.animate(RX90, np.zeros((5, 6)), dt=0.0), "dt: expected a positive"),
+    (lambda: rm.viz.animate(RX90, STRAIGHT), "got PoseTrajectory; joint_path"),
+    (lambda: rm.viz.animate(RX90, None), "got NoneType"),
+    (lambda: rm.viz.animate(SCARA, QUINTIC), "3 joints, got one of 6"),
+    (lambda: rm.viz.animate(RX90, tr.quintic(np.zeros((2, 6)), Q, 1.0)), "batch"),
+    (lambda: rm.viz.animate(RX90, tr.quintic(Q, Q, 0.0)), "takes no time"),
+    (lambda: rm.viz.animate(RX90, QUINTIC.at([0.5, 0.1])), "ascending"),
+    (lambda: rm.viz.jog("rx90"), "load it first"),
+    (lambda: rm.viz.jog(RX90, np.zeros((2, 6))), r"q: expected shape \(6,\), got \(2, 6\)"),
+    (lambda: rm.viz.jog(MIMIC, [0.5, 0.1, 0.0, 0.3]), "q: joint_5 moves with other joints"),
+)
+
+
+@pytest.mark.parametrize(("wrong", "message"), MISTAKES)
+def test_mistakes_are_named(wrong, message):
+    with pytest.raises(RobotModelsError, match=message):
+        wrong()
+
+
+def test_a_path_that_is_not_reached_says_which_part_is():
+    goal = rm.dgm(RX90, Q)
+    goal[0, 3] += 2.0
+    path = tr.joint_path(RX90, tr.straight_line(rm.dgm(RX90, Q), goal, 1.0), Q, samples=50)
+    first = int(np.isnan(path.q[:, 0]).argmax())
+    with pytest.raises(RobotModelsError, match=rf"the first is pose {first}; .*q\[:{first}\]"):
+        rm.viz.animate(RX90, path)
+
+
+def test_the_command_opens_a_page_where_there_is_a_display(tmp_path, monkeypatch, capsys):
+    opened = []
+    monkeypatch.setattr(webbrowser, "open", lambda url: opened.append(url) or True)
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", ":0")
+    page = tmp_path / "an arm.html"
+    assert main(["view", "rx90", "--out", str(page)]) == 0
+    assert opened == [page.as_uri()]
+    assert '<div id="panel">' in page.read_text(encoding="utf-8")
+    assert f"written to {page}\n" in capsys.readouterr().out
+    monkeypatch.delenv("DISPLAY")
+    assert main(["view", "rx90", "--out", str(page)]) == 0
+    assert len(opened) == 1
+    assert "There is no display or no browser here" in capsys.readouterr().out
+    (tmp_path / "one.urdf").write_text(urdf("package://nowhere/arm.stl"))
+    assert main(["view", str(tmp_path / "one.urdf"), "--no-open", "--out", str(page)]) == 0
+    assert "a skeleton is drawn for them: package://nowhere/arm.stl." in capsys.readouterr().out
+    assert main(["view", "rx90", "--out", str(tmp_path / "nowhere" / "arm.html")]) == 2
+    assert main(["view", "rx90", "--q", "1", "2"]) == 2
