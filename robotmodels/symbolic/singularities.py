@@ -98,7 +98,8 @@ def explain_singularities(
     check_model(model)
     point = model.twin.frame(frame)
     # equal models may differ in these
-    key = (model.name, point.parent, point.position.tobytes(), point.rotation.tobytes())
+    place = point.parent, point.position.tobytes(), point.rotation.tobytes()
+    key = (model.name, *place, *model.table.symbols.items())
     return _explanation(model, key, frame, tuple(checked_names(symbols).items()))
 
 
