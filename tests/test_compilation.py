@@ -212,7 +212,7 @@ def test_a_person_reads_once_that_there_is_something_to_wait_for(monkeypatch, te
 def test_the_command_compiles_in_advance(capsys, monkeypatch, tmp_path):
     names = prepare.kernel_modules()
     assert "robotmodels.kernels.poses" in names
-    assert "robotmodels.igm.paul.kernel" in names
+    assert "robotmodels.igm.paul._kernel" in names
     monkeypatch.setattr(prepare, "kernel_modules", lambda: ["robotmodels.kernels.torques"])
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert main(["compile", "--processes", "2"]) == 0
