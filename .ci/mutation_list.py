@@ -610,7 +610,7 @@ MUTATIONS = [
     Mutation("igm: search", "steps that enlarge the error are kept", "def refined(wanted",
         "axis=1) < np.sum(e**2", "axis=1) > np.sum(e**2", REDUNDANT + " -k planar"),
     Mutation("igm: search", "steps along a self-motion end before its turning point",
-        "def nearest_value(", "longest > 1e-6", "longest > 1e-1",
+        "def nearest_value(", "longest > 1e-6", "longest > 1.0",
         REDUNDANT + " -k planar"),
     Mutation("igm: search", "a self-motion at a singular pose is a double root",
         "def completed(", "if joint is None:", "if joint is not None:",
