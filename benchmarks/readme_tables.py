@@ -30,9 +30,9 @@ PACKAGES = {
 }  # fmt: skip
 Row = dict[str, Any]
 SHORT = {
-    "inverse dynamics, 100000 samples": "inverse dynamics, one sample of 100 000",
+    "inverse dynamics, 100000 samples": "inverse dynamics, per sample of 100 000",
     "all 8 postures, batch of 100000 poses, UR5e": "all 8 solutions of a pose, UR5e, batch",
-    "torque regressor 6 x 60, 100000 samples": "torque regressor, one sample of 100 000",
+    "torque regressor 6 x 60, 100000 samples": "torque regressor, per sample of 100 000",
     "base parameters, 6R with friction and rotors": "base parameters of a 6R from 100 000 samples",
     "UR10 full calibration, 100 poses": "calibration of a UR10, 100 poses",
 }
@@ -81,7 +81,7 @@ def short(results: Path = RESULTS) -> str:
     """The five rows of the README."""
     peers = json.loads((results / "peers.json").read_text(encoding="utf-8"))
     rows = {r["work"]: r for r in peers["rows"]}
-    lines = ["| task | robotmodels | fastest other program | ratio |", "|---|---|---|---|"]
+    lines = ["| task | robotmodels | fastest other program | times faster |", "|---|---|---|---|"]
     for work, words in SHORT.items():
         r = rows[work]
         mode = max(r["ratios"], key=r["ratios"].__getitem__)

@@ -243,9 +243,9 @@ def test_limits_are_dashed_lines_and_values_beyond_them_are_underlaid():
         assert [line.get_ydata()[0] for line in drawn] == pytest.approx(values)
         assert {line.get_linestyle() for line in drawn} == {"--"}
     assert not lines(figure.axes[3], "_limit of c")  # infinite: no limit
-    y, beyond = data(figure.axes[2], "a"), data(figure.axes[2], "beyond it")
+    y, beyond = data(figure.axes[2], "a"), data(figure.axes[2], "beyond the limit")
     np.testing.assert_array_equal(np.isfinite(beyond), y > np.degrees(0.8))
-    assert legend(figure) == ["a", "b", "c", "limit", "beyond it"]
+    assert legend(figure) == ["a", "b", "c", "limit", "beyond the limit"]
     kept = tr.MotionLimits(velocity=[1.0, 2.0], acceleration=[3.0, 1.0])
     exact = viz.plot_trajectory(tr.trapezoidal([0, 0], [1, 2], limits=kept), kept)
     assert legend(exact) == ["joint 1", "joint 2", "limit"]  # limits that are just kept
@@ -345,7 +345,7 @@ def test_joint_motion_fills_panels_with_the_range():
         np.minimum(inside[:, 2], 0.2 - inside[:, 2]) / 0.1,
     )
     np.testing.assert_allclose(data(margin, "with"), 100.0 * expected, atol=1e-9)
-    assert legend(figure) == ["with", "without", "limit", "beyond it"]
+    assert legend(figure) == ["with", "without", "limit", "beyond the limit"]
     seven = viz.plot_joint_motion(rm.load("panda"), t, np.zeros((21, 7)), columns=3, degrees=False)
     assert sum(not axes.get_visible() for axes in seven.axes) == 1
     assert sum(axes.get_xlabel() == "time (s)" for axes in seven.axes) == 3

@@ -31,8 +31,8 @@ def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
         help="URDF only: folder that holds packages with meshes; may be repeated",
     )  # fmt: skip
     parser.add_argument("--mimic", action="store_true",
-                        help="URDF only: mimic joints follow their masters; without it they move "
-                        "by themselves")  # fmt: skip
+                        help="URDF only: mimic joints follow the joint they mimic; without it they "
+                        "are independent")  # fmt: skip
 
 
 def robot_of(arguments: argparse.Namespace) -> RobotModel:

@@ -160,7 +160,7 @@ def _checked(
     if np.abs(reference).max(initial=0.0) > FARTHEST:
         raise InvalidValueError(
             f"q_ref: expected joint values within +-{FARTHEST:g} rad or m, got "
-            f"{float(np.abs(reference).max()):g}; whole turns more say nothing."
+            f"{float(np.abs(reference).max()):g}; reduce angles modulo 2 pi."
         )
     batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     if limits:
@@ -281,7 +281,7 @@ def _solved_chain(request: Request, U: Array, psi: Array | None, references: Arr
 
 
 def _settled(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
-    """Postures of a chain, infinite families settled and double roots marked."""
+    """Postures of a chain, self-motions brought to the reference, double roots marked."""
     solver, tolerances = request.solver, request.tolerances
     if solver is None:
         found = nothing_found(len(U), 1, references.shape[1])
@@ -290,12 +290,12 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
             if request.task.locks or request.task.mask != WHOLE_POSE:
                 raise InvalidValueError(
                     "arm_angle: not together with a locked joint or a mask; each of them already "
-                    "says which of the infinitely many postures are meant."
+                    "selects one member of the self-motion."
                 )
             raise InvalidValueError(
-                "arm_angle: this arm has none, which takes seven revolute joints with three axes "
-                "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
-                f"seven. It is solved by: {solver.method}."
+                "arm_angle: this arm has no arm angle. It needs seven revolute joints, the first "
+                "three axes meeting in a shoulder and the last three in a wrist. For other arms "
+                f"with seven joints lock a joint. Solver of this arm: {solver.method}."
             )
         found = arm_angle_postures(solver, U, psi, references, tolerances)
         # the angle is given, so that only joints that took a reference are free

@@ -26,12 +26,12 @@ def igm(
 ) -> IGMSolutions:
     """Inverse geometric model (inverse kinematics): all postures that bring the tool to a pose.
 
-    Looks at the table once, picks the family of the arm and keeps what it prepared for the next
-    call with the same model: Paul's equations where they suffice; three axes that meet or three
-    that are parallel, wherever they stand in the chain; arms that are one of these up to
-    calibration errors; elimination to up to 16 postures for other six-joint arms; virtual joints
-    for arms of fewer joints and for masks; the arm angle or locked joints for seven joints and
-    more; a numeric search from many starts for the rest. ``print(found.method)`` says which.
+    The solver for the arm is chosen from its table at the first call and kept for later calls:
+    Paul's equations where they suffice; three axes that meet or three that are parallel, anywhere
+    in the chain; arms that are one of these up to calibration errors; elimination, up to 16
+    postures, for other six-joint arms; virtual joints for arms of fewer joints and for masks; the
+    arm angle or locked joints for seven joints and more; a numeric search from many starts for the
+    rest. ``print(found.method)`` says which.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def igm(
         Joints (column of q, from 0, or name) that keep a value [rad or m].
     arm_angle : array_like, shape (...), optional
         Arms with three axes that meet in a shoulder, an elbow, and three that meet in a wrist: the
-        angle of the elbow about the line from shoulder to wrist [rad], see `ArmAngle`. The axes of
+        angle of the elbow about the line from shoulder to wrist [rad], right-handed. The axes of
         an array are added behind those of ``T``. Without it the angle of ``q_ref`` is taken.
     position_tolerance : float
         Metres. What is missing of the position may be as long as this. For poses given with few
@@ -86,11 +86,11 @@ def igm(
 
     Notes
     -----
-    A posture is returned after a forward pass over the table; ``residual`` is what that found.
-    Regular poses of an arm with a closed form take microseconds. At singular positions and beside
-    them (within some 1e-6) candidates are gathered from several sides and infinite families are
-    walked to the reference, which takes milliseconds. Redundant arms are quick at a ``q_ref`` from
-    which the pose can be reached; else the nearest value of the first free joint is searched, in
+    Every posture is checked by the direct model; ``residual`` is its error. Regular poses of an
+    arm with a closed form take microseconds. At singular positions and beside them (within some
+    1e-6) candidates at perturbed poses are added and self-motions are continued to the reference,
+    which takes milliseconds. Redundant arms are quick at a ``q_ref`` from which the pose can be
+    reached; else the nearest value of the first free joint is searched, in
     some 0.2 s a pose. Status ``INCOMPLETE`` says that solutions or a nearer value may be missing:
     after that search, with relations between several joints, and where neither a closed form nor
     elimination serves (masks that free two rotations, unless the arm turns about the asked axis

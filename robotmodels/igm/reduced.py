@@ -1,10 +1,11 @@
 """Fewer constraints or joints than six: virtual joints make a chain of six that has a closed form.
 
 A freed translation is a prismatic joint along its axis, one freed rotation a revolute joint, three
-a spherical joint at the tool. Joints that are still missing stand where they give a closed form
-and have to come out at zero; where that chain is singular and the arm is not, another one answers.
-Two freed rotations leave the rotation vectors of a plane, which no joints produce: they are
-searched, unless the arm turns its tool about the asked axis only.
+a spherical joint at the tool. Joints that are still missing are placed where they give a closed
+form, and their values must come out as zero; where that chain is singular and the arm is not,
+another extension is used. With two freed rotations the permitted orientations cannot be written as
+joint motions: such poses are solved by numeric search, unless the arm turns its tool about the
+constrained axis only.
 
 Source: Section 1.2.3 of the book: fewer than six degrees of freedom.
 """

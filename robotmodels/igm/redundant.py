@@ -90,7 +90,7 @@ def prepare_redundant(
 def _typical_rest(
     chain: JointChain, components: Components, joint: int, locked: float | None
 ) -> tuple[JointChain, float | None]:
-    """The chain without a joint, and the value it is for (None: any)."""
+    """The chain with the joint locked, and that value (None: valid for all values)."""
     if _at_an_end(chain, components, joint):
         return without_end(chain, joint, np.zeros(1), np.eye(4)[None])[0], None
     # at 0 axes may be aligned that are not elsewhere

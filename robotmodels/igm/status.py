@@ -1,4 +1,4 @@
-"""What became of a pose: a small number per pose whose value is a sentence."""
+"""Status of a pose: a small number per pose whose value is a sentence."""
 
 from __future__ import annotations
 
@@ -33,4 +33,4 @@ class IGMStatus(Outcome):
         5, "The position is reached, but the orientation is not available there.",
     )  # fmt: skip
     NOT_CONVERGED = 6, "No posture was found that meets the pose."
-    INCOMPLETE = 7, "The pose is reached; by this method other postures may be missing."
+    INCOMPLETE = 7, "The pose is reached; other postures may be missing."

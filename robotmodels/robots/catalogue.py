@@ -56,7 +56,7 @@ def robots() -> tuple[str, ...]:
 
 
 def title(name: str) -> str:
-    """Name of a robot in words.
+    """One-line description of a robot.
 
     Parameters
     ----------
@@ -144,8 +144,9 @@ def load(name: str | Path) -> RobotModel:
     >>> load("rx90").n
     6
     """
-    if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix in _FILES):
-        return read_par(name) if Path(name).suffix == ".par" else RobotModel.from_urdf(Path(name))
+    suffix = Path(name).suffix.lower() if isinstance(name, str | Path) else ""
+    if isinstance(name, Path) or suffix in _FILES:
+        return read_par(name) if suffix == ".par" else RobotModel.from_urdf(Path(name))
     if isinstance(name, str) and name.startswith(ERD_PREFIX):
         return load_erd(name.removeprefix(ERD_PREFIX))
     data = _data(name)
@@ -177,7 +178,7 @@ def _data(name: str) -> dict[str, Any]:
             "robot",
             name,
             robots(),
-            "All names: robots(). Files are known by their suffix .urdf or .par.",
+            "All names: robots(). Files end in .urdf, .xml, .xacro or .par.",
         )
     return _parsed(name)
 

@@ -139,7 +139,7 @@ def _rotated(axis: int, angle: Angle, v: Sequence[Any], notation: Notation) -> l
 
 
 def row_moves(table: DHTable, j: int, notation: Notation) -> list[Move]:
-    """Elementary motions of a row, eq. [1.3] with gamma, b and beta; none that is 1."""
+    """Elementary motions of a row, eq. [1.3] with gamma, b and beta; identity motions left out."""
     sigma = table.sigma[j - 1]
 
     def constant(column: str, name: str) -> Any:
@@ -164,7 +164,7 @@ def row_moves(table: DHTable, j: int, notation: Notation) -> list[Move]:
 
 
 def pose_moves(R: Array, p: Array, suffix: str, of: str, notation: Notation) -> list[Move]:
-    """A constant pose as Trans(x) Trans(y) Trans(z) Rot(z) Rot(y) Rot(x); none that is 1."""
+    """A constant pose as motions along x, y, z, then about z, y, x; identities are left out."""
     if hypot(R[0, 0], R[1, 0]) <= ROUNDING:  # pitch 90 degrees: the yaw is free, 0 is simplest
         up = float(np.sign(-R[2, 0]))
         angles = np.arctan2(-R[1, 2], R[1, 1]), up * pi / 2, 0.0
@@ -214,7 +214,7 @@ class Chain:
         self.variables = self.notation.variables
         needed = sorted({*self.path, *(int(j) for k in others for j in table.path(k))})
         places = {int(row) + 1: k for k, row in enumerate(table.joint_rows)}
-        # number of the frame to the variable and its place in q
+        # frame number to column of q
         self.joints = {j: k for j, k in places.items() if j in needed}
         self.path_joints = [j for j in self.path if j in self.joints]
         self.parent = {j: int(table.antecedent[j - 1]) for j in needed}
@@ -225,7 +225,7 @@ class Chain:
         self.moves[TOOL] = pose_moves(R, p, "E", "tool", self.notation)
 
     def is_prismatic(self, j: int) -> bool:
-        """Whether frame j slides."""
+        """Whether joint j is prismatic."""
         return bool(self.table.sigma[j - 1] == PRISMATIC)
 
     def ancestors(self, node: int) -> list[int]:

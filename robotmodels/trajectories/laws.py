@@ -25,7 +25,7 @@ _PHASE = 1.0 / 3.0
 
 
 class TimeLaw(Enum):
-    """How the motion is distributed over its time; the value says which derivatives are limited.
+    """How the motion is distributed over its time; the value describes the law.
 
     Examples
     --------
@@ -43,7 +43,7 @@ class TimeLaw(Enum):
 
 
 class LineLimits(NamedTuple):
-    """Limits along the coordinate of the law, each shape (R,); infinity is none."""
+    """Limits along the coordinate of the law, each shape (R,); infinity means no limit."""
 
     velocity: Array
     acceleration: Array

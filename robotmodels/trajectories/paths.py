@@ -50,7 +50,7 @@ class FixedAxisPath:
 
     @property
     def length(self) -> float:
-        """Of the way of the position, m."""
+        """Length of the position path, m."""
         return float(np.linalg.norm(self.shift)) + self.radius * abs(self.sweep)
 
     @property

@@ -255,7 +255,7 @@ def quantity_over_time(
             (limits.lower, limits.upper),
             (limits.velocity_lower, limits.velocity),
             (limits.acceleration_lower, limits.acceleration),
-            (-limits.jerk, limits.jerk),
+            (limits.jerk_lower, limits.jerk),
         )[order]
         lower, upper = unit.factor * lower[joints], unit.factor * upper[joints]
     values = unit.factor * motion.values[order][:, joints]

@@ -31,7 +31,7 @@ dark : bool
 Raises
 ------
 ShapeError, InvalidValueError
-    Wrong joint variables or options; a motion that is none of joints; coupled joints at values
+    Wrong joint variables or options; a motion that is not a joint motion; coupled joints at values
     that contradict their coupling.
 UrdfError
     A mesh file cannot be read.
@@ -196,7 +196,7 @@ def animate(
 ) -> Scene:
     """Draw a robot, or several, that moves; also called play.
 
-    More than 30 samples a second are interpolated at 30 a second, the two ends included.
+    Motions with more than 30 samples per second are resampled at 30 per second.
 
     Parameters
     ----------

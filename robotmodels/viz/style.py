@@ -42,7 +42,7 @@ SIGNED_MAP, POSITIVE_MAP = "PuOr", "viridis"
 DASHED = {"linewidth": 0.8, "linestyle": (0, (4.0, 2.5))}
 """Limits and bounds."""
 
-LIMIT, BEYOND = "limit", "beyond it"
+LIMIT, BEYOND = "limit", "beyond the limit"
 ZERO: dict[str, Any] = {"color": PALE, "linewidth": 0.8, "zorder": 1.2, "label": "_zero"}
 
 _DASHES = ("", "5 1.5", "1.3 1.1", "6 1.3 1.3 1.3", "9 2", "3 1 1 1 1 1", "2.2 2.2")

@@ -155,7 +155,7 @@ def ikm_second_order(
         Time derivative of the frame's twist, entry by entry [m/s^2, rad/s^2], as
         `dkm_second_order` gives it.
     secondary : array_like, shape (..., n), criterion, or sequence of them, optional
-        Joint accelerations for the null space; gradients are taken as such.
+        Joint accelerations for the null space; gradients are used as accelerations.
 
     Returns
     -------

@@ -44,7 +44,7 @@ class SingularityStatus(Outcome):
     'Singular: the robot has lost freedoms.'
     """
 
-    REGULAR = 0, "Regular: all freedoms of the robot are there."
+    REGULAR = 0, "Regular: no degree of freedom is lost."
     NEAR_SINGULAR = 1, "Near a singular configuration: one freedom is weak."
     SINGULAR = 2, "Singular: the robot has lost freedoms."
 
