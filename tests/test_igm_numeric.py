@@ -463,7 +463,7 @@ def test_same_call_same_answer(rng):
         ({"q0": [0, 0]}, ShapeError, "q0"),
         ({"q0": [np.inf] * 6}, InvalidValueError, "q0"),
         ({"mask": [0] * 6}, InvalidValueError, "nothing"),
-        ({"mask": [1, 1, 1]}, ShapeError, "six"),
+        ({"mask": [1, 1, 1]}, ShapeError, "6 numbers"),
         ({"mask": [1, 1, 1, 0.5, 0, 0]}, InvalidValueError, "zeros and ones"),
         ({"mask": [1, 1, 1, -1, 0, 0]}, InvalidValueError, "zeros and ones"),
         ({"mask": "111000"}, InvalidValueError, "mask"),

@@ -91,8 +91,22 @@ def idm(
     q = as_vector(q, n, "q")
     v = rest if v is None else as_vector(v, n, "v")
     a = rest if a is None else as_vector(a, n, "a")
-    if model.twin.torques_warn:
+    if model.twin.torques_warn and friction is None:
         warn_without_masses(model)
+    return motion_torques(model, q, v, a, wrench, drive, friction)
+
+
+def motion_torques(
+    model: RobotModel,
+    q: Array,
+    v: Array,
+    a: Array,
+    wrench: ArrayLike | None = None,
+    drive: bool = True,
+    friction: Friction | None = None,
+) -> Array:
+    """Joint torques of a motion, see `idm`; without a warning for a robot without masses."""
+    n = model.n
     if wrench is not None:
         wrench = as_vector(wrench, 6, "wrench")
         batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))

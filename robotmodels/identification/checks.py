@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import Array
-from ..dynamics import idm
+from ..dynamics.inverse import motion_torques
 from ..errors import InvalidValueError
 from ..estimation.factor import triangle
 from ..friction import Friction
@@ -136,7 +136,7 @@ def _torque_sizes(log: Log, model: RobotModel, samples: Array) -> Iterator[LogFi
     if model.inertia is None or not (model.inertia.values[:, 9] > 0.0).any():
         return
     q, v, a, tau = samples
-    predicted, gains = idm(model, q, v, a, drive=False), {}
+    predicted, gains = motion_torques(model, q, v, a, drive=False), {}
     for j, name in enumerate(log.names):
         friction = np.column_stack([v[:, j], np.sign(v[:, j]), a[:, j], np.ones(len(v))])
         both = np.column_stack([predicted[:, j], tau[:, j]])

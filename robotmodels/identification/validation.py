@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array, Frozen
-from ..dynamics import idm
+from ..dynamics.inverse import motion_torques
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from ..table_text import percent_text
@@ -106,7 +106,7 @@ def prediction_errors(
         predicted = parameter_torque(system.base, system.names, values, x.q, x.v, x.a, ramp)
         own += _sums(x.tau - predicted, x.tau)
         if known:
-            given += _sums(x.tau - idm(system.model, x.q, x.v, x.a), x.tau)
+            given += _sums(x.tau - motion_torques(system.model, x.q, x.v, x.a), x.tau)
         samples, steps = samples + len(x.tau), steps + max(len(x.tau) - 2, 0)
         r = np.where(block.use, block.y - block.W @ values, 0.0)
         squares += (r * r).sum(axis=0)

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, as_vector, batch_shape, read_only
 from ..drive import check_all_or_none
-from ..dynamics import gravity_torque, idm
+from ..dynamics import gravity_torque
+from ..dynamics.inverse import motion_torques
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
@@ -89,6 +90,7 @@ def torque_parts(
 
     Examples
     --------
+    >>> from robotmodels.dynamics import idm
     >>> from robotmodels.robots import load
     >>> arm, state = load("rx90"), np.random.default_rng(0).normal(size=(3, 6))
     >>> bool(np.allclose(torque_parts(arm, *state).total, idm(arm, *state), atol=1e-12))
@@ -107,7 +109,7 @@ def torque_parts(
     tool = still = taken = np.zeros((*batch, n))
     # separate calls, so that no part loses digits to a larger one
     weightless = model.with_gravity(np.zeros(3))
-    inertia = idm(weightless, q, still, a, drive=False)
+    inertia = motion_torques(weightless, q, still, a, drive=False)
     drives = model.drive_matrices if drive else None
     if drives is not None:
         inertia = inertia + a @ drives.rotor
@@ -115,8 +117,8 @@ def torque_parts(
     if friction is not None:
         taken = taken + torque_at(check_friction(friction, n), v, q)
     if wrench is not None:
-        tool = idm(weightless, q, still, still, wrench=arrays["wrench"], drive=False)
-    coriolis = idm(weightless, q, v, still, drive=False)
+        tool = motion_torques(weightless, q, still, still, wrench=arrays["wrench"], drive=False)
+    coriolis = motion_torques(weightless, q, v, still, drive=False)
     return TorqueParts(inertia, coriolis, gravity_torque(model, q), taken, tool)
 
 

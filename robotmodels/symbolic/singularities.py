@@ -258,7 +258,8 @@ def _explained(
         )
         keys = list(dict.fromkeys(p for s in sets or () for p in s))
     ordered = sorted(keys, key=book.order)
-    factors = tuple(replace(book(p), power=powers.get(p, 1)) for p in ordered)
+    made = {p: replace(book(p), power=powers.get(p, 1)) for p in ordered}
+    factors = tuple(made.values())
     chain.notation.check_new_names()
     expressions += [f.expression for f in factors if f.expression is not None]
     draft = replace(
@@ -266,7 +267,7 @@ def _explained(
         status=_status(task, factors, sets),
         task=task.words,
         factors=factors,
-        conditions=_conditions(sets or [], book),
+        conditions=_conditions(sets or [], book, made),
         unit=unit_text(_degree(task.minors[0], chain)),
         numbers=numbers_of(chain, expressions),
     )
@@ -305,11 +306,13 @@ def _matrix(minor: Minor, chain: PolynomialChain) -> Any:
     return sympy.ImmutableDenseMatrix(rows)
 
 
-def _conditions(sets: Iterable[frozenset[Any]], book: _Factors) -> tuple[SingularityCondition, ...]:
+def _conditions(
+    sets: Iterable[frozenset[Any]], book: _Factors, made: Mapping[Any, SingularityFactor]
+) -> tuple[SingularityCondition, ...]:
     """Conditions of the sets, the shortest first."""
     out = []
     for s in sorted(sets, key=lambda s: (len(s), sorted(map(book.order, s)))):
-        factors = tuple(book(p) for p in sorted(s, key=book.order))
+        factors = tuple(made[p] for p in sorted(s, key=book.order))
         if not factors:
             continue  # no minor: the rank is never full
         kinds = {factor.kind for factor in factors}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact
-from ...dynamics import idm
+from ...dynamics.inverse import motion_torques
 from ...errors import InvalidValueError
 from ...logs import Log
 from ...model import RobotModel, check_model
@@ -98,7 +98,7 @@ def targets(
     q, v, a = (np.ascontiguousarray(np.vstack((x, x[-1:]))) for x in (q, v, a))
     feed = np.zeros(q.shape)
     if ahead is not None:
-        feed = idm(ahead, q, v, a, drive=False)
+        feed = motion_torques(ahead, q, v, a, drive=False)
         if (drives := ahead.drive_matrices) is not None:
             feed += a @ drives.rotor + v @ drives.viscous + drives.offset
             feed += drives.coulomb * _direction(v, width)

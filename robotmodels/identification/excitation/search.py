@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..._arrays import Array
-from ...dynamics import idm
+from ...dynamics.inverse import motion_torques
 from ...model import RobotModel
 from ...trajectories import Trajectory
 from .objective import ExcitationProblem, MotionRegressor, triangular_factor
@@ -124,11 +124,11 @@ def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> Excitatio
     model = problem.model
     times = np.linspace(0.0, problem.basis.duration, _DENSE * len(problem.t) + 1)
     q, v, a = trajectory.motion.derivatives(times, (0, 1, 2))
-    torque = _torques(model, q, v, a)
+    torque = np.abs(motion_torques(model, q, v, a))
     peaks = (torque + _between(torque, 0.125)).max(axis=0)
     if (beside := _beside_jumps(model, times, v)).size:
         qb, vb, ab = trajectory.motion.derivatives(beside, (0, 1, 2))
-        peaks = np.maximum(peaks, _torques(model, qb, vb, ab).max(axis=0))
+        peaks = np.maximum(peaks, np.abs(motion_torques(model, qb, vb, ab)).max(axis=0))
     clearance = np.inf
     if problem.distances is not None:
         distance, _ = problem.distances(q)
@@ -176,11 +176,6 @@ def _means(problem: ExcitationProblem, X: Array) -> Array:
     return (problem.functions[0] @ X).mean(axis=0)
 
 
-def _torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
-    """Sizes of the torques of a motion (N, n), 0 for a robot without masses and drives."""
-    return np.zeros_like(q) if model.twin.torques_warn else np.abs(idm(model, q, v, a))
-
-
 def _middle(problem: ExcitationProblem, rng: np.random.Generator) -> Array:
     """Feasible posture, if there is one, that is drawn near the middle of the ranges first."""
     low, high, half = problem.bounds[0]
@@ -189,7 +184,7 @@ def _middle(problem: ExcitationProblem, rng: np.random.Generator) -> Array:
     excess = np.zeros(len(drawn))
     if problem.values.any():
         still = np.zeros(drawn.shape)
-        torque = np.abs(idm(problem.model, drawn, still, still, drive=False))
+        torque = np.abs(motion_torques(problem.model, drawn, still, still, drive=False))
         excess += np.maximum(torque / problem.torque_limits - 0.8, 0.0).sum(axis=1)
     if problem.distances is not None:
         excess += np.maximum(0.02 - problem.distances(drawn)[0], 0.0).sum(axis=1)

@@ -33,8 +33,9 @@ ShapeError, InvalidValueError
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import partial, wraps
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,6 +87,8 @@ class Task(Rebuilt):
     rows : callable
         ``rows(model, q, v)`` with q (N, n), and v (N, n) or None where velocities are requested,
         gives J (N, m, n), ``dJ/dt v`` (N, m) or None for zero, and the weights (m,).
+    made_by : tuple, optional
+        Function and arguments of the builders of this file, from which a pickle makes the task.
 
     Examples
     --------
@@ -101,6 +104,15 @@ class Task(Rebuilt):
 
     rate: Array
     rows: Callable[[RobotModel, Array, Array | None], Rows]
+    made_by: tuple[Callable[..., Task], tuple[Any, ...], dict[str, Any]] | None = field(
+        default=None, repr=False
+    )
+
+    def __reduce__(self) -> tuple[Any, ...]:  # functions in functions cannot be pickled
+        if self.made_by is None:
+            return Rebuilt.__reduce__(self)
+        builder, arguments, options = self.made_by
+        return partial(builder, **options), arguments
 
     def __post_init__(self) -> None:
         rate = as_floats(self.rate, "rate")
@@ -131,6 +143,17 @@ class Task(Rebuilt):
         return Level(J, rate, np.zeros((N, m)) if drift is None else drift, weights)
 
 
+def _remembered(builder: Callable[..., Task]) -> Callable[..., Task]:
+    """Builder whose tasks know how they were made, so that copies and pickles make them again."""
+
+    @wraps(builder)
+    def build(*arguments: Any, **options: Any) -> Task:
+        return replace(builder(*arguments, **options), made_by=(build, arguments, options))
+
+    return build
+
+
+@_remembered
 def TwistTask(
     rate: ArrayLike,
     frame: str | int | None = None,
@@ -162,6 +185,7 @@ def TwistTask(
     return Task(rate, rows)
 
 
+@_remembered
 def PositionTask(
     rate: ArrayLike,
     frame: str | int | None = None,
@@ -197,6 +221,7 @@ def PositionTask(
     return Task(rate, rows)
 
 
+@_remembered
 def JointTask(rate: ArrayLike, joints: Sequence[int | str], length: float | None = None) -> Task:
     """Velocities of k joints, given as columns of q (from 0) or by name.
 
@@ -230,6 +255,7 @@ def JointTask(rate: ArrayLike, joints: Sequence[int | str], length: float | None
     return Task(as_core(rate, (len(joints),), "rate"), rows)
 
 
+@_remembered
 def DistanceTask(
     rate: ArrayLike,
     first: str | int = 0,
@@ -267,6 +293,7 @@ def DistanceTask(
     return Task(as_floats(rate, "rate")[..., None], rows)
 
 
+@_remembered
 def FunctionTask(
     gradient: Callable[[Array], ArrayLike],
     rate: ArrayLike,
@@ -329,6 +356,7 @@ def FunctionTask(
     return Task(as_floats(rate, "rate"), rows)
 
 
+@_remembered
 def LinearTask(
     J: ArrayLike,
     rate: ArrayLike,
