@@ -1,5 +1,7 @@
 """Logs of random robots without noise, whose velocities and accelerations are exact."""
 
+import warnings
+
 import numpy as np
 from identities.random_robots import random_model
 
@@ -20,11 +22,18 @@ def swinging(model, rng, samples=4000, dt=2e-3, harmonics=5, period=4.0, size=1.
     return q, v, -(s * w**2) @ a + (c * w**2) @ b
 
 
+def torques(model, q, v, a):
+    """Torques, also of robots without masses, which would warn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rm.InertiaWarning)
+        return rm.idm(model, q, v, a)
+
+
 def clean_log(model, rng, noise=0.0, **options):
     """A log whose torques are those of the model, with white noise if it is asked for."""
     dt = options.setdefault("dt", 2e-3)
     q, v, a = swinging(model, rng, **options)
-    tau = rm.idm(model, q, v, a)
+    tau = torques(model, q, v, a)
     return Log(dt, q, tau + noise * rng.normal(size=tau.shape), v, a)
 
 
@@ -32,7 +41,7 @@ def recorded(name, samples, seed=7, noise=0.0, dt=0.002):
     """A log without velocities of a robot of the catalogue that moves slowly, with friction."""
     model, rng = rm.load(name), np.random.default_rng(seed)
     q, v, a = swinging(model, rng, samples, dt, 5, 10.0, 0.5)
-    tau = rm.idm(model, q, v, a) + 2.0 * v + np.sign(v) + noise * rng.normal(size=q.shape)
+    tau = torques(model, q, v, a) + 2.0 * v + np.sign(v) + noise * rng.normal(size=q.shape)
     return Log(dt, q, tau)
 
 

@@ -74,8 +74,9 @@ class PinocchioTwin:
         self.base_is_massless = not parts.inertia.values[on_base].any()
         # one warning where the torques of a robot are asked for that has no masses and no drives
         d = parts.drive
-        given = (parts.inertia.values, d.Ia, d.Fv, d.Fc, d.offset)
-        self.torques_warn = not any(values.any() for values in given)
+        given, t = [parts.inertia.values, d.Ia, d.Fv, d.Fc, d.offset], parts.transmission
+        given += [] if t is None else [t.Iam, t.Fvm, t.Fcm]
+        self.torques_warn = not any(np.any(values) for values in given)
         self.names = link_names(parts)
         self._parts = parts
         self._frames: dict[str | int | None, FrameOfInterest] = {}
