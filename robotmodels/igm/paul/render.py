@@ -125,7 +125,8 @@ def _pose_line(model: RobotModel, words: PlanText) -> Prose:
     if whole and left:
         meanings.append(("Z", "the base and the constant transformation before the first joint"))
     elif left:
-        meanings.append(("Z", "the base" + " and the constant transformation before the first joint" * moved))
+        table = " and the constant transformation before the first joint" * moved
+        meanings.append(("Z", f"the base{table}"))
     if right:
         meanings.append(("E", "the constant transformation after the last joint, with the tool"))
     elif words.plan.arm.E is not None:
