@@ -179,6 +179,12 @@ def test_limits_drop_postures(run, tmp_path):
     assert run("igm", *words)[1].count("outside") == 4
 
 
+def test_the_mask_may_be_a_word(run):
+    pose = ("planar_2r", "--xyz", 0.3, 0.2, 0, "--mask")
+    by_word, by_numbers = solved(run, *pose, "xyz"), solved(run, *pose, 1, 1, 1, 0, 0, 0)
+    assert by_word == by_numbers == solved(run, *pose, "position")
+
+
 def test_mask_axes_of_the_tool(run):
     """Pointing: the turn about the tool's z axis is free."""
     q = [0.3, 1.0, -1.8, 0.4, 0.8, -0.2]

@@ -155,6 +155,8 @@ def test_help_of_everything_has_every_command_and_status(run):
             rf"^  {status.value} +{re.escape(status.sentence[:40])}", out, re.MULTILINE
         )
     assert run("--version") == (0, f"robotmodels {rm.__version__}\n", "")
+    for words in (("--version", "-v"), ("--version", "--verbose")):
+        assert run(*words) == (0, f"{rm.show_versions()}\n", "")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -99,7 +99,7 @@ def test_slightly_off_rotations_are_projected(seed, size):
         (lambda T: T.__setitem__((slice(3), slice(3)), 1.001 * T[:3, :3]), r"det R = 1\.003"),
         (lambda T: T.__setitem__((slice(3), 2), -T[:3, 2]), "det R = -1;"),
         (lambda T: T.__setitem__((slice(3), slice(3)), 0.0), "det R = 0"),
-        (lambda T: T.__setitem__((0, 1), T[0, 1] + 1e-5), "nearest_pose"),
+        (lambda T: T.__setitem__((0, 1), T[0, 1] + 1e-5), "nearest_pose.* makes a typed"),
         (lambda T: T.__setitem__((3, 3), 2.0), "last row"),
         (lambda T: T.__setitem__((3, 0), 0.1), "last row"),
     ],

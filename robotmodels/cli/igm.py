@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import se3
-from .._arrays import Array
+from .._arrays import Array, as_mask
 from ..errors import InvalidValueError
 from ..igm import IGMSolutions, IGMStatus
 from ..igm import igm as inverse_model
@@ -62,8 +62,11 @@ def add_command(commands: Any) -> None:
         help="order by the distance to this posture; joints that the pose leaves free take its "
         "values (default 0)",
     )  # fmt: skip
-    asked.add_argument("--mask", metavar="NUMBERS",
-                       help="1 or 0 for each of x y z rx ry rz: what has to be met")  # fmt: skip
+    asked.add_argument(
+        "--mask", metavar="NUMBERS",
+        help="1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words position, "
+        "xyz (the same) and orientation",
+    )  # fmt: skip
     asked.add_argument("--mask-axes", choices=("world", "tool"), default="world",
                        help="axes of the mask (default: %(default)s)")  # fmt: skip
     asked.add_argument(
@@ -84,7 +87,7 @@ def add_command(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command: solve and print."""
     model = robot_of(arguments)
-    mask = None if arguments.mask is None else numbers(arguments.mask, 6, "--mask")
+    mask = mask_of(arguments.mask)
     T = pose_of(arguments, model, mask)
     tolerance = (1e-9,) if arguments.tolerance is None else numbers(
         arguments.tolerance, (1, 2), "--tolerance"
@@ -106,6 +109,15 @@ def run(arguments: argparse.Namespace) -> int:
     return ExitStatus.DONE if found.count else ExitStatus.NOT_REACHED
 
 
+def mask_of(text: str | None) -> Array | None:
+    """What has to be met, from six numbers or a word."""
+    if text is None:
+        return None
+    if text.isalpha():
+        return as_mask(text, name="--mask").astype(np.float64)
+    return numbers(text, 6, "--mask")
+
+
 def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None) -> Array:
     """The pose asked for."""
     ways = ("--xyz", "--matrix", "--q")
@@ -125,7 +137,7 @@ def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None
         if mask is None or mask[3:].any():
             raise InvalidValueError(
                 "--xyz: the orientation is missing; add --rpy, or ask for the position alone with "
-                "--mask 1 1 1 0 0 0."
+                "--mask position."
             )
         return se3.translation(*xyz)
     rpy = numbers(arguments.rpy, 3, "--rpy")

@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from .. import __version__
+from .. import __version__, show_versions
 from ..errors import RobotModelsError, nearest_names
 from .arguments import joined
 from .option_words import in_options
@@ -113,7 +113,9 @@ def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
         epilog=f"{_EXAMPLES}\n\n{statuses()}\n\n"
         "ROBOTMODELS_TRACEBACK=1 in the environment does what --traceback does.",
     )
-    parser.add_argument("--version", action="version", version=f"robotmodels {__version__}")
+    parser.add_argument("--version", action="version", version=f"robotmodels {__version__}",
+                        help="show the version and exit; --version -v (or --verbose) shows those "
+                        "of Python and the libraries too")  # fmt: skip
     _add_traceback(parser)
     commands: Any = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name, summary in COMMANDS.items():
@@ -145,6 +147,8 @@ def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
             if rest:
                 own.refuse(rest)
             code = arguments.run(arguments)
+        elif command is None and "--version" in words and {"-v", "--verbose"} & {*words}:
+            print(show_versions())
         elif command is None:
             parser.parse_args(words)
             parser.error(f"which command? There are {', '.join(COMMANDS)}")

@@ -48,11 +48,21 @@ def as_pose(T: Any, name: str = "T") -> Array:
     >>> as_pose([[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).shape
     (4, 4)
     """
-    T = as_core(getattr(T, "homogeneous", T), (4, 4), name)
+    try:
+        T = as_core(getattr(T, "homogeneous", T), (4, 4), name)
+    except ShapeError as error:
+        if np.shape(T) != (3,):
+            raise
+        mask = " and mask='position'" if name == "T" else ""  # not for a tool or a base
+        hint = f"For a position give se3.translation(x, y, z){mask}."
+        raise ShapeError(f"{error} {hint}") from None
     if T.size == 0:
         return T
-    if np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
-        raise NotARotationError(f"{name}: the last row of a pose must be 0 0 0 1.")
+    wanted = (0.0, 0.0, 0.0, 1.0)
+    if np.abs(T[..., 3, :] - wanted).max() > ROTATION_TOLERANCE:
+        column = np.abs(T[..., :, 3] - wanted).max() <= ROTATION_TOLERANCE
+        hint = " It looks transposed: its last column is 0 0 0 1." if column else ""
+        raise NotARotationError(f"{name}: the last row of a pose must be 0 0 0 1.{hint}")
     R = T[..., :3, :3]
     off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
     worst = float(off.max())

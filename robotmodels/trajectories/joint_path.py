@@ -174,7 +174,7 @@ def joint_path(
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     if q_start is not None and q_near is not None:
-        raise InvalidValueError("q_near: it takes the place of q_start; give one of them.")
+        raise InvalidValueError("q_near and q_start: give only one of the two.")
     start = None if q_start is None else as_exact(q_start, (model.n,), "q_start")
     near = start if q_near is None else as_exact(q_near, (model.n,), "q_near")
     motion = poses if isinstance(poses, PoseTrajectory) else None

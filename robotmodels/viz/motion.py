@@ -110,6 +110,8 @@ def timed_samples(
         )
     given: Any = value.q if timed else value
     q = as_vector(given[:, None] if timed and given.ndim == 1 == n else given, n, name)
+    if q.ndim == 3 and q.shape[1] == 1:  # one solution for each pose, as igm_numeric gives them
+        q = q[:, 0]
     if q.ndim != 2 or len(q) < 2:
         raise ShapeError(
             f"{name}: an animation needs at least two samples, shape (N, {n}), got {q.shape}; "

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .._arrays import Array
-from ..errors import FrameNotFoundError
+from ..errors import FrameNotFoundError, InvalidValueError
 from .camera import Camera
 from .motion import Motion
 from .page import page
@@ -120,10 +120,16 @@ class Scene:
 
         Raises
         ------
+        InvalidValueError
+            There is no such folder, or the path is a folder.
         OSError
             It cannot be written.
         """
         path = Path(path)
+        if path.is_dir():
+            raise InvalidValueError(f"path: {path} is a folder; give a file, such as arm.html.")
+        if not path.parent.is_dir():
+            raise InvalidValueError(f"path: there is no folder {path.parent}; make it first.")
         path.write_text(self.html(), encoding="utf-8")
         return path
 

@@ -87,7 +87,7 @@ _TURN, _STROKE = np.radians(25.0), 0.4
 
 def show(
     model: RobotModel | Sequence[RobotModel],
-    q: ArrayLike | Sequence[ArrayLike] | None = None,
+    q: ArrayLike | str | Sequence[ArrayLike | str] | None = None,
     *,
     frames: bool = False,
     names: bool = False,
@@ -111,9 +111,10 @@ def show(
     ----------
     model : RobotModel or sequence of RobotModel
         The robot, or R robots that stand where their bases are.
-    q : array_like, shape (n,) or (N, n), optional
+    q : array_like, shape (n,) or (N, n), or str, optional
         Joint variables in radians or metres; with N > 1 the postures are drawn together, each in
-        a colour of its own. For several robots a list with an entry for each. Default zero.
+        a colour of its own; or the name of one of ``model.configurations``. For several robots a
+        list with an entry for each, or one name. Default zero.
     frames, names, tool, meshes, opacity, box, grid, view, height, dark
         As at the head of `robotmodels.viz.show`.
     color : array_like, shape (3,) or (4,), optional
@@ -202,7 +203,7 @@ def animate(
     ----------
     model : RobotModel or sequence of RobotModel
         The robot, or R robots.
-    q : array_like, shape (N, n), or Trajectory, Samples, JointPath or ResolvedMotion
+    q : array_like, shape (N, n) or (N, 1, n), or Trajectory, Samples, JointPath or ResolvedMotion
         Joint variables in radians or metres, N >= 2, or a motion with its own times; for several
         robots a list of them. A trajectory is sampled at the frame rate.
     dt : float, optional
@@ -259,7 +260,7 @@ def animate(
 
 def jog(
     model: RobotModel,
-    q: ArrayLike | None = None,
+    q: ArrayLike | str | None = None,
     *,
     frames: bool = False,
     names: bool = False,
@@ -288,8 +289,9 @@ def jog(
     ----------
     model : RobotModel
         The robot.
-    q : array_like, shape (n,), optional
-        The first posture, and that of Reset: joint variables in radians or metres; default zero.
+    q : array_like, shape (n,), or str, optional
+        The first posture, and that of Reset: joint variables in radians or metres, or the name of
+        one of ``model.configurations``; default zero.
     frames, names, tool, meshes, color, opacity, box, grid, view, height, dark
         As at the head of `robotmodels.viz.show`.
 
@@ -306,7 +308,8 @@ def jog(
     <Scene 'robot': 12 shapes, 2 sliders>
     """
     check_model(model)
-    start = coupled_posture(model, None if q is None else as_exact(q, (model.n,), "q"))
+    given = _named(q, model)
+    start = coupled_posture(model, None if given is None else as_exact(given, (model.n,), "q"))
     rgba = None if color is None else _as_color(color)
     style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
     (label,) = _unique_names((model,))
@@ -328,6 +331,8 @@ def _scene(
     **options: Any,
 ) -> Scene:
     """Robots, extra nodes and what stands around them as a scene that they fill."""
+    if not isinstance(dark, (bool, np.bool_)):
+        raise InvalidValueError(f"dark: expected True or False, got {dark!r:.80}.")
     points: Array = np.concatenate([robot.points for robot in robots])
     nodes = [node for robot in robots for node in robot.nodes]
     nodes += extra
@@ -400,18 +405,32 @@ def _as_many(value: Any, model: object, count: int) -> tuple[Any, ...]:
     """An entry of q for each robot: the value itself for one model, its items for several."""
     if isinstance(model, RobotModel):
         return (value,)
-    if value is None:
-        return (None,) * count
+    if value is None or isinstance(value, str):
+        return (value,) * count
     if not hasattr(value, "__len__") or len(value) != count:
         raise ShapeError(f"q: expected a list with one entry for each of the {count} robots.")
     return tuple(value)
 
 
-def _as_postures(value: ArrayLike | None, model: RobotModel) -> Array:
+def _named(q: ArrayLike | str | None, model: RobotModel) -> ArrayLike | None:
+    """The configuration of this name; anything but a text as it is."""
+    if not isinstance(q, str):
+        return q
+    if q not in model.configurations:
+        names = ", ".join(map(repr, model.configurations))
+        raise InvalidValueError(
+            f"q: expected joint variables or the name of a configuration of {model.name} "
+            f"({names}), got {q!r:.80}."
+        )
+    return model.configurations[q]
+
+
+def _as_postures(value: ArrayLike | str | None, model: RobotModel) -> Array:
     """Joint variables as (N, n), N at least 1."""
-    if value is None:
+    given = _named(value, model)
+    if given is None:
         return model.configurations["zero"].reshape(1, model.n)
-    q = as_vector(value, model.n, "q")
+    q = as_vector(given, model.n, "q")
     if q.ndim > 2 or not q.shape[0]:
         raise ShapeError(
             f"q: expected one posture ({model.n},) or several (N, {model.n}), got {q.shape}."

@@ -123,11 +123,12 @@ def _pose_line(model: RobotModel, words: PlanText) -> Prose:
     right = whole and not np.allclose(form.after, np.eye(4), atol=1e-13)
     meanings = []
     if whole and left:
-        meanings.append(("Z", "the base and what the table has before the first motion"))
+        meanings.append(("Z", "the base and the constant transformation before the first joint"))
     elif left:
-        meanings.append(("Z", "the base" + " and the constant before joint 1" * moved))
+        table = " and the constant transformation before the first joint" * moved
+        meanings.append(("Z", f"the base{table}"))
     if right:
-        meanings.append(("E", "what it has after the last motion, and the tool"))
+        meanings.append(("E", "the constant transformation after the last joint, with the tool"))
     elif words.plan.arm.E is not None:
         meanings.append(("E", "the tool"))
     U0 = matrices("U0 = " + "Z^-1 " * left + "T" + " E^-1" * right)

@@ -41,12 +41,12 @@ class SingularityStatus(Outcome):
     Examples
     --------
     >>> SingularityStatus.SINGULAR.sentence
-    'Singular: the robot has lost freedoms.'
+    'Singular: the robot has lost degrees of freedom.'
     """
 
     REGULAR = 0, "Regular: no degree of freedom is lost."
     NEAR_SINGULAR = 1, "Near a singular configuration: one freedom is weak."
-    SINGULAR = 2, "Singular: the robot has lost freedoms."
+    SINGULAR = 2, "Singular: the robot has lost degrees of freedom."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -312,7 +312,7 @@ def classify_singularity(
     --------
     >>> from robotmodels.robots import load
     >>> print(classify_singularity(load("rx90"), [0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6]))
-    Singular: the robot has lost freedoms.
+    Singular: the robot has lost degrees of freedom.
     Rank 5 of 6, weakest singular value ... of the largest (length 0.9 m)
     elbow: the wrist centre is in the plane of axes 2 and 3: the arm is stretched or folded
     Cannot be produced, axes of R4, at the origin of R4:
