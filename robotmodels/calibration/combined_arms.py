@@ -131,7 +131,7 @@ def _table(
     names_a, names_b = [f"{a}_{x}" for x in first.names], [f"{b}_{x}" for x in second.names]
     taken = {*names_a, *names_b}
     standing = [_free(f"{b}_{name}", taken) for name in ("turn", "base")[-count:]]
-    columns = {
+    columns: dict[str, Any] = {
         word: np.concatenate(
             [getattr(first, word), [row[k] for row in stand], getattr(second, word)]
         )

@@ -186,7 +186,7 @@ def _data(name: str) -> dict[str, Any]:
 @cache
 def _parsed(name: str) -> dict[str, Any]:
     """The file of a robot, parsed once."""
-    return tomllib.loads((files(__package__) / "data" / f"{name}.toml").read_text("utf-8"))
+    return tomllib.loads((files(str(__package__)) / "data" / f"{name}.toml").read_text("utf-8"))
 
 
 def _pose(motions: Sequence[Sequence[Any]] | None) -> Array | None:
@@ -204,7 +204,7 @@ def _pose(motions: Sequence[Sequence[Any]] | None) -> Array | None:
 
 def _transmission(gears: ArrayLike, **friction: Any) -> Transmission:
     """Transmission from the matrix that gives motor angles from joint angles."""
-    return Transmission(np.linalg.inv(gears), **friction)
+    return Transmission(np.linalg.inv(np.asarray(gears, np.float64)), **friction)
 
 
 def _inertia(table: DHTable, rows: Rows, degrees: bool, data: dict[str, Any]) -> InertialParameters:
