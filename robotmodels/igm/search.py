@@ -110,10 +110,8 @@ def _damped_step(J: Array, e: Array, damping: Array) -> Array:
     # less than this is lost to rounding where A is singular
     least = LEAST_DAMPING * np.trace(A, axis1=1, axis2=2)
     A += np.maximum(damping, least)[:, None, None] * np.eye(min(r, k))
-    if r < k:
-        step = Jt @ np.linalg.solve(A, e[..., None])
-    else:
-        step = np.linalg.solve(A, Jt @ e[..., None])
+    e = e[..., None]
+    step = Jt @ np.linalg.solve(A, e) if r < k else np.linalg.solve(A, Jt @ e)
     return np.asarray(step[..., 0], np.float64)
 
 
