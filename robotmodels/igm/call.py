@@ -205,7 +205,7 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
         rows.status[missing & (rows.status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
         rows.status[missing & (rows.status == IGMStatus.OUTSIDE_LIMITS)] = IGMStatus.NOT_CONVERGED
         # others of a family, or those that were missed, may lie within the limits
-        thorough = found.valid.any(axis=1)
+        thorough = np.asarray(found.valid.any(axis=1))
     reasons = diagnose(
         model, task, thorough, poses, references, request.limits, request.tolerances, rows.status
     )
