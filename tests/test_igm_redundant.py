@@ -294,3 +294,83 @@ def test_a_rail_out_of_reach_of_its_reference_is_brought_as_near_as_it_gets():
     rail = found.q[0, 0]
     assert rm.igm(model, T, lock={0: rail - 1e-3}).count == 0
     assert rm.igm(model, T, lock={0: rail + 1e-3}).count > 0
+
+
+def test_a_posture_that_violates_the_relations_is_no_solution():
+    model, values = rm.load("iiwa14"), np.full(7, 0.4)
+    T, one = rm.dgm(model, values), np.eye(7)[3:4]
+    none = rm.igm(model, T, relations=(one, [2.0]))
+    assert none.count == 0
+    assert none.status == rm.IGMStatus.NOT_CONVERGED
+    assert none.reason() == rm.IGMStatus.NOT_CONVERGED.sentence
+    assert rm.igm(model, T, relations=(one, [0.4])).count > 0
+
+
+def test_arms_without_a_moving_joint():
+    model, values = rm.load("iiwa14"), np.full(7, 0.4)
+    T = rm.dgm(model, values)
+    found = rm.igm(model, T, lock=dict.fromkeys(range(7), 0.4))
+    assert found.count == 1
+    assert found.status == rm.IGMStatus.REACHED
+    assert rm.igm(model, T, lock=dict.fromkeys(range(7), 0.5)).count == 0
+    still = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 2, "d": 0.3}]))
+    assert rm.igm(still, rm.se3.translation(0.3, 0, 0)).count == 1
+    assert rm.igm(still, rm.se3.translation(5, 0, 0)).status == rm.IGMStatus.TOO_FAR
+
+
+def test_no_claim_about_limits_where_a_posture_lies_within():
+    model = rm.load("erd:panda")
+    q = np.random.default_rng(1).uniform(model.lower, model.upper, (200, model.n))
+    found = rm.igm(model, rm.dgm(model, q), limits=True)
+    assert not np.any(found.status == rm.IGMStatus.OUTSIDE_LIMITS)
+    assert np.all(found.count > 0)
+    np.testing.assert_array_equal(found.within_limits, found.valid)
+
+
+@pytest.mark.parametrize("values", [[0.1, 0.2, 1.3, 0.4, 0, 0.6], np.zeros(6)])
+@pytest.mark.filterwarnings("error")
+def test_limits_that_are_infinite(values):
+    model = rm.load("rx90")
+    assert rm.igm(model, rm.dgm(model, values), limits=True).count > 0
+
+
+@pytest.mark.parametrize("mask", [None, [1, 1, 1, 1, 1, 0]])
+@pytest.mark.parametrize("axes", ["world", "tool"])
+def test_unreachable_poses_of_an_arm_with_parallel_slides(mask, axes):
+    rows = [{"sigma": 1}, {"sigma": 0}, {"sigma": 0, "d": 0.05}, {"sigma": 1, "d": 0.05}]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        T = rm.se3.from_rpy(rng.uniform(-2, 2, 3))
+        T[:3, 3] = rng.uniform(-1, 1, 3)
+        assert rm.igm(model, T, mask=mask, mask_axes=axes).count == 0
+
+
+def test_a_free_coordinate_may_have_any_value():
+    model = rm.load("rx90")
+    T = np.tile(rm.dgm(model, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]), (2, 1, 1))
+    T[1, 2, 3] += 100.0
+    found = rm.igm(model, T, mask=[0, 1, 0, 1, 1, 1])
+    assert found.count[0] == found.count[1] > 0
+    assert found.status[0] == found.status[1]
+
+
+def test_solutions_by_search_are_incomplete_behind_a_mask():
+    rows = [
+        {"sigma": 1},
+        {"alpha": 0.5, "d": 0.3, "r": 0.1},
+        {"sigma": 1, "alpha": 1.1, "d": 0.2, "theta": 0.3},
+        {"alpha": 0.9, "d": 0.25, "r": 0.2},
+    ]
+    model = rm.RobotModel.from_table(
+        rm.DHTable.from_rows(rows), tool=rm.se3.translation(0.1, 0, 0.2)
+    )
+    found = rm.igm(model, rm.dgm(model, [0.2, 0.5, 0.3, 0.7]), mask=[1, 0, 1, 1, 1, 1])
+    assert "Newton" in found.method
+    assert found.status == rm.IGMStatus.INCOMPLETE
+
+
+def test_a_bool_is_no_value_of_a_locked_joint():
+    model = rm.load("iiwa14")
+    with pytest.raises(InvalidValueError, match="finite number for joint 1, got True"):
+        rm.igm(model, np.eye(4), lock={1: True})

@@ -117,8 +117,8 @@ def arranged(
     q = np.repeat(goal, found.q.shape[1], axis=1)
     q[..., columns] = found.q
     if limits:
-        middle = 0.5 * (lower + upper)
-        middle = np.where(np.abs(middle) < _UNLIMITED, middle, 0.0)
+        both = (lower > -_UNLIMITED) & (upper < _UNLIMITED)
+        middle = 0.5 * (np.where(both, lower, 0.0) + np.where(both, upper, 0.0))
         turned = turned_inside(q, lower, upper, goal if given else middle)
         q = np.where(revolute, turned, q)
     inside = found.valid & np.all((lower - AT_LIMIT <= q) & (q <= upper + AT_LIMIT), axis=-1)

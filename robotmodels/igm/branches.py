@@ -149,7 +149,8 @@ def ranked(code: Codes, labels: tuple[str, ...], found: Found) -> tuple[Codes, t
     """
     N, S = code.shape
     rank = np.zeros(N * S, np.int64)
-    for start in range(0, N, _POSES_AT_A_TIME):
+    # without joints there is one posture at most
+    for start in range(0, N if found.q.shape[2] else 0, _POSES_AT_A_TIME):
         rows = slice(start, start + _POSES_AT_A_TIME)
         there, q = found.valid[rows], found.q[rows]
         same = there[:, :, None] & there[:, None] & (code[rows, :, None] == code[rows, None])

@@ -200,13 +200,16 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
     columns = arm.columns[~np.isin(arm.columns, locked)]
     found = _solved_chain(request, U, psi, np.ascontiguousarray(references[:, columns]))
     rows = _laid_out(request, found, references, columns)
+    thorough = np.full(len(U), request.solver is None)
     if request.solver is not None:
         missing = may_miss_solutions(request.solver, U, found, references[:, columns])
         rows.status[missing & (rows.status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
+        rows.status[missing & (rows.status == IGMStatus.OUTSIDE_LIMITS)] = IGMStatus.NOT_CONVERGED
+        # others of a family, or those that were missed, may lie within the limits
+        thorough = np.asarray(found.valid.any(axis=1))
     reasons = diagnose(
-        model, task, request.solver is None, poses, references, request.limits,
-        request.tolerances, rows.status,
-    )  # fmt: skip
+        model, task, thorough, poses, references, request.limits, request.tolerances, rows.status
+    )
     if reasons is None:
         return rows
     whole = request.solver is not None and task == Task(locks=task.locks)
@@ -219,6 +222,11 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
         )
         rows = _laid_out(request, found.put(at, part), references, columns)
     lost = ~rows.valid[reasons.rows].any(axis=1)
+    if request.solver is not None:
+        # the solver has none of a pose that is reached: it misses solutions
+        unproven = reasons.met & ~found.valid[reasons.rows].any(axis=1)
+        unproven &= reasons.status == IGMStatus.REACHED
+        reasons.status[unproven] = IGMStatus.INCOMPLETE
     rows.status[reasons.rows[lost]] = reasons.status[lost]
     # a solution that the search came upon all the same
     chosen = reasons.met & lost

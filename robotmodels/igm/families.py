@@ -82,16 +82,10 @@ def may_miss_solutions(
     solver: Solver, U: Array, found: Postures, references: Array
 ) -> NDArray[np.bool_]:
     """Poses at which a method has no proof that its solutions are all, (N,)."""
-    if isinstance(solver, (ManyStarts, Related)):
-        return np.ones(len(U), np.bool_)
     if isinstance(solver, OneAxis):
-        return ~is_aligned(solver, U)
-    if isinstance(solver, Masked):
-        return np.full(len(U), isinstance(solver.inner, ManyStarts))
-    if isinstance(solver, FewerJoints):
-        return np.full(len(U), isinstance(solver.ways[0].solver, ManyStarts))
+        return ~is_aligned(solver, U) | _searches(solver.inner)
     if not isinstance(solver, Redundant):
-        return np.zeros(len(U), np.bool_)
+        return np.full(len(U), _searches(solver))
     joint, others = solver.joint, np.delete(np.arange(solver.chain.k), solver.joint)
     rest = Postures(
         found.q[..., others], found.valid, found.residual, found.double,
@@ -101,3 +95,12 @@ def may_miss_solutions(
     # a search found the nearest value of the joint
     d = difference(solver.chain.sigma, found.q, references[:, None])[..., joint]
     return out | np.any(found.free[..., joint] & (np.abs(d) > 1e-9), axis=1)
+
+
+def _searches(solver: Solver) -> bool:
+    """Whether solutions come from a search, in any of the chains that are solved on the way."""
+    if isinstance(solver, Masked):
+        return _searches(solver.inner)
+    if isinstance(solver, FewerJoints):
+        return any(_searches(way.solver) for way in solver.ways)
+    return isinstance(solver, (ManyStarts, Related, OneAxis, Redundant))

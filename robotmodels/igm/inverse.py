@@ -69,8 +69,8 @@ def igm(
         Radians, on the rotation that is missing.
     relations : (array_like (m, n), array_like (m,)), optional
         Added relations ``A q = b`` between the joints of a redundant arm, as many as it has
-        joints more than six (the book's second strategy; locking is the first). Not together with
-        ``lock``, ``mask`` or ``arm_angle``.
+        joints more than six (the book's second strategy; locking is the first). They hold modulo
+        whole turns of revolute joints. Not together with ``lock``, ``mask`` or ``arm_angle``.
 
     Returns
     -------

@@ -125,7 +125,7 @@ def _solutions(
     found = at_values(solver, references[:, solver.joint], U, references, tolerances, searched)
     parts = [(np.arange(len(U)), found)]
     if searched:
-        empty = np.flatnonzero(~found.valid.any(axis=1) & ~_too_far(solver.chain, U))
+        empty = np.flatnonzero(~found.valid.any(axis=1) & ~_too_far(solver, U))
         for start in range(0, empty.size, CHUNK):
             rows = empty[start : start + CHUNK]
             parts.append((rows, _nearest(solver, U[rows], references[rows], tolerances)))
@@ -142,9 +142,10 @@ def free_joints(solver: Redundant) -> list[int]:
     return [solver.joint, *(j + (j >= solver.joint) for j in free_joints(solver.inner))]
 
 
-def _too_far(chain: JointChain, U: Array) -> np.ndarray:
+def _too_far(solver: Redundant, U: Array) -> np.ndarray:
     """Whether positions are farther away than the arm is long."""
-    if chain.sigma.any():
+    chain = solver.chain
+    if chain.sigma.any() or not all(solver.components.asked[:3]):
         return np.zeros(len(U), np.bool_)
     reach = np.linalg.norm(chain.D[1:, :3, 3], axis=1).sum()
     return np.linalg.norm(U[:, :3, 3] - chain.D[0, :3, 3], axis=1) > 1.001 * reach

@@ -91,7 +91,8 @@ def locks_of(
                 )
         if column in columns:
             raise InvalidValueError(f"lock: joint {joint!r} is given twice.")
-        if not isinstance(value, (Real, np.number)) or not isfinite(value):
+        number = isinstance(value, (Real, np.number)) and not isinstance(value, bool)
+        if not number or not isfinite(value):
             raise InvalidValueError(
                 f"lock: expected one finite number for joint {joint!r}, got {value!r}."
             )

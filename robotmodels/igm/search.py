@@ -27,6 +27,7 @@ STEPS = 50
 SLIDES = 60
 """Steps along a self-motion to the nearest value of a joint."""
 ROWS = 4096  # configurations worked on at a time
+LEAST_DAMPING = 1e-14  # damping beside the sum of the squared singular values
 EXACT = 1e-15  # error at which nothing is left to improve
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
 CLOSE = 0.05  # the same below which a second root may be close
@@ -105,10 +106,12 @@ def refined(wanted: Constraints, U: Array, q: Array, held: Sequence[int] = ()) -
 def _damped_step(J: Array, e: Array, damping: Array) -> Array:
     """Damped steps of least length, (B, k)."""
     Jt, (_, r, k) = np.swapaxes(J, 1, 2), J.shape
-    if r < k:
-        step = Jt @ np.linalg.solve(J @ Jt + damping[:, None, None] * np.eye(r), e[..., None])
-    else:
-        step = np.linalg.solve(Jt @ J + damping[:, None, None] * np.eye(k), Jt @ e[..., None])
+    A = J @ Jt if r < k else Jt @ J
+    # less than this is lost to rounding where A is singular
+    least = LEAST_DAMPING * np.trace(A, axis1=1, axis2=2)
+    A += np.maximum(damping, least)[:, None, None] * np.eye(min(r, k))
+    e = e[..., None]
+    step = Jt @ np.linalg.solve(A, e) if r < k else np.linalg.solve(A, Jt @ e)
     return np.asarray(step[..., 0], np.float64)
 
 

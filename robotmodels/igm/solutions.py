@@ -195,6 +195,8 @@ class IGMSolutions(_Later):
         if lacking is None or status in _WITH_SOLUTIONS:
             return status.sentence
         missing = np.where(self.mask, lacking[at], 0.0)
+        if np.isnan(missing).any():
+            return status.sentence
         metres = f"{hypot(*missing[:3]):.4g} m"
         angle = f"{degrees(hypot(*missing[3:])):.4g} deg"
         if status in (IGMStatus.TOO_FAR, IGMStatus.TOO_NEAR):

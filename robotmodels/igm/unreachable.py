@@ -41,7 +41,7 @@ class Diagnosis:
 def diagnose(
     model: RobotModel,
     task: Task,
-    no_solver: bool,
+    thorough: NDArray[np.bool_],
     poses: Array,
     references: Array,
     limits: bool,
@@ -50,7 +50,8 @@ def diagnose(
 ) -> Diagnosis | None:
     """Status of poses without IK solution, the closest configuration and its error.
 
-    Shapes: poses (N, 4, 4) in world axes, references (N, n), status (N,).
+    Shapes: thorough (N,); poses (N, 4, 4) in world axes, references (N, n), status (N,). A search
+    that met a pose outside the limits, or without the relations or the arm angle, proves nothing.
     """
     rows = np.flatnonzero(status == IGMStatus.NOT_CONVERGED)
     if rows.size == 0:
@@ -61,10 +62,7 @@ def diagnose(
     if places:
         chain = locked_chain(chain, places)
     columns, n = chain.columns, model.n
-    restarts, steps = (ALL_STARTS, ALL_STEPS) if no_solver else (STARTS, STEPS)
     lower, upper = model.lower[columns], model.upper[columns]
-    space = search_space(chain, lower, upper, limits, restarts, SEED)
-    search = SearchTask(np.array(task.mask), task.in_tool_axes, tolerances, restarts, steps)
     closest, missing = np.full((len(poses), n), np.nan), np.full((len(poses), 6), np.nan)
     closest[rows] = references[rows]
     if limits:
@@ -72,8 +70,24 @@ def diagnose(
     for column, value in locks.items():
         closest[rows, column] = value
     U = se3.inverse(model.base) @ poses[rows]
-    found = pose_search(space, search, U, closest[np.ix_(rows, columns)], True)
-    closest[np.ix_(rows, columns)], missing[rows] = found.q, found.error
-    family = np.zeros((rows.size, n), np.bool_)
-    family[:, columns] = found.family
-    return Diagnosis(rows, found.status, found.valid, found.residual, closest, missing, family)
+    reason, met = np.zeros(rows.size, np.int8), np.zeros(rows.size, np.bool_)
+    residual, family = np.zeros(rows.size), np.zeros((rows.size, n), np.bool_)
+    for chosen, effort in (
+        (~thorough[rows], (STARTS, STEPS)),
+        (thorough[rows], (ALL_STARTS, ALL_STEPS)),
+    ):
+        if not chosen.any():
+            continue
+        at = np.ix_(rows[chosen], columns)
+        space = search_space(chain, lower, upper, limits, effort[0], SEED)
+        search = SearchTask(np.array(task.mask), task.in_tool_axes, tolerances, *effort)
+        found = pose_search(space, search, U[chosen], closest[at], True)
+        closest[at], missing[rows[chosen]] = found.q, found.error
+        reason[chosen], met[chosen], residual[chosen] = found.status, found.valid, found.residual
+        family[np.ix_(chosen, columns)] = found.family
+    no_reason = reason == IGMStatus.OUTSIDE_LIMITS
+    if task.relations or task.by_arm_angle:
+        no_reason |= met
+    reason[no_reason], met[no_reason] = IGMStatus.NOT_CONVERGED, False
+    closest[rows[no_reason]], missing[rows[no_reason]] = np.nan, np.nan
+    return Diagnosis(rows, reason, met, residual, closest, missing, family)
