@@ -116,7 +116,7 @@ def combine_arms(
     )
 
 
-def _joined(one: Any, other: Any, words: Any) -> dict[str, Array]:
+def _joined(one: Any, other: Any, words: Any) -> dict[str, Any]:
     """Attributes of two objects, one behind the other."""
     return {word: np.concatenate([getattr(one, word), getattr(other, word)]) for word in words}
 

@@ -174,7 +174,7 @@ _NOTHING = {"q": np.nan, "residual": np.nan, "code": -1}
 
 
 def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
-    """Rows with those of some poses replaced; labels of both."""
+    """Rows with those of some poses replaced, in place where they fit; labels of both."""
     labels, shorter = sorted((rows.labels, part.labels), key=len, reverse=True)
     if labels[: len(shorter)] != shorter:
         # the two solvers use different branch labels
@@ -184,8 +184,10 @@ def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
     wide: dict[str, Any] = {"labels": labels}
     for name in ("q", "valid", "residual", "inside", "code", "double", "free", "family"):
         old, new = getattr(rows, name), getattr(part, name)
-        values = np.full((N, most, *old.shape[2:]), _NOTHING.get(name, 0), old.dtype)
-        values[:, : old.shape[1]] = old
+        values = old
+        if most > old.shape[1] or not old.flags.writeable:
+            values = np.full((N, most, *old.shape[2:]), _NOTHING.get(name, 0), old.dtype)
+            values[:, : old.shape[1]] = old
         values[at] = _NOTHING.get(name, 0)
         values[at, : new.shape[1]] = new
         wide[name] = values

@@ -99,7 +99,12 @@ def solved(
             "relations: not together with mask, lock or arm_angle; a locked joint is a "
             "relation too, with a single 1 in its row."
         )
-    batch, poses, references = _checked(model, T, q_ref, bool(limits))
+    if quick is None or quick.most == IMPROPER:
+        batch, poses, references = _checked(model, T, q_ref, bool(limits))
+    else:  # the kernel has found them proper
+        batch, poses = quick.batch, np.asarray(T).reshape(-1, 4, 4)
+        references = np.zeros((len(poses), model.n))
+        references[:] = 0.0 if q_ref is None else q_ref
     arm = known_arm(model, task == Task())
     solver = solver_for(model, arm, task)
     request = Request(model, arm, task, solver, q_ref is not None, bool(limits), tolerances)
