@@ -94,18 +94,19 @@ def short(results: Path = RESULTS) -> str:
         )
     poses, singular, arms, lost = missed(results)
     lines.append(
-        f"\nOf the configurations of {poses} poses of {arms} arms ({singular} of the poses "
-        f"singular or nearly so), the inverse model misses {lost}."
+        f"\nInverse model, {poses} poses of {arms} arms, {singular} of them singular or nearly so: "
+        f"{lost[0]} configurations missed at regular poses, {lost[1]} at singular ones."
     )
     return "\n".join(lines)
 
 
-def missed(results: Path) -> tuple[int, int, int, int]:
-    """Poses, singular ones among them, arms, and configurations that our inverse model misses."""
+def missed(results: Path) -> tuple[int, int, int, tuple[int, int]]:
+    """Poses, singular ones of them, arms, configurations missed at regular and singular poses."""
     rows = json.loads((results / "accuracy_igm.json").read_text(encoding="utf-8"))["rows"]
     ours = [r for r in rows if r["solver"] == OURS]
-    poses, singular, lost = (sum(r[k] for r in ours) for k in ("poses", "singular", "lost"))
-    return poses, singular, len(ours), lost
+    words = "poses", "singular", "lost", "lost_singular"
+    poses, singular, lost, at_singular = (sum(r[k] for r in ours) for k in words)
+    return poses, singular, len(ours), (lost, at_singular)
 
 
 def left_out(peers: dict[str, Any]) -> str:
@@ -133,7 +134,8 @@ def accuracy(results: Path) -> list[str]:
         own = [r for r in igm if r["solver"] == solver]
         count, left = (sum(r[k] for r in own) for k in ("poses", "lost"))
         theirs.append(f"{solver} {left} of {count} ({len(own)} arms)")
-    lines.append(f"| {title} | {lost} | {'; '.join(theirs)} |")
+    ours = f"{lost[0]} at regular poses, {lost[1]} at singular ones"
+    lines.append(f"| {title} | {ours} | {'; '.join(theirs)} |")
     best = {}
     for r in camera:
         tool = r["name"].partition(":")[0]
