@@ -74,7 +74,8 @@ def add_command(commands: Any) -> None:
         help="a joint, by name or number from 1, that keeps a value; may be repeated",
     )  # fmt: skip
     asked.add_argument("--arm-angle", metavar="ANGLE",
-                       help="of seven-joint arms with an elbow that swings")  # fmt: skip
+                       help="seven-joint arms: angle of the elbow about the line from shoulder "
+                       "to wrist")  # fmt: skip
     asked.add_argument(
         "--tolerance", metavar="NUMBERS",
         help="how much may be missing: metres and radians, or one number for both (default 1e-9); "

@@ -7,12 +7,13 @@ their axes and the height along them) gives joints 0 and 4, then 5; a planar tri
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 from numba import types
 
 from ..kernels._compile import INT, MATRIX, OUT3, STACK, Floats, Ints, compiled
+from .kernels.chain import wrapped
 from .kernels.equations import ANY, DOUBLE, NONE, type_2
 from .kernels.pieper import advance, roots_of_linear, turning_pair
 
@@ -43,13 +44,6 @@ def close_loop(left: Floats, pose: Floats, inverted: int, right: Floats, out: Fl
                 for k in range(4):
                     total += left[i, m] * middle[m, k] * right[k, j]
             out[i, j] = total
-
-
-@compiled()
-def wrapped(angle: float) -> float:
-    """The same angle in (-pi, pi]."""
-    turned = angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
-    return pi if turned <= -pi else turned
 
 
 @compiled()

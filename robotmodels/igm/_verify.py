@@ -1,15 +1,13 @@
-"""Candidates of a closed form checked on the chain itself, improved, wrapped and merged."""
+"""Candidates of a closed form: checked on the chain itself, refined, wrapped and merged."""
 
 from __future__ import annotations
-
-from math import cos, sin
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, OUT3, STACK, Floats, Ints, compiled
-from ._parallel import wrapped
+from .kernels.chain import forward, jacobian, wrapped
 
 EXACT = 5e-13  # error above which a candidate is improved [m, rad]
 STEPS = 3
@@ -25,21 +23,7 @@ _JOINT_FLAGS = types.Array(types.boolean, 3, "C")
 @compiled()
 def chain_error(U: Floats, sigma: Ints, D: Floats, q: Floats, P: Floats, axes: Floats) -> float:
     """Largest element of ``U - P`` with ``P = D_0 M_1 D_1 ... D_6``; z and origin of each axis."""
-    T = np.zeros((3, 4))
-    for i in range(3):
-        for j in range(4):
-            P[i, j] = D[0, i, j]
-    for k in range(6):
-        for i in range(3):
-            axes[k, i], axes[k, 3 + i] = P[i, 2], P[i, 3]
-        c, s = (cos(q[k]), sin(q[k])) if sigma[k] == 0 else (1.0, 0.0)
-        r = 0.0 if sigma[k] == 0 else q[k]
-        for i in range(3):
-            a, b, d = c * P[i, 0] + s * P[i, 1], c * P[i, 1] - s * P[i, 0], P[i, 2]
-            for j in range(4):
-                T[i, j] = a * D[k + 1, 0, j] + b * D[k + 1, 1, j] + d * D[k + 1, 2, j]
-            T[i, 3] += r * d + P[i, 3]
-        P[:] = T
+    forward(sigma, D, q, P, axes)
     worst = 0.0
     for i in range(3):
         for j in range(4):
@@ -51,15 +35,7 @@ def chain_error(U: Floats, sigma: Ints, D: Floats, q: Floats, P: Floats, axes: F
 def newton_step(U: Floats, sigma: Ints, P: Floats, axes: Floats) -> Floats:
     """Shortest step in the joints that closes the error to first order."""
     J, e = np.zeros((6, 6)), np.zeros(6)
-    for k in range(6):
-        z, o = axes[k, :3], axes[k, 3:]
-        if sigma[k] == 0:
-            x, y, h = P[0, 3] - o[0], P[1, 3] - o[1], P[2, 3] - o[2]
-            J[0, k], J[1, k] = z[1] * h - z[2] * y, z[2] * x - z[0] * h
-            J[2, k] = z[0] * y - z[1] * x
-            J[3:, k] = z
-        else:
-            J[:3, k] = z
+    jacobian(sigma, P, axes, J)
     for i in range(3):
         e[i] = U[i, 3] - P[i, 3]
     for j in range(3):

@@ -23,7 +23,8 @@ from .. import se3
 from .._arrays import Array, read_only
 from .check import checked
 from .loop import JointChain
-from .solver import Found, Tolerances, nothing_found, postures
+from .postures import Postures, no_postures
+from .solver import Tolerances, postures
 
 MOST = 8
 """Postures at one arm angle."""
@@ -93,11 +94,11 @@ def arm_angle_of(solver: ArmAngle, q: ArrayLike) -> Array:
 
 def arm_angle_postures(
     solver: ArmAngle, U: Array, psi: Array, references: Array, tolerances: Tolerances
-) -> Found:
+) -> Postures:
     """All solutions at one arm angle per pose. Shapes: U (N, 4, 4), psi (N,), references (N, 7)."""
     from .kernels.arm_angle import STRAIGHT, arm_angle_candidates
 
-    candidates = nothing_found(len(U), MOST, 7)
+    candidates = no_postures(len(U), MOST, 7)
     arm_angle_candidates(
         np.ascontiguousarray(U),
         np.ascontiguousarray(psi),
@@ -125,7 +126,7 @@ def arm_angle_postures(
 
 
 @postures.register
-def _(solver: ArmAngle, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: ArmAngle, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     psi = arm_angle_of(solver, references)
     return arm_angle_postures(solver, U, psi, references, tolerances)
 

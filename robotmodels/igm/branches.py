@@ -13,8 +13,9 @@ from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
 from .loop import JointChain
 from .motion import axes_of
+from .postures import Postures
 from .reduced import FewerJoints
-from .solver import Found, Solver
+from .solver import Solver
 from .structure import Family
 
 Codes = NDArray[np.int16]
@@ -31,13 +32,13 @@ _POSES_AT_A_TIME = 1024
 
 
 @singledispatch
-def branches(solver: Solver, found: Found) -> tuple[Codes, tuple[str, ...]]:
+def branches(solver: Solver, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     """Number the solutions of each pose and name the numbers. Shapes: -> code (N, S)."""
     return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
 
 
 @branches.register
-def _(solver: ClosedForm, found: Found) -> tuple[Codes, tuple[str, ...]]:
+def _(solver: ClosedForm, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     plan = solver.plan
     parallel = plan.family is Family.PARALLEL
     signs = sides(solver.chain, [int(j) for j in plan.order], parallel, found.q[found.valid])
@@ -45,7 +46,7 @@ def _(solver: ClosedForm, found: Found) -> tuple[Codes, tuple[str, ...]]:
 
 
 @branches.register
-def _(solver: FewerJoints, found: Found) -> tuple[Codes, tuple[str, ...]]:
+def _(solver: FewerJoints, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     way = solver.ways[0]
     if not isinstance(way.solver, ClosedForm):
         return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
@@ -56,7 +57,7 @@ def _(solver: FewerJoints, found: Found) -> tuple[Codes, tuple[str, ...]]:
 
 
 @branches.register
-def _(solver: ArmAngle, found: Found) -> tuple[Codes, tuple[str, ...]]:
+def _(solver: ArmAngle, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     signs = arm_angle_sides(solver.chain, found.q[found.valid])
     return ranked(_numbered(found, signs), SIDES, found)
 
@@ -134,7 +135,7 @@ def _nearest_point(z: Array, p: Array, other_z: Array, other_p: Array) -> Array:
     return p + along[:, None] * z
 
 
-def _numbered(found: Found, products: tuple[Array, ...]) -> Codes:
+def _numbered(found: Postures, products: tuple[Array, ...]) -> Codes:
     """Number of the label in `SIDES`: 4 for shoulder-, 2 for elbow-, 1 for wrist-."""
     code = np.full(found.valid.shape, -1, np.int16)
     shoulder, elbow, wrist = (product < 0.0 for product in products)
@@ -142,7 +143,7 @@ def _numbered(found: Found, products: tuple[Array, ...]) -> Codes:
     return code
 
 
-def ranked(code: Codes, labels: tuple[str, ...], found: Found) -> tuple[Codes, tuple[str, ...]]:
+def ranked(code: Codes, labels: tuple[str, ...], found: Postures) -> tuple[Codes, tuple[str, ...]]:
     """Unique branch codes: solutions of one code are ranked by their joints within each pose.
 
     Shapes: code (N, S).

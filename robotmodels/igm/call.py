@@ -22,18 +22,18 @@ from .known import KnownArm, known_arm, solver_for
 from .loop import JointChain
 from .motion import lever
 from .nominal import NominalArm
-from .paul.layout import GIVEN, IMPROPER, WITHIN_LIMITS
-from .postures import Postures
+from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
+from .postures import Postures, no_postures
 from .redundant import Redundant
 from .request import FARTHEST, WHOLE_POSE, Task, above_zero, locks_of, poses_of, relations_of
 from .singular import complete
 from .solutions import IGMSolutions, later, of_fields
-from .solver import Found, Solver, Tolerances, nothing_found, postures
+from .solver import Solver, Tolerances, postures
 from .status import IGMStatus
 from .unreachable import Diagnosis, diagnose
 
-NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
-"""Method of a result where there is none but the search."""
+NO_SOLVER = "numeric search for one posture: no family of closed forms serves this arm"
+"""Method of a result where only the search serves the arm."""
 
 _FLOAT = np.dtype(np.float64)
 
@@ -99,7 +99,7 @@ def solved(
             "relations: not together with mask, lock or arm_angle; a locked joint is a "
             "relation too, with a single 1 in its row."
         )
-    if quick is None or quick.most == IMPROPER:
+    if quick is None or quick.most == NEEDS_CHECK:
         batch, poses, references = _checked(model, T, q_ref, bool(limits))
     else:  # the kernel has found them proper
         batch, poses = quick.batch, np.asarray(T).reshape(-1, 4, 4)
@@ -112,20 +112,20 @@ def solved(
     if arm.plan is solver is not None and tolerances == Tolerances():
         rows = _by_plan(request, poses, references, quick)
     elif arm_angle is None:
-        rows = _by_family(request, poses, references)
+        rows = _by_solver(request, poses, references)
     else:
         # every pose once for every angle, the angles behind
         angles = as_core(arm_angle, (), "arm_angle")
         psi = np.tile(angles.ravel(), poses.shape[0])
         poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
         batch = (*batch, *angles.shape)
-        rows = _by_family(request, poses, references, psi)
-    method = NO_FAMILY if solver is None else solver.method
+        rows = _by_solver(request, poses, references, psi)
+    method = NO_SOLVER if solver is None else solver.method
     return of_fields(result_fields(batch, rows, method, periodic, task.mask))
 
 
 def _unchecked(model: RobotModel, T: Array, q_ref: ArrayLike | None) -> PlanRows | None:
-    """Run the plan of the arm on arrays that are proper as they stand; None for others."""
+    """Run the plan of the arm on arrays that need no conversion; None for others."""
     arm = known_arm(model)
     if arm.kernel is None or T.dtype is not _FLOAT or not T.flags.c_contiguous:
         return None
@@ -175,22 +175,22 @@ def _checked(
 
 
 def _by_plan(request: Request, poses: Array, references: Array, quick: PlanRows | None) -> Rows:
-    """Solutions by Paul's plan; poses that it is not sure of by the arm's other method."""
-    if quick is None or quick.most == IMPROPER:
+    """Solutions by Paul's plan; poses where it is unreliable by the arm's other method."""
+    if quick is None or quick.most == NEEDS_CHECK:
         mode = GIVEN * request.given | WITHIN_LIMITS * request.limits
         quick = _plan_rows(request.arm, (), poses, references, mode)
     if quick.most >= 0:
         return quick.rows()
-    if quick.most == IMPROPER:
-        return _by_family(request, poses, references)
+    if quick.most == NEEDS_CHECK:
+        return _by_solver(request, poses, references)
     doubtful = np.flatnonzero(quick.marks[:, 1] == IGMStatus.NOT_CONVERGED)
-    part = _by_family(request, poses[doubtful], references[doubtful])
+    part = _by_solver(request, poses[doubtful], references[doubtful])
     if doubtful.size == len(poses):
         return part
     return put(quick._replace(most=-1 - quick.most).rows(), doubtful, part)
 
 
-def _by_family(request: Request, poses: Array, references: Array, psi: Array | None = None) -> Rows:
+def _by_solver(request: Request, poses: Array, references: Array, psi: Array | None = None) -> Rows:
     """Solutions by the arm's solver; a numeric search gives the reason where there is none.
 
     Shapes: poses (N, 4, 4), references (N, n), psi (N,).
@@ -220,20 +220,20 @@ def _by_family(request: Request, poses: Array, references: Array, psi: Array | N
     whole = request.solver is not None and task == Task(locks=task.locks)
     members = reasons.met & reasons.family.any(axis=1)
     if whole and psi is None and not request.limits and members.any():
-        # the search came upon members of families: they are completed like others
+        # members of self-motions that the search found are completed like others
         at = reasons.rows[members]
-        part = _settled_members(
+        part = _completed_members(
             request, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
         )
         rows = _laid_out(request, found.put(at, part), references, columns)
     lost = ~rows.valid[reasons.rows].any(axis=1)
     if request.solver is not None:
-        # the solver has none of a pose that is reached: it misses solutions
+        # the solver found no solution of a pose that is reached: it misses solutions
         unproven = reasons.met & ~found.valid[reasons.rows].any(axis=1)
         unproven &= reasons.status == IGMStatus.REACHED
         reasons.status[unproven] = IGMStatus.INCOMPLETE
     rows.status[reasons.rows[lost]] = reasons.status[lost]
-    # a solution that the search came upon all the same
+    # poses that only the search solved
     chosen = reasons.met & lost
     if chosen.any():
         rows = put(rows, reasons.rows[chosen], _alone(rows, reasons, chosen, model))
@@ -268,7 +268,7 @@ def _laid_out(
     return arranged(found, code, labels, columns, references, request.given, joints, limits)
 
 
-def _settled_members(request: Request, U: Array, q: Array, references: Array) -> Postures:
+def _completed_members(request: Request, U: Array, q: Array, references: Array) -> Postures:
     """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
     assert request.solver is not None
     chain, there = request.solver.chain, np.ones((len(U), 1), np.bool_)
@@ -281,12 +281,12 @@ def _solved_chain(request: Request, U: Array, psi: Array | None, references: Arr
     """Postures of a chain; poses far along rails at its base are solved beside the origin."""
     task, solver = request.task, request.solver
     if solver is None or task.relations or not all(task.mask[:3]):
-        return _settled(request, U, psi, references)
+        return _completed(request, U, psi, references)
     chain = solver.chain
     moved, poses = far_along_rails(chain, U)
     if not moved.any():
-        return _settled(request, U, psi, references)
-    found = _settled(request, poses, psi, references - moved)
+        return _completed(request, U, psi, references)
+    found = _completed(request, poses, psi, references - moved)
     n, s = np.nonzero(found.valid)
     wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
     q, residual, valid = found.q + moved[:, None], found.residual.copy(), found.valid.copy()
@@ -294,11 +294,11 @@ def _solved_chain(request: Request, U: Array, psi: Array | None, references: Arr
     return replace(found, q=q, residual=residual, valid=valid)
 
 
-def _settled(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
+def _completed(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
     """Postures of a chain, self-motions brought to the reference, double roots marked."""
     solver, tolerances = request.solver, request.tolerances
     if solver is None:
-        found = nothing_found(len(U), 1, references.shape[1])
+        found = no_postures(len(U), 1, references.shape[1])
     elif psi is not None:
         if not isinstance(solver, ArmAngle):
             if request.task.locks or request.task.mask != WHOLE_POSE:
@@ -331,7 +331,7 @@ def _settled(request: Request, U: Array, psi: Array | None, references: Array) -
     return replace(found, moving=moving)
 
 
-def moving_joints(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
+def moving_joints(chain: JointChain, task: Task, U: Array, found: Postures) -> NDArray[np.bool_]:
     """Joints that move along the self-motions of redundant arms and masked tasks (N, S, k)."""
     moving = np.zeros(found.q.shape, np.bool_)
     n, s = np.nonzero(found.family & found.valid)

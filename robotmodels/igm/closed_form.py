@@ -15,7 +15,8 @@ from .. import se3
 from .._arrays import Array
 from .check import checked
 from .loop import JointChain
-from .solver import Found, Tolerances, postures
+from .postures import Postures
+from .solver import Tolerances, postures
 from .structure import Family, LoopPlan, plan_loop
 
 __all__ = ["MOST", "ClosedForm", "closed_form_postures", "plan_loop"]
@@ -46,7 +47,7 @@ def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
 
 
 @postures.register
-def _(solver: ClosedForm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: ClosedForm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     slack = max(SLACK, tolerances.position / solver.plan.size, tolerances.orientation)
     accepted = max(ACCEPTED, *tolerances)
     q, valid, free = closed_form_postures(

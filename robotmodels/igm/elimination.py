@@ -26,8 +26,9 @@ from .check import checked
 from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
+from .postures import Postures
 from .singular import singular_postures
-from .solver import Found, Tolerances, postures
+from .solver import Tolerances, postures
 
 MOST = 16  # solutions a six-joint arm can have at one pose
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
@@ -119,7 +120,7 @@ def elimination_solutions(
 
 
 @postures.register
-def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     q, valid, double = elimination_solutions(solver, U)
     found = checked(solver.chain, U, q, valid, tolerances, double=double)
     found.family[...] = singular_postures(solver.chain, found)[1]

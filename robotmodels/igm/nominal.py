@@ -21,7 +21,8 @@ from .check import checked
 from .closed_form import closed_form_postures
 from .loop import JointChain
 from .motion import random_postures, tool_poses
-from .solver import Found, Tolerances, postures
+from .postures import Postures
+from .solver import Tolerances, postures
 from .structure import LoopPlan, plan_loop
 
 OFFSET_TOLERANCE = 8e-3
@@ -29,13 +30,13 @@ OFFSET_TOLERANCE = 8e-3
 5 mm make 7 mm where a distance between axes and a length along one come together."""
 TILT_TOLERANCE = 0.014
 """Largest angle (rad) by which an axis may be turned. Two parameters (alpha, beta) that are each
-off by 0.5 deg make 0.0124."""
-SHARE = 0.04  # offset beside half the length of the arm above which it is no error any more
+off by 0.5 deg make 0.0123."""
+SHARE = 0.04  # largest offset over half the length of the arm that counts as an error
 
-REACH = 6.0  # deviations by which a best approach of the nominal arm may miss
+REACH = 6.0  # largest error of the closest posture of the nominal arm, in deviations
 NEARLY_SINGULAR = 3.0  # deviations up to which a singular value may hide more solutions
 JUMP = 6.0  # deviations by which a joint of a regular solution may move
-WIDE, WIDEST = 1.5, 0.4  # roots of the deviation, and value, of a singular value that ends a curve
+WIDE, WIDEST = 1.5, 0.4  # a curve ends where the singular value exceeds WIDE sqrt(deviation)
 FAR = 6.0  # deviations in the pose beyond which a curve is left
 PERTURBED = 24  # poses nearby whose solutions are starts where some may be missing
 MOST = 16  # solutions of one pose
@@ -135,7 +136,7 @@ def _height(T: Array) -> float | None:
 
 
 @postures.register
-def _(solver: NominalArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: NominalArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     N = len(U)
     lengths = np.where(solver.chain.sigma == 1, solver.unit, 1.0)
     goals, scaled = np.array(U), np.broadcast_to(references / lengths, (N, 6))
@@ -155,7 +156,7 @@ def _(solver: NominalArm, U: Array, references: Array, tolerances: Tolerances) -
 def _solutions(
     solver: NominalArm, goals: Array, references: Array, tolerances: Tolerances
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
-    """Solutions (N, 16, 6), whether there is one, whether it is double, and its free joint."""
+    """Solutions (N, 16, 6), which rows hold one, which are double, and the free joint."""
     from . import _nominal as kernels
 
     N, deviation = len(goals), solver.deviation
@@ -204,7 +205,7 @@ def _solutions(
 def _candidates(
     solver: NominalArm, goals: Array, references: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Solutions of the nominal arm (N, 8, 6), or its best approach, and whether there is one."""
+    """Solutions of the nominal arm (N, 8, 6), or its best approach, and which rows hold one."""
     slack = max(3.0 * solver.deviation, 1e-9)
     return closed_form_postures(solver.plan, solver.near, goals, references, slack, np.inf)[:2]
 

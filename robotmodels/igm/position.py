@@ -13,7 +13,8 @@ import numpy as np
 from .._arrays import Array
 from .loop import JointChain
 from .motion import jacobians, random_postures
-from .solver import Found, Tolerances, nothing_found, postures
+from .postures import Postures, no_postures
+from .solver import Tolerances, postures
 
 POSITION = (True, True, True, False, False, False)
 MOST = 4  # solutions of one position
@@ -44,11 +45,11 @@ def prepare_position(chain: JointChain) -> PositionArm | None:
 
 
 @postures.register
-def _(solver: PositionArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def _(solver: PositionArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     from .kernels.pieper import position_solutions
 
     chain = solver.chain
-    found = nothing_found(len(U), MOST, 3)
+    found = no_postures(len(U), MOST, 3)
     position_solutions(
         chain.sigma,
         chain.D,

@@ -190,7 +190,7 @@ def _inner_solvers(solver: Masked, U: Array) -> list[tuple[Solver | None, NDArra
 
 
 def _moves_with_the_pose(components: Components) -> bool:
-    """Whether the freed axis, seen from the tool, is another one in every pose."""
+    """Whether the freed axis has a different direction in the tool frame at every pose."""
     if components.in_tool_axes or len(components.freed_rotations) != 1:
         return False
     axis = components.freed_rotations[0]
@@ -222,7 +222,7 @@ def _world_frame(chain: JointChain) -> Array:
 
 
 def _joints(gap: int, frame: Array, axes: tuple[int, ...], sigma: int) -> list[VirtualJoint]:
-    """Virtual joints along axes of a frame; of three revolute ones the outer ones are square."""
+    """Virtual joints along axes of a frame; three revolute joints turn about z, x and y."""
     order = (2, 0, 1) if sigma == 0 and len(axes) == 3 else axes
     return [VirtualJoint(gap, frame @ _ONTO[axis], sigma) for axis in order]
 

@@ -56,7 +56,7 @@ def redundant_joint(chain: JointChain, components: Components) -> int | None:
     q = random_postures(chain, 16, np.random.default_rng(3))
     wanted = constraints(chain, components)
     U = poses_and_jacobians(chain, q)[0]
-    # with two freed rotations poses are reached in any orientation
+    # two freed rotations leave an orientation error: pair each configuration with another pose
     U = U[::-1] if len(components.freed_rotations) == 2 else U
     _, sizes, rows = np.linalg.svd(wanted.linearised(U, q)[1])
     padded = np.zeros((len(q), chain.k))
@@ -93,7 +93,7 @@ def _typical_rest(
     """The chain with the joint locked, and that value (None: valid for all values)."""
     if _at_an_end(chain, components, joint):
         return without_end(chain, joint, np.zeros(1), np.eye(4)[None])[0], None
-    # at 0 axes may be aligned that are not elsewhere
+    # 0.5, because axes are often aligned at 0
     value = 0.5 if locked is None else locked
     return locked_chain(chain, {joint: value}), value
 

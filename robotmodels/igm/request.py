@@ -19,9 +19,9 @@ from ..model import RobotModel
 
 WHOLE_POSE = (True,) * 6
 FARTHEST = 1e6
-"""Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
+"""Largest joint value of a reference [rad or m]: beyond it whole turns cost digits."""
 FARTHEST_POSITION = 1e100
-"""Largest coordinate of a position [m]: beyond, squares of squares of lengths are no numbers."""
+"""Largest coordinate of a position [m]: beyond it fourth powers of lengths overflow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +41,8 @@ def poses_of(T: ArrayLike) -> Array:
     farthest = float(np.abs(poses[..., :3, 3]).max(initial=0.0))
     if farthest > FARTHEST_POSITION:
         raise InvalidValueError(
-            f"T: expected positions within +-{FARTHEST_POSITION:g} m, got {farthest:g}; lengths "
-            "like this leave no digits for an arm."
+            f"T: expected positions within +-{FARTHEST_POSITION:g} m, got {farthest:g}; "
+            "beyond this, rounding errors exceed the size of any arm."
         )
     return poses
 

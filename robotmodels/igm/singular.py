@@ -1,8 +1,9 @@
 """Singular poses: candidates that a solver may miss, double roots, members of self-motions.
 
-Near a singular posture a closed form loses digits: candidates with an overshoot are refined by
-Newton's method on the chain itself. Where two singularities come together, the solver is asked at
-perturbed poses too, and `q_ref` itself is refined.
+Near a singular posture a closed form loses digits: candidates whose cosine slightly exceeds 1 are
+kept and refined by Newton's method on the chain itself. Where two singularities coincide, no
+posture was found, or a pose is met only to more than rounding, the solver also runs at perturbed
+poses, and `q_ref` itself is refined.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from .self_motions import SelfMotions
 from .solver import Tolerances
 
 PERTURBED = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
-"""Distances of perturbed poses, beside the length of the arm and in radians."""
-TWICE = 1e-3
-"""Second smallest singular value below which two singularities come together."""
+"""Distances of perturbed poses, relative to the length of the arm and in radians."""
+DOUBLY_SINGULAR = 1e-3
+"""Second smallest singular value below which two singularities coincide."""
 MET = 1e-12
 """Error up to which a pose is met to rounding [m, rad]."""
 MOST = 64
 """Rows kept for a pose before self-motions are completed."""
 NEAR = 1e-4
-"""Smallest singular value below which a posture is looked at."""
+"""Smallest singular value below which a posture may be singular."""
 
 Candidates = Callable[[Array, Array], tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]]
 """Poses (N, 4, 4), references (N, k) -> candidates (N, C, k), which exist (N, C), free joints."""
@@ -51,7 +52,7 @@ def solve_singular(
     q, there, free = candidates(U, references)
     first = checked(chain, U, _filled(q, there), there, tolerances, free=free, rough=np.inf)
     met = np.where(first.valid, first.residual, 0.0).max(axis=1, initial=0.0) <= MET
-    rest = np.flatnonzero(two_singularities(chain, first) | ~met)
+    rest = np.flatnonzero(doubly_singular(chain, first) | ~met)
     if rest.size == 0:
         return first
     from scipy.spatial.transform import Rotation
@@ -78,14 +79,14 @@ def _filled(q: Array, there: NDArray[np.bool_]) -> Array:
     return np.where(there[..., None], q, 0.0)
 
 
-def two_singularities(chain: JointChain, found: Postures) -> NDArray[np.bool_]:
+def doubly_singular(chain: JointChain, found: Postures) -> NDArray[np.bool_]:
     """Whether a pose has a posture with two small singular values, or no posture."""
     n, s = np.nonzero(found.valid)
     out = ~np.any(found.valid, axis=1)
     J = jacobians(chain, found.q[n, s])
     J[:, :3] /= lever(chain)
     if chain.k > 1:
-        out[n[np.linalg.svd(J, compute_uv=False)[:, -2] < TWICE]] = True
+        out[n[np.linalg.svd(J, compute_uv=False)[:, -2] < DOUBLY_SINGULAR]] = True
     return out
 
 

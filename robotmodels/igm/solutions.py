@@ -64,7 +64,7 @@ class IGMSolutions(_Later):
     family_joints : ndarray of bool, shape (..., S, n)
         Other joints that move along the infinite family the row belongs to.
     method : str
-        What solved it.
+        The solver, in words.
     periodic : ndarray of bool, shape (n,)
         Joints whose values count modulo a whole turn in `nearest`: the revolute ones, unless
         limits were asked for.
@@ -165,7 +165,7 @@ class IGMSolutions(_Later):
         return self.valid.sum(axis=-1)
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """What became of one pose, in a sentence.
+        """Outcome of one pose as a sentence.
 
         Parameters
         ----------

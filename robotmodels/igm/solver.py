@@ -1,13 +1,13 @@
-"""What every family of arms is to the inverse model: prepared data, and one function that solves.
+"""The interface of solvers: prepared data, and one function that solves poses.
 
-A family file prepares a frozen object from a `JointChain` (what can be known before a pose is) and
+The file of a solver prepares a frozen object from a `JointChain`, before any pose is known, and
 registers how poses are solved with it::
 
     @postures.register
     def _(solver: ClosedForm, U, references, tolerances): ...
 
-so that rooms which change the chain (a locked joint, a mask, a calibrated arm) call
-`postures` on whatever serves the chain they made.
+so that code which changes the chain (a locked joint, a mask, a calibrated arm) calls `postures`
+with the solver of the changed chain.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from typing import NamedTuple, Protocol
 
 from .._arrays import Array
 from .loop import JointChain
-from .postures import Postures, no_postures
+from .postures import Postures
 
 
 class Tolerances(NamedTuple):
-    """When a pose counts as met: metres and radians, each on the length of what is missing."""
+    """Largest errors with which a pose counts as met: position [m] and rotation [rad]."""
 
     position: float = 1e-9
     orientation: float = 1e-9
@@ -38,19 +38,15 @@ class Solver(Protocol):
 
     @property
     def method(self) -> str:
-        """The family, in words."""
+        """Name of the method."""
         ...
 
 
 Prepare = Callable[[JointChain], "Solver | None"]
-"""Chooses the family of a chain; handed to families that solve another chain on the way."""
-
-
-Found = Postures
-nothing_found = no_postures
+"""Chooses the solver of a chain; passed to solvers that solve another chain on the way."""
 
 
 @singledispatch
-def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances) -> Found:
+def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     """All postures of poses by a prepared solver. Shapes: U (N, 4, 4), references (N, k)."""
-    raise TypeError(f"no family is registered for {type(solver).__name__}")
+    raise TypeError(f"no solver is registered for {type(solver).__name__}")

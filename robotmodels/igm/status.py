@@ -14,7 +14,7 @@ class IGMStatus(Outcome):
     Attributes
     ----------
     sentence : str
-        What a person reads.
+        The status as a sentence.
 
     Examples
     --------

@@ -26,12 +26,12 @@ from .angles import ROUNDING, Angle
 from .notation import Notation
 
 PLANES = ((1, 2), (2, 0), (0, 1))
-"""The axes that a rotation about x, y, z mixes."""
+"""The two axes that a rotation about x, y or z turns."""
 _GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta^{0}"}
 WORLD, TOOL = -1, -2
 """Numbers of the two nodes that are no frames of the table."""
 _ANGLES_OF_A_FORMULA = 8
-"""Angles between nodes, right ones not counted, up to which products are expanded."""
+"""Products over more angles than this (right angles not counted) stay nested."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ _MARGIN = 1.0 + 1e-14
 """Durations are this much above the least, so that rounding does not exceed a limit."""
 
 _PHASE = 1.0 / 3.0
-"""Part of the duration that each ramp takes when no limits are given, as in ``ctraj``."""
+"""Part of the duration of each ramp without limits, as in the Robotics Toolbox's ``ctraj``."""
 
 
 class TimeLaw(Enum):
@@ -79,9 +79,9 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
         TimeLaw.CUBIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
         TimeLaw.QUINTIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
         TimeLaw.BANG_BANG: ("velocity or acceleration", np.minimum(V, np.maximum(A, B))),
-        TimeLaw.TRAPEZOIDAL: ("acceleration, both ways", np.maximum(A, B)),
+        TimeLaw.TRAPEZOIDAL: ("acceleration and deceleration", np.maximum(A, B)),
         TimeLaw.SMOOTHED_TRAPEZOIDAL: (
-            "jerk, or of acceleration both ways", np.minimum(np.maximum(A, B), any_jerk),
+            "jerk, or of acceleration and deceleration", np.minimum(np.maximum(A, B), any_jerk),
         ),
         TimeLaw.JERK_LIMITED: ("jerk", any_jerk),
     }  # fmt: skip
@@ -93,7 +93,7 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
 
 
 def law_of_duration(law: TimeLaw, distance: Array, duration: Array) -> Pieces:
-    """A law of a given duration, in its usual shape: ramps of one third, equal on both sides."""
+    """A law of a given duration: equal ramps of one third of it (one half for BANG_BANG)."""
     L, T = distance, duration
     if law is TimeLaw.JERK_LIMITED:
         raise InvalidValueError("JERK_LIMITED has no shape without limits; give limits.")
@@ -112,7 +112,7 @@ _POLYNOMIALS = {
 
 
 def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> Pieces:
-    """The law with the least duration that real numbers allow."""
+    """The law with the least duration under the limits."""
     if law is TimeLaw.LINEAR:
         return law_of_duration(law, L, L / V)
     if law is TimeLaw.CUBIC:
@@ -201,14 +201,14 @@ def _fastest(
         step = np.where(at_rest, 0.0, (full * (up + down) - 2.0 * L) / slope)
         full = full - step
         if (np.abs(step) <= 1e-10 * full).all():
-            break  # the next step would be nothing: they square
+            break  # the next step would be nothing: convergence is quadratic
     V = np.where(at_rest, 0.0, np.minimum(V, full))
     return V, _ramp_time(law, V, A, J)[0], _ramp_time(law, V, B, J)[0]
 
 
 # With limits of jerk a ramp from rest bends up with the greatest jerk, may go on with the greatest
 # acceleration, and bends down with the least jerk to the velocity of the cruise. The ramp back to
-# rest is such a ramp run backwards, in which the two jerks have the same places.
+# rest is such a ramp run backwards, so the same formulas serve, with J and K in the same roles.
 
 
 class Ramp(NamedTuple):
@@ -317,5 +317,5 @@ def _cruise(L: Array, V: Array, A: Array, B: Array, up: Array, down: Array) -> A
         step = np.where(moves, (first.distance + last.distance - L) / slope, 0.0)
         full = full - step
         if (np.abs(step) <= 1e-10 * full).all():
-            break  # the next step would be nothing: they square
+            break  # the next step would be nothing: convergence is quadratic
     return np.where(moves, np.minimum(V, full), 0.0)

@@ -14,7 +14,7 @@ from ..se3.orientation import rotation_vectors_of
 
 
 class PosePath(Protocol):
-    """What a `PoseTrajectory` follows."""
+    """Path that a `PoseTrajectory` follows."""
 
     @property
     def end(self) -> float:
@@ -55,7 +55,7 @@ class FixedAxisPath:
 
     @property
     def radius(self) -> float:
-        """Of the circle, m; 0 on a line."""
+        """Radius of the circle, m; 0 on a line."""
         if self.sweep == 0.0:
             return 0.0
         arm = self.start[:3, 3] - self.centre
@@ -67,7 +67,7 @@ class FixedAxisPath:
         T[:, :3, :3] = rotation_about(self.axis, self.turn * s) @ self.start[:3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * self.shift
         if self.sweep:
-            # what the start is displaced by: a far centre would take its digits
+            # as a displacement from the start: adding a distant centre would cost digits
             across = np.cross(self.normal, self.start[:3, 3] - self.centre)
             inward = np.cross(self.normal, across)
             angle = self.sweep * s[:, None]
@@ -156,7 +156,7 @@ class BlendedPoses:
         # outside the blend one of the two runs at its full rate
         beyond = np.maximum(t - 0.5 * b, 0.0)
         f2 = np.stack((gone + beyond, rate, rise))
-        # together the two go as the time does
+        # the two times add up to the time since the corner
         f1 = np.stack((t - f2[0], 1.0 - rate, -rise))
         return corner, before, after, f1, f2
 

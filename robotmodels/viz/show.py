@@ -78,7 +78,7 @@ from .style import PALETTE, as_texts
 
 Moving = ArrayLike | Trajectory | Samples | JointPath | ResolvedMotion
 
-_SEEN = 60  # configurations of a motion that the picture is made to hold
+_SEEN = 60  # configurations used to choose the camera
 _FROM_THE_FRONT = (np.radians(-78.0), np.radians(32.0))  # azimuth, elevation
 # The picture has room for each joint turned by this much to either side, rad, or moved by this part
 # of the way to the ends of its stroke.

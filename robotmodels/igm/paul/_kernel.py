@@ -369,14 +369,14 @@ def solved(task: Task, mode: int, out: Out, rare: None) -> int:
     _, _, poses, references = task
     if not mode & layout.UNORDERED:
         if improper_pose(poses) >= 0:
-            return layout.IMPROPER
+            return layout.NEEDS_CHECK
         for p in range(poses.shape[0]):
             for i in range(3):
                 if abs(poses[p, i, 3]) > FARTHEST_POSITION:
-                    return layout.IMPROPER
+                    return layout.NEEDS_CHECK
             for m in range(references.shape[1]):
                 if not abs(references[p, m]) <= FARTHEST:
-                    return layout.IMPROPER
+                    return layout.NEEDS_CHECK
     run_plan(task, out, rare)
     if mode & layout.UNORDERED:
         return 0

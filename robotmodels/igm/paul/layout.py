@@ -23,5 +23,5 @@ DOUBLE, FREE_1, FREE_2, SMALL, ROUGH = 1, 2, 4, 8, 16
 
 # bits of the mode of a call
 GIVEN, WITHIN_LIMITS, UNORDERED = 1, 2, 4
-IMPROPER = -1000
+NEEDS_CHECK = -1000
 """Result of the kernel for a pose or reference that the checks in Python must look at."""

@@ -62,8 +62,8 @@ def derive_plan(
 ) -> PaulPlan:
     """Derive, by pre- and post-multiplication, which equation gives which joint of a chain.
 
-    ``frames`` are the numbers of its frames in print (1 to k without them), ``names`` the names and
-    values of constants that the table has named, by their usual names.
+    ``frames`` are the numbers of its frames in print (default 1 to k), ``names`` the user's
+    constants by their usual name: (name, value).
     """
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")
@@ -71,7 +71,7 @@ def derive_plan(
     joints, steps = arm.joints, []
     everyone = range(chain.k)
     solved: list[int] = []
-    # with more joints than a pose has components nothing can be found without locking some
+    # more than six joints: some have to be locked first
     while chain.k <= 6 and not all(joints.knows(j) for j in everyone):
         best = _best(arm)
         if best is None:

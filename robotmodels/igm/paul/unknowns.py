@@ -247,11 +247,3 @@ class Joints:
     def has_alternatives(self) -> bool:
         """Whether unknown angles can be written in more than one way."""
         return any(1 < len(set(root)) < len(root) for root in self._root)
-
-    def is_free_of(self, number: int) -> bool:
-        """Whether an unknown is still one: neither solved nor tied by what has been."""
-        item = self.unknowns[number]
-        if item.span is None:
-            return item.terms[0][0] not in self.lengths
-        root = self._root[item.span.group]
-        return root[item.span.a] != root[item.span.b]

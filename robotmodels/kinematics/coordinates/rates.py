@@ -13,8 +13,8 @@ T : array_like, shape (..., 4, 4)
 kind : OrientationKind or str
     Form of the orientation.
 near : array_like, shape (..., m), optional
-    Coordinates whose solution is meant, as in `operational_coordinates`: the opposite quaternion,
-    or the other solution of three angles, has other rates.
+    Reference coordinates: of the equivalent representations (the opposite quaternion, the other
+    solution of three angles), which have other rates, the nearest is used.
 model, q, v, frame
     See `robotmodels.kinematics`.
 
@@ -51,7 +51,7 @@ from .orientations import (
 SINGULAR = 1e-12
 """Sine of the angle to the singularity of a representation within which its rates do not exist.
 
-Rates grow with its inverse, and so does what becomes of the rounding of the pose. Rotations are
+Rates grow with its inverse, and so does the effect of rounding errors in the pose. Rotations are
 held exact to 4e-15, so that at this distance a rate has two correct digits left.
 """
 _SERIES_BELOW = 4.0
@@ -167,7 +167,7 @@ def coordinate_jacobian(
     kind : OrientationKind or str
         Form of the orientation.
     near : array_like, shape (..., m), optional
-        Coordinates whose solution is meant, as in `operational_coordinates`.
+        Reference coordinates: of the equivalent representations the nearest is used.
 
     Returns
     -------

@@ -39,13 +39,14 @@ def ikm(
 
     Also called inverse velocity kinematics, resolved motion rate control. Exact away from singular
     positions, ``J v = twist`` with the least weighted norm; bounded near them, where only the
-    weak directions are slowed down; the missing part of the twist is in ``error``.
+    components along nearly lost directions are reduced. The missing part of the twist is
+    ``error``.
 
     Parameters
     ----------
     model, frame, reference, mask, length
         See `robotmodels.kinematics`. The length matters for compromises between rows, singular
-        values and damping only: where the twist is met it changes nothing.
+        values and damping only: it has no effect where the twist is met exactly.
     q : array_like, shape (..., n)
         Joint variables, rad or m; its leading axes broadcast with those of ``twist``.
     twist : array_like, shape (..., 6)
@@ -58,8 +59,8 @@ def ikm(
         depend on the unit of length. ``ones(n)`` gives the plain pseudo-inverse.
     secondary : array_like, shape (..., n), criterion, or sequence of them, optional
         Joint velocities z for the freedom of a redundant robot, ``(I - J^+ J) z``, exactly, also
-        where J is damped. Of a criterion the ``gradient(model, q)``; those of a sequence are
-        summed.
+        where J is damped. A criterion contributes its ``gradient(model, q)``; the entries of a
+        sequence are summed.
     augmented : sequence of Task
         More rows, of the same importance as the twist (task augmentation).
     tasks : sequence of Task

@@ -45,7 +45,10 @@ class SingularityStatus(Outcome):
     """
 
     REGULAR = 0, "Regular: no degree of freedom is lost."
-    NEAR_SINGULAR = 1, "Near a singular configuration: one freedom is weak."
+    NEAR_SINGULAR = (
+        1,
+        "Near a singular configuration: at least one degree of freedom is nearly lost.",
+    )
     SINGULAR = 2, "Singular: the robot has lost degrees of freedom."
 
 
@@ -119,10 +122,10 @@ class SingularityReport(Rebuilt):
     words : tuple of str
         The same as sentences.
     near_kinds, near_words : tuples of SingularityKind and str
-        Of the singular sets nearby that make the freedoms weak which are not lost.
+        Nearby singular sets that explain the nearly lost directions.
     weak : LostDirections
-        Combinations that are weak but not lost, where they have the most small parts: those of
-        singular values between ``tolerance`` and ``near``.
+        Combinations that are nearly lost, in the frame in which most of their components are small:
+        those of singular values between ``tolerance`` and ``near``.
     side : WorkspaceSide
         Boundary or interior, of the poses reached near this configuration.
     lost : LostDirections
@@ -270,7 +273,7 @@ def classify_singularity(
     axes: int | None = None,
     point: int | None = None,
 ) -> SingularityReport:
-    """Freedoms lost and gained at a configuration, in numbers and in words.
+    """Degrees of freedom lost and gained at a configuration, in numbers and in words.
 
     Parameters
     ----------
