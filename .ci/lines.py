@@ -16,8 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = {
     "igm": 9000, "kinematics": 5300, "symbolic": 2700, "identification": 6800,
     "calibration": 5900, "estimation": 1800, "logs": 1500, "minimal_parameters": 2100,
-    "regressors": 1200, "dynamics, friction, drive, inertia, simulation": 3000, "viz": 3500,
-    "cli": 1700, "trajectories": 2900, "kernels": 3100,
+    "regressors": 1200, "dynamics, friction, drive, inertia, simulation": 3000, "viz": 4200,
+    "cli": 2100, "trajectories": 4000, "kernels": 3100, "performance": 2000, "loops": 800,
+    "parallel": 2000, "control": 1500, "visual_servoing": 1400, "flexible": 1500, "export": 1000,
 }  # fmt: skip
 """Lines of a package, or of several together; the rest shares `REST`."""
 REST = 6500

@@ -1,9 +1,13 @@
 """The faults that `mutations.py` puts into the numeric core, and the tests that must see them.
 
 A fault is the first ``old`` behind ``after``, a text that the package has once, made ``new``:
-files may be moved and renamed without a change here.
+files may be moved and renamed without a change here. A list `MUTATIONS` in a file `faults_*.py`
+beside this one joins it.
 """
 
+import importlib
+import sys
+from pathlib import Path
 from typing import NamedTuple
 
 __all__ = ["MUTATIONS", "Mutation"]
@@ -1362,3 +1366,7 @@ MUTATIONS = [
     Mutation("cli: terminal", "warnings of the package are dropped", "def prepared(",
         'say(f"warning: {message}")', "pass", f"{ERRORS} -k warnings_of_the_package"),
 ]
+
+sys.modules.setdefault("mutation_list", sys.modules[__name__])
+for _path in sorted(Path(__file__).parent.glob("faults_*.py")):
+    MUTATIONS += importlib.import_module(_path.stem).MUTATIONS

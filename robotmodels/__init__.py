@@ -50,12 +50,19 @@ from .urdf import NamedFrame
 if TYPE_CHECKING:
     from . import (
         calibration,
+        control,
         datasets,
+        export,
+        flexible,
         identification,
+        loops,
         obstacles,
+        parallel,
+        performance,
         simulation,
         symbolic,
         trajectories,
+        visual_servoing,
         viz,
     )
     from .igm.paul import InverseModelExplanation, explain_igm
@@ -132,6 +139,7 @@ __all__ = [
     "calibration",
     "christoffel_blocks",
     "classify_singularity",
+    "control",
     "coordinate_jacobian",
     "coriolis_matrix",
     "datasets",
@@ -146,7 +154,9 @@ __all__ = [
     "explain_igm",
     "explain_jacobian",
     "explain_singularities",
+    "export",
     "filtered_regressor",
+    "flexible",
     "force_ellipsoid",
     "friction",
     "gravity_torque",
@@ -165,6 +175,7 @@ __all__ = [
     "link_poses",
     "link_transforms",
     "load",
+    "loops",
     "manipulability",
     "mass_matrix",
     "momentum_regressor",
@@ -172,8 +183,10 @@ __all__ = [
     "obstacles",
     "operational_coordinates",
     "operational_dimension",
+    "parallel",
     "parameter_names",
     "parameter_vector",
+    "performance",
     "pose_from_coordinates",
     "potential_energy",
     "power_regressor",
@@ -195,6 +208,7 @@ __all__ = [
     "trajectories",
     "uniform_bodies",
     "velocity_ellipsoid",
+    "visual_servoing",
     "viz",
     "with_payload",
     "without_payload",
@@ -294,8 +308,9 @@ def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
     with _OPENING:
         if name in (
-            "calibration", "datasets", "identification", "obstacles", "simulation", "symbolic",
-            "trajectories", "viz",
+            "calibration", "control", "datasets", "export", "flexible", "identification", "loops",
+            "obstacles", "parallel", "performance", "simulation", "symbolic", "trajectories",
+            "visual_servoing", "viz",
         ):  # fmt: skip
             return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:

@@ -16,10 +16,11 @@ DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "notebooks" not in path.parts)
 CHAPTERS = sorted((DOCS / "book").glob("chapter_*.md"))
 ROOMS = (
-    "robotmodels", "calibration", "datasets", "drive", "dynamics", "errors", "estimation",
-    "friction", "geometry", "identification", "igm", "inertia", "kinematics", "logs",
-    "minimal_parameters", "model", "obstacles", "regressors", "robots", "se3", "simulation",
-    "symbolic", "symoro", "trajectories", "urdf", "viz",
+    "robotmodels", "calibration", "control", "datasets", "drive", "dynamics", "errors",
+    "estimation", "export", "flexible", "friction", "geometry", "identification", "igm", "inertia",
+    "kinematics", "logs", "loops", "minimal_parameters", "model", "obstacles", "parallel",
+    "performance", "regressors", "robots", "se3", "simulation", "symbolic", "symoro",
+    "trajectories", "urdf", "visual_servoing", "viz",
 )  # fmt: skip
 FOR_OTHER_ROOMS = {
     "geometry": {"FIXED", "constant_names", "NOT_XML", "PRISMATIC", "REVOLUTE"},

@@ -1,0 +1,3 @@
+"""Flat code of models in C, Python, NumPy, CasADi and MATLAB."""
+
+__all__: list[str] = []

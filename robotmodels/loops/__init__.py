@@ -1,0 +1,3 @@
+"""Robots with kinematic loops: closures, reduced models, dynamics, base parameters."""
+
+__all__: list[str] = []
