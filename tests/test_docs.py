@@ -25,7 +25,7 @@ ROOMS = (
 FOR_OTHER_ROOMS = {
     "geometry": {"FIXED", "constant_names", "NOT_XML", "PRISMATIC", "REVOLUTE"},
     "inertia": {"PARAMETERS"},
-    "model": {"FrameOfInterest", "GRAVITY", "PinocchioTwin", "check_model"},
+    "model": {"FrameOfInterest", "GRAVITY", "PinocchioTwin", "as_positions", "check_model"},
     "se3": {"ROTATION_TOLERANCE"},
 }  # fmt: skip
 """What the ground floor lists for the rooms above it, and users have no need of."""

@@ -172,15 +172,29 @@ COMPANIONS = (
 """Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
 
 
-def test_companions_of_the_viewer_are_imported_by_the_viewer_alone():
+def test_degrees_warn_once():
+    arm, slide = rm.load("rx90"), rm.load("stanford_arm")
+    with pytest.warns(
+        rm.errors.RobotModelsWarning, match=r"joint 2 is at 45 rad.*np\.deg2rad\(q\)"
+    ):
+        rm.dgm(arm, [3.0, 45.0, -60.0, 0.0, 0.0, 0.0])
+    rm.dgm(arm, [30.0, 45.0, -60.0, 0.0, 0.0, 0.0])
+    rm.idm(rm.load("puma560"), np.full((5, 6), 12.0))
+    rm.jacobian(slide, np.where(slide.table.sigma[slide.table.joint_rows] == 1, 90.0, 1.0))
+    with pytest.warns(rm.errors.RobotModelsWarning, match="joint 1"):
+        rm.idm(rm.load("puma560"), np.full((5, 6), -90.0))
+
+
+def test_companions_of_the_viewer_are_not_imported(tmp_path):
     code = f"""
 import sys, numpy as np, robotmodels as rm
 arm = rm.load("ur5")
 rm.igm(arm, rm.dgm(arm, np.full(6, 0.3)))
-rm.calibration, rm.identification, rm.trajectories, rm.viz.show(arm, np.zeros(6))
+rm.calibration, rm.identification, rm.trajectories
+rm.viz.animate(arm, np.zeros((2, 6))).save({str(tmp_path / "page.html")!r})
 print(sorted(set({COMPANIONS!r}) & set(sys.modules)))
 """
-    # meshcat and trimesh import some of them when a page or a mesh is made; the package none
+    # trimesh imports those of its own that are installed when it reads a mesh; the package none
     package = Path(rm.__file__).parent
     found = {
         name

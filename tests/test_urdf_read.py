@@ -370,6 +370,7 @@ def package(tmp_path):
     (folder / "meshes").mkdir(parents=True)
     (folder / "meshes" / "base link.stl").write_text("solid\n")
     (folder / "urdf").mkdir()
+    (folder / "package.xml").write_text("<package/>\n")
     return folder
 
 
@@ -400,7 +401,27 @@ def test_meshes_are_found_from_the_file(package, filename):
     found = read(path).visuals[0].shape.path
     assert found.samefile(package / "meshes" / "base link.stl")
     absolute = "file://" + str(found.resolve()).replace(" ", "%20")
-    assert read(meshed(absolute)).visuals[0].shape.path.samefile(found)
+    path.write_text(meshed(absolute))
+    assert read(path).visuals[0].shape.path.samefile(found)
+
+
+def test_meshes_outside_of_the_urdf_and_its_package_need_permission(package):
+    secret = package.parent / "secret.stl"
+    secret.write_text("solid\n")
+    path = package / "urdf" / "arm.urdf"
+    link = package / "urdf" / "link.stl"
+    link.symlink_to(secret)
+    names = ["../../secret.stl", str(secret), f"file://{secret}", "link.stl"]
+    names += ["package://arm_description/../secret.stl", "package:///../secret.stl"]
+    for name in names:
+        path.write_text(meshed(name))
+        assert read(path).visuals[0].shape.path is None, name
+        assert read(meshed(name)).visuals[0].shape.path is None, name
+    path.write_text(meshed("../../secret.stl"))
+    assert read(path, package_dirs=package.parent).visuals[0].shape.path.samefile(secret)
+    (package / "package.xml").unlink()
+    path.write_text(meshed("../meshes/base link.stl"))
+    assert read(path).visuals[0].shape.path is None
 
 
 def test_missing_meshes(package):

@@ -458,13 +458,14 @@ import robotmodels as rm
 arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0], d=[0.3]))
 scene = rm.viz.show(arm, [0.2])
 assert not {{"meshcat", "trimesh", "zmq", "matplotlib"}} & set(sys.modules)
-scene.save(r"{tmp_path / "a.html"}")
-assert not {{"trimesh", "matplotlib"}} & set(sys.modules)
 sys.modules["meshcat"] = None
 try:
     scene.html()
 except rm.errors.MissingExtraError as error:
     print(error)
+del sys.modules["meshcat"]
+scene.save(r"{tmp_path / "a.html"}")
+assert not {{"meshcat", "trimesh", "zmq", "matplotlib"}} & set(sys.modules)
 """
     run = subprocess.run([sys.executable, "-c", code], check=True, timeout=60, capture_output=True,
                          text=True)  # fmt: skip
@@ -486,7 +487,7 @@ def test_a_mesh_has_its_place_scale_and_colour_and_is_in_the_page_once(tmp_path)
     path = tmp_path / "arm.stl"
     path.write_text(TRIANGLE)
     blue = '<material name="blue"><color rgba="0 0 1 0.5"/></material>'
-    model = rm.RobotModel.from_urdf(urdf(str(path), "0.1 -0.1 0.1", blue))
+    model = rm.RobotModel.from_urdf(urdf(str(path), "0.1 -0.1 0.1", blue), package_dirs=tmp_path)
     scene = rm.viz.show(model, [H])
     (node,) = [n for n in scene.nodes if isinstance(n.shape, Triangles)]
     assert node.color == (0.0, 0.0, 1.0, 0.5)
@@ -496,10 +497,13 @@ def test_a_mesh_has_its_place_scale_and_colour_and_is_in_the_page_once(tmp_path)
     many = content(rm.viz.show(model, np.zeros((8, 1)), grid=False, tool=False))
     assert len(many["geometries"]) == 1
     assert sum("geometry" in command for command in many["commands"]) == 8
-    for name in ("bad.stl", "bad.dae"):
-        (tmp_path / name).write_text("this is no mesh")
+    texts = {"bad.stl": "this is no mesh", "bad.dae": "this is no mesh", "bomb.zip": "PK"}
+    texts["nan.stl"] = TRIANGLE.replace("vertex 0", "vertex nan")
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        model = rm.RobotModel.from_urdf(urdf(name), package_dirs=tmp_path)
         with pytest.raises(UrdfError, match=name):
-            rm.viz.show(rm.RobotModel.from_urdf(urdf(str(tmp_path / name))), [0.0])
+            rm.viz.show(model, [0.0])
 
 
 def test_ur5_with_its_meshes():

@@ -15,7 +15,7 @@ from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
 from ..inertia import InertiaWarning
-from ..model import RobotModel, check_model
+from ..model import RobotModel, as_positions, check_model
 
 _CHUNK = 1024  # Jacobians per piece, for the processor's cache
 _WORLD_ALIGNED = 0  # frame code of the kernels
@@ -88,7 +88,7 @@ def idm(
     check_all_or_none(drive)
     n = model.n
     rest = np.zeros(n)
-    q = as_vector(q, n, "q")
+    q = as_positions(model, q)
     v = rest if v is None else as_vector(v, n, "v")
     a = rest if a is None else as_vector(a, n, "a")
     if model.twin.torques_warn and friction is None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows
 from ..errors import InvalidValueError
-from ..model import RobotModel, check_model
+from ..model import RobotModel, as_positions, check_model
 
 Reference = Literal["world_aligned", "local", "world"]
 
@@ -65,7 +65,7 @@ def jacobian(
     array([0.3, 0. ])
     """
     check_model(model)
-    q = as_vector(q, model.n, "q")
+    q = as_positions(model, q)
     pin_reference, number = reference_of(reference)
     twin = model.twin
     point = twin.frame(frame)

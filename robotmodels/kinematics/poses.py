@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector, batch_rows
-from ..model import RobotModel, check_model
+from .._arrays import Array, batch_rows
+from ..model import RobotModel, as_positions, check_model
 
 
 def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Array:
@@ -48,7 +48,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
     (1000, 4, 4)
     """
     check_model(model)
-    q = as_vector(q, model.n, "q")
+    q = as_positions(model, q)
     twin = model.twin
     point = twin.frame(frame)
     if q.ndim == 1 and twin.serves_poses:
@@ -89,7 +89,7 @@ def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     array([0. , 0.3])
     """
     check_model(model)
-    q = as_vector(q, model.n, "q")
+    q = as_positions(model, q)
     twin = model.twin
     if q.ndim == 1 and twin.serves_poses:
         data = twin.data()

@@ -1,6 +1,6 @@
 """The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
 
-from .argument import check_model
+from .argument import as_positions, check_model
 from .frame_of_interest import FrameOfInterest
 from .robot_model import GRAVITY, RobotModel
 from .twin import PinocchioTwin
@@ -11,6 +11,7 @@ __all__ = [
     "GRAVITY",
     "PinocchioTwin",
     "RobotModel",
+    "as_positions",
     "check_model",
     "to_urdf",
     "write_urdf",

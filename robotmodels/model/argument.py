@@ -1,14 +1,49 @@
-"""The first argument of every model: a robot, and not its name or its table."""
+"""The first arguments of every model: a robot, and its joint positions."""
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from ..errors import InvalidValueError
-from ..geometry import DHTable
+from .._arrays import Array, as_vector
+from ..errors import InvalidValueError, RobotModelsWarning
+from ..geometry import FIXED, PRISMATIC, DHTable
 from .robot_model import RobotModel
+
+
+_TWO_TURNS = 4.0 * np.pi
+
+
+def as_positions(model: RobotModel, q: ArrayLike) -> Array:
+    """Joint positions of shape (..., n); angles that may be degrees warn once a robot."""
+    q = as_vector(q, model.n, "q")
+    if model.twin.angles_warn:
+        # quickly for one configuration: its norm is at least as large as each angle
+        large = q.dot(q) if q.ndim == 1 else max(q.max(initial=0.0), -q.min(initial=0.0)) ** 2
+        if large > _TWO_TURNS**2:
+            _warn_of_degrees(model, q)
+    return q
+
+
+def _warn_of_degrees(model: RobotModel, q: Array) -> None:
+    """Warn where an angle is larger than two turns and than its finite limits."""
+    limits = np.abs([model.lower, model.upper])
+    largest = np.maximum(_TWO_TURNS, np.where(np.isfinite(limits), limits, 0.0).max(axis=0))
+    kinds = model.table.sigma[model.table.sigma != FIXED]
+    largest[kinds == PRISMATIC] = np.inf
+    beyond = np.argwhere(np.abs(q) > largest)
+    if len(beyond):
+        model.twin.angles_warn = False
+        warnings.warn(
+            f"q: joint {beyond[0][-1] + 1} is at {q[tuple(beyond[0])]:.6g} rad, more than two turns. "
+            "For degrees, pass np.deg2rad(q). This warning is given once.",
+            RobotModelsWarning,
+            stacklevel=4,
+        )
 
 
 def check_model(model: object) -> None:

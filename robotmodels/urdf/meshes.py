@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from os.path import abspath
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -12,7 +13,7 @@ from ..errors import InvalidValueError, MeshNotFoundError
 
 @dataclass(frozen=True, slots=True)
 class MeshFinder:
-    """Where to look for meshes."""
+    """Where to look for meshes: nothing outside of these folders and the URDF's package is read."""
 
     package_dirs: tuple[Path, ...] = ()
     urdf_dir: Path | None = None
@@ -34,18 +35,25 @@ class MeshFinder:
     def find(self, filename: str) -> Path | None:
         """Locate one mesh."""
         candidates = self._candidates(filename)
-        for path in candidates:
-            if path.is_file():
+        for path, folders in candidates:
+            if path.is_file() and any(self._holds(folder, path) for folder in folders):
                 return path
         if self.package_dirs:
-            tried = "; ".join(str(path) for path in candidates) or "nowhere"
+            tried = "; ".join(str(path) for path, _ in candidates) or "nowhere"
             raise MeshNotFoundError(
-                f"mesh {filename!r} was not found (looked at {tried}). package_dirs must name the "
-                "folders that contain the package's folder."
+                f"mesh {filename!r:.200} was not found (looked at {tried:.400}). package_dirs must "
+                "name the folders that contain the package's folder, or the mesh."
             )
         return None
 
-    def _candidates(self, filename: str) -> list[Path]:
+    def _holds(self, folder: Path, path: Path) -> bool:
+        """Whether a mesh is below a folder; links lead elsewhere only from folders given."""
+        if folder in self.package_dirs:
+            return Path(abspath(path)).is_relative_to(abspath(folder))
+        return path.resolve().is_relative_to(folder.resolve())
+
+    def _candidates(self, filename: str) -> list[tuple[Path, list[Path]]]:
+        """Places of a mesh, each with the folders that it may be in."""
         scheme, found, rest = filename.partition("://")
         if not found:
             scheme, rest = "", filename
@@ -53,16 +61,26 @@ class MeshFinder:
             package, _, inside = unquote(rest).partition("/")
             paths = []
             for folder in self.package_dirs:
-                paths.append(folder / package / inside)
+                paths.append((folder / package / inside, [folder]))
                 if folder.resolve().name == package:
-                    paths.append(folder / inside)
+                    paths.append((folder / inside, [folder]))
             if self.urdf_dir is not None:
                 above = (self.urdf_dir, *self.urdf_dir.parents)
                 # some files leave the package's name empty: package:///folder/mesh.stl
-                paths += [folder / inside for folder in above if package in (folder.name, "")]
+                paths += [(f / inside, [f]) for f in above if package and f.name == package]
+                paths += [(f / inside, self._folders()) for f in above if not package]
             return paths
         path = Path(unquote(rest) if scheme == "file" else rest)
+        folders = self._folders()
         if path.is_absolute():
-            return [path]
+            return [(path, folders)]
         start = [self.urdf_dir] if self.urdf_dir is not None else []
-        return [folder / path for folder in (*start, *self.package_dirs)]
+        return [(folder / path, folders) for folder in (*start, *self.package_dirs)]
+
+    def _folders(self) -> list[Path]:
+        """Folders whose meshes may be read: those given, the URDF's own and its ROS package."""
+        if self.urdf_dir is None:
+            return [*self.package_dirs]
+        above = (self.urdf_dir, *self.urdf_dir.parents)
+        package = next((folder for folder in above if (folder / "package.xml").is_file()), None)
+        return [*self.package_dirs, package or self.urdf_dir, self.urdf_dir]

@@ -16,6 +16,8 @@ from ..model import RobotModel
 from ..visual import Color, Mesh, skeleton
 from .shapes import Triangles
 
+_FORMATS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
+_LARGEST, _MOST = 200_000_000, 5_000_000  # bytes of a file, vertices
 _CREASE = np.radians(35.0)  # sharper edges stay sharp, others are shaded as one smooth surface
 
 
@@ -53,6 +55,12 @@ def _read(
         raise MissingExtraError(
             "drawing mesh files needs trimesh; run: pip install 'yourdfpy>=0.0.58'"
         ) from None
+    size = path.stat().st_size
+    if path.suffix.lower() not in _FORMATS or size > _LARGEST:
+        raise UrdfError(
+            f"mesh file {path.name!r:.100} ({size / 1e6:.1f} MB): expected "
+            f"{', '.join(_FORMATS)} and at most {_LARGEST / 1e6:.0f} MB; archives are not read."
+        )
     try:
         with warnings.catch_warnings():  # deprecations in its readers do not concern the caller
             warnings.simplefilter("ignore", DeprecationWarning)
@@ -66,6 +74,9 @@ def _read(
             if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
                 surface = geometry.copy()
                 surface.apply_transform(np.diag((*scale, 1.0)) @ T)
+                points = np.asarray(surface.vertices)
+                if len(points) > _MOST or not np.isfinite(points).all():
+                    raise ValueError(f"expected finite vertices, at most {_MOST}")
                 parts.append((_creased(surface), _color(geometry)))
     except Exception as error:  # each format's reader has errors of its own
         raise UrdfError(f"mesh file {path.name!r} cannot be read: {error}.") from error

@@ -9,6 +9,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterable
 from html import escape
+from importlib import import_module
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -17,7 +18,6 @@ import numpy as np
 
 from .. import se3
 from .._arrays import Array
-from ..errors import MissingExtraError
 from ..visual import Box, Color, Cylinder, Sphere
 from .camera import ASPECT, FIELD_OF_VIEW, Camera
 from .motion import Motion
@@ -44,17 +44,19 @@ _Y_TO_Z = se3.rotation("x", np.pi / 2)  # the viewer draws cylinders along y
 
 
 class Recorder:
-    """A window of meshcat that keeps commands; geometries that repeat are kept once."""
+    """Commands of meshcat's classes; geometries that repeat are kept once."""
 
     def __init__(self) -> None:
         self.commands: list[dict[str, Any]] = []
         self.geometries: dict[bytes, int] = {}
 
-    def send(self, command: Any) -> None:
-        """Record a command of meshcat's classes."""
+    def record(self, command: str, *values: Any, path: str = "", **options: Any) -> None:
+        """Record a command by the name of its class; paths begin at the scene's root."""
         from umsgpack import packb
 
-        data = command.lower()
+        if path:
+            values += (_part("path").Path(tuple(path.split("/"))),)
+        data = getattr(_part("commands"), command)(*values, **options).lower()
         found = data.get("object", {})
         if found.get("geometries"):
             # meshcat's random names would make each page of the same scene another text
@@ -80,26 +82,22 @@ def page(
     dark: bool = False,
 ) -> str:
     """A scene as one HTML page; the panel of sliders is given as data for its script."""
-    try:
-        import meshcat
-        from umsgpack import packb, unpackb
-    except ImportError:
-        raise MissingExtraError(
-            "pictures need meshcat; run: pip install 'meshcat>=0.3.2'"
-        ) from None
+    from ._meshcat import VIEWER  # the package first: its absence is explained
+    from umsgpack import packb, unpackb
+
     recorder = Recorder()
-    root = meshcat.Visualizer(window=recorder)["/"]
-    _set_stage(root, recorder, camera, dark)
+    _set_stage(recorder, camera, dark)
     labels = []
     for node in nodes:
         if isinstance(node.shape, Label):
             labels.append([node.path, node.shape.text, node.shape.large])
         elif node.shape is not None:
-            root[node.path].set_object(_object(node))
+            recorder.record("SetObject", _object(node), None, path=node.path)
         turned = node.pose @ _Y_TO_Z if isinstance(node.shape, Cylinder) else node.pose
-        root[node.path].set_transform(np.round(turned, 9) + 0.0)
+        recorder.record("SetTransform", np.round(turned, 9) + 0.0, path=node.path)
     if motion is not None and motion.tracks:
-        root.set_animation(_animation(motion), repetitions=_MANY if motion.loop else 1)
+        repetitions = _MANY if motion.loop else 1
+        recorder.record("SetAnimation", _animation(motion), play=True, repetitions=repetitions)
     scene = {
         "commands": recorder.commands,
         "geometries": [unpackb(geometry) for geometry in recorder.geometries],
@@ -109,7 +107,6 @@ def page(
         "depth": round(camera.depth, 6),
         "panel": panel,
     }
-    viewer = Path(str(meshcat.__file__)).parent / "viewer" / "dist" / "main.min.js"
     items = (
         f'<li><span style="background: #{_rgb(color):06x}"></span>{escape(text)}</li>'
         for text, color in legend
@@ -118,7 +115,7 @@ def page(
     return Template(template).substitute(
         title=escape(title),
         theme="dark" if dark else "",
-        viewer=viewer.read_text(encoding="utf-8"),
+        viewer=VIEWER.read_text(encoding="utf-8"),
         scene=b64encode(packb(scene)).decode("ascii"),
         legend=f'<ul id="legend">{"".join(items)}</ul>' if legend else "",
         panel='<div id="panel"></div>\n' if panel else "",
@@ -131,17 +128,20 @@ def _rgb(color: Color) -> int:
     return (r << 16) + (g << 8) + b
 
 
-def _set_stage(root: Any, recorder: Recorder, camera: Camera, dark: bool) -> None:
-    """Background, lights and camera in place of meshcat's."""
-    from meshcat.geometry import PerspectiveCamera
+def _part(name: str) -> Any:
+    """A module of meshcat."""
+    return import_module(f"._meshcat.{name}", __package__)
 
+
+def _set_stage(recorder: Recorder, camera: Camera, dark: bool) -> None:
+    """Background, lights and camera in place of meshcat's."""
     top, bottom = _NIGHT if dark else _SKY
-    root["Background"].set_property("top_color", top)
-    root["Background"].set_property("bottom_color", bottom)
+    recorder.record("SetProperty", "top_color", top, path="Background")
+    recorder.record("SetProperty", "bottom_color", bottom, path="Background")
     for path in ("Grid", "Axes"):
-        root[path].set_property("visible", False)
+        recorder.record("SetProperty", "visible", False, path=path)
     for name in _OTHER_LIGHTS:
-        root[f"Lights/{name}"].delete()
+        recorder.record("Delete", path=f"Lights/{name}")
     for name, kind, intensity, position in _LIGHTS:
         matrix = se3.translation(*position).T.ravel().tolist()
         light = {"uuid": name, "type": kind, "color": 0xFFFFFF, "intensity": intensity}
@@ -154,9 +154,9 @@ def _set_stage(root: Any, recorder: Recorder, camera: Camera, dark: bool) -> Non
         # the viewer lets every object that it loads cast shadows
         _set(recorder, f"{path}/<object>", "castShadow", False)
     near, far = camera.distance / 200.0, 50.0 * max(camera.distance, 1.0)
-    lens = PerspectiveCamera(FIELD_OF_VIEW, 1, near, far)  # type: ignore[arg-type]
+    lens = _part("geometry").PerspectiveCamera(FIELD_OF_VIEW, 1, near, far)
     lens.uuid = "camera"
-    root["Cameras/default/rotated"].set_object(lens)
+    recorder.record("SetObject", lens, None, path="Cameras/default/rotated")
     position = _y_upwards(camera.position)
     _set(recorder, "/Cameras/default/rotated/<object>", "position", position)
 
@@ -176,8 +176,7 @@ def _y_upwards(point: Array) -> list[float]:
 
 def _object(node: Node) -> Any:
     """The shape of a node as an object of meshcat."""
-    import meshcat.geometry as g
-
+    g = _part("geometry")
     look = {"color": _rgb(node.color), "opacity": float(node.color[3])}
     # a transparent surface hides nothing behind it; both sides of meshes are drawn
     solid = g.MeshPhongMaterial(
@@ -193,20 +192,18 @@ def _object(node: Node) -> Any:
         case Triangles(vertices, faces):
             return g.Mesh(g.TriangularMeshGeometry(vertices, faces), solid)
         case Segments(points):
-            thin: Any = g.LineBasicMaterial(**look)
+            thin = g.LineBasicMaterial(**look)
             return g.LineSegments(g.PointsGeometry(points.T), thin)
 
 
 def _animation(motion: Motion) -> Any:
     """Turns about and shifts along z of the joints, at common times."""
-    from meshcat.animation import Animation, AnimationClip, AnimationTrack
-    from meshcat.path import Path as NodePath
-
-    clips = {}
+    animation, clips = _part("animation"), {}
     for track in motion.tracks:
         name = "position[z]" if track.prismatic else "rotation[z]"
         times, values = np.round(track.times, 5).tolist(), np.round(track.values, 6).tolist()
         # one frame a second makes the frames' numbers times
-        clip = AnimationClip({name: AnimationTrack(name, "number", times, values)}, fps=1)
-        clips[NodePath(tuple(track.path.split("/")))] = clip
-    return Animation(clips)
+        frames = animation.AnimationTrack(name, "number", times, values)
+        path = _part("path").Path(tuple(track.path.split("/")))
+        clips[path] = animation.AnimationClip({name: frames}, fps=1)
+    return animation.Animation(clips)

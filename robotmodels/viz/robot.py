@@ -71,9 +71,10 @@ def draw_robot(
         model, missing = with_stand_ins(model)
         if missing:
             warnings.warn(
-                f"mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. Pass "
-                "package_dirs=[...] to RobotModel.from_urdf (the folders that contain the "
-                "packages' folders), or meshes=False.",
+                f"mesh files not found, a skeleton is drawn for them: {', '.join(missing):.400}. "
+                "Files outside of the URDF's folder and package need package_dirs=[...] in "
+                "RobotModel.from_urdf (the folders that contain the packages' folders); "
+                "meshes=False draws no meshes.",
                 RobotModelsWarning,
                 stacklevel=3,
             )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from ..._arrays import as_vector
-from ...model import RobotModel, check_model
+from ...model import RobotModel, as_positions, check_model
 from ..jacobians import Reference
 from .bounds import JointBounds
 from .methods import InverseMethod
@@ -107,7 +107,7 @@ def ikm(
     True
     """
     check_model(model)
-    q, twist = as_vector(q, model.n, "q"), as_vector(twist, 6, "twist")
+    q, twist = as_positions(model, q), as_vector(twist, 6, "twist")
     check_size(twist, "twist")
     if (
         mask is joint_weights is length is secondary is limits is None
