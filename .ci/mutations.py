@@ -40,6 +40,7 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 FORKS = multiprocessing.get_context("forkserver")
 STOOD_ON = ["numpy", "numba", "pinocchio", "hypothesis", "pytest", "scipy.linalg", "scipy.optimize"]
 LONGEST = 600.0  # seconds; a fault may keep an iteration from ending
+ALL_TESTS = ("-m", "")  # the nightly ones too
 KILLED, SURVIVED, BROKEN = "killed", "SURVIVED", "NO RESULT"
 
 
@@ -99,7 +100,7 @@ def in_own_process(folder: Path, arguments: list[str], report: Path) -> int | No
         "NUMBA_CACHE_DIR": str(folder / "compiled"),
         "NUMBA_DISABLE_JIT": "0",
     }
-    command = [sys.executable, "-m", "pytest", *arguments]
+    command = [sys.executable, "-m", "pytest", *ALL_TESTS, *arguments]
     with report.open("w") as out:
         try:
             done = subprocess.run(
@@ -135,7 +136,7 @@ def run_pytest(folder: str, arguments: list[str], report: str) -> None:
 
     if not robotmodels.__file__.startswith(folder):
         os._exit(99)
-    code = pytest.main(arguments)
+    code = pytest.main([*ALL_TESTS, *arguments])
     sys.stdout.flush()
     os._exit(int(code))
 

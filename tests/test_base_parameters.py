@@ -99,6 +99,7 @@ def of_rows(*rows):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.nightly
 def test_rules_and_numbers_agree_on_the_catalogue(name, rng):
     rules, numbers = by_both(rm.load(name), rng)
     kept, dependent = numbers.gap

@@ -17,6 +17,8 @@ from benchmarks.measure import Contestant, Spent, in_turns
 from benchmarks.side_by_side import agreement, report, works
 from benchmarks.side_by_side.works import Entry, Tool, Work, at_most
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[1]
 
 

@@ -48,6 +48,7 @@ def fleet():
     return np.array([one_arm(seed) for seed in ARMS])
 
 
+@pytest.mark.nightly
 def test_another_tool_is_better_off_after_every_calibration(fleet):
     """Geometric errors and unmodelled bending, contacts with one tool, checked with another."""
     nominal, calibrated, _ = fleet.T

@@ -379,6 +379,7 @@ def test_bending_under_gravity_is_recovered(heavy, kind):
 
 
 @pytest.mark.parametrize("states_noise", [True, False])
+@pytest.mark.nightly
 def test_truth_is_inside_its_interval_as_often_as_stated(states_noise):
     rng = np.random.default_rng(5)
     nominal = rm.load("planar_3r")

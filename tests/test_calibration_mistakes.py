@@ -229,6 +229,7 @@ def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
 
 
 @pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
+@pytest.mark.nightly
 def test_a_real_arm_contradicts_51_for_50(robot):
     data = panda_double_socket(robot)
     touched = {
@@ -277,6 +278,7 @@ def measured_by(kind, seed):
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
 @pytest.mark.parametrize("seed", [0, 9])
 @pytest.mark.parametrize("kind", ["pose", "position", "distance", "contact"])
+@pytest.mark.nightly
 def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
     arm, first = measured_by(kind, seed)
     needed = set()
@@ -411,6 +413,7 @@ def test_columns_beyond_the_limits_are_refused_before_any_fit(mistake):
     assert "order of the joints, with the signs and zeros" in str(caught.value)
 
 
+@pytest.mark.nightly
 def test_a_few_readings_beyond_the_limits_are_a_note():
     arm = Arm(0)
     q = within_limits(arm)

@@ -108,12 +108,14 @@ def test_noise_has_no_structure(prior):
 @pytest.mark.parametrize(
     ("kind", "term"), [("compliance", "joint compliance"), ("eccentricity", "gear eccentricity")]
 )
+@pytest.mark.nightly
 def test_the_cause_is_named_first(kind, term):
     found = [named(note(fitted(seed, kind)[2])) for seed in range(9)]
     assert sum(f is not None and f[0] == term for f in found) >= 8
 
 
 @pytest.mark.parametrize("kind", ["compliance", "eccentricity", "backlash"])
+@pytest.mark.nightly
 def test_the_term_brings_on_fresh_data_what_it_promises(kind):
     ratios = []
     for seed in range(6):

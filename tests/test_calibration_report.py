@@ -182,6 +182,7 @@ def test_residuals_row_by_row(poses, contacts):
 # --- the page -------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_the_page_says_what_the_text_says_and_needs_no_network(contacts, tmp_path):
     html_report(contacts, tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text(encoding="utf-8")

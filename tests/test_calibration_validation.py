@@ -14,6 +14,7 @@ from robotmodels.calibration.validation import partition
 @pytest.mark.parametrize(
     ("name", "prior"), [("markers", PRIOR), ("motion", PRIOR), ("markers", None)]
 )
+@pytest.mark.nightly
 def test_the_stated_error_is_that_of_a_new_place(name, prior):
     ratios = [stated_over_true(PROTOCOLS[name], seed, prior) for seed in range(10)]
     folds, in_sample = np.mean(ratios, axis=0)

@@ -346,6 +346,7 @@ def test_demo_identifies_the_real_robot(run, tmp_path, monkeypatch):
     assert "Verdict" in (tmp_path / "tx40-report.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 def test_demo_of_the_real_robot_goes_on_without_extras(tmp_path):
     words = (
         "import sys; sys.modules['matplotlib'] = sys.modules['clarabel'] = None\n"

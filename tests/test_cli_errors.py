@@ -214,6 +214,7 @@ def on_terminal(words):
     return child.returncode, out, drawn.decode()
 
 
+@pytest.mark.nightly
 def test_a_bar_is_drawn_on_terminals_only():
     code, out, drawn = on_terminal(SHORT)
     assert code == 0

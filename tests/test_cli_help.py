@@ -118,6 +118,7 @@ def test_every_command_has_examples_that_are_tried():
 
 
 @pytest.mark.parametrize("command", FILES)
+@pytest.mark.nightly
 def test_examples_run_as_printed(run, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -257,6 +258,7 @@ WITH = {
 
 
 @pytest.mark.parametrize("command", EFFECTS)
+@pytest.mark.nightly
 def test_every_option_has_an_effect(run, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     FILES[command](tmp_path)

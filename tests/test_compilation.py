@@ -14,6 +14,8 @@ from robotmodels.cli.program import main
 from robotmodels.errors import RobotModelsWarning
 from robotmodels.kernels import _cache, _compile, prepare
 
+pytestmark = pytest.mark.nightly
+
 CALL = """
 import warnings
 import numpy as np

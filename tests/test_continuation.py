@@ -48,6 +48,7 @@ def traced(kind, eps, roots, start, period, most, longest):
 NO_PERIOD, NO_ROOTS = np.zeros(2), np.zeros(1)
 
 
+@pytest.mark.nightly
 def test_a_closed_curve_of_fewer_equations_than_unknowns():
     beside, points, missing, ends, found, _ = traced(
         0, 0.0, NO_ROOTS, np.array([0.9, 0.5]), NO_PERIOD, 1.0, 0.2

@@ -143,6 +143,7 @@ def plane(seed, outliers):
     ("case", "loss", "outliers", "count"),
     [(decay, "squares", 0, 200), (decay, "tukey", 8, 200), (plane, "tukey", 12, 200)],
 )
+@pytest.mark.nightly
 def test_intervals_contain_the_truth_as_often_as_they_should(case, loss, outliers, count):
     inside = []
     for seed in range(count):

@@ -21,7 +21,12 @@ from frozen_estimates import (
 
 
 @pytest.mark.parametrize(
-    ("part", "case"), [(part, case) for part, cases in QUICK.items() for case in cases]
+    ("part", "case"),
+    [
+        pytest.param(part, case, marks=() if part == "tx40" else pytest.mark.nightly)
+        for part, cases in QUICK.items()
+        for case in cases
+    ],
 )
 def test_estimates_are_the_frozen_ones(part, case):
     found = differences(case, plain(COMPUTED[part](case)), frozen(part, case))

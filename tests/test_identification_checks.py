@@ -32,6 +32,7 @@ def useless(found):
 
 
 @pytest.mark.parametrize("seed", range(8))
+@pytest.mark.nightly
 def test_correct_logs_are_not_refused_and_wrong_ones_are_named(seed):
     """Half of them with friction and springs that the model lacks, others with coarse encoders."""
     if seed % 2:
@@ -115,6 +116,7 @@ def test_a_joint_that_turns_on_and_on_is_no_motor(good):
     ],
 )
 @pytest.mark.filterwarnings("ignore:Poor prediction")  # on purpose
+@pytest.mark.nightly
 def test_torques_beside_the_models_own_inertia(good, factor, joints, words):
     model, log = good
     wrong = Log(log.dt, log.q, factor * log.tau)

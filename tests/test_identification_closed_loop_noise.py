@@ -75,6 +75,7 @@ def studied(count, position, torque, decimation, methods):
     return np.array(errors), verdicts, np.array(off)
 
 
+@pytest.mark.nightly
 def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
     count = 8
     errors, verdicts, _ = studied(count, 1e-4, 0.5, 1, (Instrumental, Didim))

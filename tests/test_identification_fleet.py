@@ -11,6 +11,8 @@ import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
 from robotmodels.identification import Log, Wls, fit, predicted_torque
 
+pytestmark = pytest.mark.nightly
+
 ARMS = range(60, 72)  # of seeds 0 to 99, 94 keep the bound of 1.02 and 99 that of 1.15
 
 

@@ -76,6 +76,7 @@ def test_every_method_recovers_exact_parameters(name, method):
 
 
 @pytest.mark.parametrize("method", [*CASES, "prior"])
+@pytest.mark.nightly
 def test_covariances_hold_over_many_logs(method):
     """Squares of errors in units of the covariance add up to the number of parameters."""
     sums, errors, stated = [], [], []

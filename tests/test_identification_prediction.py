@@ -73,6 +73,7 @@ def plain(text):
 
 
 @pytest.mark.parametrize(("method", "form"), FITS)
+@pytest.mark.nightly
 def test_every_method_and_form_warns_of_a_log_that_it_cannot_explain_alone(method, form):
     options = {"form": form, "drive": ("Ia", "Fv", "Fc"), "test": log_of(seed=1)}
     found, sentences = noticed(arm(), log_of(), method, **options)

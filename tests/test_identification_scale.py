@@ -27,6 +27,8 @@ from robotmodels.identification.forms import EquationForm
 from robotmodels.logs import Log
 from robotmodels.minimal_parameters import base_parameters
 
+pytestmark = pytest.mark.nightly
+
 
 @cache
 def system(decimation: int = 5, name: str = "planar_2r", starts: tuple[int, ...] = (0, 40_123)):
@@ -73,8 +75,8 @@ def processes(way):
         lambda stack: Shuffled(stack.enter_context(ThreadPoolExecutor(1))),
         lambda stack: Shuffled(stack.enter_context(ThreadPoolExecutor(3))),
         processes("fork"),
-        pytest.param(processes("spawn"), marks=pytest.mark.slow),  # it imports the package
-        pytest.param(dask, marks=pytest.mark.slow),
+        pytest.param(processes("spawn"), marks=pytest.mark.nightly),  # it imports the package
+        pytest.param(dask, marks=pytest.mark.nightly),
     ],
 )
 def test_the_number_of_workers_and_their_order_change_no_bit(pool):

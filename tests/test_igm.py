@@ -135,6 +135,7 @@ def test_no_branch_is_lost_at_a_singular_wrist(name, eps):
         assert "infinite family" in zero.reason()
 
 
+@pytest.mark.nightly
 def test_the_three_singular_positions_of_the_rx90():
     """Section 1.2.3, notes on singular positions: shoulder, wrist, elbow, and combinations."""
     model = rm.load("rx90")

@@ -203,6 +203,7 @@ def test_random_arms_give_back_every_configuration(slide):
 
 
 @pytest.mark.parametrize(("seed", "sigma"), [(0, REVOLUTE), (1, REVOLUTE), (2, (0, 1, 0, 0, 0, 0))])
+@pytest.mark.nightly
 def test_the_count_is_that_of_an_independent_search(seed, sigma, rng):
     chain = random_arm(seed, sigma)
     U = poses(chain, draw(chain, 2, np.random.default_rng(seed + 50)))

@@ -165,6 +165,7 @@ def test_random_tasks_give_their_configuration_back(word, mask, axes):
         ("RRRR/1", "110011", "world"), ("planar_3r", PLANE, "world"), ("RRRR", "111001", "tool"),
     ],
 )  # fmt: skip
+@pytest.mark.nightly
 def test_as_many_solutions_as_an_independent_search(word, mask, axes):
     model = arm(word)
     _, T = tasks(model, mask, axes, 2, seed=1)

@@ -74,6 +74,7 @@ def test_the_first_joints_that_move_the_tool_take_the_reference(name):
 
 
 @pytest.mark.parametrize("name", ["panda", "erd:talos_left_arm", "7R"])
+@pytest.mark.nightly
 def test_where_the_reference_has_no_solution_the_nearest_value_is_taken(name):
     model = random_arm(7, 3) if name == "7R" else rm.load(name)
     q = drawn(model, 16, seed=2)

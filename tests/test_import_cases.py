@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 
 def seconds(code):
     """Processor time of some imports in a fresh interpreter."""
@@ -13,6 +15,7 @@ def seconds(code):
     return float(done.stdout)
 
 
+@pytest.mark.nightly
 def test_import_takes_little_more_than_numpy_and_pinocchio():
     """Measured: 1.9 times as long; 2.7 would be 0.6 s where those take 0.22 s."""
     seconds("import robotmodels")  # warm-up: byte code is written and files are read into memory

@@ -185,6 +185,7 @@ def test_degrees_warn_once():
         rm.idm(rm.load("puma560"), np.full((5, 6), -90.0))
 
 
+@pytest.mark.nightly
 def test_companions_of_the_viewer_are_not_imported(tmp_path):
     code = f"""
 import sys, numpy as np, robotmodels as rm

@@ -14,6 +14,8 @@ from browser import arm_problem, cells, document, drawn, frames_page, link_color
 import robotmodels as rm
 from robotmodels import se3
 
+pytestmark = pytest.mark.nightly
+
 H = np.pi / 2
 WIDTH, HEIGHT = 400, 300
 PANEL_WIDTH = int(0.48 * WIDTH) + 2

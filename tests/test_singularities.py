@@ -573,6 +573,7 @@ def test_kinds_are_those_of_the_factors_that_vanish(name):
 
 
 @pytest.mark.parametrize("name", ["stanford_arm", "iiwa14", "tx40"])
+@pytest.mark.nightly
 def test_kinds_of_the_nearest_are_those_of_the_factors(name):
     arm = rm.load(name)
     explained = rm.explain_singularities(arm)

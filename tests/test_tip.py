@@ -171,6 +171,7 @@ def test_tips_of_trees(name):
     assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, TREES[name]))
 
 
+@pytest.mark.nightly
 def test_all_other_robots_have_no_joint_that_does_not_move_the_tip():
     for name in rm.robots():
         model = rm.load(name)

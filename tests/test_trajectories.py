@@ -200,6 +200,7 @@ def jerk_limited_ramp(V, A, J, K):
         (TimeLaw.JERK_LIMITED, jerk_limited_ramp),
     ],
 )
+@pytest.mark.nightly
 def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):
     """The greatest velocity whose ramps fit, found by bisection; no other velocity is quicker."""
     for _ in range(200):
@@ -288,6 +289,7 @@ def named(error, words):
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.nightly
 def test_the_least_duration_of_a_message_is_accepted(law, rng):
     for k in range(60):
         n = int(rng.integers(1, 5))
@@ -313,6 +315,7 @@ def test_the_least_duration_of_a_message_is_accepted(law, rng):
         assert pose(duration=least).duration == least
 
 
+@pytest.mark.nightly
 def test_the_least_durations_between_states_are_accepted(rng):
     refused = 0
     for k in range(60):

@@ -112,6 +112,7 @@ def test_blends_stop_at_a_pose_given_twice(x, a, smooth):
 
 
 @pytest.mark.parametrize("small", [1e-320, 1e-200, 1e-30, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8, 1e-4])
+@pytest.mark.nightly
 def test_extremes_of_a_series_whose_last_harmonics_vanish(rng, small):
     swing = fourier([[1.0], [small]], [[0.0], [0.0]], period=2.0)
     low, high = swing.motion.extremes(0)
@@ -272,6 +273,7 @@ def test_splines_of_uneven_times_meet_their_points(rng):
 
 @pytest.mark.parametrize("height", [0.6, 0.1, 1e-3, 1e-5, 1e-7, 3e-9])
 @pytest.mark.parametrize("side", [1e-3, 1.0, 1e3])
+@pytest.mark.nightly
 def test_flat_arcs_meet_their_points(rng, height, side):
     limits = MotionLimits(velocity=[side, 1.0], acceleration=[side, 1.0])
     for _ in range(10):

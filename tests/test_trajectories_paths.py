@@ -395,6 +395,7 @@ def test_circles(rng):
 
 
 @pytest.mark.parametrize("law", TimeLaw)
+@pytest.mark.nightly
 def test_circles_use_their_limits_in_full(law, rng):
     """The lengths of the vectors are sampled; no other shape of the law is quicker."""
     jumps = law in (TimeLaw.LINEAR, TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL)

@@ -723,6 +723,7 @@ def original(urdf):
 
 
 @pytest.mark.parametrize("name", ERD_ARMS)
+@pytest.mark.nightly
 def test_real_arms_there_and_back(name):
     """URDF -> table -> URDF: poses of every link, Jacobians and torques as in the original.
 

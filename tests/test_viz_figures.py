@@ -153,6 +153,7 @@ def overlaps(figure):
 
 
 @pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.nightly
 def test_nothing_covers_anything_else_under_any_style(name):
     with matplotlib.rc_context({"font.size": 30.0, "axes.facecolor": "black"}):
         figure = FIGURES[name]()

@@ -56,6 +56,7 @@ def calibrated():
 
 
 @pytest.mark.parametrize("name", ["few", "many", "sockets"])
+@pytest.mark.nightly
 def test_figures_of_calibrations_hold_together(calibrated, name):
     for plot in CALIBRATION:
         assert overlaps(plot(calibrated[name], title="A robot")) == [], plot.__name__

@@ -14,7 +14,6 @@ from ..errors import InvalidValueError, RobotModelsWarning
 from ..geometry import FIXED, PRISMATIC, DHTable
 from .robot_model import RobotModel
 
-
 _TWO_TURNS = 4.0 * np.pi
 
 
@@ -39,8 +38,8 @@ def _warn_of_degrees(model: RobotModel, q: Array) -> None:
     if len(beyond):
         model.twin.angles_warn = False
         warnings.warn(
-            f"q: joint {beyond[0][-1] + 1} is at {q[tuple(beyond[0])]:.6g} rad, more than two turns. "
-            "For degrees, pass np.deg2rad(q). This warning is given once.",
+            f"q: joint {beyond[0][-1] + 1} is at {q[tuple(beyond[0])]:.6g} rad, more than two "
+            "turns. For degrees, pass np.deg2rad(q). This warning is given once.",
             RobotModelsWarning,
             stacklevel=4,
         )

@@ -82,8 +82,9 @@ def page(
     dark: bool = False,
 ) -> str:
     """A scene as one HTML page; the panel of sliders is given as data for its script."""
-    from ._meshcat import VIEWER  # the package first: its absence is explained
     from umsgpack import packb, unpackb
+
+    from ._meshcat import VIEWER  # the package first: its absence is explained
 
     recorder = Recorder()
     _set_stage(recorder, camera, dark)

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from robustness.inputs import TARGETS
 from robustness.outcomes import Outcome
 
+pytestmark = pytest.mark.nightly
+
 # slow ones draw fewer: they are fuzzed for longer by .ci/fuzz.py
 EXAMPLES = {"urdf": 300, "par": 300, "log_csv": 200, "rows": 300}
 

@@ -13,6 +13,8 @@ from robotmodels.calibration import read_measurements
 from robotmodels.errors import InvalidValueError, ParFileError, UrdfError
 from robotmodels.identification import read_log
 
+pytestmark = pytest.mark.nightly
+
 MOST = 400 * 2**20
 """Bytes that a refusal may hold."""
 

@@ -15,6 +15,8 @@ from robustness.parallel_work import WORK, everything, models_of_motion, robots
 
 import robotmodels as rm
 
+pytestmark = pytest.mark.nightly
+
 THREADS = 8
 TESTS = Path(__file__).resolve().parent.parent
 

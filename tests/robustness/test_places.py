@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.nightly
+
 TESTS = Path(__file__).resolve().parent.parent
 
 # Python tells a hook of what it opens, connects and starts; caches of compiled code aside
