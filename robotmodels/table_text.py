@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 from math import pi
 from typing import NamedTuple
@@ -28,6 +29,12 @@ def boxed(columns: list[tuple[str, list[str]]]) -> str:
     ]
     head = line([head for head, _ in columns])
     return "\n".join([rule("┌", "┬", "┐"), head, rule("├", "┼", "┤"), *body, rule("└", "┴", "┘")])
+
+
+def joints_text(columns: dict[str, Iterable[float]]) -> str:
+    """Box with one line a joint and a column for each quantity."""
+    cells = [(name, [f"{x:.6g}" for x in values]) for name, values in columns.items()]
+    return boxed([("j", [str(j + 1) for j in range(len(cells[0][1]))]), *cells])
 
 
 def angle_text(value: float) -> str:

@@ -250,3 +250,12 @@ def test_pictures_refuse_other_words_for_dark_and_folders_that_are_not_there(rx9
     for path, words in ((tmp_path, "is a folder"), (tmp_path / "no" / "a.html", "no folder")):
         with pytest.raises(rm.errors.InvalidValueError, match=words):
             scene.save(path)
+
+
+def test_values_print_as_tables(rx90):
+    assert "│ 6 │" in str(rx90.drive)
+    assert len(repr(rx90.parts)) < 80
+    limits = rm.trajectories.MotionLimits(velocity=[1.0, 2.0], upper=3.0)
+    assert "upper" in str(limits)
+    assert "jerk" not in str(limits)
+    assert str(rm.trajectories.MotionLimits()) == "MotionLimits: no limits"

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from .._arrays import LARGEST, Array, Value, as_bounded, read_only
 from .._choices import chosen
 from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..table_text import joints_text
 
 
 class DriveKind(Enum):
@@ -123,6 +124,9 @@ class DriveParameters(Value):
             raise ShapeError(f"Drive parameters are all of shape (n,), got {shapes}.")
         for name in given:
             object.__setattr__(self, name, read_only(values.get(name, np.zeros(shape))))
+
+    def __str__(self) -> str:
+        return joints_text({key: getattr(self, key) for key in ("Ia", "Fv", "Fc", "offset")})
 
     @classmethod
     def zeros(cls, n: int) -> Self:

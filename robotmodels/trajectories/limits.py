@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
+from ..table_text import joints_text
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +53,12 @@ class MotionLimits:
     jerk_lower: Array = None  # type: ignore[assignment]
     lower: Array = -np.inf  # type: ignore[assignment]
     upper: Array = np.inf  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        shown = [f for f in fields(self) if np.isfinite(getattr(self, f.name)).any()]
+        rows = np.broadcast_arrays(np.zeros(1), *(getattr(self, f.name) for f in shown))[1:]
+        columns = {f.name: row for f, row in zip(shown, rows, strict=True)}
+        return joints_text(columns) if columns else "MotionLimits: no limits"
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in fields(self)}
