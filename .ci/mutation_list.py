@@ -948,7 +948,7 @@ MUTATIONS = [
         "def shortest_period(", "1.0 / np.where(most", "np.where(most",
         "tests/test_logs.py -k gaps_and_jumps_back_split"),
     Mutation("logs: MAT files", "fields of structures are left out",
-        "def _mat(path: Path)", "isinstance(value, dict)", "value is None",
+        "def read_mat(file", "isinstance(value, dict)", "value is None",
         "tests/test_logs_read.py -k mat_files_and_structures"),
     Mutation("logs: stretches", "stretches are the first of the log",
         "def stretches(log: Log", "len(whole) - 1, count", "count - 1, count",

@@ -2,6 +2,7 @@
 
 import hashlib
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -449,3 +450,32 @@ def test_damaged_and_missing_files_are_refused(tmp_path, name, data, words):
             read_log(path)
     with pytest.raises(FileNotFoundError, match=rf"there is no such file.*{name}"):
         read_log(tmp_path / f"x{name}")
+
+
+def test_damaged_mat_files_are_refused_before_scipy_reads_them(tmp_path):
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": np.arange(9.0), "q": np.zeros((9, 2)), "tau": np.ones((9, 2))})
+    data = bytearray(path.read_bytes())
+    for k in range(128, len(data), 8):  # unknown types and lengths end a process in its reader
+        path.write_bytes(data[:k] + b"\xba\xba\xba\xba" + data[k + 4 :])
+        with suppress(InvalidValueError):
+            assert len(read_log(path)) <= 9
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(InvalidValueError, match=r"no MAT file that can be read.*save\(file, '-v7'"):
+        read_log(path)
+
+
+def test_numbers_whose_squares_are_not_finite_are_refused():
+    t = np.arange(9.0) * 0.01
+    for word in ("t", "q1", "tau1"):
+        columns = {"t": t.copy(), "q1": np.sin(t), "tau1": np.cos(t)}
+        columns[word][4] = -1e200 if word == "t" else 1e200
+        with pytest.raises(InvalidValueError, match="check the units"):
+            read_log(columns)
+
+
+def test_a_pose_with_huge_numbers_is_refused_without_warnings():
+    from robotmodels import se3
+
+    with pytest.raises(ValueError, match="not a rotation"):
+        se3.as_pose(np.diag([1e200, 1e200, 1e200, 1.0]))

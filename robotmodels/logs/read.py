@@ -71,8 +71,7 @@ def read_log(
     ----------
     path : str, Path, mapping of columns, or iterable of these
         One file (or dictionary of arrays, or data frame) or several, each of which is a recording
-        of its own. ``.npz``, ``.parquet`` and ``.mat`` files are read as such, others as text. A
-        damaged MAT file may end the process, in SciPy's reader.
+        of its own. ``.npz``, ``.parquet`` and ``.mat`` files are read as such, others as text.
     torques_from : same as path, optional
         Files of the torques, one for each of ``path``: joined by time (cubic splines between the
         rows) where both have times, by row otherwise.

@@ -15,6 +15,7 @@ import numpy as np
 from .._arrays import Array
 from ..csv_table import Column, CsvTable, column_number, is_number, open_table
 from ..errors import InvalidValueError, MissingExtraError, nearest_names
+from .mat import read_mat
 
 Choice = Column | Sequence[Column]
 
@@ -164,48 +165,8 @@ def _npz(path: Path) -> dict[str, Any]:
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    """Variables of a MAT file, those in structures as "log.q"; SciPy may crash on damaged files."""
-    from scipy.io import loadmat
-
-    def flat(values: dict[str, Any], head: str = "") -> Iterator[tuple[str, Any]]:
-        for name, value in values.items():
-            if isinstance(value, dict):
-                yield from flat(value, f"{head}{name}.")
-            elif not name.startswith("__"):
-                yield head + name, value
-
-    advice = "in MATLAB save it with save(file, '-v7'), or write CSV"
-    with _opened(path, "MAT", advice) as file:
-        head = file.read(520)
-        file.seek(0)
-        if b"MATLAB 7.3" in head[:128] and head[512:516] == b"\x89HDF":
-            return _mat_7_3(file)
-        return dict(flat(loadmat(file, simplify_cells=True)))
-
-
-def _mat_7_3(file: BinaryIO) -> dict[str, Any]:
-    """Arrays and texts of a MAT file of version 7.3 (HDF5), those in structures as "log.q"."""
-    try:
-        import h5py
-    except ImportError:
-        raise MissingExtraError(
-            "MAT files of version 7.3 need h5py: pip install 'robotmodels[logs]'; or save the file "
-            "with save(file, '-v7')."
-        ) from None
-    found: dict[str, Any] = {}
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-            kind = item.attrs.get("MATLAB_class", b"").decode()
-            value = item[()]
-            if kind == "char":
-                found[name.replace("/", ".")] = "".join(map(chr, np.ravel(value)))
-            elif value.dtype.kind in "fiub":
-                found[name.replace("/", ".")] = value.T  # MATLAB stores columns first
-
-    with h5py.File(file, "r") as stored:
-        stored.visititems(visit)
-    return found
+    with _opened(path, "MAT", "in MATLAB save it with save(file, '-v7'), or write CSV") as file:
+        return read_mat(file)
 
 
 def _parquet(path: Path) -> dict[str, Any]:
@@ -243,7 +204,8 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     for name, value in stored.items():
         array = np.asarray(value)
         if array.dtype.kind in "fiub" and array.ndim <= 2 and array.size > 1:
-            whole = array.astype(np.float64)
+            with np.errstate(invalid="ignore"):  # signalling NaN of damaged files
+                whole = array.astype(np.float64)
             flat = whole.ndim == 1 or 1 in whole.shape
             matrices[name] = whole.reshape(-1, 1) if flat else whole
         elif array.dtype.kind in "UO" and all(isinstance(x, str | int | float) for x in array.flat):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
+from .._arrays import LARGEST, Array, as_bounded
 from ..errors import InvalidValueError
 from .log import RefusedRows
 
@@ -54,6 +54,8 @@ def regular_rows(
     known = dt if t is None else None
     stamps = np.asarray(np.arange(N) * (known or 1.0) if t is None else t, np.float64)
     good = np.isfinite(values).all(axis=1) & np.isfinite(stamps)
+    for numbers in (stamps[good], values[good]):
+        as_bounded(numbers, source, LARGEST)
     kept = np.flatnonzero(good)
     again = np.diff(stamps[kept], prepend=np.nan) == 0.0
     if again.sum() > _REPEATED * len(kept):

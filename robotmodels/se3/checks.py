@@ -64,16 +64,17 @@ def as_pose(T: Any, name: str = "T") -> Array:
         hint = " It looks transposed: its last column is 0 0 0 1." if column else ""
         raise NotARotationError(f"{name}: the last row of a pose must be 0 0 0 1.{hint}")
     R = T[..., :3, :3]
-    off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+        det = np.linalg.det(R)
     worst = float(off.max())
-    mirrors = np.linalg.det(R) < 0
-    if worst > ROTATION_TOLERANCE or mirrors.any():
-        fault = off if worst > ROTATION_TOLERANCE else mirrors
+    if not worst <= ROTATION_TOLERANCE or (det < 0).any():
+        fault = det < 0 if worst <= ROTATION_TOLERANCE else off
         i = np.unravel_index(int(fault.argmax()), fault.shape) if off.ndim else ()
         row = f" (row {', '.join(map(str, i))})" if i else ""
         raise NotARotationError(
             f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by "
-            f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
+            f"{float(off[i]):.2g} and det R = {float(det[i]):.6g}; at most "
             f"{ROTATION_TOLERANCE:g} is accepted and rounded away. `se3.nearest_pose(T)` makes a "
             "typed or rounded matrix a pose."
         )

@@ -307,6 +307,8 @@ def parquet(random, good):
         value = np.asarray(value)
         if value.dtype.kind in "cS" or value.ndim > 2:
             value = np.zeros(len(value)) if value.ndim else np.zeros(3)
+        if value.dtype.kind == "u":  # Arrow makes signed ones of Python's numbers
+            value = value.astype(np.float64)
         cells = value.tolist() if value.ndim else [value.item()]
         if cells and random.random() < 0.15:
             cells[random.randrange(len(cells))] = None
