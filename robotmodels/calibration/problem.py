@@ -106,7 +106,7 @@ def as_measurements(
     """Check measurements: one or several."""
     if isinstance(measurements, Measurement):
         return (measurements,)
-    found = tuple(measurements)
+    found = tuple(measurements) if isinstance(measurements, Iterable) else (measurements,)
     if not found:
         raise InvalidValueError(f"{name}: expected one or more, got none.")
     for k, m in enumerate(found):
