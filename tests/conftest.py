@@ -16,6 +16,7 @@ settings.register_profile(
     "quick", max_examples=25, deadline=None, derandomize=True, database=None, print_blob=True
 )
 settings.register_profile("thorough", max_examples=1000, deadline=None, print_blob=True)
+collect_ignore = ["nightly"]  # programs of their own: planted faults, the fuzzer
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 

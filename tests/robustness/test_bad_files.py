@@ -12,7 +12,7 @@ from robustness.outcomes import Outcome
 
 pytestmark = pytest.mark.nightly
 
-# slow ones draw fewer: they are fuzzed for longer by .ci/fuzz.py
+# slow ones draw fewer: they are fuzzed for longer by tests/nightly/fuzz.py
 EXAMPLES = {"urdf": 300, "par": 300, "log_csv": 200, "rows": 300}
 
 

@@ -1,10 +1,10 @@
 """Change one sign, index or factor of the numeric core at a time: a test must fail each time.
 
-    python .ci/mutations.py                 # all of them, and tests/mutations.md is written
-    python .ci/mutations.py --sample 5      # some, chosen at random: for every change
-    python .ci/mutations.py --only dry      # those whose room or fault has this word
-    python .ci/mutations.py --jobs 1        # one after the other; default: as processors
-    python .ci/mutations.py --places        # only look whether every text is still found
+    python tests/nightly/mutations.py              # all of them; tests/mutations.md is written
+    python tests/nightly/mutations.py --sample 5   # some, chosen at random: for every change
+    python tests/nightly/mutations.py --only dry   # those whose room or fault has this word
+    python tests/nightly/mutations.py --jobs 1     # one after the other; default: as processors
+    python tests/nightly/mutations.py --places     # only look whether every text is still found
 
 The list is `mutation_list.py`. Each fault is put into a copy of the package in a temporary folder,
 one for each job, never into the checkout. Kernels run uncompiled there (``NUMBA_DISABLE_JIT``),
@@ -35,7 +35,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).parent))
 from mutation_list import MUTATIONS, Mutation
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+CHECKOUT = Path(__file__).resolve().parents[2]
 # Importing what the package stands on takes longer than most tests here: it is done once.
 FORKS = multiprocessing.get_context("forkserver")
 STOOD_ON = ["numpy", "numba", "pinocchio", "hypothesis", "pytest", "scipy.linalg", "scipy.optimize"]
@@ -224,8 +224,8 @@ def page(outcomes: list[Outcome], minutes: float, jobs: int) -> str:
         "# Faults that were tried",
         "",
         "One sign, index, factor or term of the numeric core is changed at a time; a test must",
-        "fail. Written by `python .ci/mutations.py`; the changes themselves, text by text, are in",
-        "`.ci/mutation_list.py`.",
+        "fail. Written by `python tests/nightly/mutations.py`; the changes themselves, text by text,",
+        "are in `tests/nightly/mutation_list.py`.",
         "",
         f"{len(outcomes)} faults, {killed} found, in {minutes:.0f} minutes ({jobs} at a time, "
         f"{sum(o.seconds for o in outcomes) / 60.0:.0f} minutes one after the other).",
@@ -263,7 +263,7 @@ def main() -> int:
         except LookupError as error:
             lost.append(f"{mutation.room}, {mutation.fault}: {error}")
     if lost:
-        print("\n".join(lost), "repair .ci/mutation_list.py", sep="\n")
+        print("\n".join(lost), "repair tests/nightly/mutation_list.py", sep="\n")
         return 1
     if given.places:
         print(f"{len(chosen)} texts are found")

@@ -1,6 +1,6 @@
 """Coverage-guided fuzzing of everything that reads a file.
 
-    python .ci/fuzz.py TARGET --runs N [--seed K] [--corpus FOLDER]
+    python tests/nightly/fuzz.py TARGET --runs N [--seed K] [--corpus FOLDER]
 
 Needs atheris (Apache-2.0, pip install atheris), which is no dependency of the package, in the
 environment of the package. TARGET is one of those of tests/robustness/inputs.py, or all. Inputs are
@@ -20,7 +20,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 # compiled kernels are left as they are: Numba compiles the byte code that atheris would change
