@@ -224,8 +224,8 @@ def page(outcomes: list[Outcome], minutes: float, jobs: int) -> str:
         "# Faults that were tried",
         "",
         "One sign, index, factor or term of the numeric core is changed at a time; a test must",
-        "fail. Written by `python tests/nightly/mutations.py`; the changes themselves, text by text,",
-        "are in `tests/nightly/mutation_list.py`.",
+        "fail. Written by `python tests/nightly/mutations.py`; the changes themselves, text by",
+        "text, are in `tests/nightly/mutation_list.py`.",
         "",
         f"{len(outcomes)} faults, {killed} found, in {minutes:.0f} minutes ({jobs} at a time, "
         f"{sum(o.seconds for o in outcomes) / 60.0:.0f} minutes one after the other).",
