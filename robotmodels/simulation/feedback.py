@@ -80,11 +80,13 @@ class Feedback:
                 f"delay: expected at most the duration {end - start:.6g} s, got {delay:.6g} s; "
                 "no torque would act."
             )
-        taken: Array = start + period * np.arange(max(1, ceil((end - start) / period - 1e-9)))
+        taken: Array = start + period * np.arange(
+            max(1, ceil((end - start) / period - 1e-9)), dtype=np.float64
+        )
         # a torque that acts at a later sample acts exactly then
         whole = int(delay / period + 1e-9)
         rest = delay - whole * period
-        acts: Array = start + period * (np.arange(len(taken)) + whole)
+        acts: Array = start + period * (np.arange(len(taken), dtype=np.float64) + whole)
         acts = acts if rest < 1e-9 * period else acts + rest
         taken = _snapped(taken, near, 1e-9 * period)
         acts = _snapped(acts, near, 1e-9 * period)

@@ -46,6 +46,7 @@ class Motion:
         drive: bool,
         friction: Friction | None,
         width: Array | None = None,
+        disturbance: Law | None = None,
     ) -> None:
         from ..kernels.mass import joint_accelerations, mass_matrices
         from ..kernels.poses import jacobians
@@ -53,6 +54,7 @@ class Motion:
 
         n = model.n
         self.n, self.control, self.wrench, self.width = n, control, wrench, width
+        self.disturbance = disturbance
         self.extra, self.placed = by_dependence(friction)
         self.jump = jump_at_rest(friction, n)
         self.dry = self.smooth = dry_friction(model, drive, friction)
@@ -139,6 +141,8 @@ class Motion:
             J = np.empty((1, 6, self.n))
             self._jacobians(q.reshape(1, self.n), *self._tool, J)
             tool = self.wrench(time, q, v) @ J[0]
+        if self.disturbance is not None:
+            tool = tool - self.disturbance(time, q, v)
         return tau - friction - self.offset - tool, tau, friction, tool
 
     def balance(self, t: float, y: Array) -> tuple[Array, Array]:

@@ -47,6 +47,7 @@ def simulate(
     progress: bool | Callable[[float], None] = False,
     period: float | None = None,
     delay: float = 0.0,
+    disturbance: Callable[..., ArrayLike] | ArrayLike | None = None,
 ) -> Simulation:
     """Simulate a robot under torques: integrate the direct dynamic model over time.
 
@@ -102,6 +103,9 @@ def simulate(
         by Euler steps. Default: continuous.
     delay : float
         Time from a sample to its torque, s; zero torque acts before the first.
+    disturbance : callable, or array_like of shape (n,) or (N, n), optional
+        Torques of the surroundings on the joints, given as functions of (t, q, v) or arrays. Their
+        work is counted with that of the wrench.
 
     Returns
     -------
@@ -142,6 +146,7 @@ def simulate(
         torque, knots = _law(control, n, times, "control")
         law = Feedback(torque and (lambda t, q, v, x: torque(t, q, v)))
     tool, tool_knots = _law(wrench, 6, times, "wrench")
+    push, push_knots = _law(disturbance, n, times, "disturbance")
     if friction is not None:
         check_friction(friction, n)
     width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
@@ -153,7 +158,7 @@ def simulate(
         law.sample((start, end), every, wait, given)
         knots = np.empty(0)
     held = {*jumps.tolist(), *law.instants}
-    inside = sorted(x for x in {*held, *knots, *tool_knots} if start < x < end)
+    inside = sorted(x for x in {*held, *knots, *tool_knots, *push_knots} if start < x < end)
     cuts = [(float(x), x in held) for x in (start, *inside, end)]
     if max_evaluations is None:  # default: a few seconds of computing time
         max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
@@ -165,7 +170,7 @@ def simulate(
         "max_step": float(_positive(max_step, "max_step")),
     }
     limits = _limits(model, q) if stop_at_limits else None
-    motion = Motion(model, law, tool, drive, friction, width)
+    motion = Motion(model, law, tool, drive, friction, width, push)
     check_dissipates(motion.dry)
     _check_start(model, q, v, drive)
     report = _log_progress if progress is True else progress or None
