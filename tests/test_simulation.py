@@ -451,3 +451,92 @@ def test_maps_over_joints():
     ):
         with pytest.raises(RobotModelsError, match=message):
             dynamics_map(arm, **wrong)
+
+
+# --- feedback ----------------------------------------------------------------------------------
+
+
+class WithIntegral:
+    """A law of a slider of 2 kg whose closed loop has a triple pole at -w."""
+
+    def __init__(self, w):
+        self.w, self.state0 = w, np.array([0.5])
+
+    def command(self, t, q, v, x):
+        return -2.0 * (3.0 * self.w**2 * q + 3.0 * self.w * v + self.w**3 * x)
+
+    def rate(self, t, q, v, x):
+        return q
+
+
+def test_the_state_of_a_control_is_integrated_along():
+    w, t = 3.0, np.linspace(0.0, 2.0, 9)
+    sim = simulate(slider(), [0.0], [0.0], WithIntegral(w), t)
+    # x''' + 3 w x'' + 3 w^2 x' + w^3 x = 0 with x(0) = 1/2 and x'(0) = x''(0) = 0
+    exact = 0.5 * (1.0 + w * t + 0.5 * (w * t) ** 2) * np.exp(-w * t)
+    assert np.allclose(sim.state[:, 0], exact, atol=1e-10)
+    assert np.allclose(sim.q[:, 0], -0.25 * w**3 * t**2 * np.exp(-w * t), atol=1e-10)
+    assert sim.relative_drift < 1e-9
+    assert simulate(slider(), [0.0], [0.0], [1.0], t).state.shape == (9, 0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1, 0.23])
+def test_a_sampled_control_holds_its_torque_and_advances_by_euler(delay):
+    h, law, t = 0.05, WithIntegral(1.5), np.linspace(0.0, 1.0, 21)
+    sim = simulate(slider(), [0.2], [0.0], law, t, period=h, delay=delay)
+    # exact motion under held forces, on the grid of samples and of delayed torques
+    grid = np.unique(np.round(np.concatenate([t, t + delay]), 9))
+    sent, q, v, x, tau, found = [], 0.2, 0.0, law.state0, 0.0, []
+    for k, now in enumerate(grid[grid <= 1.0]):
+        if np.isclose(t, now).any():
+            sent.append((now + delay, law.command(now, q, v, x)[0]))
+            found.append((q, v, x[0]))
+            x = x + h * q
+        tau = next((u for start, u in reversed(sent) if start <= now + 1e-9), 0.0)
+        step = grid[k + 1] - now if k + 1 < grid.size else 0.0
+        q, v = q + step * v + 0.25 * step**2 * tau, v + 0.5 * step * tau
+    q, v, x = np.array(found)[:-1].T
+    assert np.allclose(sim.q[:-1, 0], q, atol=1e-11)
+    assert np.allclose(sim.v[:-1, 0], v, atol=1e-11)
+    assert np.allclose(sim.state[:-1, 0], x, atol=1e-11)
+    late = int(np.ceil(delay / h - 1e-9))
+    assert (sim.tau[:late] == 0.0).all()
+    now = [law.command(0.0, *state) for state in zip(sim.q, sim.v, sim.state, strict=True)]
+    assert np.allclose(sim.tau[late:-1], now[: 20 - late], atol=1e-11)
+    assert sim.relative_drift < 1e-9
+
+
+def test_functions_and_rows_are_sampled_too():
+    t = np.linspace(0.0, 1.0, 5)
+    rows = simulate(slider(), [0.0], None, t[:, None], t, period=0.25)
+    law = simulate(slider(), [0.0], None, lambda t, q, v: [t], t, period=0.25)
+    assert rows.v[-1, 0] == law.v[-1, 0] == pytest.approx(0.25 * (0.25 + 0.5 + 0.75) / 2.0)
+    assert np.allclose(law.tau[:-1, 0], t[:-1])  # a sample belongs to the time after it
+    beside = np.array([0.0, 0.25 - 1e-13, 0.5 + 1e-13, 1.0])  # rounding of times is no instant
+    near = simulate(slider(), [0.0], None, t[:, None], t, period=0.25, breaks=beside)
+    assert np.allclose(near.v, rows.v, atol=1e-12)
+    steps = simulate(slider(), [0.0], None, lambda t, q, v: [t], 1.0, period=0.25)
+    assert set(np.arange(4) / 4) <= set(steps.t.tolist())
+    assert np.isin(steps.tau[:-1, 0], np.arange(4) / 4).all()
+
+
+class Broken(WithIntegral):
+    def rate(self, t, q, v, x):
+        return [np.nan]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"period": 0.0}, "period: expected a finite number above 0"),
+        ({"period": 0.1, "delay": -1.0}, "delay: expected a finite number of at least 0"),
+        ({"delay": 0.1}, "only a sampled control is delayed"),
+        ({"period": 0.1, "delay": 2.0}, "at most the duration 1 s, got 2 s"),
+        ({"period": 1e-9}, "would sample more than"),
+        ({"period": 0.1, "control": None}, "no control to sample"),
+        ({"control": Broken(1.0)}, r"control.rate\(t, q, v, x\) at t = 0 s: expected finite"),
+    ],
+)
+def test_mistakes_of_feedback_are_named(arguments, message):
+    with pytest.raises(InvalidValueError, match=message):
+        simulate(slider(), [0.1], **{"control": WithIntegral(1.0), "t": 1.0} | arguments)

@@ -6,6 +6,7 @@ the first call.
 """
 
 from .dynamics_map import DynamicsMap, dynamics_map
+from .feedback import StatefulControl
 from .result import (
     Integrator,
     Simulation,
@@ -23,6 +24,7 @@ __all__ = [
     "SimulationEvent",
     "SimulationEventKind",
     "SimulationStatus",
+    "StatefulControl",
     "TorqueParts",
     "dynamics_map",
     "simulate",

@@ -65,18 +65,21 @@ class Integration:
 
     def follow(self, q: Array, v: Array, cuts: Sequence[tuple[float, bool]]) -> None:
         """Integrate between times at which laws have kinks or (True) jumps. Shapes: q, v (n,)."""
-        t, y = cuts[0][0], np.concatenate([q, v, np.zeros(4)])
+        control = self.motion.control
+        t, y = cuts[0][0], np.concatenate([q, v, np.zeros(4), control.state0])
         self._start, self._end = t, cuts[-1][0]
         for (begin, jumped), (end, jumps) in pairwise(cuts):
             if self.status:
                 break
             # laws are evaluated before a jump only, until it is reached
             self.motion.latest = max(nextafter(end, begin), begin) if jumps else np.inf
-            if not self.t:
-                y = self._decide(t, y, first=True)
-                self._sample(t, y)
-            elif jumped:
-                y = self._decide(t, y)
+            control.tick(t, *np.split(y[: 2 * len(q)].copy(), 2))
+            if not self.t or jumped:
+                y = self._decide(t, y, first=not self.t)
+                if self.times is None or self._next == t:
+                    self._sample(t, y)
+            # samples at a jump belong to the time after it
+            self._open = end if jumps and end < self._end else np.inf
             while t < end and not self.status:
                 t, y, event = self._smooth(t, y, end)
                 if event is not None:
@@ -109,13 +112,13 @@ class Integration:
                 old, t, y = t, float(solver.t), solver.y
                 # the last step was shortened by the bound, the next need not be
                 self._step = max(before, float(solver.h_abs))
-                dense: Any = solver.dense_output() if watched or self._next <= t else None
+                dense: Any = solver.dense_output() if watched or self._next < t else None
                 event = self._first_event(old, t, dense) if watched else None
                 if event is not None:
                     t, y, self._step = event.t, dense(event.t), None
-                while (time := self._next) <= t:
+                while (time := self._next) <= t and time != self._open:
                     self._sample(time, y if time == t else dense(time))
-                if self.times is None and t > self.t[-1]:
+                if self.times is None and self.t[-1] < t != self._open:
                     self._sample(t, y)
                 done = (t - self._start) / (self._end - self._start)
                 if self.progress is not None and (done >= self._reported + 0.01 or done >= 1.0):
@@ -142,11 +145,12 @@ class Integration:
 
     def _sample(self, t: float, y: Array) -> None:
         n, motion = self.motion.n, self.motion
-        q, v, works = np.split(y[: 2 * n + 3].copy(), [n, 2 * n])
-        at = motion.at(t, q, v)
+        q, v, works, _, x = np.split(y.copy(), [n, 2 * n, 2 * n + 3, 2 * n + 4])
+        at = motion.at(t, q, v, x)
         self.t.append(t)
         held = motion.joint_signs == 0.0
-        self.rows.append((q, v, at.a, at.tau.copy(), at.friction, held, works))
+        state = motion.control.state(x)
+        self.rows.append((q, v, at.a, at.tau.copy(), at.friction, held, works, state))
 
     def _first_event(self, t_old: float, t_new: float, dense: Any) -> Event | None:
         """The first event inside a step: speeds and limits are linear in y, margins are not."""
@@ -171,7 +175,8 @@ class Integration:
 
         def margin(s: float) -> float:
             y = np.ascontiguousarray(dense(s))
-            return self.dry.margin(mode, self.motion.at(s, y[:n], y[n : 2 * n]).reaction)
+            at = self.motion.at(s, y[:n], y[n : 2 * n], y[2 * n + 4 :])
+            return self.dry.margin(mode, at.reaction)
 
         # torques after the first event belong to another mode
         within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]

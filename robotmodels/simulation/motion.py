@@ -17,9 +17,10 @@ from ..friction import Friction
 from ..friction.protocols import by_dependence, torque_at
 from ..model import RobotModel
 from .dry_friction import SLOWEST, Mode, dry_friction, jump_at_rest
+from .feedback import Feedback
 
 Law = Callable[[float, Array, Array], Array]
-"""Torques or a wrench at time t, positions q and velocities v."""
+"""A wrench at time t, positions q and velocities v."""
 
 _WORLD_ALIGNED = 0  # frame code of the kernels
 
@@ -40,11 +41,12 @@ class Motion:
     def __init__(
         self,
         model: RobotModel,
-        control: Law | None,
+        control: Feedback,
         wrench: Law | None,
         drive: bool,
         friction: Friction | None,
         width: Array | None = None,
+        disturbance: Law | None = None,
     ) -> None:
         from ..kernels.mass import joint_accelerations, mass_matrices
         from ..kernels.poses import jacobians
@@ -52,6 +54,7 @@ class Motion:
 
         n = model.n
         self.n, self.control, self.wrench, self.width = n, control, wrench, width
+        self.disturbance = disturbance
         self.extra, self.placed = by_dependence(friction)
         self.jump = jump_at_rest(friction, n)
         self.dry = self.smooth = dry_friction(model, drive, friction)
@@ -80,26 +83,27 @@ class Motion:
         self.joint_signs = self.dry.joint_signs(mode.signs)
 
     def derivative(self, t: float, y: Array) -> Array:
-        """Time derivative of positions, velocities, three works, and the reaction of friction.
+        """Time derivative of positions, velocities, three works, reaction of friction, and control.
 
         The integral of the reaction includes torques at rest in the step control.
         """
         n, y = self.n, np.ascontiguousarray(y)
         if not isfinite(y @ y):  # guard: squares overflow
             self.evaluations += 1
-            return np.full(2 * n + 4, np.nan)
-        v = y[n : 2 * n]
-        at = self.at(t, y[:n], v)
+            return np.full(y.size, np.nan)
+        q, v, x = y[:n], y[n : 2 * n], y[2 * n + 4 :]
+        at = self.at(t, q, v, x)
         control, friction = at.tau @ v, (at.friction + self.offset) @ v
         return np.concatenate(
             [v, at.a, (control, friction, at.tool @ v, at.reaction @ self._weights)]
+            + ([self.control.rate(min(t, self.latest), q, v, x)] if x.size else [])
         )
 
-    def at(self, t: float, q: Array, v: Array) -> Loads:
+    def at(self, t: float, q: Array, v: Array, x: Array) -> Loads:
         """Accelerations and torques at one time; NaN accelerations where M is singular."""
         self.evaluations += 1
         n, zero = self.n, self._zero[0]
-        load, tau, friction, tool = self.load(t, q, v)
+        load, tau, friction, tool = self.load(t, q, v, x)
         if not self.mode.stuck.size:
             a, rows = np.empty((1, n)), (x.reshape(1, n) for x in (q, v, load))
             # a mass matrix that is not positive definite was so at the start: singular in between
@@ -124,11 +128,12 @@ class Motion:
         self._masses(row, *self._bodies, M)
         return M[0] + self.rotor, h[0]
 
-    def load(self, t: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+    def load(self, t: float, q: Array, v: Array, x: Array) -> tuple[Array, Array, Array, Array]:
         """Torque on the bodies, of the control, of friction, and for the wrench; each (n,)."""
-        time, tau, tool = min(t, self.latest), self._zero[0], self._zero[0]
-        if self.control is not None:
-            tau = self.control(time, q, v)
+        time, tool = min(t, self.latest), self._zero[0]
+        tau = self.control.torque(time, q, v, x)
+        if tau is None:
+            tau = self._zero[0]
         friction = self.friction(v)
         if self.placed is not None:
             friction = friction + torque_at(self.placed, v, q)
@@ -136,14 +141,17 @@ class Motion:
             J = np.empty((1, 6, self.n))
             self._jacobians(q.reshape(1, self.n), *self._tool, J)
             tool = self.wrench(time, q, v) @ J[0]
+        if self.disturbance is not None:
+            tool = tool - self.disturbance(time, q, v)
         return tau - friction - self.offset - tool, tau, friction, tool
 
     def balance(self, t: float, y: Array) -> tuple[Array, Array]:
         """Mass matrix, and the torques without reactions at rest, in a state."""
         self.evaluations += 1
-        q, v = y[: self.n].copy(), y[self.n : 2 * self.n].copy()
+        n = self.n
+        q, v, x = y[:n].copy(), y[n : 2 * n].copy(), y[2 * n + 4 :].copy()
         M, h = self.bodies(q, v)
-        return M, self.load(t, q, v)[0] - h
+        return M, self.load(t, q, v, x)[0] - h
 
     def friction(self, v: Array) -> Array:
         """Torque of friction that depends on velocities, without the reactions at rest."""

@@ -122,6 +122,8 @@ class Simulation(Rebuilt):
         Why it ended.
     evaluations, steps : int
         Numbers of evaluations of the model and of steps of the integrator.
+    state : ndarray, shape (N, k)
+        State of the control law; k = 0 without one.
 
     Examples
     --------
@@ -150,6 +152,7 @@ class Simulation(Rebuilt):
     status: SimulationStatus
     evaluations: int
     steps: int
+    state: Array
 
     def __post_init__(self) -> None:
         for field in fields(self):

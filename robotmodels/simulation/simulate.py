@@ -17,6 +17,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
+from .feedback import Feedback, StatefulControl, checked, sampling, stateful
 from .integration import Integration
 from .motion import Law, Motion
 from .result import Integrator, Simulation
@@ -29,7 +30,7 @@ def simulate(
     model: RobotModel,
     q0: ArrayLike,
     v0: ArrayLike | None = None,
-    control: Callable[..., ArrayLike] | ArrayLike | None = None,
+    control: Callable[..., ArrayLike] | StatefulControl | ArrayLike | None = None,
     t: ArrayLike = 1.0,
     wrench: Callable[..., ArrayLike] | ArrayLike | None = None,
     *,
@@ -44,6 +45,9 @@ def simulate(
     max_step: float = np.inf,
     max_evaluations: int | None = None,
     progress: bool | Callable[[float], None] = False,
+    period: float | None = None,
+    delay: float = 0.0,
+    disturbance: Callable[..., ArrayLike] | ArrayLike | None = None,
 ) -> Simulation:
     """Simulate a robot under torques: integrate the direct dynamic model over time.
 
@@ -59,9 +63,10 @@ def simulate(
         The robot, n joints; a payload is part of it (`with_payload`).
     q0, v0 : array_like, shape (n,)
         Positions (rad or m) and velocities at the start; default at rest.
-    control : callable, or array_like of shape (n,) or (N, n), optional
-        Torques, N m or N: a function of (t, q, v), constant ones, or rows for the N times ``t``,
-        linear between them. Default none: the arm falls freely.
+    control : callable, StatefulControl, or array_like of shape (n,) or (N, n), optional
+        Torques, N m or N: a function of (t, q, v), a law with a state that is integrated along,
+        constant ones, or rows for the N times ``t``, linear between them. Default none: the arm
+        falls freely.
     t : array_like
         A duration in seconds, with samples at the steps of the integrator; or ascending times (N,)
         of the samples, the first one the start.
@@ -93,6 +98,14 @@ def simulate(
         needs about 1000 a second.
     progress : bool or callable
         A function of the fraction done, called for about every hundredth; True logs it.
+    period : float, optional
+        Sampling period of the control, s: its torques are held between samples, its state advances
+        by Euler steps. Default: continuous.
+    delay : float
+        Time from a sample to its torque, s; zero torque acts before the first.
+    disturbance : callable, or array_like of shape (n,) or (N, n), optional
+        Torques of the surroundings on the joints, given as functions of (t, q, v) or arrays. Their
+        work is counted with that of the wrench.
 
     Returns
     -------
@@ -106,7 +119,8 @@ def simulate(
     ShapeError, InvalidValueError
         Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
         a start outside the limits, or so fast that its energy is not finite; limits requested that
-        no joint has; negative dry friction; joints that mimic others.
+        no joint has; negative dry friction; joints that mimic others; a delay without a period, or
+        longer than the simulation.
 
     References
     ----------
@@ -126,15 +140,26 @@ def simulate(
     q = as_exact(q0, (n,), "q0").copy()
     v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
     start, end, times = _times(t)
-    law, knots = _law(control, n, times, "control")
+    if isinstance(control, StatefulControl):
+        law, knots = stateful(control, n), np.empty(0)
+    else:
+        torque, knots = _law(control, n, times, "control")
+        law = Feedback(torque and (lambda t, q, v, x: torque(t, q, v)))
     tool, tool_knots = _law(wrench, 6, times, "wrench")
+    push, push_knots = _law(disturbance, n, times, "disturbance")
     if friction is not None:
         check_friction(friction, n)
     width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
     if (jumps := as_floats(breaks, "breaks")).ndim != 1:
         raise ShapeError(f"breaks: expected times of shape (K,), got {jumps.shape}.")
-    inside = sorted(x for x in {*jumps, *knots, *tool_knots} if start < x < end)
-    cuts = [(float(x), x in jumps) for x in (start, *inside, end)]
+    every, wait = sampling(period, delay)
+    if every is not None:
+        given = jumps if times is None else np.concatenate([jumps, times])
+        law.sample((start, end), every, wait, given)
+        knots = np.empty(0)
+    held = {*jumps.tolist(), *law.instants}
+    inside = sorted(x for x in {*held, *knots, *tool_knots, *push_knots} if start < x < end)
+    cuts = [(float(x), x in held) for x in (start, *inside, end)]
     if max_evaluations is None:  # default: a few seconds of computing time
         max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
     budget = int(_positive(max_evaluations, "max_evaluations", least=1))
@@ -145,23 +170,24 @@ def simulate(
         "max_step": float(_positive(max_step, "max_step")),
     }
     limits = _limits(model, q) if stop_at_limits else None
-    motion = Motion(model, law, tool, drive, friction, width)
+    motion = Motion(model, law, tool, drive, friction, width, push)
     check_dissipates(motion.dry)
     _check_start(model, q, v, drive)
     report = _log_progress if progress is True else progress or None
     run = Integration(motion, times, limits, integrator, tolerances, budget, report)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
-    q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
+    q, v, a, tau, taken, sticks, works, state = (np.array(x) for x in zip(*run.rows, strict=True))
     kinetic, potential = kinetic_energy(model, q, v, drive), potential_energy(model, q)
     return Simulation(
-        *(model, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
+        *(model, np.array(run.t), q, v, a, tau, taken, sticks, kinetic, potential),
         *works.T.copy(),
         drive=bool(drive),
         events=tuple(run.events),
         status=run.status,
         evaluations=motion.evaluations,
         steps=run.steps,
+        state=state,
     )
 
 
@@ -175,7 +201,7 @@ def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, A
     if law is None:
         return None, none
     if callable(law):
-        return _checked(law, size, name), none
+        return checked(law, size, name, "t, q, v"), none
     values = as_floats(law, name).copy()
     if values.shape == (size,):
         return lambda time, q, v: values, none
@@ -186,21 +212,6 @@ def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, A
             f"({size},){rows}, got shape {values.shape}."
         )
     return lambda time, q, v: np.array([np.interp(time, t, x) for x in values.T]), t[1:-1]
-
-
-def _checked(law: Callable[..., Any], size: int, name: str) -> Law:
-    """User function with checks of its values."""
-
-    def value(t: float, q: Array, v: Array) -> Array:
-        where = f"{name}(t, q, v) at t = {t:.9g} s"
-        try:
-            answer = law(t, q.copy(), v.copy())
-        except Exception as error:
-            error.add_note(f"Raised by {where}.")
-            raise
-        return as_exact(answer, (size,), where)
-
-    return value
 
 
 def _times(t: ArrayLike) -> tuple[float, float, Array | None]:

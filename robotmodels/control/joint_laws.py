@@ -1,0 +1,234 @@
+"""Laws of the joints with constant gains: decentralised PID, PD with gravity, passivity.
+
+The error is ``e = q_d - q``; gains are one number or one for each joint.
+
+Parameters
+----------
+reference : Trajectory, array_like (n,) or callable
+    Positions: a motion, a constant, or a function of t that returns (q, v, a).
+model : RobotModel
+    The robot as the controller believes it to be, n joints.
+kp, ki, kd : float or array_like
+    Gains of the error, of its integral and of its rate; ki may be 0.
+slope, gain : float or array_like
+    Rate at which the error vanishes where ``s = e' + slope e`` is 0, 1/s; torque by s, N m s/rad.
+feedforward : RobotModel or array_like (n,), optional
+    Constant torques, or a model whose torques of the reference motion are added.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Gains that are not positive; a reference for another number of joints; no model.
+
+References
+----------
+Seed book section 5.2.5 (decentralised control); M. Takegaki and S. Arimoto, ASME J. Dyn. Syst.
+Meas. Control 103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and
+W. Li, "Applied Nonlinear Control", 1991, section 9.2.
+
+Examples
+--------
+>>> DecentralizedPID([0.5, 0.2], kp=100.0, ki=50.0, kd=20.0).command(0, [0, 0], [0, 0], [0, 0])
+array([50., 20.])
+>>> PDGravity([0.5, 0.2], kp=100.0, kd=20.0).command(0.0, [0.0, 0.0], [1.0, 0.0])
+array([30., 20.])
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array, Value, as_number, as_vector
+from ..dynamics import gravity_torque, idm, mass_matrix
+from ..errors import InvalidValueError
+from ..model import RobotModel, check_model
+from .law import Law, as_gains, started, virtual_torques
+from .reference import Desired, as_reference, joint_reference
+
+
+@dataclass(frozen=True, slots=True)
+class PIDGains(Value):
+    """Gains of a PID controller of one joint ``inertia q'' + viscous q' = tau``."""
+
+    kp: float
+    ki: float
+    kd: float
+    inertia: float
+    viscous: float = 0.0
+
+    @property
+    def critical_ki(self) -> float:
+        """Integral gain at the border of stability (Routh): ``(kd + viscous) kp / inertia``."""
+        return (self.kd + self.viscous) * self.kp / self.inertia
+
+    @property
+    def margin(self) -> float:
+        """Routh margin ``critical_ki / ki``: stable above 1."""
+        return self.critical_ki / self.ki if self.ki else np.inf
+
+
+def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
+    """Gains of a PID controller that give a joint a triple pole at -omega.
+
+    Parameters
+    ----------
+    inertia, viscous, omega : float
+        Inertia and viscous friction of the joint, kg m^2 and N m s/rad (kg and N s/m); bandwidth,
+        rad/s, above ``viscous / (3 inertia)``.
+
+    Returns
+    -------
+    PIDGains
+        ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
+
+    Examples
+    --------
+    >>> gains = pid_gains(inertia=2.0, viscous=1.0, omega=5.0)
+    >>> gains.kp, gains.kd, gains.ki, gains.margin
+    (150.0, 29.0, 250.0, 9.0)
+    """
+    a, w = as_number(inertia, "inertia", above=0.0), as_number(omega, "omega", above=0.0)
+    f = as_number(viscous, "viscous", least=0.0)
+    if (kd := 3.0 * a * w - f) <= 0.0:
+        raise InvalidValueError(
+            f"omega: expected more than viscous / (3 inertia) = {f / (3.0 * a):.6g} rad/s, the "
+            f"bandwidth of friction alone, got {w:.6g}."
+        )
+    return PIDGains(3.0 * a * w * w, a * w**3, kd, a, f)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class JointLaw(Law):
+    """Parts of laws of the joints: their number, the reference, and its error."""
+
+    n: int = field(init=False)
+    _desired: Desired = field(init=False)
+
+    def _prepare(self: Any, gains: tuple[str, ...], model: Any, zero: str = "") -> None:
+        """Check the model, the reference and the gains."""
+        if model is not None:
+            check_model(model)
+        desired, n = joint_reference(self.reference, model and model.n)
+        self._set(reference=as_reference(self.reference), n=n, _desired=desired)
+        for name in gains:
+            self._set(**{name: as_gains(getattr(self, name), name, n, name == zero)})
+
+    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
+        """Error of the joints, shape (n,)."""
+        return self._desired(t)[0] - as_vector(q, self.n, "q")
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SurfaceLaw(JointLaw):
+    """Parts of laws of ``s = e' + slope e``."""
+
+    def surface(self, t: float, q: Any, v: Any) -> Array:
+        """``s = e' + slope e``, shape (n,)."""
+        _, v, v_r, _ = self._rates(t, q, v)
+        return v_r - v
+
+    def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
+        """``s^T A s / 2``."""
+        s = self.surface(t, q, v)
+        return 0.5 * float(s @ mass_matrix(plant, q) @ s)
+
+    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
+        """Also velocity ``q_d' + slope e`` and acceleration that reduce the error."""
+        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
+        return q, v, v_d + self.slope * (q_d - q), a_d + self.slope * (v_d - v)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class DecentralizedPID(JointLaw):
+    """PID control of each joint alone: ``kp e + kd e' + ki (integral of e) + feedforward``."""
+
+    reference: Any
+    kp: Any
+    ki: Any
+    kd: Any
+    feedforward: Any = None
+
+    def __post_init__(self) -> None:
+        given = self.feedforward
+        model = given if isinstance(given, RobotModel) else None
+        self._prepare(("kp", "ki", "kd"), model, zero="ki")
+        if given is not None and model is None:
+            self._set(feedforward=as_vector(np.asarray(given, float), self.n, "feedforward"))
+
+    @property
+    def state0(self) -> Array:
+        """Integral of the error at the start, zero, shape (n,)."""
+        return np.zeros(self.n)
+
+    def command(self, t: float, q: Any, v: Any, x: Any, wrench: Any = None) -> Array:
+        """Torques, shape (n,)."""
+        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
+        tau = self.kp * (q_d - q) + self.kd * (v_d - v) + self.ki * as_vector(x, self.n, "x")
+        if isinstance(self.feedforward, RobotModel):
+            return tau + idm(self.feedforward, q_d, v_d, a_d)
+        return tau if self.feedforward is None else tau + self.feedforward
+
+    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """The error, shape (n,)."""
+        return self.error(t, q, v)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PDGravity(JointLaw):
+    """PD control with gravity compensation (Takegaki and Arimoto), PD+ for motions (Paden, Panja).
+
+    ``tau = A(q) q_d'' + C(q, q') q_d' + Q(q) + kp e + kd e'``. Without a model nothing is
+    compensated, and there is no Lyapunov function.
+    """
+
+    reference: Any
+    kp: Any
+    kd: Any
+    model: RobotModel | None = None
+
+    def __post_init__(self) -> None:
+        self._prepare(("kp", "kd"), self.model)
+
+    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """Torques, shape (n,)."""
+        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
+        tau = self.kp * (q_d - q) + self.kd * (v_d - v)
+        if (model := self.model) is None:
+            return tau
+        if not (v_d.any() or a_d.any()):
+            return tau + gravity_torque(model, q) + model.drive.offset
+        tau = tau + virtual_torques(model, q, v, v_d, a_d) + model.drive.offset
+        return tau if model.drive_matrices is None else tau + model.drive_matrices.rotor @ a_d
+
+    def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
+        """``(e'^T A e' + e^T kp e) / 2``, with the rate ``-e'^T kd e'``."""
+        e, de = self.error(t, q, v), self._desired(t)[1] - v
+        V = 0.5 * float(de @ mass_matrix(plant, q) @ de + e @ (self.kp * e))
+        return None if self.model is None else V
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Passivity(SurfaceLaw):
+    """Passivity-based control: ``tau = A(q) q_r'' + C(q, q') q_r' + Q(q) + friction + gain s``.
+
+    The reference velocity is ``q_r' = q_d' + slope e``, and ``s = q_r' - q'``.
+    """
+
+    reference: Any
+    slope: Any
+    gain: Any
+    model: RobotModel = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        check_model(self.model)
+        self._prepare(("slope", "gain"), self.model)
+
+    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """Torques, shape (n,)."""
+        q, v, v_r, a_r = self._rates(t, q, v)
+        tau = virtual_torques(self.model, q, v, v_r, a_r) + self.gain * (v_r - v)
+        drives = self.model.drive_matrices
+        return tau if drives is None else tau + drives.torque(started(v, v_r), a_r)

@@ -1,0 +1,211 @@
+"""Sliding modes of first and higher order, and their scalar laws.
+
+The surface is ``s = e' + slope e`` with ``e = q_d - q``. With a model the torque is that of the
+acceleration ``q_d'' + slope e' + u``, so that ``s' = -u`` up to disturbances, with u in rad/s^2
+(m/s^2); without one the torque is u itself, in N m (N).
+
+Parameters
+----------
+reference : Trajectory, array_like (n,) or callable
+    Positions: a motion, a constant, or a function of t that returns (q, v, a); None for the
+    scalar law alone, see `first_order`.
+slope : float or array_like
+    Rate at which the error vanishes on the surface, 1/s.
+model : RobotModel, optional
+    The robot as the controller believes it to be.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Gains that are not positive; a reference for another number of joints.
+
+References
+----------
+Seed book sections 5.2.6 and 5.2.7; A. Levant, Int. J. Control 58(6), 1993 (super-twisting).
+
+Examples
+--------
+>>> SlidingMode([0.0], slope=5.0, gain=2.0, layer=0.1).command(0.0, [0.01], [0.0])
+array([-1.])
+>>> SuperTwisting([0.0], slope=5.0, k1=2.0, k2=1.0).rate(0.0, [0.0], [-0.25], [0.5])
+array([1.])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats, as_number
+from ..errors import InvalidValueError
+from ..model import RobotModel
+from .joint_laws import SurfaceLaw
+from .law import NONE, as_gains, model_torques
+
+_MOST_STEPS = 10_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class _Sliding(SurfaceLaw):
+    """Parts of both laws."""
+
+    def _begin(self: Any, gains: tuple[str, ...]) -> None:
+        if self.reference is not None:
+            self._prepare(gains, self.model, zero="layer")
+        else:  # the scalar law alone
+            self._set(n=None, _desired=None)
+            for name in gains:
+                self._set(**{name: as_gains(getattr(self, name), name, None, name == "layer")})
+
+    def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """Torques, shape (n,)."""
+        q, v, v_r, a_r = self._rates(t, q, v)
+        u = -self.reaching(v_r - v, np.asarray(x, dtype=np.float64))[0]
+        return u if self.model is None else model_torques(self.model, q, v, a_r + u)
+
+    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
+        if self.reference is None:
+            raise InvalidValueError("reference: a law for a robot needs one, this one is scalar.")
+        return SurfaceLaw._rates(self, t, q, v)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SlidingMode(_Sliding):
+    """Sliding mode of first order: ``u = gain sign(s)``, or ``gain sat(s / layer)`` with a layer.
+
+    Parameters
+    ----------
+    gain : float or array_like
+        Larger than every disturbance, in the unit of u.
+    layer : float or array_like
+        Half width of the boundary layer, rad/s (m/s); 0 switches, and needs a sampling period.
+    """
+
+    reference: Any
+    slope: Any
+    gain: Any
+    layer: Any = 0.0
+    model: RobotModel | None = None
+
+    def __post_init__(self) -> None:
+        self._begin(("slope", "gain", "layer"))
+
+    @property
+    def switches(self) -> bool:  # type: ignore[override]
+        """Whether a layer is missing."""
+        return not np.all(self.layer)
+
+    def reaching(self, s: Array, x: Array) -> tuple[Array, Array]:
+        """``s'`` by the law alone, and no rate of a state."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside = np.clip(s / self.layer, -1.0, 1.0)
+        return -self.gain * np.where(np.asarray(self.layer) > 0.0, inside, np.sign(s)), NONE
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SuperTwisting(_Sliding):
+    """Sliding mode of second order: ``u = k1 sqrt(|s|) sign(s) + x``, ``x' = k2 sign(s)``.
+
+    It needs a sampling period. For disturbances with rates up to L, ``k1 = 1.5 sqrt(L)`` and
+    ``k2 = 1.1 L`` (Levant).
+
+    Parameters
+    ----------
+    k1, k2 : float or array_like
+        Gains of the root and of the integral.
+    """
+
+    reference: Any
+    slope: Any
+    k1: Any
+    k2: Any
+    model: RobotModel | None = None
+
+    switches = True
+
+    def __post_init__(self) -> None:
+        self._begin(("slope", "k1", "k2"))
+
+    @property
+    def state0(self) -> Array:
+        """Integral at the start, zero, shape (n,); one number for the scalar law."""
+        return np.zeros(self.n or 1)
+
+    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """``k2 sign(s)``, shape (n,)."""
+        return self.k2 * np.sign(self.surface(t, q, v))
+
+    def reaching(self, s: Array, x: Array) -> tuple[Array, Array]:
+        """``s'`` by the law alone, and the rate of its integral."""
+        way = np.sign(s)
+        return -self.k1 * np.sqrt(np.abs(s)) * way - x, self.k2 * way
+
+
+def first_order(
+    law: SlidingMode | SuperTwisting | Callable[[Array], ArrayLike],
+    s0: ArrayLike,
+    disturbance: Callable[[float], ArrayLike] | ArrayLike | None,
+    t: float,
+    step: float,
+) -> Array:
+    """Scalar sliding mode ``s' = law(s) + disturbance(t)`` by explicit Euler steps.
+
+    Parameters
+    ----------
+    law : SlidingMode, SuperTwisting or callable
+        A law, whose integral starts at zero, or a function of s.
+    s0 : array_like, shape (...)
+        Start, of any shape: all entries are independent.
+    disturbance : callable or array_like, optional
+        Function of t, or constant; its answers broadcast with s0.
+    t, step : float
+        Duration and step, s.
+
+    Returns
+    -------
+    ndarray, shape (N + 1, ...)
+        s at the multiples of the step, N = t / step.
+
+    Raises
+    ------
+    InvalidValueError
+        A step that is not positive, a negative duration, values that are not finite.
+
+    References
+    ----------
+    Seed book sections 5.2.6 and 5.2.7.
+
+    Examples
+    --------
+    >>> first_order(SlidingMode(None, slope=1.0, gain=2.0), 1.0, 0.5, t=1.0, step=0.25)
+    array([1.   , 0.625, 0.25 , -0.125, 0.5  ])
+    """
+    h, end = as_number(step, "step", above=0.0), as_number(t, "t", least=0.0)
+    if end / h > _MOST_STEPS:
+        raise InvalidValueError(f"step: {h:.3g} s would take more than {_MOST_STEPS} steps.")
+    s = as_floats(s0, "s0")
+    reaching = getattr(law, "reaching", None)
+    if reaching is None and not callable(law):
+        raise InvalidValueError(
+            f"law: expected a sliding mode or a function of s, got {type(law).__name__}."
+        )
+    if disturbance is None or not callable(disturbance):
+        constant = as_floats(0.0 if disturbance is None else disturbance, "disturbance")
+    out = np.empty((round(end / h) + 1, *s.shape))
+    out[0], x = s, np.zeros(s.shape)
+    for k in range(len(out) - 1):
+        push: Any = disturbance(k * h) if callable(disturbance) else constant
+        if reaching is None:
+            rate, change = law(s), NONE  # type: ignore[operator]
+        else:
+            rate, change = reaching(s, x)
+        s = out[k + 1] = s + h * (np.asarray(rate) + push)
+        if change is not NONE:
+            x = x + h * change
+    if not np.isfinite(out).all():
+        raise InvalidValueError("law, disturbance: s is not finite; expected finite values.")
+    return out

@@ -1,0 +1,172 @@
+"""Feedback in a simulation: control laws with a state of their own, sampling and delay."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from math import ceil
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_core, as_exact, as_number
+from ..errors import InvalidValueError, ShapeError
+
+Law = Callable[[float, Array, Array, Array], Array]
+"""Torques, or rates of the state, at time t, positions q, velocities v and state x."""
+
+_MOST_SAMPLES = 10_000_000
+_NONE = np.empty(0)
+
+
+@runtime_checkable
+class StatefulControl(Protocol):
+    """A control law with a state x (k,), such as an integral or an estimate.
+
+    The torque is ``command(t, q, v, x)``, shape (n,); the state begins at ``state0`` and its time
+    derivative is ``rate(t, q, v, x)``, shape (k,).
+
+    Examples
+    --------
+    >>> class Integral:
+    ...     state0 = np.zeros(6)
+    ...     def command(self, t, q, v, x):
+    ...         return -4.0 * q - 4.0 * v - x
+    ...     def rate(self, t, q, v, x):
+    ...         return q
+    >>> isinstance(Integral(), StatefulControl)
+    True
+    """
+
+    @property
+    def state0(self) -> ArrayLike:
+        """State at the start, shape (k,)."""
+        ...
+
+    def command(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike:
+        """Torques, shape (n,)."""
+        ...
+
+    def rate(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike:
+        """Time derivative of the state, shape (k,)."""
+        ...
+
+
+class Feedback:
+    """A control law as the integration calls it: with its state, or held between samples."""
+
+    def __init__(self, command: Law | None, rate: Law | None = None, state0: Array = _NONE) -> None:
+        self.command, self._rate, self._state0 = command, rate, state0
+        self.state0 = state0  # the part of the state that the integrator integrates
+        self.instants: tuple[float, ...] = ()
+        self._sampled = False
+
+    def sample(self, ends: tuple[float, float], period: float, delay: float, near: Array) -> None:
+        """Sample the law every `period`; each torque acts `delay` later, the first ones are zero.
+
+        A state advances by Euler steps of one period. Instants within rounding of the times `near`
+        are these times.
+        """
+        start, end = ends
+        if self.command is None:
+            raise InvalidValueError("period: there is no control to sample; give control.")
+        if (end - start) / period > _MOST_SAMPLES:
+            raise InvalidValueError(
+                f"period: {period:.3g} s would sample more than {_MOST_SAMPLES} times."
+            )
+        if delay > end - start:
+            raise InvalidValueError(
+                f"delay: expected at most the duration {end - start:.6g} s, got {delay:.6g} s; "
+                "no torque would act."
+            )
+        taken: Array = start + period * np.arange(
+            max(1, ceil((end - start) / period - 1e-9)), dtype=np.float64
+        )
+        # a torque that acts at a later sample acts exactly then
+        whole = int(delay / period + 1e-9)
+        rest = delay - whole * period
+        acts: Array = start + period * (np.arange(len(taken), dtype=np.float64) + whole)
+        acts = acts if rest < 1e-9 * period else acts + rest
+        taken = _snapped(taken, near, 1e-9 * period)
+        acts = _snapped(acts, near, 1e-9 * period)
+        self._taken, self._acts = deque(taken.tolist()), deque(acts[acts < end].tolist())
+        self.instants = tuple(sorted({*self._taken, *self._acts}))
+        self._period, self._sampled, self.state0 = period, True, _NONE
+        self._waiting: deque[Array] = deque()
+        self._held: Array | None = None
+        self._state = self._next = self._state0
+
+    def tick(self, t: float, q: Array, v: Array) -> None:
+        """Sample the law, and change the torque that is held, if this is the instant to do so."""
+        if not self._sampled:
+            return
+        if self._taken and self._taken[0] <= t:
+            self._taken.popleft()
+            x = self._state = self._next
+            self._waiting.append(self.command(t, q, v, x))  # type: ignore[misc]
+            if self._rate is not None:
+                self._next = x + self._period * self._rate(t, q, v, x)
+        while self._acts and self._acts[0] <= t:
+            self._acts.popleft()
+            self._held = self._waiting.popleft()
+
+    def torque(self, t: float, q: Array, v: Array, x: Array) -> Array | None:
+        """Torques (n,), None without control."""
+        if self._sampled:
+            return self._held
+        return None if self.command is None else self.command(t, q, v, x)
+
+    def rate(self, t: float, q: Array, v: Array, x: Array) -> Array:
+        """Time derivative of the state that is integrated."""
+        return _NONE if self._sampled or self._rate is None else self._rate(t, q, v, x)
+
+    def state(self, x: Array) -> Array:
+        """State of the law (k,), from the part that is integrated."""
+        return self._state if self._sampled else x
+
+
+def _snapped(times: Array, near: Array, tolerance: float) -> Array:
+    """Times, replaced by the nearest of other times where they differ by rounding only."""
+    if not near.size:
+        return times
+    near = np.sort(near)
+    after = np.minimum(np.searchsorted(near, times - tolerance), near.size - 1)
+    return np.where(np.abs(near[after] - times) <= tolerance, near[after], times)
+
+
+def stateful(control: StatefulControl, n: int) -> Feedback:
+    """Feedback by a law with a state; its answers are checked."""
+    state0 = as_core(control.state0, (), "control.state0")
+    if state0.ndim != 1:
+        raise ShapeError(f"control.state0: expected shape (k,), got {state0.shape}.")
+    return Feedback(
+        checked(control.command, n, "control.command", "t, q, v, x"),
+        checked(control.rate, state0.size, "control.rate", "t, q, v, x"),
+        state0.copy(),
+    )
+
+
+def checked(law: Callable[..., Any], size: int, name: str, words: str) -> Callable[..., Array]:
+    """User function with checks of its values."""
+
+    def value(t: float, *state: Array) -> Array:
+        where = f"{name}({words}) at t = {t:.9g} s"
+        try:
+            answer = law(t, *(x.copy() for x in state))
+        except Exception as error:
+            error.add_note(f"Raised by {where}.")
+            raise
+        return as_exact(answer, (size,), where)
+
+    return value
+
+
+def sampling(period: ArrayLike | None, delay: ArrayLike) -> tuple[float | None, float]:
+    """Checked period and delay of a sampled controller, s."""
+    wait = as_number(delay, "delay", least=0.0)
+    if period is None:
+        if wait:
+            raise InvalidValueError("delay: only a sampled control is delayed; give period, too.")
+        return None, 0.0
+    return as_number(period, "period", above=0.0), wait
