@@ -135,12 +135,14 @@ def drive_torques(
     rows = (model.table.joint_rows + 1).tolist()
     tau: list[Number] = []
     for i, row in enumerate(rows):
-        Ia, Fv, Fc, offset = (parameters.get(f"{c}{row}", 0.0) for c in ("Ia", "Fv", "Fc", "offset"))
+        Ia, Fv, Fc, offset = (
+            parameters.get(f"{c}{row}", 0.0) for c in ("Ia", "Fv", "Fc", "offset")
+        )
         tau.append(Ia * a[i] + Fv * v[i] + Fc * function("sign", v[i]) + offset)
     transmission = model.transmission
     for m in () if transmission is None else transmission.coupled_motors:
         w = transmission.weights[m - 1].tolist()  # type: ignore[union-attr]
-        Iam, Fvm, Fcm = (parameters.get(f"{c}{m}", 0.0) for c in ("Iam", "Fvm", "Fcm"))
+        Iam, Fvm, Fcm = (parameters.get(f"{c}{rows[m - 1]}", 0.0) for c in ("Iam", "Fvm", "Fcm"))
         rate, change = (sum((w[k] * x[k] for k in range(model.n)), 0.0) for x in (v, a))
         for j in np.flatnonzero(w).tolist():
             rest = Iam * (change - w[j] * a[j]) + Fvm * (rate - w[j] * v[j])

@@ -144,7 +144,10 @@ def jacobian(frames: Frames, number: int, point: Vector, n: int) -> list[list[Nu
             z = R[0][2], R[1][2], R[2][2]
             zero = 0.0, 0.0, 0.0
             arm = zero if link.slides else minus(point, p)
-            columns[link.joint] = [*(z if link.slides else cross(z, arm)), *(zero if link.slides else z)]
+            columns[link.joint] = [
+                *(z if link.slides else cross(z, arm)),
+                *(zero if link.slides else z),
+            ]
     return columns
 
 
@@ -220,5 +223,5 @@ def _link(
         last = cosine_sine(q[j], theta) if sigma == REVOLUTE else cosine_sine(theta)
     if sigma == PRISMATIC:
         r = q[j] + r
-    turns = tuple(turn for turn in (*before, (2, *last)) if turn[1] != 1.0)
+    turns = tuple(turn for turn in (*before, (2, *last)) if turn[1:] != (1.0, 0.0))
     return Link(k + 1, parent, j, bool(sigma == PRISMATIC), shift, turns, r)

@@ -29,6 +29,7 @@ q v a tau T wrench geometry parameters J M h Q W valid status q_out a_out tau_ou
 """.split())  # fmt: skip
 """Words of the languages, names of their libraries and those that generated code uses."""
 _TAKEN = re.compile(r"[tCS]\d+")  # of lines, cosines and sines
+_EXACT = 1e-13
 _LENGTHS = ("b", "d", "r")
 _LETTERS = {"gamma": "G", "b": "BL", "beta": "B", "alpha": "A", "d": "D", "theta": "TH", "r": "RL"}
 
@@ -66,9 +67,10 @@ class Draft:
         self.values.append(tuple(map(float, values)))
         return self.scalars[port.name]
 
-    def base(self) -> BaseParameters:
+    def base(self, tolerance: float | None = None) -> BaseParameters:
         """The base parameters; offsets have their own values."""
-        return base_parameters(self.model, drive=_without_default_offset(self.kinds))
+        kinds = _without_default_offset(self.kinds)
+        return base_parameters(self.model, drive=kinds, tolerance=tolerance)
 
 
 def _without_default_offset(kinds: tuple[DriveKind, ...]) -> tuple[DriveKind, ...]:
@@ -77,10 +79,12 @@ def _without_default_offset(kinds: tuple[DriveKind, ...]) -> tuple[DriveKind, ..
     return every[:-1] if kinds == every else kinds
 
 
-def dynamic_parameters(draft: Draft, choice: str, is_general: bool) -> dict[str, Number]:
-    """Standard parameters by name; those that are missing are zero.
+def dynamic_parameters(
+    draft: Draft, choice: str, is_general: bool
+) -> tuple[dict[str, Number], dict[str, Number] | None]:
+    """Standard parameters by name, those that are missing are zero; simpler ones of equal torques.
 
-    Numbers are those of the base parameters, which are fewer, unless geometric parameters are
+    The simpler ones are base parameters, which do not exist where geometric parameters are
     ``is_general``.
     """
     model, kinds = draft.model, draft.kinds
@@ -88,17 +92,17 @@ def dynamic_parameters(draft: Draft, choice: str, is_general: bool) -> dict[str,
     standard = dict(zip(names, parameter_vector(model, kinds).tolist(), strict=True))
     if choice == "symbols":
         given = draft.symbols("parameters", names, tuple(standard.values()))
-        return dict(zip(names, given, strict=True))
+        return dict(zip(names, given, strict=True)), None
     if choice == "numbers" and is_general:
-        return standard
-    base = draft.base()
+        return standard, None
+    # numbers use every digit of the table, symbols are those of `base_parameters` by default
+    base = draft.base(_EXACT if choice == "numbers" else None)
     values = base.values(model).tolist()
-    if choice == "numbers" and base.neglected:
-        return standard
     given = draft.symbols("parameters", base.names, values) if choice == "base" else values
     offsets = {f"offset{row + 1}" for row in model.table.joint_rows}
     rest = {name: x for name, x in standard.items() if name in offsets - {*base.parameter_names}}
-    return {**rest, **dict(zip(base.names, given, strict=True))}
+    simpler = {**rest, **dict(zip(base.names, given, strict=True))}
+    return (simpler, None) if choice == "base" else (standard, simpler)
 
 
 def geometric_parameters(draft: Draft) -> Constant:

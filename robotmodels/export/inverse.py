@@ -278,7 +278,11 @@ def two_equations(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) 
     near = either(_below(width, 1e-6 * size), _below(rho, limits.small**2))
     return [
         Branch(
-            (tuple(pick(depends, 0.5, a, b) for a, b in zip(alone.unknowns[0], angle, strict=True)),),  # type: ignore[arg-type]
+            (
+                tuple(
+                    pick(depends, 0.5, a, b) for a, b in zip(alone.unknowns[0], angle, strict=True)
+                ),
+            ),  # type: ignore[arg-type]
             pick(depends, 0.5, alone.valid, 1.0),
             pick(depends, 0.5, alone.free, free),
             near,
@@ -313,7 +317,9 @@ def length(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list
     return [Branch(((pick(size, limits.zero, r, wanted[0]), 1.0, 0.0),), 1.0, free, near)]
 
 
-def length_times_angle(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def length_times_angle(
+    g: Sequence[Number], limits: Limits, wanted: Sequence[float]
+) -> list[Branch]:
     """``X1 r S = Y1, X2 r C = Y2``: a length of either sign, then the angle."""
     A, B = g[1] / g[0], g[3] / g[2]
     r = _size(A, B)

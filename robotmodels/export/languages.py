@@ -160,14 +160,18 @@ def _nested(port: Port, row: Sequence[str], opening: str = "[", closing: str = "
     if len(port.shape) == 1:
         return [opening + ", ".join(row) + closing]
     step = port.shape[1]
-    rows = [opening + ", ".join(row[k : k + step]) + closing for k in range(0, len(row), max(step, 1))]
+    rows = [
+        opening + ", ".join(row[k : k + step]) + closing for k in range(0, len(row), max(step, 1))
+    ]
     return [opening, *(f"    {line}," for line in rows), closing]
 
 
 def _c(program: Source, code: Body) -> list[str]:
     arguments = [f"const double *{p.name}" for p in program.inputs]
     arguments += [f"double *{_result(program, p)}" for p in program.outputs]
-    unused = [f"(void){p.name};" for p, used in zip(program.inputs, code.used, strict=True) if not used]
+    unused = [
+        f"(void){p.name};" for p, used in zip(program.inputs, code.used, strict=True) if not used
+    ]
     stores = [
         f"{_result(program, port)}[{k}] = {value};"
         for port, row in zip(program.outputs, code.results, strict=True)
@@ -285,7 +289,9 @@ def _matlab(program: Source, code: Body) -> list[str]:
     return lines
 
 
-def _bracketed(opening: str, between: str, closing: str, first: int = 0) -> Callable[[Port, int], str]:
+def _bracketed(
+    opening: str, between: str, closing: str, first: int = 0
+) -> Callable[[Port, int], str]:
     def element(port: Port, k: int) -> str:
         return port.name + opening + between.join(map(str, _indices(port, k, first))) + closing
 

@@ -17,6 +17,7 @@ from ..inertia import PARAMETERS
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
+from .dynamics import Parameters
 from .geometry import Frames, carried, constant_pose, frames_of, jacobian, pose_of
 from .inputs import (
     Draft,
@@ -34,6 +35,7 @@ ModelName = Literal[
     "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
     "base_regressor", "ddm", "igm",
 ]  # fmt: skip
+_STATES, _ROUNDING = 10, 1e-13
 Rows = list[tuple[Port, list[Number]]]
 """Outputs with their elements."""
 
@@ -101,7 +103,7 @@ def program(
     model: RobotModel,
     kind: ModelName,
     parameters: Literal["numbers", "symbols", "base"] = "numbers",
-    geometry: Numbers = "numbers",
+    geometry: Literal["numbers", "symbols"] = "numbers",
     drive: Drives = True,
     wrench: bool = False,
     frame: str | int | None = None,
@@ -181,14 +183,14 @@ def program(
     if kind == "igm":
         return _finished(draft, kind, _inverse(draft))
     constant = geometric_parameters(draft) if geometry == "symbols" else None
-    own: dict[str, Number] = {}
+    own: Parameters = {}
     if "parameters" in _KINDS[kind].accepts:
-        own = dynamic_parameters(draft, parameters, constant is not None)
+        own, simpler = dynamic_parameters(draft, parameters, constant is not None)
+        if simpler is not None and _same_torques(model, own, simpler):
+            own = simpler
     at_rest = np.flatnonzero(model.chain.joint < 0).tolist()
     heavy = any(f"{name}{k + 1}" in own for k in at_rest for name in PARAMETERS)
-    frames = frames_of(
-        model, draft.scalars["q"], constant, heavy or kind == "torque_regressor"
-    )
+    frames = frames_of(model, draft.scalars["q"], constant, heavy or kind == "torque_regressor")
     if kind in ("dgm", "jacobian"):
         return _finished(draft, kind, _geometric(draft, kind, frames, frame))
     return _finished(draft, kind, _dynamic(draft, kind, frames, own))
@@ -227,6 +229,19 @@ _WHY = {
 }
 
 
+def _same_torques(model: RobotModel, own: Parameters, other: Parameters) -> bool:
+    """Whether two sets of parameters have the same torques, to rounding."""
+    draft = Draft(model, ())
+    q, v, a = (draft.input(name, (model.n,)) for name in "qva")
+    frames = frames_of(model, q, heavy=True)
+    results = [dynamics.inverse_dynamics(model, frames, x, v, a, {}) for x in (own, other)]
+    states = np.random.default_rng(0).normal(size=(3, model.n, _STATES))
+    torques = draft.tape.frozen(results).run(list(states))
+    first, second = (np.array([np.broadcast_to(x, _STATES) for x in row]) for row in torques)
+    off, size = (np.abs(x).max(initial=0.0) for x in (first - second, first))
+    return bool(off <= _ROUNDING * size)
+
+
 def _inverse(draft: Draft) -> Rows:
     """All postures of a pose."""
     model = draft.model
@@ -241,7 +256,11 @@ def _inverse(draft: Draft) -> Rows:
             IGMStatus.INCOMPLETE: " It is near a singular pose.",
         }
         draft.notes.append(f"  {int(code)}: {code.sentence}{more.get(code, '')}")
-    return [(Port("q", (S, model.n)), q), (Port("valid", (S,)), valid), (Port("status", ()), status)]
+    return [
+        (Port("q", (S, model.n)), q),
+        (Port("valid", (S,)), valid),
+        (Port("status", ()), status),
+    ]
 
 
 def _geometric(draft: Draft, kind: str, frames: Frames, frame: str | int | None) -> Rows:
@@ -259,7 +278,7 @@ def _geometric(draft: Draft, kind: str, frames: Frames, frame: str | int | None)
     return [(Port("T", (4, 4)), [*elements, 0.0, 0.0, 0.0, 1.0])]
 
 
-def _dynamic(draft: Draft, kind: str, frames: Frames, own: dict[str, Number]) -> Rows:
+def _dynamic(draft: Draft, kind: str, frames: Frames, own: Parameters) -> Rows:
     """Torques, masses, regressors or accelerations."""
     model, scalars = draft.model, draft.scalars
     n, zero = model.n, [0.0] * model.n
@@ -292,7 +311,7 @@ _DRIVE_TERMS = ("Ia", "Fv", "Fc", "offset")
 
 
 def _accelerations(
-    draft: Draft, frames: Frames, own: dict[str, Number], bias: Sequence[Number]
+    draft: Draft, frames: Frames, own: Parameters, bias: Sequence[Number]
 ) -> list[Number]:
     """Accelerations by the mass matrix; joints that mimic others follow them."""
     model, n = draft.model, draft.model.n
@@ -339,7 +358,11 @@ def _finished(draft: Draft, kind: str, results: Rows) -> Program:
         notes.append(f"  {port.name} {port.shape}: {_INPUTS[port.name]}")
         pairs = zip(names, values, strict=True)
         notes += [f"    {k}: {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
-    notes += ["Outputs:", *(f"  {port.name} {port.shape}" for port, _ in results), f"  {row.result}"]
+    notes += [
+        "Outputs:",
+        *(f"  {port.name} {port.shape}" for port, _ in results),
+        f"  {row.result}",
+    ]
     notes += ["Joints:", *joint_notes(model), *draft.notes]
     if any(node[0] == "sign" for node in operations.nodes):
         notes.append("sign(0) = 0; in CasADi, smooth > 0 replaces sign(v) by tanh(v / smooth).")
