@@ -33,7 +33,8 @@ from .tape import Number, Scalar, Tape, function, pick
 
 Angle = tuple[Number, Number, Number]
 """Value, cosine and sine of an unknown; a length has its value alone."""
-_NEAR = 1e-12  # relative square of the overshoot up to which two solutions are one
+_NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
+_BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may cause
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,17 +247,19 @@ def one_equation(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -
     rho = function("sqrt", square)
     room = (rho - Z) * (rho + Z)
     size = pick(Z, 0.0, Z, -Z)
-    root, scale = _root(room), 1.0 / pick(rho, limits.zero, square, 1.0)
     free = _below(rho, limits.zero)
-    near = either(_below(rho, limits.small), _below(room, _NEAR * square))
+    double = both(_below(room, _NEAR * square), _below(size - rho, _BEYOND * rho))
+    near = either(_below(rho, limits.small), double)
     there = _below(size - rho, limits.slack * rho)
     still = _below(size, max(limits.zero, limits.slack))
     first = pick(free, 0.5, still, there)
     second = both(both(first, _below(free, 0.5)), pick(room, 0.0, 1.0, 0.0))
+    Z = pick(Z, rho, rho, pick(-Z, rho, -rho, Z))  # an overshoot is a double root
+    root = function("sqrt", pick(room, 0.0, room, 0.0))
     out = []
     for valid, e in ((first, root), (second, -root)):
-        S, C = (X * Z + Y * e) * scale, (Y * Z - X * e) * scale
-        angle = _angle(S, C, rho, limits.zero, wanted[0])
+        S, C = X * Z + Y * e, Y * Z - X * e
+        angle = _angle(S, C, square, limits.zero**2, wanted[0])
         out.append(Branch((angle,), valid, free, near))
     return out
 
@@ -337,7 +340,7 @@ def length_and_angle(g: Sequence[Number], limits: Limits, wanted: Sequence[float
     a, h, c = u1 * u1 + v1 * v1, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0
     room = h * h - a * c
     root, size = _root(room), h * h + pick(a * c, 0.0, a * c, -(a * c))
-    near = _below(room, _NEAR * size)
+    near = both(_below(room, _NEAR * size), _below(-room, _BEYOND * size))
     there = _below(-room, limits.slack * size)
     out = []
     for sign, valid in ((1.0, there), (-1.0, pick(room, 0.0, 1.0, 0.0))):

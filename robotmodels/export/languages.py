@@ -326,7 +326,7 @@ LANGUAGES = {
     "casadi": Language(
         ".py", "#", _bracketed("[", ", ", "]"), "{} = {}",
         {
-            "functions": "casadi.", "sign": "_sign({}, smooth)", "nan": "math.nan",
+            "functions": "casadi.", "sign": "_sign({}, smooth)", "nan": 'float("nan")',
             "pick": "casadi.if_else({} > {}, {}, {})",
         },
         _casadi,

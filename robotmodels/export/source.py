@@ -85,7 +85,7 @@ class Program:
             )
         arrays = [as_core(x, p.shape, p.name) for x, p in zip(inputs, self.inputs, strict=True)]
         flat = [
-            x.reshape(*x.shape[: x.ndim - len(p.shape)], p.size)
+            x.reshape((*x.shape[: x.ndim - len(p.shape)], p.size))
             for x, p in zip(arrays, self.inputs, strict=True)
         ]
         batch = batch_shape(tuple(flat), tuple(p.name for p in self.inputs))
@@ -96,7 +96,7 @@ class Program:
             result = np.empty((*batch, port.size))
             for k, x in enumerate(row):
                 result[..., k] = x
-            out.append(result.reshape(*batch, *port.shape))
+            out.append(result.reshape((*batch, *port.shape)))
         return out[0] if len(out) == 1 else tuple(out)
 
     def code(self, language: str = "c") -> str:

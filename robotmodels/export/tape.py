@@ -211,7 +211,7 @@ def _pick(a: Array, b: Array, x: Array, y: Array) -> Array:
 _RUN: dict[str, Callable[..., Array]] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "sin": np.sin,
     "cos": np.cos, "sqrt": np.sqrt, "sign": np.sign, "floor": np.floor, "atan2": np.arctan2,
-    "pick": _pick,
+    "pick": _pick, "nan": lambda: np.float64(np.nan),
 }  # fmt: skip
 
 
