@@ -1,8 +1,8 @@
 """The inverse geometric model on a tape: Paul's plan, all branches at once.
 
 The plan that `explain_igm` prints and that the package's kernel runs is unrolled: every step is
-solved for each of its solutions, and a flag goes along that says whether they exist. Where a step
-is singular, an undetermined joint is 0 and the status of the pose says so.
+solved for each of its solutions, and a flag goes along that says whether they exist. At a singular
+pose an undetermined joint is 0, and the status of the pose says so.
 
 References
 ----------
@@ -12,346 +12,306 @@ section 4.4 and appendix 1, for the types of equations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
 from math import cos, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import se3
-from .._arrays import Array
 from ..errors import InvalidValueError
 from ..igm import IGMStatus
-from ..igm.by_plan import ByPlan, prepare_by_plan
+from ..igm.by_plan import prepare_by_plan
 from ..igm.families import prepare_task
-from ..igm.loop import JointChain, joint_chain
+from ..igm.loop import joint_chain
 from ..igm.paul import explain_igm, layout
 from ..igm.paul.program import ACCEPTED, SLACK, SMALL_AMPLITUDE, ZERO_AMPLITUDE
 from ..igm.request import Task
 from ..model import RobotModel
+from .dynamics import dot
 from .tape import Number, Scalar, Tape, function, pick
 
-Angle = tuple[Number, Number, Number]
-"""Value, cosine and sine of an unknown; a length has its value alone."""
 _NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
 _BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may cause
+_FREE, _DOUBTFUL = float(IGMStatus.REACHED_FAMILY), float(IGMStatus.INCOMPLETE)
 
 
-@dataclass(frozen=True, slots=True)
-class Branch:
-    """A solution of the steps so far: whether it exists, is free, is near a singular pose."""
+class Unknown(NamedTuple):
+    """Value, cosine and sine of an unknown; a length has its value alone."""
 
-    unknowns: tuple[Angle, ...] = ()
-    valid: Number = 1.0
-    free: Number = 0.0
-    doubtful: Number = 0.0
+    value: Number
+    cosine: Number = 1.0
+    sine: Number = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Overshoot of a double root, amplitude that is zero, amplitude that is small."""
+class Solution(NamedTuple):
+    """Unknowns of a step, whether they exist (0 or 1), and their status."""
 
-    slack: float
+    unknowns: tuple[Unknown, ...]
+    valid: Number
+    status: Number
+
+
+class Limits(NamedTuple):
+    """Amplitudes of an equation that are zero, or small; values of unknowns that are free."""
+
     zero: float
     small: float
+    wanted: tuple[float, float]
 
 
-@dataclass(slots=True)
 class _Plan:
-    """The plan as the kernel reads it, see `igm.paul.layout`."""
+    """A plan as the kernel reads it (`igm.paul.layout`), and the postures that it gives."""
 
-    code: Array
-    numbers: Array
-    found: list[tuple[list[Number], Branch]] = field(default_factory=list)
+    def __init__(self, model: RobotModel) -> None:
+        chain = joint_chain(model)
+        family = prepare_task(chain, Task())
+        solver = None if family is None else prepare_by_plan(chain, family)
+        if solver is None:
+            other = explain_igm(model).takes_over or "the numeric solver `igm_numeric`"
+            raise InvalidValueError(
+                f"model: Paul's equations, of which code is written, do not solve {model.name!r} "
+                f"alone; in this package it is solved by {other}."
+            )
+        for step in solver.plan.steps:
+            if step.type.kernel not in _SOLVERS:
+                raise InvalidValueError(
+                    f"model: the plan of {model.name!r} contains {step.type.formula}, which has no "
+                    "code without loops; `igm` of this package solves it."
+                )
+        at = solver.program.adapted(se3.inverse(model.base), np.zeros((3, chain.k)))
+        self.columns: list[int] = chain.columns.tolist()
+        self.code: list[int] = solver.program.plan.tolist()
+        self.numbers: list[float] = at.tolist()
+        self.found: list[tuple[list[Number], Solution]] = []
 
-    def head(self, which: int) -> int:
-        return int(self.code[which])
-
-    def place(self, which: int, k: int = 0) -> int:
-        """Element k of a part of the instructions."""
-        return int(self.code[int(self.code[which]) + k])
-
-    def number(self, which: int, k: int = 0) -> float:
-        return float(self.numbers[int(self.code[which]) + k])
-
-
-def prepared_plan(model: RobotModel) -> tuple[JointChain, ByPlan]:
-    """The plan of an arm, or the error that names the family of its inverse model."""
-    chain = joint_chain(model)
-    family = prepare_task(chain, Task())
-    plan = None if family is None else prepare_by_plan(chain, family)
-    if plan is None:
-        after = explain_igm(model).takes_over or "the numeric solver `igm_numeric`"
-        raise InvalidValueError(
-            f"model: {model.name!r} has no plan of Paul's equations, from which code of the inverse "
-            f"geometric model is written; in this package {after} solves it."
-        )
-    polynomials = [s.type.formula for s in plan.plan.steps if s.type.kernel in _POLYNOMIALS]
-    if polynomials:
-        raise InvalidValueError(
-            f"model: the plan of {model.name!r} contains {polynomials[0]}, whose roots have no "
-            "code without loops; `igm` of this package solves it."
-        )
-    return chain, plan
-
-
-_POLYNOMIALS = (layout.QUARTIC, layout.POLYNOMIAL)
+    def part(self, which: int, first: int, count: int) -> list[float]:
+        """Some of the numbers of a part."""
+        at = self.code[which] + first
+        return self.numbers[at : at + count]
 
 
 def inverse_model(model: RobotModel, tape: Tape, T: Sequence[Number]) -> tuple[list[Number], ...]:
     """Joint variables (S n,), flags (S,) and status of a world pose (16,), row by row."""
-    chain, solver = prepared_plan(model)
-    program = solver.program
-    plan = _Plan(program.plan, program.adapted(se3.inverse(model.base), np.zeros((3, chain.k))))
-    registers = [plan.number(layout.INITIAL, i) for i in range(plan.head(layout.REGISTERS))]
-    _solve(plan, 0, _loaded(plan, registers, T), Branch())
-    nothing = Scalar(tape, tape.add("nan", ()))
-    q: list[Number] = []
-    reached: Number = 0.0
-    free: Number = 0.0
-    doubtful: Number = 0.0
-    for values, branch in plan.found:
-        row: list[Number] = [0.0] * model.n
-        for column, value in zip(chain.columns.tolist(), values, strict=True):
-            row[column] = value
-        q += [pick(branch.valid, 0.5, x, nothing) for x in row]
-        reached = pick(branch.valid, 0.5, 1.0, reached)
-        free = pick(branch.valid, 0.5, pick(branch.free, 0.5, 1.0, free), free)
-        doubtful = pick(branch.doubtful, 0.5, 1.0, doubtful)
-    status = pick(doubtful, 0.5, float(IGMStatus.INCOMPLETE), float(IGMStatus.REACHED))
-    status = pick(free, 0.5, float(IGMStatus.REACHED_FAMILY), status)
-    status = pick(reached, 0.5, status, float(IGMStatus.NOT_CONVERGED))
-    return q, [branch.valid for _, branch in plan.found], [status]
-
-
-def _loaded(plan: _Plan, x: Sequence[Number], T: Sequence[Number]) -> list[Number]:
-    """Registers with ``U0 = before T after``, column by column, and the references (all 0)."""
-    out = list(x)
-    for i in range(3):
-        row = [plan.number(layout.SIDES, 4 * i + j) for j in range(4)]
-        m = [sum((row[k] * T[4 * k + j] for k in range(3)), 0.0) for j in range(4)]
-        m[3] = m[3] + row[3]
+    plan = _Plan(model)
+    x: list[Number] = [*plan.part(layout.INITIAL, 0, plan.code[layout.REGISTERS])]
+    before, after = plan.part(layout.SIDES, 0, 12), plan.part(layout.SIDES, 12, 16)
+    for i in range(3):  # U0 = before T after, column by column
+        row = before[4 * i : 4 * i + 4]
+        turned = [dot(row[:3], T[j:12:4]) for j in range(4)]
+        turned[3] = turned[3] + row[3]
         for j in range(4):
-            after = [plan.number(layout.SIDES, 12 + 4 * k + j) for k in range(4)]
-            out[1 + 3 * j + i] = sum((m[k] * after[k] for k in range(4)), 0.0)
-    k = plan.head(layout.JOINTS)
-    references = range(plan.head(layout.UNKNOWNS))
-    return out + [plan.number(layout.REFERENCES, i * (k + 1) + k) for i in references]
+            x[1 + 3 * j + i] = dot(turned, after[j::4])
+    _solve(plan, 0, x, 1.0, 0.0)
+    q: list[Number] = []
+    status: Number = float(IGMStatus.NOT_CONVERGED)
+    reached: Number = 0.0
+    for values, solution in plan.found:
+        row = [0.0] * model.n
+        for column, value in zip(plan.columns, values, strict=True):
+            row[column] = value  # type: ignore[call-overload]
+        q += [pick(solution.valid, 0.5, x, Scalar(tape, tape.add("nan"))) for x in row]
+        worse = pick(reached, 0.5, _larger(status, solution.status), solution.status)
+        status = pick(solution.valid, 0.5, worse, status)
+        reached = pick(solution.valid, 0.5, 1.0, reached)
+    return q, [solution.valid for _, solution in plan.found], [status]
 
 
-def _solve(plan: _Plan, level: int, x: list[Number], branch: Branch) -> None:
-    """The rest of the tree of solutions behind a branch."""
-    x = list(x)
-    starts, operations = plan.head(layout.STARTS), plan.head(layout.OPERATIONS)
-    for i in range(int(plan.code[starts + level]), int(plan.code[starts + level + 1])):
-        d, a, b, c, e = plan.code[operations + 5 * i : operations + 5 * i + 5].tolist()
-        f, g = plan.numbers[2 * i : 2 * i + 2].tolist()
+def status_notes() -> list[str]:
+    """The statuses of a pose in sentences."""
+    more = {_FREE: " Joints that are free are 0.", _DOUBTFUL: " The pose is nearly singular."}
+    codes = (
+        IGMStatus.REACHED,
+        IGMStatus.REACHED_FAMILY,
+        IGMStatus.NOT_CONVERGED,
+        IGMStatus.INCOMPLETE,
+    )
+    return [f"  status {int(code)}: {code.sentence}{more.get(float(code), '')}" for code in codes]
+
+
+def _solve(plan: _Plan, level: int, x: list[Number], valid: Number, status: Number) -> None:
+    """The rest of the tree of solutions behind a branch with the registers ``x``."""
+    code, x = plan.code, list(x)
+    for i in range(*(code[code[layout.STARTS] + level + k] for k in range(2))):
+        at = code[layout.OPERATIONS] + 5 * i
+        d, a, b, c, e = code[at : at + 5]
+        f, g = plan.numbers[2 * i : 2 * i + 2]
         x[d] = f * (x[a] * x[b]) + g * (x[c] * x[e])
-    if level == plan.head(layout.STEPS):
-        _keep(plan, x, branch)
+    if level == code[layout.STEPS]:
+        _keep(plan, x, valid, status)
         return
-    at = plan.head(layout.STEP_TABLE) + layout.STEP * level
-    step = plan.code[at : at + layout.STEP].tolist()
-    g = [x[k] for k in step[layout.COEFFICIENTS :]]
-    free = plan.head(layout.REGISTERS)
-    wanted = [x[free + step[layout.REFERENCE + i]] for i in range(2)]
-    scale = plan.number(layout.SCALES, level)
-    limits = Limits(SLACK, ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale)
-    for solution in _SOLVERS[step[layout.CODE]](g, limits, [float(w) for w in wanted]):  # type: ignore[arg-type]
+    at = code[layout.STEP_TABLE] + layout.STEP * level
+    step = code[at : at + layout.STEP]
+    k = code[layout.JOINTS]
+    offsets = [
+        plan.part(layout.REFERENCES, step[layout.REFERENCE + i] * (k + 1) + k, 1) for i in (0, 1)
+    ]
+    (scale,) = plan.part(layout.SCALES, level, 1)
+    wanted = (offsets[0] or [0.0])[0], (offsets[1] or [0.0])[0]
+    limits = Limits(ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale, wanted)
+    coefficients = [x[k] for k in step[layout.COEFFICIENTS :]]
+    for solution in _SOLVERS[step[layout.CODE]](coefficients, limits):
         own = list(x)
-        for place, angle in zip(step[layout.FIRST : layout.SECOND + 1], solution.unknowns):
+        for place, unknown in zip(step[layout.FIRST :], solution.unknowns, strict=False):
             if place > 12:
-                own[place : place + 3] = angle
-        after = Branch(
-            (),
-            both(branch.valid, solution.valid),
-            either(branch.free, solution.free),
-            either(branch.doubtful, both(branch.valid, solution.doubtful)),
-        )
-        _solve(plan, level + 1, own, after)
+                own[place : place + 3] = unknown
+        there = pick(valid, 0.5, solution.valid, 0.0)
+        _solve(plan, level + 1, own, there, _larger(status, solution.status))
 
 
-def both(a: Number, b: Number) -> Number:
-    """Whether both flags are set."""
-    return pick(a, 0.5, b, 0.0) if isinstance(a, Scalar) else (b if a > 0.5 else 0.0)
-
-
-def either(a: Number, b: Number) -> Number:
-    """Whether one of two flags is set."""
-    return pick(a, 0.5, 1.0, b)
-
-
-def _keep(plan: _Plan, x: list[Number], branch: Branch) -> None:
-    """Check both sides of the pose; the joint variables in (-pi, pi]."""
-    k = plan.head(layout.JOINTS)
+def _keep(plan: _Plan, x: list[Number], valid: Number, status: Number) -> None:
+    """Check both sides of the pose; joint variables in (-pi, pi]."""
+    code, k = plan.code, plan.code[layout.JOINTS]
+    results, sigma = code[layout.RESULTS], code[layout.SIGMA]
     turn: Number = 0.0
     far: Number = 0.0
     for i in range(3):
-        place = [plan.place(layout.RESULTS, k + i + 3 * j) for j in range(8)]
-        d = [x[place[j]] - x[place[j + 4]] for j in range(4)]
-        off = d[3] + sum((plan.number(layout.LEVER, j) * d[j] for j in range(3)), 0.0)
-        turn = turn + sum((d[j] * d[j] for j in range(3)), 0.0)
-        far = far + off * off
-    worst = pick(far, 0.5 * turn, far, 0.5 * turn)
-    met = pick(worst, ACCEPTED**2, 0.0, 1.0)
-    values = []
-    for j in range(k):
-        value = x[plan.place(layout.RESULTS, j)]
-        if plan.place(layout.SIGMA, j) == 0 and isinstance(value, Scalar):
-            value = value + 2.0 * pi * function("floor", (pi - value) * (0.5 / pi))
-        values.append(value)
-    plan.found.append((values, replace(branch, valid=both(branch.valid, met))))
+        at = results + k + i
+        d = [x[code[at + 3 * j]] - x[code[at + 3 * j + 12]] for j in range(4)]
+        off = d[3] + dot(plan.part(layout.LEVER, 0, 3), d[:3])
+        turn, far = turn + dot(d[:3], d[:3]), far + off * off
+    met = _below(_larger(far, 0.5 * turn), ACCEPTED**2)
+    values = [x[code[results + j]] for j in range(k)]
+    for j, value in enumerate(values):
+        if code[sigma + j] == 0 and isinstance(value, Scalar):
+            values[j] = value + 2.0 * pi * function("floor", (pi - value) * (0.5 / pi))
+    plan.found.append((values, Solution((), pick(valid, 0.5, met, 0.0), status)))
 
 
-def _angle(sine: Number, cosine: Number, amplitude: Number, small: Number, other: float) -> Angle:
-    """An angle by multiples of its sine and cosine; the other value where both are nearly 0."""
-    scale = 1.0 / pick(amplitude, small, amplitude, 1.0)
-    value = pick(amplitude, small, function("atan2", sine, cosine), other)
-    return (
-        value,
-        pick(amplitude, small, cosine * scale, cos(other)),
-        pick(amplitude, small, sine * scale, sin(other)),
-    )
-
-
-def _root(square: Number) -> Number:
-    return function("sqrt", pick(square, 0.0, square, 0.0))
-
-
-def _size(a: Number, b: Number) -> Number:
-    return function("sqrt", a * a + b * b)
+def _larger(a: Number, b: Number) -> Number:
+    return pick(a, b, a, b)
 
 
 def _below(x: Number, limit: Number) -> Number:
     return pick(x, limit, 0.0, 1.0)
 
 
-def direct_angle(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def _size(x: Number) -> Number:
+    return pick(x, 0.0, x, -x)
+
+
+def _status(amplitude: Number, zero: float, small: float) -> Number:
+    """Regular, doubtful or free, by the amplitude that determines an unknown."""
+    return pick(amplitude, small, 0.0, pick(amplitude, zero, _DOUBTFUL, _FREE))
+
+
+def _angle(sine: Number, cosine: Number, amplitude: Number, zero: float, other: float) -> Unknown:
+    """An angle by multiples of its sine and cosine; the other value where both are zero."""
+    scale = 1.0 / pick(amplitude, zero, amplitude, 1.0)
+    three = function("atan2", sine, cosine), cosine * scale, sine * scale
+    free = other, cos(other), sin(other)
+    return Unknown(*(pick(amplitude, zero, x, y) for x, y in zip(three, free, strict=True)))
+
+
+def direct_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S = g0, X C = g1`` with X > 0."""
-    rho = _size(g[0], g[1])
-    free, near = _below(rho, limits.zero), _below(rho, limits.small)
-    return [Branch((_angle(g[0], g[1], rho, limits.zero, wanted[0]),), 1.0, free, near)]
+    rho = function("sqrt", g[0] * g[0] + g[1] * g[1])
+    angle = _angle(g[0], g[1], rho, limits.zero, limits.wanted[0])
+    return [Solution((angle,), 1.0, _status(rho, limits.zero, limits.small))]
 
 
-def opposite_angles(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S = g0, X C = g1`` with X of any sign: an angle and the opposite one."""
-    first = direct_angle(g, limits, wanted)[0]
-    second = direct_angle([-g[0], -g[1]], limits, wanted)[0]
-    return [first, replace(second, valid=_below(first.free, 0.5))]
+    (first,), (second,) = direct_angle(g, limits), direct_angle([-g[0], -g[1]], limits)
+    return [first, second._replace(valid=_single(first))]
 
 
-def one_equation(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def _single(solution: Solution) -> Number:
+    """Whether a second solution differs from the first: none does where the unknown is free."""
+    return pick(solution.status, _FREE, 1.0, _below(solution.status, 0.5))
+
+
+def one_equation(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S + Y C = Z``, two solutions."""
     X, Y, Z = g[:3]
     square = X * X + Y * Y
-    rho = function("sqrt", square)
+    rho, size = function("sqrt", square), _size(Z)
     room = (rho - Z) * (rho + Z)
-    size = pick(Z, 0.0, Z, -Z)
-    free = _below(rho, limits.zero)
-    double = both(_below(room, _NEAR * square), _below(size - rho, _BEYOND * rho))
-    near = either(_below(rho, limits.small), double)
-    there = _below(size - rho, limits.slack * rho)
-    still = _below(size, max(limits.zero, limits.slack))
-    first = pick(free, 0.5, still, there)
-    second = both(both(first, _below(free, 0.5)), pick(room, 0.0, 1.0, 0.0))
+    double = pick(room, _NEAR * square, 0.0, _below(size - rho, _BEYOND * rho))
+    status = _status(rho, limits.zero, limits.small)
+    status = pick(status, 0.5, status, pick(double, 0.5, _DOUBTFUL, 0.0))
+    free = _below(size, max(limits.zero, SLACK))
+    first = pick(rho, limits.zero, _below(size - rho, SLACK * rho), free)
+    second = pick(rho, limits.zero, pick(room, 0.0, 1.0, 0.0), 0.0)
     Z = pick(Z, rho, rho, pick(-Z, rho, -rho, Z))  # an overshoot is a double root
-    root = function("sqrt", pick(room, 0.0, room, 0.0))
+    root = function("sqrt", _larger(room, 0.0))
     out = []
     for valid, e in ((first, root), (second, -root)):
         S, C = X * Z + Y * e, Y * Z - X * e
-        angle = _angle(S, C, square, limits.zero**2, wanted[0])
-        out.append(Branch((angle,), valid, free, near))
+        angle = _angle(S, C, square, limits.zero**2, limits.wanted[0])
+        out.append(Solution((angle,), valid, status))
     return out
 
 
-def two_equations(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
-    """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``; the stronger one alone where they depend."""
+def two_equations(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``; doubtful where they depend on each other."""
     X1, Y1, Z1, X2, Y2, Z2 = g[:6]
     det = X1 * Y2 - X2 * Y1
-    one, two = X1 * X1 + Y1 * Y1, X2 * X2 + Y2 * Y2
-    size, width = function("sqrt", one * two), pick(det, 0.0, det, -det)
-    stronger = [pick(two, one, b, a) for a, b in ((X1, X2), (Y1, Y2), (Z1, Z2))]
-    alone = one_equation(stronger, limits, wanted)[0]
+    size = function("sqrt", (X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
     sign = pick(det, 0.0, 1.0, -1.0)
     S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
-    rho, least = _size(S, C), limits.zero**2
-    angle = _angle(S, C, rho, least, wanted[0])
-    depends = both(pick(size, least, 1.0, 0.0), _below(width, 1e-12 * size))
-    free = either(_below(size, least), _below(rho, least))
-    near = either(_below(width, 1e-6 * size), _below(rho, limits.small**2))
-    return [
-        Branch(
-            (
-                tuple(
-                    pick(depends, 0.5, a, b) for a, b in zip(alone.unknowns[0], angle, strict=True)
-                ),
-            ),  # type: ignore[arg-type]
-            pick(depends, 0.5, alone.valid, 1.0),
-            pick(depends, 0.5, alone.free, free),
-            near,
-        )
-    ]
+    rho = function("sqrt", S * S + C * C)
+    angle = _angle(S, C, rho, limits.zero**2, limits.wanted[0])
+    near = pick(_size(det), _BEYOND * size, 0.0, _DOUBTFUL)
+    return [Solution((angle,), 1.0, _larger(near, _status(rho, limits.zero**2, limits.small**2)))]
 
 
-def two_angles(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def two_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``."""
     W1, W2, X, Y, Z1, Z2, sense = g
     square = W1 * W1 + W2 * W2
     third = 0.5 * (square - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
-    W = float(function("sqrt", square)) if not isinstance(square, Scalar) else 1.0
-    scaled = Limits(limits.slack, max(limits.zero * W, limits.zero**2), limits.small * W)
+    width = 1.0 if isinstance(square, Scalar) else float(square) ** 0.5
+    least = limits.zero**2
+    scaled = limits._replace(zero=max(limits.zero * width, least), small=limits.small * width)
     out = []
-    for first in one_equation([Z1 * Y + Z2 * X, Z1 * X - Z2 * Y, third], scaled, wanted):
+    for first in one_equation([Z1 * Y + Z2 * X, Z1 * X - Z2 * Y, third], scaled):
         _, C, S = first.unknowns[0]
         one, two = X * C + Y * S + Z1, sense * (X * S - Y * C + Z2)
         Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
-        rho = _size(Sj, Cj)
-        angle = _angle(Sj, Cj, rho, limits.zero**2, wanted[1])
-        free = either(first.free, _below(rho, limits.zero**2))
-        out.append(replace(first, unknowns=(*first.unknowns, angle), free=free))
+        rho = function("sqrt", Sj * Sj + Cj * Cj)
+        second = _angle(Sj, Cj, rho, least, limits.wanted[1])
+        status = _larger(first.status, _status(rho, least, least))
+        out.append(Solution((*first.unknowns, second), first.valid, status))
     return out
 
 
-def length(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``g0 r = g1``."""
-    size = pick(g[0], 0.0, g[0], -g[0])
+    size = _size(g[0])
     r = g[1] / pick(size, limits.zero, g[0], 1.0)
-    free, near = _below(size, limits.zero), _below(size, limits.small)
-    return [Branch(((pick(size, limits.zero, r, wanted[0]), 1.0, 0.0),), 1.0, free, near)]
+    value = pick(size, limits.zero, r, limits.wanted[0])
+    return [Solution((Unknown(value),), 1.0, _status(size, limits.zero, limits.small))]
 
 
-def length_times_angle(
-    g: Sequence[Number], limits: Limits, wanted: Sequence[float]
-) -> list[Branch]:
+def length_times_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X1 r S = Y1, X2 r C = Y2``: a length of either sign, then the angle."""
     A, B = g[1] / g[0], g[3] / g[2]
-    r = _size(A, B)
-    free, near = _below(r, limits.zero), _below(r, limits.small)
-    out = []
+    r = function("sqrt", A * A + B * B)
+    status, out = _status(r, limits.zero, limits.small), []
     for sign, valid in ((1.0, 1.0), (-1.0, pick(r, limits.zero, 1.0, 0.0))):
-        angle = _angle(sign * A, sign * B, r, limits.zero, wanted[1])
-        out.append(Branch(((sign * r, 1.0, 0.0), angle), valid, free, near))
+        angle = _angle(sign * A, sign * B, r, limits.zero, limits.wanted[1])
+        out.append(Solution((Unknown(sign * r), angle), valid, status))
     return out
 
 
-def length_and_angle(g: Sequence[Number], limits: Limits, wanted: Sequence[float]) -> list[Branch]:
+def length_and_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length by a quadratic, then the angle."""
     u0, u1, v0, v1 = g[1] / g[0], g[2] / g[0], g[4] / g[3], g[5] / g[3]
     a, h, c = u1 * u1 + v1 * v1, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0
     room = h * h - a * c
-    root, size = _root(room), h * h + pick(a * c, 0.0, a * c, -(a * c))
-    near = both(_below(room, _NEAR * size), _below(-room, _BEYOND * size))
-    there = _below(-room, limits.slack * size)
-    out = []
-    for sign, valid in ((1.0, there), (-1.0, pick(room, 0.0, 1.0, 0.0))):
+    root, size, out = function("sqrt", _larger(room, 0.0)), h * h + _size(a * c), []
+    near = pick(_size(room), _BEYOND * size, 0.0, _DOUBTFUL)
+    for sign, valid in ((1.0, _below(-room, SLACK * size)), (-1.0, pick(room, 0.0, 1.0, 0.0))):
         r = (sign * root - h) / a
         S, C = u0 + u1 * r, v0 + v1 * r
-        angle = _angle(S, C, _size(S, C), limits.zero, wanted[1])
-        out.append(Branch(((r, 1.0, 0.0), angle), valid, 0.0, near))
+        rho = function("sqrt", S * S + C * C)
+        angle = _angle(S, C, rho, limits.zero, limits.wanted[1])
+        out.append(Solution((Unknown(r), angle), valid, near))
     return out
 
 
-_SOLVERS = {
+_SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.ANGLE: direct_angle,
     layout.OPPOSITE_ANGLES: opposite_angles,
     layout.ONE_EQUATION: one_equation,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,22 +12,12 @@ from ..drive import Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
 from ..errors import InvalidValueError, SingularMassMatrixError, nearest_names
-from ..igm import IGMStatus
-from ..inertia import PARAMETERS
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
-from .dynamics import Parameters
-from .geometry import Frames, carried, constant_pose, frames_of, jacobian, pose_of
-from .inputs import (
-    Draft,
-    comment,
-    dynamic_parameters,
-    geometric_parameters,
-    identifier,
-    joint_notes,
-)
-from .inverse import inverse_model
+from .dynamics import Parameters, dot
+from .geometry import Constant, Link, jacobian, links_of, point_of, pose_of, poses
+from .inputs import Draft, comment, dynamic_parameters, geometric_parameters, identifier
 from .source import Program
 from .tape import Number, Port
 
@@ -35,68 +25,50 @@ ModelName = Literal[
     "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
     "base_regressor", "ddm", "igm",
 ]  # fmt: skip
-_STATES, _ROUNDING = 10, 1e-13
-Rows = list[tuple[Port, list[Number]]]
-"""Outputs with their elements."""
 
 
 class _Kind(NamedTuple):
-    """A model: its name in words, inputs, the arguments that it accepts, outputs in words."""
+    """A model: its name in words, inputs, the arguments that it accepts, outputs with units."""
 
     title: str
     inputs: tuple[str, ...]
     accepts: tuple[str, ...]
-    result: str
+    output: str
+    unit: str
 
 
-_DYNAMIC = ("parameters", "geometry")
+_DYNAMIC, _FORCED = ("parameters", "geometry"), ("parameters", "geometry", "wrench")
+_TORQUES, _RATES = "[N m] or [N]", "[rad/s^2] or [m/s^2]"
 _KINDS = {
-    "dgm": _Kind(
-        "direct geometric model", ("q",), ("geometry", "frame"), "T: pose in the world [m]"
-    ),
-    "jacobian": _Kind(
-        "Jacobian", ("q",), ("geometry", "frame"), "J: rows v, w of the frame's origin, world axes"
-    ),
-    "idm": _Kind(
-        "inverse dynamic model", ("q", "v", "a"), (*_DYNAMIC, "wrench"),
-        "tau: torques [N m] or forces [N]",
-    ),
-    "mass_matrix": _Kind("mass matrix", ("q",), _DYNAMIC, "M: [kg m^2], [kg m], [kg]"),
-    "bias": _Kind(
-        "torques of motion without acceleration", ("q", "v"), (*_DYNAMIC, "wrench"),
-        "h: torques [N m] or forces [N] of idm at a = 0",
-    ),
-    "gravity_torque": _Kind(
-        "gravity torques", ("q",), _DYNAMIC, "Q: torques [N m] or forces [N]"
-    ),
+    "dgm": _Kind("direct geometric model", ("q",), ("geometry", "frame"), "T", "world pose [m]"),
+    "jacobian": _Kind("Jacobian", ("q",), ("geometry", "frame"), "J", "[v; w] in world axes"),
+    "idm": _Kind("inverse dynamic model", ("q", "v", "a"), _FORCED, "tau", _TORQUES),
+    "mass_matrix": _Kind("mass matrix", ("q",), _DYNAMIC, "M", "[kg m^2], [kg m], [kg]"),
+    "bias": _Kind("inverse dynamic model at a = 0", ("q", "v"), _FORCED, "h", _TORQUES),
+    "gravity_torque": _Kind("gravity torques", ("q",), _DYNAMIC, "Q", _TORQUES),
     "torque_regressor": _Kind(
-        "torque regressor", ("q", "v", "a"), ("geometry",),
-        "W: torques per unit of the standard parameters",
+        "regressor of the standard parameters", ("q", "v", "a"), ("geometry",), "W", _TORQUES
     ),
     "base_regressor": _Kind(
-        "torque regressor of the base parameters", ("q", "v", "a"), ("geometry",),
-        "W: torques per unit of the base parameters",
+        "regressor of the base parameters", ("q", "v", "a"), ("geometry",), "W", _TORQUES
     ),
-    "ddm": _Kind(
-        "direct dynamic model", ("q", "v", "tau"), (*_DYNAMIC, "wrench"),
-        "a: accelerations [rad/s^2] or [m/s^2]",
-    ),
-    "igm": _Kind(
-        "inverse geometric model", ("T",), (),
-        "q: postures, a row for each branch, NaN if it does not exist; "
-        "valid: 1 for postures that exist, else 0; status: see below",
-    ),
-}  # fmt: skip
-_INPUTS = {
-    "q": "joint variables [rad] or [m]",
-    "v": "velocities [rad/s] or [m/s]",
-    "a": "accelerations [rad/s^2] or [m/s^2]",
-    "tau": "torques [N m] or forces [N]",
+    "ddm": _Kind("direct dynamic model", ("q", "v", "tau"), _FORCED, "a", _RATES),
+    "igm": _Kind("inverse geometric model", ("T",), (), "q", "NaN where valid is not 1"),
+}
+_UNITS = {
+    "q": "joint variables [rad] or [m]", "v": "velocities [rad/s] or [m/s]",
+    "a": f"accelerations {_RATES}", "tau": f"torques {_TORQUES}",
     "T": "pose of the tool in the world [m]",
     "wrench": "force [N] and moment [N m] of the tool on its environment, at the tool, world axes",
-    "geometry": "geometric parameters [m] or [rad]",
-    "parameters": "dynamic parameters [kg m^2], [kg m], [kg], friction in joint units",
+    "geometry": "[m] or [rad]", "parameters": "SI units",
+}  # fmt: skip
+_WHY = {
+    "parameters": "Geometric models have no dynamic parameters, and a regressor multiplies them.",
+    "geometry": "Paul's equations are those of the numbers; explain_igm prints them in symbols.",
+    "wrench": "Only torques and accelerations depend on it.",
+    "frame": "Dynamic models are those of all links, the inverse model is that of the tool.",
 }
+_STATES, _ROUNDING = 10, 1e-13
 
 
 def program(
@@ -181,19 +153,33 @@ def program(
     for name in (*_KINDS[kind].inputs, *("wrench",) * bool(wrench)):
         draft.input(name, {"T": (4, 4), "wrench": (6,)}.get(name, (model.n,)))
     if kind == "igm":
-        return _finished(draft, kind, _inverse(draft))
-    constant = geometric_parameters(draft) if geometry == "symbols" else None
-    own: Parameters = {}
+        from .inverse import inverse_model, status_notes  # opens the inverse models of the package
+
+        results = inverse_model(model, draft.tape, draft.scalars["T"])
+        S = len(results[1])
+        draft.notes += status_notes()
+        ports = Port("q", (S, model.n)), Port("valid", (S,)), Port("status", ())
+        return _finished(draft, kind, ports, results)
+    constant = geometric_parameters(draft) if geometry == "symbols" else _numbers(model)
+    links, own = links_of(model, draft.scalars["q"], constant), {}
     if "parameters" in _KINDS[kind].accepts:
-        own, simpler = dynamic_parameters(draft, parameters, constant is not None)
+        own, simpler = dynamic_parameters(draft, parameters, geometry == "symbols")
         if simpler is not None and _same_torques(model, own, simpler):
             own = simpler
-    at_rest = np.flatnonzero(model.chain.joint < 0).tolist()
-    heavy = any(f"{name}{k + 1}" in own for k in at_rest for name in PARAMETERS)
-    frames = frames_of(model, draft.scalars["q"], constant, heavy or kind == "torque_regressor")
     if kind in ("dgm", "jacobian"):
-        return _finished(draft, kind, _geometric(draft, kind, frames, frame))
-    return _finished(draft, kind, _dynamic(draft, kind, frames, own))
+        rows = _geometric(draft, kind, links, frame)
+    elif "regressor" in kind:
+        rows = _regressor(draft, kind, links)
+    elif kind == "mass_matrix":
+        rows = dynamics.mass_matrix(model, links, own)
+    else:
+        rows = [_torques(draft, kind, links, own)]
+    elements = [x for row in rows for x in row]
+    if kind in ("idm", "bias", "gravity_torque", "ddm"):
+        shape: tuple[int, ...] = (model.n,)
+    else:
+        shape = (len(rows), len(rows[0]) if rows else model.n)
+    return _finished(draft, kind, (Port(_KINDS[kind].output, shape),), (elements,))
 
 
 def _check(kind: str, given: dict[str, Any]) -> None:
@@ -209,127 +195,96 @@ def _check(kind: str, given: dict[str, Any]) -> None:
         "wrench": (False, True),
     }
     for name, words in choices.items():
-        if isinstance(given[name], np.ndarray) or given[name] not in words:
+        if not any(type(given[name]) is type(word) and given[name] == word for word in words):
             listed = ", ".join(map(repr, words))
             raise InvalidValueError(f"{name}: expected one of {listed}, got {given[name]!r:.60}.")
     for name, value in given.items():
         if name not in _KINDS[kind].accepts and value not in ("numbers", False, None):
             able = ", ".join(repr(k) for k, row in _KINDS.items() if name in row.accepts)
             raise InvalidValueError(
-                f"{name}: {kind!r} has no {name}={value!r:.40}; {able} have it. {_WHY[name]}"
+                f"{name}: {kind!r} has no {name}={value!r:.40}, only {able} have. {_WHY[name]}"
             )
 
 
-_WHY = {
-    "parameters": "Geometric models have no dynamic parameters, and a regressor multiplies them.",
-    "geometry": "Paul's equations are derived for the numbers of a table; explain_igm prints them "
-    "with its symbols.",
-    "wrench": "Only torques and accelerations depend on it.",
-    "frame": "Dynamic models are those of all links; an inverse model is that of the tool.",
-}
+def _numbers(model: RobotModel) -> Constant:
+    """Geometric parameters as they are in the table."""
+    return lambda column, row: float(getattr(model.table, column)[row - 1])
 
 
 def _same_torques(model: RobotModel, own: Parameters, other: Parameters) -> bool:
     """Whether two sets of parameters have the same torques, to rounding."""
     draft = Draft(model, ())
     q, v, a = (draft.input(name, (model.n,)) for name in "qva")
-    frames = frames_of(model, q, heavy=True)
-    results = [dynamics.inverse_dynamics(model, frames, x, v, a, {}) for x in (own, other)]
+    links = links_of(model, q, _numbers(model))
+    moved = dynamics.motions(model, links, v, a)
+    both = [dynamics.inverse_dynamics(model, links, moved, x, v, a, {}) for x in (own, other)]
     states = np.random.default_rng(0).normal(size=(3, model.n, _STATES))
-    torques = draft.tape.frozen(results).run(list(states))
+    torques = draft.tape.frozen(both).run(list(states))
     first, second = (np.array([np.broadcast_to(x, _STATES) for x in row]) for row in torques)
     off, size = (np.abs(x).max(initial=0.0) for x in (first - second, first))
     return bool(off <= _ROUNDING * size)
 
 
-def _inverse(draft: Draft) -> Rows:
-    """All postures of a pose."""
-    model = draft.model
-    q, valid, status = inverse_model(model, draft.tape, draft.scalars["T"])
-    S = len(valid)
-    draft.notes += ["status (without a posture all rows of q are NaN):"]
-    for code in (
-        IGMStatus.REACHED, IGMStatus.REACHED_FAMILY, IGMStatus.NOT_CONVERGED, IGMStatus.INCOMPLETE
-    ):  # fmt: skip
-        more = {
-            IGMStatus.REACHED_FAMILY: " Joints that are free are 0.",
-            IGMStatus.INCOMPLETE: " It is near a singular pose.",
-        }
-        draft.notes.append(f"  {int(code)}: {code.sentence}{more.get(code, '')}")
-    return [
-        (Port("q", (S, model.n)), q),
-        (Port("valid", (S,)), valid),
-        (Port("status", ()), status),
-    ]
-
-
-def _geometric(draft: Draft, kind: str, frames: Frames, frame: str | int | None) -> Rows:
-    """Pose of a frame, or its Jacobian."""
-    model = draft.model
-    if frame is not None:
-        model.twin.frame(frame)
-        draft.notes.append(f"of the frame {comment(str(frame))}")
-    number, (R, p) = pose_of(model, frames, frame)
+def _geometric(
+    draft: Draft, kind: str, links: Sequence[Link], frame: str | int | None
+) -> list[Sequence[Number]]:
+    """Rows of a pose or a Jacobian."""
+    number, point = point_of(draft.model, frame)
+    draft.notes.append(f"Frame: {comment(str('tool' if frame is None else frame))}")
     if kind == "jacobian":
-        columns = jacobian(frames, number, p, model.n)
-        rows = [columns[j][i] for i in range(6) for j in range(model.n)]
-        return [(Port("J", (6, model.n)), rows)]
-    elements = [x for row, d in zip(R, p, strict=True) for x in (*row, d)]
-    return [(Port("T", (4, 4)), [*elements, 0.0, 0.0, 0.0, 1.0])]
+        return [*jacobian(draft.model, links, number, point)]
+    R, p = pose_of(poses(draft.model, links), number, point)
+    return [*((*row, x) for row, x in zip(R, p, strict=True)), (0.0, 0.0, 0.0, 1.0)]
 
 
-def _dynamic(draft: Draft, kind: str, frames: Frames, own: Parameters) -> Rows:
-    """Torques, masses, regressors or accelerations."""
-    model, scalars = draft.model, draft.scalars
-    n, zero = model.n, [0.0] * model.n
+def _regressor(draft: Draft, kind: str, links: Sequence[Link]) -> list[list[Number]]:
+    """Rows of torques per unit of each parameter."""
+    model, (v, a) = draft.model, (draft.scalars[name] for name in "va")
+    is_base = kind == "base_regressor"
+    names = draft.base().names if is_base else parameter_names(model, draft.kinds)
+    draft.notes.append(f"Columns: {', '.join(names)}")
+    moved = dynamics.motions(model, links, v, a)
+    columns = [
+        dynamics.inverse_dynamics(model, links, moved, {name: 1.0}, v, a, {}) for name in names
+    ]
+    return [[column[i] for column in columns] for i in range(model.n)]
+
+
+def _torques(draft: Draft, kind: str, links: Sequence[Link], own: Parameters) -> list[Number]:
+    """Torques of a motion, or accelerations under torques."""
+    model, scalars, zero = draft.model, draft.scalars, [0.0] * draft.model.n
     v, a = scalars.get("v", zero), scalars.get("a", zero)
-    if "regressor" in kind:
-        names = draft.base().names
-        if kind == "torque_regressor":
-            names = parameter_names(model, draft.kinds)
-        draft.notes.append(f"columns: {', '.join(names)}")
-        columns = dynamics.regressor(model, frames, names, v, a)
-        rows = [column[i] for i in range(n) for column in columns]
-        return [(Port("W", (n, len(names))), rows)]
-    if kind == "mass_matrix":
-        M = dynamics.mass_matrix(model, frames, own)
-        return [(Port("M", (n, n)), [x for row in M for x in row])]
     if kind == "gravity_torque":
-        own = {name: x for name, x in own.items() if not name.startswith(_DRIVE_TERMS)}
+        own = {name: x for name, x in own.items() if not name.startswith(dynamics.DRIVE_TERMS)}
     tool: dict[int, dynamics.Wrench] = {}
     if "wrench" in scalars:
-        number, place = carried(model, frames, None)
-        point = constant_pose(place)[1]
-        tool = dynamics.tool_wrench(frames, number, point, scalars["wrench"])
-    tau = dynamics.inverse_dynamics(model, frames, own, v, a, tool)
+        tool = dynamics.tool_wrench(model, links, point_of(model, None), scalars["wrench"])
+    moved = dynamics.motions(model, links, v, a)
+    tau = dynamics.inverse_dynamics(model, links, moved, own, v, a, tool)
     if kind != "ddm":
-        return [(Port(_KINDS[kind].result.split(":")[0], (n,)), tau)]
-    return [(Port("a", (n,)), _accelerations(draft, frames, own, tau))]
-
-
-_DRIVE_TERMS = ("Ia", "Fv", "Fc", "offset")
+        return tau
+    rest = [x - y for x, y in zip(scalars["tau"], tau, strict=True)]
+    return _accelerations(draft, dynamics.mass_matrix(model, links, own), rest)
 
 
 def _accelerations(
-    draft: Draft, frames: Frames, own: Parameters, bias: Sequence[Number]
+    draft: Draft, M: Sequence[Sequence[Number]], torques: Sequence[Number]
 ) -> list[Number]:
-    """Accelerations by the mass matrix; joints that mimic others follow them."""
-    model, n = draft.model, draft.model.n
-    G = None if model.transmission is None else free_motion(model.transmission)
-    if model.inertia.values.any() or model.drive.Ia.any():
-        at = np.zeros(n) if model.transmission is None else model.transmission.offset
-        ddm(model, at, np.zeros(n), np.zeros(n), drive=bool(draft.kinds))  # refuses singular masses
-    M = dynamics.mass_matrix(model, frames, own)
-    rest = [x - y for x, y in zip(draft.scalars["tau"], bias, strict=True)]
+    """Accelerations under torques; joints that mimic others follow them."""
+    model, K = draft.model, draft.model.transmission
+    rest = np.zeros(model.n)
+    if model.inertia.values.any() or model.drive.Ia.any():  # refuses singular mass matrices
+        ddm(model, rest if K is None else K.offset, rest, rest, drive=bool(draft.kinds))
+    G = None if K is None else free_motion(K)
     try:
         if G is None:
-            return dynamics.solved(M, rest)
-        draft.notes.append("joints that mimic others follow them; q and v must do so too")
+            return dynamics.solved(M, torques)
+        draft.notes.append("Joints that mimic others follow them; q and v must do so, too.")
         free = G.T.tolist()
-        MG = [[_dot(row, column) for column in free] for row in M]
-        reduced = [[_dot(row, [x[j] for x in MG]) for j in range(len(free))] for row in free]
-        x = dynamics.solved(reduced, [_dot(row, rest) for row in free])
-        return [_dot(row, x) for row in G.tolist()]
+        MG = [[dot(row, column) for column in free] for row in M]
+        own = [[dot(row, [x[j] for x in MG]) for j in range(len(free))] for row in free]
+        solution = dynamics.solved(own, [dot(row, torques) for row in free])
+        return [dot(row, solution) for row in G.tolist()]
     except ZeroDivisionError:
         raise SingularMassMatrixError(
             f"model: the mass matrix of {model.name!r} is singular. Give inertial parameters with "
@@ -337,43 +292,30 @@ def _accelerations(
         ) from None
 
 
-def _dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
-    return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
-
-
-def _finished(draft: Draft, kind: str, results: Rows) -> Program:
+def _finished(
+    draft: Draft, kind: str, outputs: tuple[Port, ...], results: Sequence[Sequence[Number]]
+) -> Program:
     """The program with its header."""
     model, row = draft.model, _KINDS[kind]
-    name = identifier(f"{model.name}_{kind}" if model.name else kind)
-    operations = draft.tape.frozen(elements for _, elements in results)
-    count = operations.count()
+    name = identifier(f"{model.name}_{kind}")
+    operations = draft.tape.frozen(results)
+    counts = ", ".join(f"{k} {word}" for word, k in operations.count()._asdict().items())
     notes = [
-        f"{name}: {row.title} of {comment(model.name)}, {model.n} joints.",
-        f"Written by robotmodels {_version()}; {count.multiplications} multiplications, "
-        f"{count.additions} additions, {count.functions} functions, {count.divisions} divisions.",
-        "SI units and radians; matrices row by row; frames of Khalil and Kleinfinger.",
-        "Inputs:",
+        f"{name}: {row.title} of {comment(model.name)}",
+        f"Written by robotmodels {version('robotmodels')}. {counts}.",
+        "SI units and radians, matrices row by row, frames of Khalil and Kleinfinger.",
     ]
     for port, names, values in zip(draft.inputs, draft.elements, draft.values, strict=True):
-        notes.append(f"  {port.name} {port.shape}: {_INPUTS[port.name]}")
+        notes.append(f"Input {port.name} {port.shape}: {_UNITS[port.name]}")
         pairs = zip(names, values, strict=True)
-        notes += [f"    {k}: {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
-    notes += [
-        "Outputs:",
-        *(f"  {port.name} {port.shape}" for port, _ in results),
-        f"  {row.result}",
-    ]
-    notes += ["Joints:", *joint_notes(model), *draft.notes]
+        notes += [f"  {k} {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
+    notes += [f"Output {port.name} {port.shape}: {row.unit}" for port in outputs[:1]]
+    notes += [f"Output {port.name} {port.shape}" for port in outputs[1:]] + draft.notes
+    joints = (f"{k} {comment(name)}" for k, name in enumerate(model.table.joint_names))
+    notes.append(f"Joints: {', '.join(joints)}")
     if any(node[0] == "sign" for node in operations.nodes):
         notes.append("sign(0) = 0; in CasADi, smooth > 0 replaces sign(v) by tanh(v / smooth).")
+    elements, values = tuple(draft.elements), tuple(draft.values)
     return Program(
-        name, kind, tuple(draft.inputs), tuple(port for port, _ in results),
-        tuple(draft.elements), tuple(draft.values), tuple(notes), operations,
-    )  # fmt: skip
-
-
-def _version() -> str:
-    try:
-        return version("robotmodels")
-    except PackageNotFoundError:
-        return "(not installed)"
+        name, kind, tuple(draft.inputs), elements, values, outputs, tuple(notes), operations
+    )

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, batch_shape
 from ..errors import InvalidValueError
-from .languages import LANGUAGES, body, language_of
+from .languages import LANGUAGES, Text, file_text, lines_of
 from .tape import OperationCount, Operations, Port
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Program:
     """A model as straight-line code, made by `program`. Read-only, picklable, equal by value.
 
@@ -22,16 +22,16 @@ class Program:
     ----------
     name : str
         Name of the function in generated code.
-    model : str
+    kind : str
         The model, such as ``"idm"``.
-    inputs, outputs : tuple of (name, shape)
-        In the order of the arguments and of the results.
-    elements : tuple of tuple of str
-        Names of the elements of each input; empty where they have only numbers.
-    values : tuple of tuple of float
-        For inputs with named elements their values in the model.
+    inputs : tuple of (name, shape)
+        In the order of the arguments.
+    elements, values : tuple of tuple
+        Names of the elements of inputs that are parameters, and their values in the model.
+    outputs : tuple of (name, shape)
+        In the order of the results.
     notes : tuple of str
-        What the header says: conventions, joints, identifiers that differ from the names given.
+        The header: conventions, units, identifiers that differ from the names given.
     operations : Operations
         The tape.
 
@@ -40,18 +40,18 @@ class Program:
     >>> from robotmodels.export import program
     >>> from robotmodels.robots import load
     >>> arm = program(load("planar_2r"), "gravity_torque", parameters="base", drive=False)
-    >>> arm.inputs
-    (Port(name='q', shape=(2,)), Port(name='parameters', shape=(4,)))
-    >>> arm.count
-    OperationCount(multiplications=5, additions=3, functions=4, divisions=0)
+    >>> arm.inputs[-1], arm.elements[-1]
+    (Port(name='parameters', shape=(4,)), ('ZZ1', 'ZZ2', 'MX2', 'MY2'))
+    >>> arm.count.divisions
+    0
     """
 
     name: str
-    model: str
+    kind: str
     inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
     elements: tuple[tuple[str, ...], ...]
     values: tuple[tuple[float, ...], ...]
+    outputs: tuple[Port, ...]
     notes: tuple[str, ...]
     operations: Operations
 
@@ -63,15 +63,22 @@ class Program:
     @property
     def lines(self) -> tuple[str, ...]:
         """The assignments, one by one, in Python."""
-        return tuple(body(self, LANGUAGES["python"]).lines)
+        return tuple(lines_of(self._text, LANGUAGES["python"])[0])
+
+    @property
+    def _text(self) -> Text:
+        """What is printed."""
+        return Text(
+            self.name, self.inputs, self.elements, self.outputs, self.notes, self.operations
+        )
 
     def __call__(self, *inputs: ArrayLike) -> Array | tuple[Array, ...]:
-        """Run the tape, for checks.
+        """Run the tape, for checks; leading axes of the inputs are batch axes.
 
         Parameters
         ----------
         *inputs : array_like
-            In the order of `inputs`; leading axes are batch axes and broadcast.
+            In the order of `inputs`.
 
         Returns
         -------
@@ -83,13 +90,12 @@ class Program:
             raise InvalidValueError(
                 f"inputs: {self.name} takes {len(self.inputs)} ({names}), got {len(inputs)}."
             )
-        arrays = [as_core(x, p.shape, p.name) for x, p in zip(inputs, self.inputs, strict=True)]
-        flat = [
-            x.reshape((*x.shape[: x.ndim - len(p.shape)], p.size))
-            for x, p in zip(arrays, self.inputs, strict=True)
-        ]
-        batch = batch_shape(tuple(flat), tuple(p.name for p in self.inputs))
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        flat = []
+        for value, port in zip(inputs, self.inputs, strict=True):
+            x = as_core(value, port.shape, port.name)
+            flat.append(x.reshape((*x.shape[: x.ndim - len(port.shape)], port.size)))
+        batch = batch_shape(tuple(flat), tuple(port.name for port in self.inputs))
+        with np.errstate(all="ignore"):
             rows = self.operations.run([np.moveaxis(x, -1, 0) for x in flat])
         out = []
         for port, row in zip(self.outputs, rows, strict=True):
@@ -112,16 +118,12 @@ class Program:
         str
             One function, self-contained, the same text every time.
         """
-        return language_of(language).file(self)
+        return file_text(self._text, language)
 
     def __repr__(self) -> str:
-        def ports(of: tuple[Port, ...]) -> str:
-            return ", ".join(f"{p.name} {p.shape}" for p in of)
-
+        ports = [", ".join(f"{p.name} {p.shape}" for p in of) for of in (self.inputs, self.outputs)]
         counted = ", ".join(f"{n} {word}" for word, n in self.count._asdict().items())
-        return f"<Program {self.name}: {ports(self.inputs)} -> {ports(self.outputs)}\n {counted}>"
-
-    __str__ = __repr__
+        return f"<Program {self.name}: {ports[0]} -> {ports[1]}; {counted}>"
 
 
 def write(program: Program, path: str | Path, language: str | None = None) -> None:
