@@ -36,12 +36,14 @@ class Motion(NamedTuple):
     w: Vector
     dw: Vector
     u: Vector
-    U: tuple[Vector, Vector, Vector]
+    U: tuple[Vector, ...]
 
 
-def ten_of(parameters: Parameters, number: int) -> Ten:
-    """Inertial parameters of a link."""
-    return tuple(parameters.get(f"{name}{number}", 0.0) for name in PARAMETERS)
+def ten_of(parameters: Parameters, number: int, link: Link) -> Ten:
+    """Inertial parameters of a link about its origin, lifted or not."""
+    ten = tuple(parameters.get(f"{name}{number}", 0.0) for name in PARAMETERS)
+    J = _shifted(ten[:6], ten[6:9], ten[9], (0.0, 0.0, link.lift))
+    return (*J, *ten[6:8], ten[8] + ten[9] * link.lift, ten[9])
 
 
 def motions(
@@ -121,6 +123,7 @@ def tool_wrench(
     F, N = times(columns, tuple(wrench[:3])), times(columns, tuple(wrench[3:]))  # type: ignore[arg-type]
     for k in model.table.path(number):
         F, N = links[k - 1].inward(F), links[k - 1].inward(N)
+        point = plus(point, (0.0, 0.0, links[k - 1].lift))  # not zero for the last one alone
     return {number: (F, plus(N, cross(point, F)))}
 
 
@@ -157,7 +160,7 @@ def inverse_dynamics(
     """Joint torques of a motion, drives and the wrench of the tool included."""
     wrenches = {}
     for number in range(1, len(links) + 1):
-        ten = ten_of(parameters, number)
+        ten = ten_of(parameters, number, links[number - 1])
         F, N = tool.get(number, (_ZERO, _ZERO))
         if any(map(given, ten)) or number in tool:
             own = link_wrench(moved[number], ten)
@@ -177,7 +180,8 @@ def mass_matrix(
     zero, rotors = [0.0] * model.n, {k: x for k, x in parameters.items() if k.startswith("Ia")}
     units = np.eye(model.n).tolist()
     M = [drive_torques(model, rotors, zero, unit) for unit in units]  # symmetric
-    composite = [ten_of(parameters, number) for number in range(len(links) + 1)]
+    composite: list[Ten] = [(0.0,) * 10]
+    composite += [ten_of(parameters, k, link) for k, link in enumerate(links, start=1)]
     for number in range(len(links), 0, -1):
         link, ten = links[number - 1], composite[number]
         if link.joint >= 0:
@@ -226,7 +230,7 @@ def solved(M: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Numbe
     for k in range(len(L) - 1, -1, -1):
         factors = [y / L[k][k] if given(y) else 0.0 for y in L[k][:k]]
         for i, factor in enumerate(factors):
-            L[i][: i + 1] = [y - factor * z for y, z in zip(L[i], L[k][: i + 1])]
+            L[i][: i + 1] = [y - factor * z for y, z in zip(L[i][: i + 1], L[k], strict=False)]
             x[i] = x[i] - factor * x[k]
         L[k][:k] = factors
     for k, row in enumerate(L):

@@ -13,7 +13,7 @@ tree structure robots", IEEE Journal of Robotics and Automation 3(6), 1987; seed
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
 
 import numpy as np
@@ -42,6 +42,7 @@ class Link:
     shift: Vector  # in the axes of the antecedent
     turns: tuple[tuple[int, Number, Number], ...]  # axis (0 x, 1 y, 2 z), cosine, sine
     r: Number
+    lift: Number = 0.0  # place along the axis of a link without successors, if it is not r
 
     def inward(self, a: Vector) -> Vector:
         """Vector of the antecedent's axes in those of the link."""
@@ -83,7 +84,16 @@ def links_of(model: RobotModel, q: Sequence[Number], constant: Constant) -> list
     return links
 
 
-COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+COLUMNS: tuple[str, ...] = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+
+
+def lowered(links: Sequence[Link]) -> list[Link]:
+    """Links without successors moved along their axes, so that no motion depends on ``r``."""
+    inner = {link.antecedent - 1 for link in links}
+    return [
+        link if k in inner or link.slides else replace(link, r=0.0, lift=link.r)
+        for k, link in enumerate(links)
+    ]
 
 
 def poses(model: RobotModel, links: Sequence[Link]) -> list[Pose]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from ..drive import DriveKind
@@ -14,15 +14,16 @@ from ..regressors import parameter_names, parameter_vector
 from .geometry import COLUMNS, Constant
 from .tape import Number, Port, Tape
 
-_WORDS = {*keyword.kwlist, *"""
+_RESERVED = """
 auto break case char const continue default do double else enum extern float for goto if inline int
 long register restrict return short signed sizeof static struct switch typedef union unsigned void
 volatile while asm main NULL NAN INFINITY end function elseif otherwise parfor persistent catch spmd
 classdef reshape acos asin atan atan2 ceil cos cosh erf exp fabs floor fma fmax fmin fmod gamma
 hypot j0 j1 jn log pow round sin sinh sqrt tan tanh tgamma y0 y1 yn abs sign pi inf nan np math
 casadi smooth batch select_ q v a tau T wrench geometry parameters J M h Q W valid status a_out
-""".split()}  # fmt: skip
+"""
 """Words of the languages, names of their libraries and those that generated code uses."""
+_WORDS = {*keyword.kwlist, *_RESERVED.split()}
 _TAKEN = re.compile(r"[tCS]\d+")  # of lines, cosines and sines
 _LETTERS = dict(zip(COLUMNS, ("G", "BL", "B", "A", "D", "TH", "RL"), strict=True))
 _EXACT = 1e-13

@@ -94,8 +94,9 @@ def lines_of(text: Text, language: Language) -> tuple[list[str], list[list[str]]
             is_short = not name
         elif operation in _SIGN:
             a, b = operands
-            if operation in ("add", "mul") and known[b][0][0].isdigit() or known[b][1] == level:
-                a, b = (b, a) if operation in ("add", "mul") else (a, b)
+            first = known[b][0][0].isdigit() or known[b][1] == level  # constants, sums in sums
+            if operation in ("add", "mul") and first:
+                a, b = b, a
             expression = operand(a, level) + _SIGN[operation] + operand(b, level + 1)
             is_short = uses[number] == 1 and len(expression) <= _WIDEST
         elif operation in ("pick", "sign"):
@@ -206,8 +207,8 @@ def _between(
 
 LANGUAGES = {
     "c": Language(
-        ".c", "//", lambda name, at: f"{name}[{at[-1] + 4 * (len(at) == 2 and at[0])}]", "const double {} = {};",
-        "", "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
+        ".c", "//", lambda name, at: f"{name}[{sum(x * 4**i for i, x in enumerate(at[::-1]))}]",
+        "const double {} = {};", "", "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
         lambda name, _, elements: [f"{name}[{k}] = {x};" for k, x in enumerate(elements)], _c,
     ),
     "python": Language(

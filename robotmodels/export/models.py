@@ -16,7 +16,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
 from .dynamics import Parameters, dot
-from .geometry import Constant, Link, jacobian, links_of, point_of, pose_of, poses
+from .geometry import Constant, Link, jacobian, links_of, lowered, point_of, pose_of, poses
 from .inputs import Draft, comment, dynamic_parameters, geometric_parameters, identifier
 from .source import Program
 from .tape import Number, Port
@@ -169,11 +169,11 @@ def program(
     if kind in ("dgm", "jacobian"):
         rows = _geometric(draft, kind, links, frame)
     elif "regressor" in kind:
-        rows = _regressor(draft, kind, links)
+        rows = _regressor(draft, kind, lowered(links))
     elif kind == "mass_matrix":
-        rows = dynamics.mass_matrix(model, links, own)
+        rows = dynamics.mass_matrix(model, lowered(links), own)
     else:
-        rows = [_torques(draft, kind, links, own)]
+        rows = [_torques(draft, kind, lowered(links), own)]
     elements = [x for row in rows for x in row]
     if kind in ("idm", "bias", "gravity_torque", "ddm"):
         shape: tuple[int, ...] = (model.n,)
@@ -215,7 +215,7 @@ def _same_torques(model: RobotModel, own: Parameters, other: Parameters) -> bool
     """Whether two sets of parameters have the same torques, to rounding."""
     draft = Draft(model, ())
     q, v, a = (draft.input(name, (model.n,)) for name in "qva")
-    links = links_of(model, q, _numbers(model))
+    links = lowered(links_of(model, q, _numbers(model)))
     moved = dynamics.motions(model, links, v, a)
     both = [dynamics.inverse_dynamics(model, links, moved, x, v, a, {}) for x in (own, other)]
     states = np.random.default_rng(0).normal(size=(3, model.n, _STATES))
@@ -297,7 +297,7 @@ def _finished(
 ) -> Program:
     """The program with its header."""
     model, row = draft.model, _KINDS[kind]
-    name = identifier(f"{model.name}_{kind}")
+    name = f"{identifier(model.name)}_{kind}"
     operations = draft.tape.frozen(results)
     counts = ", ".join(f"{k} {word}" for word, k in operations.count()._asdict().items())
     notes = [

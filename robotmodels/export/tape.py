@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from math import prod
-from typing import NamedTuple, Union
+from typing import Any, NamedTuple, Union
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from .._arrays import Array
 Node = tuple[str, tuple[int, ...], float]
 """An operation, its operands (node numbers from 1, negative for the opposite), a constant."""
 Number = Union[float, "Scalar"]
-Vector = tuple[Number, Number, Number]
+Vector = tuple[Number, ...]
 
-RUN: dict[str, Callable[..., Array]] = {
+RUN: dict[str, Callable[..., Any]] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide,
     "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "sign": np.sign, "floor": np.floor,
     "atan2": np.arctan2, "pick": lambda a, b, x, y: np.where(a > b, x, y),
@@ -87,6 +87,14 @@ class Scalar:
     def __mul__(self, other: Number) -> Number:
         if not isinstance(other, Scalar) and other in (0.0, 1.0, -1.0):
             return 0.0 if other == 0.0 else (self if other > 0.0 else -self)
+        if not isinstance(other, Scalar):  # a constant times a constant times x
+            operation, operands, _ = self.tape.nodes[abs(self.number) - 1]
+            for k, x in zip(operands, operands[::-1], strict=True) if operation == "mul" else ():
+                factor = self.tape.nodes[k - 1]
+                if factor[0] == "constant":
+                    return Scalar(self.tape, x) * (
+                        (other if self.number > 0 else -other) * factor[2]
+                    )
         a, b = self.number, self.tape.number(other)
         node = self.tape.add("mul", tuple(sorted((abs(a), abs(b)))))
         return Scalar(self.tape, node if (a < 0) == (b < 0) else -node)
@@ -169,7 +177,7 @@ class Operations(NamedTuple):
 
     def run(self, inputs: Sequence[Array]) -> list[list[Array]]:
         """Elements of the results for the elements of the inputs, arrays (k, ...) each."""
-        values: list[Array] = [np.zeros(())]
+        values: list[Any] = [np.zeros(())]
         for operation, operands, value in self.nodes:
             if operation == "input":
                 values.append(inputs[operands[0]][operands[1]])
@@ -205,7 +213,7 @@ def pick(a: Number, b: Number, x: Number, y: Number) -> Number:
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
     x, y, z = ((1, 2), (2, 0), (0, 1))
-    return tuple(a[i] * b[j] - a[j] * b[i] for i, j in (x, y, z))  # type: ignore[return-value]
+    return tuple(a[i] * b[j] - a[j] * b[i] for i, j in (x, y, z))
 
 
 def plus(a: Vector, b: Vector) -> Vector:
@@ -215,4 +223,4 @@ def plus(a: Vector, b: Vector) -> Vector:
 
 def times(M: Sequence[Vector], a: Vector) -> Vector:
     """Matrix, given by its rows, times a vector."""
-    return tuple(r[0] * a[0] + r[1] * a[1] + r[2] * a[2] for r in M)  # type: ignore[return-value]
+    return tuple(r[0] * a[0] + r[1] * a[1] + r[2] * a[2] for r in M)
