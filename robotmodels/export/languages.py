@@ -1,12 +1,12 @@
 """Printers of a tape: C99, Python, NumPy, CasADi and MATLAB.
 
-A language is what its elements, functions and results look like; the lines are made once for all.
-Products and sums that are used once are written into the line that uses them.
+A language is what its elements and functions look like; the lines are made once for all. Products
+and sums that are used once are written into the line that uses them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..errors import InvalidValueError, nearest_names
@@ -29,22 +29,25 @@ class Text(NamedTuple):
 
 
 class Language(NamedTuple):
-    """How a language writes comments, elements of inputs, assignments, functions and results.
+    """How a language writes elements ``name(i, j)``, assignments, functions and comments."""
 
-    ``result`` takes name, shape and elements; ``frame`` the text, the names of inputs and outputs
-    and the lines between.
-    """
-
+    name: str
     suffix: str
     comment: str
-    element: Callable[[str, Sequence[int]], str]
+    brackets: tuple[str, str, str]
+    first: int  # index
     assignment: str
     functions: str
     sign: str
     pick: str
     nan: str
-    result: Callable[[str, tuple[int, ...], Sequence[str]], list[str]]
-    frame: Callable[[Text, list[str], list[str], list[str]], list[str]]
+
+    def element(self, port: Port, k: int) -> str:
+        """Element k of an input, counted row by row; in C all are in one row."""
+        flat = len(port.shape) == 1 or self.name == "c"
+        indices = (k,) if flat else divmod(k, port.shape[1])
+        opening, between, closing = self.brackets
+        return port.name + opening + between.join(str(i + self.first) for i in indices) + closing
 
 
 def file_text(text: Text, language: str) -> str:
@@ -55,22 +58,21 @@ def file_text(text: Text, language: str) -> str:
         words = ", ".join(map(repr, LANGUAGES))
         raise InvalidValueError(f"language: expected one of {words}, got {language!r:.60}.{meant}")
     of = LANGUAGES[language]
-    head = [f"{of.comment} {note}".rstrip() for note in text.notes]
     inputs, outputs = [port.name for port in text.inputs], []
     lines, results = lines_of(text, of)
     for port, elements in zip(text.outputs, results, strict=True):
         outputs.append(f"{port.name}_out" if port.name in inputs else port.name)
-        lines += of.result(outputs[-1], port.shape, elements)
-    return "\n".join([*head, *of.frame(text, inputs, outputs, lines), ""])
+        lines += _result(of, outputs[-1], port.shape, elements)
+    head = [f"{of.comment} {note}" for note in text.notes]
+    return "\n".join([*head, *_framed(text, of, inputs, outputs, lines), ""])
 
 
 def lines_of(text: Text, language: Language) -> tuple[list[str], list[list[str]]]:
     """Assignments, and the elements of the results."""
     nodes, results = text.operations
     uses = [0] * (len(nodes) + 1)
-    for k in (k for operation, operands, _ in nodes if operation != "input" for k in operands):
-        uses[abs(k)] += 1
-    for k in (k for row in results for k in row):
+    operands_of = (operands for operation, operands, _ in nodes if operation != "input")
+    for k in (k for row in (*operands_of, *results) for k in row):
         uses[abs(k)] += 1
     known: list[tuple[str, int]] = [("", 0)]  # text of each node, and how tightly it binds
     lines: list[str] = []
@@ -84,13 +86,12 @@ def lines_of(text: Text, language: Language) -> tuple[list[str], list[list[str]]
     count = 0
     for number, (operation, operands, value) in enumerate(nodes, start=1):
         name, level, is_short = "", _LEVEL.get(operation, 3), False
-        if operation == "constant" or operation == "nan":
+        if operation in ("constant", "nan"):
             expression, is_short = repr(value) if operation == "constant" else language.nan, True
         elif operation == "input":
-            port, k = text.inputs[operands[0]], operands[1]
-            indices = (k,) if len(port.shape) == 1 else divmod(k, port.shape[1])
-            expression = language.element(port.name, indices)
-            name = text.elements[operands[0]][k] if text.elements[operands[0]] else ""
+            port, k = operands
+            expression = language.element(text.inputs[port], k)
+            name = text.elements[port][k] if text.elements[port] else ""
             is_short = not name
         elif operation in _SIGN:
             a, b = operands
@@ -118,115 +119,90 @@ def lines_of(text: Text, language: Language) -> tuple[list[str], list[list[str]]
     return lines, [[operand(k, 0) for k in row] for row in results]
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+def _result(of: Language, name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
+    """Lines that put the elements of a result together."""
+    rows, columns = (shape * 2)[:2] if shape else (1, 1)
+    is_matrix, after = len(shape) == 2, []
+    if of.name == "c":
+        return [f"{name}[{k}] = {x};" for k, x in enumerate(elements)]
+    opening, mark, closing = "[", ",", "]"
+    if of.name == "python":
+        if not shape:
+            return [f"{name} = {elements[0]}"]
+        if is_matrix:
+            at = range(0, len(elements), max(columns, 1))
+            elements = [f"[{', '.join(elements[k : k + columns])}]" for k in at]
+    elif of.name == "numpy":
+        opening, closing = "np.array([", "])"
+        elements = [f"batch + ({x})" for x in elements]
+        after = [f"{name} = np.moveaxis({name}, 0, -1).reshape(batch.shape + {shape})"]
+    elif of.name == "casadi":
+        opening, closing = "casadi.vertcat(", ")"
+        after = [f"{name} = {name}.reshape(({columns}, {rows})).T"] * is_matrix
+    else:
+        mark, closing = "", "];"
+        after = [f"{name} = reshape({name}, {columns}, {rows}).';"] * is_matrix
+    return [f"{name} = {opening}", *(f"    {x}{mark}" for x in elements), closing, *after]
 
 
-def _listed(start: str, elements: Sequence[str], end: str) -> list[str]:
-    return [start, *(f"    {element}," for element in elements), end]
-
-
-def _rows(shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    """Elements row by row, in brackets if there are several to a row."""
-    if len(shape) < 2:
-        return list(elements)
-    step = max(shape[1], 1)
-    return [f"[{', '.join(elements[k : k + step])}]" for k in range(0, len(elements), step)]
-
-
-def _python_result(name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    if not shape:
-        return [f"{name} = {elements[0]}"]
-    return _listed(f"{name} = [", _rows(shape, elements), "]")
-
-
-def _numpy_result(name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    lines = _listed(f"{name} = np.array([", [f"batch + ({x})" for x in elements], "])")
-    return [*lines, f"{name} = np.moveaxis({name}, 0, -1).reshape(batch.shape + {shape})"]
-
-
-def _casadi_result(name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    end = f").reshape(({shape[1]}, {shape[0]})).T" if len(shape) == 2 else ")"
-    return _listed(f"{name} = casadi.vertcat(", elements, end)
-
-
-def _matlab_result(name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    lines = [f"{name} = [", *(f"    {element}" for element in elements), "];"]
-    reshaped = f"{name} = reshape({name}, {shape[-1]}, {shape[0]}).';" if len(shape) == 2 else ""
-    return [*lines, *[reshaped] * bool(reshaped)]
-
-
-def _c(text: Text, inputs: list[str], outputs: list[str], lines: list[str]) -> list[str]:
-    arguments = [f"const double *{name}" for name in inputs]
-    arguments += [f"double *{name}" for name in outputs]
-    unused = [f"(void){name};" for name in (*inputs, *outputs)]
-    return [
-        "#include <math.h>", "", f"void {text.name}({', '.join(arguments)})", "{",
-        *_indented([*unused, *lines]), "}",
-    ]  # fmt: skip
-
-
-def _python(text: Text, inputs: list[str], outputs: list[str], lines: list[str]) -> list[str]:
-    head = f"def {text.name}({', '.join(inputs)}):"
-    return ["import math", "", "", head, *_indented([*lines, f"return {', '.join(outputs)}"])]
-
-
-def _numpy(text: Text, inputs: list[str], outputs: list[str], lines: list[str]) -> list[str]:
-    arrays = [f"{name} = np.asarray({name}, dtype=np.float64)" for name in inputs]
-    shapes = (f"{p.name}.shape[:-{len(p.shape)}]" for p in text.inputs)
-    arrays.append(f"batch = np.zeros(np.broadcast_shapes({', '.join(shapes)}))")
-    return ["import numpy as np", *_python(text, inputs, outputs, [*arrays, *lines])[1:]]
-
-
-def _casadi(text: Text, inputs: list[str], outputs: list[str], lines: list[str]) -> list[str]:
-    smooth = any(node[0] == "sign" for node in text.operations.nodes)
-    helper = [
-        "", "", "def _sign(x, smooth):",
-        "    return casadi.tanh(x / smooth) if smooth else casadi.sign(x)",
-    ]  # fmt: skip
-    arguments = [*inputs, *["smooth=0.0"] * smooth]
-    body = _python(text, arguments, outputs, lines)[1:]
-    return ["import casadi", *(helper if smooth else ()), *body]
-
-
-def _matlab(text: Text, inputs: list[str], outputs: list[str], lines: list[str]) -> list[str]:
-    head = f"function [{', '.join(outputs)}] = {text.name}({', '.join(inputs)})"
-    select = [
-        "", "function z = select_(condition, x, y)", "    z = y;", "    if condition",
-        "        z = x;", "    end", "end",
-    ]  # fmt: skip
-    uses = any(node[0] == "pick" for node in text.operations.nodes)
-    return [head, *_indented(lines), "end", *(select if uses else ())]
-
-
-def _between(
-    opening: str, middle: str, closing: str, first: int = 0
-) -> Callable[[str, Sequence[int]], str]:
-    return lambda name, at: name + opening + middle.join(str(k + first) for k in at) + closing
+def _framed(
+    text: Text, of: Language, inputs: list[str], outputs: list[str], lines: list[str]
+) -> list[str]:
+    """The function around the lines."""
+    operations = {node[0] for node in text.operations.nodes}
+    used = {node[1][0] for node in text.operations.nodes if node[0] == "input"}
+    before, after, arguments = [], [], [*inputs]
+    if of.name == "c":
+        unused = [name for k, name in enumerate(inputs) if k not in used]
+        unused += [name for name, port in zip(outputs, text.outputs, strict=True) if not port.size]
+        lines = [*(f"(void){name};" for name in unused), *lines]
+        given = [*(f"const double *{x}" for x in inputs), *(f"double *{x}" for x in outputs)]
+        head = ["#include <math.h>", "", f"void {text.name}({', '.join(given)})", "{"]
+        return [*head, *(f"    {line}" for line in lines), "}"]
+    if of.name == "matlab":
+        head = [f"function [{', '.join(outputs)}] = {text.name}({', '.join(inputs)})"]
+        choice = ["", "function z = select_(condition, x, y)"]
+        choice += ["    z = y;", "    if condition", "        z = x;", "    end", "end"]
+        after = choice if "pick" in operations else []
+        return [*head, *(f"    {line}" for line in lines), "end", *after]
+    if of.name == "numpy":
+        before = [f"{name} = np.asarray({name}, dtype=np.float64)" for name in inputs]
+        shapes = (f"{port.name}.shape[:-{len(port.shape)}]" for port in text.inputs)
+        before.append(f"batch = np.zeros(np.broadcast_shapes({', '.join(shapes)}))")
+    library = {"python": "math", "numpy": "numpy as np", "casadi": "casadi"}[of.name]
+    head = [f"import {library}", "", ""]
+    if of.name == "casadi" and "sign" in operations:
+        arguments.append("smooth=0.0")
+        smooth = "    return casadi.tanh(x / smooth) if smooth else casadi.sign(x)"
+        head += ["def _sign(x, smooth):", smooth, "", ""]
+    body = [*before, *lines, f"return {', '.join(outputs)}"]
+    head.append(f"def {text.name}({', '.join(arguments)}):")
+    return [*head, *(f"    {line}" for line in body)]
 
 
 LANGUAGES = {
-    "c": Language(
-        ".c", "//", lambda name, at: f"{name}[{sum(x * 4**i for i, x in enumerate(at[::-1]))}]",
-        "const double {} = {};", "", "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
-        lambda name, _, elements: [f"{name}[{k}] = {x};" for k, x in enumerate(elements)], _c,
-    ),
-    "python": Language(
-        ".py", "#", _between("[", "][", "]"), "{} = {}",
-        "math.", "float(({0} > 0.0) - ({0} < 0.0))", "({2} if {0} > {1} else {3})", "math.nan",
-        _python_result, _python,
-    ),
-    "numpy": Language(
-        ".py", "#", _between("[..., ", ", ", "]"), "{} = {}",
-        "np.", "np.sign({})", "np.where({} > {}, {}, {})", "np.nan", _numpy_result, _numpy,
-    ),
-    "casadi": Language(
-        ".py", "#", _between("[", ", ", "]"), "{} = {}", "casadi.", "_sign({}, smooth)",
-        "casadi.if_else({} > {}, {}, {})", 'float("nan")', _casadi_result, _casadi,
-    ),
-    "matlab": Language(
-        ".m", "%", _between("(", ", ", ")", 1), "{} = {};",
-        "", "sign({})", "select_({} > {}, {}, {})", "NaN", _matlab_result, _matlab,
-    ),
+    language.name: language
+    for language in (
+        Language(
+            "c", ".c", "//", ("[", "", "]"), 0, "const double {} = {};", "",
+            "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
+        ),
+        Language(
+            "python", ".py", "#", ("[", "][", "]"), 0, "{} = {}", "math.",
+            "float(({0} > 0.0) - ({0} < 0.0))", "({2} if {0} > {1} else {3})", "math.nan",
+        ),
+        Language(
+            "numpy", ".py", "#", ("[..., ", ", ", "]"), 0, "{} = {}", "np.",
+            "np.sign({})", "np.where({} > {}, {}, {})", "np.nan",
+        ),
+        Language(
+            "casadi", ".py", "#", ("[", ", ", "]"), 0, "{} = {}", "casadi.",
+            "_sign({}, smooth)", "casadi.if_else({} > {}, {}, {})", 'float("nan")',
+        ),
+        Language(
+            "matlab", ".m", "%", ("(", ", ", ")"), 1, "{} = {};", "",
+            "sign({})", "select_({} > {}, {}, {})", "NaN",
+        ),
+    )
 }  # fmt: skip
 """By name, in the order of the documentation."""
