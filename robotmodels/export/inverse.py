@@ -57,7 +57,7 @@ class Limits(NamedTuple):
 
     zero: float
     small: float
-    wanted: tuple[float, float]
+    wanted: tuple[float, ...]
 
 
 class _Plan:
@@ -73,12 +73,12 @@ class _Plan:
                 f"model: Paul's equations, of which code is written, do not solve {model.name!r} "
                 f"alone; in this package it is solved by {other}."
             )
-        for step in solver.plan.steps:
-            if step.type.kernel not in _SOLVERS:
-                raise InvalidValueError(
-                    f"model: the plan of {model.name!r} contains {step.type.formula}, which has no "
-                    "code without loops; `igm` of this package solves it."
-                )
+        rare = [s.type.formula for s in solver.plan.steps if s.type.kernel not in _SOLVERS]
+        if rare:
+            raise InvalidValueError(
+                f"model: the plan of {model.name!r} contains {rare[0]}, for which no code is "
+                "written; `igm` of this package solves it."
+            )
         at = solver.program.adapted(se3.inverse(model.base), np.zeros((3, chain.k)))
         self.columns: list[int] = chain.columns.tolist()
         self.code: list[int] = solver.program.plan.tolist()
@@ -120,12 +120,7 @@ def inverse_model(model: RobotModel, tape: Tape, T: Sequence[Number]) -> tuple[l
 def status_notes() -> list[str]:
     """The statuses of a pose in sentences."""
     more = {_FREE: " Joints that are free are 0.", _DOUBTFUL: " The pose is nearly singular."}
-    codes = (
-        IGMStatus.REACHED,
-        IGMStatus.REACHED_FAMILY,
-        IGMStatus.NOT_CONVERGED,
-        IGMStatus.INCOMPLETE,
-    )
+    codes = (IGMStatus(k) for k in (0, 1, 6, 7))
     return [f"  status {int(code)}: {code.sentence}{more.get(float(code), '')}" for code in codes]
 
 
@@ -143,11 +138,9 @@ def _solve(plan: _Plan, level: int, x: list[Number], valid: Number, status: Numb
     at = code[layout.STEP_TABLE] + layout.STEP * level
     step = code[at : at + layout.STEP]
     k = code[layout.JOINTS]
-    offsets = [
-        plan.part(layout.REFERENCES, step[layout.REFERENCE + i] * (k + 1) + k, 1) for i in (0, 1)
-    ]
+    free = (step[layout.REFERENCE + i] * (k + 1) + k for i in (0, 1))
+    wanted = tuple(plan.part(layout.REFERENCES, at, 1)[0] for at in free)
     (scale,) = plan.part(layout.SCALES, level, 1)
-    wanted = (offsets[0] or [0.0])[0], (offsets[1] or [0.0])[0]
     limits = Limits(ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale, wanted)
     coefficients = [x[k] for k in step[layout.COEFFICIENTS :]]
     for solution in _SOLVERS[step[layout.CODE]](coefficients, limits):
@@ -213,12 +206,8 @@ def direct_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
 def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S = g0, X C = g1`` with X of any sign: an angle and the opposite one."""
     (first,), (second,) = direct_angle(g, limits), direct_angle([-g[0], -g[1]], limits)
-    return [first, second._replace(valid=_single(first))]
-
-
-def _single(solution: Solution) -> Number:
-    """Whether a second solution differs from the first: none does where the unknown is free."""
-    return pick(solution.status, _FREE, 1.0, _below(solution.status, 0.5))
+    is_free = pick(first.status, _FREE, 0.0, pick(first.status, 0.5, 1.0, 0.0))
+    return [first, second._replace(valid=_below(is_free, 0.5))]
 
 
 def one_equation(g: Sequence[Number], limits: Limits) -> list[Solution]:
@@ -284,33 +273,6 @@ def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
     return [Solution((Unknown(value),), 1.0, _status(size, limits.zero, limits.small))]
 
 
-def length_times_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
-    """``X1 r S = Y1, X2 r C = Y2``: a length of either sign, then the angle."""
-    A, B = g[1] / g[0], g[3] / g[2]
-    r = function("sqrt", A * A + B * B)
-    status, out = _status(r, limits.zero, limits.small), []
-    for sign, valid in ((1.0, 1.0), (-1.0, pick(r, limits.zero, 1.0, 0.0))):
-        angle = _angle(sign * A, sign * B, r, limits.zero, limits.wanted[1])
-        out.append(Solution((Unknown(sign * r), angle), valid, status))
-    return out
-
-
-def length_and_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
-    """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length by a quadratic, then the angle."""
-    u0, u1, v0, v1 = g[1] / g[0], g[2] / g[0], g[4] / g[3], g[5] / g[3]
-    a, h, c = u1 * u1 + v1 * v1, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0
-    room = h * h - a * c
-    root, size, out = function("sqrt", _larger(room, 0.0)), h * h + _size(a * c), []
-    near = pick(_size(room), _BEYOND * size, 0.0, _DOUBTFUL)
-    for sign, valid in ((1.0, _below(-room, SLACK * size)), (-1.0, pick(room, 0.0, 1.0, 0.0))):
-        r = (sign * root - h) / a
-        S, C = u0 + u1 * r, v0 + v1 * r
-        rho = function("sqrt", S * S + C * C)
-        angle = _angle(S, C, rho, limits.zero, limits.wanted[1])
-        out.append(Solution((Unknown(r), angle), valid, near))
-    return out
-
-
 _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.ANGLE: direct_angle,
     layout.OPPOSITE_ANGLES: opposite_angles,
@@ -318,6 +280,4 @@ _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.TWO_EQUATIONS: two_equations,
     layout.TWO_ANGLES: two_angles,
     layout.LENGTH: length,
-    layout.LENGTH_TIMES_ANGLE: length_times_angle,
-    layout.LENGTH_AND_ANGLE: length_and_angle,
 }

@@ -45,7 +45,7 @@ class Language(NamedTuple):
     def element(self, port: Port, k: int) -> str:
         """Element k of an input, counted row by row; in C all are in one row."""
         flat = len(port.shape) == 1 or self.name == "c"
-        indices = (k,) if flat else divmod(k, port.shape[1])
+        indices = (k,) if flat else divmod(k, port.shape[-1])
         opening, between, closing = self.brackets
         return port.name + opening + between.join(str(i + self.first) for i in indices) + closing
 

@@ -8,10 +8,10 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..drive import Drives, drive_kinds
+from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
-from ..errors import InvalidValueError, SingularMassMatrixError, nearest_names
+from ..errors import InvalidValueError, nearest_names
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
@@ -62,12 +62,6 @@ _UNITS = {
     "wrench": "force [N] and moment [N m] of the tool on its environment, at the tool, world axes",
     "geometry": "[m] or [rad]", "parameters": "SI units",
 }  # fmt: skip
-_WHY = {
-    "parameters": "Geometric models have no dynamic parameters, and a regressor multiplies them.",
-    "geometry": "Paul's equations are those of the numbers; explain_igm prints them in symbols.",
-    "wrench": "Only torques and accelerations depend on it.",
-    "frame": "Dynamic models are those of all links, the inverse model is that of the tool.",
-}
 _STATES, _ROUNDING = 10, 1e-13
 
 
@@ -166,6 +160,11 @@ def program(
         own, simpler = dynamic_parameters(draft, parameters, geometry == "symbols")
         if simpler is not None and _same_torques(model, own, simpler):
             own = simpler
+    if kind == "ddm" and parameters == "numbers":  # refuses singular mass matrices
+        still, K = np.zeros(model.n), model.transmission
+        ddm(
+            model, still if K is None else K.offset, still, still, drive=DriveKind.IA in draft.kinds
+        )
     if kind in ("dgm", "jacobian"):
         rows = _geometric(draft, kind, links, frame)
     elif "regressor" in kind:
@@ -174,11 +173,9 @@ def program(
         rows = dynamics.mass_matrix(model, lowered(links), own)
     else:
         rows = [_torques(draft, kind, lowered(links), own)]
+    is_vector = kind in ("idm", "bias", "gravity_torque", "ddm")
+    shape = (model.n,) if is_vector else (len(rows), len(rows[0]) if rows else model.n)
     elements = [x for row in rows for x in row]
-    if kind in ("idm", "bias", "gravity_torque", "ddm"):
-        shape: tuple[int, ...] = (model.n,)
-    else:
-        shape = (len(rows), len(rows[0]) if rows else model.n)
     return _finished(draft, kind, (Port(_KINDS[kind].output, shape),), (elements,))
 
 
@@ -202,7 +199,7 @@ def _check(kind: str, given: dict[str, Any]) -> None:
         if name not in _KINDS[kind].accepts and value not in ("numbers", False, None):
             able = ", ".join(repr(k) for k, row in _KINDS.items() if name in row.accepts)
             raise InvalidValueError(
-                f"{name}: {kind!r} has no {name}={value!r:.40}, only {able} have. {_WHY[name]}"
+                f"{name}: {kind!r} has no {name}={value!r:.40}, only {able} have."
             )
 
 
@@ -267,29 +264,18 @@ def _torques(draft: Draft, kind: str, links: Sequence[Link], own: Parameters) ->
     return _accelerations(draft, dynamics.mass_matrix(model, links, own), rest)
 
 
-def _accelerations(
-    draft: Draft, M: Sequence[Sequence[Number]], torques: Sequence[Number]
-) -> list[Number]:
+def _accelerations(draft: Draft, M: list[list[Number]], torques: list[Number]) -> list[Number]:
     """Accelerations under torques; joints that mimic others follow them."""
-    model, K = draft.model, draft.model.transmission
-    rest = np.zeros(model.n)
-    if model.inertia.values.any() or model.drive.Ia.any():  # refuses singular mass matrices
-        ddm(model, rest if K is None else K.offset, rest, rest, drive=bool(draft.kinds))
+    K = draft.model.transmission
     G = None if K is None else free_motion(K)
-    try:
-        if G is None:
-            return dynamics.solved(M, torques)
-        draft.notes.append("Joints that mimic others follow them; q and v must do so, too.")
-        free = G.T.tolist()
-        MG = [[dot(row, column) for column in free] for row in M]
-        own = [[dot(row, [x[j] for x in MG]) for j in range(len(free))] for row in free]
-        solution = dynamics.solved(own, [dot(row, torques) for row in free])
-        return [dot(row, solution) for row in G.tolist()]
-    except ZeroDivisionError:
-        raise SingularMassMatrixError(
-            f"model: the mass matrix of {model.name!r} is singular. Give inertial parameters with "
-            "model.with_inertia(...), or rotor inertias Ia with model.with_drive(...)."
-        ) from None
+    if G is None:
+        return dynamics.solved(M, torques)
+    draft.notes.append("Joints that mimic others follow them; q and v must do so, too.")
+    free = G.T.tolist()
+    MG = [[dot(row, column) for column in free] for row in M]
+    own = [[dot(row, column) for column in zip(*MG, strict=True)] for row in free]
+    solution = dynamics.solved(own, [dot(row, torques) for row in free])
+    return [dot(row, solution) for row in G.tolist()]
 
 
 def _finished(
