@@ -276,7 +276,7 @@ def test_casadi():
             np.testing.assert_allclose(
                 np.array(actual).reshape(port.shape), wanted, rtol=1e-12, atol=1e-12
             )
-    smooth = export.program(rm.load("rx90"), "idm").code("casadi")
+    smooth = export.program(rm.load("tx40"), "idm").code("casadi")
     assert "smooth=0.0" in smooth
     assert "tanh" in smooth
 

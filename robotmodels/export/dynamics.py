@@ -76,7 +76,7 @@ def motions(
     return out
 
 
-def link_wrench(motion: Motion, ten: Ten) -> Wrench:
+def wrench_of(motion: Motion, ten: Ten) -> Wrench:
     """Force ``M u + U MS`` and moment ``J dw + w x J w + MS x u`` that accelerate a link."""
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     w, dw, u, U = motion
@@ -127,7 +127,7 @@ def tool_wrench(
     return {number: (F, plus(N, cross(point, F)))}
 
 
-def drive_torques(
+def torques_of_drives(
     model: RobotModel, parameters: Parameters, v: Sequence[Number], a: Sequence[Number]
 ) -> list[Number]:
     """Torques of rotors, friction and offsets, with those of coupled motors."""
@@ -163,9 +163,9 @@ def inverse_dynamics(
         ten = ten_of(parameters, number, links[number - 1])
         F, N = tool.get(number, (_ZERO, _ZERO))
         if any(map(given, ten)) or number in tool:
-            own = link_wrench(moved[number], ten)
+            own = wrench_of(moved[number], ten)
             wrenches[number] = plus(own[0], F), plus(own[1], N)
-    return joint_torques(links, wrenches, drive_torques(model, parameters, v, a))
+    return joint_torques(links, wrenches, torques_of_drives(model, parameters, v, a))
 
 
 def given(x: Number) -> bool:
@@ -179,7 +179,7 @@ def mass_matrix(
     """Joint-space inertia matrix by composite bodies, with rotors."""
     zero, rotors = [0.0] * model.n, {k: x for k, x in parameters.items() if k.startswith("Ia")}
     units = np.eye(model.n).tolist()
-    M = [drive_torques(model, rotors, zero, unit) for unit in units]  # symmetric
+    M = [torques_of_drives(model, rotors, zero, unit) for unit in units]  # symmetric
     composite: list[Ten] = [(0.0,) * 10]
     composite += [ten_of(parameters, k, link) for k, link in enumerate(links, start=1)]
     for number in range(len(links), 0, -1):

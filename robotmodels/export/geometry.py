@@ -114,7 +114,7 @@ def point_of(model: RobotModel, frame: str | int | None) -> tuple[int, Pose]:
     return point.parent, constant_pose(pose)
 
 
-def pose_of(places: Sequence[Pose], number: int, point: Pose) -> Pose:
+def world_pose(places: Sequence[Pose], number: int, point: Pose) -> Pose:
     """World pose of a constant pose in a frame."""
     (R, p), (E, e) = places[number], point
     columns: Sequence[Vector] = list(zip(*E, strict=True))  # type: ignore[arg-type]
@@ -126,7 +126,7 @@ def jacobian(
 ) -> list[list[Number]]:
     """Rows of the world-aligned Jacobian of a constant pose in a frame."""
     places, zero = poses(model, links), (0.0, 0.0, 0.0)
-    _, tip = pose_of(places, number, point)
+    _, tip = world_pose(places, number, point)
     columns: list[tuple[Number, ...]] = [(0.0,) * 6] * model.n
     for k in model.table.path(number):
         link, (R, p) = links[k - 1], places[k]

@@ -210,7 +210,7 @@ def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     return [first, second._replace(valid=_below(is_free, 0.5))]
 
 
-def one_equation(g: Sequence[Number], limits: Limits) -> list[Solution]:
+def angle_of_one(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S + Y C = Z``, two solutions."""
     X, Y, Z = g[:3]
     square = X * X + Y * Y
@@ -232,7 +232,7 @@ def one_equation(g: Sequence[Number], limits: Limits) -> list[Solution]:
     return out
 
 
-def two_equations(g: Sequence[Number], limits: Limits) -> list[Solution]:
+def angle_of_two(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``; doubtful where they depend on each other."""
     X1, Y1, Z1, X2, Y2, Z2 = g[:6]
     det = X1 * Y2 - X2 * Y1
@@ -245,7 +245,7 @@ def two_equations(g: Sequence[Number], limits: Limits) -> list[Solution]:
     return [Solution((angle,), 1.0, _larger(near, _status(rho, limits.zero**2, limits.small**2)))]
 
 
-def two_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
+def pair_of_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``."""
     W1, W2, X, Y, Z1, Z2, sense = g
     square = W1 * W1 + W2 * W2
@@ -254,7 +254,7 @@ def two_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     least = limits.zero**2
     scaled = limits._replace(zero=max(limits.zero * width, least), small=limits.small * width)
     out = []
-    for first in one_equation([Z1 * Y + Z2 * X, Z1 * X - Z2 * Y, third], scaled):
+    for first in angle_of_one([Z1 * Y + Z2 * X, Z1 * X - Z2 * Y, third], scaled):
         _, C, S = first.unknowns[0]
         one, two = X * C + Y * S + Z1, sense * (X * S - Y * C + Z2)
         Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
@@ -276,8 +276,8 @@ def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
 _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.ANGLE: direct_angle,
     layout.OPPOSITE_ANGLES: opposite_angles,
-    layout.ONE_EQUATION: one_equation,
-    layout.TWO_EQUATIONS: two_equations,
-    layout.TWO_ANGLES: two_angles,
+    layout.ONE_EQUATION: angle_of_one,
+    layout.TWO_EQUATIONS: angle_of_two,
+    layout.TWO_ANGLES: pair_of_angles,
     layout.LENGTH: length,
 }

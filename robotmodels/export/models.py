@@ -16,7 +16,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
 from .dynamics import Parameters, dot
-from .geometry import Constant, Link, jacobian, links_of, lowered, point_of, pose_of, poses
+from .geometry import Constant, Link, jacobian, links_of, lowered, point_of, poses, world_pose
 from .inputs import Draft, comment, dynamic_parameters, geometric_parameters, identifier
 from .source import Program
 from .tape import Number, Port
@@ -230,7 +230,7 @@ def _geometric(
     draft.notes.append(f"Frame: {comment(str('tool' if frame is None else frame))}")
     if kind == "jacobian":
         return [*jacobian(draft.model, links, number, point)]
-    R, p = pose_of(poses(draft.model, links), number, point)
+    R, p = world_pose(poses(draft.model, links), number, point)
     return [*((*row, x) for row, x in zip(R, p, strict=True)), (0.0, 0.0, 0.0, 1.0)]
 
 
