@@ -15,6 +15,7 @@ import robotmodels as rm
 from robotmodels import export
 from robotmodels.cli.program import main
 from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
+from robotmodels.export.tape import Tape, function
 
 KINDS = (
     "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
@@ -173,6 +174,24 @@ def test_generation_is_quick():
         start = time.process_time()
         export.program(model, kind).code("c")
         assert time.process_time() - start < limit
+
+
+def test_the_tape_shares_and_folds():
+    tape = Tape()
+    x, y = tape.inputs(0, 2)
+    assert (x * y).number == (y * x).number == -(x * -y).number
+    assert (x + y).number == (y + x).number == -(-x - y).number
+    assert (x - y).number == -(y - x).number
+    assert function("sin", -x).number == -function("sin", x).number
+    assert function("cos", -x).number == function("cos", x).number
+    assert (2.0 * (-3.0 * x)).number == (-6.0 * x).number
+    assert (x - x, 0.0 * x, 0.0 / y) == (0.0, 0.0, 0.0)
+    assert (1.0 * x).number == (x + 0.0).number == x.number
+    result = (x * y + 2.0) / (x - y)
+    frozen = tape.frozen([[result, -x]])
+    assert frozen.count() == (1, 2, 0, 1)
+    (row,) = frozen.run([np.array([3.0, 5.0])])
+    assert [float(value) for value in row] == [-8.5, -3.0]
 
 
 # --- languages -----------------------------------------------------------------------------------
@@ -425,6 +444,7 @@ def test_a_program_is_a_value():
         ({"kind": "dgm", "geometry": True}, "'symbols'"),
         ({"kind": "dgm", "parameters": "base"}, "only .idm."),
         ({"kind": "mass_matrix", "wrench": True}, "'idm', 'bias', 'ddm'"),
+        ({"kind": "idm", "wrench": 1}, "True or False"),
         ({"kind": "idm", "frame": 2}, "'dgm', 'jacobian'"),
         ({"kind": "igm", "geometry": "symbols"}, "no geometry='symbols'"),
         ({"kind": "dgm", "frame": "nowhere"}, "nowhere"),
@@ -448,6 +468,8 @@ def test_refused_models(tmp_path):
     program = export.program(rm.load("rx90"), "dgm")
     with pytest.raises(InvalidValueError, match="'matlab'"):
         program.code("fortran")
+    with pytest.raises(InvalidValueError, match="str or Path"):
+        export.write(program, None)
     with pytest.raises(InvalidValueError, match="takes 1"):
         program(np.zeros(6), np.zeros(6))
     with pytest.raises(ShapeError):

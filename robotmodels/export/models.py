@@ -184,17 +184,15 @@ def _check(kind: str, given: dict[str, Any]) -> None:
     if not isinstance(kind, str) or kind not in _KINDS:
         near = nearest_names(str(kind), _KINDS)
         meant = f" Did you mean {near[0]!r}?" if near else ""
-        words = ", ".join(map(repr, _KINDS))
-        raise InvalidValueError(f"kind: expected one of {words}, got {kind!r:.60}.{meant}")
-    choices = {
-        "parameters": ("numbers", "symbols", "base"),
-        "geometry": ("numbers", "symbols"),
-        "wrench": (False, True),
-    }
-    for name, words in choices.items():
-        if not any(type(given[name]) is type(word) and given[name] == word for word in words):
-            listed = ", ".join(map(repr, words))
+        listed = ", ".join(map(repr, _KINDS))
+        raise InvalidValueError(f"kind: expected one of {listed}, got {kind!r:.60}.{meant}")
+    words = ("numbers", "symbols", "base")
+    for name, allowed in (("parameters", words), ("geometry", words[:2])):
+        if not isinstance(given[name], str) or given[name] not in allowed:
+            listed = ", ".join(map(repr, allowed))
             raise InvalidValueError(f"{name}: expected one of {listed}, got {given[name]!r:.60}.")
+    if not isinstance(given["wrench"], (bool, np.bool_)):
+        raise InvalidValueError(f"wrench: expected True or False, got {given['wrench']!r:.60}.")
     for name, value in given.items():
         if name not in _KINDS[kind].accepts and value not in ("numbers", False, None):
             able = ", ".join(repr(k) for k, row in _KINDS.items() if name in row.accepts)

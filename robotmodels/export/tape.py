@@ -210,10 +210,9 @@ def pick(a: Number, b: Number, x: Number, y: Number) -> Number:
     return x if four[2] == four[3] else Scalar(tape, tape.add("pick", four))
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(x: Vector, y: Vector) -> Vector:
     """Vector product."""
-    x, y, z = ((1, 2), (2, 0), (0, 1))
-    return tuple(a[i] * b[j] - a[j] * b[i] for i, j in (x, y, z))
+    return tuple(x[i] * y[j] - x[j] * y[i] for i, j in ((1, 2), (2, 0), (0, 1)))
 
 
 def plus(a: Vector, b: Vector) -> Vector:
