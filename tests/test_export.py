@@ -161,7 +161,8 @@ def test_numbers_need_fewer_operations_than_symbols():
 
 
 def test_constants_of_angles_are_exact():
-    for theta, sine in ((30.0, 0.5), (90.0, 1.0), (-90.0, -1.0), (180.0, 0.0), (210.0, -0.5)):
+    sines = {30: 0.5, 45: 0.5**0.5, 90: 1.0, -90: -1.0, 180: 0.0, 210: -0.5, -120: -(0.75**0.5)}
+    for theta, sine in sines.items():
         table = rm.DHTable.from_rows([{"sigma": 1, "alpha": theta}], degrees=True)
         pose = export.program(rm.RobotModel.from_table(table), "dgm")([0.0])
         assert pose[2, 1] == sine
@@ -355,6 +356,8 @@ def test_all_postures(name):
     found = rm.igm(model, T)
     np.testing.assert_array_equal(valid.sum(axis=-1), found.count)
     np.testing.assert_array_equal(status, found.status)
+    turns = model.table.sigma[model.table.joint_rows] == 0
+    assert np.nanmax(np.abs(q[..., turns]), initial=0.0) <= np.pi
     same_postures(q, valid, found)
     assert np.abs(rm.dgm(model, q[valid == 1]) - np.repeat(T, found.count, axis=0)).max() < 1e-12
 

@@ -12,6 +12,7 @@ from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
 from ..errors import InvalidValueError, nearest_names
+from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import dynamics
@@ -295,8 +296,10 @@ def _finished(
         notes += [f"  {k} {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
     notes += [f"Output {port.name} {port.shape}: {row.unit}" for port in outputs[:1]]
     notes += [f"Output {port.name} {port.shape}" for port in outputs[1:]] + draft.notes
-    joints = (f"{k} {comment(name)}" for k, name in enumerate(model.table.joint_names))
-    notes.append(f"Joints: {', '.join(joints)}")
+    sigma = model.table.sigma[model.table.joint_rows]
+    joints = zip(model.table.joint_names, np.where(sigma == PRISMATIC, "m", "rad"), strict=True)
+    named = (f"{k} {comment(name)} [{unit}]" for k, (name, unit) in enumerate(joints))
+    notes.append(f"Joints: {', '.join(named)}")
     if any(node[0] == "sign" for node in operations.nodes):
         notes.append("sign(0) = 0; in CasADi, smooth > 0 replaces sign(v) by tanh(v / smooth).")
     elements, values = tuple(draft.elements), tuple(draft.values)
