@@ -82,6 +82,7 @@ COMMANDS = {
     "excite": "a motion for the dynamic identification of a robot",
     "identify": "dynamic parameters of a robot from logs of its motion",
     "view": "open a robot with joint sliders in the browser",
+    "export": "a model of a robot as C, Python, NumPy, CasADi or MATLAB code",
     "compile": "compile everything in advance, so that first calls are fast",
 }
 """Each is the module of the same name, which is imported when it is asked for."""

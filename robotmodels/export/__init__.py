@@ -1,3 +1,11 @@
-"""Flat code of models in C, Python, NumPy, CasADi and MATLAB."""
+"""Flat code of models in C, Python, NumPy, CasADi and MATLAB.
 
-__all__: list[str] = []
+`program` writes a model of a robot once, as straight-line operations; a `Program` runs, counts its
+operations and prints itself in five languages, and `write` makes a file.
+"""
+
+from .models import program
+from .source import Program, write
+from .tape import OperationCount
+
+__all__ = ["OperationCount", "Program", "program", "write"]

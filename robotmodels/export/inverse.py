@@ -1,0 +1,283 @@
+"""The inverse geometric model on a tape: Paul's plan, all branches at once.
+
+The plan that `explain_igm` prints and that the package's kernel runs is unrolled: every step is
+solved for each of its solutions, and a flag goes along that says whether they exist. At a singular
+pose an undetermined joint is 0, and the status of the pose says so.
+
+References
+----------
+Seed book section 1.2.3.2; W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*,
+section 4.4 and appendix 1, for the types of equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import se3
+from ..errors import InvalidValueError
+from ..igm import IGMStatus
+from ..igm.by_plan import prepare_by_plan
+from ..igm.families import prepare_task
+from ..igm.loop import joint_chain
+from ..igm.paul import explain_igm, layout
+from ..igm.paul.program import ACCEPTED, SLACK, SMALL_AMPLITUDE, ZERO_AMPLITUDE
+from ..igm.request import Task
+from ..model import RobotModel
+from .dynamics import dot
+from .tape import Number, Scalar, Tape, function, pick
+
+_NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
+_BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may cause
+_FREE, _DOUBTFUL = float(IGMStatus.REACHED_FAMILY), float(IGMStatus.INCOMPLETE)
+
+
+class Unknown(NamedTuple):
+    """Value, cosine and sine of an unknown; a length has its value alone."""
+
+    value: Number
+    cosine: Number = 1.0
+    sine: Number = 0.0
+
+
+class Solution(NamedTuple):
+    """Unknowns of a step, whether they exist (0 or 1), and their status."""
+
+    unknowns: tuple[Unknown, ...]
+    valid: Number
+    status: Number
+
+
+class Limits(NamedTuple):
+    """Amplitudes of an equation that are zero, or small; values of unknowns that are free."""
+
+    zero: float
+    small: float
+    wanted: tuple[float, ...]
+
+
+class _Plan:
+    """A plan as the kernel reads it (`igm.paul.layout`), and the postures that it gives."""
+
+    def __init__(self, model: RobotModel) -> None:
+        chain = joint_chain(model)
+        family = prepare_task(chain, Task())
+        solver = None if family is None else prepare_by_plan(chain, family)
+        if solver is None:
+            other = explain_igm(model).takes_over or "the numeric solver `igm_numeric`"
+            raise InvalidValueError(
+                f"model: Paul's equations, of which code is written, do not solve {model.name!r} "
+                f"alone; in this package it is solved by {other}."
+            )
+        rare = [s.type.formula for s in solver.plan.steps if s.type.kernel not in _SOLVERS]
+        if rare:
+            raise InvalidValueError(
+                f"model: the plan of {model.name!r} contains {rare[0]}, for which no code is "
+                "written; `igm` of this package solves it."
+            )
+        at = solver.program.adapted(se3.inverse(model.base), np.zeros((3, chain.k)))
+        self.columns: list[int] = chain.columns.tolist()
+        self.code: list[int] = solver.program.plan.tolist()
+        self.numbers: list[float] = at.tolist()
+        self.found: list[tuple[list[Number], Solution]] = []
+
+    def part(self, which: int, first: int, count: int) -> list[float]:
+        """Some of the numbers of a part."""
+        at = self.code[which] + first
+        return self.numbers[at : at + count]
+
+
+def inverse_model(model: RobotModel, tape: Tape, T: Sequence[Number]) -> tuple[list[Number], ...]:
+    """Joint variables (S n,), flags (S,) and status of a world pose (16,), row by row."""
+    plan = _Plan(model)
+    x: list[Number] = [*plan.part(layout.INITIAL, 0, plan.code[layout.REGISTERS])]
+    before, after = plan.part(layout.SIDES, 0, 12), plan.part(layout.SIDES, 12, 16)
+    for i in range(3):  # U0 = before T after, column by column
+        row = before[4 * i : 4 * i + 4]
+        turned = [dot(row[:3], T[j:12:4]) for j in range(4)]
+        turned[3] = turned[3] + row[3]
+        for j in range(4):
+            x[1 + 3 * j + i] = dot(turned, after[j::4])
+    _solve(plan, 0, x, 1.0, 0.0)
+    q: list[Number] = []
+    status: Number = float(IGMStatus.NOT_CONVERGED)
+    reached: Number = 0.0
+    for values, solution in plan.found:
+        row = [0.0] * model.n
+        for column, value in zip(plan.columns, values, strict=True):
+            row[column] = value  # type: ignore[call-overload]
+        q += [pick(solution.valid, 0.5, x, Scalar(tape, tape.add("nan"))) for x in row]
+        worse = pick(reached, 0.5, _larger(status, solution.status), solution.status)
+        status = pick(solution.valid, 0.5, worse, status)
+        reached = pick(solution.valid, 0.5, 1.0, reached)
+    return q, [solution.valid for _, solution in plan.found], [status]
+
+
+def status_notes() -> list[str]:
+    """The statuses of a pose in sentences."""
+    more = {_FREE: " Joints that are free are 0.", _DOUBTFUL: " The pose is nearly singular."}
+    codes = (IGMStatus(k) for k in (0, 1, 6, 7))
+    return [f"  status {int(code)}: {code.sentence}{more.get(float(code), '')}" for code in codes]
+
+
+def _solve(plan: _Plan, level: int, x: list[Number], valid: Number, status: Number) -> None:
+    """The rest of the tree of solutions behind a branch with the registers ``x``."""
+    code, x = plan.code, list(x)
+    for i in range(*(code[code[layout.STARTS] + level + k] for k in range(2))):
+        at = code[layout.OPERATIONS] + 5 * i
+        d, a, b, c, e = code[at : at + 5]
+        f, g = plan.numbers[2 * i : 2 * i + 2]
+        x[d] = f * (x[a] * x[b]) + g * (x[c] * x[e])
+    if level == code[layout.STEPS]:
+        _keep(plan, x, valid, status)
+        return
+    at = code[layout.STEP_TABLE] + layout.STEP * level
+    step = code[at : at + layout.STEP]
+    k = code[layout.JOINTS]
+    free = (step[layout.REFERENCE + i] * (k + 1) + k for i in (0, 1))
+    wanted = tuple(plan.part(layout.REFERENCES, at, 1)[0] for at in free)
+    (scale,) = plan.part(layout.SCALES, level, 1)
+    limits = Limits(ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale, wanted)
+    coefficients = [x[k] for k in step[layout.COEFFICIENTS :]]
+    for solution in _SOLVERS[step[layout.CODE]](coefficients, limits):
+        own = list(x)
+        for place, unknown in zip(step[layout.FIRST :], solution.unknowns, strict=False):
+            if place > 12:
+                own[place : place + 3] = unknown
+        there = pick(valid, 0.5, solution.valid, 0.0)
+        _solve(plan, level + 1, own, there, _larger(status, solution.status))
+
+
+def _keep(plan: _Plan, x: list[Number], valid: Number, status: Number) -> None:
+    """Check both sides of the pose; joint variables in (-pi, pi]."""
+    code, k = plan.code, plan.code[layout.JOINTS]
+    results, sigma = code[layout.RESULTS], code[layout.SIGMA]
+    turn: Number = 0.0
+    far: Number = 0.0
+    for i in range(3):
+        at = results + k + i
+        d = [x[code[at + 3 * j]] - x[code[at + 3 * j + 12]] for j in range(4)]
+        off = d[3] + dot(plan.part(layout.LEVER, 0, 3), d[:3])
+        turn, far = turn + dot(d[:3], d[:3]), far + off * off
+    met = _below(_larger(far, 0.5 * turn), ACCEPTED**2)
+    values = [x[code[results + j]] for j in range(k)]
+    for j, value in enumerate(values):
+        if code[sigma + j] == 0 and isinstance(value, Scalar):
+            values[j] = value + 2.0 * pi * function("floor", (pi - value) * (0.5 / pi))
+    plan.found.append((values, Solution((), pick(valid, 0.5, met, 0.0), status)))
+
+
+def _larger(a: Number, b: Number) -> Number:
+    return pick(a, b, a, b)
+
+
+def _below(x: Number, limit: Number) -> Number:
+    return pick(x, limit, 0.0, 1.0)
+
+
+def _size(x: Number) -> Number:
+    return pick(x, 0.0, x, -x)
+
+
+def _status(amplitude: Number, zero: float, small: float) -> Number:
+    """Regular, doubtful or free, by the amplitude that determines an unknown."""
+    return pick(amplitude, small, 0.0, pick(amplitude, zero, _DOUBTFUL, _FREE))
+
+
+def _angle(sine: Number, cosine: Number, amplitude: Number, zero: float, other: float) -> Unknown:
+    """An angle by multiples of its sine and cosine; the other value where both are zero."""
+    scale = 1.0 / pick(amplitude, zero, amplitude, 1.0)
+    three = function("atan2", sine, cosine), cosine * scale, sine * scale
+    free = other, cos(other), sin(other)
+    return Unknown(*(pick(amplitude, zero, x, y) for x, y in zip(three, free, strict=True)))
+
+
+def direct_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``X S = g0, X C = g1`` with X > 0."""
+    rho = function("sqrt", g[0] * g[0] + g[1] * g[1])
+    angle = _angle(g[0], g[1], rho, limits.zero, limits.wanted[0])
+    return [Solution((angle,), 1.0, _status(rho, limits.zero, limits.small))]
+
+
+def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``X S = g0, X C = g1`` with X of any sign: an angle and the opposite one."""
+    (first,), (second,) = direct_angle(g, limits), direct_angle([-g[0], -g[1]], limits)
+    is_free = pick(first.status, _FREE, 0.0, pick(first.status, 0.5, 1.0, 0.0))
+    return [first, second._replace(valid=_below(is_free, 0.5))]
+
+
+def angle_of_one(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``X S + Y C = Z``, two solutions."""
+    X, Y, Z = g[:3]
+    square = X * X + Y * Y
+    rho, size = function("sqrt", square), _size(Z)
+    room = (rho - Z) * (rho + Z)
+    double = pick(room, _NEAR * square, 0.0, _below(size - rho, _BEYOND * rho))
+    status = _status(rho, limits.zero, limits.small)
+    status = pick(status, 0.5, status, pick(double, 0.5, _DOUBTFUL, 0.0))
+    free = _below(size, max(limits.zero, SLACK))
+    first = pick(rho, limits.zero, _below(size - rho, SLACK * rho), free)
+    second = pick(rho, limits.zero, pick(room, 0.0, 1.0, 0.0), 0.0)
+    Z = pick(Z, rho, rho, pick(-Z, rho, -rho, Z))  # an overshoot is a double root
+    root = function("sqrt", _larger(room, 0.0))
+    out = []
+    for valid, e in ((first, root), (second, -root)):
+        S, C = X * Z + Y * e, Y * Z - X * e
+        angle = _angle(S, C, square, limits.zero**2, limits.wanted[0])
+        out.append(Solution((angle,), valid, status))
+    return out
+
+
+def angle_of_two(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``; doubtful where they depend on each other."""
+    X1, Y1, Z1, X2, Y2, Z2 = g[:6]
+    det = X1 * Y2 - X2 * Y1
+    size = function("sqrt", (X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
+    sign = pick(det, 0.0, 1.0, -1.0)
+    S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
+    rho = function("sqrt", S * S + C * C)
+    angle = _angle(S, C, rho, limits.zero**2, limits.wanted[0])
+    near = pick(_size(det), _BEYOND * size, 0.0, _DOUBTFUL)
+    return [Solution((angle,), 1.0, _larger(near, _status(rho, limits.zero**2, limits.small**2)))]
+
+
+def pair_of_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``."""
+    W1, W2, X, Y, Z1, Z2, sense = g
+    square = W1 * W1 + W2 * W2
+    third = 0.5 * (square - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
+    width = 1.0 if isinstance(square, Scalar) else float(square) ** 0.5
+    least = limits.zero**2
+    scaled = limits._replace(zero=max(limits.zero * width, least), small=limits.small * width)
+    out = []
+    for first in angle_of_one([Z1 * Y + Z2 * X, Z1 * X - Z2 * Y, third], scaled):
+        _, C, S = first.unknowns[0]
+        one, two = X * C + Y * S + Z1, sense * (X * S - Y * C + Z2)
+        Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
+        rho = function("sqrt", Sj * Sj + Cj * Cj)
+        second = _angle(Sj, Cj, rho, least, limits.wanted[1])
+        status = _larger(first.status, _status(rho, least, least))
+        out.append(Solution((*first.unknowns, second), first.valid, status))
+    return out
+
+
+def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``g0 r = g1``."""
+    size = _size(g[0])
+    r = g[1] / pick(size, limits.zero, g[0], 1.0)
+    value = pick(size, limits.zero, r, limits.wanted[0])
+    return [Solution((Unknown(value),), 1.0, _status(size, limits.zero, limits.small))]
+
+
+_SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
+    layout.ANGLE: direct_angle,
+    layout.OPPOSITE_ANGLES: opposite_angles,
+    layout.ONE_EQUATION: angle_of_one,
+    layout.TWO_EQUATIONS: angle_of_two,
+    layout.TWO_ANGLES: pair_of_angles,
+    layout.LENGTH: length,
+}

@@ -1,0 +1,494 @@
+"""Flat code of models: the tape against the library, every language against the tape."""
+
+import ctypes
+import pickle
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model, random_rotation, random_state
+
+import robotmodels as rm
+from robotmodels import export
+from robotmodels.cli.program import main
+from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
+from robotmodels.export.tape import Tape, function
+
+KINDS = (
+    "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
+    "base_regressor", "ddm",
+)  # fmt: skip
+FORCED = ("idm", "bias", "ddm")
+CC = shutil.which("cc") or shutil.which("gcc")
+needs_compiler = pytest.mark.skipif(CC is None, reason="no C compiler (cc, gcc) is on the path")
+
+
+def random_robot(seed):
+    """Serial or tree, revolute and prismatic, fixed frames, beta, base rotated, coupled motors."""
+    rng = np.random.default_rng(seed)
+    flags = dict(
+        zip(("tree", "fixed", "drive", "transmission"), (rng.random(4) < 0.5).tolist(), strict=True)
+    )
+    return random_model(rng, f=int(rng.integers(1, 9)), tip="any", **flags), rng
+
+
+def inputs_of(program, **given):
+    """Inputs by name; parameters of the model."""
+    named = zip(program.inputs, program.values, strict=True)
+    return [given.get(port.name, np.array(values)) for port, values in named]
+
+
+def library(model, kind, drive, q, v, a, wrench):
+    """The same quantity by the package itself."""
+    base = rm.base_parameters(model, drive=("Ia", "Fv", "Fc") if drive else False)
+    return {
+        "dgm": lambda: rm.dgm(model, q),
+        "jacobian": lambda: rm.jacobian(model, q),
+        "idm": lambda: rm.idm(model, q, v, a, wrench, drive=drive),
+        "bias": lambda: rm.idm(model, q, v, 0 * a, wrench, drive=drive),
+        "mass_matrix": lambda: rm.mass_matrix(model, q, drive=drive),
+        "gravity_torque": lambda: rm.gravity_torque(model, q),
+        "torque_regressor": lambda: rm.torque_regressor(model, q, v, a, drive=drive),
+        "base_regressor": lambda: rm.torque_regressor(
+            model, q, v, a, drive=base.drive, columns=base
+        ),
+        "ddm": lambda: rm.ddm(model, q, v, a, wrench, drive=drive),
+    }[kind]()
+
+
+def close(actual, expected, tolerance=1e-12):
+    assert actual.shape == expected.shape
+    size = max(1.0, np.abs(expected).max(initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * size)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("drive", [True, False])
+def test_the_tape_is_the_library(seed, drive):
+    model, rng = random_robot(seed)
+    q, v, a = random_state(model, rng, 4)
+    given = {"q": q, "v": v, "a": a, "tau": a, "wrench": rng.normal(size=(4, 6))}
+    base = rm.base_parameters(model, drive=("Ia", "Fv", "Fc") if drive else False)
+    of_base = rm.base_model(model, base, base.values(model))
+    for kind in KINDS:
+        dynamic = kind in ("idm", "mass_matrix", "bias", "gravity_torque", "ddm")
+        for parameters in ("numbers", "symbols", "base") if dynamic else ("numbers",):
+            robot = of_base if parameters == "base" else model
+            expected = library(robot, kind, drive, q, v, a, given["wrench"])
+            for geometry in ("numbers", "symbols"):
+                program = export.program(
+                    model, kind, parameters, geometry, drive=drive, wrench=kind in FORCED
+                )
+                actual = program(*inputs_of(program, **given))
+                close(actual, expected, 1e-10 if kind == "ddm" else 1e-12)
+
+
+def test_frames():
+    model, rng = random_robot(3)
+    q = random_state(model, rng)[0]
+    for frame in (*range(model.f + 1), *model.frame_names):
+        close(export.program(model, "dgm", frame=frame)(q), rm.dgm(model, q, frame))
+        J = export.program(model, "jacobian", frame=frame, geometry="symbols")
+        close(J(*inputs_of(J, q=q)), rm.jacobian(model, q, frame))
+
+
+def test_kinds_of_drives():
+    model = rm.load("tx40")
+    q, v, a = random_state(model, np.random.default_rng(0))
+    names = rm.parameter_names(model, ("Fv", "offset"))
+    program = export.program(model, "torque_regressor", drive=("Fv", "offset"))
+    assert program.outputs[0].shape == (6, len(names))
+    close(program(q, v, a), rm.torque_regressor(model, q, v, a, drive=("Fv", "offset")))
+
+
+def test_joints_that_mimic_others():
+    two = rm.Transmission([[1.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.2, 0.0, 1.0]], [0.1, 0.2, -0.1])
+    rng = np.random.default_rng(1)
+    model = random_model(rng, f=3, prismatic=False, drive=True).with_transmission(two)
+    q, v, tau = (
+        two.to_joint(rng.normal(size=3)),
+        two.matrix @ rng.normal(size=3),
+        rng.normal(size=3),
+    )
+    program = export.program(model, "ddm")
+    close(program(q, v, tau), rm.ddm(model, q, v, tau), 1e-10)
+    assert "mimic" in program.code("c")
+
+
+# --- operations ----------------------------------------------------------------------------------
+
+
+def general_arm(n, seed=0):
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.uniform(0.1, 1.0, n) for name in ("alpha", "d", "theta", "r")}
+    table = rm.DHTable(antecedent=range(n), sigma=[0] * n, **columns)
+    return rm.RobotModel.from_table(table, gravity=9.81 * random_rotation(rng)[0])
+
+
+@pytest.mark.parametrize("n", [3, 6, 7, 9])
+def test_operations_stay_below_the_bound_of_khalil_and_kleinfinger(n):
+    count = export.program(general_arm(n), "idm", parameters="base", drive=False).count
+    assert count.multiplications <= 92 * n - 127
+    assert count.additions <= 81 * n - 117
+    assert (count.functions, count.divisions) == (2 * n, 0)
+
+
+@pytest.mark.parametrize(
+    ("model", "multiplications", "additions"),
+    [(general_arm(6), 412, 358), (rm.load("rx90"), 247, 240)],
+    ids=["general", "rx90"],
+)
+def test_operations_of_published_arms(model, multiplications, additions):
+    count = export.program(model, "idm", parameters="base", drive=False).count
+    assert count.multiplications <= multiplications
+    assert count.additions <= additions
+
+
+def test_numbers_need_fewer_operations_than_symbols():
+    model = rm.load("puma560")
+    counts = [
+        export.program(model, "idm", parameters=choice).count.multiplications
+        for choice in ("numbers", "base", "symbols")
+    ]
+    assert counts == sorted(counts)
+    assert export.program(model, "dgm").count.functions == 2 * model.n
+    planar = export.program(rm.load("planar_2r"), "gravity_torque", "base", drive=False)
+    assert planar.count.functions <= 4
+    assert all("=" in line for line in planar.lines)
+
+
+def test_constants_of_angles_are_exact():
+    sines = {30: 0.5, 45: 0.5**0.5, 90: 1.0, -90: -1.0, 180: 0.0, 210: -0.5, -120: -(0.75**0.5)}
+    for theta, sine in sines.items():
+        table = rm.DHTable.from_rows([{"sigma": 1, "alpha": theta}], degrees=True)
+        pose = export.program(rm.RobotModel.from_table(table), "dgm")([0.0])
+        assert pose[2, 1] == sine
+
+
+def test_generation_is_quick():
+    panda, rx90 = rm.load("panda"), rm.load("rx90")
+    export.program(rx90, "idm")
+    for model, kind, limit in ((rx90, "idm", 0.5), (panda, "base_regressor", 3.0)):
+        start = time.process_time()
+        export.program(model, kind).code("c")
+        assert time.process_time() - start < limit
+
+
+def test_the_tape_shares_and_folds():
+    tape = Tape()
+    x, y = tape.inputs(0, 2)
+    assert (x * y).number == (y * x).number == -(x * -y).number
+    assert (x + y).number == (y + x).number == -(-x - y).number
+    assert (x - y).number == -(y - x).number
+    assert function("sin", -x).number == -function("sin", x).number
+    assert function("cos", -x).number == function("cos", x).number
+    assert (2.0 * (-3.0 * x)).number == (-6.0 * x).number
+    assert (x - x, 0.0 * x, 0.0 / y) == (0.0, 0.0, 0.0)
+    assert (1.0 * x).number == (x + 0.0).number == x.number
+    result = (x * y + 2.0) / (x - y)
+    frozen = tape.frozen([[result, -x]])
+    assert frozen.count() == (1, 2, 0, 1)
+    (row,) = frozen.run([np.array([3.0, 5.0])])
+    assert [float(value) for value in row] == [-8.5, -3.0]
+
+
+# --- languages -----------------------------------------------------------------------------------
+
+
+def compiled(program, folder):
+    """The function of the C code, called with arrays, as a list of outputs."""
+    source, library = folder / "code.c", folder / f"{program.name}.so"
+    export.write(program, source)
+    flags = ["-O2", "-Wall", "-Wextra", "-Werror", "-std=c99", "-pedantic", "-shared", "-fPIC"]
+    subprocess.run([CC, *flags, "-o", library, source, "-lm"], check=True)
+    function = getattr(ctypes.CDLL(str(library)), program.name)
+
+    def call(*inputs):
+        arrays = [np.ascontiguousarray(x, np.float64) for x in inputs]
+        outputs = [np.full(port.shape, 7.0) for port in program.outputs]
+        function(*(x.ctypes.data_as(ctypes.c_void_p) for x in (*arrays, *outputs)))
+        return outputs
+
+    return call
+
+
+def executed(program, language):
+    """The one public function of the Python code."""
+    space = {}
+    exec(program.code(language), space)
+    public = [name for name, x in space.items() if callable(x) and name[0] != "_"]
+    assert public == [program.name]
+    return space[program.name]
+
+
+def programs():
+    """Every model with inputs, of several robots."""
+    for seed, kind in enumerate((*KINDS, "igm")):
+        model, rng = random_robot(seed + 20) if kind != "igm" else (rm.load("rx90"), None)
+        options = {"wrench": True} if kind in FORCED else {}
+        if kind in ("idm", "mass_matrix", "ddm"):
+            options["parameters"] = ("numbers", "symbols", "base")[seed % 3]
+        options |= {"geometry": "symbols"} if seed % 2 and kind != "igm" else {}
+        rng = rng or np.random.default_rng(0)
+        q, v, a = random_state(model, rng, 3)
+        given = {"q": q, "v": v, "a": a, "tau": a, "wrench": rng.normal(size=(3, 6))}
+        program = export.program(model, kind, **options)
+        yield program, inputs_of(program, T=rm.dgm(model, q), **given)
+
+
+def one(inputs, program, k):
+    """Sample k of inputs that may be batches."""
+    pairs = zip(inputs, program.inputs, strict=True)
+    return [x[k] if x.ndim > len(port.shape) else x for x, port in pairs]
+
+
+def outputs(result):
+    return result if isinstance(result, tuple) else (result,)
+
+
+@needs_compiler
+def test_c(tmp_path):
+    for program, inputs in programs():
+        call = compiled(program, tmp_path)
+        for k, expected in enumerate(zip(*outputs(program(*inputs)), strict=True)):
+            for actual, wanted in zip(call(*one(inputs, program, k)), expected, strict=True):
+                np.testing.assert_allclose(actual, wanted, rtol=1e-12, atol=1e-12)
+        code = program.code("c")
+        assert not any(word in code for word in ("static", "alloc", "#define"))
+
+
+@pytest.mark.parametrize("language", ["python", "numpy"])
+def test_python_and_numpy(language):
+    for program, inputs in programs():
+        function, expected = executed(program, language), outputs(program(*inputs))
+        if language == "numpy":
+            found = outputs(function(*inputs))
+            for k in (0, 2):
+                for x, y in zip(outputs(function(*one(inputs, program, k))), found, strict=True):
+                    np.testing.assert_array_equal(x, y[k])
+            none = outputs(function(*(x[:0] if x.ndim > 1 else x for x in inputs)))
+            assert all(x.shape[0] == 0 for x in none)
+        else:
+            rows = [one([*inputs], program, k) for k in range(3)]
+            results = [outputs(function(*(x.tolist() for x in row))) for row in rows]
+            found = [np.array(x) for x in zip(*results, strict=True)]
+        for actual, wanted in zip(found, expected, strict=True):
+            assert actual.shape == wanted.shape
+            np.testing.assert_allclose(actual, wanted, rtol=1e-12, atol=1e-12)
+
+
+def test_casadi():
+    casadi = pytest.importorskip("casadi")
+    for program, inputs in programs():
+        function = executed(program, "casadi")
+        shapes = [
+            port.shape if len(port.shape) == 2 else (*port.shape, 1) for port in program.inputs
+        ]
+        symbols = [casadi.SX.sym(p.name, *s) for p, s in zip(program.inputs, shapes, strict=True)]
+        graph = casadi.Function("f", symbols, list(outputs(function(*symbols))))
+        results = graph.call([casadi.DM(x) for x in one(inputs, program, 0)])
+        for port, actual, wanted in zip(
+            program.outputs, results, outputs(program(*one(inputs, program, 0))), strict=True
+        ):
+            np.testing.assert_allclose(
+                np.array(actual).reshape(port.shape), wanted, rtol=1e-12, atol=1e-12
+            )
+    smooth = export.program(rm.load("tx40"), "idm").code("casadi")
+    assert "smooth=0.0" in smooth
+    assert "tanh" in smooth
+
+
+def test_matlab():
+    code = export.program(rm.load("rx90"), "igm").code("matlab")
+    assert "function [q, valid, status] = rx90_igm(T)" in code
+    assert "T(1, 4)" in code
+    assert "reshape(q, 6, 8).'" in code
+    assert "function z = select_" in code
+    lines = export.program(rm.load("rx90"), "idm").code("matlab").splitlines()
+    assert all(line.startswith("%") for line in lines[:5])
+    assert sum(line.startswith("function") for line in lines) == 1
+
+
+def test_the_same_bytes_in_two_processes():
+    script = (
+        "import sys, robotmodels as rm; from robotmodels import export; m = rm.load('tx40');"
+        "sys.stdout.write(''.join(export.program(m, k, **o).code(l) for k, o, l in"
+        " (('idm', {'parameters': 'base'}, 'c'), ('igm', {}, 'numpy'), ('ddm', {}, 'casadi'))))"
+    )
+    texts = [
+        subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, check=True,
+            env={**__import__("os").environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in ("1", "2")
+    ]  # fmt: skip
+    assert texts[0] == texts[1]
+    assert len(texts[0]) > 10_000
+
+
+# --- inverse geometric model ---------------------------------------------------------------------
+
+ARMS = (
+    "lab_rr", "lab_rrt", "lab_trr", "planar_2r", "planar_3r", "gantry", "rx90", "tx40", "puma560",
+    "stanford_arm", "cobra_s600", "ur5", "kr6_r900", "irb6640", "xarm5",
+)  # fmt: skip
+
+
+def same_postures(q, valid, found):
+    """Whether rows are the postures that the package finds, in any order."""
+    for rows, there, others, known in zip(q, valid, found.q, found.valid, strict=True):
+        away = np.abs((rows[there == 1, None] - others[None, known] + np.pi) % (2 * np.pi) - np.pi)
+        assert away.max(axis=-1).min(axis=0, initial=np.inf).max(initial=0.0) < 1e-8
+        assert np.isnan(rows[there == 0]).all()
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_all_postures(name):
+    model = rm.load(name).with_base(rm.se3.translation(0.1, 0.2, 0.3) @ rm.se3.rotation("x", 0.7))
+    rng = np.random.default_rng(1)
+    T = rm.dgm(
+        model, rng.uniform(np.maximum(model.lower, -3), np.minimum(model.upper, 3), (50, model.n))
+    )
+    q, valid, status = export.program(model, "igm")(T)
+    found = rm.igm(model, T)
+    np.testing.assert_array_equal(valid.sum(axis=-1), found.count)
+    np.testing.assert_array_equal(status, found.status)
+    turns = model.table.sigma[model.table.joint_rows] == 0
+    assert np.nanmax(np.abs(q[..., turns]), initial=0.0) <= np.pi
+    same_postures(q, valid, found)
+    assert np.abs(rm.dgm(model, q[valid == 1]) - np.repeat(T, found.count, axis=0)).max() < 1e-12
+
+
+def test_singular_poses_have_a_status():
+    model, rng = rm.load("rx90"), np.random.default_rng(0)
+    program = export.program(model, "igm")
+    statuses = []
+    for fifth in (0.0, 1e-8, 0.5):
+        q = rng.uniform(-1, 1, 6)
+        q[4] = fifth
+        rows, valid, status = program(rm.dgm(model, q))
+        assert valid.sum() == rm.igm(model, rm.dgm(model, q)).count
+        statuses.append(int(status))
+    assert statuses == [
+        rm.IGMStatus.REACHED_FAMILY, rm.IGMStatus.INCOMPLETE, rm.IGMStatus.REACHED
+    ]  # fmt: skip
+    far = np.eye(4)
+    far[0, 3] = 9.0
+    rows, valid, status = program(far)
+    assert (np.isnan(rows).all(), valid.sum(), status) == (True, 0, rm.IGMStatus.NOT_CONVERGED)
+    assert "The pose is reached by an infinite family" in program.code("c")
+
+
+# --- names, files, refusals ----------------------------------------------------------------------
+
+
+def planar(symbols, names=("double", "for")):
+    table = rm.DHTable(
+        antecedent=[0, 1], sigma=[0, 0], d=[0.2, 0.3], r=[0.0, 0.1], names=names, symbols=symbols
+    )
+    return rm.RobotModel.from_table(table, name="int main() /* \u202e */")
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("symbols", "elements"),
+    [
+        ({("d", 1): "L1", ("d", 2): "RL9"}, ("L1", "RL9", "RL2")),
+        ({("d", 1): "double", ("d", 2): "sin"}, ("double_", "sin_", "RL2")),
+        ({("d", 1): "q", ("d", 2): "_x", ("r", 2): "C1"}, ("q_", "x", "C1_")),
+        ({("d", 1): "L1+L2", ("d", 2): "L", ("r", 2): "L"}, ("D1", "D2", "RL2")),
+        ({("d", 1): "a_", ("d", 2): "a"}, ("a_", "a__", "RL2")),
+    ],
+)
+def test_names_that_collide_or_are_keywords(symbols, elements, tmp_path):
+    model = planar(symbols)
+    program = export.program(model, "dgm", geometry="symbols")
+    assert program.elements[-1] == elements
+    call = compiled(program, tmp_path)
+    np.testing.assert_allclose(
+        call([0.1, 0.2], program.values[-1])[0], rm.dgm(model, [0.1, 0.2]), atol=1e-15
+    )
+    for name, element in zip(symbols.values(), elements, strict=False):
+        assert name == element or f"{name} is written {element}" in program.code("c")
+    assert program.code("c").isascii()
+    assert program.name == "int_main_dgm"
+
+
+def test_symbols_of_a_par_file_keep_their_names(tmp_path):
+    path, values = tmp_path / "arm.par", {"D2": 0.4, "RL2": 0.1}
+    rows = "Ant={0,1} Sigma={0,0} Alpha={0,Pi/2} d={0,D2} Theta={t1,t2} R={0,RL2} B={0,0}"
+    head = ["NL=2", "NJ=2", "NF=2", "Type=0", "gamma={0,0}", "Mu={1,1}"]
+    path.write_text("\n".join([*head, *rows.split()]))
+    program = export.program(rm.read_par(path, values=values), "dgm", geometry="symbols")
+    assert dict(zip(program.elements[-1], program.values[-1], strict=True)) == values
+
+
+def test_a_program_is_a_value():
+    program = export.program(rm.load("rx90"), "idm", parameters="symbols")
+    copy = pickle.loads(pickle.dumps(program))
+    assert copy == program
+    assert hash(copy) == hash(program)
+    assert copy.code("c") == program.code("c")
+    assert len(repr(program).splitlines()) <= 6
+    assert "multiplications" in str(program)
+    assert program(np.zeros((0, 6)), np.zeros(6), np.zeros(6), program.values[-1]).shape == (0, 6)
+    assert program([0.0] * 6, [0.0] * 6, [0.0] * 6, program.values[-1]).shape == (6,)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"kind": "imd"}, "'idm'"),
+        ({"kind": 3}, "expected one of"),
+        ({"kind": "idm", "parameters": "number"}, "'symbols'"),
+        ({"kind": "dgm", "geometry": True}, "'symbols'"),
+        ({"kind": "dgm", "parameters": "base"}, "only .idm."),
+        ({"kind": "mass_matrix", "wrench": True}, "'idm', 'bias', 'ddm'"),
+        ({"kind": "idm", "wrench": 1}, "True or False"),
+        ({"kind": "idm", "frame": 2}, "'dgm', 'jacobian'"),
+        ({"kind": "igm", "geometry": "symbols"}, "no geometry='symbols'"),
+        ({"kind": "dgm", "frame": "nowhere"}, "nowhere"),
+        ({"kind": "idm", "drive": "Fz"}, "drive"),
+    ],
+)
+def test_refused_choices(options, words):
+    with pytest.raises(RobotModelsError, match=words):
+        export.program(rm.load("rx90"), **options)
+
+
+def test_refused_models(tmp_path):
+    with pytest.raises(InvalidValueError, match="elimination"):
+        export.program(rm.load("crx10ia"), "igm")
+    with pytest.raises(InvalidValueError, match="arm angle"):
+        export.program(rm.load("iiwa14"), "igm")
+    with pytest.raises(rm.errors.SingularMassMatrixError):
+        export.program(rm.load("ur5"), "ddm", drive=False)
+    with pytest.raises(InvalidValueError, match="load it first"):
+        export.program("rx90", "idm")
+    program = export.program(rm.load("rx90"), "dgm")
+    with pytest.raises(InvalidValueError, match="'matlab'"):
+        program.code("fortran")
+    with pytest.raises(InvalidValueError, match="str or Path"):
+        export.write(program, None)
+    with pytest.raises(InvalidValueError, match="takes 1"):
+        program(np.zeros(6), np.zeros(6))
+    with pytest.raises(ShapeError):
+        program(np.zeros(5))
+    with pytest.raises(InvalidValueError, match="cannot write"):
+        export.write(program, tmp_path / "no" / "folder.c")
+    with pytest.raises(InvalidValueError, match="language"):
+        export.write(program, tmp_path / "code.txt")
+
+
+def test_command_line(tmp_path, capsys):
+    out = tmp_path / "arm.c"
+    assert main(["export", "rx90", "idm", "--parameters", "base", "--out", str(out)]) == 0
+    assert "rx90_idm" in out.read_text()
+    assert "multiplications" in capsys.readouterr().out
+    assert main(["export", "rx90", "dgm", "--language", "numpy", "--frame", "3"]) == 0
+    assert "np.asarray" in capsys.readouterr().out
+    assert main(["export", "crx10ia", "igm"]) == 2
+    assert main(["export", "rx90", "igd"]) == 2
