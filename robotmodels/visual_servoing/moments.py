@@ -1,0 +1,289 @@
+"""Moments of complex shapes: polygons, by Green's theorem, and sets of points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array, as_core, read_only
+from ..errors import InvalidValueError, ShapeError
+from .features import Feature, Flags, placed
+from .matrices import moment_rows, point_rows
+
+_COMPONENTS = (
+    *("area", "x", "y", "n20", "n02", "n11"),
+    *("alpha", "xn", "yn", "an", "c_x", "c_y"),
+)
+_FLAT = 1e-6  # of the size: heights above the plane of a polygon, and areas
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Moments(Feature):
+    """Moments of the image of a planar polygon, or of a set of points.
+
+    ``area`` a; centre of gravity ``x``, ``y``; ``n20``, ``n02``, ``n11``: centred moments mu
+    divided by the area; ``alpha``: orientation, modulo pi. With the scale c, the root of the
+    object's own area: ``an = c / sqrt(a)``, the depth of an object parallel to the image, and
+    ``xn = an x``, ``yn = an y``. Skewness in x and y, zero for centrally symmetric images:
+    ``c_x = sqrt(a) (mu30 + mu12) / (mu20 + mu02)^(3/2)`` and ``c_y`` with mu03 + mu21; they keep
+    their values when the image is shifted or scaled, and turn with it as a vector.
+
+    Parameters
+    ----------
+    polygon : array_like, shape (k, 3), optional
+        Corners of a planar region in order, in the frame of the object, m.
+    components : sequence of str
+        Which, in this order.
+    points : array_like, shape (k, 3), optional
+        Instead of a polygon: moments are sums over points, which need not be coplanar. Their
+        ``area`` is mu20 + mu02, and n20, n02, n11 are divided by their number k.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        A polygon with fewer than three corners, without area, not planar or that crosses itself;
+        unknown components; ``alpha`` of an image without orientation, such as a square.
+
+    References
+    ----------
+    Seed book section 6.2.4.3; F. Chaumette, "Image moments", IEEE Trans. Robotics 20(4), 2004;
+    O. Tahri and F. Chaumette, "Point-based and region-based image moments for visual servoing of
+    planar objects", IEEE Trans. Robotics 21(6), 2005.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> plate = Moments([[-0.2, -0.1, 0], [0.2, -0.1, 0], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
+    >>> plate.measure(translation(0.1, 0.0, 2.0)).round(6) + 0.0
+    array([0.02    , 0.05    , 0.      , 0.003333, 0.000833, 0.      ,
+           0.      , 0.1     , 0.      , 2.      , 0.      , 0.      ])
+    """
+
+    polygon: Array | None = None
+    components: tuple[str, ...] = _COMPONENTS
+    points: Array | None = None
+
+    def __post_init__(self) -> None:
+        if (self.polygon is None) == (self.points is None):
+            raise InvalidValueError("Moments: expected a polygon or points=, one of the two.")
+        name, least = ("points", 2) if self.polygon is None else ("polygon", 3)
+        corners = as_core(getattr(self, name), (3,), name)
+        if corners.ndim != 2 or len(corners) < least:
+            raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {corners.shape}.")
+        given = (self.components,) if isinstance(self.components, str) else self.components
+        words = tuple(given)
+        if not words or len(set(words)) < len(words) or not set(words) <= set(_COMPONENTS):
+            raise InvalidValueError(
+                f"components: expected some of {', '.join(_COMPONENTS)}, each once, got {words}."
+            )
+        if self.polygon is not None:
+            _check_polygon(corners)
+        elif not np.ptp(corners, axis=0).any():
+            raise InvalidValueError("points: expected points that do not all coincide.")
+        object.__setattr__(self, name, read_only(corners))
+        object.__setattr__(self, "components", words)
+
+    def _periods(self) -> Array:
+        return np.array([np.pi if name == "alpha" else 0.0 for name in self.components])
+
+    @property
+    def _corners(self) -> Array:
+        corners = self.points if self.polygon is None else self.polygon
+        assert corners is not None
+        return corners
+
+    def _placed(self, T: Array) -> tuple[Array, Array]:
+        """Corners and normal in the camera."""
+        normal = np.zeros(3) if self.polygon is None else _normal(self.polygon)
+        return placed(T, self._corners), T[..., :3, :3] @ normal
+
+    def _visible(self, G: Any) -> Flags:
+        X, n = G
+        front = (X[..., 2] > 0.0).all(axis=-1)
+        if self.polygon is None:
+            return front
+        distance = np.abs((n * X[..., 0, :]).sum(axis=-1))
+        return front & (distance > _FLAT * np.linalg.norm(X[..., 0, :], axis=-1))
+
+    def _depth(self, G: Any) -> Array:
+        X, n = G
+        if self.polygon is None:
+            return 1.0 / X[..., 2]
+        return n / (n * X[..., 0, :]).sum(axis=-1, keepdims=True)
+
+    def _parallel(self, w: float) -> Array:
+        return np.array([0.0, 0.0, w]) if self.points is None else np.full(len(self.points), w)
+
+    def _measure(self, G: Any) -> Array:
+        return self._of(self._raw(self._outline(None, G), None)[0], None)[0]
+
+    def _rows(self, s: Any, depth: Any, G: Any = None) -> Array:
+        if G is None:
+            raise InvalidValueError(
+                "measurement: the interaction matrix of moments needs moments of higher order than "
+                'those measured; give the pose of the object, or interaction="desired" to the task.'
+            )
+        return self._of(*self._raw(self._outline(None, G), depth))[1]
+
+    def _outline(self, s: Any, G: Any) -> Any:
+        return None if G is None else G[0][..., :2] / G[0][..., 2:]
+
+    def _raw(self, image: Array, depth: Any) -> tuple[Array, Array | None]:
+        """Raw moments (..., 5, 5) and their rates (..., 4, 4, 6), up to orders 4 and 3."""
+        x, y = image[..., 0], image[..., 1]
+        if self.polygon is None:
+            p, q = (np.stack([z**k for k in range(5)], axis=-1) for z in (x, y))
+            m = np.einsum("...ki,...kj->...ij", p, q)
+            if depth is None:
+                return m, None
+            L = point_rows(x, y, np.broadcast_to(depth, x.shape))
+            k = np.arange(4.0)
+            dp, dq = (np.concatenate((0.0 * z[..., :1], z[..., :3]), -1) * k for z in (p, q))
+            rates = np.einsum("...ki,...kj,...kr->...ijr", dp, q[..., :4], L[..., 0, :])
+            return m, rates + np.einsum("...ki,...kj,...kr->...ijr", p[..., :4], dq, L[..., 1, :])
+        m = _polygon_moments(x, y)
+        m = m * np.sign(m[..., :1, :1])  # of corners in either sense
+        if depth is None:
+            return m, None
+        rates = np.zeros((*m.shape[:-2], 4, 4, 6))
+        a, b, c = (np.broadcast_to(depth[..., k], m.shape[:-2]) for k in range(3))
+        for i in range(4):
+            for j in range(4 - i):
+                rates[..., i, j, :] = moment_rows(m, i, j, a, b, c)
+        return m, rates
+
+    def _of(self, raw: Array, rates: Array | None) -> tuple[Array, Array]:
+        """Components (..., k) and their interaction matrix (..., k, 6) by the chain rule."""
+        zero = np.zeros((*raw.shape[:-2], 6)) if rates is None else None
+        m = {
+            (i, j): _Rate(raw[..., i, j], rates[..., i, j, :] if rates is not None else zero)
+            for i in range(4)
+            for j in range(4 - i)
+        }
+        whole = m[0, 0]
+        x, y = m[1, 0] / whole, m[0, 1] / whole
+        mu20, mu02 = m[2, 0] - x * m[1, 0], m[0, 2] - y * m[0, 1]
+        mu11 = m[1, 1] - x * m[0, 1]
+        mu30 = m[3, 0] - x * m[2, 0] * 3.0 + x * x * m[1, 0] * 2.0
+        mu03 = m[0, 3] - y * m[0, 2] * 3.0 + y * y * m[0, 1] * 2.0
+        mu21 = m[2, 1] - x * m[1, 1] * 2.0 - y * m[2, 0] + x * x * m[0, 1] * 2.0
+        mu12 = m[1, 2] - y * m[1, 1] * 2.0 - x * m[0, 2] + y * y * m[1, 0] * 2.0
+        spread = mu20 + mu02
+        area = whole if self.points is None else spread
+        an = area ** (-0.5) * _own_scale(self)
+        skewness = area**0.5 * spread ** (-1.5)
+        found = {
+            "area": area, "x": x, "y": y, "n20": mu20 / whole, "n02": mu02 / whole,
+            "n11": mu11 / whole, "xn": an * x, "yn": an * y, "an": an,
+            "c_x": skewness * (mu30 + mu12), "c_y": skewness * (mu03 + mu21),
+        }  # fmt: skip
+        if "alpha" in self.components:
+            found["alpha"] = _half_angle(mu11 * 2.0, mu20 - mu02, spread.value)
+        parts = [found[name] for name in self.components]
+        return np.stack([p.value for p in parts], -1), np.stack([p.rate for p in parts], -2)
+
+
+class _Rate:
+    """A number (...) and its row (..., 6) of the interaction matrix, with the rules of derivation."""
+
+    def __init__(self, value: Array, rate: Any) -> None:
+        self.value, self.rate = value, rate
+
+    def __add__(self, other: _Rate) -> _Rate:
+        return _Rate(self.value + other.value, self.rate + other.rate)
+
+    def __sub__(self, other: _Rate) -> _Rate:
+        return _Rate(self.value - other.value, self.rate - other.rate)
+
+    def __mul__(self, other: _Rate | float) -> _Rate:
+        if not isinstance(other, _Rate):
+            return _Rate(self.value * other, self.rate * other)
+        rate = self.value[..., None] * other.rate + other.value[..., None] * self.rate
+        return _Rate(self.value * other.value, rate)
+
+    def __pow__(self, power: float) -> _Rate:
+        slope = power * self.value ** (power - 1.0)
+        return _Rate(self.value**power, slope[..., None] * self.rate)
+
+    def __truediv__(self, other: _Rate) -> _Rate:
+        return self * other**-1.0
+
+
+def _half_angle(sine: _Rate, cosine: _Rate, spread: Array) -> _Rate:
+    """Half the angle of a vector."""
+    square = sine.value**2 + cosine.value**2
+    if not (square > (_FLAT * spread) ** 2).all():
+        raise InvalidValueError(
+            "components: alpha does not exist for an image whose n20 and n02 are equal and n11 is "
+            "0, such as a square; leave alpha out."
+        )
+    rate = (cosine.value / square)[..., None] * sine.rate
+    rate = rate - (sine.value / square)[..., None] * cosine.rate
+    return _Rate(0.5 * np.arctan2(sine.value, cosine.value), 0.5 * rate)
+
+
+def _polygon_moments(x: Array, y: Array) -> Array:
+    """Raw moments up to order 4 of polygons. Shapes: x, y (..., k) -> (..., 5, 5)."""
+    X, Y = np.roll(x, -1, axis=-1), np.roll(y, -1, axis=-1)
+    cross = x * Y - X * y
+    m = np.zeros((*x.shape[:-1], 5, 5))
+    for p in range(5):
+        for q in range(5 - p):
+            terms = sum(
+                comb(k + n, n)
+                * comb(p + q - k - n, q - n)
+                * X**k
+                * x ** (p - k)
+                * Y**n
+                * y ** (q - n)
+                for k in range(p + 1)
+                for n in range(q + 1)
+            )
+            factor = (p + q + 2) * (p + q + 1) * comb(p + q, p)
+            m[..., p, q] = (cross * terms).sum(axis=-1) / factor
+    return m
+
+
+def _normal(corners: Array) -> Array:
+    """Unit normal of a planar polygon. Shapes: (k, 3) -> (3,)."""
+    return np.linalg.svd(corners - corners.mean(axis=0))[2][2]
+
+
+def _own_scale(feature: Moments) -> float:
+    """Root of the area of the object itself: sqrt(a) Z of the object parallel to the image."""
+    if feature.polygon is None:
+        corners = feature._corners
+        return float(np.linalg.norm(corners - corners.mean(axis=0)))
+    return float(np.sqrt(_area(feature.polygon)))
+
+
+def _area(corners: Array) -> float:
+    shifted = corners - corners[0]
+    return 0.5 * float(np.linalg.norm(np.cross(shifted, np.roll(shifted, -1, axis=0)).sum(axis=0)))
+
+
+def _check_polygon(corners: Array) -> None:
+    """Raise for polygons without area, that are not planar or cross themselves."""
+    spread = corners - corners.mean(axis=0)
+    size = float(np.abs(spread).max())
+    if not _area(corners) > _FLAT * size**2:
+        raise InvalidValueError("polygon: expected corners that enclose an area, which is zero.")
+    _, _, axes = np.linalg.svd(spread)
+    if np.abs(spread @ axes[2]).max() > _FLAT * size:
+        raise InvalidValueError("polygon: expected corners in one plane; points= need not be.")
+    p = spread @ axes[:2].T
+    ends = np.roll(p, -1, axis=0)
+
+    def side(a: Array, b: Array, c: Array) -> float:
+        return float((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
+
+    for i in range(len(p)):
+        for j in range(i + 2, len(p) - (i == 0)):
+            a, b, c, d = p[i], ends[i], p[j], ends[j]
+            if side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0:
+                raise InvalidValueError(
+                    f"polygon: its edges {i} and {j} cross; expected the corners in order."
+                )

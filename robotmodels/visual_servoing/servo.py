@@ -1,0 +1,320 @@
+"""Simulation of visual servoing: a free camera, eye in hand, eye to hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Frozen, Value, as_exact, as_number, read_only
+from ..errors import InvalidValueError
+from ..kinematics import JointBounds, dgm, ikm
+from ..kinematics.inverse import IKMStatus
+from ..model import RobotModel, check_model
+from ..se3 import as_single_pose, inverse, nearest_pose
+from .camera import Camera
+from .tasks import Hybrid, Task
+from .tracking import TargetMotion
+from .velocity import ServoStatus, law, moved
+
+_MOST = 1_000_000  # steps of a simulation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeInHand(Value):
+    """A camera on the tool of a robot (section 6.2.2), at ``T_tool_camera (4, 4)``.
+
+    Parameters
+    ----------
+    T_tool_camera : array_like, shape (4, 4), optional
+        Pose of the camera in the tool; default the tool itself.
+
+    Examples
+    --------
+    >>> EyeInHand().T_tool_camera.shape
+    (4, 4)
+    """
+
+    T_tool_camera: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        T = as_single_pose(self.T_tool_camera, "T_tool_camera")
+        object.__setattr__(self, "T_tool_camera", read_only(T))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeToHand(Value):
+    """A camera fixed in the world that sees the object on the tool (section 6.2.3).
+
+    Parameters
+    ----------
+    T_world_camera : array_like, shape (4, 4), optional
+        Pose of the camera; default the world itself.
+
+    Examples
+    --------
+    >>> EyeToHand().T_world_camera.shape
+    (4, 4)
+    """
+
+    T_world_camera: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        T = as_single_pose(self.T_world_camera, "T_world_camera")
+        object.__setattr__(self, "T_world_camera", read_only(T))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ServoMotion(Frozen):
+    """A simulated motion under visual servoing, N samples. Read-only.
+
+    Parameters
+    ----------
+    task : Task or Hybrid
+        What was regulated.
+    t : ndarray, shape (N,)
+        Times, s; they end early where the object is behind the camera or out of sight.
+    T : ndarray, shape (N, 4, 4)
+        Poses of the object in the camera.
+    cameras : ndarray, shape (N, 4, 4)
+        Poses of the camera in the world; without a robot, in the object at the start.
+    q : ndarray, shape (N, n), or None
+        Joint variables, rad or m.
+    s, error : ndarray, shape (N, k)
+        Measurements, and ``s - s*``.
+    velocity : ndarray, shape (N, 6)
+        Twists [v; w] of the camera in its own axes that the law asks for.
+    codes : ndarray of int8, shape (N,)
+        `ServoStatus` of every sample.
+    camera : Camera or None
+        The camera of the call.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> from robotmodels.visual_servoing import task_3d
+    >>> servo(task_3d(translation(0, 0, 0.5)), translation(0, 0, 1), duration=20.0).status
+    <ServoStatus.CONVERGES: 0>
+    """
+
+    task: Task | Hybrid
+    t: Array
+    T: Array
+    cameras: Array
+    q: Array | None
+    s: Array
+    error: Array
+    velocity: Array
+    codes: NDArray[np.int8]
+    camera: Camera | None = None
+
+    @property
+    def status(self) -> ServoStatus:
+        """Outcome at the end."""
+        return ServoStatus(int(self.codes[-1]))
+
+    def reason(self) -> str:
+        """Sentence of the status, with the error at the end."""
+        return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
+
+    def __repr__(self) -> str:
+        return f"<ServoMotion: {len(self.t)} samples to {self.t[-1]:g} s. {self.reason()}>"
+
+
+def servo(
+    task: Task | Hybrid,
+    T0: ArrayLike,
+    camera: Camera | None = None,
+    robot: RobotModel | None = None,
+    q0: ArrayLike | None = None,
+    mounting: EyeInHand | EyeToHand | None = None,
+    duration: float = 10.0,
+    step: float = 0.02,
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    *,
+    target: Callable[[float], ArrayLike] | ArrayLike | None = None,
+    tracking: TargetMotion | None = None,
+    limits: JointBounds | bool = True,
+) -> ServoMotion:
+    """Simulate visual servoing.
+
+    A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
+    robot, noise or tracking the law is sampled: every velocity is held for one step.
+
+    Parameters
+    ----------
+    task : Task or Hybrid
+        What is regulated, k components.
+    T0 : array_like, shape (4, 4)
+        Pose of the object in the camera at the start.
+    camera : Camera, optional
+        Whose image has to contain the object.
+    robot : RobotModel, optional
+        Carries the camera or the object; n joints.
+    q0 : array_like, shape (n,), optional
+        Its joint variables at the start, rad or m.
+    mounting : EyeInHand or EyeToHand, optional
+        Default ``EyeInHand()``.
+    duration, step : float
+        Seconds.
+    noise : float
+        Standard deviation of every component of the measurement, in its unit.
+    rng : Generator or int, optional
+        Source of the noise, default 0.
+    target : array_like, shape (6,), or function of t -> (6,), optional
+        Twist [v; w] of the object in its own axes.
+    tracking : TargetMotion, optional
+        Estimates and compensates the motion of the target.
+    limits : JointBounds or bool
+        Limits of the joints, see `ikm`; True takes those of the robot.
+
+    Returns
+    -------
+    ServoMotion
+        Poses, measurements, errors, velocities and the status.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
+
+    References
+    ----------
+    Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> from robotmodels.visual_servoing import Points
+    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+    >>> start = translation(0.1, 0.0, 1.0) @ rotation("z", 0.5)
+    >>> run = servo(Task(square, translation(0, 0, 0.5), gain=1.0), start)
+    >>> run.status, bool(abs(run.error[-1]).max() < 1e-4)
+    (<ServoStatus.CONVERGES: 0>, True)
+    """
+    if not isinstance(task, Task | Hybrid):
+        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    primary = task if isinstance(task, Task) else task.primary
+    T = as_single_pose(T0, "T0")
+    h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
+    sigma = as_number(noise, "noise", least=0.0)
+    if total > _MOST * h:
+        raise InvalidValueError(f"step: {total:g} s in steps of {h:g} s are more than {_MOST}.")
+    arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
+    if arm is None and (q0 is not None or mounting is not None):
+        raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
+    source = np.random.default_rng(0 if rng is None else rng)
+    sampled = arm is not None or sigma > 0.0 or tracking is not None
+    world = np.eye(4) if arm is None else arm.camera @ T  # pose of the object
+    estimate, own, rows = None, np.zeros(primary.feature.size), []
+    for k in range(int(np.floor(total / h + 1e-9)) + 1):
+        s = None
+        if sigma and primary.feature._visible(G := primary.feature._placed(T)):
+            s = primary.feature._measure(G) + sigma * source.normal(size=own.size)
+        v, error, _, code, pseudo = law(task, s, T, camera)
+        s = error + primary.s_desired
+        if tracking is not None and code < ServoStatus.OUT_OF_SIGHT:
+            estimate = (
+                tracking.start(s) if estimate is None else tracking.update(estimate, s, own, h)
+            )
+            v = v - pseudo @ estimate.rate
+        moving = _twist(target, k * h)
+        camera_pose = world @ inverse(T) if arm is None else arm.camera
+        rows.append([k * h, T, camera_pose, None if arm is None else arm.q, s, error, v, code])
+        if code >= ServoStatus.OUT_OF_SIGHT:
+            break
+        if arm is not None:
+            v, T, met = arm.follow(v, T, moving, h)
+            rows[-1][-1] = code if met else ServoStatus.LIMITED
+        elif sampled:
+            T = moved(T, h * v)
+        else:
+            T = _continued(task, T, v, h)
+        if tracking is not None:
+            own = primary.matrix(s, primary.feature._placed(rows[-1][1])) @ v
+        if moving is not None:
+            shift = moved(np.eye(4), -h * moving)
+            T = T @ shift
+            world = world @ shift
+    t, T, cameras, q, s, error, velocity, codes = zip(*rows, strict=True)
+    joints = None if arm is None else np.array(q)
+    arrays = map(np.array, (t, T, cameras)), map(np.array, (s, error, velocity))
+    return ServoMotion(task, *arrays[0], joints, *arrays[1], np.array(codes, np.int8), camera)
+
+
+class _Arm:
+    """The robot of a simulation: its posture, and how it gives the camera a velocity."""
+
+    def __init__(self, robot: Any, q0: Any, mounting: Any, T: Array, h: float, limits: Any) -> None:
+        self.model = check_model(robot) or robot
+        if q0 is None:
+            raise InvalidValueError("q0: expected the joint variables of the robot at the start.")
+        self.q = as_exact(q0, (robot.n,), "q0")
+        self.mounting = EyeInHand() if mounting is None else mounting
+        if not isinstance(self.mounting, EyeInHand | EyeToHand):
+            got = type(mounting).__name__
+            raise InvalidValueError(f"mounting: expected EyeInHand or EyeToHand, got {got}.")
+        bounds = limits if isinstance(limits, JointBounds) else JointBounds(step=h)
+        self.limits = None if limits is False else bounds
+        if limits is True and not ((robot.lower <= self.q) & (self.q <= robot.upper)).all():
+            raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
+        self.held = None  # pose of the object in the tool
+        if isinstance(self.mounting, EyeToHand):
+            self.held = inverse(dgm(robot, self.q)) @ self.mounting.T_world_camera @ T
+
+    @property
+    def camera(self) -> Array:
+        """Pose of the camera in the world."""
+        if isinstance(self.mounting, EyeToHand):
+            return self.mounting.T_world_camera
+        return dgm(self.model, self.q) @ self.mounting.T_tool_camera
+
+    def follow(self, v: Array, T: Array, moving: Any, h: float) -> tuple[Array, Array, bool]:
+        """Move for one step: the velocity achieved, the pose of the object, whether it was met."""
+        before = self.camera
+        if isinstance(self.mounting, EyeInHand):
+            place = self.mounting.T_tool_camera
+            w = place[:3, :3] @ v[3:]
+            linear = place[:3, :3] @ v[:3] + np.cross(place[:3, 3], w)
+            found = ikm(self.model, self.q, np.r_[linear, w], reference="local", limits=self.limits)
+            world = before @ T
+        else:  # the object moves as the camera would in the opposite direction
+            tool = dgm(self.model, self.q)[:3, 3] - before[:3, 3]
+            w = -before[:3, :3] @ v[3:]
+            twist = np.r_[np.cross(w, tool) - before[:3, :3] @ v[:3], w]
+            found = ikm(self.model, self.q, twist, limits=self.limits)
+            world = None
+        self.q = self.q + h * found.v
+        after = inverse(self.camera) @ (
+            dgm(self.model, self.q) @ self.held if world is None else world
+        )
+        wanted = float(np.abs(v).max())
+        met = found.status == IKMStatus.MET or wanted < 1e-9
+        return v * float(found.scale), after, bool(met)
+
+
+def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
+    """Pose after a step of the continuous law, by Runge-Kutta of order 4 on ``dT/dt = -[v] T``."""
+
+    def rate(T: Array, v: Array | None = None) -> Array:
+        v = law(task, None, T)[0] if v is None else v
+        change = np.zeros((4, 4))
+        change[:3] = np.cross(T[:3].T, v[3:]).T
+        change[:3, 3] -= v[:3]
+        return change
+
+    k1 = rate(T, v)
+    k2 = rate(T + 0.5 * h * k1)
+    k3 = rate(T + 0.5 * h * k2)
+    k4 = rate(T + h * k3)
+    return nearest_pose(T + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+
+
+def _twist(target: Any, t: float) -> Array | None:
+    if target is None:
+        return None
+    return as_exact(target(t) if callable(target) else target, (6,), "target")

@@ -1,0 +1,281 @@
+"""Velocity of the camera for one measurement, and a status that states what it achieves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Value, as_exact, read_only
+from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..se3 import as_pose
+from .camera import Camera
+from .features import Feature, as_measurement, brief, wrapped
+from .tasks import Hybrid, Task
+
+RANK_TOLERANCE = 1e-9
+"""Singular values of an interaction matrix up to this part of the largest are zero."""
+_ZERO = 1e-10  # error of a task that is met
+_REDUCIBLE = 1e-3  # part of the error below which a velocity cannot reduce it
+_NEARBY = 0.05 * np.random.default_rng(0).normal(size=(3, 6))  # motions off a singular pose
+
+
+class ServoStatus(Outcome):
+    """Outcome of a visual servoing law; fits int8.
+
+    Attributes
+    ----------
+    sentence : str
+        The meaning of the code.
+
+    Examples
+    --------
+    >>> ServoStatus.BEHIND.sentence
+    'A part of the object is at or behind the plane of the camera, or is seen edge-on.'
+    """
+
+    CONVERGES = 0, "The velocity reduces the error, or it is zero."
+    AT_MINIMUM = (
+        1,
+        "The error is not zero, yet no velocity of this law reduces it: a local minimum.",
+    )
+    SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
+    OUT_OF_SIGHT = 3, "A part of the object is outside the image."
+    BEHIND = 4, "A part of the object is at or behind the plane of the camera, or is seen edge-on."
+    LIMITED = 5, "Joint limits or a singular position of the robot prevent the camera velocity."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ServoStep(Value):
+    """Velocity of the camera for one measurement, or for a batch. Read-only.
+
+    Parameters
+    ----------
+    v : ndarray, shape (..., 6)
+        Twist [v; w] of the camera in its own axes, m/s and rad/s; zero for an object that is
+        behind the camera or out of sight.
+    error : ndarray, shape (..., k)
+        ``s - s*``; NaN for an object behind the camera.
+    rank : int or ndarray, shape (...)
+        Rank of the matrix of the law.
+    status : ServoStatus, or ndarray of int8, shape (...)
+        What the velocity achieves.
+
+    Examples
+    --------
+    >>> ServoStep(np.zeros(6), np.zeros(8), 6, ServoStatus.CONVERGES).reason()
+    'The velocity reduces the error, or it is zero.'
+    """
+
+    v: Array
+    error: Array
+    rank: int | NDArray[np.int8]
+    status: ServoStatus | NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        self.v.flags.writeable = self.error.flags.writeable = False
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status, of row i in a batch."""
+        code = self.status[i] if isinstance(self.status, np.ndarray) else self.status
+        if np.ndim(code):
+            raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
+        return ServoStatus(int(code)).sentence
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+
+def camera_velocity(
+    task: Task | Hybrid, measurement: Any, camera: Camera | None = None
+) -> ServoStep:
+    """Velocity of the camera that regulates a task.
+
+    Parameters
+    ----------
+    task : Task or Hybrid
+        The task, k components.
+    measurement : array_like, shape (..., k) or (..., 4, 4)
+        Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
+    camera : Camera, optional
+        Whose image has to contain the object.
+
+    Returns
+    -------
+    ServoStep
+        Velocity, error, rank and status.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        A measurement of another feature, NaN, a matrix that is not a pose.
+
+    References
+    ----------
+    Seed book sections 6.3.2 and 6.3.3.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> from robotmodels.visual_servoing import Points
+    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+    >>> goal = translation(0, 0, 0.5)
+    >>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
+    array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
+    >>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
+    <ServoStatus.SINGULAR: 2>
+    """
+    if not isinstance(task, Task | Hybrid):
+        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    feature = task.feature if isinstance(task, Task) else task.primary.feature
+    s, T = sensed(feature, measurement)
+    if (T is None or T.ndim == 2) and (s is None or s.ndim == 1):
+        return ServoStep(*law(task, s, T, camera)[:4])
+    rows = T.reshape(-1, 4, 4) if s is None else s.reshape(-1, feature.size)
+    found = [law(task, *((None, row) if s is None else (row, None)), camera)[:4] for row in rows]
+    batch = T.shape[:-2] if s is None else s.shape[:-1]
+    v = np.array([f[0] for f in found]).reshape(*batch, 6)
+    error = np.array([f[1] for f in found]).reshape(*batch, feature.size)
+    codes = (np.array([f[k] for f in found], np.int8).reshape(batch) for k in (2, 3))
+    return ServoStep(v, error, *map(_frozen_codes, codes))
+
+
+def law(
+    task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
+) -> tuple[Array, Array, int, ServoStatus, Array]:
+    """Velocity, error, rank, status and pseudo-inverse (6, k) for one measurement or pose or both."""
+    primary = task if isinstance(task, Task) else task.primary
+    feature = primary.feature
+    G = None if T is None else feature._placed(T)
+    if G is not None and not feature._visible(G):
+        nothing = np.full(feature.size, np.nan)
+        return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
+    measured = feature._measure(G) if s is None else s
+    error = measured - primary.s_desired
+    if primary.periods is not None:
+        error = wrapped(error, primary.periods)
+    A = (
+        primary.matrix(measured, G)
+        if primary._L is None or primary.interaction == "mean"
+        else primary._L
+    )
+    inverse, rank = pseudo_inverse(A)
+    if primary.interaction == "mean":
+        inverse, rank = _mean(inverse, primary)
+    direction = inverse @ error
+    status = ServoStatus.CONVERGES
+    size = sqrt(error @ error)
+    if size > _ZERO:
+        seen = A @ direction
+        if rank < min(A.shape) and _is_singular(feature, primary._T if T is None else T, rank):
+            status = ServoStatus.SINGULAR
+        elif sqrt(seen @ seen) <= _REDUCIBLE * size:
+            status = ServoStatus.AT_MINIMUM
+    if camera is not None:
+        outline = feature._outline(measured, G)
+        if outline is not None and not camera.sees(outline):
+            return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
+    v = -primary.gain * direction
+    if isinstance(task, Hybrid):
+        z = _secondary(task, s, T)
+        v = v + task.weight * (z - pseudo_inverse(A)[0] @ (A @ z))
+    return v, error, rank, status, inverse
+
+
+def pseudo_inverse(A: Array) -> tuple[Array, int]:
+    """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
+    from ..kernels.svd import decompositions
+
+    m, n = A.shape
+    p = min(m, n)
+    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
+    decompositions(np.ascontiguousarray(A[None]), U, S, V)
+    sizes = S[0].tolist()
+    least = RANK_TOLERANCE * sizes[0]
+    rank = sum(size > least for size in sizes)
+    return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
+
+
+def _mean(inverse: Array, task: Task) -> tuple[Array, int]:
+    """Half the sum of the pseudo-inverses of the current and the desired matrix, and its rank."""
+    mean = 0.5 * (inverse + pseudo_inverse(task._L)[0])
+    return mean, pseudo_inverse(mean)[1]
+
+
+def _is_singular(feature: Feature, T: Array | None, rank: int) -> bool:
+    """Whether the rank is less than at poses nearby."""
+    if T is None:
+        return True
+    for twist in _NEARBY:
+        nearby = moved(T, twist * np.repeat((np.linalg.norm(T[:3, 3]), 1.0), 3))
+        if (
+            feature._visible(feature._placed(nearby))
+            and pseudo_inverse(feature.interaction(nearby))[1] > rank
+        ):
+            return True
+    return False
+
+
+def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
+    """Twist that the secondary motion asks for."""
+    if isinstance(task.secondary, Task):
+        return law(task.secondary, None if T is not None else s, T)[0]
+    if not callable(task.secondary):
+        return task.secondary
+    if T is None:
+        raise InvalidValueError("measurement: a secondary function needs the pose (4, 4).")
+    return as_exact(task.secondary(T.copy()), (6,), "secondary(T)")
+
+
+def sensed(feature: Feature, measurement: Any) -> tuple[Array | None, Array | None]:
+    """Checked measurement or poses, the other is None."""
+    if type(measurement) is np.ndarray and measurement.shape == (4, 4):
+        if _is_pose(measurement):
+            return None, measurement
+    if hasattr(measurement, "homogeneous"):
+        return None, as_pose(measurement, "measurement")
+    array = np.asarray(measurement)
+    if array.shape[-2:] == (4, 4) and (
+        feature.size != 4 or array.ndim > 2 or np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0))
+    ):
+        return None, as_pose(measurement, "measurement")
+    return as_measurement(measurement, feature, "measurement"), None
+
+
+def _is_pose(T: Array) -> bool:
+    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
+    if T.dtype != np.float64:
+        return False
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
+    off = (a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0)
+    off += (a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i)
+    mirrors = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0
+    rounding = all(-1e-12 < number < 1e-12 for number in off)
+    return rounding and not mirrors and isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
+
+
+def moved(T: Array, twist: Array) -> Array:
+    """Pose of the object after the camera has moved by a constant twist for 1 s."""
+    v, w = -twist[:3], -twist[3:]
+    square = float(w @ w)
+    if square < 1e-8:
+        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        angle = sqrt(square)
+        a, b = np.sin(angle) / angle, 2.0 * (np.sin(0.5 * angle) / angle) ** 2
+        c = (1.0 - a) / square
+    x, y, z = w.tolist()
+    W = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    WW = W @ W
+    R, V = np.eye(3) + a * W + b * WW, np.eye(3) + b * W + c * WW
+    after = np.eye(4)
+    after[:3, :3], after[:3, 3] = R @ T[:3, :3], R @ T[:3, 3] + V @ v
+    return after
+
+
+def _frozen_codes(codes: NDArray[np.int8]) -> NDArray[np.int8]:
+    return read_only(codes, np.int8)
