@@ -39,8 +39,9 @@ array([0.      , 0.      , 0.140625, 0.140625, 0.      ])
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,7 +49,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
-from .matrices import ellipse_rows, line_rows, point_rows, segment_rows
+from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
 
 _THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _SHOWN = 6
@@ -57,10 +58,19 @@ Flags = NDArray[np.bool_]
 
 
 class Feature(Value):
-    """Shared parts of all features; ``G`` is the geometry of the object in the camera."""
+    """Shared parts of all features. ``G`` is the geometry of the object in the camera."""
 
     __slots__ = ()
-    depends_on_depth = True
+    depends_on_depth: ClassVar[bool] = True
+    _period: ClassVar[tuple[float, ...]] = (0.0,)
+    """Periods of the components of one element, 0 where there is none."""
+
+    _placed: ClassVar[Callable[..., Any]]  # (T): geometry of the object in the camera
+    _visible: ClassVar[Callable[..., Flags]]  # (G): whether the feature exists
+    _measure: ClassVar[Callable[..., Array]]  # (G): measurement (..., k)
+    _depth: ClassVar[Callable[..., Any]]  # (G): depths or planes that the rows need
+    _rows: ClassVar[Callable[..., Array]]  # (s, depth, G): interaction matrix (..., k, 6)
+    _outline: ClassVar[Callable[..., Any]]  # (s, G): points (..., m, 2) that the camera has to see
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
@@ -70,6 +80,20 @@ class Feature(Value):
         """Interaction matrix L (..., k, 6) at poses T, ``ds/dt = L [v; w]``."""
         G = self._seen(T)
         return self._rows(self._measure(G), self._depth(G), G)
+
+    @property
+    def size(self) -> int:
+        """Number k of components."""
+        return len(self._periods())
+
+    def _periods(self) -> Array:
+        """Period of each component. Shapes: -> (k,)."""
+        objects = getattr(self, "object_points", getattr(self, "points", (0,)))
+        return np.tile(self._period, len(objects))
+
+    def _parallel(self, Z: float) -> Any:
+        """Depth of an object parallel to the image."""
+        return np.array((0.0, 0.0, 1.0, -Z))
 
     def _seen(self, T: Any) -> Any:
         """Geometry at checked poses, where the feature exists."""
@@ -86,43 +110,6 @@ class Feature(Value):
 
     def __repr__(self) -> str:
         return brief(self)
-
-    @property
-    def size(self) -> int:
-        """Number k of components."""
-        return len(self._periods())
-
-    def _periods(self) -> Array:
-        """Period of each component, 0 where it has none. Shapes: -> (k,)."""
-        raise NotImplementedError
-
-    def _placed(self, T: Array) -> Any:
-        """Geometry of the object in the camera. Shapes: T (..., 4, 4)."""
-        raise NotImplementedError
-
-    def _visible(self, G: Any) -> Flags:
-        """Whether the feature exists. Shapes: -> (...)."""
-        raise NotImplementedError
-
-    def _measure(self, G: Any) -> Array:
-        """Measurement. Shapes: -> (..., k)."""
-        raise NotImplementedError
-
-    def _depth(self, G: Any) -> Any:
-        """Inverse depths that the rows need, as numbers or as planes (a, b, c)."""
-        raise NotImplementedError
-
-    def _parallel(self, w: float) -> Any:
-        """The same for an object parallel to the image at the inverse depth w."""
-        raise NotImplementedError
-
-    def _rows(self, s: Array, depth: Any, G: Any = None) -> Array:
-        """Interaction matrix of a measurement. Shapes: s (..., k) -> (..., k, 6)."""
-        raise NotImplementedError
-
-    def _outline(self, s: Array, G: Any) -> Array | None:
-        """Points of the image that the camera has to see. Shapes: -> (..., m, 2)."""
-        raise NotImplementedError
 
 
 def placed(T: Array, points: Array) -> Array:
@@ -141,7 +128,8 @@ def unit(vector: Any, name: str) -> Array:
     length = float(np.linalg.norm(array))
     if not length > 0.0:
         raise InvalidValueError(f"{name}: expected a vector that is not zero.")
-    return read_only(array / length)
+    # unit vectors stay as they are, so that copies are equal
+    return read_only(array if abs(length - 1.0) < 4e-16 else array / length)
 
 
 def _pairs(points: Any) -> Array:
@@ -157,7 +145,14 @@ def _pairs(points: Any) -> Array:
 
 
 def _set(feature: Any, **fields: Any) -> None:
+    """Checked centre, directions and radius of a solid, or other fields."""
     for name, value in fields.items():
+        if name in ("normal", "axis"):
+            value = unit(value, name)
+        elif name == "centre":
+            value = read_only(as_exact(value, (3,), name))
+        elif name == "radius":
+            value = as_number(value, name, above=0.0)
         object.__setattr__(feature, name, value)
 
 
@@ -166,6 +161,7 @@ class Points(Feature):
     """Image points: x, y of each of ``object_points (k, 3)``."""
 
     object_points: Array
+    _period = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         points = as_core(self.object_points, (3,), "object_points")
@@ -173,9 +169,6 @@ class Points(Feature):
         if points.ndim != 2 or not len(points):
             raise ShapeError(f"object_points: expected (k, 3), k from 1, got {points.shape}.")
         _set(self, object_points=read_only(points))
-
-    def _periods(self) -> Array:
-        return np.zeros(2 * len(self.object_points))
 
     def _placed(self, T: Array) -> Array:
         return placed(T, self.object_points)
@@ -187,13 +180,13 @@ class Points(Feature):
         return _flat(G[..., :2] / G[..., 2:])
 
     def _depth(self, G: Array) -> Array:
-        return 1.0 / G[..., 2]
+        return G[..., 2]
 
-    def _parallel(self, w: float) -> Array:
-        return np.full(len(self.object_points), w)
+    def _parallel(self, Z: float) -> Array:
+        return np.full(len(self.object_points), Z)
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        return point_rows(s[..., 0::2], s[..., 1::2], depth).reshape(*s.shape, 6)
+        return point_rows(s[..., 0::2], s[..., 1::2], 1.0 / depth).reshape(*s.shape, 6)
 
     def _outline(self, s: Array, G: Any) -> Array:
         return s.reshape(*s.shape[:-1], len(self.object_points), 2)
@@ -203,17 +196,15 @@ class Points(Feature):
 class Lines(Feature):
     """Straight lines through pairs of ``points (k, 2, 3)``: rho, theta of each.
 
-    Seen from the first point to the second, theta is the direction of the normal on the right
-    (the image has y downwards), so that (rho, theta) and (-rho, theta + pi) are two lines.
+    The normal at theta follows the direction from the first point to the second, so that
+    (rho, theta) and (-rho, theta + pi) are two lines; theta itself jumps at pi, errors do not.
     """
 
     points: Array
+    _period = (0.0, _TURN)
 
     def __post_init__(self) -> None:
         _set(self, points=_pairs(self.points))
-
-    def _periods(self) -> Array:
-        return np.tile([0.0, _TURN], len(self.points))
 
     def _placed(self, T: Array) -> tuple[Array, Array]:
         X = placed(T, self.points.reshape(-1, 3))
@@ -222,25 +213,18 @@ class Lines(Feature):
     def _visible(self, G: Any) -> Flags:
         p, q = G
         normal, along = np.cross(p, q), np.linalg.norm(q - p, axis=-1)
-        size = np.linalg.norm(p, axis=-1) * along
-        exists = np.hypot(normal[..., 0], normal[..., 1]) > _THIN * size
+        exists = np.hypot(*np.moveaxis(normal, -1, 0)[:2]) > _THIN * along * norm(p)[..., 0]
         return ((p[..., 2] > 0.0) & (q[..., 2] > 0.0) & exists).all(axis=-1)
 
     def _measure(self, G: Any) -> Array:
         return _line_of(np.cross(*G))
 
     def _depth(self, G: Any) -> Array:
-        p, q = G
-        along = q - p
-        nearest = p - inner(p, along) / inner(along, along) * along
-        return nearest / inner(nearest, nearest)
-
-    def _parallel(self, w: float) -> Array:
-        return np.array([0.0, 0.0, w])
+        p, along = G[0], G[1] - G[0]
+        return _plane_at(p - inner(p, along) / inner(along, along) * along)
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        rows = line_rows(s[..., 0::2], s[..., 1::2], depth[..., 0], depth[..., 1], depth[..., 2])
-        return rows.reshape(*s.shape, 6)
+        return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
 
     def _outline(self, s: Array, G: Any) -> Array:
         rho, theta = s[..., 0::2], s[..., 1::2]  # the point nearest to the optical axis
@@ -252,20 +236,18 @@ class Segments(Feature):
     """Segments between pairs of ``points (k, 2, 3)``: middle x, y, length, alpha of each."""
 
     points: Array
+    _period = (0.0, 0.0, 0.0, _TURN)
 
     def __post_init__(self) -> None:
         _set(self, points=_pairs(self.points))
-
-    def _periods(self) -> Array:
-        return np.tile([0.0, 0.0, 0.0, _TURN], len(self.points))
 
     def _placed(self, T: Array) -> Array:
         return placed(T, self.points.reshape(-1, 3))
 
     def _visible(self, G: Array) -> Flags:
-        across = np.linalg.norm(np.cross(G[..., 0::2, :], G[..., 1::2, :]), axis=-1)
-        size = np.linalg.norm(G, axis=-1).max(axis=-1, keepdims=True)
-        return (G[..., 2] > 0.0).all(axis=-1) & (across > _THIN * size**2).all(axis=-1)
+        across = norm(np.cross(G[..., 0::2, :], G[..., 1::2, :]))[..., 0]
+        size = norm(G).max(axis=-2) ** 2
+        return (G[..., 2] > 0.0).all(axis=-1) & (across > _THIN * size).all(axis=-1)
 
     def _measure(self, G: Array) -> Array:
         p, q = ((G[..., :2] / G[..., 2:])[..., k::2, :] for k in (0, 1))
@@ -273,14 +255,13 @@ class Segments(Feature):
         return _flat(np.stack((x, y, np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1))
 
     def _depth(self, G: Array) -> Array:
-        return 1.0 / np.stack((G[..., 0::2, 2], G[..., 1::2, 2]), axis=-1)
+        return np.stack((G[..., 0::2, 2], G[..., 1::2, 2]), axis=-1)
 
-    def _parallel(self, w: float) -> Array:
-        return np.full((len(self.points), 2), w)
+    def _parallel(self, Z: float) -> Array:
+        return np.full((len(self.points), 2), Z)
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        rows = segment_rows(s[..., 0::4], s[..., 1::4], s[..., 2::4], s[..., 3::4], depth)
-        return rows.reshape(*s.shape, 6)
+        return _flat_rows(interaction_segment(*(s[..., k::4] for k in range(4)), depth))
 
     def _outline(self, s: Array, G: Any) -> Array:
         middle, alpha = np.stack((s[..., 0::4], s[..., 1::4]), axis=-1), s[..., 3::4]
@@ -292,16 +273,10 @@ class _Ellipse(Feature):
     """An object whose image is an ellipse: x, y, n20, n02, n11."""
 
     __slots__ = ()
-
-    def _periods(self) -> Array:
-        return np.zeros(5)
-
-    def _parallel(self, w: float) -> Array:
-        return np.array([0.0, 0.0, w])
+    _period = (0.0,) * 5
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        a, b, c = (np.broadcast_to(depth[..., i], s.shape[:-1]) for i in range(3))
-        return ellipse_rows(*np.moveaxis(s, -1, 0), a, b, c)
+        return interaction_ellipse(*np.moveaxis(s, -1, 0), depth)
 
     def _outline(self, s: Array, G: Any) -> Array:
         reach = 2.0 * np.sqrt(np.maximum(s[..., 2:4], 0.0))
@@ -317,9 +292,7 @@ class Circle(_Ellipse):
     radius: float
 
     def __post_init__(self) -> None:
-        centre = read_only(as_exact(self.centre, (3,), "centre"))
-        _set(self, centre=centre, normal=unit(self.normal, "normal"))
-        _set(self, radius=as_number(self.radius, "radius", above=0.0))
+        _set(self, centre=self.centre, normal=self.normal, radius=self.radius)
 
     def _placed(self, T: Array) -> tuple[Array, Array]:
         return placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.normal
@@ -327,7 +300,7 @@ class Circle(_Ellipse):
     def _visible(self, G: Any) -> Flags:
         c, n = G
         lowest = c[..., 2] - self.radius * np.sqrt(np.maximum(1.0 - n[..., 2] ** 2, 0.0))
-        return (lowest > 0.0) & (np.abs(inner(c, n)) > _THIN * np.sqrt(inner(c, c)))[..., 0]
+        return (lowest > 0.0) & (np.abs(inner(c, n)) > _THIN * norm(c))[..., 0]
 
     def _measure(self, G: Any) -> Array:
         c, n = G
@@ -337,7 +310,7 @@ class Circle(_Ellipse):
 
     def _depth(self, G: Any) -> Array:
         c, n = G
-        return n / inner(c, n)
+        return np.concatenate((n, -inner(c, n)), axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -348,8 +321,7 @@ class Sphere(_Ellipse):
     radius: float
 
     def __post_init__(self) -> None:
-        _set(self, centre=read_only(as_exact(self.centre, (3,), "centre")))
-        _set(self, radius=as_number(self.radius, "radius", above=0.0))
+        _set(self, centre=self.centre, radius=self.radius)
 
     def _placed(self, T: Array) -> Array:
         return placed(T, self.centre[None])[..., 0, :]
@@ -358,11 +330,10 @@ class Sphere(_Ellipse):
         return G[..., 2] > self.radius
 
     def _measure(self, G: Array) -> Array:
-        square = inner(G, G)[..., None] - self.radius**2
-        return _ellipse_of(_outer(G, G) - square * np.eye(3))
+        return _ellipse_of(_outer(G, G) - (inner(G, G)[..., None] - self.radius**2) * np.eye(3))
 
-    def _depth(self, G: Array) -> Array:
-        return G / (inner(G, G) - self.radius**2)  # the outline is in the polar plane
+    def _depth(self, G: Array) -> Array:  # the outline is in the polar plane
+        return np.concatenate((G, self.radius**2 - inner(G, G)), axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -372,38 +343,42 @@ class Cylinder(Feature):
     centre: Array
     axis: Array
     radius: float
+    _period = (0.0, _TURN, 0.0, _TURN)
 
     def __post_init__(self) -> None:
-        centre = read_only(as_exact(self.centre, (3,), "centre"))
-        _set(self, centre=centre, axis=unit(self.axis, "axis"))
-        _set(self, radius=as_number(self.radius, "radius", above=0.0))
-
-    def _periods(self) -> Array:
-        return np.array([0.0, _TURN, 0.0, _TURN])
+        _set(self, centre=self.centre, axis=self.axis, radius=self.radius)
 
     def _placed(self, T: Array) -> tuple[Array, Array, Array]:
         """Centre, nearest point of the axis, normals of the planes of both outlines (..., 2, 3)."""
         p, u = placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.axis
         nearest = p - inner(p, u) * u
-        d = np.maximum(np.sqrt(inner(nearest, nearest)), 1e-300)
+        d = np.maximum(norm(nearest), 1e-300)
         sine = np.minimum(self.radius / d, 1.0)
         towards, beside = sine * nearest / d, np.sqrt(1.0 - sine**2) * np.cross(u, nearest / d)
         return p, nearest, np.stack((towards + beside, towards - beside), axis=-2)
 
     def _visible(self, G: Any) -> Flags:
         p, nearest, n = G
-        outside = np.linalg.norm(nearest, axis=-1) > self.radius * (1.0 + _THIN)
+        outside = norm(nearest)[..., 0] > self.radius * (1.0 + _THIN)
         return (p[..., 2] > 0.0) & outside & (np.hypot(n[..., 0], n[..., 1]) > _THIN).all(axis=-1)
 
     def _measure(self, G: Any) -> Array:
         return _line_of(G[2])
 
     def _depth(self, G: Any) -> Array:
-        _, nearest, n = G
-        contact = nearest[..., None, :] - self.radius * n
-        return contact / inner(contact, contact)
+        return _plane_at(G[1][..., None, :] - self.radius * G[2])  # lines of contact
 
-    _parallel, _rows, _outline = Lines._parallel, Lines._rows, Lines._outline
+    _rows, _outline = Lines._rows, Lines._outline
+
+
+def norm(a: Array) -> Array:
+    """Lengths of vectors in the last axis, which is kept."""
+    return np.sqrt(inner(a, a))
+
+
+def _plane_at(point: Array) -> Array:
+    """Planes through points, normal to their vectors. Shapes: (..., 3) -> (..., 4)."""
+    return np.concatenate((point, -inner(point, point)), axis=-1)
 
 
 def _outer(a: Array, b: Array) -> Array:
@@ -416,6 +391,11 @@ def _flat(image: Array) -> Array:
     return image.reshape(*image.shape[:-2], image.shape[-2] * image.shape[-1])
 
 
+def _flat_rows(L: Array) -> Array:
+    """Rows of all elements below each other. Shapes: (..., n, m, 6) -> (..., n m, 6)."""
+    return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
+
+
 def _line_of(normal: Array) -> Array:
     """Image lines of planes through the camera. Shapes: normal (..., n, 3) -> (..., 2 n)."""
     length = np.hypot(normal[..., 0], normal[..., 1])
@@ -424,7 +404,7 @@ def _line_of(normal: Array) -> Array:
 
 
 def _ellipse_of(Q: Array) -> Array:
-    """Centre and moments of the ellipse ``[x y 1] Q [x y 1]^T = 0``. Shapes: (..., 3, 3) -> (..., 5)."""
+    """Ellipse ``[x y 1] Q [x y 1]^T = 0``. Shapes: (..., 3, 3) -> (..., 5)."""
     determinant = Q[..., 0, 0] * Q[..., 1, 1] - Q[..., 0, 1] ** 2
     x = (Q[..., 0, 1] * Q[..., 1, 2] - Q[..., 1, 1] * Q[..., 0, 2]) / determinant
     y = (Q[..., 0, 1] * Q[..., 0, 2] - Q[..., 0, 0] * Q[..., 1, 2]) / determinant

@@ -25,7 +25,7 @@ servoing", IEEE Trans. Robotics and Automation 15(2), 1999.
 Examples
 --------
 >>> from robotmodels.se3 import rotation
->>> PoseError().measure(rotation("z", 0.3)).round(3)
+>>> PoseError().measure(rotation("z", 0.3)).round(3) + 0.0
 array([ 0. ,  0. ,  0. ,  0. ,  0. , -0.3])
 """
 
@@ -58,9 +58,6 @@ class _InSpace(Feature):
     def _depth(self, G: Array) -> None:
         return None
 
-    def _parallel(self, w: float) -> None:
-        return None
-
     def _outline(self, s: Array, G: Array | None) -> Array | None:
         """The origin of the object."""
         if G is None or not (G[..., 2, 3] > 0.0).all():
@@ -77,14 +74,12 @@ class PoseError(_InSpace):
     """
 
     desired: Array | None = None
+    _period = (0.0,) * 6
 
     def __post_init__(self) -> None:
         if self.desired is not None:
             desired = read_only(as_single_pose(self.desired, "desired"))
             object.__setattr__(self, "desired", desired)
-
-    def _periods(self) -> Array:
-        return np.zeros(6)
 
     def _measure(self, G: Array) -> Array:
         M = inverse(G) if self.desired is None else self.desired @ inverse(G)
@@ -102,12 +97,10 @@ class Point3D(_InSpace):
     """Coordinates X, Y, Z of ``point (3,)`` in the camera, m."""
 
     point: Array
+    _period = (0.0,) * 3
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
-
-    def _periods(self) -> Array:
-        return np.zeros(3)
 
     def _measure(self, G: Array) -> Array:
         return placed(G, self.point[None])[..., 0, :]
@@ -122,13 +115,11 @@ class Plane3D(_InSpace):
 
     normal: Array
     distance: float
+    _period = (0.0,) * 4
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit(self.normal, "normal"))
         object.__setattr__(self, "distance", as_number(self.distance, "distance", least=-np.inf))
-
-    def _periods(self) -> Array:
-        return np.zeros(4)
 
     def _measure(self, G: Array) -> Array:
         n = G[..., :3, :3] @ self.normal
@@ -152,13 +143,11 @@ class PointAndRotation(_InSpace):
 
     point: Array
     desired: Array
+    _period = (0.0,) * 6
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
         object.__setattr__(self, "desired", read_only(as_single_pose(self.desired, "desired")))
-
-    def _periods(self) -> Array:
-        return np.zeros(6)
 
     def _visible(self, G: Array) -> Flags:
         return placed(G, self.point[None])[..., 0, 2] > 0.0

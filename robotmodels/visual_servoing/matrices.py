@@ -24,10 +24,15 @@ theta_u : array_like, shape (..., 3)
 point, normal : array_like, shape (..., 3)
     Point and unit normal in the camera, m.
 
+moments : array_like, shape (..., K, K)
+    Raw moments of a region, [p, q] the integral of ``x^p y^q``; used up to order i + j + 1.
+i, j : int
+    Order of the moment, K at least i + j + 2.
+
 Returns
 -------
 ndarray, shape (..., k, 6)
-    Rows in the order of the arguments.
+    Rows in the order of the arguments; of ``m_ij`` one.
 
 Raises
 ------
@@ -60,46 +65,99 @@ from ..se3 import skew
 def interaction_point(x: ArrayLike, y: ArrayLike, Z: ArrayLike) -> Array:
     """Interaction matrix of an image point: x, y."""
     x, y, Z = _together(x=x, y=y, Z=Z)
-    return point_rows(x, y, 1.0 / _depth(Z))
+    return point_rows(x, y, 1.0 / _in_front(Z))
+
+
+def point_rows(x: Array, y: Array, w: Array) -> Array:
+    """The same with inverse depths w, without checks. Shapes: (...) -> (..., 2, 6)."""
+    L = np.zeros((*x.shape, 2, 6))
+    xy = x * y
+    L[..., 0, 0] = L[..., 1, 1] = -w
+    L[..., 0, 2], L[..., 1, 2] = x * w, y * w
+    L[..., 0, 3], L[..., 1, 4] = xy, -xy
+    L[..., 0, 4], L[..., 1, 3] = -1.0 - x * x, 1.0 + y * y
+    L[..., 0, 5], L[..., 1, 5] = y, -x
+    return L
 
 
 def interaction_line(rho: ArrayLike, theta: ArrayLike, plane: ArrayLike) -> Array:
     """Interaction matrix of a straight line: rho, theta."""
     a, b, c = _inverse_depth(plane)
     rho, theta, a, b, c = _together(rho=rho, theta=theta, A=a, B=b, C=c)
-    return line_rows(rho, theta, a, b, c)
+    cos, sin = np.cos(theta), np.sin(theta)
+    turn, shift = b * cos - a * sin, -(a * rho * cos + b * rho * sin + c)
+    still, square = np.zeros_like(rho), 1.0 + rho**2
+    first = shift * cos, shift * sin, -shift * rho, square * sin, -square * cos, still
+    second = turn * cos, turn * sin, -turn * rho, -rho * cos, -rho * sin, still - 1.0
+    return np.stack((np.stack(first, axis=-1), np.stack(second, axis=-1)), axis=-2)
 
 
 def interaction_segment(
     x: ArrayLike, y: ArrayLike, length: ArrayLike, alpha: ArrayLike, Z: ArrayLike
 ) -> Array:
-    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2) of its ends."""
+    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2) of both ends."""
+    depth = _in_front(as_core(Z, (2,), "Z"))
     x, y, length, alpha = _together(x=x, y=y, length=length, alpha=alpha)
     if not (length > 0.0).all():
         raise InvalidValueError(f"length: expected numbers above 0, got {length.min():.4g}.")
-    return segment_rows(x, y, length, alpha, 1.0 / _depth(as_core(Z, (2,), "Z")))
+    cos, sin = np.cos(alpha), np.sin(alpha)
+    dx, dy = 0.5 * length * cos, 0.5 * length * sin
+    first = point_rows(x - dx, y - dy, 1.0 / depth[..., 0])
+    last = point_rows(x + dx, y + dy, 1.0 / depth[..., 1])
+    middle, along = 0.5 * (first + last), last - first
+    cos, sin, length = cos[..., None], sin[..., None], length[..., None]
+    stretch = cos * along[..., 0, :] + sin * along[..., 1, :]
+    turn = (cos * along[..., 1, :] - sin * along[..., 0, :]) / length
+    return np.concatenate((middle, np.stack((stretch, turn), axis=-2)), axis=-2)
 
 
 def interaction_ellipse(
     x: ArrayLike, y: ArrayLike, n20: ArrayLike, n02: ArrayLike, n11: ArrayLike, plane: ArrayLike
 ) -> Array:
     """Interaction matrix of an ellipse, the image of a circle or a sphere: x, y, n20, n02, n11."""
-    a, b, c = _inverse_depth(plane)
-    return ellipse_rows(*_together(x=x, y=y, n20=n20, n02=n02, n11=n11, A=a, B=b, C=c))
+    x, y, n20, n02, n11, _ = _together(
+        x=x, y=y, n20=n20, n02=n02, n11=n11, D=as_core(plane, (4,), "plane")[..., 3]
+    )
+    # raw moments of a region of area 1; those of third order about its centre are zero
+    m = np.zeros((*x.shape, 4, 4))
+    m[..., 0, 0] = 1.0
+    m[..., 1, 0], m[..., 0, 1] = x, y
+    m[..., 2, 0], m[..., 0, 2], m[..., 1, 1] = n20 + x * x, n02 + y * y, n11 + x * y
+    m[..., 3, 0], m[..., 0, 3] = x * (x * x + 3.0 * n20), y * (y * y + 3.0 * n02)
+    m[..., 2, 1] = y * (x * x + n20) + 2.0 * x * n11
+    m[..., 1, 2] = x * (y * y + n02) + 2.0 * y * n11
+    area = interaction_moment(m, 0, 0, plane)
+    dx, dy, xx, yy, xy = (
+        interaction_moment(m, i, j, plane) - m[..., i, j, None, None] * area
+        for i, j in ((1, 0), (0, 1), (2, 0), (0, 2), (1, 1))
+    )
+    x, y = x[..., None, None], y[..., None, None]
+    rows = dx, dy, xx - 2.0 * x * dx, yy - 2.0 * y * dy, xy - x * dy - y * dx
+    return np.concatenate(rows, axis=-2)
 
 
 def interaction_moment(moments: ArrayLike, i: int, j: int, plane: ArrayLike) -> Array:
-    """Interaction matrix (..., 1, 6) of m_ij of a region, of its raw moments (..., K, K).
-
-    Entry [p, q] is the integral of ``x^p y^q``; those up to the order i + j + 1 are used.
-    """
+    """Interaction matrix (..., 1, 6) of the raw moment m_ij of a region."""
     m = as_floats(moments, "moments")
     if min(i, j) < 0 or m.ndim < 2 or min(m.shape[-2:]) < i + j + 2:
         raise ShapeError(
             f"moments: expected shape (..., K, K) with K from i + j + 2 = {i + j + 2} and i, j not "
             f"negative, got {m.shape}."
         )
-    return moment_rows(m, i, j, *_inverse_depth(plane))[..., None, :]
+    a, b, c = _inverse_depth(plane)
+    here, right, up = m[..., i, j], m[..., i + 1, j], m[..., i, j + 1]
+    left, down = m[..., i - 1, j], m[..., i, j - 1]  # without effect where i or j is 0
+    left_up, right_down = m[..., i - 1, j + 1], m[..., i + 1, j - 1]
+    order = i + j + 3
+    row = (
+        -i * (a * here + b * left_up + c * left) - a * here,
+        -j * (a * right_down + b * here + c * down) - b * here,
+        order * (a * right + b * up + c * here) - c * here,
+        order * up + j * down,
+        -order * right - i * left,
+        i * left_up - j * right_down,
+    )
+    return np.stack(np.broadcast_arrays(*row), axis=-1)[..., None, :]
 
 
 def interaction_theta_u(theta_u: ArrayLike) -> Array:
@@ -138,92 +196,6 @@ def interaction_plane_3d(normal: ArrayLike) -> Array:
     return L
 
 
-# ------------------------------------------------- the formulas; 1 / Z = w = a x + b y + c
-
-
-def point_rows(x: Array, y: Array, w: Array) -> Array:
-    """Rows of points. Shapes: x, y, w (...) -> (..., 2, 6)."""
-    L = np.zeros((*x.shape, 2, 6))
-    xy = x * y
-    L[..., 0, 0] = L[..., 1, 1] = -w
-    L[..., 0, 2], L[..., 1, 2] = x * w, y * w
-    L[..., 0, 3], L[..., 1, 4] = xy, -xy
-    L[..., 0, 4], L[..., 1, 3] = -1.0 - x * x, 1.0 + y * y
-    L[..., 0, 5], L[..., 1, 5] = y, -x
-    return L
-
-
-def line_rows(rho: Array, theta: Array, a: Array, b: Array, c: Array) -> Array:
-    """Rows of lines. Shapes: all (...) -> (..., 2, 6)."""
-    cos, sin = np.cos(theta), np.sin(theta)
-    turn, shift = b * cos - a * sin, -(a * rho * cos + b * rho * sin + c)
-    L = np.zeros((*rho.shape, 2, 6))
-    for row, factor in ((0, shift), (1, turn)):
-        L[..., row, 0], L[..., row, 1], L[..., row, 2] = (
-            factor * cos,
-            factor * sin,
-            -factor * rho,
-        )
-    L[..., 0, 3], L[..., 0, 4] = (1.0 + rho**2) * sin, -(1.0 + rho**2) * cos
-    L[..., 1, 3], L[..., 1, 4], L[..., 1, 5] = -rho * cos, -rho * sin, -1.0
-    return L
-
-
-def segment_rows(x: Array, y: Array, length: Array, alpha: Array, w: Array) -> Array:
-    """Rows of segments, from those of their ends. Shapes: x ... (...), w (..., 2) -> (..., 4, 6)."""
-    cos, sin = np.cos(alpha), np.sin(alpha)
-    dx, dy = 0.5 * length * cos, 0.5 * length * sin
-    first = point_rows(x - dx, y - dy, w[..., 0])
-    last = point_rows(x + dx, y + dy, w[..., 1])
-    L = np.empty((*x.shape, 4, 6))
-    L[..., :2, :] = 0.5 * (first + last)
-    along = last - first
-    cos, sin = cos[..., None], sin[..., None]
-    L[..., 2, :] = cos * along[..., 0, :] + sin * along[..., 1, :]
-    L[..., 3, :] = (cos * along[..., 1, :] - sin * along[..., 0, :]) / length[..., None]
-    return L
-
-
-def ellipse_rows(
-    x: Array, y: Array, n20: Array, n02: Array, n11: Array, a: Array, b: Array, c: Array
-) -> Array:
-    """Rows of ellipses, from the moments of a region of area 1. Shapes: all (...) -> (..., 5, 6)."""
-    m = np.zeros((*x.shape, 4, 4))
-    m[..., 0, 0] = 1.0
-    m[..., 1, 0], m[..., 0, 1] = x, y
-    m[..., 2, 0], m[..., 0, 2], m[..., 1, 1] = n20 + x * x, n02 + y * y, n11 + x * y
-    m[..., 3, 0], m[..., 0, 3] = x * (x * x + 3.0 * n20), y * (y * y + 3.0 * n02)
-    m[..., 2, 1] = y * (x * x + n20) + 2.0 * x * n11
-    m[..., 1, 2] = x * (y * y + n02) + 2.0 * y * n11
-    area = moment_rows(m, 0, 0, a, b, c)
-    rates = {
-        (i, j): moment_rows(m, i, j, a, b, c) - m[..., i, j, None] * area
-        for i, j in ((1, 0), (0, 1), (2, 0), (0, 2), (1, 1))
-    }
-    dx, dy = rates[1, 0], rates[0, 1]
-    x, y = x[..., None], y[..., None]
-    second = (rates[2, 0] - 2.0 * x * dx, rates[0, 2] - 2.0 * y * dy, rates[1, 1] - x * dy - y * dx)
-    return np.stack((dx, dy, *second), axis=-2)
-
-
-def moment_rows(m: Array, i: int, j: int, a: Array, b: Array, c: Array) -> Array:
-    """Row of the raw moment m_ij of a region. Shapes: m (..., K, K), a, b, c (...) -> (..., 6)."""
-    here, right, up = m[..., i, j], m[..., i + 1, j], m[..., i, j + 1]
-    zero, order = np.zeros_like(here), i + j + 3
-    left = m[..., i - 1, j] if i else zero
-    down = m[..., i, j - 1] if j else zero
-    left_up = m[..., i - 1, j + 1] if i else zero
-    right_down = m[..., i + 1, j - 1] if j else zero
-    L = np.empty((*np.broadcast_shapes(here.shape, np.shape(c)), 6))
-    L[..., 0] = -i * (a * here + b * left_up + c * left) - a * here
-    L[..., 1] = -j * (a * right_down + b * here + c * down) - b * here
-    L[..., 2] = order * (a * right + b * up + c * here) - c * here
-    L[..., 3] = order * up + j * down
-    L[..., 4] = -order * right - i * left
-    L[..., 5] = i * left_up - j * right_down
-    return L
-
-
 def _together(**given: ArrayLike) -> list[Array]:
     """Arguments as float arrays of one shape."""
     arrays = [as_floats(value, name) for name, value in given.items()]
@@ -234,7 +206,8 @@ def _together(**given: ArrayLike) -> list[Array]:
         raise ShapeError(f"The arguments do not broadcast against each other: {shapes}.") from None
 
 
-def _depth(Z: Array) -> Array:
+def _in_front(Z: Array) -> Array:
+    """Depths, checked."""
     if not (Z > 0.0).all():
         raise InvalidValueError(
             f"Z: expected depths in front of the camera, above 0, got {Z.min():.4g} m."

@@ -10,8 +10,8 @@ import numpy as np
 
 from .._arrays import Array, as_core, read_only
 from ..errors import InvalidValueError, ShapeError
-from .features import Feature, Flags, placed
-from .matrices import moment_rows, point_rows
+from .features import Feature, Flags, inner, norm, placed
+from .matrices import interaction_moment, point_rows
 
 _COMPONENTS = (
     *("area", "x", "y", "n20", "n02", "n11"),
@@ -56,10 +56,9 @@ class Moments(Feature):
     Examples
     --------
     >>> from robotmodels.se3 import translation
-    >>> plate = Moments([[-0.2, -0.1, 0], [0.2, -0.1, 0], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
-    >>> plate.measure(translation(0.1, 0.0, 2.0)).round(6) + 0.0
-    array([0.02    , 0.05    , 0.      , 0.003333, 0.000833, 0.      ,
-           0.      , 0.1     , 0.      , 2.      , 0.      , 0.      ])
+    >>> plate = [[-0.2, -0.1, 0], [0.2, -0.1, 0], [0.2, 0.1, 0], [-0.2, 0.1, 0]]
+    >>> Moments(plate, components=("x", "n20", "an")).measure(translation(0.1, 0.0, 2.0)).round(4)
+    array([0.05  , 0.0033, 2.    ])
     """
 
     polygon: Array | None = None
@@ -105,17 +104,17 @@ class Moments(Feature):
         front = (X[..., 2] > 0.0).all(axis=-1)
         if self.polygon is None:
             return front
-        distance = np.abs((n * X[..., 0, :]).sum(axis=-1))
-        return front & (distance > _FLAT * np.linalg.norm(X[..., 0, :], axis=-1))
+        corner = X[..., 0, :]
+        return front & (np.abs(inner(n, corner)) > _FLAT * norm(corner))[..., 0]
 
     def _depth(self, G: Any) -> Array:
         X, n = G
         if self.polygon is None:
-            return 1.0 / X[..., 2]
-        return n / (n * X[..., 0, :]).sum(axis=-1, keepdims=True)
+            return X[..., 2]
+        return np.concatenate((n, -inner(n, X[..., 0, :])), axis=-1)
 
-    def _parallel(self, w: float) -> Array:
-        return np.array([0.0, 0.0, w]) if self.points is None else np.full(len(self.points), w)
+    def _parallel(self, Z: float) -> Array:
+        return Feature._parallel(self, Z) if self.points is None else np.full(len(self.points), Z)
 
     def _measure(self, G: Any) -> Array:
         return self._of(self._raw(self._outline(None, G), None)[0], None)[0]
@@ -139,7 +138,7 @@ class Moments(Feature):
             m = np.einsum("...ki,...kj->...ij", p, q)
             if depth is None:
                 return m, None
-            L = point_rows(x, y, np.broadcast_to(depth, x.shape))
+            L = point_rows(x, y, 1.0 / depth)
             k = np.arange(4.0)
             dp, dq = (np.concatenate((0.0 * z[..., :1], z[..., :3]), -1) * k for z in (p, q))
             rates = np.einsum("...ki,...kj,...kr->...ijr", dp, q[..., :4], L[..., 0, :])
@@ -149,10 +148,9 @@ class Moments(Feature):
         if depth is None:
             return m, None
         rates = np.zeros((*m.shape[:-2], 4, 4, 6))
-        a, b, c = (np.broadcast_to(depth[..., k], m.shape[:-2]) for k in range(3))
         for i in range(4):
             for j in range(4 - i):
-                rates[..., i, j, :] = moment_rows(m, i, j, a, b, c)
+                rates[..., i, j, :] = interaction_moment(m, i, j, depth)[..., 0, :]
         return m, rates
 
     def _of(self, raw: Array, rates: Array | None) -> tuple[Array, Array]:

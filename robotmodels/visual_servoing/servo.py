@@ -14,7 +14,7 @@ from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
 from ..model import RobotModel, check_model
-from ..se3 import as_single_pose, inverse, nearest_pose
+from ..se3 import as_single_pose, inverse
 from .camera import Camera
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
@@ -298,20 +298,20 @@ class _Arm:
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
-    """Pose after a step of the continuous law, by Runge-Kutta of order 4 on ``dT/dt = -[v] T``."""
+    """Pose after a step of the continuous law: Munthe-Kaas' Runge-Kutta method of order 4."""
+    q1 = -h * v
+    q2 = -h * law(task, None, moved(T, -0.5 * q1))[0] - q1
+    third = moved(T, -0.5 * (q1 + q2) + 0.125 * _bracket(q1, q2))
+    q3 = -h * law(task, None, third)[0] - q1 - q2
+    q4 = -h * law(task, None, moved(T, -q1 - q2 - q3))[0] - q1 - 2.0 * q2
+    whole = q1 + q2 + q3 / 3.0 + q4 / 6.0 - _bracket(q1, q2) / 6.0 - _bracket(q1, q4) / 12.0
+    return moved(T, -whole)
 
-    def rate(T: Array, v: Array | None = None) -> Array:
-        v = law(task, None, T)[0] if v is None else v
-        change = np.zeros((4, 4))
-        change[:3] = np.cross(T[:3].T, v[3:]).T
-        change[:3, 3] -= v[:3]
-        return change
 
-    k1 = rate(T, v)
-    k2 = rate(T + 0.5 * h * k1)
-    k3 = rate(T + 0.5 * h * k2)
-    k4 = rate(T + h * k3)
-    return nearest_pose(T + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+def _bracket(a: Array, b: Array) -> Array:
+    """Lie bracket of twists."""
+    linear = np.cross(a[3:], b[:3]) - np.cross(b[3:], a[:3])
+    return np.concatenate((linear, np.cross(a[3:], b[3:])))
 
 
 def _twist(target: Any, t: float) -> Array | None:

@@ -84,7 +84,7 @@ class Task(Value):
         gain, depth, w = as_number(self.gain, "gain", above=0.0), self.depth, None
         if not isinstance(depth, str):
             depth = as_number(depth, "depth", above=0.0)
-            w = feature._parallel(1.0 / depth)
+            w = feature._parallel(depth)
         elif depth not in ("true", "desired"):
             raise InvalidValueError(
                 f'depth: expected "true", "desired" or metres above 0, got {depth!r:.40}.'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from math import isfinite, sqrt
 from typing import Any
 
@@ -147,7 +148,7 @@ def camera_velocity(
 def law(
     task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
 ) -> tuple[Array, Array, int, ServoStatus, Array]:
-    """Velocity, error, rank, status and pseudo-inverse (6, k) for one measurement or pose or both."""
+    """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
     primary = task if isinstance(task, Task) else task.primary
     feature = primary.feature
     G = None if T is None else feature._placed(T)
@@ -186,14 +187,20 @@ def law(
     return v, error, rank, status, inverse
 
 
-def pseudo_inverse(A: Array) -> tuple[Array, int]:
-    """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
+@cache
+def _decompositions() -> Any:
+    """The kernel of singular values, imported when it is first used."""
     from ..kernels.svd import decompositions
 
+    return decompositions
+
+
+def pseudo_inverse(A: Array) -> tuple[Array, int]:
+    """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
     m, n = A.shape
     p = min(m, n)
     U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
-    decompositions(np.ascontiguousarray(A[None]), U, S, V)
+    _decompositions()(np.ascontiguousarray(A[None]), U, S, V)
     sizes = S[0].tolist()
     least = RANK_TOLERANCE * sizes[0]
     rank = sum(size > least for size in sizes)
@@ -233,9 +240,9 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
 
 def sensed(feature: Feature, measurement: Any) -> tuple[Array | None, Array | None]:
     """Checked measurement or poses, the other is None."""
-    if type(measurement) is np.ndarray and measurement.shape == (4, 4):
-        if _is_pose(measurement):
-            return None, measurement
+    quick = type(measurement) is np.ndarray and measurement.shape == (4, 4)
+    if quick and _is_pose(measurement):
+        return None, measurement
     if hasattr(measurement, "homogeneous"):
         return None, as_pose(measurement, "measurement")
     array = np.asarray(measurement)
