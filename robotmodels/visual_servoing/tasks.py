@@ -66,7 +66,7 @@ class Task(Value):
     depth: str | float = "true"
     s_desired: Array = field(init=False)
     periods: Array | None = field(init=False)
-    _T: Array | None = field(init=False)
+    T_desired: Array | None = field(init=False)
     _L: Array | None = field(init=False)
     _w: Any = field(init=False)
 
@@ -104,7 +104,7 @@ class Task(Value):
             L = feature._rows(s, w) if T is None else feature.interaction(T)
         periods = feature._periods() if feature._periods().any() else None
         values = {"feature": feature, "desired": s if T is None else T, "gain": gain}
-        values |= {"depth": depth, "s_desired": s, "periods": periods, "_T": T, "_L": L, "_w": w}
+        values |= {"depth": depth, "s_desired": s, "periods": periods, "T_desired": T, "_L": L, "_w": w}
         for name, value in values.items():
             given = read_only(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, given)

@@ -172,7 +172,7 @@ def law(
     size = sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
-        if rank < min(A.shape) and _is_singular(feature, primary._T if T is None else T, rank):
+        if rank < min(A.shape) and _is_singular(feature, primary.T_desired if T is None else T, rank):
             status = ServoStatus.SINGULAR
         elif sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
