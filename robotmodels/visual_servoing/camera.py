@@ -78,4 +78,4 @@ class Camera(Value):
     def sees(self, image: ArrayLike) -> NDArray[np.bool_]:
         """Whether all of the normalised points (..., k, 2) are inside the image."""
         u = self.pixels(image)
-        return ((u >= 0.0) & (u <= self.size)).all(axis=(-2, -1))
+        return np.all((u >= 0.0) & (u <= self.size), axis=(-2, -1))

@@ -1,41 +1,4 @@
-"""Features of an image: points, lines, segments, circles, spheres, cylinders.
-
-Every feature has ``measure(T)`` and ``interaction(T)``. Coordinates of objects are in the frame of
-the object, metres; image coordinates are normalised. Angles of errors are taken modulo a turn.
-
-Parameters
-----------
-T : array_like, shape (..., 4, 4)
-    Pose of the object in the camera, ``T_camera_object``.
-
-Returns
--------
-ndarray, shape (..., k) or (..., k, 6)
-    Measurement; interaction matrix for the twist [v; w] of the camera in its own axes.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    An object of another shape or without extent; a matrix that is not a pose; an object at or
-    behind the plane of the camera, or seen so that the feature does not exist.
-
-References
-----------
-Seed book sections 6.2.4.1 and 6.2.4.2; B. Espiau, F. Chaumette and P. Rives, "A new approach to
-visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
-
-Examples
---------
->>> import numpy as np
->>> from robotmodels.se3 import translation
->>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
->>> square.measure(translation(0, 0, 1.0))
-array([-0.1, -0.1,  0.1, -0.1,  0.1,  0.1, -0.1,  0.1])
->>> square.interaction(translation(0, 0, 1.0)).shape
-(8, 6)
->>> Sphere([0, 0, 0], 0.6).measure(translation(0, 0, 1.0))  # x, y, n20, n02, n11
-array([0.      , 0.      , 0.140625, 0.140625, 0.      ])
-"""
+"""Features of an image: what all of them have, and points, lines and segments."""
 
 from __future__ import annotations
 
@@ -49,28 +12,61 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
-from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
+from .matrices import interaction_line, interaction_segment, point_rows
 
-_THIN = 1e-9  # relative: lengths, areas and angles below are zero
+THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _SHOWN = 6
 _TURN = 2.0 * np.pi
 Flags = NDArray[np.bool_]
 
 
 class Feature(Value):
-    """Shared parts of all features. ``G`` is the geometry of the object in the camera."""
+    """A feature of an object: its measurement, and its interaction matrix.
+
+    Objects are given in their own frame, metres; image coordinates are normalised. Errors of
+    angles are taken modulo their period.
+
+    Parameters
+    ----------
+    T : array_like, shape (..., 4, 4)
+        Of ``measure`` and ``interaction``: poses of the object in the camera.
+
+    Returns
+    -------
+    ndarray, shape (..., k) or (..., k, 6)
+        Measurement; interaction matrix for the twist [v; w] of the camera in its own axes.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        An object of another shape or without extent; a matrix that is not a pose; an object at or
+        behind the plane of the camera, or seen so that the feature does not exist.
+
+    References
+    ----------
+    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2 to 6.2.5.4; B. Espiau, F. Chaumette and
+    P. Rives, "A new approach to visual servoing in robotics", IEEE Trans. Robotics and Automation
+    8(3), 1992.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+    >>> square.measure(translation(0, 0, 1.0))
+    array([-0.1, -0.1,  0.1, -0.1,  0.1,  0.1, -0.1,  0.1])
+    >>> square.interaction(translation(0, 0, 1.0)).shape
+    (8, 6)
+    """
 
     __slots__ = ()
     depends_on_depth: ClassVar[bool] = True
     _period: ClassVar[tuple[float, ...]] = (0.0,)
     """Periods of the components of one element, 0 where there is none."""
 
-    _placed: ClassVar[Callable[..., Any]]  # (T): geometry of the object in the camera
-    _visible: ClassVar[Callable[..., Flags]]  # (G): whether the feature exists
+    _corners: ClassVar[Any]  # points (m, 3) of the object
     _measure: ClassVar[Callable[..., Array]]  # (G): measurement (..., k)
     _depth: ClassVar[Callable[..., Any]]  # (G): depths or planes that the rows need
     _rows: ClassVar[Callable[..., Array]]  # (s, depth, G): interaction matrix (..., k, 6)
-    _outline: ClassVar[Callable[..., Any]]  # (s, G): points (..., m, 2) that the camera has to see
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
@@ -90,6 +86,18 @@ class Feature(Value):
         """Period of each component. Shapes: -> (k,)."""
         objects = getattr(self, "object_points", getattr(self, "points", (0,)))
         return np.tile(self._period, len(objects))
+
+    def _placed(self, T: Array) -> Any:
+        """Geometry G of the object in the camera."""
+        return placed(T, self._corners)
+
+    def _visible(self, G: Any) -> Flags:
+        """Whether the feature exists. Shapes: -> (...)."""
+        return np.asarray((G[..., 2] > 0.0).all(axis=-1))
+
+    def _outline(self, s: Array, G: Any) -> Any:
+        """Points (..., m, 2) that the camera has to see, None where they are not known."""
+        return None if G is None else G[..., :2] / G[..., 2:]
 
     def _parallel(self, Z: float) -> Any:
         """Depth of an object parallel to the image."""
@@ -139,12 +147,12 @@ def _pairs(points: Any) -> Array:
     if pairs.ndim != 3 or not len(pairs):
         raise ShapeError(f"points: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
     lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
-    if not (lengths > _THIN * np.abs(pairs).max()).all():
+    if not (lengths > THIN * np.abs(pairs).max()).all():
         raise InvalidValueError("points: expected two different points on each line or segment.")
     return read_only(pairs)
 
 
-def _set(feature: Any, **fields: Any) -> None:
+def set_fields(feature: Any, **fields: Any) -> None:
     """Checked centre, directions and radius of a solid, or other fields."""
     for name, value in fields.items():
         if name in ("normal", "axis"):
@@ -168,13 +176,11 @@ class Points(Feature):
         points = points[None] if points.ndim == 1 else points
         if points.ndim != 2 or not len(points):
             raise ShapeError(f"object_points: expected (k, 3), k from 1, got {points.shape}.")
-        _set(self, object_points=read_only(points))
+        set_fields(self, object_points=read_only(points))
 
-    def _placed(self, T: Array) -> Array:
-        return placed(T, self.object_points)
-
-    def _visible(self, G: Array) -> Flags:
-        return (G[..., 2] > 0.0).all(axis=-1)
+    @property
+    def _corners(self) -> Array:  # type: ignore[override]
+        return self.object_points
 
     def _measure(self, G: Array) -> Array:
         return _flat(G[..., :2] / G[..., 2:])
@@ -204,7 +210,7 @@ class Lines(Feature):
     _period = (0.0, _TURN)
 
     def __post_init__(self) -> None:
-        _set(self, points=_pairs(self.points))
+        set_fields(self, points=_pairs(self.points))
 
     def _placed(self, T: Array) -> tuple[Array, Array]:
         X = placed(T, self.points.reshape(-1, 3))
@@ -213,15 +219,15 @@ class Lines(Feature):
     def _visible(self, G: Any) -> Flags:
         p, q = G
         normal, along = np.cross(p, q), np.linalg.norm(q - p, axis=-1)
-        exists = np.hypot(*np.moveaxis(normal, -1, 0)[:2]) > _THIN * along * norm(p)[..., 0]
+        exists = np.hypot(*np.moveaxis(normal, -1, 0)[:2]) > THIN * along * norm(p)[..., 0]
         return ((p[..., 2] > 0.0) & (q[..., 2] > 0.0) & exists).all(axis=-1)
 
     def _measure(self, G: Any) -> Array:
-        return _line_of(np.cross(*G))
+        return line_of(np.cross(*G))
 
     def _depth(self, G: Any) -> Array:
         p, along = G[0], G[1] - G[0]
-        return _plane_at(p - inner(p, along) / inner(along, along) * along)
+        return plane_at(p - inner(p, along) / inner(along, along) * along)
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
         return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
@@ -239,15 +245,11 @@ class Segments(Feature):
     _period = (0.0, 0.0, 0.0, _TURN)
 
     def __post_init__(self) -> None:
-        _set(self, points=_pairs(self.points))
+        set_fields(self, points=_pairs(self.points))
 
-    def _placed(self, T: Array) -> Array:
-        return placed(T, self.points.reshape(-1, 3))
-
-    def _visible(self, G: Array) -> Flags:
-        across = norm(np.cross(G[..., 0::2, :], G[..., 1::2, :]))[..., 0]
-        size = norm(G).max(axis=-2) ** 2
-        return (G[..., 2] > 0.0).all(axis=-1) & (across > _THIN * size).all(axis=-1)
+    @property
+    def _corners(self) -> Array:  # type: ignore[override]
+        return self.points.reshape(-1, 3)
 
     def _measure(self, G: Array) -> Array:
         p, q = ((G[..., :2] / G[..., 2:])[..., k::2, :] for k in (0, 1))
@@ -261,114 +263,8 @@ class Segments(Feature):
         return np.full((len(self.points), 2), Z)
 
     def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        return _flat_rows(interaction_segment(*(s[..., k::4] for k in range(4)), depth))
-
-    def _outline(self, s: Array, G: Any) -> Array:
-        middle, alpha = np.stack((s[..., 0::4], s[..., 1::4]), axis=-1), s[..., 3::4]
-        reach = 0.5 * s[..., 2::4, None] * np.stack((np.cos(alpha), np.sin(alpha)), axis=-1)
-        return np.concatenate((middle - reach, middle + reach), axis=-2)
-
-
-class _Ellipse(Feature):
-    """An object whose image is an ellipse: x, y, n20, n02, n11."""
-
-    __slots__ = ()
-    _period = (0.0,) * 5
-
-    def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
-        return interaction_ellipse(*np.moveaxis(s, -1, 0), depth)
-
-    def _outline(self, s: Array, G: Any) -> Array:
-        reach = 2.0 * np.sqrt(np.maximum(s[..., 2:4], 0.0))
-        return np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2)
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Circle(_Ellipse):
-    """A circle: x, y, n20, n02, n11 of the ellipse of its image, of moments divided by the area."""
-
-    centre: Array
-    normal: Array
-    radius: float
-
-    def __post_init__(self) -> None:
-        _set(self, centre=self.centre, normal=self.normal, radius=self.radius)
-
-    def _placed(self, T: Array) -> tuple[Array, Array]:
-        return placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.normal
-
-    def _visible(self, G: Any) -> Flags:
-        c, n = G
-        lowest = c[..., 2] - self.radius * np.sqrt(np.maximum(1.0 - n[..., 2] ** 2, 0.0))
-        return (lowest > 0.0) & (np.abs(inner(c, n)) > _THIN * norm(c))[..., 0]
-
-    def _measure(self, G: Any) -> Array:
-        c, n = G
-        d, excess = inner(c, n)[..., None], inner(c, c)[..., None] - self.radius**2
-        mixed = _outer(c, n) + _outer(n, c)
-        return _ellipse_of(d**2 * np.eye(3) - d * mixed + excess * _outer(n, n))
-
-    def _depth(self, G: Any) -> Array:
-        c, n = G
-        return np.concatenate((n, -inner(c, n)), axis=-1)
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Sphere(_Ellipse):
-    """A sphere: x, y, n20, n02, n11 of the ellipse of its outline."""
-
-    centre: Array
-    radius: float
-
-    def __post_init__(self) -> None:
-        _set(self, centre=self.centre, radius=self.radius)
-
-    def _placed(self, T: Array) -> Array:
-        return placed(T, self.centre[None])[..., 0, :]
-
-    def _visible(self, G: Array) -> Flags:
-        return G[..., 2] > self.radius
-
-    def _measure(self, G: Array) -> Array:
-        return _ellipse_of(_outer(G, G) - (inner(G, G)[..., None] - self.radius**2) * np.eye(3))
-
-    def _depth(self, G: Array) -> Array:  # the outline is in the polar plane
-        return np.concatenate((G, self.radius**2 - inner(G, G)), axis=-1)
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Cylinder(Feature):
-    """An infinite cylinder: rho, theta of the two lines of its outline."""
-
-    centre: Array
-    axis: Array
-    radius: float
-    _period = (0.0, _TURN, 0.0, _TURN)
-
-    def __post_init__(self) -> None:
-        _set(self, centre=self.centre, axis=self.axis, radius=self.radius)
-
-    def _placed(self, T: Array) -> tuple[Array, Array, Array]:
-        """Centre, nearest point of the axis, normals of the planes of both outlines (..., 2, 3)."""
-        p, u = placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.axis
-        nearest = p - inner(p, u) * u
-        d = np.maximum(norm(nearest), 1e-300)
-        sine = np.minimum(self.radius / d, 1.0)
-        towards, beside = sine * nearest / d, np.sqrt(1.0 - sine**2) * np.cross(u, nearest / d)
-        return p, nearest, np.stack((towards + beside, towards - beside), axis=-2)
-
-    def _visible(self, G: Any) -> Flags:
-        p, nearest, n = G
-        outside = norm(nearest)[..., 0] > self.radius * (1.0 + _THIN)
-        return (p[..., 2] > 0.0) & outside & (np.hypot(n[..., 0], n[..., 1]) > _THIN).all(axis=-1)
-
-    def _measure(self, G: Any) -> Array:
-        return _line_of(G[2])
-
-    def _depth(self, G: Any) -> Array:
-        return _plane_at(G[1][..., None, :] - self.radius * G[2])  # lines of contact
-
-    _rows, _outline = Lines._rows, Lines._outline
+        x, y, length, alpha = (s[..., k::4] for k in range(4))
+        return _flat_rows(interaction_segment(x, y, length, alpha, depth))
 
 
 def norm(a: Array) -> Array:
@@ -376,14 +272,9 @@ def norm(a: Array) -> Array:
     return np.sqrt(inner(a, a))
 
 
-def _plane_at(point: Array) -> Array:
+def plane_at(point: Array) -> Array:
     """Planes through points, normal to their vectors. Shapes: (..., 3) -> (..., 4)."""
     return np.concatenate((point, -inner(point, point)), axis=-1)
-
-
-def _outer(a: Array, b: Array) -> Array:
-    """Outer products of vectors in the last axis."""
-    return a[..., :, None] * b[..., None, :]
 
 
 def _flat(image: Array) -> Array:
@@ -396,21 +287,11 @@ def _flat_rows(L: Array) -> Array:
     return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
 
 
-def _line_of(normal: Array) -> Array:
+def line_of(normal: Array) -> Array:
     """Image lines of planes through the camera. Shapes: normal (..., n, 3) -> (..., 2 n)."""
     length = np.hypot(normal[..., 0], normal[..., 1])
     s = np.stack((-normal[..., 2] / length, np.arctan2(normal[..., 1], normal[..., 0])), axis=-1)
     return _flat(s)
-
-
-def _ellipse_of(Q: Array) -> Array:
-    """Ellipse ``[x y 1] Q [x y 1]^T = 0``. Shapes: (..., 3, 3) -> (..., 5)."""
-    determinant = Q[..., 0, 0] * Q[..., 1, 1] - Q[..., 0, 1] ** 2
-    x = (Q[..., 0, 1] * Q[..., 1, 2] - Q[..., 1, 1] * Q[..., 0, 2]) / determinant
-    y = (Q[..., 0, 1] * Q[..., 0, 2] - Q[..., 0, 0] * Q[..., 1, 2]) / determinant
-    scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
-    moments = scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]
-    return np.stack((x, y, *moments), axis=-1)
 
 
 def wrapped(error: Array, periods: Array) -> Array:

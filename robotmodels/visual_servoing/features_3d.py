@@ -1,32 +1,6 @@
 """Features in space: pose, point, plane, and the features of 2 1/2-D servoing.
 
 Their measurement comes from an estimated pose, or from stereo or range cameras.
-
-Parameters
-----------
-T : array_like, shape (..., 4, 4)
-    Pose of the object in the camera, ``T_camera_object``.
-
-Returns
--------
-ndarray, shape (..., k) or (..., k, 6)
-    Measurement; interaction matrix for the twist [v; w] of the camera in its own axes.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    An object of another shape; a matrix that is not a pose; a point at or behind the camera.
-
-References
-----------
-Seed book sections 6.2.5.2 to 6.2.5.4; E. Malis, F. Chaumette and S. Boudet, "2 1/2 D visual
-servoing", IEEE Trans. Robotics and Automation 15(2), 1999.
-
-Examples
---------
->>> from robotmodels.se3 import rotation
->>> PoseError().measure(rotation("z", 0.3)).round(3) + 0.0
-array([ 0. ,  0. ,  0. ,  0. ,  0. , -0.3])
 """
 
 from __future__ import annotations
@@ -71,6 +45,12 @@ class PoseError(_InSpace):
 
     ``desired`` is the pose of the object in the desired camera, by default the identity: the
     desired camera is at the frame of the object. In a `Task` it is the pose of the task.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation
+    >>> PoseError().measure(rotation("z", 0.3)).round(3) + 0.0
+    array([ 0. ,  0. ,  0. ,  0. ,  0. , -0.3])
     """
 
     desired: Array | None = None
@@ -138,7 +118,8 @@ class PointAndRotation(_InSpace):
     """Features of 2 1/2-D servoing: x, y, log(Z) of ``point (3,)``, and theta u as in `PoseError`.
 
     Their interaction matrix is block triangular: the rotation alone moves theta u, and the image
-    of the point goes straight to its goal.
+    of the point goes straight to its goal (E. Malis, F. Chaumette and S. Boudet, "2 1/2 D visual
+    servoing", IEEE Trans. Robotics and Automation 15(2), 1999).
     """
 
     point: Array

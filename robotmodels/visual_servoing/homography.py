@@ -1,4 +1,37 @@
-"""Homographies between two images of a plane, and the motion in them (section 6.2.5.1)."""
+"""Homographies between two images of a plane, and the motions in them.
+
+Parameters
+----------
+image_1, image_2 : array_like, shape (n, 2)
+    The same points in both images, normalised coordinates, n from 4.
+H : array_like, shape (3, 3)
+    Homography of normalised coordinates, with any scale.
+image : array_like, shape (n, 2), optional
+    Points of the plane in the first image: only motions with them in front of it are given.
+
+Returns
+-------
+ndarray of shape (3, 3), or PlaneMotions
+    H scaled to a second singular value of 1 and positive depths; k is 1, 2 or 4 motions.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Fewer than four points, points on a line, a singular matrix.
+
+References
+----------
+Seed book section 6.2.5.1; O. Faugeras and F. Lustman 1988; Y. Ma, S. Soatto, J. Kosecka and
+S. Sastry, "An invitation to 3-D vision", 5.3.
+
+Examples
+--------
+>>> import numpy as np
+>>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+>>> H = homography(corners, corners + [0.5, 0.0])
+>>> H.round(6)[0] + 0.0, decompose_homography(H).R.shape
+(array([1. , 0. , 0.5]), (4, 3, 3))
+"""
 
 from __future__ import annotations
 
@@ -24,11 +57,6 @@ class PlaneMotions(Frozen):
     n : ndarray, shape (k, 3)
         Unit normals of the plane in the first camera, ``n . X_1 = distance``; NaN without
         translation, where k is 1.
-
-    Examples
-    --------
-    >>> decompose_homography(np.eye(3)).t
-    array([[0., 0., 0.]])
     """
 
     R: Array
@@ -37,33 +65,7 @@ class PlaneMotions(Frozen):
 
 
 def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
-    """Homography ``x_2 ~ H x_1`` of points of a plane, by least squares of normalised points.
-
-    Parameters
-    ----------
-    image_1, image_2 : array_like, shape (n, 2)
-        The same points in both images, normalised coordinates, n from 4.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Scaled so that its second singular value is 1, with positive depths: ``R + t n^T``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Fewer than four points, or three of four on a line.
-
-    References
-    ----------
-    Seed book section 6.2.5.1; R. Hartley and A. Zisserman, "Multiple view geometry", 4.4.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> homography(corners, corners + [0.5, 0.0]).round(6)[0] + 0.0
-    array([1. , 0. , 0.5])
-    """
+    """Homography ``x_2 ~ H x_1`` of points of a plane, by least squares of normalised points."""
     p, q = as_core(image_1, (2,), "image_1"), as_core(image_2, (2,), "image_2")
     if p.ndim != 2 or p.shape != q.shape or len(p) < 4:
         raise ShapeError(
@@ -85,36 +87,7 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
 
 
 def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneMotions:
-    """Motions and planes of a homography: four in general, two with the plane in front.
-
-    Parameters
-    ----------
-    H : array_like, shape (3, 3)
-        Homography of normalised coordinates, with any scale.
-    image : array_like, shape (n, 2), optional
-        Points of the plane in the first image: only motions with all of them in front of the
-        first camera are given.
-
-    Returns
-    -------
-    PlaneMotions
-        ``R (k, 3, 3)``, ``t (k, 3)``, ``n (k, 3)``; k is 1, 2 or 4.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another shape, a singular matrix.
-
-    References
-    ----------
-    Seed book section 6.2.5.1; O. Faugeras and F. Lustman 1988; Y. Ma, S. Soatto, J. Kosecka and
-    S. Sastry, "An invitation to 3-D vision", 5.3.
-
-    Examples
-    --------
-    >>> decompose_homography(np.eye(3) + np.outer([0.1, 0, 0.2], [0, 0, 1])).R.shape
-    (4, 3, 3)
-    """
+    """Motions and planes of a homography: four in general, two with the plane in front."""
     A = as_exact(H, (3, 3), "H")
     _, (largest, middle, least), Vt = np.linalg.svd(A)
     if not least > 1e-12 * largest:
@@ -142,7 +115,7 @@ def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneM
 
 
 def _scaled(p: Array) -> tuple[Array, Array]:
-    """Homogeneous points with their mean at 0 and unit spread, and the matrix. Shapes: -> (n, 3)."""
+    """Homogeneous points (n, 3) with mean 0 and unit spread, and the matrix that does it."""
     mean = p.mean(axis=0)
     spread = float(np.linalg.norm(p - mean) / np.sqrt(len(p))) or 1.0
     N = np.array(((1.0, 0.0, -mean[0]), (0.0, 1.0, -mean[1]), (0.0, 0.0, spread))) / spread

@@ -1,4 +1,48 @@
-"""Virtual links, and interaction matrices learnt from motions."""
+"""Virtual links between camera and object, and interaction matrices learnt from motions.
+
+Parameters
+----------
+feature : Points, Lines, Segments, Circle, ...
+    Feature that is kept.
+T : array_like, shape (4, 4)
+    Pose of the object in the camera.
+dS, dX : array_like, shapes (N, k) and (N, 6)
+    Changes of a measurement, and the small displacements [v; w] of the camera in its own axes that
+    caused them, m and rad.
+L, ds, dx : array_like, shapes (k, 6), (k,) and (6,)
+    Estimate so far; the last change and its displacement, which leaves L as it is where it is zero.
+factor : float
+    Part of the correction, in (0, 1].
+
+Returns
+-------
+VirtualLink, or ndarray of shape (k, 6)
+    The link, or the interaction matrix.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arrays that do not fit each other, displacements that do not span all six directions, a pose at
+    which the feature does not exist.
+
+References
+----------
+Seed book sections 6.3.3.1 and 6.2.4.4; B. Espiau, F. Chaumette and P. Rives 1992; M. Jagersand,
+O. Fuentes and R. Nelson, "Experimental evaluation of uncalibrated visual servoing", ICRA 1997.
+
+Examples
+--------
+>>> import numpy as np
+>>> from robotmodels.se3 import translation
+>>> from robotmodels.visual_servoing import Sphere
+>>> link = virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1))
+>>> link.link_class, link.rank, link.name
+(3, 3, 'ball joint')
+>>> estimate_interaction(np.eye(6)[:, :2], np.eye(6)).shape
+(2, 6)
+>>> broyden(np.zeros((1, 6)), [0.2], [0.1, 0, 0, 0, 0, 0])
+array([[2., 0., 0., 0., 0., 0.]])
+"""
 
 from __future__ import annotations
 
@@ -34,13 +78,6 @@ class VirtualLink(Frozen):
         Orthonormal twists [v; w] of the camera in its own axes.
     name : str
         Of the mechanical link with as many rotations and translations, "" for others.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import Sphere
-    >>> virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1)).name
-    'ball joint'
     """
 
     link_class: int
@@ -50,36 +87,7 @@ class VirtualLink(Frozen):
 
 
 def virtual_link(feature: Feature, T: ArrayLike) -> VirtualLink:
-    """Virtual link between a camera and an object: the kernel of the interaction matrix.
-
-    Parameters
-    ----------
-    feature : Points, Lines, ...
-        What is kept.
-    T : array_like, shape (4, 4)
-        Pose of the object in the camera.
-
-    Returns
-    -------
-    VirtualLink
-        Class, rank, twists and name.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Not a feature, not a pose, a pose at which the feature does not exist.
-
-    References
-    ----------
-    Seed book section 6.3.3.1; B. Espiau, F. Chaumette and P. Rives 1992.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import Points
-    >>> virtual_link(Points([[0, 0, 0]]), translation(0.1, 0, 1)).link_class
-    4
-    """
+    """Virtual link between a camera and an object: the kernel of the interaction matrix."""
     if not isinstance(feature, Feature):
         raise InvalidValueError(f"feature: expected a feature, got {type(feature).__name__}.")
     _, sizes, Vt = np.linalg.svd(feature.interaction(as_single_pose(T, "T")))
@@ -91,34 +99,7 @@ def virtual_link(feature: Feature, T: ArrayLike) -> VirtualLink:
 
 
 def estimate_interaction(dS: ArrayLike, dX: ArrayLike) -> Array:
-    """Interaction matrix from motions of the camera: least squares of ``dS = dX L^T``.
-
-    Parameters
-    ----------
-    dS : array_like, shape (N, k)
-        Changes of the measurement.
-    dX : array_like, shape (N, 6)
-        Small displacements [v; w] of the camera in its own axes that caused them, m and rad.
-
-    Returns
-    -------
-    ndarray, shape (k, 6)
-        Estimate of L.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Different numbers of rows; displacements that do not span all six directions.
-
-    References
-    ----------
-    Seed book section 6.2.4.4.
-
-    Examples
-    --------
-    >>> estimate_interaction(np.eye(6)[:, :2], np.eye(6)).shape
-    (2, 6)
-    """
+    """Interaction matrix from motions of the camera: least squares of ``dS = dX L^T``."""
     S, X = as_floats(dS, "dS"), as_vector(dX, 6, "dX")
     if S.ndim != 2 or X.ndim != 2 or len(S) != len(X):
         raise ShapeError(f"dS, dX: expected shapes (N, k) and (N, 6), got {S.shape} and {X.shape}.")
@@ -133,38 +114,7 @@ def estimate_interaction(dS: ArrayLike, dX: ArrayLike) -> Array:
 
 
 def broyden(L: ArrayLike, ds: ArrayLike, dx: ArrayLike, factor: float = 1.0) -> Array:
-    """Broyden's update: the matrix nearest to L that explains the last motion.
-
-    Parameters
-    ----------
-    L : array_like, shape (k, 6)
-        Estimate so far.
-    ds : array_like, shape (k,)
-        Change of the measurement.
-    dx : array_like, shape (6,)
-        Displacement [v; w] that caused it; zero leaves L as it is.
-    factor : float
-        Part of the correction, in (0, 1].
-
-    Returns
-    -------
-    ndarray, shape (k, 6)
-        ``L + factor (ds - L dx) dx^T / (dx^T dx)``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays that do not fit each other, a factor outside (0, 1].
-
-    References
-    ----------
-    Seed book section 6.2.4.4; M. Jagersand, O. Fuentes and R. Nelson, ICRA 1997.
-
-    Examples
-    --------
-    >>> broyden(np.zeros((1, 6)), [0.2], [0.1, 0, 0, 0, 0, 0])
-    array([[2., 0., 0., 0., 0., 0.]])
-    """
+    """Broyden's update: the matrix nearest to L that explains the last motion."""
     A, s, x = as_vector(L, 6, "L"), as_floats(ds, "ds"), as_vector(dx, 6, "dx")
     if A.ndim != 2 or s.shape != A.shape[:1] or x.ndim != 1:
         raise ShapeError(

@@ -95,7 +95,7 @@ def interaction_line(rho: ArrayLike, theta: ArrayLike, plane: ArrayLike) -> Arra
 def interaction_segment(
     x: ArrayLike, y: ArrayLike, length: ArrayLike, alpha: ArrayLike, Z: ArrayLike
 ) -> Array:
-    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2) of both ends."""
+    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2)."""
     depth = _in_front(as_core(Z, (2,), "Z"))
     x, y, length, alpha = _together(x=x, y=y, length=length, alpha=alpha)
     if not (length > 0.0).all():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from math import comb
 from typing import Any
 
@@ -17,6 +18,7 @@ _COMPONENTS = (
     *("area", "x", "y", "n20", "n02", "n11"),
     *("alpha", "xn", "yn", "an", "c_x", "c_y"),
 )
+_ORDERS = [(i, j) for i in range(4) for j in range(4 - i)]
 _FLAT = 1e-6  # of the size: heights above the plane of a polygon, and areas
 
 
@@ -72,8 +74,7 @@ class Moments(Feature):
         corners = as_core(getattr(self, name), (3,), name)
         if corners.ndim != 2 or len(corners) < least:
             raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {corners.shape}.")
-        given = (self.components,) if isinstance(self.components, str) else self.components
-        words = tuple(given)
+        words = (self.components,) if isinstance(self.components, str) else tuple(self.components)
         if not words or len(set(words)) < len(words) or not set(words) <= set(_COMPONENTS):
             raise InvalidValueError(
                 f"components: expected some of {', '.join(_COMPONENTS)}, each once, got {words}."
@@ -85,31 +86,26 @@ class Moments(Feature):
         object.__setattr__(self, name, read_only(corners))
         object.__setattr__(self, "components", words)
 
+    @property
+    def _corners(self) -> Any:
+        return self.points if self.polygon is None else self.polygon
+
     def _periods(self) -> Array:
         return np.array([np.pi if name == "alpha" else 0.0 for name in self.components])
 
-    @property
-    def _corners(self) -> Array:
-        corners = self.points if self.polygon is None else self.polygon
-        assert corners is not None
-        return corners
-
     def _placed(self, T: Array) -> tuple[Array, Array]:
         """Corners and normal in the camera."""
-        normal = np.zeros(3) if self.polygon is None else _normal(self.polygon)
-        return placed(T, self._corners), T[..., :3, :3] @ normal
+        return placed(T, self._corners), T[..., :3, :3] @ _axes(self._corners)[2]
 
     def _visible(self, G: Any) -> Flags:
         X, n = G
-        front = (X[..., 2] > 0.0).all(axis=-1)
-        if self.polygon is None:
-            return front
         corner = X[..., 0, :]
-        return front & (np.abs(inner(n, corner)) > _FLAT * norm(corner))[..., 0]
+        edge_on = (np.abs(inner(n, corner)) <= _FLAT * norm(corner))[..., 0]
+        return (X[..., 2] > 0.0).all(axis=-1) & ~(edge_on & (self.points is None))
 
     def _depth(self, G: Any) -> Array:
         X, n = G
-        if self.polygon is None:
+        if self.points is not None:
             return X[..., 2]
         return np.concatenate((n, -inner(n, X[..., 0, :])), axis=-1)
 
@@ -117,7 +113,8 @@ class Moments(Feature):
         return Feature._parallel(self, Z) if self.points is None else np.full(len(self.points), Z)
 
     def _measure(self, G: Any) -> Array:
-        return self._of(self._raw(self._outline(None, G), None)[0], None)[0]
+        m, _ = self._raw(self._outline(None, G), None)
+        return self._of(m, np.zeros((*m.shape[:-2], 4, 4, 6)))[0]
 
     def _rows(self, s: Any, depth: Any, G: Any = None) -> Array:
         if G is None:
@@ -130,37 +127,32 @@ class Moments(Feature):
     def _outline(self, s: Any, G: Any) -> Any:
         return None if G is None else G[0][..., :2] / G[0][..., 2:]
 
-    def _raw(self, image: Array, depth: Any) -> tuple[Array, Array | None]:
+    def _raw(self, image: Array, depth: Any) -> tuple[Array, Any]:
         """Raw moments (..., 5, 5) and their rates (..., 4, 4, 6), up to orders 4 and 3."""
         x, y = image[..., 0], image[..., 1]
-        if self.polygon is None:
-            p, q = (np.stack([z**k for k in range(5)], axis=-1) for z in (x, y))
-            m = np.einsum("...ki,...kj->...ij", p, q)
+        if self.points is None:
+            m = _polygon_moments(x, y)
+            m = m * np.sign(m[..., :1, :1])  # of corners in either sense
             if depth is None:
                 return m, None
-            L = point_rows(x, y, 1.0 / depth)
-            k = np.arange(4.0)
-            dp, dq = (np.concatenate((0.0 * z[..., :1], z[..., :3]), -1) * k for z in (p, q))
-            rates = np.einsum("...ki,...kj,...kr->...ijr", dp, q[..., :4], L[..., 0, :])
-            return m, rates + np.einsum("...ki,...kj,...kr->...ijr", p[..., :4], dq, L[..., 1, :])
-        m = _polygon_moments(x, y)
-        m = m * np.sign(m[..., :1, :1])  # of corners in either sense
+            rates = np.zeros((*m.shape[:-2], 4, 4, 6))
+            for i, j in _ORDERS:
+                rates[..., i, j, :] = interaction_moment(m, i, j, depth)[..., 0, :]
+            return m, rates
+        p, q = (np.stack([z**k for k in range(5)], axis=-1) for z in (x, y))
+        m = np.einsum("...ki,...kj->...ij", p, q)
         if depth is None:
             return m, None
-        rates = np.zeros((*m.shape[:-2], 4, 4, 6))
-        for i in range(4):
-            for j in range(4 - i):
-                rates[..., i, j, :] = interaction_moment(m, i, j, depth)[..., 0, :]
-        return m, rates
+        L = point_rows(x, y, 1.0 / depth)
+        dp, dq = (
+            np.concatenate((0.0 * z[..., :1], z[..., :3]), -1) * np.arange(4.0) for z in (p, q)
+        )
+        rates = np.einsum("...ki,...kj,...kr->...ijr", dp, q[..., :4], L[..., 0, :])
+        return m, rates + np.einsum("...ki,...kj,...kr->...ijr", p[..., :4], dq, L[..., 1, :])
 
-    def _of(self, raw: Array, rates: Array | None) -> tuple[Array, Array]:
+    def _of(self, raw: Array, rates: Array) -> tuple[Array, Array]:
         """Components (..., k) and their interaction matrix (..., k, 6) by the chain rule."""
-        zero = np.zeros((*raw.shape[:-2], 6)) if rates is None else None
-        m = {
-            (i, j): _Rate(raw[..., i, j], rates[..., i, j, :] if rates is not None else zero)
-            for i in range(4)
-            for j in range(4 - i)
-        }
+        m = {(i, j): _Rate(raw[..., i, j], rates[..., i, j, :]) for i, j in _ORDERS}
         whole = m[0, 0]
         x, y = m[1, 0] / whole, m[0, 1] / whole
         mu20, mu02 = m[2, 0] - x * m[1, 0], m[0, 2] - y * m[0, 1]
@@ -171,8 +163,10 @@ class Moments(Feature):
         mu12 = m[1, 2] - y * m[1, 1] * 2.0 - x * m[0, 2] + y * y * m[1, 0] * 2.0
         spread = mu20 + mu02
         area = whole if self.points is None else spread
-        an = area ** (-0.5) * _own_scale(self)
-        skewness = area**0.5 * spread ** (-1.5)
+        spread_3d = self._corners - self._corners.mean(axis=0)
+        own = (spread_3d**2).sum() if self.points is not None else _area(self._corners)
+        an = area**-0.5 * float(np.sqrt(own))
+        skewness = area**0.5 * spread**-1.5
         found = {
             "area": area, "x": x, "y": y, "n20": mu20 / whole, "n02": mu02 / whole,
             "n11": mu11 / whole, "xn": an * x, "yn": an * y, "an": an,
@@ -185,16 +179,16 @@ class Moments(Feature):
 
 
 class _Rate:
-    """A number (...) and its row (..., 6) of the interaction matrix, with the rules of derivation."""
+    """A number (...) and its row (..., 6) of the interaction matrix, with rules of derivation."""
 
-    def __init__(self, value: Array, rate: Any) -> None:
+    def __init__(self, value: Array, rate: Array) -> None:
         self.value, self.rate = value, rate
 
     def __add__(self, other: _Rate) -> _Rate:
         return _Rate(self.value + other.value, self.rate + other.rate)
 
     def __sub__(self, other: _Rate) -> _Rate:
-        return _Rate(self.value - other.value, self.rate - other.rate)
+        return self + other * -1.0
 
     def __mul__(self, other: _Rate | float) -> _Rate:
         if not isinstance(other, _Rate):
@@ -218,44 +212,31 @@ def _half_angle(sine: _Rate, cosine: _Rate, spread: Array) -> _Rate:
             "components: alpha does not exist for an image whose n20 and n02 are equal and n11 is "
             "0, such as a square; leave alpha out."
         )
-    rate = (cosine.value / square)[..., None] * sine.rate
-    rate = rate - (sine.value / square)[..., None] * cosine.rate
-    return _Rate(0.5 * np.arctan2(sine.value, cosine.value), 0.5 * rate)
+    rate = cosine.value[..., None] * sine.rate - sine.value[..., None] * cosine.rate
+    return _Rate(0.5 * np.arctan2(sine.value, cosine.value), 0.5 * rate / square[..., None])
 
 
 def _polygon_moments(x: Array, y: Array) -> Array:
     """Raw moments up to order 4 of polygons. Shapes: x, y (..., k) -> (..., 5, 5)."""
     X, Y = np.roll(x, -1, axis=-1), np.roll(y, -1, axis=-1)
-    cross = x * Y - X * y
+    (p0, p1), (q0, q1) = (
+        [np.stack([z**k for k in range(5)]) for z in ends] for ends in ((x, X), (y, Y))
+    )
     m = np.zeros((*x.shape[:-1], 5, 5))
-    for p in range(5):
-        for q in range(5 - p):
+    for p, q in product(range(5), range(5)):
+        if p + q < 5:
             terms = sum(
-                comb(k + n, n)
-                * comb(p + q - k - n, q - n)
-                * X**k
-                * x ** (p - k)
-                * Y**n
-                * y ** (q - n)
-                for k in range(p + 1)
-                for n in range(q + 1)
+                comb(k + n, n) * comb(p + q - k - n, q - n) * p1[k] * p0[p - k] * q1[n] * q0[q - n]
+                for k, n in product(range(p + 1), range(q + 1))
             )
             factor = (p + q + 2) * (p + q + 1) * comb(p + q, p)
-            m[..., p, q] = (cross * terms).sum(axis=-1) / factor
+            m[..., p, q] = ((x * Y - X * y) * terms).sum(axis=-1) / factor
     return m
 
 
-def _normal(corners: Array) -> Array:
-    """Unit normal of a planar polygon. Shapes: (k, 3) -> (3,)."""
-    return np.linalg.svd(corners - corners.mean(axis=0))[2][2]
-
-
-def _own_scale(feature: Moments) -> float:
-    """Root of the area of the object itself: sqrt(a) Z of the object parallel to the image."""
-    if feature.polygon is None:
-        corners = feature._corners
-        return float(np.linalg.norm(corners - corners.mean(axis=0)))
-    return float(np.sqrt(_area(feature.polygon)))
+def _axes(corners: Array) -> Array:
+    """Principal axes of points; of a planar polygon the last is normal. Shapes: -> (3, 3)."""
+    return np.linalg.svd(corners - corners.mean(axis=0))[2]
 
 
 def _area(corners: Array) -> float:
@@ -265,23 +246,21 @@ def _area(corners: Array) -> float:
 
 def _check_polygon(corners: Array) -> None:
     """Raise for polygons without area, that are not planar or cross themselves."""
-    spread = corners - corners.mean(axis=0)
-    size = float(np.abs(spread).max())
+    p = (corners - corners.mean(axis=0)) @ _axes(corners).T
+    size = float(np.abs(p).max())
     if not _area(corners) > _FLAT * size**2:
         raise InvalidValueError("polygon: expected corners that enclose an area, which is zero.")
-    _, _, axes = np.linalg.svd(spread)
-    if np.abs(spread @ axes[2]).max() > _FLAT * size:
+    if np.abs(p[:, 2]).max() > _FLAT * size:
         raise InvalidValueError("polygon: expected corners in one plane; points= need not be.")
-    p = spread @ axes[:2].T
-    ends = np.roll(p, -1, axis=0)
+    x, y = p[:, 0], p[:, 1]
+    X, Y = np.roll(x, -1), np.roll(y, -1)
 
-    def side(a: Array, b: Array, c: Array) -> float:
-        return float((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
+    def side(u: Array, v: Array) -> Array:  # of points (u, v), beside each edge
+        return (X - x)[:, None] * (v - y[:, None]) - (Y - y)[:, None] * (u - x[:, None])
 
-    for i in range(len(p)):
-        for j in range(i + 2, len(p) - (i == 0)):
-            a, b, c, d = p[i], ends[i], p[j], ends[j]
-            if side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0:
-                raise InvalidValueError(
-                    f"polygon: its edges {i} and {j} cross; expected the corners in order."
-                )
+    apart = side(x, y) * side(X, Y) < -((_FLAT * size) ** 4)
+    if (apart & apart.T).any():
+        i, j = np.argwhere(apart & apart.T)[0]
+        raise InvalidValueError(
+            f"polygon: its edges {i} and {j} cross; expected the corners in order."
+        )

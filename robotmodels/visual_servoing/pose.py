@@ -1,4 +1,49 @@
-"""Pose of an object from image points: three points, many points, virtual visual servoing."""
+"""Pose of an object from image points: three points, many points, virtual visual servoing.
+
+`p3p` finds all poses of three points. `pnp` finds the pose of least squared image error, of planar
+objects both minima: it starts from triples of points and refines on all points. `refine_pose` is
+virtual visual servoing: a virtual camera is moved from a first pose until its image fits, with
+steps that are damped where the error would grow (Levenberg-Marquardt).
+
+Parameters
+----------
+points : array_like, shape (n, 3)
+    Points of the object, m, n from 3, not all on a line; of `p3p` (..., 3, 3).
+image : array_like, shape (..., n, 2)
+    Their normalised image coordinates.
+T0 : array_like, shape (4, 4)
+    First pose of the object in the camera.
+
+Returns
+-------
+PoseSolutions
+    Poses with all points in front of the camera, by growing image error.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arrays that do not fit each other, points on a line, a first pose with points behind the camera.
+
+References
+----------
+Seed book section 6.2.5.1; M. Fischler and R. Bolles, "Random sample consensus", Comm. ACM 24(6),
+1981; G. Schweighofer and A. Pinz, "Robust pose estimation from a planar target", IEEE Trans. PAMI
+28(12), 2006; E. Marchand and F. Chaumette, "Virtual visual servoing", 2002.
+
+Examples
+--------
+>>> import numpy as np
+>>> from robotmodels.se3 import translation
+>>> corners = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+>>> image = corners[:, :2] / 0.5
+>>> pnp(corners, image).T[0, :3, 3].round(9) + 0.0
+array([0. , 0. , 0.5])
+>>> refine_pose(corners, image, translation(0.1, 0, 0.7)).T[0, :3, 3].round(9) + 0.0
+array([0. , 0. , 0.5])
+>>> triangle = [[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]]
+>>> p3p(triangle, np.array(triangle)[:, :2] / 12**0.5)
+<PoseSolutions: 4 poses. The poses found are all that fit the image.>
+"""
 
 from __future__ import annotations
 
@@ -7,7 +52,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, as_core
 from .._outcomes import Outcome
@@ -48,11 +93,6 @@ class PoseSolutions(Frozen):
         Largest distance of an image point from its measurement, normalised.
     status : ndarray of int8, shape (...)
         Codes of `PoseStatus`.
-
-    Examples
-    --------
-    >>> p3p(np.eye(3), [[0.1, 0.0], [0.0, 0.1], [0.0, 0.0]]).T.shape[-2:]
-    (4, 4)
     """
 
     T: Array
@@ -72,7 +112,7 @@ class PoseSolutions(Frozen):
             raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
         return PoseStatus(int(code)).sentence
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> Array:
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.T, dtype=dtype)
 
     def __repr__(self) -> str:
@@ -82,38 +122,7 @@ class PoseSolutions(Frozen):
 
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
-    """All poses of three points, at most four.
-
-    Parameters
-    ----------
-    points : array_like, shape (..., 3, 3)
-        Points of the object, one a row, m; not on a line.
-    image : array_like, shape (..., 3, 2)
-        Their normalised image coordinates.
-
-    Returns
-    -------
-    PoseSolutions
-        Every pose with the points in front of the camera.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays of another shape, points on a line.
-
-    References
-    ----------
-    Seed book section 6.2.5.1; M. Fischler and R. Bolles, "Random sample consensus", Comm. ACM
-    24(6), 1981; R. Haralick et al., "Review and analysis of solutions of the three point
-    perspective pose estimation problem", 1994.
-
-    Examples
-    --------
-    >>> h = 1.0 / np.sqrt(3.0)
-    >>> corners = [[2 * h, 0, 0], [-h, 1, 0], [-h, -1, 0]]
-    >>> p3p(corners, np.array(corners)[:, :2] / 2).count
-    np.int64(4)
-    """
+    """All poses of three points, at most four."""
     P, m = as_core(points, (3, 3), "points"), as_core(image, (3, 2), "image")
     batch = _batch(P.shape[:-2], m.shape[:-2])
     P = np.broadcast_to(P, (*batch, 3, 3)).reshape(-1, 3, 3)
@@ -135,41 +144,8 @@ def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
 
 
 def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
-    """Pose of three or more points of least squared image error; both minima of planar objects.
-
-    Starts from triples of points, each refined on all points. Of objects that are not planar the
-    best minimum is given, of three points all poses.
-
-    Parameters
-    ----------
-    points : array_like, shape (n, 3)
-        Points of the object, m, n from 3, not all on a line.
-    image : array_like, shape (..., n, 2)
-        Their normalised image coordinates.
-
-    Returns
-    -------
-    PoseSolutions
-        By growing image error.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays that do not fit each other, points on a line.
-
-    References
-    ----------
-    Seed book section 6.2.5.1; G. Schweighofer and A. Pinz, "Robust pose estimation from a planar
-    target", IEEE Trans. PAMI 28(12), 2006.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> corners = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> pnp(corners, corners[:, :2] / 0.5).T[0, 2, 3].round(9)
-    np.float64(0.5)
-    """
-    P, images = _checked(points, image, 3)
+    """Pose of three or more points of least squared image error; both minima if planar."""
+    P, images = _checked(points, image)
     if len(P) == 3:
         return p3p(P, images)
     singular = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
@@ -181,43 +157,8 @@ def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
 
 
 def refine_pose(points: ArrayLike, image: ArrayLike, T0: ArrayLike) -> PoseSolutions:
-    """Virtual visual servoing: the pose of least image error near a first one.
-
-    A virtual camera is moved as in visual servoing until its image fits the measured one;
-    steps are damped where the image error would grow (Levenberg-Marquardt).
-
-    Parameters
-    ----------
-    points : array_like, shape (n, 3)
-        Points of the object, m, n from 3.
-    image : array_like, shape (..., n, 2)
-        Their normalised image coordinates.
-    T0 : array_like, shape (4, 4)
-        First pose of the object in the camera.
-
-    Returns
-    -------
-    PoseSolutions
-        One row, S = 1.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arrays that do not fit each other; a first pose with points behind the camera.
-
-    References
-    ----------
-    Seed book section 6.2.5.1; E. Marchand and F. Chaumette, "Virtual visual servoing", 2002.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> corners = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> found = refine_pose(corners, corners[:, :2] / 0.5, translation(0.1, 0, 0.7))
-    >>> found.T[0, :3, 3].round(9) + 0.0
-    array([0. , 0. , 0.5])
-    """
-    P, images = _checked(points, image, 3)
+    """Virtual visual servoing: the pose of least image error near a first one."""
+    P, images = _checked(points, image)
     T = as_single_pose(T0, "T0")
     Points(P).measure(T)  # raises where points are behind the camera
     found = []
@@ -392,7 +333,7 @@ def _refined(feature: Points, m: Array, T: Array) -> tuple[Array, float, bool]:
     for _ in range(_ITERATIONS):
         A = feature._rows(e + m, feature._depth(G))
         H, g = A.T @ A, A.T @ e
-        step = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
+        step: Array = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]  # type: ignore[assignment]
         after = moved(T, step)
         G_after = feature._placed(after)
         e_after = feature._measure(G_after) - m if feature._visible(G_after) else e + np.inf
@@ -409,10 +350,10 @@ def _refined(feature: Points, m: Array, T: Array) -> tuple[Array, float, bool]:
     return T, cost, False
 
 
-def _checked(points: Any, image: Any, least: int) -> tuple[Array, Array]:
+def _checked(points: Any, image: Any) -> tuple[Array, Array]:
     P = as_core(points, (3,), "points")
-    if P.ndim != 2 or len(P) < least:
-        raise ShapeError(f"points: expected shape (n, 3), n from {least}, got {P.shape}.")
+    if P.ndim != 2 or len(P) < 3:
+        raise ShapeError(f"points: expected shape (n, 3), n from 3, got {P.shape}.")
     return P, as_core(image, (len(P), 2), "image")
 
 

@@ -198,7 +198,7 @@ def servo(
     """
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    primary = task if isinstance(task, Task) else task.primary
+    primary = task.regulated
     T = as_single_pose(T0, "T0")
     h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
     sigma = as_number(noise, "noise", least=0.0)
@@ -210,7 +210,8 @@ def servo(
     source = np.random.default_rng(0 if rng is None else rng)
     sampled = arm is not None or sigma > 0.0 or tracking is not None
     world = np.eye(4) if arm is None else arm.camera @ T  # pose of the object
-    estimate, own, rows = None, np.zeros(primary.feature.size), []
+    estimate, own = None, np.zeros(primary.feature.size)
+    rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
         s = None
         if sigma and primary.feature._visible(G := primary.feature._placed(T)):
@@ -240,10 +241,11 @@ def servo(
             shift = moved(np.eye(4), -h * moving)
             T = T @ shift
             world = world @ shift
-    t, T, cameras, q, s, error, velocity, codes = zip(*rows, strict=True)
-    joints = None if arm is None else np.array(q)
-    arrays = map(np.array, (t, T, cameras)), map(np.array, (s, error, velocity))
-    return ServoMotion(task, *arrays[0], joints, *arrays[1], np.array(codes, np.int8), camera)
+    t, T, cameras, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
+    joints = None if arm is None else q
+    return ServoMotion(
+        task, t, T, cameras, joints, s, error, velocity, codes.astype(np.int8), camera
+    )
 
 
 class _Arm:
@@ -262,7 +264,7 @@ class _Arm:
         self.limits = None if limits is False else bounds
         if limits is True and not ((robot.lower <= self.q) & (self.q <= robot.upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
-        self.held = None  # pose of the object in the tool
+        self.held: Any = None  # pose of the object in the tool
         if isinstance(self.mounting, EyeToHand):
             self.held = inverse(dgm(robot, self.q)) @ self.mounting.T_world_camera @ T
 
@@ -315,6 +317,6 @@ def _bracket(a: Array, b: Array) -> Array:
 
 
 def _twist(target: Any, t: float) -> Array | None:
-    if target is None:
-        return None
-    return as_exact(target(t) if callable(target) else target, (6,), "target")
+    """Twist of the target at a time."""
+    given: Any = target(t) if callable(target) else target
+    return None if given is None else as_exact(given, (6,), "target")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_number, read_only
 from ..errors import InvalidValueError
 from ..se3 import as_single_pose, inverse
 from .features import Feature, as_measurement, brief
@@ -60,14 +60,14 @@ class Task(Value):
     """
 
     feature: Feature
-    desired: Array
+    desired: Any
     gain: float = 0.5
     interaction: str = "current"
     depth: str | float = "true"
     s_desired: Array = field(init=False)
     periods: Array | None = field(init=False)
     T_desired: Array | None = field(init=False)
-    _L: Array | None = field(init=False)
+    L_desired: Array | None = field(init=False)
     _w: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -78,8 +78,9 @@ class Task(Value):
             )
         feature, s, T = _goal(self.feature, self.desired)
         if self.interaction not in _MATRICES:
+            words = ", ".join(_MATRICES)
             raise InvalidValueError(
-                f"interaction: expected one of {', '.join(_MATRICES)}, got {self.interaction!r:.40}."
+                f"interaction: expected one of {words}, got {self.interaction!r:.40}."
             )
         gain, depth, w = as_number(self.gain, "gain", above=0.0), self.depth, None
         if not isinstance(depth, str):
@@ -104,10 +105,22 @@ class Task(Value):
             L = feature._rows(s, w) if T is None else feature.interaction(T)
         periods = feature._periods() if feature._periods().any() else None
         values = {"feature": feature, "desired": s if T is None else T, "gain": gain}
-        values |= {"depth": depth, "s_desired": s, "periods": periods, "T_desired": T, "_L": L, "_w": w}
+        values |= {
+            "depth": depth,
+            "s_desired": s,
+            "periods": periods,
+            "T_desired": T,
+            "L_desired": L,
+            "_w": w,
+        }
         for name, value in values.items():
             given = read_only(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, given)
+
+    @property
+    def regulated(self) -> Task:
+        """The task itself; of a `Hybrid` its primary task."""
+        return self
 
     def matrix(self, s: Array, G: Any) -> Array:
         """Current interaction matrix (k, 6) of a measurement, and of the geometry if known."""
@@ -126,7 +139,7 @@ class Task(Value):
 
 
 def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
-    """Position-based (3-D) visual servoing: both parts of `PoseError` decay by themselves.
+    """Position-based (3-D) visual servoing: a `Task` whose two errors decay by themselves.
 
     Parameters
     ----------
@@ -138,55 +151,40 @@ def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
     Returns
     -------
     Task
-        With translation and rotation vector of the camera in the desired camera.
-
-    References
-    ----------
-    Seed book sections 6.2.5.2 and 6.3.2.1.
+        With the feature `PoseError`; see sections 6.2.5.2 and 6.3.2.1.
 
     Examples
     --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import camera_velocity
-    >>> task = task_3d(translation(0, 0, 0.5))
-    >>> camera_velocity(task, translation(0, 0, 0.5) @ rotation("z", 0.2)).v.round(6) + 0.0
-    array([0. , 0. , 0. , 0. , 0. , 0.1])
+    >>> task_3d(np.eye(4)).feature.size
+    6
     """
     return Task(PoseError(), as_single_pose(desired, "desired"), gain)
 
 
 def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
-    """2 1/2-D visual servoing with the first of the points as the reference point.
+    """2 1/2-D visual servoing: a `Task` that moves the image of a point straight to its goal.
 
     Parameters
     ----------
     points : array_like, shape (k, 3) or (3,)
-        Points of the object, m; the image of the first goes straight to its goal.
-    desired : array_like, shape (4, 4)
-        Desired pose of the object in the camera.
-    gain : float
-        Above 0, 1/s.
+        Points of the object, m; the first is the reference point.
+    desired, gain
+        As of `task_3d`.
 
     Returns
     -------
     Task
-        With x, y, log(Z) of the point and the rotation vector theta u: `PointAndRotation`.
-
-    References
-    ----------
-    Seed book section 6.3.2.1; E. Malis, F. Chaumette and S. Boudet 1999.
+        With the feature `PointAndRotation`; see section 6.3.2.1.
 
     Examples
     --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import camera_velocity
-    >>> task = task_2_1_2d([0.1, 0.0, 0.0], translation(0, 0, 0.5))
-    >>> half_a_turn = translation(0, 0, 0.5) @ rotation("z", 3.1)
-    >>> abs(camera_velocity(task, half_a_turn).v[2].round(9))  # no retreat
-    np.float64(0.0)
+    >>> from robotmodels.se3 import translation
+    >>> task_2_1_2d([0.1, 0.0, 0.0], translation(0, 0, 0.5)).s_desired[:2]
+    array([0.2, 0. ])
     """
-    given = np.atleast_2d(np.asarray(points, dtype=np.float64))
-    return Task(PointAndRotation(given[0], as_single_pose(desired, "desired")), desired, gain)
+    first = as_core(points, (3,), "points").reshape(-1, 3)[0]
+    T = as_single_pose(desired, "desired")
+    return Task(PointAndRotation(first, T), T, gain)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -232,6 +230,11 @@ class Hybrid(Value):
             twist = read_only(as_exact(self.secondary, (6,), "secondary"))
             object.__setattr__(self, "secondary", twist)
         object.__setattr__(self, "weight", as_number(self.weight, "weight"))
+
+    @property
+    def regulated(self) -> Task:
+        """The primary task."""
+        return self.primary
 
     def __repr__(self) -> str:
         return brief(self)

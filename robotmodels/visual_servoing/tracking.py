@@ -12,12 +12,12 @@ from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetEstimate(Frozen):
-    """State of the estimation: measurement s, its rate by the target, the slope of that, covariance.
+    """Estimate of a target: last s (k,), its rate by the target, the slope of the rate, covariance.
 
     Parameters
     ----------
     s, rate, slope : ndarray, shape (k,)
-        Last measurement, ``ds/dt`` by the target, and its derivative.
+        Units of s, per s, per s^2.
     covariance : ndarray, shape (2, 2)
         Of rate and slope, the same for every component.
     """
@@ -30,7 +30,7 @@ class TargetEstimate(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetMotion(Value):
-    """Estimation of ``ds/dt`` by a moving target: ``(s_k - s_{k-1}) / step - L [v; w]``, filtered.
+    """Estimation of the rate of s by a moving target: of ``(s_k - s_{k-1}) / step - L [v; w]``.
 
     Parameters
     ----------
@@ -41,11 +41,6 @@ class TargetMotion(Value):
         Standard deviation of the change of the slope in one second, 1/s^2 per root second.
     noise : float
         Standard deviation of a component of s.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Numbers that are not positive.
 
     References
     ----------

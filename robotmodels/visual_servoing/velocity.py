@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
-from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .._arrays import Array, Value, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-from ..se3 import as_pose
+from ..se3 import as_pose, skew
 from .camera import Camera
 from .features import Feature, as_measurement, brief, wrapped
 from .tasks import Hybrid, Task
@@ -132,58 +132,58 @@ def camera_velocity(
     """
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    feature = task.feature if isinstance(task, Task) else task.primary.feature
-    s, T = sensed(feature, measurement)
-    if (T is None or T.ndim == 2) and (s is None or s.ndim == 1):
-        return ServoStep(*law(task, s, T, camera)[:4])
-    rows = T.reshape(-1, 4, 4) if s is None else s.reshape(-1, feature.size)
-    found = [law(task, *((None, row) if s is None else (row, None)), camera)[:4] for row in rows]
-    batch = T.shape[:-2] if s is None else s.shape[:-1]
-    v = np.array([f[0] for f in found]).reshape(*batch, 6)
-    error = np.array([f[1] for f in found]).reshape(*batch, feature.size)
-    codes = (np.array([f[k] for f in found], np.int8).reshape(batch) for k in (2, 3))
-    return ServoStep(v, error, *map(_frozen_codes, codes))
+    feature = task.regulated.feature
+    given, is_pose = _sensed(feature, measurement)
+    core = 2 if is_pose else 1
+    if given.ndim == core:
+        return ServoStep(*law(task, *((None, given) if is_pose else (given, None)), camera)[:4])
+    batch = given.shape[:-core]
+    rows = given.reshape(math.prod(batch), *given.shape[-core:])
+    found = [law(task, *((None, x) if is_pose else (x, None)), camera)[:4] for x in rows]
+    v, error, ranks, codes = zip(*found, strict=True) if found else ((),) * 4
+    return ServoStep(
+        np.reshape(v, (*batch, 6)), np.reshape(error, (*batch, feature.size)),
+        read_only(np.reshape(ranks, batch), np.int8), read_only(np.reshape(codes, batch), np.int8),
+    )  # fmt: skip
 
 
 def law(
     task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
 ) -> tuple[Array, Array, int, ServoStatus, Array]:
     """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
-    primary = task if isinstance(task, Task) else task.primary
-    feature = primary.feature
+    primary = task.regulated
+    feature, L_desired = primary.feature, primary.L_desired
     G = None if T is None else feature._placed(T)
     if G is not None and not feature._visible(G):
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
-    measured = feature._measure(G) if s is None else s
+    measured: Array = feature._measure(G) if s is None else s
     error = measured - primary.s_desired
     if primary.periods is not None:
         error = wrapped(error, primary.periods)
-    A = (
-        primary.matrix(measured, G)
-        if primary._L is None or primary.interaction == "mean"
-        else primary._L
-    )
-    inverse, rank = pseudo_inverse(A)
-    if primary.interaction == "mean":
-        inverse, rank = _mean(inverse, primary)
-    direction = inverse @ error
-    status = ServoStatus.CONVERGES
-    size = sqrt(error @ error)
+    mean = primary.interaction == "mean"
+    A = primary.matrix(measured, G) if L_desired is None or mean else L_desired
+    inverse, rank = own, _ = pseudo_inverse(A)
+    if mean and L_desired is not None:
+        inverse = 0.5 * (own + pseudo_inverse(L_desired)[0])
+        rank = pseudo_inverse(inverse)[1]
+    direction, status = inverse @ error, ServoStatus.CONVERGES
+    size = math.sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
-        if rank < min(A.shape) and _is_singular(feature, primary.T_desired if T is None else T, rank):
+        if rank < min(A.shape) and _loses_rank(
+            feature, primary.T_desired if T is None else T, rank
+        ):
             status = ServoStatus.SINGULAR
-        elif sqrt(seen @ seen) <= _REDUCIBLE * size:
+        elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
-    if camera is not None:
-        outline = feature._outline(measured, G)
-        if outline is not None and not camera.sees(outline):
-            return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
+    outline = None if camera is None else feature._outline(measured, G)
+    if camera is not None and outline is not None and not camera.sees(outline):
+        return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
     v = -primary.gain * direction
     if isinstance(task, Hybrid):
         z = _secondary(task, s, T)
-        v = v + task.weight * (z - pseudo_inverse(A)[0] @ (A @ z))
+        v = v + task.weight * (z - own @ (A @ z))
     return v, error, rank, status, inverse
 
 
@@ -202,29 +202,18 @@ def pseudo_inverse(A: Array) -> tuple[Array, int]:
     U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
     _decompositions()(np.ascontiguousarray(A[None]), U, S, V)
     sizes = S[0].tolist()
-    least = RANK_TOLERANCE * sizes[0]
-    rank = sum(size > least for size in sizes)
+    rank = sum(size > RANK_TOLERANCE * sizes[0] for size in sizes)
     return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
 
 
-def _mean(inverse: Array, task: Task) -> tuple[Array, int]:
-    """Half the sum of the pseudo-inverses of the current and the desired matrix, and its rank."""
-    mean = 0.5 * (inverse + pseudo_inverse(task._L)[0])
-    return mean, pseudo_inverse(mean)[1]
-
-
-def _is_singular(feature: Feature, T: Array | None, rank: int) -> bool:
+def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
     """Whether the rank is less than at poses nearby."""
     if T is None:
         return True
-    for twist in _NEARBY:
-        nearby = moved(T, twist * np.repeat((np.linalg.norm(T[:3, 3]), 1.0), 3))
-        if (
-            feature._visible(feature._placed(nearby))
-            and pseudo_inverse(feature.interaction(nearby))[1] > rank
-        ):
-            return True
-    return False
+    reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
+    poses = [moved(T, twist * reach) for twist in _NEARBY]
+    seen = [nearby for nearby in poses if feature._visible(feature._placed(nearby))]
+    return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
 
 
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
@@ -235,34 +224,34 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
         return task.secondary
     if T is None:
         raise InvalidValueError("measurement: a secondary function needs the pose (4, 4).")
-    return as_exact(task.secondary(T.copy()), (6,), "secondary(T)")
+    asked: Any = task.secondary(T.copy())
+    return as_exact(asked, (6,), "secondary(T)")
 
 
-def sensed(feature: Feature, measurement: Any) -> tuple[Array | None, Array | None]:
-    """Checked measurement or poses, the other is None."""
-    quick = type(measurement) is np.ndarray and measurement.shape == (4, 4)
-    if quick and _is_pose(measurement):
-        return None, measurement
-    if hasattr(measurement, "homogeneous"):
-        return None, as_pose(measurement, "measurement")
-    array = np.asarray(measurement)
-    if array.shape[-2:] == (4, 4) and (
-        feature.size != 4 or array.ndim > 2 or np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0))
-    ):
-        return None, as_pose(measurement, "measurement")
-    return as_measurement(measurement, feature, "measurement"), None
+def _sensed(feature: Feature, measurement: Any) -> tuple[Array, bool]:
+    """Checked measurements or poses, and whether they are poses."""
+    shape = np.shape(getattr(measurement, "homogeneous", measurement))
+    if shape[-2:] == (4, 4):
+        if type(measurement) is np.ndarray and len(shape) == 2 and _is_exact(measurement):
+            return measurement, True
+        four = feature.size == 4 and len(shape) == 2  # may be four measurements
+        if not four or np.array_equal(np.asarray(measurement)[3], (0.0, 0.0, 0.0, 1.0)):
+            return as_pose(measurement, "measurement"), True
+    return as_measurement(measurement, feature, "measurement"), False
 
 
-def _is_pose(T: Array) -> bool:
+def _is_exact(T: Array) -> bool:
     """Whether a matrix is a pose to rounding: a quick answer for control loops."""
     if T.dtype != np.float64:
         return False
     (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
-    off = (a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0)
-    off += (a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i)
-    mirrors = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0
+    off = (
+        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),
+        *(a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i),
+        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) - 1.0,
+    )
     rounding = all(-1e-12 < number < 1e-12 for number in off)
-    return rounding and not mirrors and isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
+    return rounding and math.isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
 
 
 def moved(T: Array, twist: Array) -> Array:
@@ -272,17 +261,12 @@ def moved(T: Array, twist: Array) -> Array:
     if square < 1e-8:
         a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
     else:
-        angle = sqrt(square)
-        a, b = np.sin(angle) / angle, 2.0 * (np.sin(0.5 * angle) / angle) ** 2
+        angle = math.sqrt(square)
+        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
         c = (1.0 - a) / square
-    x, y, z = w.tolist()
-    W = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    W = skew(w)
     WW = W @ W
-    R, V = np.eye(3) + a * W + b * WW, np.eye(3) + b * W + c * WW
     after = np.eye(4)
-    after[:3, :3], after[:3, 3] = R @ T[:3, :3], R @ T[:3, 3] + V @ v
-    return after
-
-
-def _frozen_codes(codes: NDArray[np.int8]) -> NDArray[np.int8]:
-    return read_only(codes, np.int8)
+    after[:3, :3] += a * W + b * WW
+    after[:3, 3] = v + b * (W @ v) + c * (WW @ v)
+    return after @ T

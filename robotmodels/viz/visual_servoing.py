@@ -28,7 +28,7 @@ from ..kinematics import link_poses
 from ..model import RobotModel
 from ..visual import Box, Color
 from ..visual_servoing import Camera as Sensor
-from ..visual_servoing import ServoMotion, Task
+from ..visual_servoing import ServoMotion
 from . import style
 from .camera import framed
 from .motion import Motion, Track, keyframes
@@ -185,7 +185,7 @@ def object_points(run: ServoMotion) -> Array:
 
 def image_paths(run: ServoMotion) -> tuple[Array, Array | None]:
     """Image paths (N, m, 2) of the object's points, in pixels with a camera, and their goal."""
-    task = run.task if isinstance(run.task, Task) else run.task.primary
+    task = run.task.regulated
     poses = run.T if task.T_desired is None else np.concatenate((run.T, task.T_desired[None]))
     X = apply(poses, _corners(run))
     X = np.where(X[..., 2:] > 0.0, X, np.nan)
@@ -197,8 +197,7 @@ def image_paths(run: ServoMotion) -> tuple[Array, Array | None]:
 
 def _corners(run: ServoMotion) -> Array:
     """Points of the object in its frame: those of the feature, its centre, or the origin."""
-    task = run.task if isinstance(run.task, Task) else run.task.primary
-    feature: Any = task.feature
+    feature: Any = run.task.regulated.feature
     names = ("object_points", "points", "polygon", "point", "centre")
     given = [getattr(feature, name, None) for name in names]
     found = next((points for points in given if points is not None), np.zeros(3))
