@@ -65,7 +65,8 @@ _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-12  # of the squared sides
 _SAME = 1e-7  # of distances or poses
 _TURNED = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-_TRIPLES, _STARTS, _ITERATIONS = 24, 8, 60
+_TRIPLES, _STARTS, _ITERATIONS = 24, 6, 60
+_NEAR = 0.02  # of the depth: entries of poses that lead to the same minimum
 
 
 class PoseStatus(Outcome):
@@ -286,15 +287,18 @@ def _minima(P: Array, m: Array, planar: bool) -> tuple[list[Array], list[float],
     T = T[valid]
     X = P @ np.swapaxes(T[:, :3, :3], -1, -2) + T[:, None, :3, 3]
     T = T[(X[..., 2] > 0.0).all(axis=-1)]
-    starts = list(T[np.argsort(_residual(T, P, m))[:_STARTS]]) if len(T) else []
+    starts = list(T[np.argsort(_residual(T, P, m))[:_STARTS]])
     feature, found = Points(P), list[tuple[float, float, Array]]()
+    tried: list[Array] = []
     while starts:
-        pose, cost, done = _refined(feature, m.ravel(), starts.pop(0))
-        if planar and not found:
-            starts.append(_flipped(pose, P))
-        known = any(
-            np.abs(pose - other).max() <= 1e-5 * max(1.0, abs(pose[2, 3])) for *_, other in found
-        )
+        start = starts.pop(0)
+        if any(np.abs(start - other).max() <= _NEAR * other[2, 3] for other in tried):
+            continue
+        pose, cost, done = _refined(feature, m.ravel(), start)
+        if planar and not tried:
+            starts.insert(0, _flipped(pose, P))
+        known = any(np.abs(pose - other).max() <= 1e-5 * other[2, 3] for *_, other in found)
+        tried += [start, pose]
         if done and not known:
             found.append((cost, float(_residual(pose, P, m)), pose))
     if not found:

@@ -129,7 +129,7 @@ def show_servo(
     >>> from robotmodels.visual_servoing import servo, task_3d
     >>> run = servo(task_3d(translation(0, 0, 0.5)), translation(0.1, 0, 1), duration=2.0)
     >>> show_servo(run)
-    <Scene 'visual servoing': 14 shapes>
+    <Scene 'visual servoing': 12 shapes>
     """
     style.as_instance(run, ServoMotion, "run", "servo")
     places, track = object_points(run), run.cameras[:, :3, 3]
