@@ -204,99 +204,92 @@ def servo(
     sigma = as_number(noise, "noise", least=0.0)
     if total > _MOST * h:
         raise InvalidValueError(f"step: {total:g} s in steps of {h:g} s are more than {_MOST}.")
-    arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
-    if arm is None and (q0 is not None or mounting is not None):
+    if robot is None and (q0 is not None or mounting is not None):
         raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
+    arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
     source = np.random.default_rng(0 if rng is None else rng)
-    sampled = arm is not None or sigma > 0.0 or tracking is not None
-    world = np.eye(4) if arm is None else arm.camera @ T  # pose of the object
-    estimate, own = None, np.zeros(primary.feature.size)
+    feature, sampled = primary.feature, arm is not None or sigma > 0.0 or tracking is not None
+    object_pose = np.eye(4)  # in the world, which without a robot is the object at the start
+    estimate, own = None, np.zeros(feature.size)
     rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
         s = None
-        if sigma and primary.feature._visible(G := primary.feature._placed(T)):
-            s = primary.feature._measure(G) + sigma * source.normal(size=own.size)
+        if sigma and feature._visible(G := feature._placed(T)):
+            s = feature._measure(G) + sigma * source.normal(size=own.size)
         v, error, _, code, pseudo = law(task, s, T, camera)
-        s = error + primary.s_desired
-        if tracking is not None and code < ServoStatus.OUT_OF_SIGHT:
-            estimate = (
-                tracking.start(s) if estimate is None else tracking.update(estimate, s, own, h)
-            )
+        s, lost = error + primary.s_desired, code >= ServoStatus.OUT_OF_SIGHT
+        if tracking is not None and not lost:
+            estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
-        moving = _twist(target, k * h)
-        camera_pose = world @ inverse(T) if arm is None else arm.camera
+            own = primary.matrix(s, feature._placed(T)) @ v
+        camera_pose = object_pose @ inverse(T) if arm is None else arm.camera
         rows.append([k * h, T, camera_pose, None if arm is None else arm.q, s, error, v, code])
-        if code >= ServoStatus.OUT_OF_SIGHT:
+        if lost:
             break
+        given: Any = target(k * h) if callable(target) else target
+        twist = np.zeros(6) if given is None else as_exact(given, (6,), "target")
+        shift = moved(np.eye(4), -h * twist)
         if arm is not None:
-            v, T, met = arm.follow(v, T, moving, h)
+            T, met = arm.follow(v, T, shift)
             rows[-1][-1] = code if met else ServoStatus.LIMITED
-        elif sampled:
-            T = moved(T, h * v)
         else:
-            T = _continued(task, T, v, h)
-        if tracking is not None:
-            own = primary.matrix(s, primary.feature._placed(rows[-1][1])) @ v
-        if moving is not None:
-            shift = moved(np.eye(4), -h * moving)
-            T = T @ shift
-            world = world @ shift
+            T = (moved(T, h * v) if sampled else _continued(task, T, v, h)) @ shift
+            object_pose = object_pose @ shift
     t, T, cameras, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
-    joints = None if arm is None else q
-    return ServoMotion(
-        task, t, T, cameras, joints, s, error, velocity, codes.astype(np.int8), camera
-    )
+    joints, codes = None if arm is None else q, codes.astype(np.int8)
+    return ServoMotion(task, t, T, cameras, joints, s, error, velocity, codes, camera)
 
 
 class _Arm:
-    """The robot of a simulation: its posture, and how it gives the camera a velocity."""
+    """The robot of a simulation; it carries the camera or the object, the other is ``fixed``."""
 
     def __init__(self, robot: Any, q0: Any, mounting: Any, T: Array, h: float, limits: Any) -> None:
-        self.model = check_model(robot) or robot
+        check_model(robot)
         if q0 is None:
             raise InvalidValueError("q0: expected the joint variables of the robot at the start.")
-        self.q = as_exact(q0, (robot.n,), "q0")
-        self.mounting = EyeInHand() if mounting is None else mounting
-        if not isinstance(self.mounting, EyeInHand | EyeToHand):
+        mounting = EyeInHand() if mounting is None else mounting
+        if not isinstance(mounting, EyeInHand | EyeToHand):
             got = type(mounting).__name__
             raise InvalidValueError(f"mounting: expected EyeInHand or EyeToHand, got {got}.")
+        self.model, self.h, self.q = robot, h, as_exact(q0, (robot.n,), "q0")
         bounds = limits if isinstance(limits, JointBounds) else JointBounds(step=h)
         self.limits = None if limits is False else bounds
         if limits is True and not ((robot.lower <= self.q) & (self.q <= robot.upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
-        self.held: Any = None  # pose of the object in the tool
-        if isinstance(self.mounting, EyeToHand):
-            self.held = inverse(dgm(robot, self.q)) @ self.mounting.T_world_camera @ T
+        tool = dgm(robot, self.q)
+        self.in_hand = isinstance(mounting, EyeInHand)
+        if isinstance(mounting, EyeInHand):
+            self.held, self.fixed = mounting.T_tool_camera, tool @ mounting.T_tool_camera @ T
+        else:
+            self.held, self.fixed = (
+                inverse(tool) @ mounting.T_world_camera @ T,
+                mounting.T_world_camera,
+            )
 
     @property
     def camera(self) -> Array:
         """Pose of the camera in the world."""
-        if isinstance(self.mounting, EyeToHand):
-            return self.mounting.T_world_camera
-        return dgm(self.model, self.q) @ self.mounting.T_tool_camera
+        return dgm(self.model, self.q) @ self.held if self.in_hand else self.fixed
 
-    def follow(self, v: Array, T: Array, moving: Any, h: float) -> tuple[Array, Array, bool]:
-        """Move for one step: the velocity achieved, the pose of the object, whether it was met."""
-        before = self.camera
-        if isinstance(self.mounting, EyeInHand):
-            place = self.mounting.T_tool_camera
-            w = place[:3, :3] @ v[3:]
-            linear = place[:3, :3] @ v[:3] + np.cross(place[:3, 3], w)
-            found = ikm(self.model, self.q, np.r_[linear, w], reference="local", limits=self.limits)
-            world = before @ T
-        else:  # the object moves as the camera would in the opposite direction
-            tool = dgm(self.model, self.q)[:3, 3] - before[:3, 3]
-            w = -before[:3, :3] @ v[3:]
-            twist = np.r_[np.cross(w, tool) - before[:3, :3] @ v[:3], w]
-            found = ikm(self.model, self.q, twist, limits=self.limits)
-            world = None
-        self.q = self.q + h * found.v
-        after = inverse(self.camera) @ (
-            dgm(self.model, self.q) @ self.held if world is None else world
-        )
-        wanted = float(np.abs(v).max())
-        met = found.status == IKMStatus.MET or wanted < 1e-9
-        return v * float(found.scale), after, bool(met)
+    def follow(self, v: Array, T: Array, shift: Array) -> tuple[Array, bool]:
+        """Move for one step, the target by a shift: its pose, whether the velocity was met."""
+        met = bool(np.abs(v).max() < 1e-9)
+        if not self.in_hand:  # the object moves in its axes as the camera would in the other sense
+            v = (
+                -np.concatenate((v[:3] + np.cross(v[3:], T[:3, 3]), v[3:])).reshape(2, 3)
+                @ T[:3, :3]
+            )
+        R, p = self.held[:3, :3], self.held[:3, 3]
+        linear, angular = np.reshape(v, (2, 3)) @ R.T
+        twist = np.concatenate((linear + np.cross(p, angular), angular))
+        found = ikm(self.model, self.q, twist, reference="local", limits=self.limits)
+        self.q = self.q + self.h * found.v
+        met |= bool(found.status == IKMStatus.MET)
+        if self.in_hand:
+            self.fixed = self.fixed @ shift
+            return inverse(self.camera) @ self.fixed, met
+        self.held = self.held @ shift
+        return inverse(self.fixed) @ dgm(self.model, self.q) @ self.held, met
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
@@ -314,9 +307,3 @@ def _bracket(a: Array, b: Array) -> Array:
     """Lie bracket of twists."""
     linear = np.cross(a[3:], b[:3]) - np.cross(b[3:], a[:3])
     return np.concatenate((linear, np.cross(a[3:], b[3:])))
-
-
-def _twist(target: Any, t: float) -> Array | None:
-    """Twist of the target at a time."""
-    given: Any = target(t) if callable(target) else target
-    return None if given is None else as_exact(given, (6,), "target")
