@@ -1,6 +1,7 @@
 """Laws, simulations and estimated poses: closed forms, published cases, statuses."""
 
 import pickle
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -209,8 +210,9 @@ def test_statuses_out_of_sight_and_behind():
     assert vs.servo(task, translation(0, 0, -1.0)).status is S.BEHIND
     for feature in (vs.Sphere([0, 0, 0], 0.1), vs.Moments([*SQUARE[:3], [-0.15, 0.12, 0]]),
                     vs.Lines([SQUARE[1:3]]), vs.Segments([SQUARE[:2]]), vs.PoseError()):  # fmt: skip
-        assert vs.camera_velocity(vs.Task(feature, GOAL), aside, camera).status is S.OUT_OF_SIGHT
-        assert vs.camera_velocity(vs.Task(feature, GOAL), GOAL, camera).status is S.CONVERGES
+        law = vs.Task(feature, GOAL)
+        assert vs.camera_velocity(law, aside, camera).status is S.OUT_OF_SIGHT
+        assert vs.camera_velocity(law, GOAL, camera).status is S.CONVERGES
 
 
 def test_angles_of_errors_take_the_short_way():
@@ -325,9 +327,14 @@ def test_limits_are_kept_and_named():
     assert abs(np.diff(run.q, axis=0)).max() <= 0.5 * 0.05 + 1e-9
     assert run.status is S.LIMITED
     assert abs(run.error[-1]).max() > 1e-3
-    outside = UR5.with_table(UR5.table)
+    table = replace(UR5.table, lower=POSTURE - 0.05, upper=POSTURE + 0.05)
+    own = vs.servo(
+        vs.Task(POINTS, GOAL, 1.5), START, robot=UR5.with_table(table), q0=POSTURE, duration=4.0,
+        step=0.05,
+    )  # fmt: skip
+    assert abs(own.q - POSTURE).max() <= 0.05 + 1e-9
     with pytest.raises(InvalidValueError, match="inside the limits"):
-        vs.servo(vs.Task(POINTS, GOAL), START, robot=outside, q0=np.full(6, 9.0))
+        vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=np.full(6, 9.0))
     with pytest.raises(InvalidValueError, match="q0"):
         vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5)
     with pytest.raises(InvalidValueError, match="mounting"):
@@ -423,6 +430,13 @@ def test_a_square_far_away_has_two_minima():
     normals = found.T[:, :3, 2]
     assert normals[0] @ normals[1] < np.cos(0.9)  # tilted the other way
     assert found.residual[1] > found.residual[0]
+    rng = np.random.default_rng(9)
+    counts = []
+    for _ in range(20):
+        plate = rng.uniform(-0.2, 0.2, (6, 3)) * (1, 1, 0)
+        far = translation(0.1, 0, 5.0) @ rotation("z", rng.uniform(-3, 3)) @ rotation("x", 0.5)
+        counts.append(vs.pnp(plate, vs.Points(plate).measure(far).reshape(6, 2)).count)
+    assert np.mean(np.array(counts) == 2) > 0.9
 
 
 def test_homographies():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,9 +13,9 @@ from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, rea
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
 from .matrices import interaction_line, interaction_segment, point_rows
+from .results import brief
 
 THIN = 1e-9  # relative: lengths, areas and angles below are zero
-_SHOWN = 6
 _TURN = 2.0 * np.pi
 Flags = NDArray[np.bool_]
 
@@ -298,18 +298,6 @@ def wrapped(error: Array, periods: Array) -> Array:
     """Differences of features with angles in their period. Shapes: (..., k), (k,) -> (..., k)."""
     whole = np.where(periods > 0.0, periods, 1.0)
     return np.where(periods > 0.0, error - whole * np.round(error / whole), error)
-
-
-def brief(value: Any) -> str:
-    """One line for a value with arrays: those of more than six numbers by their shapes."""
-    parts = []
-    for f in fields(value):
-        if f.init:
-            entry = getattr(value, f.name)
-            long = isinstance(entry, np.ndarray) and entry.size > _SHOWN
-            text = f"<{entry.shape} array>" if long else f"{entry!r}"
-            parts.append(f"{f.name}={' '.join(text.split())}")
-    return f"{type(value).__name__}({', '.join(parts)})"
 
 
 def as_measurement(s: Any, feature: Feature, name: str) -> Array:

@@ -40,12 +40,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_core, as_exact
+from .._arrays import Array, as_core, as_exact
 from ..errors import InvalidValueError, ShapeError
+from .results import Result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlaneMotions(Frozen):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PlaneMotions(Result):
     """Motions that a homography allows, ``H = R + t n^T``.
 
     Parameters

@@ -51,10 +51,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_floats, as_number, as_vector
+from .._arrays import Array, as_floats, as_number, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Feature
+from .results import Result
 from .velocity import RANK_TOLERANCE
 
 _NAMES = {
@@ -64,8 +65,8 @@ _NAMES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VirtualLink(Frozen):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class VirtualLink(Result):
     """The motions of a camera that leave a feature unchanged at a pose.
 
     Parameters

@@ -54,11 +54,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, as_core
+from .._arrays import Array, as_core
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points
+from .results import Result
 from .velocity import moved
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
@@ -79,7 +80,7 @@ class PoseStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PoseSolutions(Frozen):
+class PoseSolutions(Result):
     """Poses of an object in the camera; rows are packed, missing ones NaN. Read-only.
 
     As an array (``np.asarray``) it is ``T``.
@@ -202,9 +203,10 @@ def _p3p(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
     s = s * np.sign(s.sum(axis=-1, keepdims=True))
     size = np.einsum("npi,neij,npj->np", s, E, s)
     s = s * np.sqrt(sides.sum(axis=-1)[:, None] / np.maximum(size, 1e-300))[..., None]
+    chords = ((rays[:, i] - rays[:, j]) ** 2).sum(axis=-1)[:, None]
     for _ in range(12):
-        s = s - _newton(s, E, sides)
-    off = np.abs(np.einsum("npi,neij,npj->npe", s, E, s) - sides[:, None]).max(axis=-1)
+        s = s - _newton(s, chords, sides[:, None])[0]
+    off = np.abs(_newton(s, chords, sides[:, None])[1]).max(axis=-1)
     good = (off <= _FITS * sides.max(axis=-1)[:, None]) & (s > 0.0).all(axis=-1)
     near = (
         np.abs(s[:, :, None] - s[:, None]).max(axis=-1) <= _SAME * np.abs(s).max(axis=-1)[:, None]
@@ -222,16 +224,21 @@ def _p3p(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
     return T, good
 
 
-def _newton(s: Array, E: Array, sides: Array) -> Array:
-    """Newton step of the law of cosines, by the inverse of 3 x 3. Shapes: s (N, 4, 3) -> same."""
-    J = np.einsum("neij,npj->npei", E, s)
-    residual = 0.5 * (np.einsum("npei,npi->npe", J, s) - sides[:, None])
+def _newton(s: Array, chords: Array, sides: Array) -> tuple[Array, Array]:
+    """Newton step of the law of cosines, and its residuals. Shapes: s (N, 4, 3), others (N, 1, 3).
+
+    The law is written with the chords between unit rays, which small angles do not cancel in.
+    """
+    i, j, row = np.array((0, 0, 1)), np.array((1, 2, 2)), np.arange(3)
+    gap, J = s[..., i] - s[..., j], np.zeros((*s.shape, 3))
+    residual = 0.5 * (gap**2 + s[..., i] * s[..., j] * chords - sides)
+    J[..., row, i], J[..., row, j] = gap + 0.5 * s[..., j] * chords, -gap + 0.5 * s[..., i] * chords
     r0, r1, r2 = np.moveaxis(J, -2, 0)
     inverse = np.stack((np.cross(r1, r2), np.cross(r2, r0), np.cross(r0, r1)), axis=-1)
     determinant = (r0 * inverse[..., 0]).sum(axis=-1)[..., None]
     scale = np.abs(J).max(axis=(-2, -1))[..., None] ** 3 + 1e-300
     safe = np.where(np.abs(determinant) < 1e-14 * scale, np.inf, determinant)
-    return np.einsum("npij,npj->npi", inverse, residual) / safe
+    return np.einsum("npij,npj->npi", inverse, residual) / safe, residual
 
 
 def _in_y(Q: Array) -> tuple[Array, Array, Array]:
@@ -287,8 +294,8 @@ def _minima(P: Array, m: Array, planar: bool) -> tuple[list[Array], list[float],
     T = T[valid]
     X = P @ np.swapaxes(T[:, :3, :3], -1, -2) + T[:, None, :3, 3]
     T = T[(X[..., 2] > 0.0).all(axis=-1)]
-    starts = list(T[np.argsort(_residual(T, P, m))[:_STARTS]])
-    feature, found = Points(P), list[tuple[float, float, Array]]()
+    starts = [*T[np.argsort(_residual(T, P, m))[:_STARTS]], _frontal(P, m)]
+    feature, found = Points(P), list[tuple[bool, float, float, Array]]()
     tried: list[Array] = []
     while starts:
         start = starts.pop(0)
@@ -299,14 +306,26 @@ def _minima(P: Array, m: Array, planar: bool) -> tuple[list[Array], list[float],
             starts.insert(0, _flipped(pose, P))
         known = any(np.abs(pose - other).max() <= 1e-5 * other[2, 3] for *_, other in found)
         tried += [start, pose]
-        if done and not known:
-            found.append((cost, float(_residual(pose, P, m)), pose))
+        if np.isfinite(cost) and not known:
+            found.append((not done, cost, float(_residual(pose, P, m)), pose))
     if not found:
         return [], [], PoseStatus.NONE_FOUND
-    found.sort(key=lambda minimum: minimum[0])
-    found = found[: 1 + planar]
-    code = PoseStatus.FOUND if len(found) == 1 else PoseStatus.TWO_MINIMA
-    return [f[2] for f in found], [f[1] for f in found], code
+    found.sort(key=lambda minimum: minimum[:2])  # those that converged first
+    kept = [minimum for minimum in found if not minimum[0]][: 1 + planar] or found[:1]
+    code = PoseStatus.TWO_MINIMA if len(kept) == 2 else PoseStatus.FOUND
+    code = PoseStatus.NOT_CONVERGED if kept[0][0] else code
+    return [f[3] for f in kept], [f[2] for f in kept], code
+
+
+def _frontal(P: Array, m: Array) -> Array:
+    """The object parallel to the image with the size and the place of its image, a last start."""
+    flat = np.linalg.svd(P - P.mean(axis=0))[2]
+    flat[2] *= np.linalg.det(flat)
+    depth = np.linalg.norm(P - P.mean(axis=0)) / (np.linalg.norm(m - m.mean(axis=0)) + 1e-12)
+    T = np.eye(4)
+    T[:3, :3] = flat
+    T[:3, 3] = depth * np.append(m.mean(axis=0), 1.0) - flat @ P.mean(axis=0)
+    return T
 
 
 def _flipped(T: Array, P: Array) -> Array:

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_exact, as_number, read_only
 from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
+from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose, inverse
 from .camera import Camera
+from .results import Result, brief
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
 from .velocity import ServoStatus, law, moved
@@ -23,7 +25,7 @@ from .velocity import ServoStatus, law, moved
 _MOST = 1_000_000  # steps of a simulation
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EyeInHand(Value):
     """A camera on the tool of a robot (section 6.2.2), at ``T_tool_camera (4, 4)``.
 
@@ -44,8 +46,11 @@ class EyeInHand(Value):
         T = as_single_pose(self.T_tool_camera, "T_tool_camera")
         object.__setattr__(self, "T_tool_camera", read_only(T))
 
+    def __repr__(self) -> str:
+        return brief(self)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EyeToHand(Value):
     """A camera fixed in the world that sees the object on the tool (section 6.2.3).
 
@@ -66,9 +71,12 @@ class EyeToHand(Value):
         T = as_single_pose(self.T_world_camera, "T_world_camera")
         object.__setattr__(self, "T_world_camera", read_only(T))
 
+    def __repr__(self) -> str:
+        return brief(self)
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ServoMotion(Frozen):
+class ServoMotion(Result):
     """A simulated motion under visual servoing, N samples. Read-only.
 
     Parameters
@@ -198,6 +206,12 @@ def servo(
     """
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    for name, value, kind in (
+        ("camera", camera, Camera), ("tracking", tracking, TargetMotion),
+        ("limits", None if isinstance(limits, bool) else limits, JointBounds),
+    ):  # fmt: skip
+        if value is not None and not isinstance(value, kind):
+            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
     primary = task.regulated
     T = as_single_pose(T0, "T0")
     h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
@@ -207,7 +221,7 @@ def servo(
     if robot is None and (q0 is not None or mounting is not None):
         raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
     arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
-    source = np.random.default_rng(0 if rng is None else rng)
+    source = generator_of(rng)
     feature, sampled = primary.feature, arm is not None or sigma > 0.0 or tracking is not None
     object_pose = np.eye(4)  # in the world, which without a robot is the object at the start
     estimate, own = None, np.zeros(feature.size)
@@ -275,10 +289,8 @@ class _Arm:
         """Move for one step, the target by a shift: its pose, whether the velocity was met."""
         met = bool(np.abs(v).max() < 1e-9)
         if not self.in_hand:  # the object moves in its axes as the camera would in the other sense
-            v = (
-                -np.concatenate((v[:3] + np.cross(v[3:], T[:3, 3]), v[3:])).reshape(2, 3)
-                @ T[:3, :3]
-            )
+            seen = np.stack((v[:3] + np.cross(v[3:], T[:3, 3]), v[3:]))
+            v = -seen @ T[:3, :3]
         R, p = self.held[:3, :3], self.held[:3, 3]
         linear, angular = np.reshape(v, (2, 3)) @ R.T
         twist = np.concatenate((linear + np.cross(p, angular), angular))

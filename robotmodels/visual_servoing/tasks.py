@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Value, as_core, as_exact, as_number, read_only
 from ..errors import InvalidValueError
 from ..se3 import as_single_pose, inverse
-from .features import Feature, as_measurement, brief
+from .features import Feature, as_measurement
 from .features_3d import PointAndRotation, PoseError, rotations
+from .results import brief
 
 _MATRICES = ("current", "desired", "mean")
 

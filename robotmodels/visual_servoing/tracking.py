@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._arrays import Array, Value, as_exact, as_floats, as_number
+from .results import Result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TargetEstimate(Frozen):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TargetEstimate(Result):
     """Estimate of a target: last s (k,), its rate by the target, the slope of the rate, covariance.
 
     Parameters

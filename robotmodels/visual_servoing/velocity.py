@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Value, as_exact, read_only
+from .._arrays import Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..se3 import as_pose, skew
 from .camera import Camera
-from .features import Feature, as_measurement, brief, wrapped
+from .features import Feature, as_measurement, wrapped
+from .results import Result
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -47,11 +48,11 @@ class ServoStatus(Outcome):
     SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
     BEHIND = 4, "A part of the object is at or behind the plane of the camera, or is seen edge-on."
-    LIMITED = 5, "Joint limits or a singular position of the robot prevent the camera velocity."
+    LIMITED = 5, "The robot cannot give the camera its velocity: limits, singular, too few joints."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ServoStep(Value):
+class ServoStep(Result):
     """Velocity of the camera for one measurement, or for a batch. Read-only.
 
     Parameters
@@ -78,7 +79,7 @@ class ServoStep(Value):
     status: ServoStatus | NDArray[np.int8]
 
     def __post_init__(self) -> None:
-        self.v.flags.writeable = self.error.flags.writeable = False
+        self.v.flags.writeable = self.error.flags.writeable = False  # quicker than copies
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
@@ -86,9 +87,6 @@ class ServoStep(Value):
         if np.ndim(code):
             raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
         return ServoStatus(int(code)).sentence
-
-    def __repr__(self) -> str:
-        return brief(self)
 
 
 def camera_velocity(
@@ -132,6 +130,8 @@ def camera_velocity(
     """
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    if camera is not None and not isinstance(camera, Camera):
+        raise InvalidValueError(f"camera: expected a Camera, got {type(camera).__name__}.")
     feature = task.regulated.feature
     given, is_pose = _sensed(feature, measurement)
     core = 2 if is_pose else 1
