@@ -1,3 +1,73 @@
 """Visual servoing (chapter 6): image features, interaction matrices, tasks, pose, simulation."""
 
-__all__: list[str] = []
+from .camera import Camera
+from .features import Feature, Lines, Points, Segments
+from .features_3d import Plane3D, Point3D, PointAndRotation, PoseError
+from .homography import PlaneMotions, decompose_homography, homography
+from .links import VirtualLink, broyden, estimate_interaction, virtual_link
+from .matrices import (
+    interaction_ellipse,
+    interaction_line,
+    interaction_moment,
+    interaction_plane_3d,
+    interaction_point,
+    interaction_point_3d,
+    interaction_segment,
+    interaction_theta_u,
+)
+from .moments import Moments
+from .pose import PoseSolutions, PoseStatus, p3p, pnp, refine_pose
+from .servo import EyeInHand, EyeToHand, ServoMotion, servo
+from .solids import Circle, Cylinder, Sphere
+from .tasks import Hybrid, Task, task_2_1_2d, task_3d
+from .tracking import TargetEstimate, TargetMotion
+from .velocity import ServoStatus, ServoStep, camera_velocity
+
+__all__ = [
+    "Camera",
+    "Circle",
+    "Cylinder",
+    "EyeInHand",
+    "EyeToHand",
+    "Feature",
+    "Hybrid",
+    "Lines",
+    "Moments",
+    "Plane3D",
+    "PlaneMotions",
+    "Point3D",
+    "PointAndRotation",
+    "Points",
+    "PoseError",
+    "PoseSolutions",
+    "PoseStatus",
+    "Segments",
+    "ServoMotion",
+    "ServoStatus",
+    "ServoStep",
+    "Sphere",
+    "TargetEstimate",
+    "TargetMotion",
+    "Task",
+    "VirtualLink",
+    "broyden",
+    "camera_velocity",
+    "decompose_homography",
+    "estimate_interaction",
+    "homography",
+    "interaction_ellipse",
+    "interaction_line",
+    "interaction_moment",
+    "interaction_plane_3d",
+    "interaction_point",
+    "interaction_point_3d",
+    "interaction_segment",
+    "interaction_theta_u",
+    "p3p",
+    "pnp",
+    "refine_pose",
+    "servo",
+    "task_2_1_2d",
+    "task_3d",
+    "virtual_link",
+]

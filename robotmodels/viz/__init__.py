@@ -36,6 +36,7 @@ from .trajectories import (
     plot_trajectory,
 )
 from .velocities import plot_ellipsoids, plot_inverse_velocities, plot_singularities
+from .visual_servoing import plot_servo, show_servo
 
 __all__ = [
     "Camera",
@@ -67,8 +68,10 @@ __all__ = [
     "plot_processing",
     "plot_profiles",
     "plot_selection",
+    "plot_servo",
     "plot_singularities",
     "plot_torque_parts",
     "plot_trajectory",
     "show",
+    "show_servo",
 ]

@@ -1,0 +1,227 @@
+"""Interaction matrices in closed form, for measured features: ``ds/dt = L [v; w]``.
+
+The twist is that of the camera in its own axes, linear then angular; the object stands still.
+Coordinates are normalised: x = X / Z, y = Y / Z. Arguments broadcast against each other.
+
+Parameters
+----------
+x, y : array_like, shape (...)
+    Normalised coordinates of a point or a centre of gravity.
+Z : array_like, shape (...)
+    Depths along the optical axis, m, above 0.
+rho, theta : array_like, shape (...)
+    Line ``x cos(theta) + y sin(theta) = rho``.
+length, alpha : array_like, shape (...)
+    Of a segment from its first point to its second, alpha in rad from the x axis.
+n20, n02, n11 : array_like, shape (...)
+    Centred moments of second order divided by the area; an ellipse with the semi-axis a along x
+    has n20 = a^2 / 4.
+plane : array_like, shape (..., 4)
+    Plane (A, B, C, D) of the object, ``A X + B Y + C Z + D = 0`` in the camera, D not 0, so
+    ``1 / Z = -(A x + B y + C) / D``. ``(0, 0, 1, -Z)`` is parallel to the image.
+theta_u : array_like, shape (..., 3)
+    Rotation vector of the current camera in the axes of the desired one, rad.
+point, normal : array_like, shape (..., 3)
+    Point and unit normal in the camera, m.
+
+moments : array_like, shape (..., K, K)
+    Raw moments of a region, [p, q] the integral of ``x^p y^q``; used up to order i + j + 1.
+i, j : int
+    Order of the moment, K at least i + j + 2.
+
+Returns
+-------
+ndarray, shape (..., k, 6)
+    Rows in the order of the arguments; of ``m_ij`` one.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Arguments that do not fit each other, NaN; a depth that is not positive; a plane through the
+    centre of the camera.
+
+References
+----------
+Seed book sections 6.2.4.1 to 6.2.4.3 and 6.2.5.2 to 6.2.5.4; F. Chaumette, "Image moments: a
+general and useful set of features for visual servoing", IEEE Trans. Robotics 20(4), 2004.
+
+Examples
+--------
+>>> interaction_point(0.1, 0.2, 2.0).round(3)
+array([[-0.5 ,  0.  ,  0.05,  0.02, -1.01,  0.2 ],
+       [ 0.  , -0.5 ,  0.1 ,  1.04, -0.02, -0.1 ]])
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_core, as_floats
+from ..errors import InvalidValueError, ShapeError
+from ..se3 import skew
+
+
+def interaction_point(x: ArrayLike, y: ArrayLike, Z: ArrayLike) -> Array:
+    """Interaction matrix of an image point: x, y."""
+    x, y, Z = _together(x=x, y=y, Z=Z)
+    return point_rows(x, y, 1.0 / _in_front(Z))
+
+
+def point_rows(x: Array, y: Array, w: Array) -> Array:
+    """The same with inverse depths w, without checks. Shapes: (...) -> (..., 2, 6)."""
+    L = np.zeros((*x.shape, 2, 6))
+    xy = x * y
+    L[..., 0, 0] = L[..., 1, 1] = -w
+    L[..., 0, 2], L[..., 1, 2] = x * w, y * w
+    L[..., 0, 3], L[..., 1, 4] = xy, -xy
+    L[..., 0, 4], L[..., 1, 3] = -1.0 - x * x, 1.0 + y * y
+    L[..., 0, 5], L[..., 1, 5] = y, -x
+    return L
+
+
+def interaction_line(rho: ArrayLike, theta: ArrayLike, plane: ArrayLike) -> Array:
+    """Interaction matrix of a straight line: rho, theta."""
+    a, b, c = _inverse_depth(plane)
+    rho, theta, a, b, c = _together(rho=rho, theta=theta, A=a, B=b, C=c)
+    cos, sin = np.cos(theta), np.sin(theta)
+    turn, shift = b * cos - a * sin, -(a * rho * cos + b * rho * sin + c)
+    still, square = np.zeros_like(rho), 1.0 + rho**2
+    first = shift * cos, shift * sin, -shift * rho, square * sin, -square * cos, still
+    second = turn * cos, turn * sin, -turn * rho, -rho * cos, -rho * sin, still - 1.0
+    return np.stack((np.stack(first, axis=-1), np.stack(second, axis=-1)), axis=-2)
+
+
+def interaction_segment(
+    x: ArrayLike, y: ArrayLike, length: ArrayLike, alpha: ArrayLike, Z: ArrayLike
+) -> Array:
+    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2)."""
+    depth = _in_front(as_core(Z, (2,), "Z"))
+    x, y, length, alpha = _together(x=x, y=y, length=length, alpha=alpha)
+    if not (length > 0.0).all():
+        raise InvalidValueError(f"length: expected numbers above 0, got {length.min():.4g}.")
+    cos, sin = np.cos(alpha), np.sin(alpha)
+    dx, dy = 0.5 * length * cos, 0.5 * length * sin
+    first = point_rows(x - dx, y - dy, 1.0 / depth[..., 0])
+    last = point_rows(x + dx, y + dy, 1.0 / depth[..., 1])
+    middle, along = 0.5 * (first + last), last - first
+    cos, sin, length = cos[..., None], sin[..., None], length[..., None]
+    stretch = cos * along[..., 0, :] + sin * along[..., 1, :]
+    turn = (cos * along[..., 1, :] - sin * along[..., 0, :]) / length
+    return np.concatenate((middle, np.stack((stretch, turn), axis=-2)), axis=-2)
+
+
+def interaction_ellipse(
+    x: ArrayLike, y: ArrayLike, n20: ArrayLike, n02: ArrayLike, n11: ArrayLike, plane: ArrayLike
+) -> Array:
+    """Interaction matrix of an ellipse, the image of a circle or a sphere: x, y, n20, n02, n11."""
+    x, y, n20, n02, n11, _ = _together(
+        x=x, y=y, n20=n20, n02=n02, n11=n11, D=as_core(plane, (4,), "plane")[..., 3]
+    )
+    # raw moments of a region of area 1; those of third order about its centre are zero
+    m = np.zeros((*x.shape, 4, 4))
+    m[..., 0, 0] = 1.0
+    m[..., 1, 0], m[..., 0, 1] = x, y
+    m[..., 2, 0], m[..., 0, 2], m[..., 1, 1] = n20 + x * x, n02 + y * y, n11 + x * y
+    m[..., 3, 0], m[..., 0, 3] = x * (x * x + 3.0 * n20), y * (y * y + 3.0 * n02)
+    m[..., 2, 1] = y * (x * x + n20) + 2.0 * x * n11
+    m[..., 1, 2] = x * (y * y + n02) + 2.0 * y * n11
+    area = interaction_moment(m, 0, 0, plane)
+    dx, dy, xx, yy, xy = (
+        interaction_moment(m, i, j, plane) - m[..., i, j, None, None] * area
+        for i, j in ((1, 0), (0, 1), (2, 0), (0, 2), (1, 1))
+    )
+    x, y = x[..., None, None], y[..., None, None]
+    rows = dx, dy, xx - 2.0 * x * dx, yy - 2.0 * y * dy, xy - x * dy - y * dx
+    return np.concatenate(rows, axis=-2)
+
+
+def interaction_moment(moments: ArrayLike, i: int, j: int, plane: ArrayLike) -> Array:
+    """Interaction matrix (..., 1, 6) of the raw moment m_ij of a region."""
+    m = as_floats(moments, "moments")
+    if min(i, j) < 0 or m.ndim < 2 or min(m.shape[-2:]) < i + j + 2:
+        raise ShapeError(
+            f"moments: expected shape (..., K, K) with K from i + j + 2 = {i + j + 2} and i, j not "
+            f"negative, got {m.shape}."
+        )
+    a, b, c = _inverse_depth(plane)
+    here, right, up = m[..., i, j], m[..., i + 1, j], m[..., i, j + 1]
+    left, down = m[..., i - 1, j], m[..., i, j - 1]  # without effect where i or j is 0
+    left_up, right_down = m[..., i - 1, j + 1], m[..., i + 1, j - 1]
+    order = i + j + 3
+    row = (
+        -i * (a * here + b * left_up + c * left) - a * here,
+        -j * (a * right_down + b * here + c * down) - b * here,
+        order * (a * right + b * up + c * here) - c * here,
+        order * up + j * down,
+        -order * right - i * left,
+        i * left_up - j * right_down,
+    )
+    return np.stack(np.broadcast_arrays(*row), axis=-1)[..., None, :]
+
+
+def interaction_theta_u(theta_u: ArrayLike) -> Array:
+    """Interaction matrix of the rotation vector of the current camera in the desired one."""
+    w = as_core(theta_u, (3,), "theta_u")
+    L = np.zeros((*w.shape[:-1], 3, 6))
+    half = 0.5 * np.linalg.norm(w, axis=-1)[..., None, None]
+    small = half < 0.02
+    safe = np.where(small, 1.0, half)
+    # (1 - h cot h) / (2 h)^2, by its series near 0
+    factor = np.where(
+        small,
+        1.0 / 12.0 + half**2 / 180.0 + half**4 / 1890.0,
+        (1.0 - safe / np.tan(safe)) / (4.0 * safe**2),
+    )
+    S = skew(w)
+    L[..., 3:] = np.eye(3) + 0.5 * S + factor * (S @ S)
+    return L
+
+
+def interaction_point_3d(point: ArrayLike) -> Array:
+    """Interaction matrix of a point in space: X, Y, Z."""
+    X = as_core(point, (3,), "point")
+    L = np.zeros((*X.shape[:-1], 3, 6))
+    L[..., :3] = -np.eye(3)
+    L[..., 3:] = skew(X)
+    return L
+
+
+def interaction_plane_3d(normal: ArrayLike) -> Array:
+    """Interaction matrix of a plane in space, ``normal . X = distance``: normal, distance."""
+    n = as_core(normal, (3,), "normal")
+    L = np.zeros((*n.shape[:-1], 4, 6))
+    L[..., :3, 3:] = skew(n)
+    L[..., 3, :3] = -n
+    return L
+
+
+def _together(**given: ArrayLike) -> list[Array]:
+    """Arguments as float arrays of one shape."""
+    arrays = [as_floats(value, name) for name, value in given.items()]
+    try:
+        return list(np.broadcast_arrays(*arrays))
+    except ValueError:
+        shapes = ", ".join(f"{k} {v.shape}" for k, v in zip(given, arrays, strict=True))
+        raise ShapeError(f"The arguments do not broadcast against each other: {shapes}.") from None
+
+
+def _in_front(Z: Array) -> Array:
+    """Depths, checked."""
+    if not (Z > 0.0).all():
+        raise InvalidValueError(
+            f"Z: expected depths in front of the camera, above 0, got {Z.min():.4g} m."
+        )
+    return Z
+
+
+def _inverse_depth(plane: ArrayLike) -> tuple[Array, Array, Array]:
+    """Coefficients of 1 / Z = a x + b y + c on a plane."""
+    P = as_core(plane, (4,), "plane")
+    if not P[..., 3].all() or not P[..., :3].any(axis=-1).all():
+        raise InvalidValueError(
+            "plane: expected (A, B, C, D) with A X + B Y + C Z + D = 0, a normal and D not zero; "
+            "of a plane through the centre of the camera the image has no area."
+        )
+    a, b, c = np.moveaxis(-P[..., :3] / P[..., 3:], -1, 0)
+    return a, b, c

@@ -1,0 +1,90 @@
+"""Tracking of a moving target: estimation of the motion that the camera does not cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Value, as_exact, as_floats, as_number
+from .results import Result
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TargetEstimate(Result):
+    """Estimate of a target: last s (k,), its rate by the target, the slope of the rate, covariance.
+
+    Parameters
+    ----------
+    s, rate, slope : ndarray, shape (k,)
+        Units of s, per s, per s^2.
+    covariance : ndarray, shape (2, 2)
+        Of rate and slope, the same for every component.
+    """
+
+    s: Array
+    rate: Array
+    slope: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TargetMotion(Value):
+    """Estimation of the rate of s by a moving target: of ``(s_k - s_{k-1}) / step - L [v; w]``.
+
+    Parameters
+    ----------
+    kalman : bool
+        Whether a Kalman filter with constant slope filters the differences; otherwise they are
+        used as they are.
+    process : float
+        Standard deviation of the change of the slope in one second, 1/s^2 per root second.
+    noise : float
+        Standard deviation of a component of s.
+
+    References
+    ----------
+    Seed book section 6.3.4; P. Corke and M. Good, "Dynamic effects in visual closed-loop systems",
+    IEEE Trans. Robotics and Automation 12(5), 1996.
+
+    Examples
+    --------
+    >>> tracker = TargetMotion()
+    >>> found = tracker.start([0.0])
+    >>> for k in range(1, 200):
+    ...     found = tracker.update(found, [0.02 * k * 0.3], [0.0], 0.02)
+    >>> found.rate.round(6)
+    array([0.3])
+    """
+
+    kalman: bool = True
+    process: float = 1.0
+    noise: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for name in ("process", "noise"):
+            object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
+
+    def start(self, s: ArrayLike) -> TargetEstimate:
+        """Estimate before any motion was seen, of a measurement s (k,)."""
+        s = as_floats(s, "s")
+        return TargetEstimate(s, 0.0 * s, 0.0 * s, np.diag((1.0, 1.0)))
+
+    def update(
+        self, last: TargetEstimate, s: ArrayLike, own: ArrayLike, step: float
+    ) -> TargetEstimate:
+        """Estimate with the next measurement s (k,); ``own`` (k,) is the rate by the camera."""
+        s, own = (as_exact(x, last.s.shape, name) for x, name in ((s, "s"), (own, "own")))
+        h = as_number(step, "step", above=0.0)
+        seen = (s - last.s) / h - own
+        if not self.kalman:
+            return TargetEstimate(s, seen, 0.0 * s, last.covariance)
+        F = np.array(((1.0, h), (0.0, 1.0)))
+        Q = self.process**2 * np.array(((h**3 / 3.0, h**2 / 2.0), (h**2 / 2.0, h)))
+        P = F @ last.covariance @ F.T + Q
+        K = P[:, 0] / (P[0, 0] + 2.0 * (self.noise / h) ** 2)
+        rate = last.rate + h * last.slope
+        missing = seen - rate
+        kept = np.eye(2) - np.outer(K, (1.0, 0.0))
+        return TargetEstimate(s, rate + K[0] * missing, last.slope + K[1] * missing, kept @ P)

@@ -1,0 +1,272 @@
+"""Velocity of the camera for one measurement, and a status that states what it achieves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, as_exact, read_only
+from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..se3 import as_pose, skew
+from .camera import Camera
+from .features import Feature, as_measurement, wrapped
+from .results import Result
+from .tasks import Hybrid, Task
+
+RANK_TOLERANCE = 1e-9
+"""Singular values of an interaction matrix up to this part of the largest are zero."""
+_ZERO = 1e-10  # error of a task that is met
+_REDUCIBLE = 1e-3  # part of the error below which a velocity cannot reduce it
+_NEARBY = 0.05 * np.random.default_rng(0).normal(size=(3, 6))  # motions off a singular pose
+
+
+class ServoStatus(Outcome):
+    """Outcome of a visual servoing law; fits int8.
+
+    Attributes
+    ----------
+    sentence : str
+        The meaning of the code.
+
+    Examples
+    --------
+    >>> ServoStatus.BEHIND.sentence
+    'A part of the object is at or behind the plane of the camera, or is seen edge-on.'
+    """
+
+    CONVERGES = 0, "The velocity reduces the error, or it is zero."
+    AT_MINIMUM = (
+        1,
+        "The error is not zero, yet no velocity of this law reduces it: a local minimum.",
+    )
+    SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
+    OUT_OF_SIGHT = 3, "A part of the object is outside the image."
+    BEHIND = 4, "A part of the object is at or behind the plane of the camera, or is seen edge-on."
+    LIMITED = 5, "The robot cannot give the camera its velocity: limits, singular, too few joints."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ServoStep(Result):
+    """Velocity of the camera for one measurement, or for a batch. Read-only.
+
+    Parameters
+    ----------
+    v : ndarray, shape (..., 6)
+        Twist [v; w] of the camera in its own axes, m/s and rad/s; zero for an object that is
+        behind the camera or out of sight.
+    error : ndarray, shape (..., k)
+        ``s - s*``; NaN for an object behind the camera.
+    rank : int or ndarray, shape (...)
+        Rank of the matrix of the law.
+    status : ServoStatus, or ndarray of int8, shape (...)
+        What the velocity achieves.
+
+    Examples
+    --------
+    >>> ServoStep(np.zeros(6), np.zeros(8), 6, ServoStatus.CONVERGES).reason()
+    'The velocity reduces the error, or it is zero.'
+    """
+
+    v: Array
+    error: Array
+    rank: int | NDArray[np.int8]
+    status: ServoStatus | NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        self.v.flags.writeable = self.error.flags.writeable = False  # quicker than copies
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status, of row i in a batch."""
+        code = self.status[i] if isinstance(self.status, np.ndarray) else self.status
+        if np.ndim(code):
+            raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
+        return ServoStatus(int(code)).sentence
+
+
+def camera_velocity(
+    task: Task | Hybrid, measurement: Any, camera: Camera | None = None
+) -> ServoStep:
+    """Velocity of the camera that regulates a task.
+
+    Parameters
+    ----------
+    task : Task or Hybrid
+        The task, k components.
+    measurement : array_like, shape (..., k) or (..., 4, 4)
+        Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
+    camera : Camera, optional
+        Whose image has to contain the object.
+
+    Returns
+    -------
+    ServoStep
+        Velocity, error, rank and status.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        A measurement of another feature, NaN, a matrix that is not a pose.
+
+    References
+    ----------
+    Seed book sections 6.3.2 and 6.3.3.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> from robotmodels.visual_servoing import Points
+    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+    >>> goal = translation(0, 0, 0.5)
+    >>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
+    array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
+    >>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
+    <ServoStatus.SINGULAR: 2>
+    """
+    if not isinstance(task, Task | Hybrid):
+        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    if camera is not None and not isinstance(camera, Camera):
+        raise InvalidValueError(f"camera: expected a Camera, got {type(camera).__name__}.")
+    feature = task.regulated.feature
+    given, is_pose = _sensed(feature, measurement)
+    core = 2 if is_pose else 1
+    if given.ndim == core:
+        return ServoStep(*law(task, *((None, given) if is_pose else (given, None)), camera)[:4])
+    batch = given.shape[:-core]
+    rows = given.reshape(math.prod(batch), *given.shape[-core:])
+    found = [law(task, *((None, x) if is_pose else (x, None)), camera)[:4] for x in rows]
+    v, error, ranks, codes = zip(*found, strict=True) if found else ((),) * 4
+    return ServoStep(
+        np.reshape(v, (*batch, 6)), np.reshape(error, (*batch, feature.size)),
+        read_only(np.reshape(ranks, batch), np.int8), read_only(np.reshape(codes, batch), np.int8),
+    )  # fmt: skip
+
+
+def law(
+    task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
+) -> tuple[Array, Array, int, ServoStatus, Array]:
+    """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
+    primary = task.regulated
+    feature, L_desired = primary.feature, primary.L_desired
+    G = None if T is None else feature._placed(T)
+    if G is not None and not feature._visible(G):
+        nothing = np.full(feature.size, np.nan)
+        return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
+    measured: Array = feature._measure(G) if s is None else s
+    error = measured - primary.s_desired
+    if primary.periods is not None:
+        error = wrapped(error, primary.periods)
+    mean = primary.interaction == "mean"
+    A = primary.matrix(measured, G) if L_desired is None or mean else L_desired
+    inverse, rank = own, _ = pseudo_inverse(A)
+    if mean and L_desired is not None:
+        inverse = 0.5 * (own + pseudo_inverse(L_desired)[0])
+        rank = pseudo_inverse(inverse)[1]
+    direction, status = inverse @ error, ServoStatus.CONVERGES
+    size = math.sqrt(error @ error)
+    if size > _ZERO:
+        seen = A @ direction
+        if rank < min(A.shape) and _loses_rank(
+            feature, primary.T_desired if T is None else T, rank
+        ):
+            status = ServoStatus.SINGULAR
+        elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
+            status = ServoStatus.AT_MINIMUM
+    outline = None if camera is None else feature._outline(measured, G)
+    if camera is not None and outline is not None and not camera.sees(outline):
+        return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
+    v = -primary.gain * direction
+    if isinstance(task, Hybrid):
+        z = _secondary(task, s, T)
+        v = v + task.weight * (z - own @ (A @ z))
+    return v, error, rank, status, inverse
+
+
+@cache
+def _decompositions() -> Any:
+    """The kernel of singular values, imported when it is first used."""
+    from ..kernels.svd import decompositions
+
+    return decompositions
+
+
+def pseudo_inverse(A: Array) -> tuple[Array, int]:
+    """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
+    m, n = A.shape
+    p = min(m, n)
+    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
+    _decompositions()(np.ascontiguousarray(A[None]), U, S, V)
+    sizes = S[0].tolist()
+    rank = sum(size > RANK_TOLERANCE * sizes[0] for size in sizes)
+    return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
+
+
+def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
+    """Whether the rank is less than at poses nearby."""
+    if T is None:
+        return True
+    reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
+    poses = [moved(T, twist * reach) for twist in _NEARBY]
+    seen = [nearby for nearby in poses if feature._visible(feature._placed(nearby))]
+    return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
+
+
+def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
+    """Twist that the secondary motion asks for."""
+    if isinstance(task.secondary, Task):
+        return law(task.secondary, None if T is not None else s, T)[0]
+    if not callable(task.secondary):
+        return task.secondary
+    if T is None:
+        raise InvalidValueError("measurement: a secondary function needs the pose (4, 4).")
+    asked: Any = task.secondary(T.copy())
+    return as_exact(asked, (6,), "secondary(T)")
+
+
+def _sensed(feature: Feature, measurement: Any) -> tuple[Array, bool]:
+    """Checked measurements or poses, and whether they are poses."""
+    shape = np.shape(getattr(measurement, "homogeneous", measurement))
+    if shape[-2:] == (4, 4):
+        if type(measurement) is np.ndarray and len(shape) == 2 and _is_exact(measurement):
+            return measurement, True
+        four = feature.size == 4 and len(shape) == 2  # may be four measurements
+        if not four or np.array_equal(np.asarray(measurement)[3], (0.0, 0.0, 0.0, 1.0)):
+            return as_pose(measurement, "measurement"), True
+    return as_measurement(measurement, feature, "measurement"), False
+
+
+def _is_exact(T: Array) -> bool:
+    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
+    if T.dtype != np.float64:
+        return False
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
+    off = (
+        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),
+        *(a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i),
+        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) - 1.0,
+    )
+    rounding = all(-1e-12 < number < 1e-12 for number in off)
+    return rounding and math.isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
+
+
+def moved(T: Array, twist: Array) -> Array:
+    """Pose of the object after the camera has moved by a constant twist for 1 s."""
+    v, w = -twist[:3], -twist[3:]
+    square = float(w @ w)
+    if square < 1e-8:
+        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        angle = math.sqrt(square)
+        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
+        c = (1.0 - a) / square
+    W = skew(w)
+    WW = W @ W
+    after = np.eye(4)
+    after[:3, :3] += a * W + b * WW
+    after[:3, 3] = v + b * (W @ v) + c * (WW @ v)
+    return after @ T

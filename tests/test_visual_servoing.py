@@ -1,0 +1,399 @@
+"""Interaction matrices against exact projection, closed forms of the literature, refused input."""
+
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from robotmodels import visual_servoing as vs
+from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.se3 import inverse, rotation, translation
+
+SQUARE = np.array([[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]])
+PLATE = [[-0.2, -0.15, 0], [0.25, -0.1, 0], [0.2, 0.18, 0], [-0.1, 0.2, 0], [-0.3, 0.05, 0]]
+
+
+def pose(rng, tilt=0.9):
+    """A random pose with the object well in front of the camera."""
+    T = np.eye(4)
+    turn = Rotation.from_rotvec([0.0, 0.0, rng.uniform(-3.0, 3.0)])
+    T[:3, :3] = (turn * Rotation.from_rotvec(0.5 * tilt * rng.normal(size=3))).as_matrix()
+    T[:3, 3] = [*rng.uniform(-0.3, 0.3, 2), rng.uniform(1.5, 2.5)]
+    return T
+
+
+def hat(twist):
+    v, w = twist[:3], twist[3:]
+    return np.array(
+        [[0, -w[2], w[1], v[0]], [w[2], 0, -w[0], v[1]], [-w[1], w[0], 0, v[2]], [0, 0, 0, 0]]
+    )
+
+
+def seen_after(T, twist):
+    """Pose of the object after a motion of the camera in its own axes: matrix exponential."""
+    return expm(-hat(np.asarray(twist))) @ T
+
+
+def angles_of(feature):
+    """Period of each component."""
+    name = type(feature).__name__
+    period = {"Lines": [0, 2 * np.pi], "Cylinder": [0, 2 * np.pi], "Segments": [0, 0, 0, 2 * np.pi]}
+    if name == "Moments":
+        return np.array([np.pi if c == "alpha" else 0.0 for c in feature.components])
+    one = period.get(name, [0.0])
+    return np.tile(one, feature.size // len(one))
+
+
+def differences(feature, T, h=1e-5):
+    columns = []
+    for direction in h * np.eye(6):
+        ds = feature.measure(seen_after(T, direction)) - feature.measure(seen_after(T, -direction))
+        period = angles_of(feature)
+        columns.append(ds - period * np.round(ds / np.where(period > 0.0, period, 1.0)))
+    return np.array(columns).T / (2.0 * h)
+
+
+def features():
+    rng = np.random.default_rng(7)
+    pairs = rng.uniform(-0.3, 0.3, (3, 2, 3))
+    return {
+        "points": vs.Points(rng.uniform(-0.3, 0.3, (4, 3))),
+        "lines": vs.Lines(pairs),
+        "segments": vs.Segments(pairs),
+        "circle": vs.Circle([0.1, 0.0, 0.1], [0.1, 0.2, 1.0], 0.2),
+        "sphere": vs.Sphere([0.1, 0.1, 0.0], 0.2),
+        "cylinder": vs.Cylinder([0.1, 0.1, 0.0], [1.0, 0.3, 0.2], 0.1),
+        "moments of a polygon": vs.Moments(PLATE),
+        "moments of points": vs.Moments(points=rng.uniform(-0.3, 0.3, (6, 3))),
+        "pose": vs.PoseError(),
+        "pose to another": vs.PoseError(pose(rng)),
+        "point in space": vs.Point3D([0.1, 0.2, 0.3]),
+        "plane in space": vs.Plane3D([0.1, 0.2, 1.0], 0.3),
+        "2 1/2-D": vs.PointAndRotation([0.1, 0.2, 0.0], pose(rng)),
+    }
+
+
+FEATURES = features()
+every = pytest.mark.parametrize("feature", FEATURES.values(), ids=FEATURES.keys())
+
+
+# --- interaction matrices ------------------------------------------------------------------------
+
+
+@every
+def test_interaction_is_the_derivative_of_the_measurement(feature):
+    rng = np.random.default_rng(1)
+    poses = [pose(rng, tilt) for tilt in (0.0, 0.9) for _ in range(12)]
+    L = feature.interaction(poses)
+    assert L.shape == (24, feature.size, 6)
+    for T, matrix in zip(poses, L, strict=True):
+        assert abs(matrix - differences(feature, T)).max() < 1e-7 * max(1.0, abs(matrix).max())
+
+
+@every
+def test_batches_and_empty_batches(feature):
+    rng = np.random.default_rng(2)
+    T = np.array([pose(rng) for _ in range(6)]).reshape(2, 3, 4, 4)
+    k = feature.size
+    assert feature.measure(T).shape == (2, 3, k)
+    assert np.allclose(feature.measure(T)[1, 2], feature.measure(T[1, 2]), rtol=0, atol=1e-12)
+    assert np.allclose(feature.interaction(T.tolist())[0, 1], feature.interaction(T[0, 1]))
+    assert feature.measure(np.empty((0, 4, 4))).shape == (0, k)
+    assert feature.interaction(np.empty((0, 4, 4))).shape == (0, k, 6)
+
+
+@every
+def test_features_are_values(feature):
+    again = pickle.loads(pickle.dumps(feature))
+    assert again == feature
+    assert hash(again) == hash(feature)
+    assert len(repr(feature).splitlines()) <= 6
+    assert feature != vs.Points(SQUARE)
+
+
+def test_measurements_are_projections():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        T = pose(rng)
+        rho, theta = vs.Lines([[[0.1, 0.2, 0.0], [0.3, -0.1, 0.2]]]).measure(T)
+        X = np.linspace([0.1, 0.2, 0.0], [0.3, -0.1, 0.2], 5) @ T[:3, :3].T + T[:3, 3]
+        x, y = X[:, 0] / X[:, 2], X[:, 1] / X[:, 2]
+        assert abs(x * np.cos(theta) + y * np.sin(theta) - rho).max() < 1e-12
+
+        # points of a circle and of a sphere's outline are on their ellipses
+        t = np.linspace(0.0, 6.0, 9)[:, None]
+        circle = 0.2 * (np.cos(t) * [1, 0, 0] + np.sin(t) * [0, 1, 0]) @ T[:3, :3].T + T[:3, 3]
+        on_ellipse(circle, vs.Circle([0, 0, 0], [0, 0, 1], 0.2).measure(T))
+        c = T[:3, 3]
+        d, ray = np.linalg.norm(c), c / np.linalg.norm(c)
+        side = np.cross(ray, [1.0, 0.0, 0.0])
+        side /= np.linalg.norm(side)
+        rim = 0.2 * np.sqrt(1.0 - (0.2 / d) ** 2)
+        outline = (1.0 - (0.2 / d) ** 2) * c + rim * (
+            np.cos(t) * side + np.sin(t) * np.cross(ray, side)
+        )
+        on_ellipse(outline, vs.Sphere([0, 0, 0], 0.2).measure(T))
+
+        # every line of a cylinder's outline touches it
+        axis = T[:3, 0]
+        s = vs.Cylinder([0, 0, 0], [1, 0, 0], 0.1).measure(T)
+        for rho, theta in s.reshape(2, 2):
+            n = np.array([np.cos(theta), np.sin(theta), -rho])
+            n /= np.linalg.norm(n)
+            assert abs(n @ axis) < 1e-12
+            assert abs(n @ c) == pytest.approx(0.1, abs=1e-12)
+
+
+def on_ellipse(X, s):
+    d = X[:, :2] / X[:, 2:] - s[:2]
+    M = np.linalg.inv([[s[2], s[4]], [s[4], s[3]]])
+    assert abs(np.einsum("ki,ij,kj->k", d, M, d) - 4.0).max() < 1e-9
+
+
+def test_moments_are_those_of_many_small_cells():
+    T = pose(np.random.default_rng(4))
+    corners = np.array(PLATE, float)
+    image = corners @ T[:3, :3].T + T[:3, 3]
+    image = image[:, :2] / image[:, 2:]
+    # a fan of triangles, each divided finely
+    k = np.arange(200)
+    u, v = (a.ravel() for a in np.meshgrid((k + 0.5) / 200, (k + 0.5) / 200))
+    u, v, weight = u, v * (1.0 - u), 1.0 - u
+    m = {}
+    for b, c in pairwise(image[1:]):
+        a = image[0]
+        x = a[:, None] + np.outer(b - a, u) + np.outer(c - a, v)
+        area = abs(np.linalg.det([b - a, c - a])) * weight / 40000
+        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1), (3, 0), (1, 2)):
+            m[i, j] = m.get((i, j), 0.0) + (area * x[0] ** i * x[1] ** j).sum()
+    area, x, y = m[0, 0], m[1, 0] / m[0, 0], m[0, 1] / m[0, 0]
+    mu20, mu02 = m[2, 0] - area * x * x, m[0, 2] - area * y * y
+    mu11 = m[1, 1] - area * x * y
+    mu30 = m[3, 0] - 3 * x * m[2, 0] + 2 * area * x**3
+    mu12 = m[1, 2] - 2 * y * m[1, 1] - x * m[0, 2] + 2 * area * x * y * y
+    expected = {
+        "area": area, "x": x, "y": y, "n20": mu20 / area, "n02": mu02 / area, "n11": mu11 / area,
+        "alpha": 0.5 * np.arctan2(2 * mu11, mu20 - mu02),
+        "c_x": np.sqrt(area) * (mu30 + mu12) / (mu20 + mu02) ** 1.5,
+    }  # fmt: skip
+    found = vs.Moments(PLATE, components=tuple(expected)).measure(T)
+    assert found == pytest.approx(list(expected.values()), abs=1e-4)
+
+
+def test_moments_of_a_parallel_plane_have_the_published_rows():
+    """F. Chaumette 2004, with the depth Z: area and centre of gravity; an, xn, yn decouple."""
+    T = translation(0.1, -0.2, 2.0) @ rotation("z", 0.4)
+    words = ("area", "x", "y", "n20", "n02", "n11")
+    moments = vs.Moments(PLATE, components=words)
+    a, x, y, n20, n02, n11 = moments.measure(T)
+    Z = 2.0
+    rows = [
+        [0, 0, 2 * a / Z, 3 * a * y, -3 * a * x, 0],
+        [-1 / Z, 0, x / Z, x * y + 4 * n11, -(1 + x * x + 4 * n20), y],
+        [0, -1 / Z, y / Z, 1 + y * y + 4 * n02, -x * y - 4 * n11, -x],
+    ]
+    assert abs(moments.interaction(T)[:3] - rows).max() < 1e-12
+    normed = vs.Moments(PLATE, components=("xn", "yn", "an"))
+    L = normed.interaction(T)
+    assert abs(L[:, :3] + np.eye(3)).max() < 1e-12
+    assert normed.measure(T)[2] == pytest.approx(Z)
+
+
+def test_skewness_turns_with_the_image_and_ignores_shift_and_scale():
+    asymmetric = vs.Moments(PLATE, components=("c_x", "c_y"))
+    c = asymmetric.measure(translation(0.0, 0.0, 1.0))
+    assert asymmetric.measure(translation(0.2, -0.1, 3.0)) == pytest.approx(c, abs=1e-9)
+    turned = asymmetric.measure(translation(0.0, 0.0, 1.0) @ rotation("z", 0.7))
+    assert turned == pytest.approx(rotation("z", 0.7)[:2, :2] @ c, abs=1e-9)
+    assert np.linalg.norm(c) > 0.01
+    assert vs.Moments(SQUARE, components=("c_x", "c_y")).measure(
+        translation(0, 0, 1)
+    ) == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_corners_in_the_other_sense_are_the_same_region():
+    T = pose(np.random.default_rng(5))
+    assert vs.Moments(PLATE[::-1]).measure(T) == pytest.approx(vs.Moments(PLATE).measure(T))
+
+
+def test_bare_matrices_are_those_of_the_features():
+    T = pose(np.random.default_rng(6))
+    X = np.array([0.1, 0.2, 0.3]) @ T[:3, :3].T + T[:3, 3]
+    x, y = X[:2] / X[2]
+    point = vs.Points([0.1, 0.2, 0.3])
+    assert np.allclose(vs.interaction_point(x, y, X[2]), point.interaction(T))
+    assert vs.interaction_point([0.1, 0.2], 0.0, 1.0).shape == (2, 2, 6)
+    # any plane through a line gives the same matrix
+    ends = np.array([[0.1, 0.2, 0.0], [0.3, -0.1, 0.2]])
+    P, Q = ends @ T[:3, :3].T + T[:3, 3]
+    line = vs.Lines([ends])
+    for direction in ([1.0, 0.2, 0.1], [0.0, 1.0, -0.5]):
+        n = np.cross(Q - P, direction)
+        L = vs.interaction_line(*line.measure(T), [*n, -n @ P])
+        assert np.allclose(L, line.interaction(T))
+    n = T[:3, :3] @ [0.0, 0.0, 1.0]
+    circle = vs.Circle([0, 0, 0], [0, 0, 1], 0.2)
+    L = vs.interaction_ellipse(*circle.measure(T), [*n, -n @ T[:3, 3]])
+    assert np.allclose(L, circle.interaction(T))
+    segment = vs.Segments([ends])
+    L = vs.interaction_segment(*segment.measure(T), [P[2], Q[2]])
+    assert np.allclose(L, segment.interaction(T))
+    m = np.zeros((3, 3))
+    m[0, 0], m[1, 0], m[0, 1] = 0.5, 0.1, 0.2
+    row = vs.interaction_moment(m, 0, 0, [0, 0, 1, -2.0])
+    assert row.tolist() == [[0, 0, 0.5, 3 * 0.2, -3 * 0.1, 0]]
+
+
+def test_rotation_vector():
+    rng = np.random.default_rng(8)
+    for size in (0.0, 1e-9, 1e-4, 0.02, 0.1, 1.0, 3.0, np.pi):
+        u = rng.normal(size=3)
+        tu = size * u / np.linalg.norm(u)
+        L = vs.interaction_theta_u(tu)
+        assert abs(L[:, :3]).max() == 0.0
+        assert L[:, 3:] @ tu == pytest.approx(tu, abs=1e-12)  # L theta-u = theta-u
+        R = Rotation.from_rotvec(tu).as_matrix()
+        if 0.0 < size < 3.1:
+            for k in range(3):
+                turn = [Rotation.from_rotvec(s * 1e-5 * np.eye(3)[k]).as_matrix() for s in (1, -1)]
+                plus, minus = (Rotation.from_matrix(R @ M).as_rotvec() for M in turn)
+                assert L[:, 3 + k] == pytest.approx((plus - minus) / 2e-5, abs=1e-6)
+
+
+def test_learnt_matrices():
+    rng = np.random.default_rng(9)
+    square, T = vs.Points(SQUARE), pose(rng)
+    dX = 1e-5 * rng.normal(size=(20, 6))
+    dS = [square.measure(seen_after(T, x)) - square.measure(T) for x in dX]
+    L = vs.estimate_interaction(dS, dX)
+    assert abs(L - square.interaction(T)).max() < 1e-3
+    with pytest.raises(InvalidValueError, match="span 5 of 6"):
+        vs.estimate_interaction(np.zeros((9, 2)), np.c_[rng.normal(size=(9, 5)), np.zeros(9)])
+    # Broyden: the secant holds, directions across the motion stay
+    A, ds, dx = rng.normal(size=(8, 6)), rng.normal(size=8), rng.normal(size=6)
+    B = vs.broyden(A, ds, dx)
+    assert pytest.approx(ds) == B @ dx
+    across = rng.normal(size=6)
+    across -= across @ dx / (dx @ dx) * dx
+    assert pytest.approx(A @ across) == B @ across
+    assert (vs.broyden(A, ds, np.zeros(6)) == A).all()
+
+
+# --- virtual links -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("feature", "link_class", "name"),
+    [
+        (vs.Points([[0.1, 0.0, 0.0]]), 4, "linear annular"),
+        (vs.Lines([[[0, 0, 0], [1, 0, 0]]]), 4, "rectilinear"),
+        (vs.Points(SQUARE[:2]), 2, ""),
+        (vs.Points(SQUARE[:3]), 0, "rigid"),
+        (vs.Sphere([0, 0, 0], 0.2), 3, "ball joint"),
+        (vs.Circle([0, 0, 0], [0, 0.3, 1], 0.2), 1, "revolute"),
+        (vs.Cylinder([0, 0, 0], [1, 0, 0], 0.1), 2, "sliding pivot"),
+        (vs.Plane3D([0, 0, 1], 0.1), 3, "plane on plane"),
+        (vs.Lines([[[0, 0, 0], [1, 0, 0]], [[0, 0.1, 0], [1, 0.1, 0]]]), 2, ""),
+        (vs.Points([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]), 1, "revolute"),
+    ],
+)
+def test_virtual_links(feature, link_class, name):
+    rng = np.random.default_rng(10)
+    T = pose(rng)
+    link = vs.virtual_link(feature, T)
+    assert (link.link_class, link.rank) == (link_class, 6 - link_class)
+    assert link.kernel_twists.shape == (link_class, 6)
+    assert name in (link.name, "")
+    s = feature.measure(T)
+    for twist in link.kernel_twists:  # quadratic change along the kernel, linear across
+        assert abs(feature.measure(seen_after(T, 1e-6 * twist)) - s).max() < 1e-10
+    _, sizes, Vt = np.linalg.svd(feature.interaction(T))
+    for size, twist in zip(sizes[: link.rank], Vt, strict=False):
+        moved = np.linalg.norm(feature.measure(seen_after(T, 1e-6 * twist)) - s)
+        assert moved == pytest.approx(1e-6 * size, rel=0.01)
+
+
+def test_a_circle_seen_centred_has_a_larger_class():
+    assert vs.virtual_link(vs.Circle([0, 0, 0], [0, 0, 1], 0.2), translation(0, 0, 1)).rank == 3
+
+
+# --- refused input -------------------------------------------------------------------------------
+
+GOAL = translation(0.0, 0.0, 0.5)
+TASK = vs.Task(vs.Points(SQUARE), GOAL)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "words"),
+    [
+        (lambda: vs.Points(SQUARE).measure(translation(0, 0, 0)), InvalidValueError, "in front"),
+        (lambda: vs.Points(SQUARE).measure(translation(0, 0, -1)), InvalidValueError, "in front"),
+        (lambda: vs.Sphere([0, 0, 0], 1).measure(GOAL), InvalidValueError, "camera inside"),
+        (lambda: vs.Circle([0, 0, 0], [1, 0, 0], 0.1).measure(GOAL), InvalidValueError, "edge-on"),
+        (lambda: vs.Cylinder([0, 0, 0], [1, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
+        (lambda: vs.Lines([[[0, 0, 0], [0, 0, 1]]]).measure(GOAL), InvalidValueError, "edge-on"),
+        (lambda: vs.Moments(SQUARE[:2]), ShapeError, "k from 3"),
+        (lambda: vs.Moments([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), InvalidValueError, "area"),
+        (lambda: vs.Moments(SQUARE[[0, 2, 1, 3]]), InvalidValueError, "cross|area"),
+        (lambda: vs.Moments([*SQUARE[:3], [0, 0, 1]]), InvalidValueError, "one plane"),
+        (lambda: vs.Moments(SQUARE, components=("area", "m17")), InvalidValueError, "m17"),
+        (lambda: vs.Moments(), InvalidValueError, "polygon or points"),
+        (lambda: vs.Moments(SQUARE).measure(GOAL), InvalidValueError, "alpha"),
+        (lambda: vs.Moments(SQUARE).measure(GOAL @ rotation("x", np.pi / 2) @ translation(0, 0, 0)),
+         InvalidValueError, "edge-on"),
+        (lambda: vs.Lines([[[1, 0, 0], [1, 0, 0]]]), InvalidValueError, "different points"),
+        (lambda: vs.Circle([0, 0, 0], [0, 0, 0], 1), InvalidValueError, "normal"),
+        (lambda: vs.Sphere([0, 0, 0], -1), InvalidValueError, "radius"),
+        (lambda: vs.Points([[0, 0, np.nan]]), InvalidValueError, "finite"),
+        (lambda: vs.Points([]), ShapeError, "object_points"),
+        (lambda: vs.Points(SQUARE).measure(2 * np.eye(4)), NotARotationError, "last row"),
+        (lambda: vs.Camera(focal=0), InvalidValueError, "focal"),
+        (lambda: vs.Camera(size=(0, 480)), InvalidValueError, "size"),
+        (lambda: vs.Camera().project([0, 0, -1.0]), InvalidValueError, "in front"),
+        (lambda: vs.interaction_point(0, 0, 0), InvalidValueError, "Z"),
+        (lambda: vs.interaction_point([1, 2], [1, 2, 3], 1), ShapeError, "broadcast"),
+        (lambda: vs.interaction_line(0, 0, [0, 0, 1, 0]), InvalidValueError, "plane"),
+        (lambda: vs.interaction_segment(0, 0, 0, 0, [1, 1]), InvalidValueError, "length"),
+        (lambda: vs.interaction_moment(np.ones((2, 2)), 1, 0, [0, 0, 1, -1]), ShapeError, "K"),
+        (lambda: vs.broyden(np.ones((2, 6)), [1], np.ones(6)), ShapeError, "ds"),
+        (lambda: vs.broyden(np.ones((1, 6)), [1], np.ones(6), 2.0), InvalidValueError, "factor"),
+        (lambda: vs.estimate_interaction([[1]], np.ones((2, 6))), ShapeError, "dS"),
+        (lambda: vs.virtual_link("point", GOAL), InvalidValueError, "feature"),
+        (lambda: vs.Task(SQUARE, GOAL), InvalidValueError, "feature"),
+        (lambda: vs.Task(vs.Points(SQUARE), np.zeros(5)), ShapeError, "8 numbers"),
+        (lambda: vs.Task(vs.Points(SQUARE), vs.Sphere([0, 0, 0], 1)), InvalidValueError, "Sphere"),
+        (lambda: vs.Task(vs.Points(SQUARE), GOAL, gain=0), InvalidValueError, "gain"),
+        (lambda: vs.Task(vs.Points(SQUARE), GOAL, interaction="best"), InvalidValueError, "mean"),
+        (lambda: vs.Task(vs.Points(SQUARE), GOAL, depth=-1.0), InvalidValueError, "depth"),
+        (lambda: vs.Task(vs.Points(SQUARE), GOAL, depth="some"), InvalidValueError, "depth"),
+        (lambda: vs.Task(vs.Points(SQUARE), np.ones(8), interaction="mean"), InvalidValueError,
+         "desired pose"),
+        (lambda: vs.camera_velocity(TASK, np.ones(8)), InvalidValueError, 'depth="true"'),
+        (lambda: vs.camera_velocity(TASK, np.ones(6)), ShapeError, "8 numbers"),
+        (lambda: vs.camera_velocity(TASK, np.ones((4, 4))), NotARotationError, "last row"),
+        (lambda: vs.camera_velocity("task", GOAL), InvalidValueError, "Task"),
+        (lambda: vs.Hybrid("task", np.zeros(6)), InvalidValueError, "primary"),
+        (lambda: vs.Hybrid(TASK, np.zeros(5)), ShapeError, "secondary"),
+        (lambda: vs.servo(TASK, GOAL, step=0), InvalidValueError, "step"),
+        (lambda: vs.servo(TASK, GOAL, duration=1e9), InvalidValueError, "steps"),
+        (lambda: vs.servo(TASK, GOAL, q0=np.zeros(6)), InvalidValueError, "robot"),
+        (lambda: vs.servo(TASK, GOAL, noise=-1), InvalidValueError, "noise"),
+        (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
+         "on a line"),
+        (lambda: vs.p3p(np.eye(3), np.eye(3)), ShapeError, "image"),
+        (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "n from 3"),
+        (lambda: vs.pnp(np.outer(range(5), [1, 2, 3]), np.ones((5, 2))), InvalidValueError, "line"),
+        (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], -GOAL), NotARotationError, "T0"),
+        (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),
+        (lambda: vs.homography(SQUARE[:3, :2], SQUARE[:3, :2]), ShapeError, "n from 4"),
+        (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), InvalidValueError, "determine"),
+        (lambda: vs.decompose_homography(np.ones((3, 3))), InvalidValueError, "regular"),
+        (lambda: vs.TargetMotion(noise=0.0), InvalidValueError, "noise"),
+    ],
+)  # fmt: skip
+def test_refused(call, kind, words):
+    with pytest.raises(kind, match=words):
+        call()
