@@ -31,6 +31,7 @@ from .pose_trajectory import PoseSamples, PoseTrajectory
 from .resolved_motion import ResolvedMotion, resolved_motion
 from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
+from .time_optimal import TimedPath, TimingStatus, time_optimal
 from .trajectory import Samples, Trajectory
 
 __all__ = [
@@ -47,6 +48,8 @@ __all__ = [
     "SplineEnds",
     "Synchronisation",
     "TimeLaw",
+    "TimedPath",
+    "TimingStatus",
     "Trajectory",
     "along_line",
     "bang_bang",
@@ -68,5 +71,6 @@ __all__ = [
     "resolved_motion",
     "smoothed_trapezoidal",
     "straight_line",
+    "time_optimal",
     "trapezoidal",
 ]
