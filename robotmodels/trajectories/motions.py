@@ -14,7 +14,9 @@ from ..errors import InvalidValueError, ShapeError
 from .piecewise import PiecewisePolynomial
 
 _STENCIL = 7
-_SPACING = 5e-3  # of the duration: balances truncation and rounding of a first and second derivative
+_SPACING = (
+    5e-3  # of the duration: balances truncation and rounding of a first and second derivative
+)
 _SAMPLES = 4001
 _JUMP = 1e-9  # of the largest value: smaller jumps are put down to rounding
 _INSIDE = np.linspace(0.0, 1.0, 6)  # where extremes are sought in each piece of a law

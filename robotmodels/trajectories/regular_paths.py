@@ -85,14 +85,13 @@ def _jumps(motion: Motion, t: Array, rate: Array, most: float) -> bool:
 
 
 def _by_length(motion: Motion, t: Array) -> Motion | str:
-    """Spline through points of the path at even steps of its length in joint space."""
+    """Spline through points of the path, over its length in joint space."""
     (q,) = motion.derivatives(t, (0,))
     length = np.concatenate(((0.0,), np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))))
     if not length[-1] > 0.0:
         raise InvalidValueError("path: it has no length; no joint moves.")
     moved = np.concatenate(((True,), np.diff(length) > 1e-9 * length[-1]))
-    even = np.linspace(0.0, length[-1], _KNOTS + 1)
-    times = np.interp(even, length[moved], t[moved])
+    times = np.interp(length[-1] * toward_ends(_KNOTS), length[moved], t[moved])
     times[-1] = t[-1]
     (knots,) = motion.derivatives(times, (0,))
     chords = np.diff(knots, axis=0)
@@ -125,6 +124,11 @@ def _is_kink(motion: Motion, low: float, high: float, length: float, turn: float
             return False
         low, high = t[seen[k]], t[seen[k + 1] + 1]
     return True
+
+
+def toward_ends(intervals: int) -> Array:
+    """Fractions from 0 to 1 that are dense at both ends, where a path from rest bends most."""
+    return np.sin(np.linspace(0.0, 0.5 * np.pi, intervals + 1)) ** 2
 
 
 def checked_points(points: int) -> int:

@@ -18,7 +18,7 @@ from .motions import TimedMotion
 from .path_limits import SLOWEST, Passes, PathLimits, Rows
 from .piecewise import PiecewisePolynomial
 from .pose_trajectory import PoseTrajectory
-from .regular_paths import checked_points, path_of
+from .regular_paths import checked_points, path_of, toward_ends
 from .trajectory import Trajectory
 
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
@@ -184,12 +184,14 @@ def time_optimal(
     problem = PathLimits(n, model, limits, torque, friction, both_ends)
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
-    s = np.linspace(0.0, float(motion.duration), points + 1)
+    own = isinstance(path, Trajectory) and motion is path.motion
+    even = np.linspace(0.0, 1.0, points + 1)
+    s = float(motion.duration) * (even if own else toward_ends(points))
     q, rate, bend = motion.derivatives(s, (0, 1, 2))
     checked_limits(problem.limits, n, q)
-    if isinstance(path, Trajectory) and motion is not path.motion:  # by length: rates of length
-        (own,) = path.motion.derivatives(np.array([0.0, path.duration]), (1,))
-        rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, own, strict=True))
+    if isinstance(path, Trajectory) and not own:  # rates of the length
+        (speed,) = path.motion.derivatives(np.array([0.0, path.duration]), (1,))
+        rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
     ends = (rates[0], rates[1])
     rows = problem.rows(q, rate, bend)
     at_rest = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
