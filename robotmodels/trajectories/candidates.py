@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array, as_number
 from ..errors import InvalidValueError
@@ -53,6 +54,13 @@ class Cost:
             raise InvalidValueError("time, torque: expected at least one weight above zero.")
 
 
+class Knots(NamedTuple):
+    """Parameters (K,) of stations and nodes, and which of them are stations."""
+
+    at: Array
+    fixed: NDArray[np.intp]
+
+
 class Evaluated(NamedTuple):
     """What became of a candidate; its duration is infinite where it has no timing."""
 
@@ -79,7 +87,7 @@ class Candidates:
     )  # fmt: skip
 
     def __init__(
-        self, limits: PathLimits, stations: Array, at: tuple[Array, Array],
+        self, limits: PathLimits, stations: Array, at: Knots,
         bodies: tuple[Obstacle, ...], clearance: float, cost: Cost, optimal: bool,
     ) -> None:  # fmt: skip
         from scipy.interpolate import CubicSpline
@@ -93,7 +101,7 @@ class Candidates:
         spline = CubicSpline(self.knots, np.eye(len(self.knots)), bc_type=ends)
         self.basis = np.stack([spline(self.grid, k) for k in range(3)])
 
-    def finer(self, at: tuple[Array, Array], optimal: bool = False) -> Candidates:
+    def finer(self, at: Knots, optimal: bool = False) -> Candidates:
         """The same task with other knots."""
         return Candidates(
             self.limits, self.stations, at, self.bodies, self.clearance, self.cost, optimal
@@ -141,7 +149,7 @@ class Candidates:
         return over
 
     def _by_passes(self, q: Array, rate: Array, bend: Array) -> tuple[float, float]:
-        found = self.limits.passes(self.grid, q, rate, bend, sweeps=6)
+        found = self.limits.passes(self.grid, q, rate, bend, sweeps=2)
         T = found.duration
         if not self.cost.torque or not np.isfinite(T):
             return T, self.cost.time * T
@@ -198,26 +206,25 @@ class Candidates:
         )  # fmt: skip
         z = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
         tried = np.unique(np.clip([T, *(1.0 / z)], T, most))
-        costs = [
-            t * (time + torque * (aa / t**4 + 2 * ab / t**3 + (bb + 2 * ac) / t**2 + 2 * bc / t + cc))
-            for t in tried
-        ]  # fmt: skip
+        squares = [cc, 2.0 * bc, bb + 2.0 * ac, 2.0 * ab, aa]
+        costs = [t * (time + torque * sum(c / t**k for k, c in enumerate(squares))) for t in tried]
         k = int(np.argmin(costs))
         return float(tried[k]), float(costs[k])
 
 
-def knots_of(stations: Array, nodes: int) -> tuple[Array, Array]:
-    """Parameters (K,) of stations and nodes, and which are stations."""
+def knots_of(stations: Array, nodes: int) -> Knots:
+    """Knots of a path whose legs share its parameter as their lengths."""
     length = np.linalg.norm(np.diff(stations, axis=0), axis=1)
     share = np.maximum(length / length.sum(), _SHORTEST)
     return spread(np.concatenate(((0.0,), np.cumsum(share / share.sum()))), nodes)
 
 
-def spread(at: Array, nodes: int) -> tuple[Array, Array]:
-    """Knots (K,) with nodes spread evenly between stations, and which knots are stations."""
+def spread(at: Array, nodes: int) -> Knots:
+    """Knots with nodes spread evenly between stations, which are at given parameters."""
     share = np.diff(at)
     parts = np.ones(len(share), dtype=int)
     for _ in range(nodes):
         parts[(share / parts).argmax()] += 1
-    inner = [np.linspace(*at[i : i + 2], k + 1)[:-1] for i, k in enumerate(parts.tolist())]
-    return np.append(np.concatenate(inner), at[-1]), np.concatenate(((0,), np.cumsum(parts)))
+    inner = [np.linspace(at[i], at[i + 1], k + 1)[:-1] for i, k in enumerate(parts.tolist())]
+    fixed = np.concatenate((np.zeros(1, np.intp), np.cumsum(parts)))
+    return Knots(np.append(np.concatenate(inner), at[-1]), fixed)

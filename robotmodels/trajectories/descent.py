@@ -14,7 +14,8 @@ from .candidates import Candidates, Evaluated
 
 _FIRST = 0.1  # of the longest way of a joint: first bound of a step
 _LEAST = 1e-5
-_ENOUGH = 1e-4  # relative improvement that ends it
+_ENOUGH = 5e-4  # relative improvement; three smaller ones in a row end it
+_FAR = 1.2  # of a limit
 _NEAR = 0.2  # m: obstacles farther away than this do not count
 _STEP = 1e-6  # rad or m, of a derivative
 
@@ -30,7 +31,7 @@ def descended(
 
     now = task.evaluated(free)
     size = float(np.ptp(task.stations, axis=0).max())
-    radius, program = _FIRST * size, None
+    radius, program, slow = _FIRST * size, None, 0
     for _ in range(iterations):
         if radius < _LEAST * size or not np.isfinite(now.cost):
             break
@@ -50,7 +51,8 @@ def descended(
             continue
         radius *= 2.0 if better > 0.7 * hoped else 1.0 if better > 0.25 * hoped else 0.5
         free, now, program = trial, then, None
-        if better < _ENOUGH * now.penalized and hoped < 10.0 * _ENOUGH * now.penalized:
+        slow = slow + 1 if better < _ENOUGH * now.penalized else 0
+        if slow == 3:
             break
     return free, now
 
@@ -67,7 +69,7 @@ def _program(task: Candidates, free: Array, now: Evaluated) -> tuple[Array, Arra
 
     def add(by_q: Array, by_T: Array | float, value: Array, most: Array, slack: float) -> None:
         """Rows of ``value + step <= most``. Shapes: by_q (..., k), value and most (...)."""
-        wanted = np.isfinite(most)
+        wanted = most - value < _FAR * np.abs(most) + slack  # others do not bind within a step
         block = np.zeros((*value.shape, k + 2))
         block[..., :k], block[..., k], block[..., k + 1] = by_q, by_T, -slack
         rows.append(block[wanted])
@@ -115,14 +117,14 @@ def _torques(limits: object, q: Array, v: Array, a: Array, B: Array) -> tuple[Ar
         return np.zeros((G, n)), np.zeros((G, n, k * n + 1))
     drives = model.drive_matrices
     E = np.eye(n)
-    blocks = [(q, v, a)]
+    blocks: list[Any] = [(q, v, a)]
     # quadratic in v and linear in a: differences over steps of 1 are exact
     for part, h in enumerate((_STEP, 1.0, 1.0)):
         for j in range(n):
             for side in (h, -h):
                 moved = [q, v, a]
                 moved[part] = moved[part] + side * E[j]
-                blocks.append(tuple(moved))
+                blocks.append(moved)
     stacked = (np.concatenate(x) for x in zip(*blocks, strict=True))
     every = rigid_torques(model, *stacked).reshape(1 + 6 * n, G, n)
     tau = every[0]

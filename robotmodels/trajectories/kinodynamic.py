@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
 from .._arrays import Array, Value, as_exact, as_number, read_only
 from .._choices import chosen
 from .._outcomes import Outcome
-from ..dynamics import idm
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm import igm
@@ -25,25 +23,14 @@ from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
-from .candidates import Candidates, Cost, Evaluated, knots_of, spread
+from .candidates import Candidates, Cost, knots_of
 from .checks import checked_limits
-from .descent import descended
 from .limits import MotionLimits
 from .path_limits import SLOWEST, PathLimits
-from .random_profiles import half_width
-from .time_optimal import law_of, time_optimal
-from .time_scaling import stretched, time_scaled
-from .motions import TimedMotion
+from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import Trajectory
 
-_RATE = 500  # evaluations for each second
-_RESTARTS = 3
-_LEVELS = (9, 19)  # nodes of the profiles that are improved locally, of every restart
-_FINEST = 29  # of the best one
-_STEPS = 40
-_CHECKED = 10_001
-_HOT, _COLD = 0.1, 1e-3  # temperatures, of the cost of the start
-_NARROW = 0.1  # of the first steps: the last ones
+_QUICKEST = Cost()
 
 
 class Timing(Enum):
@@ -57,19 +44,6 @@ class Timing(Enum):
 
     OPTIMAL = "the quickest motion along its path"
     PROFILE = "its own profile over time, evenly stretched to the least duration"
-
-
-class PlanMethod(Enum):
-    """How the planner searches; the value says how.
-
-    Examples
-    --------
-    >>> PlanMethod.DESCENT.value
-    'local improvement of the straight path and of random ones'
-    """
-
-    ANNEAL = "simulated annealing of the nodes, then local improvement"
-    DESCENT = "local improvement of the straight path and of random ones"
 
 
 class PlanStatus(Outcome):
@@ -168,7 +142,9 @@ class Plan(Value):
     @property
     def spread(self) -> float:
         """Relative difference between the worst and the best restart."""
-        return float(np.ptp(self.restarts) / self.restarts.min()) if self.restarts.size else np.nan
+        if not np.isfinite(self.restarts).all() or not self.restarts.size:
+            return np.inf
+        return float(np.ptp(self.restarts) / self.restarts.min())
 
     def reason(self) -> str:
         """The status as a sentence, with the end and the joint."""
@@ -195,7 +171,7 @@ def kinodynamic(
     via: Sequence[ArrayLike | Pose] = (),
     obstacles: Iterable[Obstacle] | Obstacle = (),
     clearance: float = 0.0,
-    cost: Cost = Cost(),
+    cost: Cost = _QUICKEST,
     nodes: int = 4,
     method: PlanMethod | str = PlanMethod.ANNEAL,
     timing: Timing | str = Timing.OPTIMAL,
@@ -240,8 +216,8 @@ def kinodynamic(
     rng : Generator or int, optional
         Random numbers, or their seed; by default a fixed one.
     seconds : float
-        Greatest duration of the search, by the clock. It makes up to 500 evaluations for each second
-        and ends early; only if the clock ends it, results with one seed may differ.
+        Greatest duration of the search, by the clock. It makes up to 500 evaluations for each
+        second and ends early; only if the clock ends it, results with one seed may differ.
     progress : bool or callable
         Called with the number of evaluations and the least cost; True prints both.
 
@@ -276,14 +252,14 @@ def kinodynamic(
     wanted = as_number(clearance, "clearance", least=0.0)
     count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
-    search = _Search(as_number(seconds, "seconds", above=0.0), progress)
+    seconds = as_number(seconds, "seconds", above=0.0)
     given = [q0, *_listed(via), q1]
     postures = [_postures(model, each, k, given, problem) for k, each in enumerate(given)]
     missing = [k for k, each in enumerate(postures) if not len(each)]
     if missing:
         name = _name(missing[0], len(given))
         why = f"No posture reaches the pose {name} within the limits of position."
-        return search.without(PlanStatus.NONE_FOUND, why)
+        return _without(PlanStatus.NONE_FOUND, why)
     for status, test in (
         (PlanStatus.ENDS_NOT_HELD, _held), (PlanStatus.ENDS_IN_COLLISION, _clear),
     ):  # fmt: skip
@@ -294,59 +270,36 @@ def kinodynamic(
             postures[k] = postures[k][good]
             if not good.any():
                 end = k in (0, len(given) - 1)
-                return search.without(status if end else PlanStatus.NONE_FOUND, why)
+                return _without(status if end else PlanStatus.NONE_FOUND, why)
     generator = generator_of(rng)
-    optimal = timing is Timing.OPTIMAL
     tasks = []
     for choice in product(*postures):
         stations = np.array(choice)
         at = knots_of(stations, count)
+        optimal = timing is Timing.OPTIMAL
         task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
         tasks.append((task.evaluated(task.straight()).penalized, len(tasks), task))
-    tasks = [task for _, _, task in sorted(tasks)[:_RESTARTS]]
+    tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
+    search = Search(seconds, progress)
     results = []
-    for r in range(_RESTARTS):
-        found = _restart(search, tasks[r % len(tasks)], method, generator, r)
-        results.append(found)
-    return _best(search, results, model, limits, wanted)
+    for r in range(RESTARTS):
+        search.share((r + 1) / (RESTARTS + 1))
+        results.append(restart(search, tasks[r % len(tasks)], method, generator, r))
+    search.share(1.0)
+    results.sort(key=lambda result: result.found.penalized)
+    restarts = np.array([result.found.penalized for result in results])
+    best = best_motion(search, results, model, limits)
+    if best is None:
+        return replace(_without(PlanStatus.NONE_FOUND, ""), history=search.rows, restarts=restarts)
+    return Plan(
+        best.motion, PlanStatus.FOUND, best.cost, search.rows, best.use, restarts, best.times
+    )
 
 
-class _Search:
-    """Counts evaluations, keeps their costs and ends the search."""
-
-    __slots__ = ("allowed", "best", "deadline", "history", "report")
-
-    def __init__(self, seconds: float, progress: bool | Callable[[int, float], Any]) -> None:
-        self.deadline = time.monotonic() + seconds
-        self.allowed = int(_RATE * seconds) + 1
-        self.best = np.inf
-        self.history: list[tuple[int, float, float]] = []
-        self.report = progress if callable(progress) else (_printed if progress else None)
-
-    def evaluated(self, task: Candidates, free: Array) -> Evaluated | None:
-        """What became of a candidate; None when the search is over."""
-        if time.monotonic() > self.deadline:
-            return None
-        found = task.evaluated(free)
-        self.best = min(self.best, found.penalized)
-        self.history.append((len(self.history) + 1, found.penalized, self.best))
-        if self.report is not None and len(self.history) % 50 == 0:
-            self.report(len(self.history), self.best)
-        return found
-
-    def without(self, status: PlanStatus, why: str) -> Plan:
-        """A plan without a motion."""
-        none = np.empty(0)
-        return Plan(None, status, np.inf, self.rows, none, none, none, why)
-
-    @property
-    def rows(self) -> Array:
-        """History (N, 3)."""
-        return np.array(self.history).reshape(-1, 3)
-
-
-def _printed(evaluations: int, cost: float) -> None:
-    print(f"{evaluations} evaluations, least cost {cost:.6g}")
+def _without(status: PlanStatus, why: str) -> Plan:
+    """A plan without a motion."""
+    none = np.empty(0)
+    return Plan(None, status, np.inf, np.empty((0, 3)), none, none, none, why)
 
 
 def _listed(via: Any) -> list[Any]:
@@ -391,14 +344,14 @@ def _postures(
 
 def _held(
     problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[Array, str]:
+) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) the torques hold, and a sentence about the first."""
     rest = np.zeros(q.shape)
     load = np.abs(problem.rows(q, rest, rest).held)
     stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
     margin = problem.torque * (1.0 + 1e-9) + stuck - load
     j = int(margin[0].argmin())
-    return (margin >= 0.0).all(axis=1), (
+    return np.atleast_1d((margin >= 0.0).all(axis=1)), (
         f"The torques do not hold the robot at {name}: joint {j + 1} needs {load[0, j]:.6g} and "
         f"has {problem.torque[j]:.6g}, a margin of {margin[0, j]:.4g} (N m or N)."
     )
@@ -406,204 +359,11 @@ def _held(
 
 def _clear(
     problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[Array, str]:
+) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) keep the clearance, and a sentence about the first."""
     if not bodies or problem.model is None:
         return np.ones(len(q), np.bool_), ""
     distance = clearance_of(problem.model, q, bodies)
-    return distance >= wanted, (
+    return np.atleast_1d(distance >= wanted), (
         f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
     )
-
-
-def _annealed(
-    search: _Search, task: Candidates, rng: np.random.Generator, evaluations: int
-) -> tuple[Array, Evaluated]:
-    """Simulated annealing from the straight path, with steps that shrink with the temperature."""
-    free = best = task.straight()
-    now = least = task.evaluated(free)
-    width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
-    scale = now.penalized if np.isfinite(now.penalized) else 1.0
-    for k in range(evaluations):
-        cold = k / max(evaluations - 1, 1)
-        size = width * _NARROW**cold
-        wave = int(rng.geometric(0.5)) if len(free) > 1 else 1
-        bump = np.sin(wave * np.pi * task.knots[task.free]) / wave**2
-        step = bump[:, None] * rng.normal(0.0, 1.0, free.shape[1])
-        trial = free + size * step
-        then = search.evaluated(task, trial)
-        if then is None:
-            break
-        worse = then.penalized - now.penalized if np.isfinite(then.penalized) else np.inf
-        temperature = scale * _HOT * (_COLD / _HOT) ** cold
-        if not np.isfinite(now.penalized) or worse < temperature * rng.exponential():
-            free, now = trial, then
-        if now.penalized < least.penalized:
-            best, least = free, now
-            scale = least.penalized
-    return best, least
-
-
-def _restart(
-    search: _Search, task: Candidates, method: PlanMethod, rng: np.random.Generator, r: int
-) -> tuple[Evaluated, Candidates, Array, Trajectory | None]:
-    """One search: cost, profile and its nodes, and the path with the timing that it came from."""
-    free = task.straight()
-    if method is PlanMethod.ANNEAL:
-        free, now = _annealed(search, task, rng, search.allowed // (_RESTARTS + 1))
-    else:
-        if r:
-            width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
-            free = free + width * rng.uniform(-1.0, 1.0, free.shape)
-        now = task.evaluated(free)
-    if not task.optimal:
-        free, now = descended(task, free, 2 * _STEPS, search.evaluated)
-        return now, task, free, None
-    path, timed, at = _timed(task, free)
-    if timed is None:
-        return now, task, free, path
-    profile, fine, done = timed, task, now
-    for nodes in _LEVELS:
-        fine = task.finer(spread(at, nodes))
-        free = profile.q(fine.knots[fine.free] * profile.duration)
-        free, done = descended(fine, free, _STEPS, search.evaluated)
-        profile = fine.path(free)
-    return done, fine, free, path
-
-
-def _timed(task: Candidates, free: Array) -> tuple[Trajectory, Trajectory | None, Array]:
-    """A path, its quickest motion, and the fractions of time of its stations."""
-    path = task.path(free)
-    passes = task.limits.passes(task.grid, *task.sampled(free))
-    if not np.isfinite(passes.duration):
-        return path, None, np.empty(0)
-    law = law_of(task.grid, passes.found[:, 0])
-    at = np.interp(task.knots[task.fixed], task.grid, law.breaks[0]) / passes.duration
-    return path, Trajectory(TimedMotion(path.motion, law)), at
-
-
-def _best(
-    search: _Search, results: list[Any], model: RobotModel, limits: MotionLimits | None,
-    wanted: float,
-) -> Plan:  # fmt: skip
-    """The plan from the results of the restarts, the best of them refined once more."""
-    results = sorted(results, key=lambda found: found[0].penalized)
-    restarts = np.array([found[0].penalized for found in results])
-    for k, (done, task, free, path) in enumerate(results):
-        options = []
-        if np.isfinite(done.cost) and not task.optimal:
-            if path is not None and k == 0:
-                fine = task.finer(spread(task.knots[task.fixed], _FINEST))
-                start = task.path(free).q(fine.knots[fine.free])
-                finer, then = descended(fine, start, _STEPS, search.evaluated)
-                if then.penalized < done.penalized:
-                    done, task, free = then, fine, finer
-            options = _finished(search, task, free, model, limits, path is not None)
-        elif path is not None:
-            options = [_retimed(task, path, model, limits)]
-        options = [o for o in options if o is not None and _short(task, o, wanted) <= 1e-9]
-        if options:
-            costs = [_cost_of(task, model, option) for option in options]
-            i = int(np.argmin([c for c, _ in costs]))
-            times = _times_at(options[i], task.stations[1:-1])
-            return Plan(
-                options[i], PlanStatus.FOUND, costs[i][0], search.rows, costs[i][1], restarts, times
-            )
-    return search.without(PlanStatus.NONE_FOUND, "")
-
-
-def _finished(
-    search: _Search, task: Candidates, free: Array, model: RobotModel,
-    limits: MotionLimits | None, retimed: bool,
-) -> list[Trajectory | None]:  # fmt: skip
-    """Motions of a profile: stretched to the least duration, and timed anew along its path."""
-    for _ in range(4):
-        path = task.path(free)
-        scaled = time_scaled(path, model, task.limits.torque, limits).trajectory
-        if scaled is None:
-            break
-        short = _short(task, scaled, task.clearance)
-        if short <= 0.0:
-            break
-        task.margin += 1.5 * short + 1e-6
-        free, _ = descended(task, free, 8, search.evaluated)
-    if scaled is not None and task.cost.torque:
-        slow = task.evaluated(free).duration
-        if slow > scaled.duration:
-            scaled = Trajectory(stretched(scaled.motion, slow))
-    return [scaled, _retimed(task, path, model, limits) if retimed else None]
-
-
-def _retimed(
-    task: Candidates, path: Trajectory, model: RobotModel, limits: MotionLimits | None
-) -> Trajectory | None:  # fmt: skip
-    """The quickest motion along a path that keeps the limits between the points of its grid too."""
-    given = task.limits.limits
-    share = 1.0
-    for _ in range(4):
-        tight = MotionLimits(
-            given.velocity * share, given.acceleration * share,
-            velocity_lower=given.velocity_lower * share,
-            acceleration_lower=given.acceleration_lower * share,
-        )  # fmt: skip
-        motion = time_optimal(
-            path, tight, model, task.limits.torque * share, points=400, both_ends=True
-        ).trajectory
-        if motion is None:
-            return None
-        over = _use(task, model, motion)[1]
-        if over <= 1.0 + 1e-6:
-            return motion
-        share /= over
-    return None
-
-
-def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array, float]:
-    """Greatest torques over their limits (n,), and the greatest ratio to any limit."""
-    seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
-    bound, limits = task.limits.torque, task.limits.limits
-    with np.errstate(divide="ignore", invalid="ignore"):
-        torque = np.abs(idm(model, seen.q, seen.v, seen.a)).max(axis=0)
-        use = np.where(torque > 0.0, torque / bound, 0.0)
-        rates = [
-            np.where(side * x > 0.0, x / most, 0.0).max()
-            for x, upper, lower in (
-                (seen.v, limits.velocity, limits.velocity_lower),
-                (seen.a, limits.acceleration, limits.acceleration_lower),
-            )
-            for side, most in ((1.0, upper), (-1.0, lower))
-        ]
-    return use, float(max(use.max(), *rates))
-
-
-def _cost_of(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[float, Array]:
-    """Cost of a motion and the greatest torques over their limits (n,)."""
-    use, _ = _use(task, model, motion)
-    cost = task.cost.time * motion.duration
-    if task.cost.torque:
-        seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
-        ratio = idm(model, seen.q, seen.v, seen.a) / task.limits.torque
-        cost += task.cost.torque * float((ratio**2).sum(axis=1).mean()) * motion.duration
-    return cost, use
-
-
-def _short(task: Candidates, motion: Trajectory, wanted: float) -> float:
-    """How far a motion is outside of the limits of position or the clearance, at many times."""
-    margin, task.margin = task.margin, 0.0
-    found = task.violation(motion.q(np.linspace(0.0, motion.duration, _CHECKED)))
-    task.margin = margin
-    return found
-
-
-def _times_at(motion: Trajectory, stations: Array) -> Array:
-    """Times (k,) at which configurations (k, n) are met, in this order."""
-    times, low = [], 0.0
-    for q in stations:
-        a, b = low, motion.duration
-        for _ in range(12):
-            t = np.linspace(a, b, 401)
-            k = int(np.linalg.norm(motion.q(t) - q, axis=1).argmin())
-            a, b = t[max(k - 1, 0)], t[min(k + 1, 400)]
-        times.append(t[k])
-        low = t[k]
-    return np.array(times)

@@ -157,6 +157,9 @@ class PathLimits:
         """Quickest rates at points s (N + 1,) of a path whose derivatives are given there."""
         rows = self.rows(q, rate, bend) if rows is None else rows
         steps, given = np.diff(s), np.square(ends)
+        if ends[1] == 0.0:  # at rest dry friction does not help to brake
+            held = rows.held[-1, self.loaded]
+            rows.c[-1, self.acceleration.size :] = held / self.scale[self.acceleration.size :]
         now = self._swept(steps, rows, given)
         if not self.viscous or now.failed >= 0:
             return now
@@ -165,15 +168,18 @@ class PathLimits:
         x, best, turns = now.found[:, 0], None, self.direction(rate)
         for _ in range(sweeps):
             speed = np.sqrt(np.maximum(x, 0.0))[:, None]
-            here = self.drag(q, turns * speed)[:, self.loaded]
-            over, under = (
-                self.drag(q, turns * speed * (1.0 + h))[:, self.loaded] for h in (1e-4, -1e-4)
-            )
-            moving = x[:, None] > 0.0
-            slope = np.where(moving, (over - under) / np.where(moving, 4e-4 * x[:, None], 1.0), 0.0)
+            here = self.drag(q, turns * speed)[:, self.loaded] - first
+            square = np.where(x > 0.0, x, np.inf)[:, None]
+            if self.friction is None:  # proportional to the speed
+                slope = 0.5 * here / square
+            else:
+                over, under = (
+                    self.drag(q, turns * speed * (1.0 + h))[:, self.loaded] for h in (1e-4, -1e-4)
+                )
+                slope = (over - under) / (4e-4 * square)
             b, c = rows.b.copy(), rows.c.copy()
             b[:, k:] += slope / self.scale[k:]
-            c[:, k:] += np.where(moving, here - slope * x[:, None] - first, 0.0) / self.scale[k:]
+            c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
             last, now = now, self._swept(steps, rows._replace(b=b, c=c), given)
             if now.failed >= 0:
                 x = 0.25 * x

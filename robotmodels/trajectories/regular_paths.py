@@ -1,4 +1,4 @@
-"""Paths with a regular parameter: their own, or the length where their own timing rests or jumps."""
+"""Paths with a regular parameter: their own, or their length where that rests or jumps."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..kinematics.singular.task import whole_number
 from ..model import RobotModel, check_model
 from .joint_path import joint_path
 from .motions import Motion
+from .path_events import PathEventKind
 from .point_to_point import linear
 from .pose_trajectory import PoseTrajectory
 from .splines import cubic_spline
@@ -49,7 +50,9 @@ def _through_poses(path: PoseTrajectory, model: RobotModel | None, points: int) 
     evenly = PoseTrajectory(path.path, linear(0.0, end, duration=end))
     found = joint_path(model, evenly, samples=2 * max(points, 200) + 1)
     if not found.complete:
-        return f"The joints cannot follow the poses: {found.events[0]}"
+        stops = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
+        first = next(event for event in found.events if event.kind in stops)
+        return f"The joints cannot follow the poses: {first}"
     return _regular(cubic_spline(found.q, found.t, ends="not_a_knot").motion, points)
 
 
@@ -57,31 +60,32 @@ def _regular(motion: Motion, points: int) -> Motion | str:
     """The motion itself where its velocity is continuous and nowhere small, else by its length."""
     end = float(motion.duration)
     t = np.linspace(0.0, end, _SAMPLES * points + 1)
-    (rate,) = motion.derivatives(t, (1,))
+    q, rate = motion.derivatives(t, (0, 1))
     speed = np.sqrt((rate * rate).sum(axis=1))
     most = float(speed.max())
-    if speed.min() > _SLOW * most and not _jumps(motion, t, rate, most):
+    if speed.min() > _SLOW * most and not _jumps(motion, t, q, most):
         return motion
     return _by_length(motion, np.linspace(0.0, end, 10 * _KNOTS + 1))
 
 
-def _jumps(motion: Motion, t: Array, rate: Array, most: float) -> bool:
-    """Whether the velocity jumps: a change between samples that does not shrink with their step."""
-    step = np.diff(rate, axis=0)
-    bend = np.abs(np.diff(step, axis=0)).max(axis=1, initial=0.0)
+def _jumps(motion: Motion, t: Array, q: Array, most: float) -> bool:
+    """Whether the velocity jumps: a change of slope that does not shrink with the step."""
+    slope = np.diff(q, axis=0) / np.diff(t)[:, None]
+    change = np.diff(slope, axis=0)
+    bend = np.abs(np.diff(change, axis=0)).max(axis=1, initial=0.0)
     at = np.flatnonzero(bend > _BEND * most)
     at = at[np.argsort(bend[at])[-20:]]
     if not at.size:
         return False
-    low, high, first = t[at], t[at + 2], bend[at]
-    change = first
+    low, high, first, left = t[at], t[at + 3], bend[at], bend[at]
     for _ in range(_ROUNDS):
         fine = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _ZOOM)
-        (values,) = motion.derivatives(fine.reshape(-1), (1,))
-        steps = np.abs(np.diff(values.reshape(*fine.shape, -1), axis=1)).max(axis=2)
+        (values,) = motion.derivatives(fine.reshape(-1), (0,))
+        slopes = np.diff(values.reshape(*fine.shape, -1), axis=1) / np.diff(fine)[..., None]
+        steps = np.abs(np.diff(slopes, axis=1)).max(axis=2)
         k, row = steps.argmax(axis=1), np.arange(at.size)
-        low, high, change = fine[row, k], fine[row, k + 1], steps[row, k]
-    return bool((change > 0.2 * first).any())
+        low, high, left = fine[row, k], fine[row, k + 2], steps[row, k]
+    return bool((left > 0.2 * first).any())
 
 
 def _by_length(motion: Motion, t: Array) -> Motion | str:
@@ -122,7 +126,7 @@ def _is_kink(motion: Motion, low: float, high: float, length: float, turn: float
         k = int(turns.argmax())
         if turns[k] < 0.5 * turn:
             return False
-        low, high = t[seen[k]], t[seen[k + 1] + 1]
+        low, high = float(t[seen[k]]), float(t[seen[k + 1] + 1])
     return True
 
 

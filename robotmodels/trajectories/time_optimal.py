@@ -56,7 +56,7 @@ class TimedPath(Value):
         does (one interval at a change between two limits).
     grid_gap : float
         Relative difference from the duration on the grid with half as many intervals, which
-        estimates the relative error of the duration.
+        estimates the relative error of the duration; infinite without one.
     explanation : str
         Details of the status.
 
@@ -74,7 +74,7 @@ class TimedPath(Value):
     rate: Array
     maximum_rate: Array
     active: NDArray[np.str_]
-    grid_gap: float = np.nan
+    grid_gap: float = np.inf
     explanation: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -205,9 +205,7 @@ def time_optimal(
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = problem.passes(
-        s[half], q[half], rate[half], bend[half], ends, _part(passes.rows, half)
-    )
+    coarse = problem.passes(s[half], q[half], rate[half], bend[half], ends, _part(rows, half))
     gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
     if torque_rate is not None or np.isfinite(problem.limits.jerk).any():
         raise NotImplementedError
@@ -248,7 +246,7 @@ def law_of(s: Array, x: Array) -> PiecewisePolynomial:
 
 def _without(status: TimingStatus, why: str) -> TimedPath:
     none = np.empty(0)
-    return TimedPath(None, status, none, none, none, np.empty(0, str), np.nan, why)
+    return TimedPath(None, status, none, none, none, np.empty(0, str), np.inf, why)
 
 
 def _part(rows: Rows, at: NDArray[np.intp]) -> Rows:

@@ -54,8 +54,8 @@ class ScaledTrajectory(Value):
         Samples, as fractions of the duration.
     windows : ndarray, shape (N, 2)
         Least and greatest duration with which each sample keeps the limits, s: the window of the
-        shortest ones if there are several, NaN if there is none. The greatest is infinite where
-        the robot is held still.
+        shortest ones if there are several, both infinite if there is none. The greatest is
+        infinite where the robot is held still.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class ScaledTrajectory(Value):
         return self.status.sentence
 
     def __repr__(self) -> str:
-        most = np.nanmax(self.windows[:, 0], initial=0.0)
+        most = self.windows[:, 0].max(initial=0.0)
         return (
             f"<ScaledTrajectory: {self.status.name}, {self.duration:.6g} s\n"
             f"  windows of {len(self.windows)} samples begin at {most:.6g} s at the latest>"
@@ -166,7 +166,7 @@ def time_scaled(
     if not _held(model, motion, bound):
         return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows)
     T = _least_duration(model, motion, bound, least)
-    if np.isnan(T):
+    if np.isinf(T):
         heavy = (np.abs(parts[2]) > bound).any()
         status = ScalingStatus.NOT_HELD_STILL if heavy else ScalingStatus.NO_WINDOW
         return ScaledTrajectory(None, status, fraction, windows)
@@ -202,7 +202,7 @@ def windows_of(parts: tuple[Array, Array, Array], bound: Array, least: float) ->
     slow = np.where((high < z) & (low < high), high, 0.0).max(axis=-1, initial=0.0)
     with np.errstate(divide="ignore"):
         window = np.stack((1.0 / z[..., 0], 1.0 / slow), axis=-1)
-    return np.where(z > 0.0, window, np.nan)
+    return np.where(z > 0.0, window, np.inf)
 
 
 def _forbidden(parts: tuple[Array, Array, Array], bound: Array) -> tuple[Array, Array]:
@@ -210,7 +210,7 @@ def _forbidden(parts: tuple[Array, Array, Array], bound: Array) -> tuple[Array, 
 
     Of ``A z^2 + B z + c > 0`` with ``c = +-C - bound``: outside of the roots, or between them.
     """
-    A, B, C = (np.concatenate((x, -x), axis=-1) for x in parts)
+    A, B, C = (np.concatenate((x, 0.0 - x), axis=-1) + 0.0 for x in parts)  # no -0.0
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         c = C - np.concatenate((bound, bound))
         square = np.where(np.isfinite(c), B * B - 4.0 * A * c, 0.0)
@@ -249,8 +249,7 @@ def _earliest(
     model: RobotModel, motion: Motion, fraction: Array, bound: Array, least: float
 ) -> Array:  # fmt: skip
     """Least duration (N,) at samples; infinite where there is none."""
-    windows = windows_of(torque_parts(model, motion, fraction), bound, least)
-    return np.nan_to_num(windows[:, 0], nan=np.inf, posinf=np.inf)
+    return windows_of(torque_parts(model, motion, fraction), bound, least)[:, 0]
 
 
 def _held(model: RobotModel, motion: Motion, bound: Array) -> bool:
