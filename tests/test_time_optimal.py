@@ -175,6 +175,29 @@ def test_rates_at_the_ends():
     assert "2" in time_optimal(line([0.0], [1.0]), limits, end_rate=3.0).reason()
 
 
+def test_limits_of_jerk_and_of_the_rates_of_torques():
+    limits = MotionLimits(velocity=1.0, acceleration=2.0, jerk=10.0)
+    timed = time_optimal(line([0.0], [1.0]), limits)
+    assert timed.trajectory.check(limits, 0.011).kept
+    exact = tr.jerk_limited([0.0], [1.0], limits=limits).duration
+    assert exact * 0.995 <= timed.duration <= 1.03 * exact
+    assert (timed.active == "rate").any()
+    path, model, torque = PATHS["spline"], planar(), np.array([120.0, 40.0])
+    before = time_optimal(path, FREE, model, torque, points=100)
+    for factor in (60.0, 20.0, 8.0):
+        rate = factor * torque
+        timed = time_optimal(path, FREE, model, torque, rate, points=100, both_ends=True)
+        t = np.linspace(0, timed.duration, 4001)
+        tau = rm.idm(model, *(getattr(timed.trajectory, x)(t) for x in "qva"))
+        slope = np.abs(np.diff(tau, axis=0)) / t[1]
+        assert np.quantile(slope / rate, 0.95) <= 1.02
+        assert (np.abs(tau) / torque).max() <= 1.06
+        assert timed.duration > before.duration
+        before = timed
+    by_friction = time_optimal(path, FREE, planar(Fv=[5.0, 2.0]), torque, 20 * torque, points=60)
+    assert by_friction.status is TimingStatus.OPTIMAL
+
+
 def test_gravity_beyond_the_torques_is_named_first():
     model = planar()
     held = np.abs(rm.gravity_torque(model, [0.0, 0.0]))

@@ -54,26 +54,30 @@ class PathLimits:
 
     __slots__ = (
         "acceleration", "drives", "ends", "friction", "limits", "loaded", "lower", "model", "n",
-        "names", "scale", "torque", "upper", "viscous",
+        "names", "rates", "scale", "torque", "upper", "viscous",
     )  # fmt: skip
 
     def __init__(
         self, n: int, model: RobotModel | None, limits: MotionLimits | None,
-        torque: object, friction: bool | Friction, both_ends: bool,
+        torque: object, friction: bool | Friction, both_ends: bool, torque_rate: object = None,
     ) -> None:  # fmt: skip
         bounds = checked_limits(MotionLimits() if limits is None else limits, n)
         assert bounds is not None
         self.n, self.model, self.limits = n, model, bounds
         self.torque = checked_torque(torque, model, n)
-        rows = np.isfinite(bounds.acceleration) | np.isfinite(bounds.acceleration_lower)
+        jerk = np.minimum(bounds.jerk, -bounds.jerk_lower)
+        none = np.full(n, np.inf)
+        pull = none if torque_rate is None else checked_torque(torque_rate, model, n, "torque_rate")
+        rows = np.isfinite([bounds.acceleration, bounds.acceleration_lower, jerk]).any(axis=0)
         self.acceleration = np.flatnonzero(rows)
-        self.loaded = np.flatnonzero(np.isfinite(self.torque))
+        self.loaded = np.flatnonzero(np.isfinite([self.torque, pull]).any(axis=0))
         lower = (bounds.acceleration_lower[rows], -self.torque[self.loaded])
         upper = (bounds.acceleration[rows], self.torque[self.loaded])
         lower, upper = np.concatenate(lower), np.concatenate(upper)
         size = np.maximum(*(np.where(np.isfinite(b), np.abs(b), 0.0) for b in (lower, upper)))
         self.scale = np.where(size > 0.0, size, 1.0)
         self.lower, self.upper = lower / self.scale, upper / self.scale
+        self.rates = np.concatenate((jerk[rows], pull[self.loaded])) / self.scale
         # accelerations at both ends of every interval, as is usual; torques if asked for
         self.ends = np.repeat([1, int(both_ends)], [self.acceleration.size, self.loaded.size])
         self.names = np.array(
@@ -163,24 +167,9 @@ class PathLimits:
         now = self._swept(steps, rows, given)
         if not self.viscous or now.failed >= 0:
             return now
-        first = self.drag(q, SLOWEST * self.direction(rate))[:, self.loaded]
-        k = self.acceleration.size
-        x, best, turns = now.found[:, 0], None, self.direction(rate)
+        x, best = now.found[:, 0], None
         for _ in range(sweeps):
-            speed = np.sqrt(np.maximum(x, 0.0))[:, None]
-            here = self.drag(q, turns * speed)[:, self.loaded] - first
-            square = np.where(x > 0.0, x, np.inf)[:, None]
-            if self.friction is None:  # proportional to the speed
-                slope = 0.5 * here / square
-            else:
-                over, under = (
-                    self.drag(q, turns * speed * (1.0 + h))[:, self.loaded] for h in (1e-4, -1e-4)
-                )
-                slope = (over - under) / (4e-4 * square)
-            b, c = rows.b.copy(), rows.c.copy()
-            b[:, k:] += slope / self.scale[k:]
-            c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
-            last, now = now, self._swept(steps, rows._replace(b=b, c=c), given)
+            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given)
             if now.failed >= 0:
                 x = 0.25 * x
                 now = last
@@ -189,6 +178,27 @@ class PathLimits:
                 return now
             best, x = now, now.found[:, 0]
         return now if best is None else best
+
+    def tangent(self, rows: Rows, x: Array, q: Array, rate: Array) -> Rows:
+        """Rows with the friction that depends on the speed, by its tangent at squared rates x."""
+        if not self.viscous:
+            return rows
+        k, turns = self.acceleration.size, self.direction(rate)
+        speed = np.sqrt(np.maximum(x, 0.0))[:, None]
+        square = np.where(x > 0.0, x, np.inf)[:, None]
+        first = self.drag(q, SLOWEST * turns)
+        here = (self.drag(q, turns * speed) - first)[:, self.loaded]
+        if self.friction is None:  # proportional to the speed
+            slope = 0.5 * here / square
+        else:
+            over, under = (
+                self.drag(q, turns * speed * (1.0 + h))[:, self.loaded] for h in (1e-4, -1e-4)
+            )
+            slope = (over - under) / (4e-4 * square)
+        b, c = rows.b.copy(), rows.c.copy()
+        b[:, k:] += slope / self.scale[k:]
+        c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
+        return rows._replace(b=b, c=c)
 
     def _swept(self, steps: Array, rows: Rows, given: Array) -> Passes:
         from .kernels import path_rates
@@ -205,18 +215,22 @@ class PathLimits:
         return Passes(found, -1, duration, rows)
 
 
-def checked_torque(torque: object, model: RobotModel | None, n: int) -> Array:
+def checked_torque(
+    torque: object, model: RobotModel | None, n: int, name: str = "torque"
+) -> Array:  # fmt: skip
     """Greatest torques (n,), infinite where there is no limit; by default those of the table."""
     if model is None:
         if torque is not None:
-            raise InvalidValueError("torque: limits of torque need model=, whose torques they are.")
+            raise InvalidValueError(
+                f"{name}: limits of torque need model=, whose torques they are."
+            )
         return np.full(n, np.inf)
     check_model(model)
     if model.n != n:
         raise ShapeError(f"path: expected {model.n} joints, as {model.name} has, got {n}.")
-    limit = as_reals(model.table.effort if torque is None else torque, "torque")  # type: ignore[arg-type]
+    limit = as_reals(model.table.effort if torque is None else torque, name)  # type: ignore[arg-type]
     if limit.shape not in ((), (n,)):
-        raise ShapeError(f"torque: expected one number or {n}, got shape {limit.shape}.")
+        raise ShapeError(f"{name}: expected one number or {n}, got shape {limit.shape}.")
     if not (limit >= 0.0).all():
-        raise InvalidValueError(f"torque: expected limits of at least 0 N m, got {limit}.")
+        raise InvalidValueError(f"{name}: expected limits of at least 0 N m, got {limit}.")
     return np.broadcast_to(limit, n)

@@ -18,6 +18,7 @@ from .motions import TimedMotion
 from .path_limits import SLOWEST, Passes, PathLimits, Rows
 from .piecewise import PiecewisePolynomial
 from .pose_trajectory import PoseTrajectory
+from .rate_limits import rate_limited
 from .regular_paths import checked_points, path_of, toward_ends
 from .trajectory import Trajectory
 
@@ -52,8 +53,9 @@ class TimedPath(Value):
     maximum_rate : ndarray, shape (N,)
         Greatest rate that the limits allow at each point alone: the maximum velocity curve.
     active : ndarray of str, shape (N,)
-        The limit that binds from each point on, such as ``"torque of joint 2"``; empty where none
-        does (one interval at a change between two limits).
+        The limit that binds from each point on, such as ``"torque of joint 2"``; ``"rate"`` where
+        a limit of jerk or of the rate of a torque makes the motion slower; empty where none does
+        (one interval at a change between two limits).
     grid_gap : float
         Relative difference from the duration on the grid with half as many intervals, which
         estimates the relative error of the duration; infinite without one.
@@ -140,8 +142,8 @@ def time_optimal(
         Greatest torques of both signs, N m or N; default those of the model's table. Infinity is
         no limit.
     torque_rate : array_like, shape () or (n,), optional
-        Greatest rates of the torques, N m/s or N/s, from rest to rest. The motion is then a local
-        optimum, found from the one without them.
+        Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
+        is then a local optimum, found from the one without them, and keeps them within 1 %.
     friction : bool or Friction
         Whether Fv and Fc of the drives count; or a friction model that acts besides. Rotor inertia
         and offsets always count.
@@ -181,12 +183,13 @@ def time_optimal(
                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
     motion, scalar = path_of(path, model, points)
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
-    problem = PathLimits(n, model, limits, torque, friction, both_ends)
+    problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
     own = isinstance(path, Trajectory) and motion is path.motion
-    even = np.linspace(0.0, 1.0, points + 1)
-    s = float(motion.duration) * (even if own else toward_ends(points))
+    evenly = own and not np.isfinite(problem.rates).any()
+    s = np.linspace(0.0, 1.0, points + 1) if evenly else toward_ends(points)
+    s = float(motion.duration) * s
     q, rate, bend = motion.derivatives(s, (0, 1, 2))
     checked_limits(problem.limits, n, q)
     if isinstance(path, Trajectory) and not own:  # rates of the length
@@ -207,15 +210,22 @@ def time_optimal(
     half = np.append(np.arange(0, points, 2), points)
     coarse = problem.passes(s[half], q[half], rate[half], bend[half], ends, _part(rows, half))
     gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
-    if torque_rate is not None or np.isfinite(problem.limits.jerk).any():
-        raise NotImplementedError
     x = passes.found[:, 0]
     if not x.max() < 1e200:
         raise InvalidValueError(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
-    law = law_of(s, passes.found[:, 0])
+    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    if np.isfinite(problem.rates).any():
+        slower = rate_limited(problem, s, q, rate, rows, x)
+        if slower is None:
+            return _without(
+                TimingStatus.NOT_CONTROLLABLE,
+                "No motion was found that keeps the limits of jerk or of the rates of torques.",
+            )
+        slowed = slower[0] < x * (1.0 - 1e-3)
+        x, law = slower
     trajectory = Trajectory(TimedMotion(motion, law), scalar)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
@@ -229,7 +239,7 @@ def time_optimal(
         s,
         np.sqrt(np.maximum(x, 0.0)),
         np.sqrt(np.maximum(passes.found[:, 4], 0.0)),
-        problem.names[code],
+        np.where(slowed, "rate", problem.names[code]),
         gap,
     )
 
