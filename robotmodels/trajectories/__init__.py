@@ -1,10 +1,11 @@
 """Trajectories: motion from poses and postures, by laws of time that keep limits.
 
-Seed book sections 4.2 and 4.3. Every generator of joint motion returns a `Trajectory`; the plain
+Seed book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; the plain
 arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`.
 """
 
 from .blends import blended_lines
+from .candidates import Cost
 from .cartesian import (
     blended_poses,
     circle,
@@ -14,6 +15,7 @@ from .cartesian import (
 from .harmonics import FourierSeries, fourier, fourier_basis
 from .jerk import jerk_limited
 from .joint_path import JointPath, joint_path
+from .kinodynamic import Plan, PlanMethod, PlanStatus, Pose, Timing, kinodynamic
 from .laws import TimeLaw
 from .limits import LimitsReport, MotionLimits
 from .path_events import PathEvent, PathEventKind
@@ -28,25 +30,39 @@ from .point_to_point import (
     trapezoidal,
 )
 from .pose_trajectory import PoseSamples, PoseTrajectory
+from .random_profiles import ProfileLaw, random_profile
 from .resolved_motion import ResolvedMotion, resolved_motion
 from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
+from .time_optimal import TimedPath, TimingStatus, time_optimal
+from .time_scaling import ScaledTrajectory, ScalingStatus, time_scaled
 from .trajectory import Samples, Trajectory
 
 __all__ = [
+    "Cost",
     "FourierSeries",
     "JointPath",
     "LimitsReport",
     "MotionLimits",
     "PathEvent",
     "PathEventKind",
+    "Plan",
+    "PlanMethod",
+    "PlanStatus",
+    "Pose",
     "PoseSamples",
     "PoseTrajectory",
+    "ProfileLaw",
     "ResolvedMotion",
     "Samples",
+    "ScaledTrajectory",
+    "ScalingStatus",
     "SplineEnds",
     "Synchronisation",
     "TimeLaw",
+    "TimedPath",
+    "Timing",
+    "TimingStatus",
     "Trajectory",
     "along_line",
     "bang_bang",
@@ -62,11 +78,15 @@ __all__ = [
     "jerk_limited",
     "joint_path",
     "joint_trajectory",
+    "kinodynamic",
     "linear",
     "quintic",
     "quintic_spline",
+    "random_profile",
     "resolved_motion",
     "smoothed_trapezoidal",
     "straight_line",
+    "time_optimal",
+    "time_scaled",
     "trapezoidal",
 ]

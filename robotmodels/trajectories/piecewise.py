@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, read_only
+from .._arrays import Array, Value, read_only
 from ..errors import ShapeError
 
 _ROUNDING = 1e-9  # jumps smaller than this beside the largest value are put down to rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PiecewisePolynomial:
+class PiecewisePolynomial(Value):
     """Polynomials of the normalised time of each piece.
 
     Shapes: breaks (..., c, K + 1), coefficients (..., K, d + 1, n), lengths (..., c, K).

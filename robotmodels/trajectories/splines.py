@@ -62,6 +62,7 @@ class SplineEnds(Enum):
 
     CLAMPED = "given velocities at the ends"
     NATURAL = "no acceleration at the ends"
+    NOT_A_KNOT = "one polynomial on the first two intervals, and one on the last two"
     PERIODIC = "velocity and acceleration go on from the last point at the first"
 
 
@@ -103,6 +104,7 @@ def cubic_spline(
     condition: Any = {
         SplineEnds.CLAMPED: ((1, knots.rates["v0"]), (1, knots.rates["v1"])),
         SplineEnds.NATURAL: "natural",
+        SplineEnds.NOT_A_KNOT: "not-a-knot",
         SplineEnds.PERIODIC: "periodic",
     }[ends]
     spline = CubicSpline(knots.times, q, bc_type=condition)

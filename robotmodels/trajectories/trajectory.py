@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, read_only
-from ..errors import InvalidValueError
+from .._arrays import Array, Value, as_floats, as_number, read_only
+from ..errors import InvalidValueError, ShapeError
 from .limits import LimitsReport, MotionLimits
+from .motions import FunctionMotion, Motion
 from .number_text import counted, greatest_shown, seconds_shown
-
-
-class Motion(Protocol):
-    """What a `Trajectory` is made of: functions of time for n joints."""
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        ...
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """Leading axes: one motion each."""
-        ...
-
-    @property
-    def duration(self) -> Array:
-        """Durations, s, shape (...)."""
-        ...
-
-    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
-        ...
-
-    def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value (..., n) of a derivative over the motion."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +72,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+class Trajectory(Value):
     """Motion of joints over a time from 0 to ``duration``.
 
     Before and after it the joints stay where they are, if the motion begins and ends at rest;
@@ -119,6 +94,35 @@ class Trajectory:
     scalar: bool = False
     repeats: bool = False
     holds: bool = False
+
+    @classmethod
+    def from_functions(
+        cls,
+        q: Callable[[Array], ArrayLike],
+        duration: float,
+        v: Callable[[Array], ArrayLike] | None = None,
+        a: Callable[[Array], ArrayLike] | None = None,
+        jerk: Callable[[Array], ArrayLike] | None = None,
+    ) -> Self:
+        """Motion by functions of times t (N,), which return arrays (N, n), or (N,) for scalars.
+
+        Derivatives that are not given are differences of the last one given (errors of about
+        1e-12 of a first, 1e-10 of a second derivative). `check` looks at samples of such a motion.
+        """
+        end = as_number(duration, "duration", above=0.0)
+        functions = (q, *(f for f in (v, a, jerk) if f is not None))
+        given = [f is not None for f in (v, a, jerk)]
+        if not all(map(callable, functions)) or given != sorted(given, reverse=True):
+            raise InvalidValueError(
+                "q, v, a, jerk: expected functions of time, each with those before it."
+            )
+        ends = np.array([0.0, 0.5 * end, end])
+        shape = np.shape(q(ends))
+        if len(shape) not in (1, 2) or shape[0] != 3 or shape[-1] == 0:
+            raise ShapeError(f"q: expected an array (3, n) for three times, got shape {shape}.")
+        motion = FunctionMotion(functions, end, 1 if len(shape) == 1 else shape[1])
+        motion.derivatives(ends, (0, 1, 2, 3))
+        return cls(motion, scalar=len(shape) == 1)
 
     @property
     def n(self) -> int:

@@ -28,6 +28,7 @@ from .processing import plot_processing
 from .report import html_report, identification_html
 from .scene import Scene
 from .show import animate, jog, show
+from .time_optimal import plot_phase_plane, plot_plan
 from .trajectories import (
     plot_joint_motion,
     plot_joint_path,
@@ -64,6 +65,8 @@ __all__ = [
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
+    "plot_phase_plane",
+    "plot_plan",
     "plot_pose_path",
     "plot_processing",
     "plot_profiles",

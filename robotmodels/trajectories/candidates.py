@@ -1,0 +1,230 @@
+"""Candidates of the kinodynamic planner: paths through free nodes, their timing and their cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, as_number
+from ..errors import InvalidValueError
+from ..obstacles.clearance import link_distances
+from ..obstacles.shapes import Obstacle
+from .path_limits import PathLimits
+from .splines import SplineEnds, cubic_spline
+from .time_scaling import windows_of
+from .trajectory import Trajectory
+
+_GRID = 60  # intervals
+_SHORTEST = 0.05  # share of the parameter of a leg
+_PENALTY = 20.0  # of the duration, for each unit of violation
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Objective of the planner: ``time * T + torque * integral of sum (tau / limit)^2 dt``.
+
+    Parameters
+    ----------
+    time : float
+        Weight of the duration, 1/s.
+    torque : float
+        Weight of the squared torques, each in units of its limit, 1/s.
+
+    Raises
+    ------
+    InvalidValueError
+        A negative weight, or both zero.
+
+    Examples
+    --------
+    >>> Cost(torque=0.5)
+    Cost(time=1.0, torque=0.5)
+    """
+
+    time: float = 1.0
+    torque: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("time", "torque"):
+            object.__setattr__(self, name, as_number(getattr(self, name), name, least=0.0))
+        if not self.time + self.torque > 0.0:
+            raise InvalidValueError("time, torque: expected at least one weight above zero.")
+
+
+class Knots(NamedTuple):
+    """Parameters (K,) of stations and nodes, and which of them are stations."""
+
+    at: Array
+    fixed: NDArray[np.intp]
+
+
+class Evaluated(NamedTuple):
+    """What became of a candidate; its duration is infinite where it has no timing."""
+
+    cost: float
+    duration: float
+    violation: float
+
+    @property
+    def penalized(self) -> float:
+        """Cost with a penalty, for the search."""
+        return self.cost * (1.0 + _PENALTY * self.violation)
+
+
+class Candidates:
+    """Paths through stations that are given and nodes between them that are free.
+
+    With ``optimal`` a path is timed exactly; else it is a profile at rest at its ends, over a
+    parameter that is the time divided by the duration.
+    """
+
+    __slots__ = (
+        "basis", "bodies", "clearance", "cost", "fixed", "free", "grid", "knots", "limits",
+        "margin", "optimal", "stations",
+    )  # fmt: skip
+
+    def __init__(
+        self, limits: PathLimits, stations: Array, at: Knots,
+        bodies: tuple[Obstacle, ...], clearance: float, cost: Cost, optimal: bool,
+    ) -> None:  # fmt: skip
+        from scipy.interpolate import CubicSpline
+
+        self.limits, self.stations, (self.knots, self.fixed) = limits, stations, at
+        self.bodies, self.clearance, self.cost, self.optimal = bodies, clearance, cost, optimal
+        self.margin = 0.0
+        self.free = np.setdiff1d(np.arange(len(self.knots)), self.fixed)
+        self.grid = np.linspace(0.0, 1.0, max(_GRID, 4 * len(self.knots)) + 1)
+        ends = "not-a-knot" if optimal else "clamped"
+        spline = CubicSpline(self.knots, np.eye(len(self.knots)), bc_type=ends)
+        self.basis = np.stack([spline(self.grid, k) for k in range(3)])
+
+    def finer(self, at: Knots, optimal: bool = False) -> Candidates:
+        """The same task with other knots."""
+        return Candidates(
+            self.limits, self.stations, at, self.bodies, self.clearance, self.cost, optimal
+        )
+
+    def straight(self) -> Array:
+        """Nodes (k, n) on the straight lines between the stations."""
+        along = [np.interp(self.knots, self.knots[self.fixed], x) for x in self.stations.T]
+        return np.stack(along, axis=-1)[self.free]
+
+    def points(self, free: Array) -> Array:
+        """Stations and nodes (K, n) in the order of the path."""
+        points = np.empty((len(self.knots), self.stations.shape[1]))
+        points[self.fixed], points[self.free] = self.stations, free
+        return points
+
+    def path(self, free: Array) -> Trajectory:
+        """The path, over a parameter from 0 to 1."""
+        ends = SplineEnds.NOT_A_KNOT if self.optimal else SplineEnds.CLAMPED
+        return cubic_spline(self.points(free), self.knots, ends=ends)
+
+    def sampled(self, free: Array) -> tuple[Array, Array, Array]:
+        """Positions on the grid and their derivatives by the parameter, each (G + 1, n)."""
+        q, rate, bend = self.basis @ self.points(free)
+        return q, rate, bend
+
+    def evaluated(self, free: Array) -> Evaluated:
+        """Timing, cost and violation of a candidate."""
+        q, rate, bend = self.sampled(free)
+        violation = self.violation(q)
+        if self.optimal:
+            T, cost = self._by_passes(q, rate, bend)
+        else:
+            T, cost = self._by_windows(q, rate, bend)
+        return Evaluated(cost, T, violation)
+
+    def violation(self, q: Array) -> float:
+        """How far postures (N, n) are outside of the limits of position and the clearance."""
+        limits = self.limits.limits
+        over = np.maximum(q - limits.upper, limits.lower - q).max(initial=-np.inf)
+        over = max(float(over) + self.margin, 0.0)
+        if self.bodies and self.limits.model is not None:
+            distances, _ = link_distances(self.limits.model, q, self.bodies)
+            over += max(self.clearance + self.margin - float(distances.min(initial=np.inf)), 0.0)
+        return over
+
+    def _by_passes(self, q: Array, rate: Array, bend: Array) -> tuple[float, float]:
+        found = self.limits.passes(self.grid, q, rate, bend, sweeps=2)
+        T = found.duration
+        if not self.cost.torque or not np.isfinite(T):
+            return T, self.cost.time * T
+        x, u = found.found[:, :1], found.found[:, 1:2]
+        rows, k = found.rows, self.limits.acceleration.size
+        speed = np.sqrt(np.maximum(x[:, 0], 0.0))
+        h = 2.0 * np.diff(self.grid) / (speed[1:] + speed[:-1])
+        share = 0.5 * (np.append(h, 0.0) + np.append(0.0, h)) / T
+        C = rows.c[:, k:]
+        A = (rows.a[:, k:] * u + rows.b[:, k:] * x) * T * T
+        return self._slowed(share, A, np.zeros(A.shape), C, T, np.inf)
+
+    def _by_windows(self, q: Array, rate: Array, bend: Array) -> tuple[float, float]:
+        """Least duration of the profile itself, from the windows at the points of the grid."""
+        rows, limits = self.limits.rows(q, rate, bend), self.limits.limits
+        k, scale = self.limits.acceleration.size, self.limits.scale
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pace = np.where(rate > 0.0, rate / limits.velocity, rate / limits.velocity_lower)
+            rise = np.where(
+                bend > 0.0, bend / limits.acceleration, bend / limits.acceleration_lower
+            )
+        least = max(float(np.nanmax(pace, initial=0.0)), np.sqrt(np.nanmax(rise, initial=0.0)))
+        A, C = rows.b[:, k:], rows.c[:, k:]
+        # rows hold the torques of q'' and of q' apart: together those of the profile in one second
+        B = (self.limits.drag(q, rate) - self.limits.drag(q, 1e-30 * rate))[:, self.limits.loaded]
+        B = B / scale[k:]
+        if not A.shape[1]:
+            return least, self.cost.time * least
+        flat, bound = (A.reshape(-1), B.reshape(-1), C.reshape(-1)), np.ones(A.size)
+        T, most = windows_of(flat, bound, least)  # type: ignore[arg-type]
+        if not np.isfinite(T):
+            return np.inf, np.inf
+        share = np.full(len(q), 1.0 / (len(q) - 1))
+        share[[0, -1]] *= 0.5
+        return self._slowed(share, A, B, C, float(T), float(most))
+
+    def _slowed(
+        self, share: Array, A: Array, B: Array, C: Array, T: float, most: float
+    ) -> tuple[float, float]:
+        """Duration between T and the most with the least cost, and that cost."""
+        time, torque = self.cost.time, self.cost.torque
+        if not torque:
+            return T, time * T
+        aa, ab, ac, bb, bc, cc = (
+            float(share @ (x * y).sum(axis=1))
+            for x, y in ((A, A), (A, B), (A, C), (B, B), (B, C), (C, C))
+        )
+        if most == np.inf and (np.abs(C) > 1.0).any():
+            most = T
+        # of (time + torque mean((A z^2 + B z + C)^2)) / z with z = 1 / T
+        roots = np.roots(
+            [3.0 * torque * aa, 4.0 * torque * ab, torque * (bb + 2.0 * ac), 0.0,
+             -(time + torque * cc)]
+        )  # fmt: skip
+        z = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
+        tried = np.unique(np.clip([T, *(1.0 / z)], T, most))
+        squares = [cc, 2.0 * bc, bb + 2.0 * ac, 2.0 * ab, aa]
+        costs = [t * (time + torque * sum(c / t**k for k, c in enumerate(squares))) for t in tried]
+        k = int(np.argmin(costs))
+        return float(tried[k]), float(costs[k])
+
+
+def knots_of(stations: Array, nodes: int) -> Knots:
+    """Knots of a path whose legs share its parameter as their lengths."""
+    length = np.linalg.norm(np.diff(stations, axis=0), axis=1)
+    share = np.maximum(length / length.sum(), _SHORTEST)
+    return spread(np.concatenate(((0.0,), np.cumsum(share / share.sum()))), nodes)
+
+
+def spread(at: Array, nodes: int) -> Knots:
+    """Knots with nodes spread evenly between stations, which are at given parameters."""
+    share = np.diff(at)
+    parts = np.ones(len(share), dtype=int)
+    for _ in range(nodes):
+        parts[(share / parts).argmax()] += 1
+    inner = [np.linspace(at[i], at[i + 1], k + 1)[:-1] for i, k in enumerate(parts.tolist())]
+    fixed = np.concatenate((np.zeros(1, np.intp), np.cumsum(parts)))
+    return Knots(np.append(np.concatenate(inner), at[-1]), fixed)

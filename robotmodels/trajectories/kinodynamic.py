@@ -1,0 +1,369 @@
+"""Kinodynamic planning: the best motion between configurations or poses under limits of torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import se3
+from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._choices import chosen
+from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
+from ..igm import igm
+from ..kinematics.singular.task import generator_of, whole_number
+from ..model import RobotModel, check_model
+from ..obstacles import clearance as clearance_of
+from ..obstacles.clearance import checked_obstacles
+from ..obstacles.shapes import Obstacle
+from .candidates import Candidates, Cost, knots_of
+from .checks import checked_limits
+from .limits import MotionLimits
+from .path_limits import SLOWEST, PathLimits
+from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
+from .trajectory import Trajectory
+
+_QUICKEST = Cost()
+
+
+class Timing(Enum):
+    """How a candidate of the planner is timed; the value says how.
+
+    Examples
+    --------
+    >>> Timing.PROFILE.value
+    'its own profile over time, evenly stretched to the least duration'
+    """
+
+    OPTIMAL = "the quickest motion along its path"
+    PROFILE = "its own profile over time, evenly stretched to the least duration"
+
+
+class PlanStatus(Outcome):
+    """Outcome of `kinodynamic`; fits int8."""
+
+    FOUND = 0, "A motion was found that keeps all limits; a better one may exist."
+    NONE_FOUND = 1, "No motion was found that keeps all limits; one may exist."
+    ENDS_NOT_HELD = 2, "The torques do not hold the robot at an end."
+    ENDS_IN_COLLISION = 3, "The robot is nearer to an obstacle than allowed at an end."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose(Value):
+    """An end or a via point of a plan given as a pose: the planner chooses the posture.
+
+    Parameters
+    ----------
+    T : array_like, shape (4, 4)
+        World pose of the tool, m.
+
+    Raises
+    ------
+    ShapeError, NotARotationError
+        An array that is no pose.
+
+    Examples
+    --------
+    >>> Pose(np.eye(4)).T.shape
+    (4, 4)
+    """
+
+    T: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T", read_only(as_exact(se3.as_pose(self.T, "T"), (4, 4), "T")))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Plan(Value):
+    """The best motion that the planner found.
+
+    Parameters
+    ----------
+    trajectory : Trajectory or None
+        The motion; None without one.
+    status : PlanStatus
+        Outcome.
+    cost : float
+        Its cost, see `Cost`; infinite without one.
+    history : ndarray, shape (N, 3)
+        Number of the evaluation, cost of the candidate (with a penalty for limits of position and
+        clearance that it does not keep; infinite without a timing), least cost so far.
+    torque_use : ndarray, shape (n,)
+        Greatest torque of each joint over its limit; 0 where it has none.
+    restarts : ndarray, shape (R,)
+        Least cost of each restart of the search: their spread shows how local it is.
+    via_times : ndarray, shape (k,)
+        Times at which the via points are met, s.
+    explanation : str
+        Details of the status.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import MotionLimits, kinodynamic
+    >>> plan = kinodynamic(load("ur5e"), np.zeros(6), np.full(6, 0.2), MotionLimits(),
+    ...                    torque=[1, 1, 1, 1, 1, 1])
+    >>> plan.status.name, plan.trajectory
+    ('ENDS_NOT_HELD', None)
+    """
+
+    trajectory: Trajectory | None
+    status: PlanStatus
+    cost: float
+    history: Array
+    torque_use: Array
+    restarts: Array
+    via_times: Array
+    explanation: str = ""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if isinstance(value := getattr(self, field.name), np.ndarray):
+                object.__setattr__(self, field.name, read_only(value))
+
+    @property
+    def duration(self) -> float:
+        """Seconds; NaN without a motion."""
+        return np.nan if self.trajectory is None else self.trajectory.duration
+
+    @property
+    def evaluations(self) -> int:
+        """Number of candidates that were timed."""
+        return len(self.history)
+
+    @property
+    def spread(self) -> float:
+        """Relative difference between the worst and the best restart."""
+        if not np.isfinite(self.restarts).all() or not self.restarts.size:
+            return np.inf
+        return float(np.ptp(self.restarts) / self.restarts.min())
+
+    def reason(self) -> str:
+        """The status as a sentence, with the end and the joint."""
+        return self.explanation or self.status.sentence
+
+    def __repr__(self) -> str:
+        lines = [f"<Plan: {self.status.name}, {self.duration:.6g} s, cost {self.cost:.6g}"]
+        if self.trajectory is None:
+            lines.append(self.reason())
+        else:
+            use = ", ".join(f"{x:.0%}" for x in self.torque_use)
+            lines.append(f"greatest torques {use} of their limits")
+        spread = f", spread {self.spread:.2%}" if self.restarts.size else ""
+        lines.append(f"{self.evaluations} evaluations, {self.restarts.size} restarts{spread}>")
+        return "\n  ".join(lines)
+
+
+def kinodynamic(
+    model: RobotModel,
+    q0: ArrayLike | Pose,
+    q1: ArrayLike | Pose,
+    limits: MotionLimits | None,
+    torque: ArrayLike | None = None,
+    via: Sequence[ArrayLike | Pose] = (),
+    obstacles: Iterable[Obstacle] | Obstacle = (),
+    clearance: float = 0.0,
+    cost: Cost = _QUICKEST,
+    nodes: int = 4,
+    method: PlanMethod | str = PlanMethod.ANNEAL,
+    timing: Timing | str = Timing.OPTIMAL,
+    rng: np.random.Generator | int | None = None,
+    seconds: float = 10.0,
+    progress: bool | Callable[[int, float], Any] = False,
+) -> Plan:
+    """Kinodynamic planning: the best motion from rest to rest without a given path.
+
+    Also called optimal motion planning, minimum-time trajectory optimisation. Paths are splines
+    through free nodes; simulated annealing varies the nodes, with the exact timing of every path
+    (`time_optimal`), from several restarts. The best path of each is then refined to more nodes
+    and improved by sequential linear programming. The motion is checked at 10 000 times.
+
+    The search is local in the end: `Plan.restarts` shows its spread.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints, with its drives.
+    q0, q1 : array_like, shape (n,), or Pose
+        The ends, rad or m. Of a pose the planner chooses the posture.
+    limits : MotionLimits
+        Of velocity, acceleration and position.
+    torque : array_like, shape () or (n,), optional
+        Greatest torques of both signs, N m or N; default those of the model's table.
+    via : sequence of array_like, shape (n,), or Pose
+        Configurations on the way, in this order.
+    obstacles : Sphere, Box, Plane, Capsule, or iterable of these
+        Bodies that the links avoid, see `robotmodels.obstacles`.
+    clearance : float
+        Least distance from them, m.
+    cost : Cost
+        Weights of the duration and of the squared torques.
+    nodes : int
+        Free configurations of a path in the search.
+    method : PlanMethod or str
+        ``"anneal"`` or ``"descent"``.
+    timing : Timing or str
+        ``"optimal"`` times every path exactly; ``"profile"`` takes the nodes as a profile over
+        time and stretches it, with the windows of `time_scaled`.
+    rng : Generator or int, optional
+        Random numbers, or their seed; by default a fixed one.
+    seconds : float
+        Greatest duration of the search, by the clock. It makes up to 500 evaluations for each
+        second and ends early; only if the clock ends it, results with one seed may differ.
+    progress : bool or callable
+        Called with the number of evaluations and the least cost; True prints both.
+
+    Returns
+    -------
+    Plan
+        The motion, or why there is none.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors of the wrong length, ends outside of the limits of position, ends or via points
+        that coincide, NaN, limits that are all infinite.
+
+    References
+    ----------
+    Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import MotionLimits, kinodynamic
+    >>> plan = kinodynamic(load("ur5e"), [0, -1.5, 1, 0, 0, 0], [1, -1, 0.5, 0, 0, 0],
+    ...                    MotionLimits(acceleration=50.0), seconds=0.5)
+    >>> plan.status.name, bool(plan.torque_use.max() <= 1.001)
+    ('FOUND', True)
+    """
+    check_model(model)
+    timing, method = chosen(Timing, timing, "timing"), chosen(PlanMethod, method, "method")
+    if not isinstance(cost, Cost):
+        raise InvalidValueError(f"cost: expected a Cost, got {type(cost).__name__}.")
+    wanted = as_number(clearance, "clearance", least=0.0)
+    count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
+    problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
+    seconds = as_number(seconds, "seconds", above=0.0)
+    given = [q0, *_listed(via), q1]
+    postures = [_postures(model, each, k, given, problem) for k, each in enumerate(given)]
+    missing = [k for k, each in enumerate(postures) if not len(each)]
+    if missing:
+        name = _name(missing[0], len(given))
+        why = f"No posture reaches the pose {name} within the limits of position."
+        return _without(PlanStatus.NONE_FOUND, why)
+    for status, test in (
+        (PlanStatus.ENDS_NOT_HELD, _held), (PlanStatus.ENDS_IN_COLLISION, _clear),
+    ):  # fmt: skip
+        for k in range(len(given)):
+            if 0 < k < len(given) - 1 and test is _held:
+                continue
+            good, why = test(problem, postures[k], bodies, wanted, _name(k, len(given)))
+            postures[k] = postures[k][good]
+            if not good.any():
+                end = k in (0, len(given) - 1)
+                return _without(status if end else PlanStatus.NONE_FOUND, why)
+    generator = generator_of(rng)
+    tasks = []
+    for choice in product(*postures):
+        stations = np.array(choice)
+        at = knots_of(stations, count)
+        optimal = timing is Timing.OPTIMAL
+        task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
+        tasks.append((task.evaluated(task.straight()).penalized, len(tasks), task))
+    tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
+    search = Search(seconds, progress)
+    results = []
+    for r in range(RESTARTS):
+        search.share((r + 1) / (RESTARTS + 1))
+        results.append(restart(search, tasks[r % len(tasks)], method, generator, r))
+    search.share(1.0)
+    results.sort(key=lambda result: result.found.penalized)
+    restarts = np.array([result.found.penalized for result in results])
+    best = best_motion(search, results, model, limits)
+    if best is None:
+        return replace(_without(PlanStatus.NONE_FOUND, ""), history=search.rows, restarts=restarts)
+    return Plan(
+        best.motion, PlanStatus.FOUND, best.cost, search.rows, best.use, restarts, best.times
+    )
+
+
+def _without(status: PlanStatus, why: str) -> Plan:
+    """A plan without a motion."""
+    none = np.empty(0)
+    return Plan(None, status, np.inf, np.empty((0, 3)), none, none, none, why)
+
+
+def _listed(via: Any) -> list[Any]:
+    """Via points one by one."""
+    if isinstance(via, Pose):
+        raise InvalidValueError("via: expected a sequence of configurations or poses, got a Pose.")
+    points = list(via)
+    if points and np.ndim(points[0]) == 0 and not isinstance(points[0], Pose):
+        raise InvalidValueError("via: expected a sequence of configurations, got one; write [q].")
+    return points
+
+
+def _name(k: int, stations: int) -> str:
+    return "q0" if k == 0 else "q1" if k == stations - 1 else f"via[{k - 1}]"
+
+
+def _postures(
+    model: RobotModel, given: Any, k: int, every: list[Any], problem: PathLimits
+) -> Array:  # fmt: skip
+    """Configurations (m, n) of an end or via point, within the limits of position."""
+    limits, name = problem.limits, _name(k, len(every))
+    if not isinstance(given, Pose):
+        q = as_exact(given, (model.n,), name)
+        checked_limits(limits, model.n, q[None])
+        before = every[k - 1] if k else None
+        if before is not None and not isinstance(before, Pose) and np.array_equal(before, q):
+            raise InvalidValueError(
+                f"{name}: it is the same as {_name(k - 1, len(every))}; leave one of them out."
+            )
+        return q[None]
+    near = next((np.asarray(q, float) for q in every if not isinstance(q, Pose)), None)
+    found = igm(model, given.T, near)
+    q = found.q[found.valid]
+    turn = 2.0 * np.pi * (model.table.sigma[model.table.joint_rows] == REVOLUTE)
+    reference = np.clip(np.zeros(model.n) if near is None else near, limits.lower, limits.upper)
+    q = q - turn * np.round((q - reference) / np.where(turn > 0.0, turn, 1.0))
+    for side in (1.0, -1.0):  # a whole turn back inside
+        out = (q > limits.upper) if side > 0.0 else (q < limits.lower)
+        q = q - side * turn * out
+    return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
+
+
+def _held(
+    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
+) -> tuple[NDArray[np.bool_], str]:
+    """Which configurations (m, n) the torques hold, and a sentence about the first."""
+    rest = np.zeros(q.shape)
+    load = np.abs(problem.rows(q, rest, rest).held)
+    stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
+    margin = problem.torque * (1.0 + 1e-9) + stuck - load
+    j = int(margin[0].argmin())
+    return np.atleast_1d((margin >= 0.0).all(axis=1)), (
+        f"The torques do not hold the robot at {name}: joint {j + 1} needs {load[0, j]:.6g} and "
+        f"has {problem.torque[j]:.6g}, a margin of {margin[0, j]:.4g} (N m or N)."
+    )
+
+
+def _clear(
+    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
+) -> tuple[NDArray[np.bool_], str]:
+    """Which configurations (m, n) keep the clearance, and a sentence about the first."""
+    if not bodies or problem.model is None:
+        return np.ones(len(q), np.bool_), ""
+    distance = clearance_of(problem.model, q, bodies)
+    return np.atleast_1d(distance >= wanted), (
+        f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
+    )

@@ -1,0 +1,236 @@
+"""Limits of a motion along a path, as rows that are linear in the acceleration and squared rate.
+
+With s' the rate of the path parameter and x = s'^2, joint velocities are ``q' s'``, accelerations
+``q' s'' + q'' x``, and torques ``a s'' + b x + c`` with a, b, c from three calls of the inverse
+dynamic model (seed book section 4.4.1.1). Friction that depends on the speed is replaced by its
+tangent at the rates of the solution before, until these do not change any more.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .._arrays import Array, as_reals
+from ..dynamics.inverse import rigid_torques, warn_without_masses
+from ..errors import InvalidValueError, ShapeError
+from ..friction import Friction, check_friction
+from ..friction.protocols import torque_at
+from ..model import RobotModel, check_model
+from .checks import checked_limits
+from .limits import MotionLimits
+
+SLOWEST = 1e-30  # rate at which friction is that of a joint that only just moves
+_STILL = 1e-9  # of the greatest rate: a joint that is slower does not move
+_SWEEPS = 60
+_SETTLED = 1e-10  # relative change of the duration
+
+
+class Rows(NamedTuple):
+    """``lower <= a u + b x + c <= upper`` and ``x <= top``, of K quantities at N + 1 points.
+
+    Shapes: a, b, c (N + 1, K), top (N + 1,); held (N + 1, n), torques at rest without friction.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    top: Array
+    held: Array
+
+
+class Passes(NamedTuple):
+    """Outcome of the two passes: `path_rates` at the points, and the point that failed, or -1."""
+
+    found: Array
+    failed: int
+    duration: float
+    rows: Rows
+
+
+class PathLimits:
+    """What limits the motion of a robot along paths; the same for all paths that are tried."""
+
+    __slots__ = (
+        "acceleration", "drives", "ends", "friction", "limits", "loaded", "lower", "model", "n",
+        "names", "rates", "scale", "torque", "upper", "viscous",
+    )  # fmt: skip
+
+    def __init__(
+        self, n: int, model: RobotModel | None, limits: MotionLimits | None,
+        torque: object, friction: bool | Friction, both_ends: bool, torque_rate: object = None,
+    ) -> None:  # fmt: skip
+        bounds = checked_limits(MotionLimits() if limits is None else limits, n)
+        assert bounds is not None
+        self.n, self.model, self.limits = n, model, bounds
+        self.torque = checked_torque(torque, model, n)
+        jerk = np.minimum(bounds.jerk, -bounds.jerk_lower)
+        none = np.full(n, np.inf)
+        pull = none if torque_rate is None else checked_torque(torque_rate, model, n, "torque_rate")
+        rows = np.isfinite([bounds.acceleration, bounds.acceleration_lower, jerk]).any(axis=0)
+        self.acceleration = np.flatnonzero(rows)
+        self.loaded = np.flatnonzero(np.isfinite([self.torque, pull]).any(axis=0))
+        lower = (bounds.acceleration_lower[rows], -self.torque[self.loaded])
+        upper = (bounds.acceleration[rows], self.torque[self.loaded])
+        lower, upper = np.concatenate(lower), np.concatenate(upper)
+        size = np.maximum(*(np.where(np.isfinite(b), np.abs(b), 0.0) for b in (lower, upper)))
+        self.scale = np.where(size > 0.0, size, 1.0)
+        self.lower, self.upper = lower / self.scale, upper / self.scale
+        self.rates = np.concatenate((jerk[rows], pull[self.loaded])) / self.scale
+        # accelerations at both ends of every interval, as is usual; torques if asked for
+        self.ends = np.repeat([1, int(both_ends)], [self.acceleration.size, self.loaded.size])
+        self.names = np.array(
+            [f"acceleration of joint {j + 1}" for j in self.acceleration]
+            + [f"torque of joint {j + 1}" for j in self.loaded]
+            + [f"velocity of joint {j + 1}" for j in range(n)]
+            + [""]
+        )
+        own = isinstance(friction, Friction) and not isinstance(friction, bool)
+        if not own and not isinstance(friction, bool | np.bool_):
+            raise InvalidValueError(
+                f"friction: expected True, False or a friction model, got {friction!r:.60}."
+            )
+        self.friction, self.drives, self.viscous = (friction if own else None), None, False
+        if model is not None and self.loaded.size:
+            self.drives = model.drive_matrices
+            if own:
+                check_friction(friction, n)  # type: ignore[arg-type]
+            if not friction:
+                self.friction, self.viscous = False, False
+            else:
+                self.viscous = own or (self.drives is not None and bool(self.drives.viscous.any()))
+            if model.twin.torques_warn:
+                warn_without_masses(model, 4)
+        if not (self.lower.size or np.isfinite(bounds.velocity).any()):
+            raise InvalidValueError(
+                "limits: all are infinite, so the time would be zero; give limits of velocity and "
+                "acceleration, or of torque."
+            )
+
+    def drag(self, q: Array, v: Array) -> Array:
+        """Torques of friction at velocities. Shapes: q, v (..., n) -> (..., n)."""
+        if self.friction is False:
+            return np.zeros(v.shape)
+        drag = np.zeros(v.shape)
+        if self.drives is not None:
+            drag = self.drives.torque(v, None) - self.drives.offset
+        if self.friction is not None:
+            drag = drag + torque_at(self.friction, v, q)  # type: ignore[arg-type]
+        return drag
+
+    def rows(self, q: Array, rate: Array, bend: Array) -> Rows:
+        """Rows at points of a path. Shapes: q and its derivatives by s (N + 1, n)."""
+        some, N = self.acceleration, len(q)
+        a, b, c = np.empty((3, N, self.scale.size))
+        k, gravity = some.size, np.zeros(q.shape)
+        a[:, :k], b[:, :k], c[:, :k] = rate[:, some], bend[:, some], 0.0
+        if self.loaded.size and self.model is not None:
+            none = np.zeros(q.shape)
+            tau = rigid_torques(
+                self.model,
+                np.concatenate((q, q, q)),
+                np.concatenate((none, none, rate)),
+                np.concatenate((none, rate, bend)),
+            ).reshape(3, N, self.n)
+            gravity, inertial, moving = tau[0], tau[1] - tau[0], tau[2] - tau[0]
+            if self.drives is not None:
+                rotor = self.drives.rotor
+                inertial, moving = inertial + rate @ rotor, moving + bend @ rotor
+                gravity = gravity + self.drives.offset
+            load, steady = self.loaded, gravity
+            if self.drives is not None or self.friction:
+                steady = gravity + self.drag(q, SLOWEST * self.direction(rate))
+            a[:, k:], b[:, k:], c[:, k:] = inertial[:, load], moving[:, load], steady[:, load]
+        a /= self.scale
+        b /= self.scale
+        c /= self.scale
+        with np.errstate(divide="ignore"):
+            most = np.where(rate > 0.0, self.limits.velocity, -self.limits.velocity_lower)
+            top = (most / np.abs(rate)).min(axis=1) ** 2
+        return Rows(a, b, c, np.minimum(top, 1e300), gravity)
+
+    def direction(self, rate: Array) -> Array:
+        """The rates, with those that are nothing but rounding made zero."""
+        return np.where(np.abs(rate) > _STILL * np.abs(rate).max(initial=0.0), rate, 0.0)
+
+    def passes(
+        self, s: Array, q: Array, rate: Array, bend: Array, ends: tuple[float, float] = (0.0, 0.0),
+        rows: Rows | None = None, sweeps: int = _SWEEPS,
+    ) -> Passes:  # fmt: skip
+        """Quickest rates at points s (N + 1,) of a path whose derivatives are given there."""
+        rows = self.rows(q, rate, bend) if rows is None else rows
+        steps, given = np.diff(s), np.square(ends)
+        if ends[1] == 0.0:  # at rest dry friction does not help to brake
+            held = rows.held[-1, self.loaded]
+            rows.c[-1, self.acceleration.size :] = held / self.scale[self.acceleration.size :]
+        now = self._swept(steps, rows, given)
+        if not self.viscous or now.failed >= 0:
+            return now
+        x, best = now.found[:, 0], None
+        for _ in range(sweeps):
+            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given)
+            if now.failed >= 0:
+                x = 0.25 * x
+                now = last
+                continue
+            if best is not None and abs(now.duration - last.duration) <= _SETTLED * now.duration:
+                return now
+            best, x = now, now.found[:, 0]
+        return now if best is None else best
+
+    def tangent(self, rows: Rows, x: Array, q: Array, rate: Array) -> Rows:
+        """Rows with the friction that depends on the speed, by its tangent at squared rates x."""
+        if not self.viscous:
+            return rows
+        k, turns = self.acceleration.size, self.direction(rate)
+        speed = np.sqrt(np.maximum(x, 0.0))[:, None]
+        square = np.where(x > 0.0, x, np.inf)[:, None]
+        first = self.drag(q, SLOWEST * turns)
+        here = (self.drag(q, turns * speed) - first)[:, self.loaded]
+        if self.friction is None:  # proportional to the speed
+            slope = 0.5 * here / square
+        else:
+            over, under = (
+                self.drag(q, turns * speed * (1.0 + h))[:, self.loaded] for h in (1e-4, -1e-4)
+            )
+            slope = (over - under) / (4e-4 * square)
+        b, c = rows.b.copy(), rows.c.copy()
+        b[:, k:] += slope / self.scale[k:]
+        c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
+        return rows._replace(b=b, c=c)
+
+    def _swept(self, steps: Array, rows: Rows, given: Array) -> Passes:
+        from .kernels import path_rates
+
+        found = np.empty((len(steps) + 1, 6))
+        failed = path_rates(
+            steps, rows.a, rows.b, rows.c, self.lower, self.upper, self.ends, rows.top, given, found
+        )
+        if failed >= 0:
+            return Passes(found, failed, np.inf, rows)
+        rate = np.sqrt(np.maximum(found[:, 0], 0.0))
+        pace = rate[1:] + rate[:-1]
+        duration = float((2.0 * steps / pace).sum()) if pace.min() > 0.0 else np.inf
+        return Passes(found, -1, duration, rows)
+
+
+def checked_torque(
+    torque: object, model: RobotModel | None, n: int, name: str = "torque"
+) -> Array:  # fmt: skip
+    """Greatest torques (n,), infinite where there is no limit; by default those of the table."""
+    if model is None:
+        if torque is not None:
+            raise InvalidValueError(
+                f"{name}: limits of torque need model=, whose torques they are."
+            )
+        return np.full(n, np.inf)
+    check_model(model)
+    if model.n != n:
+        raise ShapeError(f"path: expected {model.n} joints, as {model.name} has, got {n}.")
+    limit = as_reals(model.table.effort if torque is None else torque, name)  # type: ignore[arg-type]
+    if limit.shape not in ((), (n,)):
+        raise ShapeError(f"{name}: expected one number or {n}, got shape {limit.shape}.")
+    if not (limit >= 0.0).all():
+        raise InvalidValueError(f"{name}: expected limits of at least 0 N m, got {limit}.")
+    return np.broadcast_to(limit, n)

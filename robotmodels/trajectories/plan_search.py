@@ -1,0 +1,298 @@
+"""Search of the kinodynamic planner: annealing, local improvement, and the check of the motion."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._arrays import Array
+from ..dynamics import idm
+from ..model import RobotModel
+from .candidates import Candidates, Evaluated, spread
+from .descent import descended
+from .limits import MotionLimits
+from .motions import TimedMotion
+from .random_profiles import half_width
+from .time_optimal import law_of, time_optimal
+from .time_scaling import stretched, time_scaled
+from .trajectory import Trajectory
+
+_RATE = 500  # evaluations for each second
+RESTARTS = 3
+_LEVELS = (9, 19, 29)  # nodes of the profiles that are improved; the last only of the best one
+_MOST = 120  # variables of a linear program
+_STEPS = 40
+_CHECKED = 10_001
+_MET = 5e-10  # rad or m: how near a via point is passed
+_HOT, _COLD = 0.1, 1e-3  # temperatures, of the cost of the start
+_NARROW = 0.1  # of the first steps: the last ones
+
+
+class PlanMethod(Enum):
+    """How the planner searches; the value says how.
+
+    Examples
+    --------
+    >>> PlanMethod.DESCENT.value
+    'local improvement of the straight path and of random ones'
+    """
+
+    ANNEAL = "simulated annealing of the nodes, then local improvement"
+    DESCENT = "local improvement of the straight path and of random ones"
+
+
+class Restart(NamedTuple):
+    """Outcome of one restart: a profile, and the path that it came from if that was timed."""
+
+    found: Evaluated
+    task: Candidates
+    free: Array
+    path: Trajectory | None
+
+
+class Best(NamedTuple):
+    """The best motion that keeps all limits."""
+
+    motion: Trajectory
+    cost: float
+    use: Array
+    times: Array
+
+
+class Search:
+    """Counts evaluations, keeps their costs and ends the search."""
+
+    __slots__ = ("allowed", "best", "deadline", "history", "report", "seconds", "start")
+
+    def __init__(self, seconds: float, progress: bool | Callable[[int, float], Any]) -> None:
+        self.start, self.seconds = time.monotonic(), seconds
+        self.share(1.0)
+        self.allowed = int(_RATE * seconds) + 1
+        self.best = np.inf
+        self.history: list[tuple[int, float, float]] = []
+        self.report = progress if callable(progress) else (_printed if progress else None)
+
+    def share(self, part: float) -> None:
+        """Let the search go on until a part of its time is over."""
+        self.deadline = self.start + part * self.seconds
+
+    def evaluated(self, task: Candidates, free: Array) -> Evaluated | None:
+        """What became of a candidate; None when the search is over."""
+        if time.monotonic() > self.deadline:
+            return None
+        found = task.evaluated(free)
+        self.best = min(self.best, found.penalized)
+        self.history.append((len(self.history) + 1, found.penalized, self.best))
+        if self.report is not None and len(self.history) % 50 == 0:
+            self.report(len(self.history), self.best)
+        return found
+
+    @property
+    def rows(self) -> Array:
+        """History (N, 3)."""
+        return np.array(self.history).reshape(-1, 3)
+
+
+def _printed(evaluations: int, cost: float) -> None:
+    sys.stderr.write(f"{evaluations} evaluations, least cost {cost:.6g}\n")
+
+
+def _annealed(
+    search: Search, task: Candidates, rng: np.random.Generator, evaluations: int
+) -> tuple[Array, Evaluated]:
+    """Simulated annealing from the straight path, with steps that shrink with the temperature."""
+    free = best = task.straight()
+    now = least = task.evaluated(free)
+    width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
+    scale = now.penalized if np.isfinite(now.penalized) else 1.0
+    for k in range(evaluations):
+        cold = k / max(evaluations - 1, 1)
+        size = width * _NARROW**cold
+        wave = int(rng.geometric(0.5)) if len(free) > 1 else 1
+        bump = np.sin(wave * np.pi * task.knots[task.free]) / wave**2
+        step = bump[:, None] * rng.normal(0.0, 1.0, free.shape[1])
+        trial = free + size * step
+        then = search.evaluated(task, trial)
+        if then is None:
+            break
+        worse = then.penalized - now.penalized if np.isfinite(then.penalized) else np.inf
+        temperature = scale * _HOT * (_COLD / _HOT) ** cold
+        if not np.isfinite(now.penalized) or worse < temperature * rng.exponential():
+            free, now = trial, then
+        if now.penalized < least.penalized:
+            best, least = free, now
+            scale = least.penalized
+    return best, least
+
+
+def restart(
+    search: Search, task: Candidates, method: PlanMethod, rng: np.random.Generator, r: int
+) -> Restart:
+    """One search from the straight path, or from a random one."""
+    free = task.straight()
+    if method is PlanMethod.ANNEAL:
+        free, now = _annealed(search, task, rng, search.allowed // (RESTARTS + 1))
+    else:
+        if r:
+            width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
+            free = free + width * rng.uniform(-1.0, 1.0, free.shape)
+        now = task.evaluated(free)
+    if not task.optimal:
+        free, now = descended(task, free, 2 * _STEPS, search.evaluated)
+        return Restart(now, task, free, None)
+    path, timed, at = _timed(task, free)
+    if timed is None:
+        return Restart(now, task, free, path)
+    profile, fine, done = timed, task, now
+    for nodes in _levels(task)[:-1]:
+        fine = task.finer(spread(at, nodes))
+        free = profile.q(fine.knots[fine.free] * profile.duration)
+        free, done = descended(fine, free, _STEPS, search.evaluated)
+        profile = fine.path(free)
+    return Restart(done, fine, free, path)
+
+
+def _levels(task: Candidates) -> tuple[int, ...]:
+    """Numbers of nodes of the local improvement."""
+    return tuple(k for k in _LEVELS if k * task.limits.n <= _MOST or k <= _LEVELS[1])
+
+
+def _timed(task: Candidates, free: Array) -> tuple[Trajectory, Trajectory | None, Array]:
+    """A path, its quickest motion, and the fractions of time of its stations."""
+    path = task.path(free)
+    passes = task.limits.passes(task.grid, *task.sampled(free))
+    if not np.isfinite(passes.duration):
+        return path, None, np.empty(0)
+    law = law_of(task.grid, passes.found[:, 0])
+    at = np.interp(task.knots[task.fixed], task.grid, law.breaks[0]) / passes.duration
+    return path, Trajectory(TimedMotion(path.motion, law)), at
+
+
+def best_motion(
+    search: Search, results: list[Restart], model: RobotModel, limits: MotionLimits | None
+) -> Best | None:
+    """The best motion from the restarts in the order of their costs; the first is refined."""
+    for k, (done, task, free, path) in enumerate(results):
+        options: list[Trajectory | None] = []
+        if np.isfinite(done.cost) and not task.optimal:
+            if path is not None and k == 0:
+                fine = task.finer(spread(task.knots[task.fixed], _levels(task)[-1]))
+                start = task.path(free).q(fine.knots[fine.free])
+                finer, then = descended(fine, start, _STEPS, search.evaluated)
+                if then.penalized < done.penalized:
+                    task, free = fine, finer
+            options = _finished(search, task, free, model, limits, path is not None)
+        if path is not None:
+            options.append(_retimed(task, path, model))
+        kept = []
+        for motion in (o for o in options if o is not None and _short(task, o) <= 1e-9):
+            times = _times_at(motion, task.stations[1:-1])
+            missed = np.abs(motion.q(times) - task.stations[1:-1]).max(initial=0.0)
+            if missed <= _MET:
+                kept.append(Best(motion, *_cost_of(task, model, motion), times))
+        if kept:
+            return min(kept, key=lambda best: best.cost)
+    return None
+
+
+def _finished(
+    search: Search, task: Candidates, free: Array, model: RobotModel,
+    limits: MotionLimits | None, retimed: bool,
+) -> list[Trajectory | None]:  # fmt: skip
+    """Motions of a profile: stretched to the least duration, and timed anew along its path."""
+    rates = None if limits is None else replace(limits, lower=-np.inf, upper=np.inf)
+    path, scaled = task.path(free), None
+    for _ in range(4):
+        path = task.path(free)
+        scaled = time_scaled(path, model, task.limits.torque, rates).trajectory
+        if scaled is None:
+            break
+        short = _short(task, scaled)
+        if short <= 0.0:
+            break
+        task.margin += 1.5 * short + 1e-6
+        free, _ = descended(task, free, 8, search.evaluated)
+    if scaled is not None and task.cost.torque:
+        slow = task.evaluated(free).duration
+        if slow > scaled.duration:
+            scaled = Trajectory(stretched(scaled.motion, slow))
+    return [scaled, _retimed(task, path, model) if retimed else None]
+
+
+def _retimed(task: Candidates, path: Trajectory, model: RobotModel) -> Trajectory | None:
+    """The quickest motion along a path that keeps the limits between the points of its grid too."""
+    given = task.limits.limits
+    share = 1.0
+    for _ in range(4):
+        tight = MotionLimits(
+            given.velocity * share, given.acceleration * share,
+            velocity_lower=given.velocity_lower * share,
+            acceleration_lower=given.acceleration_lower * share,
+        )  # fmt: skip
+        motion = time_optimal(
+            path, tight, model, task.limits.torque * share, points=400, both_ends=True
+        ).trajectory
+        if motion is None:
+            return None
+        over = _use(task, model, motion)[1]
+        if over <= 1.0 + 1e-6:
+            return motion
+        share /= over
+    return None
+
+
+def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array, float]:
+    """Greatest torques over their limits (n,), and the greatest ratio to any limit."""
+    seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
+    bound, limits = task.limits.torque, task.limits.limits
+    with np.errstate(divide="ignore", invalid="ignore"):
+        torque = np.abs(idm(model, seen.q, seen.v, seen.a)).max(axis=0)
+        use = np.where(torque > 0.0, torque / bound, 0.0)
+        rates = [
+            np.where(side * x > 0.0, x / most, 0.0).max()
+            for x, upper, lower in (
+                (seen.v, limits.velocity, limits.velocity_lower),
+                (seen.a, limits.acceleration, limits.acceleration_lower),
+            )
+            for side, most in ((1.0, upper), (-1.0, lower))
+        ]
+    return use, float(max(use.max(), *rates))
+
+
+def _cost_of(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[float, Array]:
+    """Cost of a motion and the greatest torques over their limits (n,)."""
+    use, _ = _use(task, model, motion)
+    cost = task.cost.time * motion.duration
+    if task.cost.torque:
+        seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
+        ratio = idm(model, seen.q, seen.v, seen.a) / task.limits.torque
+        cost += task.cost.torque * float((ratio**2).sum(axis=1).mean()) * motion.duration
+    return cost, use
+
+
+def _short(task: Candidates, motion: Trajectory) -> float:
+    """How far a motion is outside of the limits of position or the clearance, at many times."""
+    margin, task.margin = task.margin, 0.0
+    found = task.violation(motion.q(np.linspace(0.0, motion.duration, _CHECKED)))
+    task.margin = margin
+    return found
+
+
+def _times_at(motion: Trajectory, stations: Array) -> Array:
+    """Times (k,) at which configurations (k, n) are met, in this order."""
+    times, low = [], 0.0
+    for q in stations:
+        a, b = low, motion.duration
+        for _ in range(12):
+            t = np.linspace(a, b, 401)
+            k = int(np.linalg.norm(motion.q(t) - q, axis=1).argmin())
+            a, b = t[max(k - 1, 0)], t[min(k + 1, 400)]
+        times.append(t[k])
+        low = t[k]
+    return np.array(times)

@@ -1,0 +1,306 @@
+"""Time-optimal motion along a given path under limits of velocity, acceleration and torque."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Value, as_number, read_only
+from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..friction import Friction
+from ..model import RobotModel
+from .checks import checked_limits
+from .limits import MotionLimits
+from .motions import TimedMotion
+from .path_limits import SLOWEST, Passes, PathLimits, Rows
+from .piecewise import PiecewisePolynomial
+from .pose_trajectory import PoseTrajectory
+from .rate_limits import rate_limited
+from .regular_paths import checked_points, path_of, toward_ends
+from .trajectory import Trajectory
+
+_ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
+
+
+class TimingStatus(Outcome):
+    """Outcome of `time_optimal`; fits int8."""
+
+    OPTIMAL = 0, "The motion is the quickest along the path."
+    NOT_HELD_STILL = 1, "Gravity exceeds the torques."
+    NOT_CONTROLLABLE = 2, "No motion follows the path to its end within the limits."
+    PATH_NOT_SMOOTH = 3, "The path has a kink, where every motion has to stop."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TimedPath(Value):
+    """The quickest motion along a path, and what limits it.
+
+    Parameters
+    ----------
+    trajectory : Trajectory or None
+        The motion; None without one. The acceleration of the path parameter is constant between
+        the points of the grid.
+    status : TimingStatus
+        Outcome.
+    parameter : ndarray, shape (N,)
+        Path parameter s at the points of the grid: the path's own, or its length in joint space
+        where its own timing rests or jumps.
+    rate : ndarray, shape (N,)
+        Rate of the parameter there, 1/s (of its unit).
+    maximum_rate : ndarray, shape (N,)
+        Greatest rate that the limits allow at each point alone: the maximum velocity curve.
+    active : ndarray of str, shape (N,)
+        The limit that binds from each point on, such as ``"torque of joint 2"``; ``"rate"`` where
+        a limit of jerk or of the rate of a torque makes the motion slower; empty where none does
+        (one interval at a change between two limits).
+    grid_gap : float
+        Relative difference from the duration on the grid with half as many intervals, which
+        estimates the relative error of the duration; infinite without one.
+    explanation : str
+        Details of the status.
+
+    Examples
+    --------
+    >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
+    >>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0), points=10)
+    >>> timed.status.name, str(timed.active[0]), str(timed.active[5])
+    ('OPTIMAL', 'acceleration of joint 1', 'velocity of joint 1')
+    """
+
+    trajectory: Trajectory | None
+    status: TimingStatus
+    parameter: Array
+    rate: Array
+    maximum_rate: Array
+    active: NDArray[np.str_]
+    grid_gap: float = np.inf
+    explanation: str = field(default="")
+
+    def __post_init__(self) -> None:
+        for name in ("parameter", "rate", "maximum_rate"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "active", read_only(self.active, str))
+
+    def __hash__(self) -> int:
+        return hash((self.status, self.duration, self.explanation))
+
+    @property
+    def duration(self) -> float:
+        """Seconds; NaN without a motion."""
+        return np.nan if self.trajectory is None else self.trajectory.duration
+
+    def reason(self) -> str:
+        """The status as a sentence, with the place and the joint."""
+        return self.explanation or self.status.sentence
+
+    def __repr__(self) -> str:
+        lines = [f"<TimedPath: {self.status.name}"]
+        if self.trajectory is None:
+            return f"{lines[0]}\n  {self.reason()}>"
+        lines[0] += f", {self.duration:.6g} s on {self.rate.size - 1} intervals"
+        lines.append(f"grid gap {self.grid_gap:.2g}")
+        names, counts = np.unique(self.active[:-1], return_counts=True)
+        order = np.argsort(-counts, kind="stable")[:4]
+        shares = [f"{names[k] or 'none'} {counts[k] / counts.sum():.0%}" for k in order]
+        return "\n  ".join([*lines, f"active: {', '.join(shares)}>"])
+
+
+def time_optimal(
+    path: Trajectory | PoseTrajectory,
+    limits: MotionLimits | None,
+    model: RobotModel | None = None,
+    torque: ArrayLike | None = None,
+    torque_rate: ArrayLike | None = None,
+    friction: bool | Friction = True,
+    points: int = 200,
+    start_rate: float = 0.0,
+    end_rate: float = 0.0,
+    *,
+    both_ends: bool = False,
+) -> TimedPath:
+    """Time-optimal path parametrisation: the quickest motion along a path.
+
+    Also called TOPP, TOPP-RA. The path keeps its shape and loses its own timing. On a grid of its
+    parameter, the rates from which the end is reached are computed backward, and the greatest of
+    them forward (reachability analysis). Accelerations are limited at both ends of every interval
+    of the grid, torques at its start, so that between points they may be exceeded by what
+    ``grid_gap`` estimates; ``both_ends`` limits them at both.
+
+    Parameters
+    ----------
+    path : Trajectory or PoseTrajectory
+        n joints along a path, or poses (which need ``model``; its joints then follow them as in
+        `joint_path`). Continuous in its direction.
+    limits : MotionLimits
+        Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
+    model : RobotModel, optional
+        The robot, n joints, for limits of torque.
+    torque : array_like, shape () or (n,), optional
+        Greatest torques of both signs, N m or N; default those of the model's table. Infinity is
+        no limit.
+    torque_rate : array_like, shape () or (n,), optional
+        Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
+        is then a local optimum, found from the one without them, and keeps them within 1 %.
+    friction : bool or Friction
+        Whether Fv and Fc of the drives count; or a friction model that acts besides. Rotor inertia
+        and offsets always count.
+    points : int
+        Number of intervals of the grid, evenly spaced in the parameter.
+    start_rate, end_rate : float
+        Rate of the path's own parameter at the ends, not negative.
+    both_ends : bool
+        Whether torques are limited at both ends of each interval.
+
+    Returns
+    -------
+    TimedPath
+        The motion, or why there is none.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates,
+        no finite limit, a path outside the limits of position.
+
+    References
+    ----------
+    Seed book sections 4.4.1.1 and 4.5.1.2. H. Pham and Q.-C. Pham, A new approach to time-optimal
+    path parameterization based on reachability analysis, IEEE T-RO 34, 2018.
+
+    Examples
+    --------
+    >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
+    >>> line = linear([0.0, 0.0], [1.0, 0.5], duration=1.0)
+    >>> timed = time_optimal(line, MotionLimits(velocity=1.0, acceleration=2.0))
+    >>> round(timed.duration, 6)  # D / v + v / a
+    1.5
+    """
+    points = checked_points(points)
+    rates = tuple(as_number(r, k, least=0.0) for r, k in
+                  ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    motion, scalar = path_of(path, model, points)
+    n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
+    problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
+    if isinstance(motion, str):
+        return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
+    own = isinstance(path, Trajectory) and motion is path.motion
+    evenly = own and not np.isfinite(problem.rates).any()
+    s = np.linspace(0.0, 1.0, points + 1) if evenly else toward_ends(points)
+    s = float(motion.duration) * s
+    q, rate, bend = motion.derivatives(s, (0, 1, 2))
+    checked_limits(problem.limits, n, q)
+    if isinstance(path, Trajectory) and not own:  # rates of the length
+        (speed,) = path.motion.derivatives(np.array([0.0, path.duration]), (1,))
+        rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
+    ends = (rates[0], rates[1])
+    rows = problem.rows(q, rate, bend)
+    at_rest = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
+    found = not_held(problem, rows.held, s, q, at_rest)
+    if found:
+        return _without(TimingStatus.NOT_HELD_STILL, found)
+    passes = problem.passes(s, q, rate, bend, ends, rows)
+    if passes.failed >= 0 or np.isinf(passes.duration):
+        found = not_held(problem, rows.held, s, q)
+        if found:
+            return _without(TimingStatus.NOT_HELD_STILL, found)
+        return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
+    half = np.append(np.arange(0, points, 2), points)
+    coarse = problem.passes(s[half], q[half], rate[half], bend[half], ends, _part(rows, half))
+    gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
+    x = passes.found[:, 0]
+    if not x.max() < 1e200:
+        raise InvalidValueError(
+            f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
+            "zero there; give limits of velocity and acceleration of every joint, or of torque."
+        )
+    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    if np.isfinite(problem.rates).any():
+        slower = rate_limited(problem, s, q, rate, rows, x)
+        if slower is None:
+            return _without(
+                TimingStatus.NOT_CONTROLLABLE,
+                "No motion was found that keeps the limits of jerk or of the rates of torques.",
+            )
+        slowed = slower[0] < x * (1.0 - 1e-3)
+        x, law = slower
+    trajectory = Trajectory(TimedMotion(motion, law), scalar)
+    code = passes.found[:, 5].astype(int)
+    velocity = code == problem.scale.size
+    if velocity.any():
+        with np.errstate(divide="ignore"):
+            spare = np.where(rate > 0.0, problem.limits.velocity, -problem.limits.velocity_lower)
+            code[velocity] += (spare / np.abs(rate)).argmin(axis=1)[velocity]
+    return TimedPath(
+        trajectory,
+        TimingStatus.OPTIMAL,
+        s,
+        np.sqrt(np.maximum(x, 0.0)),
+        np.sqrt(np.maximum(passes.found[:, 4], 0.0)),
+        np.where(slowed, "rate", problem.names[code]),
+        gap,
+    )
+
+
+def law_of(s: Array, x: Array) -> PiecewisePolynomial:
+    """Path parameter over time whose squared rates x are linear between points s (N + 1,)."""
+    rate = np.sqrt(np.maximum(x, 0.0))
+    step = np.diff(s)
+    h = 2.0 * step / (rate[1:] + rate[:-1])
+    c = np.stack((s[:-1], rate[:-1] * h, 0.5 * (rate[1:] - rate[:-1]) * h), axis=-1)
+    times = np.concatenate(((0.0,), np.cumsum(h)))
+    return PiecewisePolynomial(times[None], c[..., None], h[None])
+
+
+def _without(status: TimingStatus, why: str) -> TimedPath:
+    none = np.empty(0)
+    return TimedPath(None, status, none, none, none, np.empty(0, str), np.inf, why)
+
+
+def _part(rows: Rows, at: NDArray[np.intp]) -> Rows:
+    """Rows of some points of the grid."""
+    return Rows(*(part[at] for part in rows))
+
+
+def not_held(
+    problem: PathLimits, held: Array, s: Array, q: Array, at_rest: list[int] | None = None
+) -> str:  # fmt: skip
+    """Where gravity exceeds the torques most, as a sentence; at points at rest friction helps."""
+    margin = problem.torque * (1.0 + 1e-9) - np.abs(held)
+    help_ = ""
+    if at_rest is not None:
+        s, q, held, margin = s[at_rest], q[at_rest], held[at_rest], margin[at_rest]
+        stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
+        margin, help_ = margin + stuck, " and dry friction" if stuck.any() else ""
+    if (margin >= 0.0).all():
+        return ""
+    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
+    return (
+        f"Gravity exceeds the torques at s = {s[i]:.6g}: joint {j + 1} needs "
+        f"{abs(held[i, j]):.6g} to be held still and has {problem.torque[j]:.6g}{help_}, a margin "
+        f"of {margin[i, j]:.4g} (N m or N)."
+    )
+
+
+def _where(passes: Passes, s: Array, ends: tuple[float, float]) -> str:
+    """Why the end is not reached, as a sentence."""
+    i = passes.failed
+    if i < 0:
+        rate = passes.found[:, 0]
+        i = int(((rate[1:] <= 0.0) & (rate[:-1] <= 0.0)).argmax())
+        return f"The limits leave no acceleration at s = {s[i]:.6g}, where the motion stops."
+    if i == len(s) - 1:
+        most = np.sqrt(passes.rows.top[-1])
+        return f"end_rate {ends[1]:.6g} exceeds the limits of velocity, which allow {most:.6g}."
+    low, high = np.sqrt(np.maximum(passes.found[i, 2:4], 0.0))
+    if i == 0 and low <= high:
+        return (
+            f"start_rate {ends[0]:.6g} is not controllable at s = {s[0]:.6g}: the end is reached "
+            f"from rates between {low:.6g} and {high:.6g}."
+        )
+    return (
+        f"No rate at s = {s[i]:.6g} lets the rest of the path be followed within the limits "
+        "(the path is not controllable there)."
+    )

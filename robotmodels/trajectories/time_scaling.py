@@ -1,0 +1,275 @@
+"""Least duration of a motion that keeps its profile: windows of the duration at every sample.
+
+Stretched evenly to the duration T, a profile asks for the torques ``A / T^2 + B / T + C``: A of
+inertia, Coriolis and centrifugal effects, B of viscous friction, C of gravity, offsets and dry
+friction (seed book section 4.4.2.3). Each limit forbids intervals of ``z = 1 / T``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Value, read_only
+from .._outcomes import Outcome
+from ..dynamics.inverse import rigid_torques
+from ..errors import InvalidValueError
+from ..model import RobotModel, check_model
+from .checks import checked_limits
+from .limits import MotionLimits
+from .motions import Motion, TimedMotion
+from .path_limits import checked_torque
+from .piecewise import PiecewisePolynomial
+from .trajectory import Trajectory
+
+_SAMPLES, _FINE = 501, 4001
+_ZOOM = 41
+_ROUNDS = 4
+_WORST = 4
+"""Samples around which the least duration is refined between samples."""
+_MARGIN = 1.0 + 1e-12
+
+
+class ScalingStatus(Outcome):
+    """Outcome of `time_scaled`; fits int8."""
+
+    SCALED = 0, "The duration is the least with which the profile keeps the limits."
+    NOT_HELD_STILL = 1, "Gravity exceeds the torques at a sample, in any duration."
+    NO_WINDOW = 2, "No duration keeps the limits at all samples."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ScaledTrajectory(Value):
+    """A motion with the least duration that its profile allows.
+
+    Parameters
+    ----------
+    trajectory : Trajectory or None
+        The motion; None without one.
+    status : ScalingStatus
+        Outcome.
+    fraction : ndarray, shape (N,)
+        Samples, as fractions of the duration.
+    windows : ndarray, shape (N, 2)
+        Least and greatest duration with which each sample keeps the limits, s: the window of the
+        shortest ones if there are several, both infinite if there is none. The greatest is
+        infinite where the robot is held still.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import MotionLimits, quintic, time_scaled
+    >>> move = quintic(np.zeros(6), np.full(6, 0.1), duration=1.0)
+    >>> scaled = time_scaled(move, load("ur5e"), None, MotionLimits(velocity=0.5))
+    >>> scaled.status.name, round(scaled.duration, 6)
+    ('SCALED', 0.375)
+    """
+
+    trajectory: Trajectory | None
+    status: ScalingStatus
+    fraction: Array
+    windows: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fraction", read_only(self.fraction))
+        object.__setattr__(self, "windows", read_only(self.windows))
+
+    @property
+    def duration(self) -> float:
+        """Seconds; NaN without a motion."""
+        return np.nan if self.trajectory is None else self.trajectory.duration
+
+    def reason(self) -> str:
+        """The status as a sentence."""
+        return self.status.sentence
+
+    def __repr__(self) -> str:
+        most = self.windows[:, 0].max(initial=0.0)
+        return (
+            f"<ScaledTrajectory: {self.status.name}, {self.duration:.6g} s\n"
+            f"  windows of {len(self.windows)} samples begin at {most:.6g} s at the latest>"
+        )
+
+
+def time_scaled(
+    trajectory: Trajectory,
+    model: RobotModel,
+    torque: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+) -> ScaledTrajectory:
+    """Uniform time scaling: the least duration with which a motion keeps limits.
+
+    Also called dynamic time scaling. Limits of torque are checked at samples of the profile, and
+    between them around those that decide; those of velocity, acceleration and jerk everywhere.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The profile, n joints; its own duration does not matter.
+    model : RobotModel
+        The robot, n joints, with its drives.
+    torque : array_like, shape () or (n,), optional
+        Greatest torques of both signs, N m or N; default those of the model's table.
+    limits : MotionLimits, optional
+        Of velocity, acceleration, jerk and position.
+
+    Returns
+    -------
+    ScaledTrajectory
+        The motion, or why there is none, and the windows.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Numbers of joints that differ, NaN, negative torques, no finite limit, a motion outside
+        its limits of position or without duration.
+
+    References
+    ----------
+    Seed book section 4.4.2.3.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import quintic, time_scaled
+    >>> arm = load("ur5e")
+    >>> move = quintic([0, -1.5, 1, 0, 0, 0], [1, -0.5, 1, 0, 0, 0], duration=1.0)
+    >>> scaled = time_scaled(move, arm)
+    >>> scaled.duration < 1.0, scaled.windows.shape
+    (True, (501, 2))
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise InvalidValueError(
+            f"trajectory: expected a Trajectory, got {type(trajectory).__name__}."
+        )
+    if trajectory.motion.batch:
+        raise InvalidValueError("trajectory: expected one motion, got a batch of motions.")
+    check_model(model)
+    end, motion = trajectory.duration, trajectory.motion
+    if not end > 0.0:
+        raise InvalidValueError("trajectory: it has no duration.")
+    bound = checked_torque(torque, model, trajectory.n)
+    least = 0.0
+    if limits is not None:
+        bounds = checked_limits(limits, trajectory.n, *motion.extremes(0))
+        assert bounds is not None
+        least = end * trajectory.check(bounds).stretch
+    if not (np.isfinite(bound).any() or least > 0.0):
+        raise InvalidValueError(
+            "limits, torque: all are infinite or the motion is none, so any duration keeps them."
+        )
+    fraction = np.linspace(0.0, 1.0, _SAMPLES)
+    parts = torque_parts(model, motion, fraction)
+    windows = windows_of(parts, bound, least)
+    if not _held(model, motion, bound):
+        return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows)
+    T = _least_duration(model, motion, bound, least)
+    if np.isinf(T):
+        heavy = (np.abs(parts[2]) > bound).any()
+        status = ScalingStatus.NOT_HELD_STILL if heavy else ScalingStatus.NO_WINDOW
+        return ScaledTrajectory(None, status, fraction, windows)
+    result = Trajectory(stretched(motion, T * _MARGIN), trajectory.scalar)
+    return ScaledTrajectory(result, ScalingStatus.SCALED, fraction, windows)
+
+
+def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:
+    """A, B and C of ``A / T^2 + B / T + C`` at fractions (N,) of a motion, each (N, n)."""
+    T = float(motion.duration)
+    q, v, a = motion.derivatives(fraction * T, (0, 1, 2))
+    v, a, rest = v * T, a * T * T, np.zeros(q.shape)
+    C = rigid_torques(model, q, rest, rest)
+    A = rigid_torques(model, q, v, a) - C
+    B = rest
+    if (drives := model.drive_matrices) is not None:
+        A = A + a @ drives.rotor
+        B = v @ drives.viscous
+        C = C + drives.torque(v, None) - B
+    return A, B, C
+
+
+def windows_of(parts: tuple[Array, Array, Array], bound: Array, least: float) -> Array:
+    """Window of the shortest durations above a least one. Shapes: parts (..., n) -> (..., 2)."""
+    low, high = _forbidden(parts, bound)
+    with np.errstate(divide="ignore"):
+        z = np.full((*low.shape[:-1], 1), 1.0 / np.float64(least))
+    while True:  # from the quickest down over the intervals that are forbidden
+        inside = (low < z) & ((z < high) | (high == np.inf))
+        if not inside.any():
+            break
+        z = np.minimum(z, np.where(inside, low, np.inf).min(axis=-1, keepdims=True))
+    slow = np.where((high < z) & (low < high), high, 0.0).max(axis=-1, initial=0.0)
+    with np.errstate(divide="ignore"):
+        window = np.stack((1.0 / z[..., 0], 1.0 / slow), axis=-1)
+    return np.where(z > 0.0, window, np.inf)
+
+
+def _forbidden(parts: tuple[Array, Array, Array], bound: Array) -> tuple[Array, Array]:
+    """Open intervals (..., 4 n) of ``z = 1 / T`` in which a limit is exceeded; some are empty.
+
+    Of ``A z^2 + B z + c > 0`` with ``c = +-C - bound``: outside of the roots, or between them.
+    """
+    A, B, C = (np.concatenate((x, 0.0 - x), axis=-1) + 0.0 for x in parts)  # no -0.0
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        c = C - np.concatenate((bound, bound))
+        square = np.where(np.isfinite(c), B * B - 4.0 * A * c, 0.0)
+        far = -0.5 * (B + np.copysign(np.sqrt(np.maximum(square, 0.0)), B))
+        roots = np.sort(np.stack((far / A, c / far)), axis=0)
+    convex, never = A >= 0.0, (square <= 0.0) & (c <= 0.0)
+    first, last = (np.where(square > 0.0, root, np.inf) for root in roots)
+    low = np.stack((np.where(convex, 0.0, first), np.where(convex, last, np.inf)), axis=-1)
+    high = np.stack((np.where(convex, first, last), np.full(c.shape, np.inf)), axis=-1)
+    low[never], high[never] = np.inf, 0.0
+    low = np.maximum(low, 0.0)
+    shape = (*c.shape[:-1], -1)
+    return low.reshape(shape), high.reshape(shape)
+
+
+def _least_duration(model: RobotModel, motion: Motion, bound: Array, least: float) -> float:
+    """Least duration that keeps the limits at all samples, and between those that decide."""
+    fraction = np.linspace(0.0, 1.0, _FINE)
+    samples = [fraction]
+    latest = _earliest(model, motion, fraction, bound, least)
+    for k in np.argsort(-latest, kind="stable")[:_WORST]:
+        low, high = fraction[max(k - 1, 0)], fraction[min(k + 1, _FINE - 1)]
+        for _ in range(_ROUNDS):
+            fine = np.linspace(low, high, _ZOOM)
+            i = int(_earliest(model, motion, fine, bound, least).argmax())
+            low, high = fine[max(i - 1, 0)], fine[min(i + 1, _ZOOM - 1)]
+            samples.append(fine)
+    every = np.concatenate(samples)
+    together = tuple(x.reshape(-1) for x in torque_parts(model, motion, every))
+    # all samples at once, as limits of one joint each
+    least = max(least, float(latest[np.isfinite(latest)].max(initial=0.0)))
+    return float(windows_of(together, np.tile(bound, every.size), least)[0])  # type: ignore[arg-type]
+
+
+def _earliest(
+    model: RobotModel, motion: Motion, fraction: Array, bound: Array, least: float
+) -> Array:  # fmt: skip
+    """Least duration (N,) at samples; infinite where there is none."""
+    return windows_of(torque_parts(model, motion, fraction), bound, least)[:, 0]
+
+
+def _held(model: RobotModel, motion: Motion, bound: Array) -> bool:
+    """Whether the torques and dry friction hold the robot at the ends where it rests."""
+    ends = np.array([0.0, float(motion.duration)])
+    q, v = motion.derivatives(ends, (0, 1))
+    rest = np.abs(v).max(axis=1) <= 1e-12 * max(float(np.abs(motion.extremes(1)).max()), 1e-300)
+    load = rigid_torques(model, q, np.zeros(q.shape), np.zeros(q.shape))
+    if (drives := model.drive_matrices) is not None:
+        load, bound = load + drives.offset, bound + drives.coulomb
+    return bool((np.abs(load) <= bound * (1.0 + 1e-9))[rest].all())
+
+
+def stretched(motion: Motion, duration: float) -> Motion:
+    """The same profile in another duration."""
+    factor = duration / float(motion.duration)
+    if isinstance(motion, PiecewisePolynomial):
+        lengths = motion.lengths * factor
+        return PiecewisePolynomial(motion.breaks * factor, motion.coefficients, lengths)
+    if isinstance(motion, TimedMotion):
+        return TimedMotion(motion.path, stretched(motion.law, duration))  # type: ignore[arg-type]
+    law = PiecewisePolynomial([[0.0, duration]], [[[0.0], [float(motion.duration)]]])  # type: ignore[arg-type]
+    return TimedMotion(motion, law)
