@@ -13,7 +13,9 @@ from .._arrays import Array, Value, as_mask, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..igm import IGMStatus, igm
-from ..igm.request import poses_of
+from ..igm.known import known_arm, solver_for
+from ..igm.request import Task, poses_of
+from ..igm.solver import Tolerances, postures
 from ..kinematics import dgm
 from ..model import RobotModel, check_model
 from .arms import (
@@ -142,6 +144,11 @@ def accessibility(
             place = np.repeat((True, False), 3)
             components = place if components is None else components & place
         status, count = posture_counts(arm, rows, components, bounded, is_free)
+        lost = np.flatnonzero(status == AccessStatus.OUT_OF_REACH)
+        if lost.size and level == "pose":
+            reasons = igm(arm, rows[lost], mask=components).status
+            oriented = reasons == IGMStatus.ORIENTATION_NOT_AVAILABLE
+            status[lost[oriented]] = AccessStatus.ORIENTATION_NOT_AVAILABLE
     return Accessibility(
         read_only(status.reshape(batch), np.int8), read_only(count.reshape(batch), np.int64), level
     )
@@ -192,9 +199,19 @@ def postures_of(
                 positions = np.where(mask[:3], positions, section.frame[:3, 3])
             q, valid = section.postures(positions)
             return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
-    found = igm(arm, poses, mask=mask)
-    oriented = found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
-    return np.array(found.q), np.array(found.valid), oriented
+    known = known_arm(arm, mask is None)
+    task = Task() if mask is None else Task(mask=tuple(mask.tolist()))
+    solver = solver_for(arm, known, task)
+    if solver is None or solver.chain.k > (6 if mask is None else int(mask.sum())):
+        found = igm(arm, poses, mask=mask)
+        oriented = found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
+        return np.array(found.q), np.array(found.valid), oriented
+    # the solver alone: why a pose is not reached is not asked here
+    U = np.ascontiguousarray(known.to_base @ poses)
+    solved = postures(solver, U, np.zeros((len(U), solver.chain.k)), Tolerances())
+    q = np.where(solved.valid[..., None], 0.0, np.nan) * np.ones(arm.n)
+    q[..., solver.chain.columns] = solved.q
+    return q, solved.valid.copy(), np.zeros(len(poses), np.bool_)
 
 
 def with_free(valid: NDArray[np.bool_], q: Array, is_free: Free) -> NDArray[np.bool_]:
