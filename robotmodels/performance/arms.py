@@ -202,18 +202,24 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray
     return moved if moved.sum() == k else np.ones(6, np.bool_)
 
 
-def joint_ranges(model: RobotModel, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
-    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves."""
+def joint_ranges(
+    model: RobotModel, limits: bool, columns: ArrayLike | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves.
+
+    A slide among the columns (default those that move the tool) needs limits.
+    """
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (limits | ~turning)
-    slides = np.flatnonzero(~turning & ~bounded)
+    asked = chain_of(model).columns if columns is None else np.asarray(columns)
+    slides = np.intersect1d(np.flatnonzero(~turning & ~bounded), asked)
     if slides.size:
         raise InvalidValueError(
             f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "
             "infinite; give the table `lower` and `upper`."
         )
-    low = np.where(bounded, model.lower, -pi)
-    high = np.where(bounded, model.upper, pi)
+    low = np.where(bounded, model.lower, np.where(turning, -pi, -np.inf))
+    high = np.where(bounded, model.upper, np.where(turning, pi, np.inf))
     return np.stack((low, high), axis=1), turning & ~bounded
 
 

@@ -240,8 +240,9 @@ def _divided(
     names = () if factors is None else factors.names
     if not columns or (signed and factors is None):
         return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)
-    ranges, circle = joint_ranges(arm, bounded)
     parts = _apart(columns, factors, is_free is not None)
+    needed = [j for joints, members in parts for j in joints if members or is_free is not None]
+    ranges, circle = joint_ranges(arm, bounded, needed)
     groups = []
     for joints, members in parts:
         first, last = _CELLS.get(len(joints), (6, 6))
@@ -286,7 +287,9 @@ def _group(
     """The parts of the space of some joints, by connected cells of equal signs."""
     d = len(joints)
     low, high = ranges[list(joints)].T
-    side = (high - low) / cells
+    width = high - low
+    low = np.where(np.isfinite(width), low, 0.0)  # a slide without limits, in one cell
+    side = np.where(np.isfinite(width), width, 1.0) / cells
     closed = tuple(bool(circle[j]) for j in joints)
     axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, side, strict=True)]
     q = np.zeros((cells**d, arm.n))
@@ -311,7 +314,7 @@ def _group(
     codes[labels[labels > 0] - 1] = code[labels > 0]
     return Group(
         joints, read_only(low), read_only(side), closed, members, read_only(labels, np.int32),
-        read_only(codes, np.int64), read_only(sizes * float(np.prod(side))), separates,
+        read_only(codes, np.int64), read_only(sizes * float(np.prod(width / cells))), separates,
     )  # fmt: skip
 
 

@@ -134,7 +134,7 @@ def grid_of(
 
 def _of_section(model: RobotModel, arm: SectionArm, limits: bool) -> Array:
     """Points of the section on a grid of the last two joints, the ends included."""
-    ranges, _ = joint_ranges(model, limits)
+    ranges, _ = joint_ranges(model, limits, arm.columns[1:])
     axes = [np.linspace(*ranges[c], _GRID) for c in arm.columns[1:]]
     x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     return arm.values(x)[:, :2]

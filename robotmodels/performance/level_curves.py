@@ -35,7 +35,7 @@ class Ranges(NamedTuple):
 
 def last_two_ranges(model: RobotModel, arm: SectionArm, limits: bool) -> Ranges:
     """Where the last two joints move; bounds are infinite on a whole circle."""
-    ranges, circle = joint_ranges(model, limits)
+    ranges, circle = joint_ranges(model, limits, arm.columns[1:])
     ranges, circle = ranges[arm.columns[1:]], circle[arm.columns[1:]]
     turning = arm.periods > 0.0
     low = np.where(turning, -np.pi, ranges[:, 0])
