@@ -173,6 +173,8 @@ def _merged(G: Array) -> Array:
     """The columns of a zonotope, parallel ones added, zeros left out."""
     length = np.linalg.norm(G, axis=0)
     G = G[:, length > _ZERO * max(float(length.max(initial=0.0)), 1e-300)]
+    if G.shape[1] == 0:
+        return G
     u = G / np.linalg.norm(G, axis=0)
     cos = u.T @ u
     same = np.abs(cos) > 1.0 - 1e-13
