@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_vector, read_only
+from .._arrays import Array, as_vector, read_only
 from .._outcomes import Outcome
 from ..model import RobotModel, check_model
 from .arms import (
     Free,
+    Result,
     chain_of,
     checked_flag,
     checked_resolution,
@@ -55,7 +56,7 @@ class Group(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Aspects(Value):
+class Aspects(Result):
     """Parts of the joint space: aspects, or components of the free space.
 
     Parameters

@@ -36,7 +36,7 @@ class Bound(NamedTuple):
         """Least singular values (N,) of the task's rows, linear ones over the length."""
         J = jacobian(self.model, q)[:, self.rows][..., self.columns]
         weights = np.repeat((1.0 / self.length, 1.0), 3)[self.rows]
-        return np.linalg.svd(J * weights[:, None], compute_uv=False)[:, -1]
+        return np.asarray(np.linalg.svd(J * weights[:, None], compute_uv=False)[:, -1], float)
 
 
 def bound_of(model: RobotModel, rows: NDArray[np.bool_], strokes: Array | None = None) -> Bound:

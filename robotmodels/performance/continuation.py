@@ -80,9 +80,7 @@ def successors(
     return out, way
 
 
-def _error(
-    goal: Array, pose: Array, rows: NDArray[np.bool_], length: float
-) -> Array:
+def _error(goal: Array, pose: Array, rows: NDArray[np.bool_], length: float) -> Array:
     """Rows of the twist (N, 6) from poses to goals, linear ones over the length."""
     e = np.empty((len(goal), 6))
     e[:, :3] = (goal[:, :3, 3] - pose[:, :3, 3]) / length

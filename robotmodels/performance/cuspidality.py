@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 from math import tau
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Value, read_only
+from .._arrays import Array, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
@@ -16,7 +17,7 @@ from ..igm import igm
 from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
 from ..model import RobotModel, check_model
-from .arms import SectionArm, chain_of, section_arm, task_rows
+from .arms import Result, SectionArm, section_arm, task_rows
 from .arrangement import cut, section_lines
 from .aspects import aspects
 from .certificate import Bound, bound_of, certified
@@ -45,7 +46,7 @@ class CuspidalityStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Cuspidality(Value):
+class Cuspidality(Result):
     """Outcome of a search for a change of posture that meets no singular position.
 
     Parameters
@@ -120,7 +121,7 @@ def cuspidality(
 
     References
     ----------
-    Seed book section 3.4; P. Wenger, "Cuspidal and noncuspidal robot manipulators", Robotica 25
+    Seed book section 3.4.4; P. Wenger, "Cuspidal and noncuspidal robot manipulators", Robotica 25
     (2007); D. Salunkhe et al., arXiv 2202.08686; A. Elias and J. Wen, arXiv 2501.18505.
 
     Examples
@@ -146,10 +147,9 @@ def cuspidality(
 
 def _without(arm: RobotModel, status: CuspidalityStatus, tried: int = 0) -> Cuspidality:
     """A result without a path."""
-    none = np.full((2, arm.n), np.nan)
+    path, ends, pose = np.zeros((0, arm.n)), np.full((2, arm.n), np.nan), np.full((4, 4), np.nan)
     return Cuspidality(
-        status, read_only(np.zeros((0, arm.n))), read_only(none), read_only(np.full((4, 4), np.nan)),
-        0.0, tried,
+        status, read_only(path), read_only(ends), read_only(pose), 0.0, tried,
     )  # fmt: skip
 
 
@@ -284,7 +284,7 @@ def _far(arm: RobotModel, a: Array, b: Array) -> float:
 
 def _all_apart(arm: RobotModel, section: SectionArm) -> bool:
     """Whether in every region of the section all postures lie in different aspects."""
-    area, middle, _ = cut(section_lines(arm, section, False))
+    area, middle, *_ = cut(section_lines(arm, section, False))
     middle = middle[area > 1e-9 * section.size**2]
     divided = aspects(arm, limits=False)
     if not divided.is_complete:
@@ -314,12 +314,12 @@ def _by_search(
     codes[several] = factors.codes(found.q[several])
     if _signs_are_labels(factors, found.q[several], found.branch[several]):
         return _without(arm, CuspidalityStatus.NOT_CUSPIDAL)
-    pairs = []
-    for k, row in enumerate(codes):
-        for s in range(len(row)):
-            for r in range(s + 1, len(row)):
-                if row[s] == row[r] >= 0 and _far(arm, found.q[k, s], found.q[k, r]) > _APART:
-                    pairs.append((found.q[k, s], found.q[k, r]))
+    pairs = [
+        (rows[s], rows[r])
+        for code, rows in zip(codes, found.q, strict=True)
+        for s, r in combinations(range(len(code)), 2)
+        if code[s] == code[r] >= 0 and _far(arm, rows[s], rows[r]) > _APART
+    ]
     if not pairs:
         return _without(arm, CuspidalityStatus.NONE_FOUND)
     turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
@@ -376,5 +376,5 @@ def _most_regular(
 def _dense(knots: Array) -> Array:
     """A polyline with many points on each piece."""
     t = np.linspace(0.0, 1.0, 51)[:-1, None]
-    parts = [a + t * (b - a) for a, b in zip(knots[:-1], knots[1:], strict=True)]
+    parts = [a + t * (b - a) for a, b in pairwise(knots)]
     return np.concatenate((*parts, knots[-1:]))

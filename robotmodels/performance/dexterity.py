@@ -1,4 +1,4 @@
-"""Dexterity over configurations and over a workspace: section 3.6 of the book.
+"""Dexterity over configurations and over a workspace: sections 3.6.1 to 3.6.4 of the book.
 
 The indices: ``inverse_condition``, least over largest singular value; ``manipulability``, the
 product of the singular values; ``least_singular_value``; ``isotropy``, geometric over arithmetic
@@ -28,14 +28,26 @@ _SAMPLES = 200000
 
 
 class DexterityMap(NamedTuple):
-    """Index at the cells of a workspace (N,): of the best posture, and the mean; NaN outside."""
+    """Index of dexterity at the cells of a workspace.
+
+    Parameters
+    ----------
+    best, mean : ndarray, shape (N,)
+        Of the best posture, and the mean over the postures; NaN outside.
+    """
 
     best: Array
     mean: Array
 
 
 class GlobalIndex(float):
-    """Mean of an index, with ``spread``, its standard deviation over the same measure."""
+    """Mean of an index.
+
+    Attributes
+    ----------
+    spread : float
+        Standard deviation over the same measure.
+    """
 
     spread: float
 
@@ -140,7 +152,7 @@ def dexterity_map(
 
     References
     ----------
-    Seed book section 3.6.
+    Seed book section 3.6.1.
 
     Examples
     --------
@@ -216,7 +228,7 @@ def global_index(
 
     References
     ----------
-    Seed book section 3.6; C. Gosselin and J. Angeles, "A global performance index for the kinematic
+    Seed book section 3.6.1; C. Gosselin and J. Angeles, "A global performance index for the kinematic
     optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
 
     Examples

@@ -6,6 +6,7 @@ from math import tau
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..model import RobotModel
@@ -18,7 +19,7 @@ _MOST_CURVES = 400
 
 
 class Curve(NamedTuple):
-    """A curve of the last two joints (K, 2), and whether it closes (its last point is its first)."""
+    """A curve of the last two joints (K, 2), and whether its last point is its first."""
 
     x: Array
     closed: bool
@@ -29,7 +30,7 @@ class Ranges(NamedTuple):
 
     low: Array
     high: Array
-    circle: Array
+    circle: NDArray[np.bool_]
     bounds: Array
 
 

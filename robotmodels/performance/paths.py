@@ -8,7 +8,7 @@ from math import tau
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_mask, read_only
+from .._arrays import Array, as_mask, read_only
 from .._outcomes import Outcome
 from ..errors import ShapeError
 from ..geometry import REVOLUTE
@@ -16,7 +16,7 @@ from ..igm.request import poses_of
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
 from .accessibility import postures_of
-from .arms import chain_of, checked_flag, checked_word, section_arm, task_rows
+from .arms import Result, chain_of, checked_flag, checked_word, section_arm, task_rows
 from .certificate import bound_of
 from .continuation import successors
 from .factors import factors_of
@@ -36,7 +36,7 @@ class PathStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FeasiblePath(Value):
+class FeasiblePath(Result):
     """Joint motions that follow a path of poses, from every starting posture.
 
     Parameters

@@ -8,13 +8,13 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_mask, as_vector, read_only
+from .._arrays import Array, as_mask, as_vector, read_only
 from .._outcomes import Outcome
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import jacobian
 from ..model import RobotModel, check_model
-from .arms import checked_word
+from .arms import Result, checked_word
 
 KINDS = ("velocity", "force", "acceleration")
 _ZERO = 1e-10  # beside the largest generator, or the largest distance of a plane
@@ -31,7 +31,7 @@ class PolytopeStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polytope(Value):
+class Polytope(Result):
     """A convex polytope about the origin, symmetric to it.
 
     Parameters
@@ -103,12 +103,12 @@ def polytope(
 
     References
     ----------
-    Seed book section 3.6; A. Skuric et al., "Pycapacity", JOSS 8(89), 2023, for the words.
+    Seed book section 3.6.2; A. Skuric et al., "Pycapacity", JOSS 8(89), 2023, for the words.
 
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> found = polytope(load("puma560"), [0, 0.5, 0.5, 0, 0.5, 0], mask="position")
+    >>> found = polytope(load("ur5e"), [0, 0.5, 0.5, 0, 0.5, 0], mask="position")
     >>> found.vertices.shape[1], found.radius > 0.0
     (3, True)
     """
@@ -277,7 +277,7 @@ def _strips(J: Array, tau: Array) -> Polytope:
     """All f (m,) with ``|J^T f| <= tau``."""
     m, n = J.shape
     A = (J / tau).T  # |A f| <= 1
-    U, s, Vt = np.linalg.svd(A) if A.size else (np.eye(n), np.zeros(0), np.eye(m))
+    _, s, Vt = np.linalg.svd(A) if A.size else (None, np.zeros(0), np.eye(m))
     rank = int((s > _ZERO * s.max(initial=0.0)).sum())
     status = PolytopeStatus.BOUNDED
     basis = np.eye(m)
