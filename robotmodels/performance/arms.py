@@ -72,9 +72,10 @@ _CELL_BYTES = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionArm:
-    """Three joints for a position as the kernels take them; of two joints in a plane the first is
-    a virtual slide, column -1. ``frame`` maps (u, v, w) of the section to the world.
-    Shapes: kinds, columns (3,), D (4, 4, 4)."""
+    """Three joints for a position as the kernels take them, ``frame`` from section to world.
+
+    Of two joints in a plane the first is a virtual slide, column -1. Shapes: D (4, 4, 4).
+    """
 
     kinds: NDArray[np.int64]
     D: Array

@@ -34,7 +34,8 @@ _MARGIN = 0.02
 class Space:
     """Coordinates of a workspace: ``frame`` (4, 4) maps (u, v, w) to the world.
 
-    ``kind`` is half plane (u the distance from the first axis), plane or space."""
+    ``kind`` is half plane (u the distance from the first axis), plane or space.
+    """
 
     kind: str
     frame: Array

@@ -228,8 +228,8 @@ def global_index(
 
     References
     ----------
-    Seed book section 3.6.1; C. Gosselin and J. Angeles, "A global performance index for the kinematic
-    optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
+    Seed book section 3.6.1; C. Gosselin and J. Angeles, "A global performance index for the
+    kinematic optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
 
     Examples
     --------
