@@ -270,9 +270,8 @@ def test_accessible_poses_and_orientations():
     T = rm.dgm(arm, q)
     assert (pf.accessibility(arm, T, limits=False).count == rm.igm(arm, T).count).all()
     places = [translation(x, 0, 0.672) for x in (0.5, 0.8, 2.0)]
-    found = pf.accessibility(
-        arm.with_tool(translation(0, 0, 0.2)), places, "every_orientation", limits=False
-    )
+    arm = arm.with_tool(translation(0, 0, 0.2))
+    found = pf.accessibility(arm, places, "every_orientation", limits=False)
     assert found.status.tolist() == [0, 4, 1]
     assert found.count[0] > 0
 

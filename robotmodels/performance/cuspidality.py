@@ -141,7 +141,7 @@ def cuspidality(
         return _without(arm, CuspidalityStatus.NOT_CUSPIDAL)
     section = section_arm(arm)
     if section is not None:
-        return _of_section(arm, section)
+        return _of_section(arm, section, factors, rng, int(poses))
     return _by_search(arm, factors, rng, int(poses))
 
 
@@ -164,21 +164,29 @@ def _with(arm: RobotModel, path: Array, margin: float, tried: int) -> Cuspidalit
 # --- three joints --------------------------------------------------------------------------------
 
 
-def _of_section(arm: RobotModel, section: SectionArm) -> Cuspidality:
+def _of_section(
+    arm: RobotModel, section: SectionArm, factors: Factors, rng: np.random.Generator, poses: int
+) -> Cuspidality:
     """Around the cusps; without cusps by the aspects of all regions of the section."""
     ranges = last_two_ranges(arm, section, False)
     curves = level_curves(section, ranges)
     x, _ = cusps_of(section, curves)
     strokes = np.where(arm.table.sigma[arm.table.joint_rows] == REVOLUTE, 0.0, _stroke(arm))
     bound = bound_of(arm, task_rows(arm), strokes)
-    tried = 0
-    for cusp in x:
+    best, tried = _without(arm, CuspidalityStatus.NONE_FOUND), 0
+    if len(x):
+        best = _by_search(arm, factors, rng, poses)
+        tried = best.tried
+    for cusp in x if best.status != 0 else ():
         for path in _around(section, cusp):
             tried += 1
             whole = _closed(arm, section, path)
             margin = 0.0 if whole is None else certified(bound, whole)
-            if whole is not None and margin > 0.0:
-                return _with(arm, whole, margin, tried)
+            if whole is not None and margin > best.margin:
+                best = _with(arm, whole, margin, tried)
+                break  # lower levels are nearer to the singular curve
+    if best.status == 0:
+        return best
     if len(x) == 0 and _all_apart(arm, section):
         return _without(arm, CuspidalityStatus.NOT_CUSPIDAL)
     return _without(arm, CuspidalityStatus.NONE_FOUND, tried)
@@ -308,7 +316,7 @@ def _by_search(
 ) -> Cuspidality:
     """Labels of a closed form, else straight lines between postures with equal signs."""
     q = spread_configurations(arm, poses, rng)
-    found = igm(arm, dgm(arm, q), mask=None if factors.rows.sum() == 6 else factors.rows)
+    found = igm(arm, dgm(arm, q), mask=_asked(arm, factors))
     several = found.valid & ~found.double & ~found.free_joints.any(axis=-1)
     codes = np.full(found.valid.shape, -1)
     codes[several] = factors.codes(found.q[several])
@@ -339,6 +347,13 @@ def _by_search(
                 return _with(arm, _dense(knots), margin, tried * (via + 1))
             del k
     return _without(arm, CuspidalityStatus.NONE_FOUND, tried * (1 + _VIAS))
+
+
+def _asked(arm: RobotModel, factors: Factors) -> NDArray[np.bool_] | None:
+    """Mask of the inverse model: None for whole poses."""
+    if section_arm(arm) is not None:
+        return np.repeat((True, False), 3)
+    return None if factors.rows.sum() == 6 else factors.rows
 
 
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
