@@ -390,6 +390,16 @@ def test_the_bound_holds_for_random_pairs():
         assert (change <= np.abs(a - b) @ bound.slopes + 1e-12).all()
 
 
+def test_bound_of_the_proof():
+    from robotmodels.performance.certificate import bound_of, certified
+
+    bound = bound_of(TWO, np.array(PLANE, bool))
+    assert certified(bound, np.array([[0.0, 0.5], [1.0, -0.5]])) == 0.0
+    path = np.array([[0.0, 0.5], [1.0, 1.5]])
+    dense = path[0] + np.linspace(0, 1, 500)[:, None] * (path[1] - path[0])
+    assert 0.0 < certified(bound, path) <= bound.least(dense).min()
+
+
 def test_cuspidality_of_a_redundant_arm_is_not_defined():
     found = pf.cuspidality(rm.load("iiwa14"))
     assert found.status is pf.CuspidalityStatus.NOT_DEFINED

@@ -47,7 +47,7 @@ def add_command(commands: Any) -> None:
     parser.add_argument("--through-singular", action="store_true",
                         help="allow motions through singular positions")  # fmt: skip
     parser.add_argument("--cost", choices=("length", "conditioning"), default="length",
-                        help="what the best motion has least of (default: %(default)s)")  # fmt: skip
+                        help="what the best motion minimises (default: %(default)s)")  # fmt: skip
     parser.add_argument("--motion", type=Path, metavar="FILE",
                         help="write the best joint motion as CSV")  # fmt: skip
     parser.add_argument("--picture", type=Path, metavar="FILE",

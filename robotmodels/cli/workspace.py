@@ -109,7 +109,7 @@ def as_text(data: dict[str, Any]) -> str:
         ]
         lines.append(f"  {name:>3} posture{'s' if name != '1' else ' '}: {', '.join(values)}")
     if data["grid_error"] is not None:
-        lines.append(f"Sums of cells are good to about {data["grid_error"]:.2%}.")
+        lines.append(f"Sums of cells are good to about {data['grid_error']:.2%}.")
     for u, v in np.asarray(data["cusps"]).reshape(-1, 2):
         lines.append(f"Cusp at {u:.6f}, {v:.6f} m.")
     return "\n".join(lines)

@@ -22,7 +22,7 @@ from .arms import (
     joint_ranges,
     turned_inside,
 )
-from .factors import Factors, factors_of
+from .factors import Factors, sign_factors
 
 # cells along each of so many joints: at first, and when a grid does not separate all aspects
 _CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
@@ -128,7 +128,7 @@ class Aspects(Result):
             is_free = free_predicate(self.model, self.free)
             if is_free is not None:
                 inside &= is_free(rows)
-            factors = factors_of(self.model) if self.names else None
+            factors = sign_factors(self.model) if self.names else None
             values = None if factors is None else factors.values(rows)
             place = np.stack([_labels(g, rows, values) for g in self.groups], axis=-1)
             sizes = [len(g.volumes) + 1 for g in self.groups]
@@ -189,7 +189,7 @@ def aspects(
     (2, array([-1,  1], dtype=int8), array([1, 0]))
     """
     check_model(arm)
-    return _divided(arm, factors_of(arm), True, limits, free, resolution)
+    return _divided(arm, sign_factors(arm), True, limits, free, resolution)
 
 
 def free_components(

@@ -22,7 +22,7 @@ from .arrangement import cut, section_lines
 from .aspects import aspects
 from .certificate import Bound, bound_of, certified
 from .curves import cusps_of
-from .factors import Factors, factors_of
+from .factors import Factors, sign_factors
 from .level_curves import last_two_ranges, level_curves
 
 _LEVELS = 14  # of the determinant that are tried around a cusp, each a third of the one before
@@ -134,7 +134,7 @@ def cuspidality(
     if isinstance(poses, bool) or not isinstance(poses, (int, np.integer)) or poses < 1:
         raise InvalidValueError(f"poses: expected a number of poses of at least 1, got {poses!r}.")
     rng = np.random.default_rng(0 if rng is None else rng)
-    factors = factors_of(arm)
+    factors = sign_factors(arm)
     if factors is None:
         return _without(arm, CuspidalityStatus.NOT_DEFINED)
     if not factors.joints:  # the determinant is constant

@@ -19,7 +19,7 @@ from .accessibility import postures_of
 from .arms import Result, chain_of, checked_flag, checked_word, section_arm, task_rows
 from .certificate import bound_of
 from .continuation import successors
-from .factors import factors_of
+from .factors import sign_factors
 
 COSTS = ("length", "conditioning")
 _THROUGH = 0.5  # rad or m: longest step through a singular position
@@ -175,7 +175,7 @@ def feasible_path(
         path[:last] = U[:last, best] + tau * turns[max(last - 1, 0), best]
     there = ~np.isnan(path).any(axis=1)
     aspect = np.full(len(T), -1)
-    factors = factors_of(arm, mask)
+    factors = sign_factors(arm, mask)
     if factors is not None and there.any():
         aspect[there] = factors.codes(path[there]) if factors.joints else 0
     return FeasiblePath(
