@@ -7,7 +7,7 @@ PATHS = "tests/test_performance_paths.py -k "
 
 
 def fault(
-    name: str, after: str, old: str, new: str, tests: str, compiled: bool = False
+    name: str, after: str, old: str, new: str, tests: str, compiled: bool = True
 ) -> Mutation:
     """A fault of the room."""
     return Mutation("performance", name, after, old, new, tests, compiled)
@@ -54,8 +54,8 @@ MUTATIONS = [
           PATHS + "whole_turns"),
     fault("the longest motion is the best", "return int(chosen[price", "argmin", "argmax",
           PATHS + "least_cost"),
-    fault("accessible outside the limits", "q, inside = turned_inside(arm, q, limits)\n        valid",
-          "&= inside", "&= True", SECTIONS + "says_why"),
+    fault("accessible outside the limits",
+          "q, inside = turned_inside(arm, q, limits)\n        valid", "&= inside", "&= True", SECTIONS + "says_why"),
     fault("collisions do not count", "kept[valid] =", "is_free(q[valid])", "True",
           SECTIONS + "free_workspace or says_why"),
     fault("faces of a zonotope too near", "_polytope(vertices, faces, float(np.abs(height)",
