@@ -24,6 +24,12 @@ from .identification import (
 )
 from .motion import Motion
 from .over_time import Unit
+from .performance import (
+    plot_aspects,
+    plot_feasible_path,
+    plot_workspace,
+    show_workspace,
+)
 from .processing import plot_processing
 from .report import html_report, identification_html
 from .scene import Scene
@@ -48,6 +54,7 @@ __all__ = [
     "html_report",
     "identification_html",
     "jog",
+    "plot_aspects",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
     "plot_calibration_normality",
@@ -56,6 +63,7 @@ __all__ = [
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
+    "plot_feasible_path",
     "plot_identification_correlations",
     "plot_identification_parameters",
     "plot_identification_residuals",
@@ -75,6 +83,8 @@ __all__ = [
     "plot_singularities",
     "plot_torque_parts",
     "plot_trajectory",
+    "plot_workspace",
     "show",
     "show_servo",
+    "show_workspace",
 ]
