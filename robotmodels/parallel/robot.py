@@ -145,7 +145,7 @@ class ParallelRobot(Value):
             vector, m and rad.
         """
         T = self.checked(T)
-        turn = _rotation_vector(T) if 3 in self.columns else np.zeros_like(T[..., :3, 3])
+        turn = rotation_vector(T) if 3 in self.columns else np.zeros_like(T[..., :3, 3])
         turn[..., 2] = turn[..., 2] if 3 in self.columns else np.arctan2(T[..., 1, 0], T[..., 0, 0])
         return np.concatenate((T[..., :3, 3], turn), axis=-1)[..., list(self.columns)]
 
@@ -291,7 +291,7 @@ def pose_of(twist: Array) -> Array:
     return T
 
 
-def _rotation_vector(T: Array) -> Array:
+def rotation_vector(T: Array) -> Array:
     """Rotation vectors of poses. Shapes: (..., 4, 4) -> (..., 3)."""
     from scipy.spatial.transform import Rotation
 

@@ -143,7 +143,8 @@ def classify_singularity(
         raise ShapeError(f"T: expected one pose, shape (4, 4), got {np.shape(T)}; loop over poses.")
     if isinstance(robot, LoopedPlatform):
         kind, motion = robot.singular_motions(T, epsilon)
-        return Singularity(kind, motion, (), "", "", 0.0 if len(motion) else 1.0)
+        least = 0.0 if len(motion) else 1.0
+        return Singularity(SingularityKind(kind), motion, (), "", "", least)
     pose = robot.checked(T)[None]
     legs = leg_states(robot, pose, modes_of(robot, mode, (1,)))
     if not legs.reached.all():
