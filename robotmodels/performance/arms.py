@@ -1,0 +1,299 @@
+"""What the analyses need to know of an arm: task, ranges of joints, section of three-joint arms."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi, tau
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import se3
+from .._arrays import Array, as_mask, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..geometry import REVOLUTE
+from ..igm.loop import JointChain, joint_chain
+from ..igm.position import prepare_position
+from ..kinematics import jacobian
+from ..kinematics.lengths import characteristic_length, spread_configurations
+from ..model import RobotModel, check_model
+from ..obstacles import clearance
+from ..obstacles.clearance import checked_obstacles
+
+Free = Callable[[Array], NDArray[np.bool_]]
+_FULL_TURN = tau - 1e-9
+_CHUNK = 65536  # positions solved at a time
+_MOST_BYTES = 1e9
+_CELL_BYTES = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectionArm:
+    """Three joints for a position as the kernels take them; the first may be virtual, a slide.
+
+    An arm of two joints that moves the tool in a plane slides along its normal, at zero. The
+    section does not change with the first joint: half a plane through its axis if it turns, a
+    plane across it if it slides. Shapes: kinds (3,), D (4, 4, 4), columns (3,) of q or -1;
+    ``frame`` maps (u, v, w) of the section to the world.
+    """
+
+    kinds: NDArray[np.int64]
+    D: Array
+    columns: NDArray[np.int64]
+    local: Array
+    frame: Array
+    flip: Array
+    shift: Array
+    size: float
+
+    @property
+    def radial(self) -> bool:
+        """Whether the first coordinate is the distance from the first axis."""
+        return bool(self.kinds[0] == 0)
+
+    @property
+    def periods(self) -> Array:
+        """Periods of the last two joints; 0 for slides."""
+        return np.where(self.kinds[1:] == 0, tau, 0.0)
+
+    def values(self, x: Array) -> Array:
+        """Rows of `kernels.section_values`, coordinates as in ``frame``. Shapes: (N, 2), (N, 9)."""
+        from .kernels import VALUES, section_values
+
+        out = np.empty((len(x), VALUES))
+        section_values(self.kinds, self.local, np.ascontiguousarray(x), out)
+        out[:, :2] = out[:, :2] @ self.flip.T + self.shift
+        A = self.flip @ out[:, 2:6].reshape(-1, 2, 2)
+        out[:, 2:6] = A.reshape(-1, 4)
+        return out
+
+    def world(self, section: Array) -> Array:
+        """World positions of points (N, 2) of the section."""
+        return np.asarray(section @ self.frame[:3, :2].T + self.frame[:3, 3])
+
+    def postures(self, positions: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """All postures of world positions (N, 3): q (N, 4, 3), valid (N, 4)."""
+        from ..igm.kernels.pieper import position_solutions
+
+        N = len(positions)
+        local = np.ascontiguousarray(positions)
+        q, valid = np.full((N, 4, 3), np.nan), np.zeros((N, 4), np.bool_)
+        double, free = np.zeros((N, 4), np.bool_), np.zeros((N, 4, 3), np.bool_)
+        position_solutions(
+            self.kinds, self.D, local, np.zeros((N, 3)), self.size, 1e-12, 1e-9 * self.size,
+            q, valid, np.zeros((N, 4)), double, free,
+        )  # fmt: skip
+        if self.columns[0] < 0:
+            valid &= np.abs(q[..., 0]) <= 1e-7 * self.size
+        return q, valid
+
+    def model_postures(self, model: RobotModel, q: Array) -> Array:
+        """Postures (..., 3) in the columns of the model (..., n), other joints at zero."""
+        out = np.zeros((*q.shape[:-1], model.n))
+        for k, column in enumerate(self.columns):
+            if column >= 0:
+                out[..., column] = q[..., k]
+        return out
+
+
+_SECTIONS: dict[int, tuple[weakref.ref[RobotModel], SectionArm | None]] = {}
+
+
+def section_arm(model: RobotModel) -> SectionArm | None:
+    """The section of an arm whose position three joints, or two in a plane, determine."""
+    key = id(model)
+    entry = _SECTIONS.get(key)
+    if entry is None or entry[0]() is not model:
+        entry = (weakref.ref(model, lambda _: _SECTIONS.pop(key, None)), _section_arm(model))
+        _SECTIONS[key] = entry
+    return entry[1]
+
+
+def _section_arm(model: RobotModel) -> SectionArm | None:
+    chain = joint_chain(model)
+    D, kinds, columns = model.base @ chain.D[0], chain.sigma, chain.columns
+    rest = chain.D[1:]
+    if chain.k == 2:
+        normal = plane_normal(model)
+        if normal is None:
+            return None
+        # a slide along the normal of the plane, before the first joint
+        slide = np.eye(4)
+        slide[:3, :3] = _axes(normal)
+        rest = np.array([se3.inverse(slide) @ D, *rest])
+        D, kinds, columns = slide, np.array([1, *kinds]), np.array([-1, *columns])
+        tip = _tip(model, np.zeros(model.n))
+        D[:3, 3] = normal * (normal @ tip)
+        rest[0] = se3.inverse(D) @ model.base @ chain.D[0]
+    elif chain.k != 3 or prepare_position(chain) is None:
+        return None
+    whole = np.array([D, *rest])
+    local = whole.copy()
+    local[0] = np.eye(4)
+    radial = kinds[0] == 0
+    axis = whole[0, :3, 2]
+    R = _axes(axis)
+    frame = np.eye(4)
+    flip, shift = np.eye(2), np.zeros(2)
+    origin = whole[0, :3, 3]
+    if radial:
+        # columns: radial direction, height, and the third; the origin on the axis at height zero
+        frame[:3, :3] = np.column_stack((R[:, 0], R[:, 2], -R[:, 1]))
+        frame[:3, 3] = origin - R[:, 2] * (R[:, 2] @ origin)
+        flip[1, 1], shift[1] = float(R[:, 2] @ axis), float(R[:, 2] @ origin)
+    else:
+        frame[:3, :3] = R
+        frame[:3, 3] = R[:, 2] * (R[:, 2] @ origin)
+        flip = R[:, :2].T @ whole[0, :3, :2]
+        shift = R[:, :2].T @ origin
+    size = float(np.linalg.norm(whole[1:, :3, 3], axis=1).sum()) or 1.0
+    arrays = (read_only(a) for a in (whole, local, frame, flip, shift))
+    whole, local, frame, flip, shift = arrays
+    return SectionArm(
+        read_only(kinds, np.int64), whole, read_only(columns, np.int64), local, frame, flip, shift,
+        size,
+    )  # fmt: skip
+
+
+def _axes(axis: Array) -> Array:
+    """Orthonormal columns e1, e2, e3 with e3 along an axis, its largest component positive."""
+    e3 = axis * np.sign(axis[np.argmax(np.abs(axis))])
+    first = np.eye(3)[0] if abs(e3[0]) < 0.9 else np.eye(3)[1]
+    e1 = first - e3 * (e3 @ first)
+    e1 /= np.linalg.norm(e1)
+    return np.column_stack((e1, np.cross(e3, e1), e3))
+
+
+def plane_normal(model: RobotModel) -> Array | None:
+    """Normal of the plane in which all joints move the tool; None if there is none."""
+    q = spread_configurations(model, 16, np.random.default_rng(3))
+    columns = np.concatenate(np.moveaxis(jacobian(model, q)[:, :3], -1, 1), axis=0)
+    _, s, vectors = np.linalg.svd(columns)
+    if s[1] <= 1e-9 * s[0] or s[2] > 1e-9 * s[0]:
+        return None
+    return np.asarray(vectors[2])
+
+
+def _tip(model: RobotModel, q: Array) -> Array:
+    from ..kinematics import dgm
+
+    return np.asarray(dgm(model, q)[..., :3, 3])
+
+
+def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray[np.bool_]:
+    """Components of the twist that the postures of an arm mean (6,): by the mask, or by its joints.
+
+    Up to three joints the position if it has as many freedoms, else the rows that move at all if
+    they are as many as the joints, else all six.
+    """
+    check_model(model)
+    if mask is not None:
+        return as_mask(mask)
+    k = joint_chain(model).k
+    J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
+    length = characteristic_length(model)
+    moved = np.abs(J).max(axis=(0, 2), initial=0.0) > 1e-9 * np.repeat((length, 1.0), 3)
+    position = np.linalg.matrix_rank(J[:, :3] / length, tol=1e-9).max(initial=0)
+    if k <= 3 and position == k:
+        return np.repeat((True, False), 3) & moved
+    return moved if moved.sum() == k else np.ones(6, np.bool_)
+
+
+def joint_ranges(model: RobotModel, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
+    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves."""
+    turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (limits | ~turning)
+    slides = np.flatnonzero(~turning & ~bounded)
+    if slides.size:
+        raise InvalidValueError(
+            f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "
+            "infinite; give the table `lower` and `upper`."
+        )
+    low = np.where(bounded, model.lower, -pi)
+    high = np.where(bounded, model.upper, pi)
+    return np.stack((low, high), axis=1), turning & ~bounded
+
+
+def turned_inside(model: RobotModel, q: Array, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures (..., n) turned by whole turns to lie inside the limits, and whether they do."""
+    if not limits:
+        return q, np.isfinite(q).all(axis=-1)
+    turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    lower, upper = model.lower, model.upper
+    with np.errstate(invalid="ignore"):
+        low = np.where(turning & np.isfinite(lower), np.ceil((lower - q - 1e-9) / tau), 0.0)
+        turns = np.where((q < lower) | (q > upper), low, 0.0)
+        moved = q + tau * np.where(turning, turns, 0.0)
+        inside = (moved >= lower - 1e-9) & (moved <= upper + 1e-9)
+    return moved, inside.all(axis=-1)
+
+
+def free_predicate(model: RobotModel, free: Any) -> Free | None:
+    """Function of rows (N, n) that tells which are free, from a function or from obstacles."""
+    if free is None:
+        return None
+    if callable(free):
+
+        def asked(q: Array) -> NDArray[np.bool_]:
+            flags = np.asarray(free(q))
+            if flags.shape != q.shape[:-1] or flags.dtype != np.bool_:
+                raise ShapeError(
+                    f"free: expected a function of q (N, {model.n}) that returns bool (N,), got "
+                    f"{flags.dtype} {flags.shape} for q {q.shape}."
+                )
+            return flags
+
+        return asked
+    bodies = checked_obstacles(free)
+    return lambda q: clearance(model, q, bodies) > 0.0
+
+
+def checked_flag(value: Any, name: str) -> bool:
+    """True or False, nothing else."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.60}.")
+    return bool(value)
+
+
+def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
+    """Cells along each axis, whose grid fits into 1 GB."""
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidValueError(
+            f"resolution: expected the number of cells along each axis, a whole number of at "
+            f"least {least}, got {value!r:.60}."
+        )
+    most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
+    if value > most:
+        need = _CELL_BYTES * float(value) ** dimensions / 1e9
+        raise InvalidValueError(
+            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
+            f"than 1 GB; at most {most} fit."
+        )
+    return int(value)
+
+
+def checked_word(value: Any, words: tuple[str, ...], name: str) -> str:
+    """One of several words."""
+    if not isinstance(value, str) or value not in words:
+        listed = ", ".join(map(repr, words))
+        raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.")
+    return value
+
+
+def sequence(count: int, dimensions: int) -> Array:
+    """Points (count, dimensions) that fill the unit cube evenly: additive recurrence (R sequence)."""
+    g = 2.0
+    for _ in range(60):
+        g = (1.0 + g) ** (1.0 / (dimensions + 1))
+    steps = g ** -np.arange(1.0, dimensions + 1)
+    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0)
+
+
+def chain_of(model: RobotModel) -> JointChain:
+    """The joints that move the tool."""
+    return joint_chain(model)

@@ -1,0 +1,435 @@
+"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, tau
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Value, as_vector, read_only
+from .._outcomes import Outcome
+from ..model import RobotModel, check_model
+from .arms import (
+    Free,
+    chain_of,
+    checked_flag,
+    checked_resolution,
+    free_predicate,
+    joint_ranges,
+    turned_inside,
+)
+from .factors import Factors, factors_of
+
+# cells along each of so many joints: at first, and when a grid does not separate all aspects
+_CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
+_FEW = 7
+_SPECKS = 1e-4  # of all cells: components without a core that belong to another
+
+
+class AspectStatus(Outcome):
+    """Outcome of a search for aspects."""
+
+    FOUND = 0, "The joint space was divided."
+    NOT_SEPARATED = 1, "The grid does not separate all parts: raise the resolution."
+    NO_FREE_SPACE = 2, "No configuration is free."
+    NOT_DEFINED = (
+        3, "Aspects are not defined: the Jacobian of the task is not square, or never regular.",
+    )  # fmt: skip
+
+
+class Group(NamedTuple):
+    """A grid over some joints (columns of q): lower ends, sides, which close, labels from 1."""
+
+    joints: tuple[int, ...]
+    low: Array
+    side: Array
+    closed: tuple[bool, ...]
+    factors: tuple[int, ...]
+    labels: NDArray[np.int32]
+    codes: NDArray[np.int64]
+    volumes: Array
+    separates: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Aspects(Value):
+    """Parts of the joint space: aspects, or components of the free space.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    limits : bool
+        Whether the joint limits count.
+    free : object
+        Predicate or obstacles, or None.
+    names : tuple of str
+        The factors of the determinant; none for components of the free space.
+    signs : ndarray of int8, shape (k, factors)
+        Signs of the factors in each aspect.
+    volume : ndarray, shape (k,)
+        Volume of each, rad^n (and m for slides), largest first. Joints that do not move the tool
+        are left out.
+    groups : tuple
+        The grids: joints that no factor shares are apart, and aspects are products of parts.
+    order : ndarray of int64, shape (k, groups)
+        The part of each group that makes the aspect.
+    status : AspectStatus
+        Whether all were found.
+    """
+
+    model: RobotModel
+    limits: bool
+    free: Any
+    names: tuple[str, ...]
+    signs: NDArray[np.int8]
+    volume: Array
+    groups: tuple[Group, ...]
+    order: NDArray[np.int64]
+    status: AspectStatus
+
+    @property
+    def count(self) -> int:
+        """Number of aspects."""
+        return len(self.volume)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether each aspect has a core away from singular positions, that is of one piece."""
+        return self.status is AspectStatus.FOUND
+
+    def reason(self) -> str:
+        """The status as a sentence."""
+        return self.status.sentence
+
+    def of(self, q: ArrayLike) -> NDArray[np.int64]:
+        """Aspect of configurations.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., n)
+            Joint variables, rad or m; angles are turned inside the limits.
+
+        Returns
+        -------
+        ndarray of int64, shape (...)
+            Number of the aspect, from 0; -1 outside the limits, in collision, and so close to a
+            singular position that the grid cannot tell.
+        """
+        given = as_vector(q, self.model.n, "q")
+        rows, inside = turned_inside(self.model, given.reshape(-1, self.model.n), self.limits)
+        rows = np.where(inside[:, None], rows, 0.0)
+        out = np.full(len(rows), -1)
+        if self.count:
+            is_free = free_predicate(self.model, self.free)
+            if is_free is not None:
+                inside &= is_free(rows)
+            factors = factors_of(self.model) if self.names else None
+            values = None if factors is None else factors.values(rows)
+            place = np.stack([_labels(g, rows, values) for g in self.groups], axis=-1)
+            sizes = [len(g.volumes) + 1 for g in self.groups]
+            number = np.full(sizes, -1)
+            number[tuple(self.order.T)] = np.arange(self.count)
+            out = np.where(inside, number[tuple(place.T)], -1)
+        return out.reshape(given.shape[:-1])
+
+    def __repr__(self) -> str:
+        shares = ", ".join(f"{v:.4g}" for v in self.volume[:_FEW])
+        more = ", ..." if self.count > _FEW else ""
+        kind = "aspects" if self.names else "components"
+        return (
+            f"<Aspects of {self.model.name}: {self.count} {kind}, volumes {shares or 'none'}{more};"
+            f"\n  {self.reason()}>"
+        )
+
+
+def aspects(
+    arm: RobotModel, limits: bool = True, free: Any = None, resolution: int | None = None
+) -> Aspects:
+    """Aspects: the largest connected parts of the joint space without singular positions.
+
+    Of an arm whose position three joints determine (or two in a plane) the position counts, of
+    others the pose. The joint space is cut by every factor of the determinant on a grid that
+    closes in itself where no limit cuts it.
+
+    Parameters
+    ----------
+    arm : RobotModel
+        The robot.
+    limits : bool
+        Whether the joint limits cut the joint space.
+    free : callable or obstacles, optional
+        Function of q (N, n) that returns bool (N,), or obstacles: aspects of the free space.
+    resolution : int, optional
+        Cells along each joint.
+
+    Returns
+    -------
+    Aspects
+        The parts with their volumes and signs; none, with a status, for redundant arms.
+
+    Raises
+    ------
+    InvalidValueError
+        A slide without limits, a resolution that is no number of cells or needs more than 1 GB.
+
+    References
+    ----------
+    Seed book sections 3.4.1 to 3.4.4.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> found = aspects(load("planar_2r"), limits=False)
+    >>> found.count, found.signs.ravel(), found.of([[0.3, 1.0], [0.3, -1.0]])
+    (2, array([-1,  1], dtype=int8), array([1, 0]))
+    """
+    check_model(arm)
+    return _divided(arm, factors_of(arm), True, limits, free, resolution)
+
+
+def free_components(
+    arm: RobotModel, free: Any = None, limits: bool = True, resolution: int | None = None
+) -> Aspects:
+    """Connected components of the free joint space, singular positions included.
+
+    Parameters
+    ----------
+    arm : RobotModel
+        The robot.
+    free : callable or obstacles, optional
+        Function of q (N, n) that returns bool (N,), or obstacles.
+    limits : bool
+        Whether the joint limits cut the joint space.
+    resolution : int, optional
+        Cells along each joint.
+
+    Returns
+    -------
+    Aspects
+        The components with their volumes; ``signs`` is empty.
+
+    Raises
+    ------
+    InvalidValueError
+        As for `aspects`.
+
+    References
+    ----------
+    Seed book section 3.4.3.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> free_components(load("planar_2r"), lambda q: abs(q[:, 1]) > 0.5, limits=False).count
+    1
+    """
+    check_model(arm)
+    return _divided(arm, None, False, limits, free, resolution)
+
+
+def _divided(
+    arm: RobotModel, factors: Factors | None, signed: bool, limits: bool, free: Any,
+    resolution: int | None,
+) -> Aspects:  # fmt: skip
+    bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
+    columns = tuple(int(c) for c in chain_of(arm).columns)
+    names = () if factors is None else factors.names
+    if not columns or (signed and factors is None):
+        return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)
+    ranges, circle = joint_ranges(arm, bounded)
+    parts = _apart(columns, factors, is_free is not None)
+    groups = []
+    for joints, members in parts:
+        first, last = _CELLS.get(len(joints), (6, 6))
+        if not members and is_free is None:
+            first = last = 1  # no factor depends on these joints
+        cells = first
+        if resolution is not None or first > 1:
+            cells = checked_resolution(resolution, first, len(joints))
+        while True:
+            group = _group(arm, joints, members, factors, is_free, ranges, circle, cells)
+            if group.separates or resolution is not None or cells >= last:
+                break
+            cells = min(2 * cells, last)
+        groups.append(group)
+    return _products(arm, bounded, free, names, tuple(groups))
+
+
+def _apart(
+    columns: tuple[int, ...], factors: Factors | None, together: bool
+) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Groups of joints that share no factor, with the factors of each."""
+    groups: list[tuple[set[int], set[int]]] = []
+    if together:
+        groups = [(set(columns), set())]
+    for k, joints in enumerate(factors.joints if factors is not None else ()):
+        own, members = set(joints), {k}
+        for group in [g for g in groups if g[0] & own]:
+            groups.remove(group)
+            own |= group[0]
+            members |= group[1]
+        groups.append((own, members))
+    for column in columns:
+        if not any(column in joints for joints, _ in groups):
+            groups.append(({column}, set()))
+    return [(tuple(sorted(j)), tuple(sorted(m))) for j, m in groups]
+
+
+def _group(
+    arm: RobotModel, joints: tuple[int, ...], members: tuple[int, ...], factors: Factors | None,
+    is_free: Free | None, ranges: Array, circle: NDArray[np.bool_], cells: int,
+) -> Group:  # fmt: skip
+    """The parts of the space of some joints, by connected cells of equal signs."""
+    d = len(joints)
+    low, high = ranges[list(joints)].T
+    side = (high - low) / cells
+    closed = tuple(bool(circle[j]) for j in joints)
+    axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, side, strict=True)]
+    q = np.zeros((cells**d, arm.n))
+    for j, mesh in zip(joints, np.meshgrid(*axes, indexing="ij"), strict=True):
+        q[:, j] = mesh.ravel()
+    shape = (cells,) * d
+    code = np.zeros(shape, np.int64)
+    certain = np.ones(shape, np.bool_)
+    if members:
+        assert factors is not None
+        values = factors.values(q)[:, list(members)].T.reshape(-1, *shape)
+        for k, value in zip(members, values, strict=True):
+            code |= (value > 0.0).astype(np.int64) << k
+            certain &= _core(value, closed)
+    if is_free is not None:
+        flags = is_free(q).reshape(shape)
+        code = np.where(flags, code, -1)
+    labels, separates = _connected(code, certain & (code >= 0), closed)
+    count = int(labels.max())
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)[1:]
+    codes = np.zeros(count, np.int64)
+    codes[labels[labels > 0] - 1] = code[labels > 0]
+    return Group(
+        joints, read_only(low), read_only(side), closed, members, read_only(labels, np.int32),
+        read_only(codes, np.int64), read_only(sizes * float(np.prod(side))), separates,
+    )  # fmt: skip
+
+
+def _core(value: Array, closed: tuple[bool, ...]) -> NDArray[np.bool_]:
+    """Cells in which a factor cannot vanish, judged by its differences to the next cells."""
+    change = np.zeros_like(value)
+    for axis in range(value.ndim):
+        step = np.abs(np.diff(value, axis=axis, append=np.take(value, [0], axis=axis)))
+        if not closed[axis]:
+            last = [slice(None)] * value.ndim
+            last[axis] = slice(-1, None)
+            step[tuple(last)] = 0.0
+        change += np.maximum(step, np.roll(step, 1, axis=axis))
+    return np.abs(value) > change
+
+
+def _connected(
+    code: NDArray[np.int64], certain: NDArray[np.bool_], closed: tuple[bool, ...]
+) -> tuple[NDArray[np.int32], bool]:
+    """Labels, from 1, of connected cells with equal codes; whether the grid separates them all."""
+    from scipy import ndimage
+
+    labels = np.zeros(code.shape, np.int32)
+    separates, specks = True, _SPECKS * code.size
+    for value in np.unique(code[code >= 0]):
+        same = code == value
+        whole, count = _torus_labels(same, closed)
+        cores, _ = _torus_labels(same & certain, closed)
+        sizes = np.bincount(whole.ravel(), minlength=count + 1)
+        pairs = np.unique(np.stack((whole[cores > 0], cores[cores > 0])), axis=1)
+        per_part = np.bincount(pairs[0], minlength=count + 1)
+        kept = (per_part > 0) | (sizes > specks)
+        kept[0] = False
+        if not kept.any():
+            kept[1:] = sizes[1:] == sizes[1:].max()
+        separates &= bool((per_part[kept] == 1).all())
+        number = np.where(kept, np.cumsum(kept), 0)
+        own = number[whole]
+        lost = same & (own == 0)
+        if lost.any():
+            # the cut-off tips of a part belong to it
+            near = ndimage.distance_transform_edt(own == 0, False, True)
+            own[lost] = own[tuple(axis[lost] for axis in near)]
+        labels[same] = own[same] + labels.max()
+    return labels, separates
+
+
+def _torus_labels(
+    flags: NDArray[np.bool_], closed: tuple[bool, ...]
+) -> tuple[NDArray[np.int64], int]:
+    """Labels of connected cells, the ends of closed axes joined."""
+    from scipy import ndimage, sparse
+
+    labels, count = ndimage.label(flags)
+    pairs = [np.zeros((2, 0), np.int64)]
+    for axis, joined in enumerate(closed):
+        if joined:
+            ends = np.stack((np.take(labels, 0, axis).ravel(), np.take(labels, -1, axis).ravel()))
+            pairs.append(ends[:, (ends > 0).all(axis=0)])
+    a, b = np.unique(np.concatenate(pairs, axis=1), axis=1)
+    graph = sparse.coo_matrix((np.ones(a.size), (a, b)), (count + 1, count + 1))
+    total, parts = sparse.csgraph.connected_components(graph, directed=False)
+    # the background keeps zero
+    parts = np.where(parts == parts[0], 0, parts + (parts < parts[0]))
+    return parts[labels], int(total) - 1
+
+
+def _labels(group: Group, q: Array, values: Array | None) -> NDArray[np.int64]:
+    """Label of the part of a group for configurations (N, n); 0 where there is none."""
+    cells = np.array(group.labels.shape)
+    x = q[:, list(group.joints)]
+    closed = np.array(group.closed)
+    x = np.where(closed, (x + pi) % tau - pi, x)
+    at = np.clip(np.floor((x - group.low) / group.side).astype(int), 0, cells - 1)
+    labels = group.labels[tuple(at.T)].astype(np.int64)
+    if values is None or not group.factors:
+        return labels
+    members = list(group.factors)
+    wanted = (values[:, members] > 0.0) @ (1 << np.array(members))
+    codes = np.append(-1, group.codes)
+    # beside a singular position the cell may be of another aspect: look around
+    for reach in (1, 2):
+        wrong = np.flatnonzero(codes[labels] != wanted)
+        for step in np.ndindex(*(2 * reach + 1,) * len(cells)) if wrong.size else ():
+            to = at[wrong] + np.array(step) - reach
+            good = np.all(closed | ((to >= 0) & (to < cells)), axis=1)
+            other = group.labels[tuple((to % cells).T)]
+            good &= codes[other] == wanted[wrong]
+            labels[wrong[good]] = other[good]
+            wrong = wrong[~good]
+    return np.where(codes[labels] == wanted, labels, 0)
+
+
+def _products(
+    arm: RobotModel, limits: bool, free: Any, names: tuple[str, ...], groups: tuple[Group, ...]
+) -> Aspects:
+    """Aspects as products of the parts of all groups, largest first."""
+    if any(len(g.volumes) == 0 for g in groups):
+        return _none(arm, limits, free, AspectStatus.NO_FREE_SPACE)
+    mesh = np.meshgrid(*(np.arange(len(g.volumes)) for g in groups), indexing="ij")
+    order = np.stack([m.ravel() for m in mesh], axis=-1)
+    volume = np.prod([g.volumes[order[:, k]] for k, g in enumerate(groups)], axis=0)
+    code = np.zeros(len(order), np.int64)
+    for k, group in enumerate(groups):
+        code |= group.codes[order[:, k]]
+    signs = np.where((code[:, None] >> np.arange(len(names))) & 1, 1, -1)
+    rank = np.lexsort((code, -volume.round(9)))
+    status = AspectStatus.FOUND
+    if not all(g.separates for g in groups):
+        status = AspectStatus.NOT_SEPARATED
+    return Aspects(
+        arm, limits, free, names, read_only(signs[rank], np.int8), read_only(volume[rank]), groups,
+        read_only(order[rank] + 1, np.int64), status,
+    )  # fmt: skip
+
+
+def _none(arm: RobotModel, limits: bool, free: Any, status: AspectStatus) -> Aspects:
+    return Aspects(
+        arm, limits, free, (), read_only(np.zeros((0, 0)), np.int8), read_only(np.zeros(0)), (),
+        read_only(np.zeros((0, 0)), np.int64), status,
+    )  # fmt: skip
