@@ -32,8 +32,8 @@ class AssemblyStatus(Outcome):
     ALL = 0, "All assembly modes are listed."
     DEGENERATE = (
         1,
-        "The legs do not determine the platform: it moves with locked actuators, or the robot is "
-        "singular at every pose.",
+        "The legs do not determine the platform: solutions form a continuum, or the robot is singular "
+        "at every pose.",
     )
     SOME_LOST = 2, "Assembly modes may be missing: not every path or start led to a solution."
 
@@ -247,26 +247,19 @@ def _spatial(robot: ParallelRobot, q: Array) -> Found:
             break
     status = np.zeros(N, np.int8)
     complex_count = np.zeros(N, np.int64)
-    sizes = np.zeros(N)
-    chosen = []
-    for s in range(N):
-        x, kept, stuck = _distinct(ends[s], codes[s])
+    unit = _unit(robot, q)
+    for s, m in enumerate(members(robot, q)):
+        x, real, stuck = _distinct(ends[s], codes[s])
         complex_count[s] = len(x)
-        sizes[s] = np.sqrt((q[s] ** 2).mean())
-        T[s, : len(x)] = _poses(robot, x, kept)
-        chosen.append(stuck)
+        T[s, : len(x)] = _poses(robot, x, real)
+        scale = np.append(np.ones(4), np.full(4, 1.0 / unit[s]))
+        if any(_is_continuum(m, row * scale) for row in x[stuck]):
+            status[s] = AssemblyStatus.DEGENERATE
     residual, det = none.copy(), none.copy()
     from .kernels import polish
 
     polish(*rods(robot, q), np.array(robot.columns), T, residual, det)
-    tolerance = 1e-11 * (robot.size + sizes[:, None])
-    T[~(residual <= tolerance)] = np.nan
-    for s in range(N):
-        if chosen[s].any():
-            found = np.flatnonzero(~np.isnan(T[s, : len(chosen[s]), 0, 3]) & chosen[s])
-            if any(_moves(robot, q[s], T[s, k]) for k in found):
-                status[s] = AssemblyStatus.DEGENERATE
-                T[s] = np.nan
+    T[~(residual <= 1e-11 * (robot.size + unit[:, None]))] = np.nan
     status[lost & (status == 0)] = AssemblyStatus.SOME_LOST
     _sort_from_home(robot, T, residual, det)
     return T, residual, det, status, complex_count
@@ -394,32 +387,28 @@ def _singular_everywhere(robot: ParallelRobot) -> bool:
     return bool((values[:, -1] < _FLAT * values[:, 0]).all())
 
 
-def _moves(robot: ParallelRobot, q: Array, T: Array) -> bool:
-    """Whether the platform moves at locked actuators through a singular pose."""
-    scale = np.repeat([1.0, robot.length], 3)
-    J = _rows(robot, T[None])[0]
-    for side in (1.0, -1.0):
-        twist = 0.02 * side * np.linalg.svd(J)[2][-1] * np.repeat([robot.length, 1.0], 3)
-        X = _displaced(T, twist)
-        for _ in range(12):
-            states = leg_states(robot, X[None], np.zeros(1, np.int64))
-            rest = q - states.q[0]
-            step = np.linalg.pinv(states.rows[0] / scale, rcond=1e-4) @ rest
-            X = _displaced(X, step / scale)
-        states = leg_states(robot, X[None], np.zeros(1, np.int64))
-        away = np.linalg.norm(X[:3] - T[:3])
-        if np.abs(q - states.q[0]).max() > 1e-11 * robot.size or away < 2e-3 * min(1.0, robot.length):
-            return False
-    return True
+def _is_continuum(m: Array, x: NDArray[np.complex128]) -> bool:
+    """Whether a solution with a singular derivative lies on a curve of solutions."""
+    i, j = np.triu_indices(4)
+    u, v = np.triu_indices(4, 1)
+    M = np.zeros((7, 8, 8))
+    M[0, range(4), range(4)], M[0, range(4, 8), range(4, 8)] = -m[0], 4.0
+    M[1, range(4), range(4, 8)] = 1.0
+    legs = m[1:].reshape(5, 16)
+    M[2:, i, j] = M[2:, j, i] = legs[:, :10]
+    M[2:, 4 + u, v], M[2:, 4 + v, u] = legs[:, 10:], -legs[:, 10:]
+    M = 0.5 * (M + np.swapaxes(M, 1, 2))
 
+    def refined(y: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        for _ in range(15):
+            step = np.linalg.pinv(np.vstack((2.0 * M @ y, x.conj())), rcond=1e-5)
+            y = y - step @ np.append(y @ M @ y, x.conj() @ (y - x))
+        return y
 
-def _displaced(T: Array, twist: Any) -> Array:
-    """A pose moved by a small screw about its origin."""
-    step = pose_of(np.asarray(twist))
-    X = T.copy()
-    X[:3, :3] = step[:3, :3] @ T[:3, :3]
-    X[:3, 3] += step[:3, 3]
-    return X
+    x = refined(x)
+    along = np.linalg.svd(np.vstack((2.0 * M @ x, x.conj())))[2][-1].conj()
+    y = refined(x + 0.01 * along)
+    return bool(np.abs(y @ M @ y).max() < 1e-10 and np.abs(y - x).max() > 1e-3)
 
 
 def _sort_from_home(robot: ParallelRobot, T: Array, residual: Array, det: Array) -> None:

@@ -281,7 +281,7 @@ def _robot(
                 )
     none = np.zeros(m)
     crank, rod = (none, none) if arms is None else arms
-    low, high = (_limit(x, m, n, arms is None) for x, n in ((lower, "lower"), (upper, "upper")))
+    low, high = (checked_limit(x, m, n, arms is None) for x, n in ((lower, "lower"), (upper, "upper")))
     if not (low <= high).all():
         raise InvalidValueError(f"lower, upper: expected lower below upper, got {low} and {high}.")
     u = np.tile(_X, (m, 1)) if outward is None else outward
@@ -318,7 +318,7 @@ def _arms(proximal: ArrayLike, distal: ArrayLike, m: int) -> tuple[Array, Array]
     return both[0], both[1]
 
 
-def _limit(value: Limit, m: int, name: str, is_length: bool) -> Array:
+def checked_limit(value: Limit, m: int, name: str, is_length: bool) -> Array:
     """Limits of q, infinite or zero where there are none."""
     if value is None:
         none = np.inf if name == "upper" else (0.0 if is_length else -np.inf)

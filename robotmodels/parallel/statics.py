@@ -32,8 +32,10 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_core, as_floats, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
+from .legs import leg_states
 from .results import Result, at_index
-from .velocities import Mode, Robot, _broadcast, inverse_jacobian, reduced, scales
+from .robot import ParallelRobot
+from .velocities import Mode, Robot, _broadcast, inverse_jacobian, modes_of, reduced, scales
 
 _SINGULAR = 1e-12  # smallest singular value, relative
 
@@ -196,3 +198,28 @@ def _unitless(robot: Robot, T: ArrayLike, length: float | None, mode: Mode) -> A
     J = inverse_jacobian(robot, T, mode)
     metres = robot.length if length is None else as_number(length, "length", above=0.0)
     return reduced(robot, J) * scales(robot, metres)
+
+
+def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
+    """Determinant of the unit lines of the legs: zero at parallel singularities.
+
+    Its sign tells the sides of singular positions apart, see `assembly_modes`; its curves of zeros
+    are the singular curves of a section. NaN out of reach.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        In m^k of the k rotations of the platform.
+
+    Examples
+    --------
+    >>> from robotmodels.parallel import gough_symmetric
+    >>> robot = gough_symmetric(1.0)
+    >>> bool(abs(determinant(robot, robot.pose([0, 0, 1, 0, 0, np.pi / 2]))) < 1e-12)
+    True
+    """
+    poses = robot.checked(T)
+    rows = poses.reshape(-1, 4, 4)
+    legs = leg_states(robot, rows, modes_of(robot, mode, poses.shape[:-2]))
+    det = np.linalg.det(legs.rows[..., list(robot.columns)])
+    return np.where(legs.reached, det, np.nan).reshape(poses.shape[:-2])
