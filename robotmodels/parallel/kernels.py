@@ -54,12 +54,16 @@ def errors(T: Floats, c: Floats, b: Floats, columns: Ints, length: Floats, J: Fl
 @compiled()
 def displace(T: Floats, columns: Ints, step: Floats) -> None:
     """Move a pose by a small screw about its origin, in place."""
-    v = np.zeros(6)
+    x, y, z = 0.0, 0.0, 0.0
     for j in range(columns.size):
-        v[columns[j]] = step[j]
-    for k in range(3):
-        T[k, 3] += v[k]
-    x, y, z = v[3], v[4], v[5]
+        if columns[j] < 3:
+            T[columns[j], 3] += step[j]
+        elif columns[j] == 3:
+            x = step[j]
+        elif columns[j] == 4:
+            y = step[j]
+        else:
+            z = step[j]
     angle = sqrt(x * x + y * y + z * z)
     if angle == 0.0:
         return

@@ -246,23 +246,12 @@ def spatial(
     of the stored member and its solutions; turns (7,), phases of its equations; options (1,): the
     largest prediction error -> ends (N, 40, 16), codes (N, 40).
     """
-    begin, change = np.zeros(PARAMETERS, np.complex128), np.zeros(PARAMETERS, np.complex128)
-    x, work, J = (
-        np.zeros(8, np.complex128),
-        np.zeros((7, PARAMETERS), np.complex128),
-        np.zeros((7, 8), np.complex128),
-    )
-    target, F, G = (
-        np.zeros(PARAMETERS, np.complex128),
-        np.zeros(8, np.complex128),
-        np.zeros(8, np.complex128),
-    )
+    work, J = np.zeros((11, PARAMETERS), np.complex128), np.zeros((7, 8), np.complex128)
+    F, G, begin, change, target, x = work[1], work[2], work[7], work[8], work[9], work[10]
     for s in range(members.shape[0]):
         for k in range(PARAMETERS):
             turn = turns[(k + 15) // 16]
             begin[k] = complex(start[2 * k], start[2 * k + 1]) * complex(cos(turn), sin(turn))
-            if k == 0:
-                begin[k] = complex(start[0], start[1])
             target[k] = members[s, k]
             change[k] = target[k] - begin[k]
         for i in range(PATHS):
