@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows
 from .._outcomes import Outcome
-from ..errors import ShapeError
 from ..geometry import REVOLUTE
 from .robot import LoopedRobot, check_looped
 
@@ -20,32 +19,25 @@ class ClosingStatus(Outcome):
     """Outcome of closing a posture; fits int8."""
 
     CLOSED = 0, "The loops are closed."
-    CANNOT_CLOSE = (
-        1,
-        "The loops cannot be closed at these positions of the actuated joints: the residual is the "
-        "least one that was found.",
-    )
+    CANNOT_CLOSE = 1, "The loops cannot be closed at these positions of the actuated joints."
     NOT_CONVERGED = 2, "The iterations were used up before the loops were closed."
     SINGULAR_THERE = (
-        3,
-        "The loops are closed, but the actuated joints do not determine the motion of the passive "
-        "ones there.",
-    )
+        3, "The loops are closed, but the actuated joints do not determine the other joints there.",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ClosedPostures(Frozen, Value):
-    """Postures with closed loops, or as nearly closed as was found. Read-only, picklable.
+    """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
 
     Parameters
     ----------
     q : ndarray, shape (..., n)
-        Joint variables of all joints, rad or m; where the status is neither ``CLOSED`` nor
-        ``SINGULAR_THERE``, those of the least residual.
+        Joint variables of all joints, rad or m.
     residual : ndarray, shape (...)
         Largest distance (m) or angle (rad) between the frames of a closure.
     status : ndarray of int8, shape (...)
-        Codes of `ClosingStatus`.
+        Codes of `ClosingStatus`; loops are open for ``CANNOT_CLOSE`` and ``NOT_CONVERGED``.
 
     Examples
     --------
@@ -57,30 +49,19 @@ class ClosedPostures(Frozen, Value):
     residual: Array
     status: NDArray[np.int8]
 
-    def __post_init__(self) -> None:
-        Frozen.__post_init__(self)
-        if not self.q.shape[:-1] == self.residual.shape == self.status.shape:
-            raise ShapeError(
-                f"q, residual, status: expected shapes (..., n), (...), (...), got {self.q.shape}, "
-                f"{self.residual.shape}, {self.status.shape}."
-            )
-
-    @property
-    def is_closed(self) -> NDArray[np.bool_]:
-        """Whether the loops are closed, shape (...)."""
-        return np.isin(self.status, (ClosingStatus.CLOSED, ClosingStatus.SINGULAR_THERE))
-
     def reason(self, index: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status of one posture."""
+        """Sentence of the status of one posture, with the residual where its loops are open."""
         status = ClosingStatus(int(self.status[index]))
-        if status in (ClosingStatus.CLOSED, ClosingStatus.SINGULAR_THERE):
-            return status.sentence
-        return f"{status.sentence} Residual: {self.residual[index]:.3g} m or rad."
+        left = f" Least residual: {self.residual[index]:.3g} m or rad."
+        return status.sentence + (left if status in _OPEN else "")
 
     def __repr__(self) -> str:
-        counts = [(s, int((self.status == s).sum())) for s in ClosingStatus]
-        listed = ", ".join(f"{count} {s.name}" for s, count in counts if count)
-        return f"<ClosedPostures {self.q.shape}: {listed or 'empty'}>"
+        counts = [(int(np.sum(self.status == s)), s.name) for s in ClosingStatus]
+        listed = ", ".join(f"{count} {name}" for count, name in counts if count)
+        return f"<ClosedPostures, q {self.q.shape}: {listed or 'empty'}>"
+
+
+_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
 
 
 def close(
@@ -88,10 +69,11 @@ def close(
 ) -> ClosedPostures:
     """Close the loops: posture of all joints at given positions of the actuated ones.
 
-    Damped Newton iterations of the passive joints from the guess, which thereby chooses the
-    assembly among several; rows are independent of each other, and angles are given within half a
-    turn of the guess. Only a row that does not close from
-    its guess is started again, at random positions of the passive joints.
+    From a guess of all joints, the actuated joints move straight to their positions while damped
+    Newton iterations keep the loops closed, which keeps the assembly of the guess. Where that
+    fails, and with a guess of the passive joints alone, the iterations start at the positions
+    themselves, and last at random passive joints. Each row is independent of the others; angles
+    are within half a turn of the guess.
 
     Parameters
     ----------
@@ -100,7 +82,8 @@ def close(
     q_actuated : array_like, shape (..., n_a)
         Positions of the actuated joints, rad or m.
     q_guess : array_like, shape (..., n) or (..., n - n_a), optional
-        Posture of all joints, or positions of the passive ones, to start from; default zero.
+        Posture of all joints in the wanted assembly, or positions of the passive joints; default
+        passive joints at zero.
 
     Returns
     -------
@@ -114,7 +97,7 @@ def close(
 
     References
     ----------
-    Seed book section 2.4; K. Levenberg 1944, D. Marquardt 1963, for the damping.
+    Seed book section 2.4 (iterative method).
 
     Examples
     --------
@@ -123,49 +106,56 @@ def close(
     >>> from robotmodels.model import RobotModel
     >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
     >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> close(robot, [1.0], [1.0, 0.8, -0.8]).q.round(12)
+    >>> close(robot, [1.0], [0.5, 0.5, -0.5]).q.round(12)
     array([ 1.,  1., -1.])
     """
     check_looped(robot)
     n, passive = robot.n, robot.passive
     given = as_vector(q_actuated, len(robot.actuated), "q_actuated")
-    guess = np.zeros(n) if q_guess is None else np.asarray(q_guess)
-    size = n if guess.shape[-1:] != passive.shape else len(passive)
-    guess = as_vector(guess, size, "q_guess")
-    batch, (rows, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))
-    q = np.empty((len(rows), n))
-    q[:, passive] = start[:, passive] if size == n else start
-    q[:, robot.actuated] = rows
-    guess, residual, status = q.copy(), np.empty(len(q)), np.empty(len(q))
-    _close(robot, q, residual, status)
-    _start_again(robot, q, residual, status)
+    guess = np.zeros(len(passive)) if q_guess is None else np.asarray(q_guess)
+    follow = guess.shape[-1:] != passive.shape
+    guess = as_vector(guess, n if follow else len(passive), "q_guess")
+    batch, (target, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))
+    q = start.copy()
+    if not follow:
+        q = np.empty((len(start), n))
+        q[:, passive], q[:, robot.actuated] = start, target
+    guess = q.copy()
+    residual, status = np.empty(len(q)), np.empty(len(q))
+    _close(robot, target, follow, q, residual, status)
+    _start_again(robot, target, q, residual, status)
     turns = robot.tree.table.sigma[robot.tree.table.joint_rows] == REVOLUTE
+    turns[robot.actuated] = False
     q -= turns * 2.0 * np.pi * np.round((q - guess) / (2.0 * np.pi))
     return ClosedPostures(
         q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)
     )
 
 
-def _close(robot: LoopedRobot, q: Array, residual: Array, status: Array) -> None:
-    """Close the postures in the rows of q in place."""
+def _close(
+    robot: LoopedRobot, target: Array, follow: bool, q: Array, residual: Array, status: Array
+) -> None:
+    """Close the postures in the rows of q in place, see `kernels.closed_postures`."""
     from .kernels import closed_postures
 
-    closed_postures(robot.tree.chain, robot.cuts, robot.passive, q, residual, status)
+    closed_postures(
+        target, robot.cuts, robot.actuated, robot.passive, int(follow), q, residual, status
+    )
 
 
-def _start_again(robot: LoopedRobot, q: Array, residual: Array, status: Array) -> None:
+def _start_again(
+    robot: LoopedRobot, target: Array, q: Array, residual: Array, status: Array
+) -> None:
     """Close rows that are still open from random starts, and keep the least residual."""
     rng = np.random.default_rng(0)
     passive = robot.passive
-    spread = np.pi * robot.cuts.units[passive]
     for _ in range(_STARTS):
-        failed = np.isin(status, (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED))
-        rows = np.flatnonzero(failed)
+        rows = np.flatnonzero(np.isin(status, _OPEN))
         if not rows.size:
             return
-        again, least, code = q[rows].copy(), residual[rows].copy(), status[rows].copy()
-        again[:, passive] = rng.uniform(-spread, spread)
-        _close(robot, again, least, code)
+        again, least, code = q[rows], residual[rows], status[rows]
+        again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
+        _close(robot, target[rows], False, again, least, code)
         better = least < residual[rows]
         kept = rows[better]
         q[kept], residual[kept], status[kept] = again[better], least[better], code[better]

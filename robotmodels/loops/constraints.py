@@ -28,12 +28,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_vector, batch_rows
+from .._arrays import Array, Frozen, Value, as_vector, batch_rows, batch_shape
 from ..errors import LoopError
-from .robot import LoopedRobot, check_looped
+from ..kinematics import dgm, jacobian, jacobian_rate
+from .robot import ROWS, LoopedRobot, check_looped
 
-_DETERMINED = 1e-7
-"""Least singular value of the actuated rows of an orthonormal basis of motions."""
+_INDEPENDENT = 1e-8  # least part of an independent row beyond those before it, of the longest row
+_DETERMINED = 1e-7  # least singular value of the passive columns, with lengths in robot sizes
+_CONSISTENT = 1e-5  # largest velocity between the frames of a closure, in the same units
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -105,7 +107,7 @@ def closure_jacobian(robot: LoopedRobot, q: ArrayLike) -> Array:
     >>> (closure_jacobian(robot, [1.0, 1.0, -1.0]) @ [1.0, 1.0, -1.0]).round(12) + 0.0
     array([0., 0., 0., 0., 0.])
     """
-    return jacobians(robot, q)[1]
+    return closure_rows(robot, *checked(robot, q=q))[1]
 
 
 def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
@@ -114,8 +116,7 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
     Returns
     -------
     Mobility
-        ``int(...)`` or ``np.asarray(...)`` is the count, shape (...); ``.redundant`` has the names
-        of constraint rows that follow from others.
+        Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
 
     Examples
     --------
@@ -127,10 +128,22 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
     >>> mobility(robot, [1.0, 1.0, -1.0])
     <Mobility 1, redundant rows: cut.z, cut.rx, cut.ry>
     """
-    q = checked(robot, q=q)[0]
-    redundant = _bases(robot, q, q)[2]
-    count = robot.n - (~redundant).sum(axis=-1)
-    return Mobility(np.asarray(count, np.int64), redundant, robot.rows)
+    (q,) = checked(robot, q=q)
+    J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
+    largest = np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
+    redundant = np.zeros(J.shape[:-1], dtype=np.bool_)
+    for k in range(J.shape[-2]):  # what a row has beyond those before it, which become orthonormal
+        row, before = J[..., k, :], J[..., :k, :]
+        for _ in range(2):
+            row = row - np.einsum(
+                "...k,...kj->...j", np.einsum("...kj,...j->...k", before, row), before
+            )
+        length = np.linalg.norm(row, axis=-1)
+        redundant[..., k] = ~(length > _INDEPENDENT * largest)
+        J[..., k, :] = np.where(
+            redundant[..., k, None], 0.0, row / np.where(length > 0.0, length, 1.0)[..., None]
+        )
+    return Mobility(np.asarray(robot.n - (~redundant).sum(axis=-1)), redundant, robot.rows)
 
 
 def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
@@ -151,8 +164,7 @@ def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
     >>> velocity_map(robot, [1.0, 1.0, -1.0]).round(12).T
     array([[ 1.,  1., -1.]])
     """
-    q = checked(robot, q=q)[0]
-    return maps(robot, q, np.zeros_like(q))[0]
+    return maps(robot, *checked(robot, q=q))[0]
 
 
 def velocity_map_rate(robot: LoopedRobot, q: ArrayLike, v: ArrayLike) -> Array:
@@ -182,61 +194,73 @@ def checked(robot: LoopedRobot, **vectors: ArrayLike) -> list[Array]:
     return [as_vector(value, robot.n, name) for name, value in vectors.items()]
 
 
-def jacobians(robot: LoopedRobot, q: ArrayLike, v: ArrayLike | None = None) -> list[Array]:
-    """Residuals (..., c) of the closures, their Jacobian and its rate (..., c, n)."""
+def closure_rows(robot: LoopedRobot, q: Array) -> tuple[Array, Array]:
+    """Residuals (..., c) of the closures and their Jacobian (..., c, n) at q (..., n)."""
     from .kernels import closure_jacobians
 
-    (q,) = checked(robot, q=q)
-    v = np.zeros_like(q) if v is None else as_vector(v, robot.n, "v")
-    batch, rows = batch_rows((q, v), ("q", "v"))
-    N, c, n = len(rows[0]), len(robot.rows), robot.n
-    out = [np.empty((N, c)), np.empty((N, c, n)), np.empty((N, c, n))]
-    closure_jacobians(*rows, robot.tree.chain, robot.cuts, *out)
-    return [array.reshape(*batch, *array.shape[1:]) for array in out]
+    batch, (rows,) = batch_rows((q,), ("q",))
+    e, J = np.empty((len(rows), len(robot.rows))), np.empty((len(rows), len(robot.rows), robot.n))
+    closure_jacobians(rows, robot.cuts, e, J)
+    return e.reshape(*batch, *e.shape[1:]), J.reshape(*batch, *J.shape[1:])
 
 
-def _bases(robot: LoopedRobot, q: Array, v: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Basis of motions and its rate (..., n, n), redundant rows (..., c)."""
-    from .kernels import motion_bases
-
-    batch, rows = batch_rows((q, v), ("q", "v"))
-    N, c, n = len(rows[0]), len(robot.rows), robot.n
-    Z, B, redundant = np.empty((N, n, n)), np.empty((N, n, n)), np.empty((N, c))
-    motion_bases(*rows, robot.tree.chain, robot.cuts, Z, B, redundant)
-    is_redundant = (redundant > 0.0).reshape(*batch, c)
-    return Z.reshape(*batch, n, n), B.reshape(*batch, n, n), is_redundant
-
-
-def maps(robot: LoopedRobot, q: Array, v: Array) -> tuple[Array, Array]:
-    """Velocity map and its rate, each (..., n, n_a)."""
-    Z, B, redundant = _bases(robot, q, v)
-    n, actuated = robot.n, robot.actuated
-    m = len(actuated)
-    batch = Z.shape[:-2]
-    count = (n - (~redundant).sum(axis=-1)).reshape(-1)
-    Z, B = Z[..., :m].reshape(-1, n, m), B[..., :m].reshape(-1, n, m)
-    units = robot.cuts.units
-    for i in np.flatnonzero(count != m)[:1]:
-        raise _undetermined(robot, int(i), batch, f"{count[i]} independent motions")
-    A = Z[:, actuated]
-    least = np.linalg.svd(A / units[actuated][:, None], compute_uv=False).min(axis=-1, initial=1.0)
-    for i in np.flatnonzero(least < _DETERMINED)[:1]:
-        words = "a motion in which no actuated joint moves"
-        raise _undetermined(robot, int(i), batch, words)
-    both = np.linalg.solve(A.swapaxes(1, 2), np.concatenate((Z, B), axis=1).swapaxes(1, 2))
-    G = np.array(both[..., :n].swapaxes(1, 2), np.float64)
-    rate = np.array(both[..., n:].swapaxes(1, 2), np.float64)
-    G[:, actuated] = np.eye(m)
-    rate = rate - G @ rate[:, actuated]
-    rate[:, actuated] = 0.0
-    return G.reshape(*batch, n, m), rate.reshape(*batch, n, m)
+def jacobian_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
+    """Time derivative of the Jacobian of the closures (..., c, n) at q, v (..., n)."""
+    tree, rates = robot.tree, []
+    batch = batch_shape((q, v), ("q", "v"))
+    for closure in robot.closures:
+        first, second = closure.frames
+        point = dgm(tree, q, second)[..., None, :3, 3]
+        JA, JB = jacobian(tree, q, first), jacobian(tree, q, second)
+        # rows of the joints: twists relative to the first frame, at the origin of the second
+        twists = np.subtract(*(jacobian(tree, q, frame, "world") for frame in (second, first)))
+        change = np.subtract(
+            *(jacobian_rate(tree, q, v, frame, "world") for frame in (second, first))
+        )
+        V, W = twists[..., :3, :].swapaxes(-1, -2), twists[..., 3:, :].swapaxes(-1, -2)
+        dV, dW = change[..., :3, :].swapaxes(-1, -2), change[..., 3:, :].swapaxes(-1, -2)
+        turn, speed = (
+            np.einsum("...ij,...j->...i", J, v)[..., None, :]
+            for J in (JA[..., 3:, :], JB[..., :3, :])
+        )
+        linear = V + np.cross(W, point)
+        dlinear = dV + np.cross(dW, point) + np.cross(W, speed) - np.cross(turn, linear)
+        R = dgm(tree, q, first)[..., :3, :3]
+        parts = [(X @ R).swapaxes(-1, -2) for X in (dlinear, dW - np.cross(turn, W))]
+        rates.append(np.concatenate(parts, axis=-2)[..., : ROWS[closure.kind], :])
+    return np.concatenate([np.empty((*batch, 0, robot.n)), *rates], axis=-2)
 
 
-def _undetermined(robot: LoopedRobot, i: int, batch: tuple[int, ...], has: str) -> LoopError:
-    where = f" in sample {i}" if batch else ""
+def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, Array]:
+    """Velocity map and its rate along v, each (..., n, n_a); the rate is zero without v."""
+    n, actuated, passive = robot.n, robot.actuated, robot.passive
+    weight = np.sqrt(robot.cuts.weight)[:, None]
+    J = weight * closure_rows(robot, q)[1] * robot.units
+    U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
+    determined = len(robot.rows) >= len(passive)
+    least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
+    for i in np.flatnonzero(np.ravel(least <= _DETERMINED))[:1]:
+        raise _undetermined(robot, i, q, "can move while the actuated ones stand still")
+    inverse = (Vt.swapaxes(-1, -2) / sizes[..., None, :]) @ U.swapaxes(-1, -2)
+    G = np.zeros((*q.shape[:-1], n, len(actuated)))
+    G[..., actuated, range(len(actuated))] = 1.0
+    G[..., passive, :] = -inverse @ J[..., actuated]
+    left = np.abs(J @ G).max(axis=(-1, -2), initial=0.0)
+    for i in np.flatnonzero(np.ravel(left > _CONSISTENT))[:1]:
+        raise _undetermined(robot, i, q, "block the actuated ones, which depend on each other")
+    scales = robot.units[:, None] / robot.units[actuated]
+    if v is None:
+        return G * scales, np.zeros_like(G)
+    rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
+    dJ = weight * jacobian_rates(robot, q, v) * robot.units
+    rate[..., passive, :] = -inverse @ (dJ @ G)
+    return G * scales, rate * scales
+
+
+def _undetermined(robot: LoopedRobot, i: int, q: Array, how: str) -> LoopError:
+    where = f" in sample {i}" if q.ndim > 1 else ""
     return LoopError(
-        f"{robot.name!r} has {has}{where}, and {len(robot.actuated)} actuated joints "
-        f"{robot.actuated.tolist()}, which do not determine the others there. Check the posture "
-        "(a dead point, or loops that are open: see close), the closures (see mobility) and "
-        "actuated=."
+        f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
+        f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops that "
+        "are open: see close), the closures (see mobility) and actuated=."
     )

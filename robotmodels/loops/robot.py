@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Value, read_only
 from ..errors import InvalidValueError, LoopError
-from ..geometry import PRISMATIC
+from ..geometry import FIXED, PRISMATIC, constant_factors
+from ..kernels import Chain
 from ..kinematics import dgm, jacobian
 from ..minimal_parameters.rules import reach
 from ..model import RobotModel
@@ -20,24 +21,25 @@ from ..model import RobotModel
 ROWS = {"point": 3, "revolute": 5, "full": 6}
 """Number of constraint rows of each kind of closure."""
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
-_NO_EFFECT = 1e-10  # largest entry of the Jacobian of a closure without effect, of the robot's size
+_NO_EFFECT = 1e-10  # largest entry of the Jacobian of a closure without effect, dimensionless
 
 
 class Cuts(NamedTuple):
-    """Closures as kernels take them: the two frames of each, and its joints.
+    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
 
-    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3), of the frames in rows
-    of the table; side (k n,): -1 or 1 for joints that move the first or the second frame alone.
+    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
+    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
     """
 
+    chain: Chain
     first: NDArray[np.int64]
     second: NDArray[np.int64]
     rows: NDArray[np.int64]
     rotation: Array
     position: Array
     side: NDArray[np.int64]
-    units: Array
     length: Array
+    weight: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +64,8 @@ class Closure:
 
     References
     ----------
-    Seed book section 1.2.1; W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and
-    closed-loop robots", ICRA 1986.
+    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
+    ICRA 1986, for frames of cut joints. Seed book section 1.2.1, for the tables.
 
     Examples
     --------
@@ -78,7 +80,7 @@ class Closure:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise InvalidValueError(f"name: expected a text, not empty, got {self.name!r:.60}.")
-        if self.kind not in ROWS:
+        if not isinstance(self.kind, str) or self.kind not in ROWS:
             kinds = ", ".join(map(repr, ROWS))
             raise InvalidValueError(f"kind: expected one of {kinds}, got {self.kind!r:.60}.")
         pair = self.frames
@@ -109,33 +111,44 @@ class LoopedRobot(Value):
     actuated : array_like of int, shape (n_a,), optional
         Columns of ``q`` of the actuated joints, from 0; default the joints with ``mu = 1``.
 
+    Attributes
+    ----------
+    passive : ndarray of int, shape (n - n_a,)
+        Columns of the passive joints, ascending.
+    units : ndarray, shape (n,)
+        Natural unit of each joint: 1 rad, or the size of the robot in metres.
+    rows : tuple of str
+        Names of the c constraint rows, such as ``"cut.x"``.
+
     Raises
     ------
     LoopError
         A closure between frames of one body, or one that no joint can violate.
-    FrameNotFoundError, InvalidValueError, ShapeError
+    FrameNotFoundError, InvalidValueError
         Unknown frames; repeated names; actuated joints that do not exist or are repeated.
 
     References
     ----------
-    Seed book section 1.2.1, for the tree; the article of `Closure`, for cut loops.
+    Seed book sections 1.2.1 and 2.2.
 
     Examples
     --------
-    A parallelogram: two cranks on the base, a coupler of which both carry an end.
+    A parallelogram: two cranks on the base, a coupler on the first one that meets the second.
 
     >>> from robotmodels.geometry import DHTable
     >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> robot
-    <LoopedRobot 'robot': 3 joints, 1 actuated, closures: cut (revolute)>
+    >>> LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    <LoopedRobot 'robot': 3 joints, actuated [0], closures: cut (revolute)>
     """
 
     tree: RobotModel
     closures: tuple[Closure, ...]
     actuated: NDArray[np.int64] = None  # type: ignore[assignment]
-    _cuts: Cuts | None = field(default=None, init=False)
-    scratch: Any = field(default=None, init=False)
+    passive: NDArray[np.int64] = field(init=False)
+    units: Array = field(init=False)
+    rows: tuple[str, ...] = field(init=False)
+    cuts: Cuts = field(init=False)
+    scratch: Any = field(init=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.tree, RobotModel):
@@ -143,67 +156,19 @@ class LoopedRobot(Value):
                 f"tree: expected the RobotModel of a spanning tree, got {type(self.tree).__name__}."
             )
         closures = self.closures if isinstance(self.closures, Iterable) else (self.closures,)
-        object.__setattr__(self, "closures", tuple(closures))
-        for k, closure in enumerate(self.closures):
-            if not isinstance(closure, Closure):
-                raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
-        names = [closure.name for closure in self.closures]
-        if len(set(names)) < len(names):
-            raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
-        object.__setattr__(self, "actuated", self._checked_actuated())
-        object.__setattr__(self, "_cuts", self._checked_cuts())
-        object.__setattr__(self, "scratch", threading.local())
-
-    def _checked_actuated(self) -> NDArray[np.int64]:
-        """Columns of the actuated joints."""
-        table, n = self.tree.table, self.tree.n
-        if self.actuated is None:
-            return read_only(np.flatnonzero(table.mu[table.joint_rows]), np.int64)
-        given = np.asarray(self.actuated)
-        if given.ndim != 1 or (given.size and given.dtype.kind not in "iu"):
-            raise InvalidValueError(
-                f"actuated: expected columns of q such as [0, 1], got {self.actuated!r:.60}."
-            )
-        wrong = [int(j) for j in given if not 0 <= j < n]
-        if wrong or len(set(given.tolist())) < given.size:
-            raise InvalidValueError(
-                f"actuated: expected different columns from 0 to {n - 1}, got {given.tolist()}."
-            )
-        return read_only(given, np.int64)
-
-    def _checked_cuts(self) -> Cuts:
-        """Arrays of the closures, each of which some joint can violate."""
-        tree, size = self.tree, reach(self.tree)
-        moving = tree.table.joint_rows + 1
-        sides = np.zeros((len(self.closures), tree.n), dtype=np.int64)
-        places = []
-        for closure, side in zip(self.closures, sides, strict=True):
-            first, second = pair = [tree.twin.frame(frame) for frame in closure.frames]
-            side[:] = np.isin(moving, second.path).astype(int) - np.isin(moving, first.path)
-            places += pair
-            named = f"closure {closure.name!r}: the frames {closure.frames[0]!r} and "
-            if not side.any():
-                raise LoopError(
-                    f"{named}{closure.frames[1]!r} are on the same body; give frames of the two "
-                    "bodies that the closure joins."
-                )
-            if not _acts(tree, closure, size):
-                raise LoopError(
-                    f"{named}{closure.frames[1]!r} add no constraint: no joint moves them against "
-                    f"each other in the rows {', '.join(closure.rows)}. Remove the closure, or "
-                    "correct its frames."
-                )
-        slides = tree.table.sigma[moving - 1] == PRISMATIC
-        return Cuts(
-            first=read_only([place.parent for place in places[::2]], np.int64),
-            second=read_only([place.parent for place in places[1::2]], np.int64),
-            rows=read_only([ROWS[closure.kind] for closure in self.closures], np.int64),
-            rotation=read_only(np.array([p.rotation for p in places]).reshape(-1, 3, 3)),
-            position=read_only(np.array([p.position for p in places]).reshape(-1, 3)),
-            side=read_only(sides.ravel(), np.int64),
-            units=read_only(np.where(slides, size, 1.0)),
-            length=read_only([size]),
-        )
+        actuated = _checked_actuated(self.tree, self.actuated)
+        parts: dict[str, Any] = {
+            "closures": _checked_closures(tuple(closures)),
+            "actuated": actuated,
+            "passive": read_only(np.setdiff1d(np.arange(self.tree.n), actuated), np.int64),
+            "scratch": threading.local(),
+        }
+        parts["rows"] = tuple(row for closure in parts["closures"] for row in closure.rows)
+        parts["cuts"] = cuts = _cuts(self.tree, parts["closures"])
+        slides = cuts.chain.sigma == PRISMATIC
+        parts["units"] = read_only(np.where(slides, cuts.length, 1.0))
+        for name, value in parts.items():
+            object.__setattr__(self, name, value)
 
     @property
     def n(self) -> int:
@@ -215,26 +180,11 @@ class LoopedRobot(Value):
         """Name of the tree."""
         return self.tree.name
 
-    @property
-    def passive(self) -> NDArray[np.int64]:
-        """Columns of the passive joints, ascending."""
-        return np.setdiff1d(np.arange(self.n), self.actuated)
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Names of the c constraint rows, such as ``"cut.x"``."""
-        return tuple(row for closure in self.closures for row in closure.rows)
-
-    @property
-    def cuts(self) -> Cuts:
-        """Closures as arrays for the kernels."""
-        return self._cuts  # type: ignore[return-value]
-
     def __repr__(self) -> str:
         listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures[:4])
         more = f" and {len(self.closures) - 4} more" if len(self.closures) > 4 else ""
         return (
-            f"<LoopedRobot {self.name!r}: {self.n} joints, {len(self.actuated)} actuated, "
+            f"<LoopedRobot {self.name!r}: {self.n} joints, actuated {self.actuated.tolist()}, "
             f"closures: {listed or 'none'}{more}>"
         )
 
@@ -243,25 +193,107 @@ class LoopedRobot(Value):
         return self.tree, self.closures, self.actuated
 
 
+def check_looped(robot: object) -> None:
+    """Refuse what is not a looped robot."""
+    if not isinstance(robot, LoopedRobot):
+        raise InvalidValueError(
+            f"robot: expected a LoopedRobot, got {type(robot).__name__}; build one of a tree and "
+            "its closures: LoopedRobot(tree, closures=[...], actuated=[...])."
+        )
+
+
+def _checked_closures(closures: tuple[Any, ...]) -> tuple[Closure, ...]:
+    """Closures, each with its own name."""
+    for k, closure in enumerate(closures):
+        if not isinstance(closure, Closure):
+            raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
+    names = [closure.name for closure in closures]
+    if len(set(names)) < len(names):
+        raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
+    return closures
+
+
+def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
+    """Columns of the actuated joints."""
+    if actuated is None:
+        return read_only(np.flatnonzero(tree.table.mu[tree.table.joint_rows]), np.int64)
+    given = np.asarray(actuated)
+    is_whole = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
+    if not is_whole or not np.isin(given, range(tree.n)).all() or len({*given}) < given.size:
+        raise InvalidValueError(
+            f"actuated: expected different columns of q, from 0 to {tree.n - 1}, got "
+            f"{actuated!r:.60}."
+        )
+    return read_only(given, np.int64)
+
+
+def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
+    """Arrays of closures, each of which some joint can violate."""
+    moving, size = tree.table.joint_rows + 1, reach(tree)
+    chain, body, pose = _moving_chain(tree)
+    sides = np.zeros((len(closures), tree.n), dtype=np.int64)
+    parents, ends, weight = [], [], []
+    for closure, side in zip(closures, sides, strict=True):
+        pair = [tree.twin.frame(frame) for frame in closure.frames]
+        side[:] = np.subtract(*(np.isin(moving, place.path).astype(int) for place in pair[::-1]))
+        named = f"closure {closure.name!r}: the frames {closure.frames[0]!r} and "
+        if not side.any():
+            raise LoopError(
+                f"{named}{closure.frames[1]!r} are on the same body; give frames of the two bodies "
+                "that the closure joins."
+            )
+        if not _acts(tree, closure, size):
+            raise LoopError(
+                f"{named}{closure.frames[1]!r} add no constraint: no joint moves them against each "
+                f"other in the rows {', '.join(closure.rows)}. Remove the closure, or correct its "
+                "frames."
+            )
+        for place in pair:
+            T = np.eye(4)
+            T[:3, :3], T[:3, 3] = place.rotation, place.position
+            parents.append(body[place.parent])
+            ends.append(pose[place.parent] @ T)
+        weight += [1.0 / size**2] * 3 + [1.0] * (ROWS[closure.kind] - 3)
+    return Cuts(
+        chain=chain,
+        first=read_only(parents[::2], np.int64),
+        second=read_only(parents[1::2], np.int64),
+        rows=read_only([ROWS[closure.kind] for closure in closures], np.int64),
+        rotation=read_only(np.array([T[:3, :3] for T in ends]).reshape(-1, 3, 3)),
+        position=read_only(np.array([T[:3, 3] for T in ends]).reshape(-1, 3)),
+        side=read_only(sides.ravel(), np.int64),
+        length=read_only([size]),
+        weight=read_only(weight),
+    )
+
+
+def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
+    """Chain of the moving joints alone; of each frame, R_0 first, its joint and its pose on it."""
+    body, pose = [0], [np.eye(4)]
+    antecedent, constants = [], []
+    for sigma, a, C in zip(
+        tree.table.sigma, tree.table.antecedent, constant_factors(tree.table), strict=True
+    ):
+        at = pose[a] @ C
+        if sigma != FIXED:
+            antecedent.append(body[a])
+            constants.append(at)
+        body.append(body[a] if sigma == FIXED else len(constants))
+        pose.append(at if sigma == FIXED else np.eye(4))
+    T, joints = np.array(constants).reshape(-1, 4, 4), np.arange(tree.n)
+    sigma = tree.table.sigma[tree.table.joint_rows]
+    structure = [read_only(x, np.int64) for x in (antecedent, sigma, joints)]
+    places = [read_only(x) for x in (T[:, :3, :3], T[:, :3, 3], np.eye(3), np.zeros(3))]
+    return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
+
+
 def _acts(tree: RobotModel, closure: Closure, size: float) -> bool:
     """Whether some joint moves the two frames against each other in the rows of the closure."""
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (3, tree.n)):
         first, second = (dgm(tree, q, frame) for frame in closure.frames)
         twist = np.subtract(*(jacobian(tree, q, frame, "world") for frame in closure.frames))
         linear = twist[:3] + np.cross(twist[3:], second[:3, 3], axis=0)
-        rows = np.vstack((linear / size, twist[3:]))
-        rows = np.vstack((first[:3, :3].T @ rows[:3], first[:3, :3].T @ rows[3:]))
-        if np.abs(rows[: ROWS[closure.kind]]).max(initial=0.0) > _NO_EFFECT:
+        rows = [first[:3, :3].T @ part for part in (linear / size, twist[3:])]
+        if np.abs(np.vstack(rows)[: ROWS[closure.kind]]).max(initial=0.0) > _NO_EFFECT:
             return True
     return False
-
-
-def check_looped(robot: object) -> None:
-    """Refuse what is not a looped robot."""
-    if not isinstance(robot, LoopedRobot):
-        hint = (
-            "; give its closures: LoopedRobot(tree, closures=[...])"
-            if isinstance(robot, RobotModel)
-            else ""
-        )
-        raise InvalidValueError(f"robot: expected a LoopedRobot, got {type(robot).__name__}{hint}.")
