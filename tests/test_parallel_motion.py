@@ -129,9 +129,7 @@ def lines_of(kind, rng):
     return p, d, {"1": 2, "2b": 3}.get(kind, int(kind[0]) + 1)
 
 
-@pytest.mark.parametrize(
-    "kind", ["1", "2b", "3a", "3b", "3c", "3d", "4a", "4b", "4d", "5a", "5b"]
-)
+@pytest.mark.parametrize("kind", ["1", "2b", "3a", "3b", "3c", "3d", "4a", "4b", "4d", "5a", "5b"])
 def test_grassmann_varieties_of_constructed_legs(kind):
     """J.-P. Merlet, "Singular configurations of parallel manipulators and Grassmann geometry"."""
     for seed in range(6):
@@ -341,7 +339,10 @@ def test_kinetic_energy_is_that_of_the_parts(name):
         second = knee + s2 * u if robot.has_cranks else anchor - s2 * u
         return robot.base + s1 * along, second, along, u
 
-    rates = [(a - b) / (2 * h) for a, b in zip(parts(moved(T, h * V)), parts(moved(T, -h * V)), strict=True)]
+    rates = [
+        (a - b) / (2 * h)
+        for a, b in zip(parts(moved(T, h * V)), parts(moved(T, -h * V)), strict=True)
+    ]
     weights = (m1, m2, i1, i2)
     legs = 0.5 * sum(w * (x**2).sum() for w, x in zip(weights, rates, strict=True))
     R, mass = T[:3, :3], robot.masses
@@ -400,7 +401,10 @@ def test_a_five_bar_as_loops_is_the_five_bar():
         antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2], d=[0, 0.5, 0.4, 0.4, 0.6, 0.6]
     )
     loops = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (5, 6), "point")], [0, 1])
-    looped, five = pr.from_loops(loops, 5, [2.0, 1.0, -1.0, 1.0]), pr.five_bar([[0, 0], [0.5, 0]], 0.4, 0.6)
+    looped, five = (
+        pr.from_loops(loops, 5, [2.0, 1.0, -1.0, 1.0]),
+        pr.five_bar([[0, 0], [0.5, 0]], 0.4, 0.6),
+    )
     place = looped.home[:3, 3] + [0.02, -0.03, 0.0]
     T = five.pose(place[:2])
     q = pr.igm(looped, T).q[0]
@@ -417,9 +421,7 @@ def test_a_five_bar_as_loops_is_the_five_bar():
     modes = pr.assembly_modes(looped, q)
     both = pr.assembly_modes(five, q)
     assert modes.status == pr.AssemblyStatus.SOME_LOST
-    np.testing.assert_allclose(
-        np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8
-    )
+    np.testing.assert_allclose(np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8)
     assert pr.classify_singularity(looped, T).kind == Kind.REGULAR
     far = pr.igm(looped, five.pose([3.0, 0.0]))
     assert (far.count, far.status) == (0, pr.LegStatus.OUT_OF_REACH)
@@ -436,9 +438,13 @@ def test_a_gough_platform_is_calibrated_from_poses_and_lengths():
     nominal = pr.gough_symmetric(1.0)
     base, platform = (p + 2e-3 * rng.normal(size=(6, 3)) for p in (nominal.base, nominal.platform))
     offset = 1e-3 * rng.normal(size=6)
-    T = nominal.pose(np.c_[rng.uniform(-0.3, 0.3, (60, 3)), rng.uniform(-0.4, 0.4, (60, 3))] + [0, 0, 1, 0, 0, 0])
+    T = nominal.pose(
+        np.c_[rng.uniform(-0.3, 0.3, (60, 3)), rng.uniform(-0.4, 0.4, (60, 3))] + [0, 0, 1, 0, 0, 0]
+    )
     noise = 1e-5
-    measured = pr.igm(pr.gough(base, platform), T).q[:, 0] - offset + noise * rng.normal(size=(60, 6))
+    measured = (
+        pr.igm(pr.gough(base, platform), T).q[:, 0] - offset + noise * rng.normal(size=(60, 6))
+    )
 
     def linearise(x):
         a, b, zero = x[:18].reshape(6, 3), x[18:36].reshape(6, 3), x[36:]

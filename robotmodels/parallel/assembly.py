@@ -329,7 +329,9 @@ def _normalised(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 def _usable(x: NDArray[np.complex128], codes: Array) -> NDArray[np.bool_]:
     """Ends with a rotation: not at e.e = 0."""
-    return (np.abs((x[:, :4] ** 2).sum(axis=1)) > _FINITE) & (codes < 2) & np.isfinite(x).all(axis=1)
+    return (
+        (np.abs((x[:, :4] ** 2).sum(axis=1)) > _FINITE) & (codes < 2) & np.isfinite(x).all(axis=1)
+    )
 
 
 def _is_incomplete(x: NDArray[np.complex128], codes: Array) -> bool:

@@ -162,7 +162,11 @@ def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
 def _start(robot: ParallelRobot, q: Array) -> Array:
     """Where Newton's method starts without a given pose. Shapes: (..., m) -> (..., 4, 4)."""
     limited = np.isfinite(robot.upper).all()
-    if robot.family is not Family.GOUGH or limited or not np.allclose(robot.home[:3, :3], np.eye(3)):
+    if (
+        robot.family is not Family.GOUGH
+        or limited
+        or not np.allclose(robot.home[:3, :3], np.eye(3))
+    ):
         return robot.home
     place = robot.base.mean(axis=0) - robot.platform.mean(axis=0)
     up = robot.home[:3, 3] - place

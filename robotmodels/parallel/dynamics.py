@@ -194,9 +194,7 @@ def _legs(robot: ParallelRobot, T: Array, mode: Mode) -> tuple[LegStates, Array]
     return legs, legs.rows / legs.speed[..., None]
 
 
-def _mass_matrix(
-    robot: ParallelRobot, T: Array, legs: LegStates, V: Array
-) -> tuple[Array, Array]:
+def _mass_matrix(robot: ParallelRobot, T: Array, legs: LegStates, V: Array) -> tuple[Array, Array]:
     """Mass matrix of the platform's freedoms and wrench at zero acceleration."""
     columns = list(robot.columns)
     h = _wrench(robot, T, legs, V, np.zeros_like(V))
@@ -224,7 +222,7 @@ def _wrench(robot: ParallelRobot, T: Array, legs: LegStates, V: Array, A: Array)
     spin = np.cross(w, legs.arm)
     velocity = v[:, None] + spin
     acceleration = a[:, None] + np.cross(alpha, legs.arm) + np.cross(w, spin)
-    parts = (_crank_forces if robot.has_cranks else _strut_forces)
+    parts = _crank_forces if robot.has_cranks else _strut_forces
     at_anchor, on_actuator = parts(robot, masses, legs, V, A, velocity, acceleration)
     total[:, :3] += at_anchor.sum(axis=1)
     total[:, 3:] += np.cross(legs.arm, at_anchor).sum(axis=1)
@@ -246,7 +244,9 @@ def _strut_forces(
     (m1, s1, i1), (m2, s2, i2) = (part.T[:, :, None] for part in (masses.first, masses.second))
     rate = (u * velocity).sum(axis=-1, keepdims=True)
     turn = (velocity - rate * u) / size
-    second = (u * acceleration).sum(axis=-1, keepdims=True) + size * (turn**2).sum(-1, keepdims=True)
+    second = (u * acceleration).sum(axis=-1, keepdims=True) + size * (turn**2).sum(
+        -1, keepdims=True
+    )
     bend = (acceleration - second * u - 2.0 * rate * turn) / size  # u''
     first = m1 * (s1 * bend - robot.gravity)
     last = m2 * (acceleration - s2 * bend - robot.gravity)

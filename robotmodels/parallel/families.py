@@ -281,7 +281,9 @@ def _robot(
                 )
     none = np.zeros(m)
     crank, rod = (none, none) if arms is None else arms
-    low, high = (checked_limit(x, m, n, arms is None) for x, n in ((lower, "lower"), (upper, "upper")))
+    low, high = (
+        checked_limit(x, m, n, arms is None) for x, n in ((lower, "lower"), (upper, "upper"))
+    )
     if not (low <= high).all():
         raise InvalidValueError(f"lower, upper: expected lower below upper, got {low} and {high}.")
     u = np.tile(_X, (m, 1)) if outward is None else outward
@@ -377,9 +379,7 @@ def _middle(robot: ParallelRobot) -> float | None:
     return float((middle**2).mean()) if np.isfinite(middle).all() else None
 
 
-def height_above(
-    robot: ParallelRobot, place: Array, normal: Array, square: Any = None
-) -> Any:
+def height_above(robot: ParallelRobot, place: Array, normal: Array, square: Any = None) -> Any:
     """Height at which the mean square of six lengths is given, or the radius of the base.
 
     Shapes: place, normal (3,), square (...) -> (...).

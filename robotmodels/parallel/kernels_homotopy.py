@@ -242,9 +242,8 @@ def spatial(
 ) -> None:
     """Ends of the 40 paths to each member, those with e.e = 0 among them.
 
-    Shapes: members (N, 81), real, start (162,), first (40, 16): real and imaginary parts in turns
-    of the stored member and its solutions; turns (7,), phases of its equations; options (1,): the
-    largest prediction error -> ends (N, 40, 16), codes (N, 40).
+    Shapes: members (N, 81), stored start (162,) and first (40, 16), complex; phases turns (7,),
+    largest prediction error options (1,) -> ends (N, 40, 16), complex, codes (N, 40).
     """
     work, J = np.zeros((11, PARAMETERS), np.complex128), np.zeros((7, 8), np.complex128)
     F, G, begin, change, target, x = work[1], work[2], work[7], work[8], work[9], work[10]

@@ -370,7 +370,9 @@ class LoopedPlatform(Value):
         passive = np.setdiff1d(np.arange(self.robot.n), self.actuated)
         locked = Jp[:, passive] @ _null(J[:, passive], epsilon).T
         U, s, _ = np.linalg.svd(locked)
-        gained = (U[:, : len(s)] / unit[:, None])[:, s > np.sqrt(epsilon) * max(1.0, s.max(initial=0))]
+        gained = (U[:, : len(s)] / unit[:, None])[
+            :, s > np.sqrt(epsilon) * max(1.0, s.max(initial=0))
+        ]
         free = np.linalg.matrix_rank(Jp @ _null(J, epsilon).T, tol=np.sqrt(epsilon))
         idle = _null(np.concatenate((J, Jp)), epsilon)[:, self.actuated]
         serial = bool(np.abs(idle).max(initial=0.0) > np.sqrt(epsilon))

@@ -50,4 +50,3 @@ def at_index(array: Any, i: int | tuple[int, ...]) -> Any:
             f"i: expected the index of one row of a batch of shape {np.shape(array)}, got {i!r:.40}."
         )
     return element
-

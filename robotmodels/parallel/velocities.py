@@ -245,7 +245,9 @@ def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArra
     """Checked working modes of N poses. Shapes: -> (N,)."""
     given = np.asarray(0 if mode is None else mode)
     largest = 2**robot.m if robot.has_cranks else 1
-    if given.dtype.kind not in "iu" or (given.size and not (0 <= given.min() <= given.max() < largest)):
+    if given.dtype.kind not in "iu" or (
+        given.size and not (0 <= given.min() <= given.max() < largest)
+    ):
         raise InvalidValueError(
             f"mode: expected whole numbers from 0 to {largest - 1}, as igm(robot, T).mode numbers "
             f"the working modes, got {mode!r:.60}."

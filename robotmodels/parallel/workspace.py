@@ -32,18 +32,26 @@ class PlatformWorkspace(Workspace):
     margin : ndarray, shape (N,)
         Least distance of lengths or angles from their limits, and of joints and legs from theirs,
         m or rad; negative outside. Areas and volumes are interpolated from it.
-    options : tuple
-        Rotations (K, 3, 3), limits, cones and radius of the legs that were asked for.
+    rotations : ndarray, shape (K, 3, 3)
+        Orientations that were looked at.
+    lower, upper : ndarray, shape (m,)
+        Limits that count, m or rad.
+    joint_cone, leg_radius : float or None
+        As asked for.
     """
 
     margin: Array
-    options: tuple[Any, ...]
+    rotations: Array
+    lower: Array
+    upper: Array
+    joint_cone: float | None
+    leg_radius: float | None
 
     @property
     def poses(self) -> Array:
         """World poses of the cells in the (first) orientation, shape (N, 4, 4)."""
         T = np.tile(np.eye(4), (len(self.points), 1, 1))
-        T[:, :3, :3] = self.options[0][0]
+        T[:, :3, :3] = self.rotations[0]
         T[:, :3, 3] = _world(self.points, self.frame)
         return T
 
@@ -58,6 +66,10 @@ class PlatformWorkspace(Workspace):
         return self._measure if self.coordinates == "space" else float("nan")
 
     @property
+    def _options(self) -> tuple[Any, ...]:
+        return self.rotations, self.lower, self.upper, self.joint_cone, self.leg_radius
+
+    @property
     def _measure(self) -> float:
         return measure(self.margin.reshape(self.shape), self.size)
 
@@ -65,7 +77,7 @@ class PlatformWorkspace(Workspace):
         """Whether points (..., 2 or 3) are reached, computed exactly; shape (...)."""
         given = as_core(points, (len(self.size),), "points")
         rows = _world(given.reshape(-1, given.shape[-1]), self.frame)
-        return (_margins(self.model, self.kind, rows, self.options)[0] >= 0.0).reshape(  # type: ignore[arg-type]
+        return (_margins(self.model, self.kind, rows, self._options)[0] >= 0.0).reshape(  # type: ignore[arg-type]
             given.shape[:-1]
         )
 
@@ -145,7 +157,9 @@ def workspace(
     flat = 2 not in robot.columns or height is not None
     frame = np.eye(4)
     frame[2, 3] = robot.home[2, 3] if height is None else as_number(height, "height")
-    given = (300 if flat else 40) if resolution is None else as_bounded(resolution, "resolution", 4e3)
+    given = (
+        (300 if flat else 40) if resolution is None else as_bounded(resolution, "resolution", 4e3)
+    )
     if np.ndim(given) or given != int(given) or given < 2:
         raise InvalidValueError(f"resolution: expected a whole number from 2, got {resolution!r}.")
     # the boxes about spheres of the legs' longest reach
@@ -168,7 +182,7 @@ def workspace(
     size = 2.02 * half / (n - 1)  # centres of the outermost cells are outside
     axes = [middle[k] + size[k] * (np.arange(n) - 0.5 * (n - 1)) for k in range(d)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
-    options = (R, low, high, *bounds)
+    options = (read_only(R), low, high, *bounds)
     margin, count = _margins(robot, kind, _world(points, frame), options)
     status = WorkspaceStatus.COUNTED if len(R) == 1 else WorkspaceStatus.SAMPLED
     status = status if count.any() else WorkspaceStatus.EMPTY
@@ -176,7 +190,7 @@ def workspace(
     return PlatformWorkspace(
         robot, kind, limits is not False, None, None, R[0], read_only(points),  # type: ignore[arg-type]
         read_only(count, np.int64), read_only(size), (n,) * d, where, frame, status,
-        read_only(margin), options,
+        read_only(margin), *options,
     )  # fmt: skip
 
 
@@ -250,7 +264,9 @@ def _limits(robot: ParallelRobot, limits: Any) -> tuple[Array, Array]:
             return robot.lower, robot.upper
         limits = None, None
     if not isinstance(limits, tuple | list) or len(limits) != 2:
-        raise InvalidValueError(f"limits: expected True, False or (lower, upper), got {limits!r:.60}.")
+        raise InvalidValueError(
+            f"limits: expected True, False or (lower, upper), got {limits!r:.60}."
+        )
     low, high = (
         checked_limit(x, robot.m, n, not robot.has_cranks)
         for x, n in zip(limits, ("lower", "upper"), strict=True)

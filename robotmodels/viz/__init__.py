@@ -24,6 +24,12 @@ from .identification import (
 )
 from .motion import Motion
 from .over_time import Unit
+from .parallel import (
+    jog_parallel,
+    plot_assembly_modes,
+    plot_platform_workspace,
+    show_parallel,
+)
 from .processing import plot_processing
 from .report import html_report, identification_html
 from .scene import Scene
@@ -46,6 +52,8 @@ __all__ = [
     "html_report",
     "identification_html",
     "jog",
+    "jog_parallel",
+    "plot_assembly_modes",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
     "plot_calibration_normality",
@@ -63,6 +71,7 @@ __all__ = [
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
+    "plot_platform_workspace",
     "plot_pose_path",
     "plot_processing",
     "plot_profiles",
@@ -71,4 +80,5 @@ __all__ = [
     "plot_torque_parts",
     "plot_trajectory",
     "show",
+    "show_parallel",
 ]
