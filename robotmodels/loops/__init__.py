@@ -7,12 +7,18 @@ the cuts. Joint variables are those of all joints of the tree.
 from ..errors import LoopError
 from .closing import ClosedPostures, ClosingStatus, close
 from .constraints import Mobility, closure_jacobian, mobility, velocity_map, velocity_map_rate
+from .dynamics import closure_forces, ddm, idm
+from .parameters import base_parameters, torque_regressor
+from .read import read_mjcf, read_par
 from .robot import Closure, LoopedRobot
+from .simulation import simulate
 
 __all__ = [
     "Closure",
     "LoopedRobot",
     "LoopError",
+    "read_par",
+    "read_mjcf",
     "close",
     "ClosedPostures",
     "ClosingStatus",
@@ -21,4 +27,10 @@ __all__ = [
     "closure_jacobian",
     "velocity_map",
     "velocity_map_rate",
+    "idm",
+    "ddm",
+    "closure_forces",
+    "simulate",
+    "torque_regressor",
+    "base_parameters",
 ]

@@ -122,7 +122,7 @@ def close(
         q[:, passive], q[:, robot.actuated] = start, target
     guess = q.copy()
     residual, status = np.empty(len(q)), np.empty(len(q))
-    _close(robot, target, follow, q, residual, status)
+    _close(robot, target, int(follow), q, residual, status)
     _start_again(robot, target, q, residual, status)
     turns = robot.tree.table.sigma[robot.tree.table.joint_rows] == REVOLUTE
     turns[robot.actuated] = False
@@ -132,15 +132,21 @@ def close(
     )
 
 
+def followed(robot: LoopedRobot, target: Array, start: Array) -> ClosedPostures:
+    """Postures on the way of the actuated joints from a closed one (n,); no other starts."""
+    q = np.tile(start, (len(target), 1))
+    residual, status = np.empty(len(q)), np.empty(len(q))
+    _close(robot, target, 2, q, residual, status)
+    return ClosedPostures(q, residual, status.astype(np.int8))
+
+
 def _close(
-    robot: LoopedRobot, target: Array, follow: bool, q: Array, residual: Array, status: Array
+    robot: LoopedRobot, target: Array, follow: int, q: Array, residual: Array, status: Array
 ) -> None:
     """Close the postures in the rows of q in place, see `kernels.closed_postures`."""
     from .kernels import closed_postures
 
-    closed_postures(
-        target, robot.cuts, robot.actuated, robot.passive, int(follow), q, residual, status
-    )
+    closed_postures(target, robot.cuts, robot.actuated, robot.passive, follow, q, residual, status)
 
 
 def _start_again(
@@ -155,7 +161,7 @@ def _start_again(
             return
         again, least, code = q[rows], residual[rows], status[rows]
         again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
-        _close(robot, target[rows], False, again, least, code)
+        _close(robot, target[rows], 0, again, least, code)
         better = least < residual[rows]
         kept = rows[better]
         q[kept], residual[kept], status[kept] = again[better], least[better], code[better]

@@ -226,8 +226,8 @@ def closed_postures(
 ) -> None:
     """Close the loops by the passive joints, from the posture in each row; residuals and codes.
 
-    Shapes: target (N, n_a), q (N, n) -> q, residual, code (N,). With ``follow`` the actuated joints
-    move from the posture of the row to the target, otherwise they are there from the start.
+    Shapes: target (N, n_a), q (N, n) -> q, residual, code (N,). ``follow``: 0 with the actuated
+    joints at the target from the start, 1 moving from the row to there, 2 without a second start.
     """
     m, c = passive.shape[0], cuts.weight.shape[0]
     R, p = base_poses(q.shape[1])
@@ -237,7 +237,7 @@ def closed_postures(
     for i in range(q.shape[0]):
         for a in range(m):
             guess[a] = q[i, passive[a]]
-        moving = follow == 1
+        moving = follow > 0
         jump = not moving
         before, damping, least = np.inf, 0.0, 0.0
         code[i] = NOT_CONVERGED
@@ -265,6 +265,8 @@ def closed_postures(
                 least = damped_step(N, g, damping, L, x)
                 if cost <= _CLOSED * _CLOSED and not moved:
                     code[i] = CLOSED if least > _FLAT else SINGULAR_THERE
+                    for a in range(m):  # the last digits
+                        q[i, passive[a]] += x[a] / D[a] if least > _FLAT else 0.0
                     break
                 stuck = steepest <= _STATIONARY * sqrt(cost) and not moved
                 for a in range(m):
@@ -274,7 +276,7 @@ def closed_postures(
                 stuck = damping > _HEAVIEST
                 damping = max(damping * 10.0, 1e-3)
                 least = 0.0
-            if stuck and not moving:
+            if stuck and (follow == 2 or not moving):
                 code[i] = CANNOT_CLOSE
                 for a in range(m):
                     q[i, passive[a]] = start[a]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -142,7 +142,7 @@ class LoopedRobot(Value):
     """
 
     tree: RobotModel
-    closures: tuple[Closure, ...]
+    closures: Sequence[Closure]
     actuated: NDArray[np.int64] = None  # type: ignore[assignment]
     passive: NDArray[np.int64] = field(init=False)
     units: Array = field(init=False)

@@ -125,9 +125,9 @@ def simulate(
     n = model.n
     q = as_exact(q0, (n,), "q0").copy()
     v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
-    start, end, times = _times(t)
-    law, knots = _law(control, n, times, "control")
-    tool, tool_knots = _law(wrench, 6, times, "wrench")
+    start, end, times = times_of(t)
+    law, knots = law_of(control, n, times, "control")
+    tool, tool_knots = law_of(wrench, 6, times, "wrench")
     if friction is not None:
         check_friction(friction, n)
     width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
@@ -169,7 +169,7 @@ def _log_progress(done: float) -> None:
     _LOG.info("simulated %.0f %%", 100.0 * done)
 
 
-def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
+def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
     """Function (t, q, v) -> (size,) of a function, constant values or rows; times of its kinks."""
     none = np.empty(0)
     if law is None:
@@ -203,7 +203,7 @@ def _checked(law: Callable[..., Any], size: int, name: str) -> Law:
     return value
 
 
-def _times(t: ArrayLike) -> tuple[float, float, Array | None]:
+def times_of(t: ArrayLike) -> tuple[float, float, Array | None]:
     """Start, end, and the times of the samples if the caller gave them. Shapes: -> times (N,)."""
     times = as_floats(t, "t")
     if times.ndim == 0 and times >= 0.0:
