@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,6 +68,7 @@ class AssemblyModes(Result):
     (np.int64(6), array(6), 'All assembly modes are listed.')
     """
 
+    outcomes: ClassVar = AssemblyStatus
     T: Array
     valid: NDArray[np.bool_]
     residual: Array
@@ -75,28 +76,11 @@ class AssemblyModes(Result):
     status: NDArray[np.int8]
     complex_count: NDArray[np.int64]
 
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of assembly modes, shape (...)."""
-        return self.valid.sum(axis=-1)
-
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of one row as a sentence.
-
-        Parameters
-        ----------
-        i : int or tuple of int
-            Which row; left out for a single one.
-
-        Returns
-        -------
-        str
-            The sentence of its status.
-        """
-        status = AssemblyStatus(int(at_index(self.status, i)))
-        if status is AssemblyStatus.ALL and at_index(self.count, i) == 0:
+        """Outcome of row i as a sentence; i is left out for a single row."""
+        if at_index(self.status, i) == AssemblyStatus.ALL and at_index(self.count, i) == 0:
             return "There is no assembly mode: legs of these lengths do not meet the platform."
-        return status.sentence
+        return Result.reason(self, i)
 
 
 def assembly_modes(robot: ParallelRobot | LoopedPlatform, q: ArrayLike) -> AssemblyModes:
@@ -161,18 +145,13 @@ def _packed(found: Found, batch: tuple[int, ...]) -> AssemblyModes:
     T, residual, det, status, complex_count = found
     valid = ~np.isnan(T[..., 0, 3])
     count = int(valid.sum(axis=1).max(initial=0))
-    order = np.argsort(~valid, axis=1, kind="stable")[:, :count]
-    valid = np.take_along_axis(valid, order, 1)
-    T = np.take_along_axis(T, order[..., None, None], 1)
-    residual, det = (np.take_along_axis(x, order, 1) for x in (residual, det))
-    return AssemblyModes(
-        T.reshape(*batch, count, 4, 4),
-        valid.reshape(*batch, count),
-        np.where(valid, residual, np.nan).reshape(*batch, count),
-        np.where(valid, det, np.nan).reshape(*batch, count),
-        status.reshape(batch),
-        complex_count.reshape(batch),
-    )
+    if (valid[:, 1:] > valid[:, :-1]).any():
+        order = np.argsort(~valid, axis=1, kind="stable")
+        valid, residual, det = (np.take_along_axis(x, order, 1) for x in (valid, residual, det))
+        T = np.take_along_axis(T, order[..., None, None], 1)
+    residual[~valid] = det[~valid] = np.nan
+    rows = (x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det))
+    return AssemblyModes(*rows, status.reshape(batch), complex_count.reshape(batch))
 
 
 def _planar(robot: ParallelRobot, q: Array) -> Found:

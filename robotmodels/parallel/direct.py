@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import se3
 from .._arrays import Array, as_vector, batch_shape
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
 from .legs import check_robot, knees
 from .looped import LoopedPlatform
-from .results import Result, at_index
+from .results import Result
 from .robot import Family, ParallelRobot
 
 
@@ -51,26 +51,12 @@ class PlatformPoses(Result):
         Determinants of the lines of the legs, see `assembly_modes`.
     """
 
+    outcomes: ClassVar = PoseStatus
     T: Array
     status: NDArray[np.int8]
     iterations: NDArray[np.int64]
     residual: Array
     det: Array
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of one row as a sentence.
-
-        Parameters
-        ----------
-        i : int or tuple of int
-            Which row; left out for a single one.
-
-        Returns
-        -------
-        str
-            The sentence of its status.
-        """
-        return PoseStatus(int(at_index(self.status, i))).sentence
 
 
 def dgm(
@@ -115,30 +101,20 @@ def dgm(
     """
     check_robot(robot)
     if isinstance(robot, LoopedPlatform):
-        T, code, iterations, residual, det = robot.closed(q, T0)
-        return PlatformPoses(T, code, iterations, residual, det)
+        return PlatformPoses(*robot.closed(q, T0))
     q = checked_actuators(robot, q)
     start = _start(robot, q) if T0 is None else robot.checked(T0, "T0")
-    flat = np.broadcast_to(start.reshape(*start.shape[:-2], 16), (*start.shape[:-2], 16))
-    batch = batch_shape((q, flat), ("q", "T0"))
+    batch = batch_shape((q, start[..., 0]), ("q", "T0"))
     rows = np.ascontiguousarray(np.broadcast_to(q, (*batch, robot.m))).reshape(-1, robot.m)
     poses = np.ascontiguousarray(np.broadcast_to(start, (*batch, 4, 4))).reshape(-1, 4, 4)
     T, out = np.empty((len(rows), 4, 4)), np.empty((len(rows), 4))
     from .kernels import direct
 
     direct(*rods(robot, rows), poses, np.array(robot.columns), T, out)
-    code = out[:, 0].astype(np.int8)
-    T[code == PoseStatus.NOT_CONVERGED] = np.nan
-    if len(robot.columns) == 6:
-        found = code != PoseStatus.NOT_CONVERGED
-        T[found] = se3.as_pose(T[found])
-    return PlatformPoses(
-        T.reshape(*batch, 4, 4),
-        code.reshape(batch),
-        out[:, 1].astype(np.int64).reshape(batch),
-        out[:, 2].reshape(batch),
-        out[:, 3].reshape(batch),
-    )
+    T[out[:, 0] == PoseStatus.NOT_CONVERGED] = np.nan
+    code, iterations, residual, det = (x.reshape(batch) for x in out.T)
+    T = T.reshape(*batch, 4, 4)
+    return PlatformPoses(T, code.astype(np.int8), iterations.astype(np.int64), residual, det)
 
 
 def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:

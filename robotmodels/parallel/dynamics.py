@@ -38,7 +38,7 @@ from ..errors import InvalidValueError
 from .legs import LegStates, check_robot
 from .looped import LoopedPlatform
 from .robot import Masses, ParallelRobot
-from .velocities import Mode, Robot, _broadcast, only_freedoms, rates_of_rows, scales, states
+from .velocities import Mode, Robot, broadcast, only_freedoms, rates_of_rows, scales, states
 
 _SINGULAR = 1e-12  # smallest singular value, relative
 
@@ -182,7 +182,7 @@ def _rows(
     W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
     batch = T.shape[:-2]
     for x in (V, A, W):
-        batch = _broadcast(batch, x.shape[:-1])
+        batch = broadcast(batch, x.shape[:-1])
     flat = [np.broadcast_to(x, (*batch, 6)).reshape(-1, 6) for x in (V, A, W)]
     V, A = only_freedoms(robot, flat[0]), only_freedoms(robot, flat[1])
     return batch, np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4), V, A, flat[2]
@@ -191,7 +191,7 @@ def _rows(
 def _legs(robot: ParallelRobot, T: Array, mode: Mode) -> tuple[LegStates, Array]:
     """States of the legs and inverse Jacobians of N poses."""
     _, legs = states(robot, T, mode)
-    return legs, legs.rows / legs.speed[..., None]
+    return legs, legs.jacobian
 
 
 def _mass_matrix(robot: ParallelRobot, T: Array, legs: LegStates, V: Array) -> tuple[Array, Array]:
@@ -226,7 +226,7 @@ def _wrench(robot: ParallelRobot, T: Array, legs: LegStates, V: Array, A: Array)
     at_anchor, on_actuator = parts(robot, masses, legs, V, A, velocity, acceleration)
     total[:, :3] += at_anchor.sum(axis=1)
     total[:, 3:] += np.cross(legs.arm, at_anchor).sum(axis=1)
-    J = legs.rows / legs.speed[..., None]
+    J = legs.jacobian
     return only_freedoms(robot, total) + np.einsum("nij,ni->nj", J, on_actuator)
 
 
@@ -267,7 +267,7 @@ def _crank_forces(
     """Forces on the anchors and torques that move cranks and rods. Shapes: (N, m, 3), (N, m)."""
     m1, s1, i1 = masses.first.T
     m2, s2, i2 = (x[:, None] for x in masses.second.T)
-    J = legs.rows / legs.speed[..., None]
+    J = legs.jacobian
     rate = np.einsum("nij,nj->ni", J, V)
     second = np.einsum("nij,nj->ni", J, A)
     second += np.einsum("nij,nj->ni", rates_of_rows(robot, legs, V), V)

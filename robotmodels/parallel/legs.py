@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .looped import LoopedPlatform
-from .results import Result, at_index
+from .results import Result
 from .robot import ParallelRobot
 
 _TOUCHING = 1e-12  # of the cosine of an elbow: both solutions coincide
@@ -53,32 +53,13 @@ class LegSolutions(Result):
     array([0, 1, 2, 3])
     """
 
+    outcomes: ClassVar = LegStatus
     q: Array
     mode: NDArray[np.int64]
     valid: NDArray[np.bool_]
     within_limits: NDArray[np.bool_]
     residual: Array
     status: NDArray[np.int8]
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of working modes of each pose, shape (...)."""
-        return self.valid.sum(axis=-1)
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of one pose as a sentence.
-
-        Parameters
-        ----------
-        i : int or tuple of int
-            Which pose; left out for a call with a single pose.
-
-        Returns
-        -------
-        str
-            The sentence of its status.
-        """
-        return LegStatus(int(at_index(self.status, i))).sentence
 
 
 class LegStates(NamedTuple):
@@ -95,6 +76,11 @@ class LegStates(NamedTuple):
     direction: Array
     knee: Array
     reached: NDArray[np.bool_]
+
+    @property
+    def jacobian(self) -> Array:
+        """Inverse Jacobian (N, m, 6)."""
+        return self.rows / self.speed[..., None]
 
 
 def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64]) -> LegStates:
@@ -179,37 +165,34 @@ def igm(robot: ParallelRobot | LoopedPlatform, T: ArrayLike) -> LegSolutions:
         return _igm_looped(robot, T)
     check_robot(robot)
     T = robot.checked(T)
-    batch, rows, m = T.shape[:-2], T.reshape(-1, 4, 4), robot.m
+    batch, m = T.shape[:-2], robot.m
     modes = np.arange(2**m if robot.has_cranks else 1)
-    N, S = len(rows), len(modes)
-    states = leg_states(robot, np.repeat(rows, S, axis=0), np.tile(modes, N))
+    rows = np.repeat(T.reshape(-1, 4, 4), len(modes), axis=0)
+    N, S = len(rows) // len(modes), len(modes)
+    states = leg_states(robot, rows, np.tile(modes, N))
     q, valid = states.q.reshape(N, S, m), states.reached.reshape(N, S).copy()
-    size = np.linalg.norm(
-        np.repeat(rows, S, axis=0)[:, None, :3, 3] + states.arm - states.knee, axis=-1
-    )
-    error = np.abs(size - robot.rod) if robot.has_cranks else np.zeros_like(size)
-    residual = error.max(axis=-1, initial=0.0).reshape(N, S)
+    residual = np.zeros((N, S))
     if robot.has_cranks:
-        straight = np.abs(q[:, :1] - q[:, -1:]) < 1e-9  # mode 0 and the one with all bits differ
-        straight |= np.abs(q[:, :1] - q[:, -1:]) > 2.0 * np.pi - 1e-9
-        bits = (modes[:, None] >> np.arange(m)) & 1
-        valid &= ~(straight & (bits == 1)).any(axis=-1)
-    order = np.argsort(~valid, axis=1, kind="stable")
+        ends = rows[:, None, :3, 3] + states.arm - states.knee
+        error = np.abs(np.linalg.norm(ends, axis=-1) - robot.rod)
+        residual = error.max(axis=-1, initial=0.0).reshape(N, S)
+        # both solutions of a straight leg coincide: of mode 0 and the one with all bits
+        straight = np.abs(np.exp(1j * q[:, :1]) - np.exp(1j * q[:, -1:])) < 1e-9
+        valid &= ~(straight & ((modes[:, None] >> np.arange(m)) & 1 == 1)).any(axis=-1)
+    order = np.argsort(~valid, axis=1, kind="stable")[:, : valid.sum(axis=1).max(initial=0)]
+    keep, mode = np.take_along_axis(valid, order, 1), modes[order]
     q, residual = np.take_along_axis(q, order[..., None], 1), np.take_along_axis(residual, order, 1)
-    valid, mode = np.take_along_axis(valid, order, 1), modes[order] if N else order
-    count = int(valid.sum(axis=1).max(initial=0))
-    keep = valid[:, :count]
-    q = np.where(keep[..., None], q[:, :count], np.nan)
-    inside = keep & within(robot, np.where(keep[..., None], q, 0.0))
-    status = np.where(inside.any(axis=1), 0, np.where(keep.any(axis=1), 1, 2))
-    return LegSolutions(
-        q.reshape(*batch, count, m),
-        np.where(keep, mode[:, :count], -1).reshape(*batch, count),
-        keep.reshape(*batch, count),
-        inside.reshape(*batch, count),
-        np.where(keep, residual[:, :count], np.nan).reshape(*batch, count),
-        status.astype(np.int8).reshape(batch),
+    inside = keep & within(robot, q)
+    status = np.where(inside.any(axis=1), 0, np.where(keep.any(axis=1), 1, 2)).astype(np.int8)
+    found = (
+        np.where(keep[..., None], q, np.nan),
+        np.where(keep, mode, -1),
+        keep,
+        inside,
+        np.where(keep, residual, np.nan),
+        status,
     )
+    return LegSolutions(*(x.reshape((*batch, *x.shape[1:])) for x in found))
 
 
 def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
@@ -232,13 +215,7 @@ def check_robot(robot: Any) -> None:
 def _igm_looped(robot: LoopedPlatform, T: ArrayLike) -> LegSolutions:
     """One solution by Newton's method on all joints."""
     q, residual, reached = robot.postures(T)
-    actuated = np.where(reached[..., None], q[..., robot.actuated], np.nan)[..., None, :]
-    valid = reached[..., None]
-    return LegSolutions(
-        actuated,
-        np.where(valid, 0, -1),
-        valid,
-        valid,
-        np.where(reached, residual, np.nan)[..., None],
-        cast("Any", np.where(reached, 0, 2).astype(np.int8)),
-    )
+    q = np.where(reached[..., None], q[..., robot.actuated], np.nan)
+    mode, status = np.where(reached, 0, -1), np.where(reached, 0, 2).astype(np.int8)
+    rows = (x[..., None] for x in (mode, reached, reached, np.where(reached, residual, np.nan)))
+    return LegSolutions(q[..., None, :], *rows, status)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,9 +35,9 @@ class Family(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Masses(Value):
-    """Masses of a parallel robot, see `ParallelRobot.with_masses`.
+    """Masses, see `ParallelRobot.with_masses`.
 
-    Shapes: com (3,), inertia (3, 3) about it, first and second (m, 3) of each leg's parts.
+    Shapes: com (3,), inertia (3, 3) about it, first and second part of the legs (m, 3).
     """
 
     mass: float
@@ -51,10 +51,8 @@ class Masses(Value):
 class ParallelRobot(Value):
     """A parallel robot with m legs and as many freedoms of its platform. Read-only.
 
-    Legs of Gough platforms and 3-RPR robots have an actuated length; q is the lengths. The others
-    have an actuated crank, angle q, and a rod of constant length:
-    ``knee = base + crank (cos(q) outward + sin(q) downward)``. Made by `gough`, `planar_3rpr` and
-    the other functions of the family.
+    Legs of Gough platforms and 3-RPR robots have an actuated length q. The others have an actuated
+    crank, angle q, and a rod: ``knee = base + crank (cos(q) outward + sin(q) downward)``.
 
     Parameters
     ----------
@@ -122,89 +120,48 @@ class ParallelRobot(Value):
     @property
     def has_cranks(self) -> bool:
         """Whether angles are actuated, else lengths."""
-        return bool((self.crank > 0.0).any())
+        return self.family not in (Family.GOUGH, Family.PLANAR_3RPR)
 
     @property
     def length(self) -> float:
         """Characteristic length, m: root mean square distance of the platform's anchors."""
-        size = float(np.sqrt((self.platform**2).sum(axis=1).mean()))
-        return size if size > 0.0 else 1.0
+        return float(np.sqrt((self.platform**2).sum(axis=1).mean())) or 1.0
 
     @property
     def size(self) -> float:
-        """Largest distance between anchors of the base, or length of a leg's part, m."""
+        """Diameter of the base, or the longest part of a leg or of the platform, m."""
         spread = np.linalg.norm(self.base - self.base.mean(axis=0), axis=1).max()
         return float(max(2.0 * spread, self.length, self.crank.max(), self.rod.max()))
 
     def coordinates(self, T: ArrayLike) -> Array:
-        """Coordinates of poses: position, and angle or rotation vector.
-
-        Parameters
-        ----------
-        T : array_like, shape (..., 4, 4)
-            Poses of the platform.
-
-        Returns
-        -------
-        ndarray, shape (..., m)
-            (x, y, phi) planar, (x, y) five-bar, (x, y, z) Delta; else position and rotation
-            vector, m and rad.
-        """
+        """Coordinates (..., m) of poses: position and rotation vector, (x, y, phi), (x, y, z)."""
         T = self.checked(T)
-        turn = rotation_vector(T) if 3 in self.columns else np.zeros_like(T[..., :3, 3])
-        turn[..., 2] = turn[..., 2] if 3 in self.columns else np.arctan2(T[..., 1, 0], T[..., 0, 0])
+        turn = np.zeros_like(T[..., :3, 3])
+        if 3 in self.columns:
+            turn = rotation_vector(T)
+        elif 5 in self.columns:
+            turn[..., 2] = np.arctan2(T[..., 1, 0], T[..., 0, 0])
         return np.concatenate((T[..., :3, 3], turn), axis=-1)[..., list(self.columns)]
 
     def pose(self, coordinates: ArrayLike) -> Array:
-        """Poses of coordinates, the inverse of `coordinates`.
-
-        Parameters
-        ----------
-        coordinates : array_like, shape (..., m)
-            As from `coordinates`.
-
-        Returns
-        -------
-        ndarray, shape (..., 4, 4)
-            Poses of the platform; the other components are those of `home`.
-        """
-        X = as_core(coordinates, (len(self.columns),), "coordinates")
+        """Poses (..., 4, 4) of coordinates (..., m), the inverse of `coordinates`."""
+        X = as_core(coordinates, (self.m,), "coordinates")
         full = np.zeros((*X.shape[:-1], 6))
         full[..., :3] = self.home[:3, 3]
         full[..., list(self.columns)] = X
         return pose_of(full)
 
     def checked(self, T: Any, name: str = "T") -> Array:
-        """Poses that the platform can have.
-
-        Parameters
-        ----------
-        T : array_like, shape (..., 4, 4)
-            Poses.
-        name : str
-            Used in error messages.
-
-        Returns
-        -------
-        ndarray, shape (..., 4, 4)
-            Checked poses.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError, NotARotationError
-            No poses; out of the plane, or rotated, where the platform cannot be.
-        """
+        """Poses (..., 4, 4), checked that the platform can have them."""
         T = se3.as_pose(T, name)
-        if len(self.columns) == 6 or not T.size:
+        if self.family is Family.GOUGH or not T.size:
             return T
-        off = 0.0
-        if 2 not in self.columns:
-            out = np.abs(T[..., 2, 3] - self.home[2, 3]).max() / self.size
-            off = max(out, np.abs(T[..., 2, 2] - 1.0).max(), np.abs(T[..., :2, 2]).max())
-        elif 5 not in self.columns:
-            off = float(np.abs(T[..., :3, :3] - np.eye(3)).max())
+        if 2 in self.columns:
+            off, motion = np.abs(T[..., :3, :3] - np.eye(3)).max(), "translates only"
+        else:
+            height = np.abs(T[..., 2, 3] - self.home[2, 3]).max() / self.size
+            off, motion = max(height, np.abs(T[..., 2, :3] - [0, 0, 1]).max()), "stays in its plane"
         if off > _OFF:
-            motion = "translates only" if 2 in self.columns else "stays in its plane z = 0"
             raise InvalidValueError(
                 f"{name}: the platform of a {self.family.value[0]} {motion}, got a pose that is "
                 f"{off:.2g} off; build poses with robot.pose(coordinates)."
@@ -212,74 +169,63 @@ class ParallelRobot(Value):
         return T
 
     def with_masses(
-        self,
-        platform: tuple[Any, Any, Any],
-        legs: tuple[Any, Any] | None = None,
-        gravity: ArrayLike | None = None,
+        self, platform: Any, legs: Any = None, gravity: ArrayLike | None = None
     ) -> ParallelRobot:
         """The robot with masses of its platform and legs, for the dynamic models.
 
         A leg has two slender parts that do not turn about their own axes. Of variable length: the
         first part starts at the base, the second at the platform. With a crank: the first part is
-        the crank, the second the rod, whose positions count from the knee. A Delta's rods are
-        pairs: give the sum of both.
+        the crank, the second the rod (of a Delta the pair of rods) from the knee.
 
         Parameters
         ----------
         platform : tuple (mass, com, inertia)
-            Mass, kg; centre of mass in the platform's frame, shape (3,), m; inertia about it in
-            the same axes, shape (3, 3), kg m^2.
+            kg; centre of mass in the platform's frame, shape (3,), m; inertia about it in the same
+            axes, shape (3, 3), kg m^2.
         legs : tuple of two, each (mass, position, inertia), optional
-            Mass, kg; distance of the centre of mass from the part's own start along it, m;
-            inertia about the centre of mass across the part (of a crank: about its axis), kg m^2;
-            numbers or one for each leg. Default massless.
+            kg; distance of the centre of mass from the part's start, m; inertia about it across the
+            part, kg m^2; numbers or one for each leg. Default massless.
         gravity : array_like, shape (3,), optional
-            Acceleration of gravity in the world, m/s^2; default unchanged.
-
-        Returns
-        -------
-        ParallelRobot
-            A new robot.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Wrong shapes, negative masses, an inertia that is not symmetric and positive.
+            Acceleration in the world, m/s^2; default unchanged.
         """
-        parts = cast("Any", platform)
-        if not isinstance(parts, tuple | list) or len(parts) != 3:
-            raise ShapeError("platform: expected (mass, com, inertia).")
-        mass, com = float(as_exact(parts[0], (), "mass")), as_exact(parts[1], (3,), "com")
-        inertia = as_exact(parts[2], (3, 3), "inertia")
-        size = np.abs(inertia).max(initial=0.0)
-        if np.abs(inertia - inertia.T).max() > 1e-9 * size or (
-            np.linalg.eigvalsh(inertia).min() < -1e-12 * size
-        ):
+        parts = ((0.0, 0.0, 0.0),) * 2 if legs is None else tuple(legs)
+        if len(tuple(platform)) != 3 or len(parts) != 2 or any(len(part) != 3 for part in parts):
+            raise ShapeError(
+                "platform, legs: expected (mass, com, inertia), and for legs two parts, each (mass, "
+                "position, inertia)."
+            )
+        mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
+        inertia = as_exact(platform[2], (3, 3), "inertia")
+        size = np.abs(inertia).max()
+        odd = np.abs(inertia - inertia.T).max() > 1e-9 * size
+        if odd or np.linalg.eigvalsh(inertia).min() < -1e-12 * size:
             raise InvalidValueError(
                 "inertia: expected a symmetric matrix about the centre of mass with positive "
                 f"principal moments, got {inertia.tolist()}."
             )
-        both = [((0.0, 0.0, 0.0)), ((0.0, 0.0, 0.0))] if legs is None else list(legs)
-        if len(both) != 2 or any(len(part) != 3 for part in both):
-            raise ShapeError("legs: expected two parts, each (mass, position, inertia).")
-        rows = []
-        for name, part in zip(("first", "second"), both, strict=True):
-            values = [as_floats(value, f"legs, {name} part") for value in part]
-            if any(value.shape not in ((), (self.m,)) for value in values):
-                raise ShapeError(f"legs: expected numbers or shape ({self.m},) in the {name} part.")
-            rows.append(np.stack([np.broadcast_to(v, (self.m,)) for v in values], axis=1))
-        if mass < 0.0 or any((part[:, [0, 2]] < 0.0).any() for part in rows):
+        both = np.array([[_for_legs(value, self.m) for value in part] for part in parts])
+        if mass < 0.0 or (both[:, [0, 2]] < 0.0).any():
             raise InvalidValueError("platform, legs: masses and inertias must not be negative.")
+        first, second = (read_only(part.T) for part in both)
         g = self.gravity if gravity is None else as_exact(gravity, (3,), "gravity")
-        return replace(self, masses=Masses(mass, com, inertia, *rows), gravity=g)
+        masses = Masses(mass, read_only(com), read_only(inertia), first, second)
+        return replace(self, masses=masses, gravity=g)
 
     def __repr__(self) -> str:
-        name = self.family.value[0]
         q = "angle" if self.has_cranks else "length"
         limited = np.isfinite(self.lower).any() or np.isfinite(self.upper).any()
-        words = "with" if self.masses is not None else "without"
         limits = f"{q} {self.lower.min():.4g} to {self.upper.max():.4g}" if limited else "no limits"
+        words = "with" if self.masses is not None else "without"
+        name = self.family.value[0]
         return f"<{name}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
+
+
+def _for_legs(value: ArrayLike, m: int) -> Array:
+    """A number or one for each leg. Shapes: -> (m,)."""
+    given = as_floats(value, "legs")
+    if given.shape not in ((), (m,)):
+        raise ShapeError(f"legs: expected numbers or shape ({m},), got {given.shape}.")
+    return np.broadcast_to(given, (m,))
 
 
 def pose_of(twist: Array) -> Array:
@@ -287,9 +233,7 @@ def pose_of(twist: Array) -> Array:
     T = np.zeros((*twist.shape[:-1], 4, 4))
     w = twist[..., 3:]
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
-    S = np.zeros((*w.shape, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        S[..., k, j], S[..., j, k] = w[..., i], -w[..., i]
+    S = np.cross(np.eye(3), w[..., None, :])
     half = np.sinc(angle / (2.0 * np.pi))
     T[..., :3, :3] = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
     T[..., :3, 3] = twist[..., :3]

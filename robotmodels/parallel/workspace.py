@@ -14,7 +14,7 @@ from .._arrays import Array, as_bounded, as_core, as_floats, as_number, read_onl
 from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
 from ..performance.workspace import Workspace, WorkspaceStatus
-from .families import checked_limit
+from .families import checked_limits
 from .legs import LegStates, check_robot, leg_states
 from .robot import ParallelRobot
 
@@ -267,13 +267,7 @@ def _limits(robot: ParallelRobot, limits: Any) -> tuple[Array, Array]:
         raise InvalidValueError(
             f"limits: expected True, False or (lower, upper), got {limits!r:.60}."
         )
-    low, high = (
-        checked_limit(x, robot.m, n, not robot.has_cranks)
-        for x, n in zip(limits, ("lower", "upper"), strict=True)
-    )
-    if not (low <= high).all():
-        raise InvalidValueError("limits: expected lower below upper.")
-    return low, high
+    return checked_limits(*limits, robot.m, not robot.has_cranks)
 
 
 def _margins(
