@@ -429,6 +429,85 @@ def test_a_five_bar_as_loops_is_the_five_bar():
         pr.from_loops(five, 1)
 
 
+def gough_as_loops(robot):
+    """URDF of six legs, each two hinges and a slide, and of the platform; closed by points."""
+    masses = robot.masses
+    links, joints = ["<link name='world'/>"], []
+
+    def link(name, mass=0.0, com=(0, 0, 0), inertia=None):
+        I = np.zeros((3, 3)) if inertia is None else inertia
+        values = " ".join(
+            f"{a}='{float(I[i, j])!r}'"
+            for a, i, j in zip(
+                ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), *np.triu_indices(3), strict=True
+            )
+        )
+        place = " ".join(repr(float(x)) for x in com)
+        text = (
+            f"<inertial><origin xyz='{place}'/><mass value='{mass}'/><inertia {values}/></inertial>"
+        )
+        links.append(f"<link name='{name}'>{text if mass else ''}</link>")
+
+    def joint(kind, parent, child, axis="0 0 1", xyz=(0, 0, 0)):
+        place = " ".join(repr(float(x)) for x in xyz)
+        limit = "<limit lower='-9' upper='9' velocity='9' effort='9'/>" if kind != "fixed" else ""
+        joints.append(
+            f"<joint name='to_{child}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>"
+            f"<origin xyz='{place}'/><axis xyz='{axis}'/>{limit}</joint>"
+        )
+
+    last = "world"
+    for name, kind, axis in (
+        ("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1"),
+        ("rx", "revolute", "1 0 0"), ("ry", "revolute", "0 1 0"), ("platform", "revolute", "0 0 1"),
+    ):  # fmt: skip
+        link(name, *((masses.mass, masses.com, masses.inertia) if name == "platform" else ()))
+        joint(kind, last, name, axis)
+        last = name
+    for i in range(6):
+        (m1, s1, i1), (m2, s2, i2) = masses.first[i], masses.second[i]
+        link(f"u{i}")
+        link(f"cylinder{i}", m1, (0, 0, s1), np.diag([i1, i1, 1e-15]))
+        link(f"piston{i}", m2, (0, 0, -s2), np.diag([i2, i2, 1e-15]))
+        link(f"anchor{i}")
+        joint("revolute", "world", f"u{i}", "1 0 0", robot.base[i])
+        joint("revolute", f"u{i}", f"cylinder{i}", "0 1 0")
+        joint("prismatic", f"cylinder{i}", f"piston{i}")
+        joint("fixed", "platform", f"anchor{i}", xyz=robot.platform[i])
+    text = f"<robot name='hexapod'>{''.join(links)}{''.join(joints)}</robot>"
+    tree = RobotModel.from_urdf(text, gravity=robot.gravity)
+    assert tree.n == 24
+    closures = [Closure(f"leg{i}", (f"piston{i}", f"anchor{i}"), "point") for i in range(6)]
+    names = list(tree.table.joint_names)
+    slides = [names.index(f"to_piston{i}") for i in range(6)]
+    u = leg_directions(robot, robot.home[None])[0]
+    start = dict(zip(("to_x", "to_y", "to_z"), robot.home[:3, 3], strict=True))
+    for i, q in enumerate(pr.igm(robot, robot.home).q[0]):
+        start |= {f"to_u{i}": np.arctan2(-u[i, 1], u[i, 2]), f"to_cylinder{i}": np.arcsin(u[i, 0])}
+        start[f"to_piston{i}"] = q
+    q_home = [start.get(name, 0.0) for name in names]
+    return pr.from_loops(LoopedRobot(tree, closures, slides), "platform", q_home)
+
+
+def test_a_gough_platform_as_loops_is_the_gough_platform():
+    robot = with_masses(ROBOTS["SSM"])
+    looped = gough_as_loops(robot)
+    T, V, A = poses_near_home(robot, 3), twists(robot, 3), twists(robot, 3, 4)
+    W = np.random.default_rng(6).normal(size=(3, 6))
+    np.testing.assert_allclose(pr.igm(looped, T).q, pr.igm(robot, T).q, atol=1e-11)
+    J = pr.inverse_jacobian(robot, T)
+    np.testing.assert_allclose(pr.inverse_jacobian(looped, T), J, atol=1e-12)
+    rate = pr.inverse_jacobian_rate(robot, T, V)
+    np.testing.assert_allclose(pr.inverse_jacobian_rate(looped, T, V), rate, atol=1e-9)
+    tau = pr.idm(robot, T, V, A, W)
+    np.testing.assert_allclose(pr.idm(looped, T, V, A, W), tau, atol=1e-9)
+    np.testing.assert_allclose(pr.ddm(looped, T, V, tau, W), A, atol=1e-9)
+    np.testing.assert_allclose(pr.condition(looped, T, 0.6), pr.condition(robot, T, 0.6), rtol=1e-9)
+    forces = pr.leg_forces(robot, T, W).forces
+    np.testing.assert_allclose(pr.leg_forces(looped, T, W).forces, forces, atol=1e-9)
+    assert pr.classify_singularity(looped, T[0]).kind == Kind.REGULAR
+
+
 # --- calibration ---------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array
+from .._arrays import Array, as_vector
 from .._outcomes import Outcome
 from .direct import checked_actuators, rods
 from .legs import check_robot, leg_states
@@ -124,7 +124,8 @@ def assembly_modes(robot: ParallelRobot | LoopedPlatform, q: ArrayLike) -> Assem
     """
     check_robot(robot)
     if isinstance(robot, LoopedPlatform):
-        return _packed(robot.assemblies(q), robot.batch_of(q))
+        q = as_vector(q, robot.m, "q")
+        return _packed(robot.assemblies(q.reshape(-1, robot.m)), q.shape[:-1])
     q = checked_actuators(robot, q)
     batch, rows = q.shape[:-1], np.ascontiguousarray(q.reshape(-1, robot.m))
     if robot.family is Family.GOUGH:
