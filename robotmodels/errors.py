@@ -9,6 +9,7 @@ __all__ = [
     "FrameNotFoundError",
     "InertiaError",
     "InvalidValueError",
+    "LoopError",
     "MeshNotFoundError",
     "MissingExtraError",
     "NotARotationError",
@@ -50,6 +51,10 @@ class InertiaError(RobotModelsError, ValueError):
 
 class SingularMassMatrixError(RobotModelsError, ValueError):
     """The direct dynamic model has no answer: the mass matrix cannot be inverted."""
+
+
+class LoopError(RobotModelsError, ValueError):
+    """Closures or actuated joints of a looped robot that do not determine its motion."""
 
 
 class UrdfError(RobotModelsError, ValueError):

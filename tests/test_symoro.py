@@ -367,7 +367,7 @@ def test_loops_are_refused_by_name(read):
     robot |= {"theta": [*(f"th{j}" for j in range(1, 10)), 0]}
     with pytest.raises(ParFileError, match=r"'SR400' has closed loops.*joint 9 \(second: frame 10"):
         read(open_symoro(robot, counts=(8, 9, 10), kind=2))
-    with pytest.raises(ParFileError, match=r"first 8 entries of the.*NJ = NF = 8 and Type = 1"):
+    with pytest.raises(ParFileError, match=r"Read it with robotmodels\.loops\.read_par"):
         read(open_symoro(robot, counts=(8, 9, 10), kind=2))
     tree = {k: v[:8] if isinstance(v, list) else v for k, v in robot.items()}
     assert read(open_symoro(tree, kind=1)).n == 8

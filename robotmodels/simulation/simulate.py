@@ -139,14 +139,14 @@ def simulate(
     n = model.n
     q = as_exact(q0, (n,), "q0").copy()
     v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
-    start, end, times = _times(t)
+    start, end, times = times_of(t)
     if isinstance(control, StatefulControl):
         law, knots = stateful(control, n), np.empty(0)
     else:
-        torque, knots = _law(control, n, times, "control")
+        torque, knots = law_of(control, n, times, "control")
         law = Feedback(torque and (lambda t, q, v, x: torque(t, q, v)))
-    tool, tool_knots = _law(wrench, 6, times, "wrench")
-    push, push_knots = _law(disturbance, n, times, "disturbance")
+    tool, tool_knots = law_of(wrench, 6, times, "wrench")
+    push, push_knots = law_of(disturbance, n, times, "disturbance")
     if friction is not None:
         check_friction(friction, n)
     width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
@@ -195,7 +195,7 @@ def _log_progress(done: float) -> None:
     _LOG.info("simulated %.0f %%", 100.0 * done)
 
 
-def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
+def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
     """Function (t, q, v) -> (size,) of a function, constant values or rows; times of its kinks."""
     none = np.empty(0)
     if law is None:
@@ -214,7 +214,7 @@ def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, A
     return lambda time, q, v: np.array([np.interp(time, t, x) for x in values.T]), t[1:-1]
 
 
-def _times(t: ArrayLike) -> tuple[float, float, Array | None]:
+def times_of(t: ArrayLike) -> tuple[float, float, Array | None]:
     """Start, end, and the times of the samples if the caller gave them. Shapes: -> times (N,)."""
     times = as_floats(t, "t")
     if times.ndim == 0 and times >= 0.0:

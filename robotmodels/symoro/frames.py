@@ -15,8 +15,8 @@ from .numbers import Numbers
 from .statements import ParFile
 
 
-def counts(file: ParFile) -> tuple[int, int]:
-    """Number of links and of frames, of a file that is a tree on a fixed base."""
+def counts(file: ParFile, loops: bool = False) -> tuple[int, int, int]:
+    """Number of links, of joints and of frames, on a fixed base; a tree unless `loops`."""
     links, joints, kind = file.integer("NL", 0), file.integer("NJ", 0), file.integer("Type", 0)
     f = file.integer("NF", max(links, 2 * joints - links))
     for keyword, what in (("is_floating", "floating"), ("is_mobile", "mobile")):
@@ -26,32 +26,32 @@ def counts(file: ParFile) -> tuple[int, int]:
                 "0 out of the dynamic lists and read the arm on a fixed base.",
                 file.line(keyword),
             )
-    if joints > links:
+    if joints > links and not loops:
         cut, second = range(links + 1, joints + 1), range(joints + 1, f + 1)
         raise file.error(
-            f"{file.name!r} has closed loops, which are not supported yet: with NL = {links} links "
-            f"and NJ = {joints} joints, its loops are cut at {_numbered('joint', cut)}"
+            f"{file.name!r} has closed loops: with NL = {links} links and NJ = {joints} joints, "
+            f"they are cut at {_numbered('joint', cut)}"
             + (f" (second: {_numbered('frame', second)})" if second else "")
-            + f". Give the spanning tree: keep the first {links} entries of the geometric, dynamic "
-            f"and joint lists and set NJ = NF = {links} and Type = 1.",
+            + ". Read it with robotmodels.loops.read_par.",
             file.line("NJ"),
         )
-    if kind == 2:
+    if kind == 2 and joints == links:
         raise file.error(
-            f"Type = 2 says that {file.name!r} has closed loops, which are not supported yet, but "
-            f"NL = NJ = {links} cuts no joint; set Type = 1 if the file is the spanning tree.",
+            f"Type = 2 says that {file.name!r} has closed loops, but NL = NJ = {links} cuts no "
+            "joint; set Type = 1 if the file is the spanning tree.",
             file.line("Type"),
         )
-    if links < 1 or joints < links or f < links:
+    if links < 1 or joints < links or f < 2 * joints - links:
         raise file.error(
             f"NL = {links} links, NJ = {joints} joints and NF = {f} frames do not fit: a tree has "
-            "as many of each, at least one, and fixed frames (sigma 2) count as joints too.",
+            "as many of each, at least one, fixed frames (sigma 2) count as joints too, and each "
+            "joint more than links cuts a loop and needs a second frame.",
             file.line("NL"),
         )
-    return links, f
+    return links, joints, f
 
 
-def geometry(file: ParFile, numbers: Numbers, links: int, f: int) -> dict[str, Any]:
+def geometry(file: ParFile, numbers: Numbers, joints: int, f: int) -> dict[str, Any]:
     """Columns of the table, from its checked lists."""
     rows = {k: file.entries(k, f, f"NF = {f} frames") for k in (*INTEGERS, *GEOMETRY)}
     columns: dict[str, Any] = {
@@ -67,10 +67,10 @@ def geometry(file: ParFile, numbers: Numbers, links: int, f: int) -> dict[str, A
         for entry, value in zip(rows[key], columns.get(_column(key), ()), strict=True):
             if value not in allowed:
                 raise ParFileError(f"{entry.place}: expected {expected}, got {value}.")
-    if any(kind != FIXED for kind in columns["sigma"][links:]):
+    if any(kind != FIXED for kind in columns["sigma"][joints:]):
         raise file.error(
-            f"NF = {f} frames, but NL = {links} links: without loops only fixed frames (sigma 2) "
-            "may come after the links.",
+            f"NF = {f} frames, but NJ = {joints} joints: only fixed frames (sigma 2) may come "
+            "after the joints.",
             file.line("NF") or file.line("sigma"),
         )
     own = {0: "theta", PRISMATIC: "r"}

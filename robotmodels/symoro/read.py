@@ -10,7 +10,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from ..errors import RobotModelsWarning
-from ..geometry import DHTable
+from ..geometry import FIXED, DHTable
 from ..model import RobotModel
 from .dynamics import check_rigid_fixed, dynamics, gravity_of, left_out, listed_parameters
 from .frames import base_pose, counts, geometry
@@ -53,7 +53,7 @@ def read_par(
     ParFileError
         The file is missing or not a ``.par`` file; lists of the wrong length, entries that are
         not expressions, symbols without a number, a variable with another sign or factor than
-        +1; loops, floating or mobile bases, flexible joints.
+        +1; loops (see `robotmodels.loops.read_par`), floating or mobile bases, flexible joints.
     TableError
         Antecedents that do not come before their successors.
     InvalidValueError
@@ -94,10 +94,23 @@ def read_par(
     >>> model.name, model.table.d, model.table.theta
     ('elbow', array([0. , 0.4]), array([0. , 1.57079633]))
     """
+    return read_tree(path, values, gravity)[0]
+
+
+def read_tree(
+    path: str | Path,
+    values: Mapping[str, float] | None,
+    gravity: ArrayLike | None,
+    loops: bool = False,
+) -> tuple[RobotModel, list[tuple[int, int]]]:
+    """Spanning tree of a file, and the two frames of each cut joint; see `read_par`."""
     file = ParFile(Path(path))
     numbers = Numbers(file, checked_values(values, file))
-    links, f = counts(file)
-    columns = geometry(file, numbers, links, f)
+    links, joints, f = counts(file, loops)
+    columns = geometry(file, numbers, joints, f)
+    cuts = [(j + 1, joints + j - links + 1) for j in range(links, joints)]
+    for first, _ in cuts:  # a closure replaces a cut revolute joint
+        columns["sigma"][first - 1] = columns["sigma"][first - 1] or FIXED
     inertia, drive, silent = dynamics(file, numbers, links, columns["sigma"])
     base = base_pose(file, numbers)
     acceleration, gravity_notes = gravity_of(file, numbers, base, gravity)
@@ -112,10 +125,10 @@ def read_par(
             f"{{{silent[0]!r}: ...}} for the dynamic models)"
         )
     if alarms:
-        warnings.warn(f"{file.label}: {'; '.join(alarms)}.", RobotModelsWarning, stacklevel=2)
+        warnings.warn(f"{file.label}: {'; '.join(alarms)}.", RobotModelsWarning, stacklevel=3)
     notes = [f"{alarm[0].upper()}{alarm[1:]}." for alarm in alarms]
     notes += gravity_notes + left_out(file, numbers, columns["sigma"])
     model = RobotModel.from_table(
         table, inertia=inertia, drive=drive, base=base, gravity=acceleration, name=file.name
     )
-    return replace(model, notes=tuple(notes))
+    return replace(model, notes=tuple(notes)), cuts

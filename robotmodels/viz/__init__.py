@@ -29,6 +29,11 @@ from .performance import (
     plot_feasible_path,
     plot_workspace,
     show_workspace,
+from .parallel import (
+    jog_parallel,
+    plot_assembly_modes,
+    plot_platform_workspace,
+    show_parallel,
 )
 from .processing import plot_processing
 from .report import html_report, identification_html
@@ -55,6 +60,8 @@ __all__ = [
     "identification_html",
     "jog",
     "plot_aspects",
+    "jog_parallel",
+    "plot_assembly_modes",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
     "plot_calibration_normality",
@@ -75,6 +82,7 @@ __all__ = [
     "plot_joint_path",
     "plot_phase_plane",
     "plot_plan",
+    "plot_platform_workspace",
     "plot_pose_path",
     "plot_processing",
     "plot_profiles",
@@ -87,4 +95,5 @@ __all__ = [
     "show",
     "show_servo",
     "show_workspace",
+    "show_parallel",
 ]

@@ -21,7 +21,8 @@ _COUPLED = 1e-6  # rad or m that a joint may be off its coupling
 class SliderPanel:
     """Sliders of a robot: n joints move as ``q = C x + q_0``, x are the r independent ones.
 
-    Shapes: independent, start (r,); matrix (n, r); offset (n,).
+    Shapes: independent, start (r,); matrix (n, r); offset (n,). Struts join points of the base and
+    of a moving frame.
     """
 
     independent: NDArray[np.int64]
@@ -31,6 +32,7 @@ class SliderPanel:
     joints: tuple[dict[str, Any], ...]
     postures: tuple[tuple[str, Array], ...]
     targets: tuple[tuple[str, str, Array], ...]
+    struts: tuple[dict[str, Any], ...] = ()
 
     @property
     def q(self) -> Array:
@@ -49,6 +51,7 @@ class SliderPanel:
                 {"name": name, "path": path, "pose": pose.T.ravel().tolist()}
                 for name, path, pose in self.targets
             ],
+            "struts": list(self.struts),
         }
 
 

@@ -1,0 +1,167 @@
+"""Closing of the cut loops: the passive joints at given positions of the actuated ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Frozen, Value, as_vector, batch_rows
+from .._outcomes import Outcome
+from ..geometry import REVOLUTE
+from .robot import LoopedRobot, check_looped
+
+_STARTS = 12  # random starts for rows that do not close from the guess
+
+
+class ClosingStatus(Outcome):
+    """Outcome of closing a posture; fits int8."""
+
+    CLOSED = 0, "The loops are closed."
+    CANNOT_CLOSE = 1, "The loops cannot be closed at these positions of the actuated joints."
+    NOT_CONVERGED = 2, "The iterations were used up before the loops were closed."
+    SINGULAR_THERE = (
+        3, "The loops are closed, but the actuated joints do not determine the other joints there.",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ClosedPostures(Frozen, Value):
+    """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
+
+    Parameters
+    ----------
+    q : ndarray, shape (..., n)
+        Joint variables of all joints, rad or m.
+    residual : ndarray, shape (...)
+        Largest distance (m) or angle (rad) between the frames of a closure.
+    status : ndarray of int8, shape (...)
+        Codes of `ClosingStatus`; loops are open for ``CANNOT_CLOSE`` and ``NOT_CONVERGED``.
+
+    Examples
+    --------
+    >>> ClosedPostures(np.zeros(3), np.zeros(()), np.zeros((), np.int8)).reason()
+    'The loops are closed.'
+    """
+
+    q: Array
+    residual: Array
+    status: NDArray[np.int8]
+
+    def reason(self, index: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status of one posture, with the residual where its loops are open."""
+        status = ClosingStatus(int(self.status[index]))
+        left = f" Least residual: {self.residual[index]:.3g} m or rad."
+        return status.sentence + (left if status in _OPEN else "")
+
+    def __repr__(self) -> str:
+        counts = [(int(np.sum(self.status == s)), s.name) for s in ClosingStatus]
+        listed = ", ".join(f"{count} {name}" for count, name in counts if count)
+        return f"<ClosedPostures, q {self.q.shape}: {listed or 'empty'}>"
+
+
+_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
+
+
+def close(
+    robot: LoopedRobot, q_actuated: ArrayLike, q_guess: ArrayLike | None = None
+) -> ClosedPostures:
+    """Close the loops: posture of all joints at given positions of the actuated ones.
+
+    From a guess of all joints, the actuated joints move straight to their positions while damped
+    Newton iterations keep the loops closed, which keeps the assembly of the guess. Where that
+    fails, and with a guess of the passive joints alone, the iterations start at the positions
+    themselves, and last at random passive joints. Each row is independent of the others; angles
+    are within half a turn of the guess.
+
+    Parameters
+    ----------
+    robot : LoopedRobot
+        The robot, n joints, n_a of them actuated.
+    q_actuated : array_like, shape (..., n_a)
+        Positions of the actuated joints, rad or m.
+    q_guess : array_like, shape (..., n) or (..., n - n_a), optional
+        Posture of all joints in the wanted assembly, or positions of the passive joints; default
+        passive joints at zero.
+
+    Returns
+    -------
+    ClosedPostures
+        ``.q (..., n)``, ``.residual (...)``, ``.status (...)``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity.
+
+    References
+    ----------
+    Seed book section 2.4 (iterative method).
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    >>> close(robot, [1.0], [0.5, 0.5, -0.5]).q.round(12)
+    array([ 1.,  1., -1.])
+    """
+    check_looped(robot)
+    n, passive = robot.n, robot.passive
+    given = as_vector(q_actuated, len(robot.actuated), "q_actuated")
+    guess = np.zeros(len(passive)) if q_guess is None else np.asarray(q_guess)
+    follow = guess.shape[-1:] != passive.shape
+    guess = as_vector(guess, n if follow else len(passive), "q_guess")
+    batch, (target, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))
+    q = start.copy()
+    if not follow:
+        q = np.empty((len(start), n))
+        q[:, passive], q[:, robot.actuated] = start, target
+    guess = q.copy()
+    residual, status = np.empty(len(q)), np.empty(len(q))
+    _close(robot, target, int(follow), q, residual, status)
+    _start_again(robot, target, q, residual, status)
+    turns = robot.tree.table.sigma[robot.tree.table.joint_rows] == REVOLUTE
+    turns[robot.actuated] = False
+    q -= turns * 2.0 * np.pi * np.round((q - guess) / (2.0 * np.pi))
+    return ClosedPostures(
+        q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)
+    )
+
+
+def followed(robot: LoopedRobot, target: Array, start: Array) -> ClosedPostures:
+    """Postures on the way of the actuated joints from a closed one (n,); no other starts."""
+    q = np.tile(start, (len(target), 1))
+    residual, status = np.empty(len(q)), np.empty(len(q))
+    _close(robot, target, 2, q, residual, status)
+    return ClosedPostures(q, residual, status.astype(np.int8))
+
+
+def _close(
+    robot: LoopedRobot, target: Array, follow: int, q: Array, residual: Array, status: Array
+) -> None:
+    """Close the postures in the rows of q in place, see `kernels.closed_postures`."""
+    from .kernels import closed_postures
+
+    closed_postures(target, robot.cuts, robot.actuated, robot.passive, follow, q, residual, status)
+
+
+def _start_again(
+    robot: LoopedRobot, target: Array, q: Array, residual: Array, status: Array
+) -> None:
+    """Close rows that are still open from random starts, and keep the least residual."""
+    rng = np.random.default_rng(0)
+    passive = robot.passive
+    for _ in range(_STARTS):
+        rows = np.flatnonzero(np.isin(status, _OPEN))
+        if not rows.size:
+            return
+        again, least, code = q[rows], residual[rows], status[rows]
+        again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
+        _close(robot, target[rows], 0, again, least, code)
+        better = least < residual[rows]
+        kept = rows[better]
+        q[kept], residual[kept], status[kept] = again[better], least[better], code[better]

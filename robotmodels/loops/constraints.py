@@ -1,0 +1,266 @@
+"""Constraints of cut loops on velocities: Jacobians, mobility, and the map from actuated joints.
+
+Parameters
+----------
+robot : LoopedRobot
+    The robot: n joints, n_a of them actuated, c constraint rows.
+q, v : array_like, shape (..., n)
+    Joint variables of all joints (rad or m), which close the loops, and their velocities.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Arguments of the wrong length, or with NaN or infinity.
+LoopError
+    The actuated joints do not determine the motion of the others (velocity maps).
+
+References
+----------
+Seed book section 2.3; W. Khalil and E. Dombre, *Modeling, Identification and Control of
+Robots*, section 7.7, for the reduction of tree models by ``v = G v_a``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Frozen, Value, as_vector, batch_rows, batch_shape
+from ..errors import LoopError
+from ..kinematics import dgm, jacobian, jacobian_rate
+from .robot import ROWS, LoopedRobot, check_looped
+
+_INDEPENDENT = 1e-8  # least part of an independent row beyond those before it, of the longest row
+_DETERMINED = 1e-7  # least singular value of the passive columns, with lengths in robot sizes
+_CONSISTENT = 1e-5  # largest velocity between the frames of a closure, in the same units
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Mobility(Frozen, Value):
+    """Number of independent motions of a looped robot; serves as a number or an array.
+
+    Parameters
+    ----------
+    count : ndarray of int, shape (...)
+        Degrees of freedom: joints less independent constraint rows.
+    is_redundant : ndarray of bool, shape (..., c)
+        Constraint rows that follow from others, earlier ones first kept.
+    rows : tuple of str
+        Names of the c rows.
+
+    Examples
+    --------
+    >>> Mobility(np.array(1), np.array([False, True]), ("cut.x", "cut.z"))
+    <Mobility 1, redundant rows: cut.z>
+    """
+
+    count: NDArray[np.int64]
+    is_redundant: NDArray[np.bool_]
+    rows: tuple[str, ...]
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """Names of the rows that are redundant in every posture."""
+        everywhere = self.is_redundant.reshape(-1, len(self.rows)).all(axis=0)
+        return tuple(self.rows[k] for k in np.flatnonzero(everywhere))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self.count, dtype=dtype)
+
+    def __int__(self) -> int:
+        return int(self.count)
+
+    def __index__(self) -> int:
+        return int(self.count)
+
+    def __eq__(self, other: object) -> Any:
+        return Value.__eq__(self, other) if isinstance(other, Mobility) else self.count == other
+
+    def __hash__(self) -> int:
+        return Value.__hash__(self)
+
+    def __repr__(self) -> str:
+        return f"<Mobility {self.count}, redundant rows: {', '.join(self.redundant) or 'none'}>"
+
+
+def closure_jacobian(robot: LoopedRobot, q: ArrayLike) -> Array:
+    """Jacobian of the closures: rows that vanish on every motion, ``J v = 0``.
+
+    Rows are the velocity and angular velocity of the second frame of each closure relative to the
+    first, in the axes of the first; see ``robot.rows`` for their names.
+
+    Returns
+    -------
+    ndarray, shape (..., c, n)
+        Metres or 1 for each rad/s or m/s.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    >>> (closure_jacobian(robot, [1.0, 1.0, -1.0]) @ [1.0, 1.0, -1.0]).round(12) + 0.0
+    array([0., 0., 0., 0., 0.])
+    """
+    return closure_rows(robot, *checked(robot, q=q))[1]
+
+
+def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
+    """Mobility: number of independent motions of a posture, with the redundant rows named.
+
+    Returns
+    -------
+    Mobility
+        Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    >>> mobility(robot, [1.0, 1.0, -1.0])
+    <Mobility 1, redundant rows: cut.z, cut.rx, cut.ry>
+    """
+    (q,) = checked(robot, q=q)
+    J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
+    largest = np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
+    redundant = np.zeros(J.shape[:-1], dtype=np.bool_)
+    for k in range(J.shape[-2]):  # what a row has beyond those before it, which become orthonormal
+        row, before = J[..., k, :], J[..., :k, :]
+        for _ in range(2):
+            row = row - np.einsum(
+                "...k,...kj->...j", np.einsum("...kj,...j->...k", before, row), before
+            )
+        length = np.linalg.norm(row, axis=-1)
+        redundant[..., k] = ~(length > _INDEPENDENT * largest)
+        J[..., k, :] = np.where(
+            redundant[..., k, None], 0.0, row / np.where(length > 0.0, length, 1.0)[..., None]
+        )
+    return Mobility(np.asarray(robot.n - (~redundant).sum(axis=-1)), redundant, robot.rows)
+
+
+def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
+    """Map G from velocities of the actuated joints to those of all joints, ``v = G v_a``.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n_a)
+        The rows of the actuated joints are the identity.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    >>> velocity_map(robot, [1.0, 1.0, -1.0]).round(12).T
+    array([[ 1.,  1., -1.]])
+    """
+    return maps(robot, *checked(robot, q=q))[0]
+
+
+def velocity_map_rate(robot: LoopedRobot, q: ArrayLike, v: ArrayLike) -> Array:
+    """Time derivative of the velocity map, so that ``a = G a_a + dG/dt v_a``.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n_a)
+        The rows of the actuated joints are zero.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    >>> velocity_map_rate(robot, [1.0, 1.0, -1.0], [1.0, 1.0, -1.0]).round(12).T + 0.0
+    array([[0., 0., 0.]])
+    """
+    return maps(robot, *checked(robot, q=q, v=v))[1]
+
+
+def checked(robot: LoopedRobot, **vectors: ArrayLike) -> list[Array]:
+    """Joint vectors of all joints as arrays (..., n)."""
+    check_looped(robot)
+    return [as_vector(value, robot.n, name) for name, value in vectors.items()]
+
+
+def closure_rows(robot: LoopedRobot, q: Array) -> tuple[Array, Array]:
+    """Residuals (..., c) of the closures and their Jacobian (..., c, n) at q (..., n)."""
+    from .kernels import closure_jacobians
+
+    batch, (rows,) = batch_rows((q,), ("q",))
+    e, J = np.empty((len(rows), len(robot.rows))), np.empty((len(rows), len(robot.rows), robot.n))
+    closure_jacobians(rows, robot.cuts, e, J)
+    return e.reshape(*batch, *e.shape[1:]), J.reshape(*batch, *J.shape[1:])
+
+
+def jacobian_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
+    """Time derivative of the Jacobian of the closures (..., c, n) at q, v (..., n)."""
+    tree, rates = robot.tree, []
+    batch = batch_shape((q, v), ("q", "v"))
+    for closure in robot.closures:
+        first, second = closure.frames
+        point = dgm(tree, q, second)[..., None, :3, 3]
+        JA, JB = jacobian(tree, q, first), jacobian(tree, q, second)
+        # rows of the joints: twists relative to the first frame, at the origin of the second
+        twists = np.subtract(*(jacobian(tree, q, frame, "world") for frame in (second, first)))
+        change = np.subtract(
+            *(jacobian_rate(tree, q, v, frame, "world") for frame in (second, first))
+        )
+        V, W = twists[..., :3, :].swapaxes(-1, -2), twists[..., 3:, :].swapaxes(-1, -2)
+        dV, dW = change[..., :3, :].swapaxes(-1, -2), change[..., 3:, :].swapaxes(-1, -2)
+        turn, speed = (
+            np.einsum("...ij,...j->...i", J, v)[..., None, :]
+            for J in (JA[..., 3:, :], JB[..., :3, :])
+        )
+        linear = V + np.cross(W, point)
+        dlinear = dV + np.cross(dW, point) + np.cross(W, speed) - np.cross(turn, linear)
+        R = dgm(tree, q, first)[..., :3, :3]
+        parts = [(X @ R).swapaxes(-1, -2) for X in (dlinear, dW - np.cross(turn, W))]
+        rates.append(np.concatenate(parts, axis=-2)[..., : ROWS[closure.kind], :])
+    return np.concatenate([np.empty((*batch, 0, robot.n)), *rates], axis=-2)
+
+
+def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, Array]:
+    """Velocity map and its rate along v, each (..., n, n_a); the rate is zero without v."""
+    n, actuated, passive = robot.n, robot.actuated, robot.passive
+    weight = np.sqrt(robot.cuts.weight)[:, None]
+    J = weight * closure_rows(robot, q)[1] * robot.units
+    U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
+    determined = len(robot.rows) >= len(passive)
+    least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
+    for i in np.flatnonzero(np.ravel(least <= _DETERMINED))[:1]:
+        raise _undetermined(robot, i, q, "can move while the actuated ones stand still")
+    inverse = (Vt.swapaxes(-1, -2) / sizes[..., None, :]) @ U.swapaxes(-1, -2)
+    G = np.zeros((*q.shape[:-1], n, len(actuated)))
+    G[..., actuated, range(len(actuated))] = 1.0
+    G[..., passive, :] = -inverse @ J[..., actuated]
+    left = np.abs(J @ G).max(axis=(-1, -2), initial=0.0)
+    for i in np.flatnonzero(np.ravel(left > _CONSISTENT))[:1]:
+        raise _undetermined(robot, i, q, "block the actuated ones, which depend on each other")
+    scales = robot.units[:, None] / robot.units[actuated]
+    if v is None:
+        return G * scales, np.zeros_like(G)
+    rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
+    dJ = weight * jacobian_rates(robot, q, v) * robot.units
+    rate[..., passive, :] = -inverse @ (dJ @ G)
+    return G * scales, rate * scales
+
+
+def _undetermined(robot: LoopedRobot, i: int, q: Array, how: str) -> LoopError:
+    where = f" in sample {i}" if q.ndim > 1 else ""
+    return LoopError(
+        f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
+        f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops that "
+        "are open: see close), the closures (see mobility) and actuated=."
+    )

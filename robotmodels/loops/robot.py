@@ -1,0 +1,299 @@
+"""Robots with kinematic loops: a spanning tree, the closures of its cut loops, actuated joints."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Value, read_only
+from ..errors import InvalidValueError, LoopError
+from ..geometry import FIXED, PRISMATIC, constant_factors
+from ..kernels import Chain
+from ..kinematics import dgm, jacobian
+from ..minimal_parameters.rules import reach
+from ..model import RobotModel
+
+ROWS = {"point": 3, "revolute": 5, "full": 6}
+"""Number of constraint rows of each kind of closure."""
+_AXES = ("x", "y", "z", "rx", "ry", "rz")
+_NO_EFFECT = 1e-10  # largest entry of the Jacobian of a closure without effect, dimensionless
+
+
+class Cuts(NamedTuple):
+    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
+
+    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
+    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
+    """
+
+    chain: Chain
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    rotation: Array
+    position: Array
+    side: NDArray[np.int64]
+    length: Array
+    weight: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """Closure of a cut loop: two frames of the spanning tree that have to coincide.
+
+    Parameters
+    ----------
+    name : str
+        Name of the closure, which messages and constraint rows use.
+    frames : (int or str, int or str)
+        Numbers or names of the two frames; 0 is the base. They lie on different bodies.
+    kind : {"revolute", "point", "full"}
+        ``"revolute"``: origins and z axes coincide, as in a cut revolute joint, rows
+        ``x y z rx ry``; ``"point"``: origins coincide, as in a spherical joint, rows ``x y z``;
+        ``"full"``: the frames coincide, as in a cut body, rows ``x y z rx ry rz``.
+
+    Raises
+    ------
+    InvalidValueError
+        An empty name, another kind, or not two frames.
+
+    References
+    ----------
+    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
+    ICRA 1986, for frames of cut joints. Seed book section 1.2.1, for the tables.
+
+    Examples
+    --------
+    >>> Closure("cut", frames=(4, 7)).rows
+    ('cut.x', 'cut.y', 'cut.z', 'cut.rx', 'cut.ry')
+    """
+
+    name: str
+    frames: tuple[int | str, int | str]
+    kind: str = "revolute"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InvalidValueError(f"name: expected a text, not empty, got {self.name!r:.60}.")
+        if not isinstance(self.kind, str) or self.kind not in ROWS:
+            kinds = ", ".join(map(repr, ROWS))
+            raise InvalidValueError(f"kind: expected one of {kinds}, got {self.kind!r:.60}.")
+        pair = self.frames
+        if isinstance(pair, str) or not isinstance(pair, Iterable) or len(tuple(pair)) != 2:
+            raise InvalidValueError(
+                f"frames: expected two frames of the tree such as (4, 7), got {pair!r:.60}."
+            )
+        object.__setattr__(self, "frames", tuple(pair))
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the constraint rows: the closure's name and the axis of its first frame."""
+        return tuple(f"{self.name}.{axis}" for axis in _AXES[: ROWS[self.kind]])
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LoopedRobot(Value):
+    """Robot with kinematic loops: spanning tree, closures and actuated joints. Read-only.
+
+    Joint variables ``q (..., n)`` are those of all n joints of the tree; n_a of them are actuated.
+
+    Parameters
+    ----------
+    tree : RobotModel
+        Spanning tree, in which each loop is cut.
+    closures : sequence of Closure
+        Closures of the cut loops.
+    actuated : array_like of int, shape (n_a,), optional
+        Columns of ``q`` of the actuated joints, from 0; default the joints with ``mu = 1``.
+
+    Attributes
+    ----------
+    passive : ndarray of int, shape (n - n_a,)
+        Columns of the passive joints, ascending.
+    units : ndarray, shape (n,)
+        Natural unit of each joint: 1 rad, or the size of the robot in metres.
+    rows : tuple of str
+        Names of the c constraint rows, such as ``"cut.x"``.
+
+    Raises
+    ------
+    LoopError
+        A closure between frames of one body, or one that no joint can violate.
+    FrameNotFoundError, InvalidValueError
+        Unknown frames; repeated names; actuated joints that do not exist or are repeated.
+
+    References
+    ----------
+    Seed book sections 1.2.1 and 2.2.
+
+    Examples
+    --------
+    A parallelogram: two cranks on the base, a coupler on the first one that meets the second.
+
+    >>> from robotmodels.geometry import DHTable
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+    <LoopedRobot 'robot': 3 joints, actuated [0], closures: cut (revolute)>
+    """
+
+    tree: RobotModel
+    closures: Sequence[Closure]
+    actuated: NDArray[np.int64] = None  # type: ignore[assignment]
+    passive: NDArray[np.int64] = field(init=False)
+    units: Array = field(init=False)
+    rows: tuple[str, ...] = field(init=False)
+    cuts: Cuts = field(init=False)
+    scratch: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tree, RobotModel):
+            raise InvalidValueError(
+                f"tree: expected the RobotModel of a spanning tree, got {type(self.tree).__name__}."
+            )
+        closures = self.closures if isinstance(self.closures, Iterable) else (self.closures,)
+        actuated = _checked_actuated(self.tree, self.actuated)
+        parts: dict[str, Any] = {
+            "closures": _checked_closures(tuple(closures)),
+            "actuated": actuated,
+            "passive": read_only(np.setdiff1d(np.arange(self.tree.n), actuated), np.int64),
+            "scratch": threading.local(),
+        }
+        parts["rows"] = tuple(row for closure in parts["closures"] for row in closure.rows)
+        parts["cuts"] = cuts = _cuts(self.tree, parts["closures"])
+        slides = cuts.chain.sigma == PRISMATIC
+        parts["units"] = read_only(np.where(slides, cuts.length, 1.0))
+        for name, value in parts.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def n(self) -> int:
+        """Number of joints of the tree."""
+        return self.tree.n
+
+    @property
+    def name(self) -> str:
+        """Name of the tree."""
+        return self.tree.name
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures[:4])
+        more = f" and {len(self.closures) - 4} more" if len(self.closures) > 4 else ""
+        return (
+            f"<LoopedRobot {self.name!r}: {self.n} joints, actuated {self.actuated.tolist()}, "
+            f"closures: {listed or 'none'}{more}>"
+        )
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return self.tree, self.closures, self.actuated
+
+
+def check_looped(robot: object) -> None:
+    """Refuse what is not a looped robot."""
+    if not isinstance(robot, LoopedRobot):
+        raise InvalidValueError(
+            f"robot: expected a LoopedRobot, got {type(robot).__name__}; build one of a tree and "
+            "its closures: LoopedRobot(tree, closures=[...], actuated=[...])."
+        )
+
+
+def _checked_closures(closures: tuple[Any, ...]) -> tuple[Closure, ...]:
+    """Closures, each with its own name."""
+    for k, closure in enumerate(closures):
+        if not isinstance(closure, Closure):
+            raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
+    names = [closure.name for closure in closures]
+    if len(set(names)) < len(names):
+        raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
+    return closures
+
+
+def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
+    """Columns of the actuated joints."""
+    if actuated is None:
+        return read_only(np.flatnonzero(tree.table.mu[tree.table.joint_rows]), np.int64)
+    given = np.asarray(actuated)
+    is_whole = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
+    if not is_whole or not np.isin(given, range(tree.n)).all() or len({*given}) < given.size:
+        raise InvalidValueError(
+            f"actuated: expected different columns of q, from 0 to {tree.n - 1}, got "
+            f"{actuated!r:.60}."
+        )
+    return read_only(given, np.int64)
+
+
+def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
+    """Arrays of closures, each of which some joint can violate."""
+    moving, size = tree.table.joint_rows + 1, reach(tree)
+    chain, body, pose = _moving_chain(tree)
+    sides = np.zeros((len(closures), tree.n), dtype=np.int64)
+    parents, ends, weight = [], [], []
+    for closure, side in zip(closures, sides, strict=True):
+        pair = [tree.twin.frame(frame) for frame in closure.frames]
+        side[:] = np.subtract(*(np.isin(moving, place.path).astype(int) for place in pair[::-1]))
+        named = f"closure {closure.name!r}: the frames {closure.frames[0]!r} and "
+        if not side.any():
+            raise LoopError(
+                f"{named}{closure.frames[1]!r} are on the same body; give frames of the two bodies "
+                "that the closure joins."
+            )
+        if not _acts(tree, closure, size):
+            raise LoopError(
+                f"{named}{closure.frames[1]!r} add no constraint: no joint moves them against each "
+                f"other in the rows {', '.join(closure.rows)}. Remove the closure, or correct its "
+                "frames."
+            )
+        for place in pair:
+            T = np.eye(4)
+            T[:3, :3], T[:3, 3] = place.rotation, place.position
+            parents.append(body[place.parent])
+            ends.append(pose[place.parent] @ T)
+        weight += [1.0 / size**2] * 3 + [1.0] * (ROWS[closure.kind] - 3)
+    return Cuts(
+        chain=chain,
+        first=read_only(parents[::2], np.int64),
+        second=read_only(parents[1::2], np.int64),
+        rows=read_only([ROWS[closure.kind] for closure in closures], np.int64),
+        rotation=read_only(np.array([T[:3, :3] for T in ends]).reshape(-1, 3, 3)),
+        position=read_only(np.array([T[:3, 3] for T in ends]).reshape(-1, 3)),
+        side=read_only(sides.ravel(), np.int64),
+        length=read_only([size]),
+        weight=read_only(weight),
+    )
+
+
+def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
+    """Chain of the moving joints alone; of each frame, R_0 first, its joint and its pose on it."""
+    body, pose = [0], [np.eye(4)]
+    antecedent, constants = [], []
+    for sigma, a, C in zip(
+        tree.table.sigma, tree.table.antecedent, constant_factors(tree.table), strict=True
+    ):
+        at = pose[a] @ C
+        if sigma != FIXED:
+            antecedent.append(body[a])
+            constants.append(at)
+        body.append(body[a] if sigma == FIXED else len(constants))
+        pose.append(at if sigma == FIXED else np.eye(4))
+    T, joints = np.array(constants).reshape(-1, 4, 4), np.arange(tree.n)
+    sigma = tree.table.sigma[tree.table.joint_rows]
+    structure = [read_only(x, np.int64) for x in (antecedent, sigma, joints)]
+    places = [read_only(x) for x in (T[:, :3, :3], T[:, :3, 3], np.eye(3), np.zeros(3))]
+    return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
+
+
+def _acts(tree: RobotModel, closure: Closure, size: float) -> bool:
+    """Whether some joint moves the two frames against each other in the rows of the closure."""
+    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (3, tree.n)):
+        first, second = (dgm(tree, q, frame) for frame in closure.frames)
+        twist = np.subtract(*(jacobian(tree, q, frame, "world") for frame in closure.frames))
+        linear = twist[:3] + np.cross(twist[3:], second[:3, 3], axis=0)
+        rows = [first[:3, :3].T @ part for part in (linear / size, twist[3:])]
+        if np.abs(np.vstack(rows)[: ROWS[closure.kind]]).max(initial=0.0) > _NO_EFFECT:
+            return True
+    return False

@@ -1,0 +1,204 @@
+"""Simulation of looped robots, with every sample on the closures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_exact
+from ..drive import check_all_or_none
+from ..dynamics import kinetic_energy, potential_energy
+from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
+from ..simulation import Integrator, Simulation
+from ..simulation.integration import Integration
+from ..simulation.motion import Law, Loads, Motion
+from ..simulation.simulate import law_of, times_of
+from .constraints import closure_rows
+from .dynamics import closed
+from .engine import Engine, accelerations
+from .robot import LoopedRobot, check_looped
+
+_RATE = 10.0  # 1/s, decay of errors of the closures during the integration
+_SAME = 0.8  # least cosine between singular vectors of two evaluations that belong together
+_MOVING = 1e-6  # largest violation of the closures by the velocities at the start, of the largest
+
+
+def simulate(
+    robot: LoopedRobot,
+    q0: ArrayLike,
+    v0: ArrayLike | None = None,
+    control: Callable[..., ArrayLike] | ArrayLike | None = None,
+    t: ArrayLike = 1.0,
+    wrench: Callable[..., ArrayLike] | ArrayLike | None = None,
+    *,
+    drive: bool = True,
+    smoothing: float | None = None,
+    rtol: float = 1e-10,
+    atol: float = 1e-12,
+    max_evaluations: int = 200_000,
+) -> Simulation:
+    """Simulate a looped robot under torques of its actuated joints.
+
+    The direct model of all joints is integrated, dead points of the actuated joints included.
+    Errors of the closures decay during the integration, and every sample is projected on them, so
+    that the loops stay closed to rounding.
+
+    Parameters
+    ----------
+    robot : LoopedRobot
+        The robot, n joints, n_a of them actuated.
+    q0, v0 : array_like, shape (n,)
+        Positions (rad or m) of all joints, which close the loops, and velocities; default at rest.
+    control : callable, or array_like of shape (n_a,) or (N, n_a), optional
+        Torques of the actuated joints, N m or N: a function of (t, q, v) with q and v of all
+        joints, constant ones, or rows for the N times ``t``. Default none.
+    t, wrench, drive, rtol, atol
+        As for `robotmodels.simulate`.
+    smoothing : float, optional
+        Velocity w, rad/s or m/s: ``tanh(v / w)`` instead of ``sign(v)`` in dry friction, which
+        needs it here.
+    max_evaluations : int
+        Evaluations of the model after which the simulation ends with a status.
+
+    Returns
+    -------
+    Simulation
+        Motion of the tree, energies and works, status; ``tau`` is zero for passive joints.
+
+    Raises
+    ------
+    LoopError
+        Loops that are open at the start, or velocities that open them.
+    ShapeError, InvalidValueError
+        Arguments of the wrong shape, with NaN or infinity; dry friction without smoothing.
+
+    References
+    ----------
+    J. Baumgarte, "Stabilization of constraints and integrals of motion in dynamical systems",
+    CMAME 1, 1972. Seed book section 1.5.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, InertialParameters
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure
+    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+    >>> bars = InertialParameters.from_com(np.ones(5), np.full((5, 3), 0.1), [np.eye(3)] * 5)
+    >>> tree = RobotModel.from_table(table, bars, gravity=[0, -9.81, 0])
+    >>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
+    >>> motion = simulate(robot, [1.0, 1.0, -1.0], t=0.5)
+    >>> bool(abs(motion.q[:, 1] + motion.q[:, 2]).max() < 1e-12), bool(motion.relative_drift < 1e-8)
+    (True, True)
+    """
+    check_looped(robot)
+    check_all_or_none(drive)
+    n, tree = robot.n, robot.tree
+    q = closed(robot, as_exact(q0, (n,), "q0")).copy()
+    v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
+    start, end, times = times_of(t)
+    law, knots = law_of(control, len(robot.actuated), times, "control")
+    tool, tool_knots = law_of(wrench, 6, times, "wrench")
+    width = None if smoothing is None else np.full(n, as_exact(smoothing, (), "smoothing"))
+    drives = tree.drive_matrices if drive else None
+    if width is None and drives is not None and (drives.coulomb.any() or drives.coupling.size):
+        raise InvalidValueError(
+            "smoothing: the dry friction of looped robots needs a velocity, such as "
+            "smoothing=1e-3; or leave out the drives: drive=False."
+        )
+    motion = LoopMotion(robot, law, tool, drive, width)
+    moved = motion.projected(q, v)
+    if np.abs(moved[1] - v).max(initial=0.0) > _MOVING * np.abs(v).max(initial=0.0):
+        raise LoopError(
+            f"v0: these velocities open the loops of {robot.name!r}; take "
+            "v0 = velocity_map(robot, q0) @ v_actuated."
+        )
+    tolerances = {"rtol": float(rtol), "atol": float(atol), "max_step": np.inf}
+    cuts = sorted({start, end, *(x for x in (*knots, *tool_knots) if start < x < end)})
+    run = _Integration(
+        motion, times, None, Integrator.DOP853, tolerances, int(max_evaluations), None
+    )
+    with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
+        run.follow(
+            *moved, [(float(x), False) for x in cuts] if len(cuts) > 1 else [(start, False)] * 2
+        )
+    q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
+    kinetic, potential = kinetic_energy(tree, q, v, drive), potential_energy(tree, q)
+    return Simulation(
+        *(tree, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
+        *works.T.copy(),
+        drive=bool(drive),
+        events=(),
+        status=run.status,
+        evaluations=motion.evaluations,
+        steps=run.steps,
+    )
+
+
+class LoopMotion(Motion):
+    """Equations of motion of a looped robot on plain arrays, for an integrator."""
+
+    def __init__(
+        self,
+        robot: LoopedRobot,
+        control: Law | None,
+        wrench: Law | None,
+        drive: bool,
+        width: Array | None,
+    ) -> None:
+        def torques(t: float, q: Array, v: Array) -> Array:
+            tau = np.zeros(robot.n)
+            if control is not None:
+                tau[robot.actuated] = control(t, q, v)
+            return tau
+
+        super().__init__(robot.tree, torques, wrench, drive, None, width)
+        self.robot, self.engine = robot, Engine(robot, drive, _RATE)
+        self._weakest: tuple[Array, Array] | None = None
+        self._passed = False
+
+    def at(self, t: float, q: Array, v: Array) -> Loads:
+        """Accelerations and torques at one time; NaN accelerations where there are none."""
+        self.evaluations += 1
+        load, tau, friction, tool = self.load(t, q, v)
+        self._passed = self._passed or self._passes(q)
+        try:
+            if self._passed:
+                raise LoopError("the motion passed a singular posture of the closures")
+            a = accelerations(self.engine, q, v, load)
+        except (LoopError, SingularMassMatrixError):
+            self.singular, a = True, np.full(self.n, np.nan)
+        return Loads(a, tau, friction, tool, self._zero[0])
+
+    def _passes(self, q: Array) -> bool:
+        """Whether the least singular value of the closures changed its sign on the way to q."""
+        J = np.sqrt(self.robot.cuts.weight)[:, None] * closure_rows(self.robot, q)[1]
+        U, sizes, Vt = np.linalg.svd(J * self.robot.units, full_matrices=False)
+        last = int((sizes > 1e-12 * sizes.max(initial=0.0)).sum()) - 1
+        before, self._weakest = self._weakest, (U[:, last], Vt[last]) if last >= 0 else None
+        if before is None or self._weakest is None:
+            return False
+        turned = [float(a @ b) for a, b in zip(before, self._weakest, strict=True)]
+        return min(map(abs, turned)) > _SAME and turned[0] * turned[1] < 0.0
+
+    def projected(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The nearest state on the closures; each (n,)."""
+        weight, units = np.sqrt(self.robot.cuts.weight), self.robot.units
+        for _ in range(3):
+            e, J = closure_rows(self.robot, q)
+            inverse = np.linalg.pinv(weight[:, None] * J * units, rcond=1e-8)
+            q = q - units * (inverse @ (weight * e))
+        return q, v - units * (inverse @ (weight * (J @ v)))
+
+
+class _Integration(Integration):
+    """Integration whose samples are on the closures."""
+
+    motion: LoopMotion
+
+    def _sample(self, t: float, y: Array) -> None:
+        n = self.motion.n
+        super()._sample(
+            t, np.concatenate((*self.motion.projected(y[:n], y[n : 2 * n]), y[2 * n :]))
+        )

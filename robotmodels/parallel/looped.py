@@ -1,0 +1,324 @@
+"""Parallel robots given as kinematic loops: a platform frame on a robot of `robotmodels.loops`.
+
+The models are numeric: Newton's method on the actuated joints, and the velocity map of the loops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import loops, se3
+from .._arrays import Array, Value, as_core, as_exact, read_only
+from ..errors import InvalidValueError, LoopError
+from ..geometry import PRISMATIC
+from ..kinematics import dgm, jacobian, jacobian_rate
+from ..kinematics.lengths import characteristic_length
+from .robot import pose_of, rotation_vector
+
+_STEPS, _PIECES, _STARTS = 60, 16, 64
+_CLOSED = 1e-10
+_RANK = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LoopedPlatform(Value):
+    """A parallel robot made of kinematic loops, from `from_loops`. Read-only.
+
+    Parameters
+    ----------
+    robot : LoopedRobot
+        Spanning tree, closures, actuated joints.
+    frame : str or int
+        Frame of the platform.
+    q_home : ndarray, shape (n,)
+        All joints at the home pose, with closed loops.
+    columns : tuple of int
+        Independent components of the platform's twist, from 0; others do not count.
+    """
+
+    robot: loops.LoopedRobot
+    frame: str | int
+    q_home: Array
+    columns: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q_home", read_only(self.q_home))
+
+    @property
+    def actuated(self) -> NDArray[np.int64]:
+        """Columns of the actuated joints."""
+        return self.robot.actuated
+
+    @property
+    def m(self) -> int:
+        """Number of actuated joints."""
+        return len(self.robot.actuated)
+
+    @property
+    def home(self) -> Array:
+        """Home pose of the platform, shape (4, 4)."""
+        return dgm(self.robot.tree, self.q_home, self.frame)
+
+    @property
+    def length(self) -> float:
+        """Characteristic length, m: half the reach of the platform's frame in the tree."""
+        return 0.5 * characteristic_length(self.robot.tree, self.frame)
+
+    @property
+    def units(self) -> Array:
+        """Natural unit of each joint of the tree: 1 rad, or the characteristic length in metres."""
+        table = self.robot.tree.table
+        return np.where(table.sigma[table.joint_rows] == PRISMATIC, self.length, 1.0)
+
+    def postures(self, T: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """All joints (..., n) at poses near home, residuals, and whether the poses are reached."""
+        poses = se3.as_pose(T)
+        rows = poses.reshape(-1, 4, 4)
+        q, rest = self._newton(np.broadcast_to(self.q_home, (len(rows), self.robot.n)), rows)
+        for i in np.flatnonzero(rest > _CLOSED):
+            x = self.q_home[None]
+            for target in _between(self.home, rows[i]):
+                x, away = self._newton(x, target[None])
+            q[i], rest[i] = x[0], away[0]
+        batch = poses.shape[:-2]
+        rest = rest.reshape(batch)
+        return q.reshape(*batch, self.robot.n), rest, rest <= _CLOSED
+
+    def _newton(self, q: Array, target: Array) -> tuple[Array, Array]:
+        """Newton's method on the actuated joints, the loops closed after each step, N rows."""
+        q, rest, active = q.copy(), np.full(len(q), np.inf), np.arange(len(q))
+        for _ in range(_STEPS):
+            error = _difference(dgm(self.robot.tree, q[active], self.frame), target[active])
+            error *= np.isin(np.arange(6), self.columns)
+            away = np.abs(error).max(axis=-1, initial=0.0)
+            better = (away < 0.9 * rest[active]) & (away > 1e-15)
+            rest[active] = np.minimum(rest[active], away)
+            active, error = active[better], error[better]
+            if not active.size:
+                break
+            try:
+                J = self._inverse(self._twists(q[active]))
+            except LoopError:
+                break
+            step = np.einsum("nij,nj->ni", J, error)
+            found = loops.close(self.robot, q[active][:, self.actuated] + step, q[active])
+            good = np.asarray(found.residual) < _CLOSED
+            active = active[good]
+            q[active] = found.q[good]
+        return q, rest
+
+    def _reached(self, T: ArrayLike) -> Array:
+        """Joints at poses; raises where one is not reached."""
+        q, residual, reached = self.postures(T)
+        if not reached.all():
+            raise InvalidValueError(
+                f"T: the platform does not reach this pose near home (residual {residual.max():.2g});"
+                " see igm(robot, T).status."
+            )
+        return q
+
+    def _twists(self, q: Array) -> Array:
+        """Map from actuated velocities to the platform's twist. Shapes: (..., n) -> (..., 6, m)."""
+        return jacobian(self.robot.tree, q, self.frame) @ loops.velocity_map(self.robot, q)
+
+    def _twist_rates(self, q: Array, rate: Array) -> Array:
+        """Time derivative of `_twists`. Shapes: (..., n), (..., m) -> (..., 6, m)."""
+        tree, G = self.robot.tree, loops.velocity_map(self.robot, q)
+        v = _times(G, rate)
+        change = jacobian_rate(tree, q, v, self.frame) @ G
+        return change + jacobian(tree, q, self.frame) @ loops.velocity_map_rate(self.robot, q, v)
+
+    def _inverse(self, P: Array) -> Array:
+        """Inverse of the independent rows, least squares where singular. Shapes: (..., 6, m)."""
+        columns = list(self.columns)
+        unit = np.where(np.array(columns) < 3, 1.0, self.length)
+        J = np.zeros((*P.shape[:-2], self.m, 6))
+        J[..., columns] = np.linalg.pinv(P[..., columns, :] * unit[:, None], rcond=_RANK) * unit
+        return J
+
+    def inverse_jacobian(self, T: ArrayLike) -> Array:
+        """Inverse Jacobian (..., m, 6) at poses."""
+        return self._inverse(self._twists(self._reached(T)))
+
+    def inverse_jacobian_rate(self, T: ArrayLike, V: Array) -> Array:
+        """Time derivative (..., m, 6) of the inverse Jacobian."""
+        q = self._reached(T)
+        J = self._inverse(self._twists(q))
+        return -J @ self._twist_rates(q, _times(J, V)) @ J
+
+    def closed(self, q: ArrayLike, T0: ArrayLike | None) -> tuple[Any, ...]:
+        """Fields of `PlatformPoses` at actuated positions (..., m), from poses nearby."""
+        q = as_core(q, (self.m,), "q")
+        guess = self.q_home if T0 is None else self._reached(T0)
+        found = loops.close(self.robot, q, guess)
+        residual = np.asarray(found.residual)
+        good, det = residual < 1e-9, self._side(found.q)
+        T = np.where(good[..., None, None], dgm(self.robot.tree, found.q, self.frame), np.nan)
+        code = np.where(good, np.where(det * self._side(guess) < 0.0, 2, 0), 1).astype(np.int8)
+        return T, code, np.zeros(good.shape, np.int64), residual, np.where(good, det, np.nan)
+
+    def _side(self, q: Array) -> Array:
+        """Determinants of the inverse Jacobian's independent columns; 0 where there is none."""
+        out = np.zeros(q.shape[:-1])
+        for i in np.ndindex(out.shape):
+            try:
+                det = np.linalg.det(self._twists(q[i])[list(self.columns)])
+                out[i] = 1.0 / det if abs(det) > 1e-300 else 0.0
+            except LoopError:
+                out[i] = 0.0
+        return out
+
+    def assemblies(self, q: Array) -> tuple[Any, ...]:
+        """Assembly modes from random starts, home the first, of N rows (N, m)."""
+        T = np.full((len(q), _STARTS, 4, 4), np.nan)
+        residual, det = np.full(T.shape[:2], np.nan), np.full(T.shape[:2], np.nan)
+        random = np.random.default_rng(0).uniform(-np.pi, np.pi, (_STARTS, self.robot.n))
+        random[0] = 0.0
+        for s, row in enumerate(q):
+            starts = self.q_home + random * self.units
+            found = loops.close(self.robot, np.broadcast_to(row, (_STARTS, self.m)), starts)
+            poses = dgm(self.robot.tree, found.q, self.frame)
+            for k in np.flatnonzero(np.asarray(found.residual) < 1e-9):
+                if not (np.abs(T[s] - poses[k]).max(axis=(1, 2)) < 1e-6).any():
+                    T[s, k], residual[s, k] = poses[k], found.residual[k]
+                    det[s, k] = self._side(found.q[k])
+        return T, residual, det, np.full(len(q), 2, np.int8), (~np.isnan(det)).sum(axis=1)
+
+    def _motion(self, T: ArrayLike, V: ArrayLike, A: ArrayLike) -> tuple[Array, ...]:
+        """Joints, velocities, accelerations, and the map from actuated velocities to twists."""
+        q, V, A = self._reached(T), as_core(V, (6,), "V"), as_core(A, (6,), "A")
+        P, G = self._twists(q), loops.velocity_map(self.robot, q)
+        J = self._inverse(P)
+        rate = _times(J, V)
+        v = _times(G, rate)
+        second = _times(J, A - _times(self._twist_rates(q, rate), rate))
+        a = _times(G, second) + _times(loops.velocity_map_rate(self.robot, q, v), rate)
+        return np.broadcast_to(q, a.shape), np.broadcast_to(v, a.shape), a, P
+
+    def idm(self, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike | None) -> Array:
+        """Inverse dynamic model, as `parallel.idm`."""
+        q, v, a, P = self._motion(T, V, A)
+        W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
+        return loops.idm(self.robot, q, v, a) + _times(np.swapaxes(P, -1, -2), W)
+
+    def ddm(self, T: ArrayLike, V: ArrayLike, tau: Array, wrench: ArrayLike | None) -> Array:
+        """Direct dynamic model, as `parallel.ddm`."""
+        q, v, _, P = self._motion(T, V, np.zeros(6))
+        W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
+        a = loops.ddm(self.robot, q, v, tau - _times(np.swapaxes(P, -1, -2), W))
+        tree, frame = self.robot.tree, self.frame
+        return _times(jacobian(tree, q, frame), a) + _times(jacobian_rate(tree, q, v, frame), v)
+
+    def singular_motions(self, T: ArrayLike, epsilon: float) -> tuple[int, Array]:
+        """Code of `SingularityKind` at a pose, and twists (k, 6) with locked actuators."""
+        q, loose = self._reached(T), np.sqrt(epsilon)
+        unit = np.repeat([1.0, self.length], 3)
+        Jp = jacobian(self.robot.tree, q, self.frame) * unit[:, None] * self.units
+        J = loops.closure_jacobian(self.robot, q) * self.units
+        passive = np.setdiff1d(np.arange(self.robot.n), self.actuated)
+        locked = Jp[:, passive] @ _null(J[:, passive], epsilon).T
+        U, s, _ = np.linalg.svd(locked, full_matrices=False)
+        gained = (U / unit[:, None])[:, s > loose * max(1.0, s.max(initial=0.0))].T
+        free = np.linalg.matrix_rank(Jp @ _null(J, epsilon).T, tol=loose)
+        idle = _null(np.concatenate((J, Jp)), epsilon)[:, self.actuated]
+        if len(gained) and free > self.m:
+            return 4, gained
+        return int(np.abs(idle).max(initial=0.0) > loose) + 2 * bool(len(gained)), gained
+
+    def __repr__(self) -> str:
+        return f"<LoopedPlatform {self.frame!r} of {self.robot!r}>"
+
+
+def from_loops(
+    looped_robot: loops.LoopedRobot, platform_frame: str | int, q_home: ArrayLike | None = None
+) -> LoopedPlatform:
+    """Parallel robot of any kind from a robot with kinematic loops.
+
+    Parameters
+    ----------
+    looped_robot : LoopedRobot
+        The robot; its actuated joints determine the platform.
+    platform_frame : str or int
+        Name or number of the platform's frame in the tree.
+    q_home : array_like, shape (n,), optional
+        All joints near the home posture, rad or m; default the tree's zero posture. The loops are
+        closed from there.
+
+    Returns
+    -------
+    LoopedPlatform
+        Taken by the functions of this room in place of a `ParallelRobot`.
+
+    Raises
+    ------
+    InvalidValueError, LoopError, FrameNotFoundError
+        Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not
+        determine the platform, or more of them than it has freedoms.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.loops import Closure, LoopedRobot
+    >>> from robotmodels.model import RobotModel
+    >>> table = DHTable(antecedent=[0, 0, 1, 2, 3], sigma=[0, 0, 0, 0, 2], d=[0, 1, 1, 1, 1])
+    >>> tree = RobotModel.from_table(table)
+    >>> five = LoopedRobot(tree, [Closure("cut", (4, 5), "point")], actuated=[0, 1])
+    >>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
+    2
+    """
+    if not isinstance(looped_robot, loops.LoopedRobot):
+        raise InvalidValueError(
+            f"looped_robot: expected a loops.LoopedRobot, got {type(looped_robot).__name__}."
+        )
+    n = looped_robot.n
+    start = np.zeros(n) if q_home is None else as_exact(q_home, (n,), "q_home")
+    found = loops.close(looped_robot, start[looped_robot.actuated], start)
+    if not found.residual < 1e-8:
+        raise InvalidValueError(
+            f"q_home: the loops do not close near this posture (residual {found.residual:.2g}); give "
+            "all joints of an assembled posture."
+        )
+    P = jacobian(looped_robot.tree, found.q, platform_frame)
+    P = P @ loops.velocity_map(looped_robot, found.q)
+    columns: list[int] = []
+    for k in range(6):
+        if np.linalg.matrix_rank(P[[*columns, k]], tol=1e-7 * np.abs(P).max()) > len(columns):
+            columns.append(k)
+    if len(columns) != P.shape[1]:
+        raise InvalidValueError(
+            f"looped_robot: {P.shape[1]} actuated joints move the platform in {len(columns)} "
+            "independent ways at q_home; give a regular posture, or actuate as many joints as the "
+            "platform has freedoms."
+        )
+    return LoopedPlatform(looped_robot, platform_frame, found.q, tuple(columns))
+
+
+def _times(J: Array, x: Array) -> Array:
+    """Products of matrices and vectors with batches."""
+    return np.einsum("...ij,...j->...i", J, x)
+
+
+def _difference(T: Array, target: Array) -> Array:
+    """Small twists from poses to others. Shapes: (N, 4, 4) -> (N, 6)."""
+    turn = target.copy()
+    turn[:, :3, :3] = target[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)
+    return np.concatenate((target[:, :3, 3] - T[:, :3, 3], rotation_vector(turn)), axis=1)
+
+
+def _between(start: Array, end: Array) -> Array:
+    """Poses between two, the last included. Shapes: -> (N, 4, 4)."""
+    share = np.linspace(0.0, 1.0, _PIECES + 1)[1:, None]
+    T = pose_of(share * _difference(start[None], end[None]))
+    T[:, :3, :3] = T[:, :3, :3] @ start[:3, :3]
+    T[:, :3, 3] += start[:3, 3]
+    return T
+
+
+def _null(A: Array, epsilon: float) -> Array:
+    """Orthonormal basis of a null space. Shapes: (r, n) -> (k, n)."""
+    _, s, Vt = np.linalg.svd(A)
+    return Vt[int((s > epsilon * max(s.max(initial=0.0), 1e-300)).sum()) :]

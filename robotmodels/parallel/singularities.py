@@ -1,0 +1,250 @@
+"""Singular configurations of parallel robots: kinds, motions gained, Grassmann varieties of lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_number
+from .._outcomes import Outcome
+from ..errors import ShapeError
+from .legs import check_robot, leg_states
+from .looped import LoopedPlatform
+from .results import Result
+from .robot import Family, ParallelRobot
+from .velocities import Mode, Robot, modes_of
+
+_WORDS = {
+    "": "the lines are independent",
+    "1": "two lines coincide",
+    "2a": "lines of two skew directions",
+    "2b": "a flat pencil: lines in one plane through one point, or parallel",
+    "3a": "a regulus: lines of one family of a hyperboloid",
+    "3b": "two flat pencils with a line in common",
+    "3c": "a bundle: lines through one point, or parallel",
+    "3d": "lines in one plane",
+    "4a": "an elliptic congruence",
+    "4b": "a hyperbolic congruence: lines that meet two skew lines",
+    "4c": "a parabolic congruence: flat pencils with a line in common",
+    "4d": "a degenerate congruence: lines in a plane or through one of its points",
+    "5a": "a general linear complex",
+    "5b": "a special linear complex: lines that meet one line",
+}
+
+
+class SingularityKind(Outcome):
+    """Kinds of positions of a parallel robot."""
+
+    REGULAR = 0, "The pose is regular."
+    SERIAL = 1, "Serial singularity: an actuator moves without the platform, a leg is straight."
+    PARALLEL = 2, "Parallel singularity: the platform moves with locked actuators."
+    BOTH = 3, "Serial and parallel singularity at once."
+    CONSTRAINT = 4, "Constraint singularity: the legs no longer constrain the platform's motion."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Singularity(Result):
+    """Kind of a pose, and what the platform gains there. Read-only.
+
+    Parameters
+    ----------
+    kind : SingularityKind
+        Kind of the position.
+    motion : ndarray, shape (k, 6)
+        Twists [v; w] of the platform that locked actuators do not prevent, norm 1 with angles times
+        the characteristic length; world axes, at the platform's origin.
+    legs : tuple of int
+        Smallest set of legs whose lines depend on each other; of serial singularities the straight
+        legs. From 0.
+    variety : str
+        Class of the lines of ``legs`` in Grassmann geometry: "1" to "4", "5a", "5b", which is the
+        dimension they span; empty where the lines are independent.
+    form : str
+        The same with Merlet's letter, "3c" for instance.
+    least : float
+        Smallest singular value of the unit lines, relative to the largest.
+    """
+
+    kind: SingularityKind
+    motion: Array
+    legs: tuple[int, ...]
+    variety: str
+    form: str
+    least: float
+
+    @property
+    def status(self) -> SingularityKind:
+        """The kind."""
+        return self.kind
+
+    def reason(self) -> str:
+        """Kind of the position and form of the lines as a sentence.
+
+        Returns
+        -------
+        str
+            The sentence.
+        """
+        if not self.form:
+            return self.kind.sentence
+        names = ", ".join(str(i) for i in self.legs)
+        return f"{self.kind.sentence} Legs {names}, class {self.form}: {_WORDS[self.form]}."
+
+    def __repr__(self) -> str:
+        return f"<Singularity {self.kind.name}: {self.reason()}>"
+
+
+def classify_singularity(
+    robot: Robot, T: ArrayLike, mode: Mode = None, tolerance: float = 1e-8
+) -> Singularity:
+    """Kind of a pose, motions gained, dependent legs and their Grassmann variety.
+
+    Parameters
+    ----------
+    robot : ParallelRobot or LoopedPlatform
+        The robot, m legs.
+    T : array_like, shape (4, 4)
+        One pose of the platform.
+    mode : int, optional
+        Working mode of robots with cranks, as numbered by `igm`; default 0.
+    tolerance : float
+        Singular values below this fraction of the largest are zero, and sines of elbows.
+
+    Returns
+    -------
+    Singularity
+        The kind, with the rest.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Several poses, poses that the platform cannot have or the legs do not reach.
+
+    References
+    ----------
+    Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
+    parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from robotmodels.parallel import classify_singularity, gough_symmetric
+    >>> turned = classify_singularity(gough_symmetric(1.0), [[0, -1, 0, 0], [1, 0, 0, 0],
+    ...                                                      [0, 0, 1, 1.2], [0, 0, 0, 1]])
+    >>> turned.kind.name, turned.variety, turned.motion.shape
+    ('PARALLEL', '5a', (1, 6))
+    """
+    check_robot(robot)
+    epsilon = as_number(tolerance, "tolerance", above=0.0, below=1.0)
+    if np.ndim(getattr(T, "homogeneous", T)) != 2:
+        raise ShapeError(f"T: expected one pose, shape (4, 4), got {np.shape(T)}; loop over poses.")
+    if isinstance(robot, LoopedPlatform):
+        kind, motion = robot.singular_motions(T, epsilon)
+        least = 0.0 if len(motion) else 1.0
+        return Singularity(SingularityKind(kind), motion, (), "", "", least)
+    pose = robot.checked(T)[None]
+    legs = leg_states(robot, pose, modes_of(robot, mode, (1,)))
+    if not legs.reached.all():
+        # raises with the sentence
+        from .velocities import states
+
+        states(robot, pose[0], mode)
+    size = robot.crank if robot.has_cranks else np.ones(robot.m)
+    straight = np.flatnonzero(np.abs(legs.speed[0]) <= epsilon * size)
+    unit = np.repeat([1.0, 1.0 / robot.length], 3)
+    rows = legs.rows[0] * unit
+    columns = list(robot.columns)
+    s, motion = _kernel(rows[:, columns], epsilon)
+    gained = np.zeros((len(motion), 6))
+    gained[:, columns] = motion * unit[columns]
+    dependent, form = (), ""
+    if len(motion):
+        dependent, form = grassmann(_lines(robot, legs.rows[0], legs.arm[0], pose[0]), epsilon)
+    kind = SingularityKind((1 if straight.size else 0) + (2 if len(motion) else 0))
+    turning = _lost_constraints(robot, legs.direction[0], epsilon)
+    if len(turning):
+        kind, gained = SingularityKind.CONSTRAINT, np.vstack((gained, turning))
+    chosen = dependent or tuple(int(i) for i in straight)
+    variety = form if form.startswith("5") else form[:1]
+    return Singularity(kind, gained, chosen, variety, form, float(s[-1] / s[0]))
+
+
+def _kernel(A: Array, epsilon: float) -> tuple[Array, Array]:
+    """Singular values, and an orthonormal basis of the null space. Shapes: (m, k) -> (r, k)."""
+    _, s, Vt = np.linalg.svd(A)
+    full = np.zeros(A.shape[1])
+    full[: len(s)] = s
+    return full, Vt[full <= epsilon * max(full[0], 1e-300)]
+
+
+def _lines(robot: ParallelRobot, rows: Array, arm: Array, T: Array) -> Array:
+    """Unit lines [u; moment] about the platform's origin, moments in units of the robot."""
+    if 5 in robot.columns:
+        return rows / np.repeat([1.0, robot.length], 3)
+    # the rods of a platform that does not turn act as if they met in one point
+    return np.concatenate((rows[:, :3], np.zeros_like(arm)), axis=1)
+
+
+def _lost_constraints(robot: ParallelRobot, direction: Array, epsilon: float) -> Array:
+    """Rotations that the pairs of rods of a Delta do not prevent. Shapes: (m, 3) -> (k, 6)."""
+    if robot.family is not Family.DELTA:
+        return np.empty((0, 6))
+    hips = np.cross(robot.outward, robot.downward)
+    _, free = _kernel(np.cross(hips, direction), epsilon)
+    return np.concatenate((np.zeros_like(free), free), axis=1) / robot.length
+
+
+def grassmann(lines: Array, epsilon: float = 1e-8) -> tuple[tuple[int, ...], str]:
+    """Smallest dependent set of lines and the variety that it spans.
+
+    Shapes: lines (m, 6), unit directions and moments in one unit -> numbers from 0, form.
+    """
+    m = len(lines)
+    for k in range(2, m + 1):
+        # sets of fewer lines are independent by now, so that rank k - 1 is all there can be
+        for chosen in combinations(range(m), k):
+            L = lines[list(chosen)]
+            s = np.linalg.svd(L, compute_uv=False)
+            if k > 6 or s[-1] <= epsilon * s[0]:
+                return chosen, _form(L, k - 1, epsilon)
+    return (), ""
+
+
+def _form(L: Array, rank: int, epsilon: float) -> str:
+    """Merlet's class of lines that span a space of this dimension, one fewer than lines."""
+    if rank == 1:
+        return "1"
+    if rank == 2:
+        return "2b"  # three lines of which none coincide
+    u = L[:, :3]
+    flat = np.linalg.svd(u, compute_uv=False)[-1] <= np.sqrt(epsilon)
+    meet = np.abs(_products(L)) <= np.sqrt(epsilon)
+    if rank == 3:
+        if not meet.all():
+            return "3a" if not (meet & ~np.eye(4, dtype=bool)).any() else "3b"
+        return "3d" if flat else "3c"
+    # reciprocal screws: what meets all lines, if it is a line itself
+    _, _, Vt = np.linalg.svd(L)
+    others = Vt[rank:][:, [3, 4, 5, 0, 1, 2]]
+    if rank == 5:
+        w = others[0]
+        pitch = 2.0 * w[:3] @ w[3:] / (w @ w)
+        return "5b" if abs(pitch) <= np.sqrt(epsilon) else "5a"
+    # two screws: the lines among them are the roots of a quadratic
+    a, c = others[0, :3] @ others[0, 3:], others[1, :3] @ others[1, 3:]
+    b = 0.5 * (others[0, :3] @ others[1, 3:] + others[0, 3:] @ others[1, :3])
+    if max(abs(a), abs(b), abs(c)) <= np.sqrt(epsilon):
+        return "4d"
+    square = b * b - a * c
+    if abs(square) <= epsilon:
+        return "4c"
+    return "4b" if square > 0.0 else "4a"
+
+
+def _products(L: Array) -> Array:
+    """Mutual moments of lines, zero where two meet or are parallel. Shapes: (k, 6) -> (k, k)."""
+    M = L[:, :3] @ L[:, 3:].T
+    return M + M.T

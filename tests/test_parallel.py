@@ -1,0 +1,491 @@
+"""Parallel robots: descriptions, inverse and direct models, all assembly modes, velocities."""
+
+import pickle
+from collections import Counter
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from robotmodels import parallel as pr
+from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+
+TURN = np.deg2rad([-90.0, 30.0, 150.0])
+RING = np.c_[np.cos(TURN), np.sin(TURN), 0.0 * TURN]
+BASE, TRIANGLE = [[0, 0], [2, 0], [1, 1.7]], [[-0.3, -0.2], [0.3, -0.25], [0.05, 0.3]]
+
+
+def random_gough(rng, kind="general"):
+    base, platform = rng.normal(size=(2, 6, 3))
+    if "planar" in kind:
+        platform[:, 2] = 0.0
+    if kind == "planar base and platform":
+        base[:, 2] = 0.0
+    if kind == "shared anchor":
+        platform[1] = platform[0]
+    return pr.gough(base, platform)
+
+
+ROBOTS = {
+    "gough": random_gough(np.random.default_rng(1)),
+    "SSM": pr.gough_symmetric(1.0),
+    "3-RPR": pr.planar_3rpr(BASE, TRIANGLE),
+    "3-RRR": pr.planar_3rrr(BASE, TRIANGLE, [0.8, 0.7, 0.9], 0.9),
+    "five-bar": pr.five_bar([[-0.2, 0.0], [0.2, 0.05]], [0.4, 0.45], [0.6, 0.55]),
+    "delta": pr.delta(0.164 * RING, 0.044 * RING, TURN, 0.524, 1.244),
+}
+DIETMAIER = (
+    [
+        [0, 0, 0], [1.107915, 0, 0], [0.549094, 0.756063, 0], [0.735077, -0.223935, 0.525991],
+        [0.514188, -0.526063, -0.368418], [0.590473, 0.094733, -0.205018],
+    ],
+    [
+        [0, 0, 0], [0.542805, 0, 0], [0.956919, -0.528915, 0], [0.665885, -0.353482, 1.402538],
+        [0.478359, 1.158742, 0.107672], [-0.137087, -0.235121, 0.353913],
+    ],
+    [1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071],
+)  # fmt: skip
+
+
+def poses_near_home(robot, count, size=0.1, seed=0):
+    X = robot.coordinates(robot.home)
+    return robot.pose(X + size * np.random.default_rng(seed).uniform(-1, 1, (count, X.size)))
+
+
+def moved(T, twist):
+    """Poses moved by small screws about their origins."""
+    out = np.array(T)
+    out[..., :3, :3] = Rotation.from_rotvec(twist[..., 3:]).as_matrix() @ out[..., :3, :3]
+    out[..., :3, 3] += twist[..., :3]
+    return out
+
+
+def twists(robot, count, seed=1):
+    V = np.zeros((count, 6))
+    V[:, list(robot.columns)] = np.random.default_rng(seed).normal(size=(count, robot.m))
+    return V
+
+
+def leg_errors(base, platform, T, lengths):
+    anchors = np.einsum("...ij,kj->...ki", T[..., :3, :3], platform) + T[..., None, :3, 3]
+    return np.abs(np.linalg.norm(anchors - base, axis=-1) - lengths).max(axis=-1)
+
+
+# --- inverse and direct models -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_mode_comes_back_from_the_direct_models(name):
+    robot = ROBOTS[name]
+    T = poses_near_home(robot, 6)
+    legs = pr.igm(robot, T)
+    assert legs.count.tolist() == [2**robot.m if robot.has_cranks else 1] * 6
+    assert legs.mode[0].tolist() == list(range(legs.q.shape[1]))
+    for k in range(legs.q.shape[1]):
+        q = legs.q[:, k]
+        near = pr.dgm(robot, q, T0=moved(T, 1e-3 * twists(robot, 6)))
+        assert (near.status == pr.PoseStatus.CONVERGED).all()
+        np.testing.assert_allclose(near.T, T, atol=1e-11)
+        modes = pr.assembly_modes(robot, q)
+        away = np.where(modes.valid, np.abs(modes.T - T[:, None]).max(axis=(-1, -2)), 9.0)
+        assert away.min(axis=1).max() < 1e-11
+        assert np.nanmax(modes.residual) < 1e-12
+        assert (modes.status == pr.AssemblyStatus.ALL).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_coordinates_are_read_off_the_pose(name):
+    robot = ROBOTS[name]
+    T = poses_near_home(robot, 4)
+    X = robot.coordinates(T)
+    assert X.shape == (4, robot.m)
+    np.testing.assert_allclose(robot.pose(X), T, atol=1e-14)
+    np.testing.assert_array_equal(X[:, :2], T[:, :2, 3])
+    assert pickle.loads(pickle.dumps(robot)) == robot
+    assert len(repr(robot).splitlines()) <= 6
+
+
+def test_elbows_of_mode_zero_point_outward():
+    delta, five = ROBOTS["delta"], ROBOTS["five-bar"]
+    q = pr.igm(delta, poses_near_home(delta, 5)).q
+    assert (np.cos(q[:, 0]) > np.cos(q[:, 7])).all()
+    a = five.base[:, :2]
+    q = pr.igm(five, five.home).q[0]
+    knee = a + five.crank[:, None] * np.c_[np.cos(q), np.sin(q)]
+    middle = 0.5 * (a + five.home[:2, 3])
+    assert knee[0, 0] < middle[0, 0]
+    assert knee[1, 0] > middle[1, 0]
+
+
+def test_delta_of_the_flexpicker():
+    """R. L. Williams II, "The Delta parallel robot: kinematics solutions", 2016, snapshots."""
+    side, wB, wP, uP = 0.076, 0.164, 0.022, 0.044
+    hips = wB * RING
+    platform = [[0, -uP, 0], [side / 2, wP, 0], [-side / 2, wP, 0]]
+    robot = pr.delta(hips, platform, TURN, 0.524, 1.244)
+    for place, degrees in (([0, 0, -0.9], [-20.5] * 3), ([0.3, 0.5, -1.1], [47.5, -11.6, 21.4])):
+        q = pr.igm(robot, robot.pose(place)).q[0]
+        np.testing.assert_allclose(np.rad2deg(q), degrees, atol=0.06)
+    for degrees, place in (([0, 0, 0], [0, 0, -1.065]), ([10, 20, 30], [0.108, -0.180, -1.244])):
+        modes = pr.assembly_modes(robot, np.deg2rad(degrees))
+        assert modes.count == 2
+        lower = modes.T[modes.T[:, 2, 3].argmin(), :3, 3]
+        np.testing.assert_allclose(lower, place, atol=1e-3)  # dimensions and answers in mm
+
+
+def test_iterative_model_keeps_the_mode_near_home():
+    robot = ROBOTS["SSM"]
+    rng = np.random.default_rng(3)
+    axis = rng.normal(size=(2000, 3))
+    axis *= np.deg2rad(20) * rng.uniform(0, 1, (2000, 1)) / np.linalg.norm(axis, axis=1)[:, None]
+    X = np.c_[robot.home[:3, 3] + rng.uniform(-0.2, 0.2, (2000, 3)), axis]
+    T = robot.pose(X)
+    q = pr.igm(robot, T).q[:, 0]
+    for start in (None, robot.home):
+        found = pr.dgm(robot, q, start)
+        assert (found.status == 0).all()
+        assert found.iterations.max() <= 6
+        np.testing.assert_allclose(found.T, T, atol=1e-12)
+    assert found.reason(3) == pr.PoseStatus.CONVERGED.sentence
+
+
+def test_iterative_model_says_when_it_left_the_mode_or_found_nothing():
+    robot, rng = ROBOTS["SSM"], np.random.default_rng(0)
+    X = np.c_[rng.uniform(-0.3, 0.3, (400, 3)), rng.uniform(-1.5, 1.5, (400, 3))]
+    T = robot.pose(X + [0, 0, 1, 0, 0, 0])
+    start, q = T[:200], pr.igm(robot, T[200:]).q[:, 0]
+    found = pr.dgm(robot, q, start)
+    assert set(found.status.tolist()) == {0, 1, 2}
+    some = found.status != pr.PoseStatus.NOT_CONVERGED
+    same = found.det * pr.determinant(robot, start) > 0
+    np.testing.assert_array_equal(same[some], found.status[some] == pr.PoseStatus.CONVERGED)
+    reached = pr.igm(robot, found.T[some]).q[:, 0]
+    np.testing.assert_allclose(reached, q[some], atol=1e-12)
+    none = pr.dgm(robot, [0.1, 0.1, 0.1, 5.0, 5.0, 5.0])
+    assert none.status == pr.PoseStatus.NOT_CONVERGED
+    assert np.isnan(none.T).all()
+
+
+def test_limits_and_reach_are_statuses():
+    robot = pr.gough_symmetric(1.0, lower=0.8, upper=1.4)
+    heights = np.array([1.0, 5.0])
+    T = robot.pose([[0, 0, z, 0, 0, 0] for z in heights])
+    legs = pr.igm(robot, T)
+    assert legs.status.tolist() == [pr.LegStatus.REACHED, pr.LegStatus.OUTSIDE_LIMITS]
+    assert legs.within_limits[:, 0].tolist() == [True, False]
+    far = pr.igm(ROBOTS["delta"], ROBOTS["delta"].pose([[0, 0, -1.0], [3.0, 0, -1.0]]))
+    assert far.count.tolist() == [8, 0]
+    assert far.reason(1) == pr.LegStatus.OUT_OF_REACH.sentence
+    assert np.isnan(far.q[1]).all()
+    # angles count modulo whole turns
+    turned = pr.five_bar([[-0.2, 0], [0.2, 0]], 0.4, 0.6, lower=np.pi, upper=4 * np.pi)
+    assert pr.igm(turned, turned.home).within_limits.all()
+
+
+def test_a_straight_leg_counts_once():
+    robot = pr.five_bar([[-0.2, 0.0], [0.2, 0.0]], [0.4, 0.4], [0.6, 0.8])
+    place = robot.base[0, :2] + [0.6, 0.8]  # 0.4 + 0.6 from the first axis
+    legs = pr.igm(robot, robot.pose(place))
+    assert legs.count == 2
+    assert pr.classify_singularity(robot, robot.pose(place)).kind == pr.SingularityKind.SERIAL
+    with pytest.raises(InvalidValueError, match="leg 1 is straight"):
+        pr.inverse_jacobian(robot, robot.pose(place))
+
+
+# --- assembly modes ------------------------------------------------------------------------------
+
+
+def test_forty_assembly_modes_of_dietmaier():
+    """P. Dietmaier, "The Stewart-Gough platform of general geometry can have 40 real postures",
+    Advances in Robot Kinematics 1998."""
+    base, platform, lengths = map(np.array, DIETMAIER)
+    modes = pr.assembly_modes(pr.gough(base, platform), lengths)
+    assert modes.count == modes.complex_count == 40
+    assert leg_errors(base, platform, modes.T, lengths).max() < 1e-12
+    apart = np.abs(modes.T[:, None] - modes.T).max(axis=(-1, -2)) + 9.0 * np.eye(40)
+    assert apart.min() > 1e-3
+    assert modes.status == pr.AssemblyStatus.ALL
+
+
+@pytest.mark.parametrize(
+    ("kind", "bound"),
+    [("general", 40), ("planar platform", 40), ("planar base and platform", 40),
+     ("shared anchor", 40)],
+)  # fmt: skip
+def test_lists_of_random_platforms_are_complete(kind, bound):
+    rng = np.random.default_rng(7)
+    for _ in range(8):
+        robot = random_gough(rng, kind)
+        T = moved(np.eye(4), rng.normal(size=6))
+        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+        assert modes.complex_count == bound
+        assert modes.count % 2 == 0
+        assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-9
+        if kind == "planar base and platform":  # solutions are mirrored at the base
+            p = np.einsum("kij,j->ki", modes.T[:, :3, :3], robot.platform.mean(axis=0))
+            z = p[:, 2] + modes.T[:, 2, 3] - robot.base[0, 2]
+            np.testing.assert_allclose(np.sort(z), np.sort(-z), atol=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "bound"), [("TSSM", 16), ("MSSM", 16)])
+def test_triangular_platforms_have_sixteen_solutions(kind, bound):
+    rng = np.random.default_rng(2)
+    symmetric = pr.gough_symmetric(1.0, kind=kind)
+    # triangles of any shape have as many
+    corner = rng.normal(size=(3, 3))
+    base = corner[[0, 1, 1, 2, 2, 0]] if kind == "MSSM" else symmetric.base
+    general = pr.gough(base, rng.normal(size=(3, 3))[[0, 0, 1, 1, 2, 2]])
+    for robot in (symmetric, general):
+        T = moved(robot.home, 0.2 * rng.normal(size=6))
+        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+        assert modes.complex_count == bound
+        assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-9
+
+
+def test_real_lists_equal_a_search_by_newton():
+    robot = random_gough(np.random.default_rng(11))
+    q = pr.igm(robot, robot.home).q[0]
+    modes = pr.assembly_modes(robot, q)
+    rng = np.random.default_rng(0)
+    starts = moved(np.tile(np.eye(4), (3000, 1, 1)), rng.uniform(-3, 3, (3000, 6)))
+    found = pr.dgm(robot, q, starts)
+    T = found.T[found.status != pr.PoseStatus.NOT_CONVERGED]
+    away = np.abs(T[:, None] - modes.T).max(axis=(-1, -2))
+    assert away.min(axis=1).max() < 1e-8  # nothing beside the list
+    assert set(away.argmin(axis=1)) == set(range(int(modes.count)))
+
+
+def test_postures_that_nearly_coincide_are_both_listed():
+    robot = random_gough(np.random.default_rng(5))
+    height = np.linspace(-4, 4, 200)
+
+    def pose(z):
+        return robot.pose([0.1, 0.2, z, 0.3, 0.1, 0.2])
+
+    det = pr.determinant(robot, np.array([pose(z) for z in height]))
+    k = np.flatnonzero(np.diff(np.sign(det)))[0]
+    z0 = brentq(lambda z: float(pr.determinant(robot, pose(z))), height[k], height[k + 1])
+    for off, count in ((1e-3, 2), (1e-5, 2)):
+        T = pose(z0 + off)
+        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+        away = np.sort(np.abs(modes.T - T).max(axis=(-1, -2)))
+        assert (away < 10 * off).sum() == count
+        assert away[0] < 1e-8
+        assert modes.det.min() < 0 < modes.det.max()
+        assert modes.complex_count == 40
+    double = pr.assembly_modes(robot, pr.igm(robot, pose(z0)).q[0])
+    assert double.count == 1
+    assert double.status == pr.AssemblyStatus.ALL
+    assert np.abs(double.T - pose(z0)).max() < 1e-5
+
+
+def test_robots_that_move_with_locked_legs_are_degenerate():
+    symmetric = pr.gough_symmetric(1.0)
+    for platform in (symmetric.base, 0.5 * symmetric.base):
+        modes = pr.assembly_modes(pr.gough(symmetric.base, platform), [1.0] * 6)
+        assert modes.status == pr.AssemblyStatus.DEGENERATE
+        assert "do not determine" in modes.reason()
+    # Bricard's line-symmetric octahedron is not singular everywhere, but flexible
+    for seed in (0, 1):
+        corner = np.random.default_rng(seed).normal(size=(3, 3))
+        other = corner * [-1, -1, 1]
+        octahedron = pr.gough(corner[[0, 0, 1, 1, 2, 2]], other[[1, 2, 0, 2, 0, 1]])
+        q = pr.igm(octahedron, np.eye(4)).q[0]
+        assert pr.assembly_modes(octahedron, q).status == pr.AssemblyStatus.DEGENERATE
+        assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
+
+
+def test_legs_that_do_not_meet_give_no_mode_and_a_sentence():
+    robot = ROBOTS["SSM"]
+    modes = pr.assembly_modes(robot, [[1, 1, 1, 1, 1, 9.0], [1.0] * 6])
+    assert modes.count[0] == 0
+    assert modes.count[1] > 0
+    assert "do not meet" in modes.reason(0)
+    assert modes.reason(1) == pr.AssemblyStatus.ALL.sentence
+
+
+INNOCENTI = (17.04, 16.54, 20.84)
+
+
+def test_six_modes_of_the_planar_robot_of_innocenti():
+    """C. Innocenti and V. Parenti-Castelli, "Singularity-free evolution from one configuration to
+    another in serial and fully-parallel manipulators", J. of Mechanical Design 120 (1998)."""
+    a, b, c = INNOCENTI
+    x = (a * a + c * c - b * b) / (2 * a)
+    robot = pr.planar_3rpr(
+        [[0, 0], [15.91, 0], [0, 10]], [[0, 0], [a, 0], [x, np.sqrt(c * c - x * x)]]
+    )
+    q = [14.98, 15.38, 12.0]
+    modes = pr.assembly_modes(robot, q)
+    assert modes.count == 6
+    assert np.sign(modes.det).sum() == 0
+    assert (np.diff(robot.coordinates(modes.T)[:, 2]) > 0).all()
+    assert leg_errors(robot.base, robot.platform, modes.T, q).max() < 1e-12
+
+
+def test_planar_lists_are_even_and_equal_to_a_search():
+    rng = np.random.default_rng(4)
+    counts = Counter()
+    for k in range(200):
+        robot = pr.planar_3rpr(*rng.normal(size=(2, 3, 2)))
+        T = robot.pose(rng.normal(size=3))
+        q = pr.igm(robot, T).q[0]
+        modes = pr.assembly_modes(robot, q)
+        counts[int(modes.count)] += 1
+        assert modes.complex_count == 6
+        assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-8
+        if k < 20:
+            starts = robot.pose(rng.uniform(-4, 4, (4000, 3)))
+            found = pr.dgm(robot, q, starts)
+            T = found.T[found.status != 1]
+            away = np.abs(T[:, None] - modes.T).max(axis=(-1, -2))
+            assert away.min(axis=1).max() < 1e-7
+            assert set(away.argmin(axis=1)) == set(range(int(modes.count)))
+    assert set(counts) == {2, 4, 6}
+
+
+def test_similar_triangles_have_at_most_four_modes():
+    rng = np.random.default_rng(6)
+    for scale in (0.5, 1.0, 1.7):
+        for _ in range(10):
+            base = rng.normal(size=(3, 2))
+            robot = pr.planar_3rpr(base, scale * base)
+            T = robot.pose(rng.normal(size=3))
+            q = pr.igm(robot, T).q[0]
+            modes = pr.assembly_modes(robot, q)
+            assert modes.complex_count == 4
+            assert modes.count in (2, 4)
+            assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-9
+            # with w_i = (s e^{i phi} - 1) a_i, k_i and the lengths are of first degree in cos phi:
+            # the equation of first degree in |s e^{i phi} - 1|^2 has degree two in it
+            u = (np.abs(scale * np.exp(1j * robot.coordinates(modes.T)[:, 2]) - 1) ** 2).round(9)
+            assert len(set(u)) <= 2
+    equal = pr.planar_3rpr(base, base)
+    assert pr.assembly_modes(equal, [1.0] * 3).status == pr.AssemblyStatus.DEGENERATE
+
+
+def test_solutions_of_equal_orientation_are_both_listed():
+    # base and platform on lines: mirrored pairs, one of them with equal orientation
+    robot = pr.planar_3rpr([[0, 0], [1, 0], [3, 0]], [[0, 0], [0.5, 0], [0.9, 0]])
+    T = robot.pose([0.4, 1.1, 0.0])
+    modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+    mirrored = robot.pose([0.4, -1.1, 0.0])
+    for pose in (T, mirrored):
+        assert np.abs(modes.T - pose).max(axis=(-1, -2)).min() < 1e-9
+
+
+def test_spheres_and_circles_that_touch_miss_or_coincide():
+    five = pr.five_bar([[0, 0], [1.0, 0]], 0.3, 0.5)
+    assert pr.assembly_modes(five, [np.pi / 2, np.pi / 2]).count == 1  # the rods are stretched
+    apart = pr.assembly_modes(five, [np.pi, 0.0])
+    assert (apart.count, apart.status) == (0, 0)
+    folded = pr.five_bar([[0, 0], [0.6, 0]], 0.3, 0.5)
+    assert pr.assembly_modes(folded, [0.0, np.pi]).status == pr.AssemblyStatus.DEGENERATE
+    delta = pr.delta(0.2 * RING, 0.2 * RING, TURN, 0.5, 1.0)
+    straight = pr.assembly_modes(delta, [0.3, 0.3, 0.3])
+    assert straight.count == 2
+    line = pr.delta([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]], np.zeros((3, 3)), [0, 0, 0], 0.3, 1.5)
+    modes = pr.assembly_modes(line, [0.2, 0.2, 0.2])
+    assert (modes.count, modes.status) == (0, 0)  # three circles of one axis that do not meet
+
+
+# --- velocities ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_jacobians_are_derivatives_in_every_mode(name):
+    robot, h = ROBOTS[name], 1e-6
+    T, V = poses_near_home(robot, 4), twists(robot, 4)
+    ahead, behind = moved(T, h * V), moved(T, -h * V)
+    modes = pr.igm(robot, T).mode
+    for mode in modes.T:
+        k = int(mode[0])
+        slope = (pr.igm(robot, ahead).q[:, k] - pr.igm(robot, behind).q[:, k]) / (2 * h)
+        np.testing.assert_allclose(pr.ikm(robot, T, V, mode), slope, atol=1e-7)
+        rate = pr.inverse_jacobian_rate(robot, T, V, mode)
+        change = pr.inverse_jacobian(robot, ahead, mode) - pr.inverse_jacobian(robot, behind, mode)
+        np.testing.assert_allclose(rate, change / (2 * h), atol=1e-6)
+        np.testing.assert_allclose(pr.dkm(robot, T, slope, mode), V, atol=1e-6)
+        A = twists(robot, 4, seed=5)
+        second = pr.ikm_second_order(robot, T, V, A, mode)
+        rates = pr.ikm(robot, T, V, mode)
+        np.testing.assert_allclose(pr.dkm_second_order(robot, T, rates, second, mode), A, atol=1e-9)
+
+
+def test_rows_are_unit_lines_of_the_legs():
+    robot = ROBOTS["gough"]
+    T = poses_near_home(robot, 1)[0]
+    arm = robot.platform @ T[:3, :3].T
+    u = T[:3, 3] + arm - robot.base
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    rows = np.c_[u, np.cross(arm, u)]
+    np.testing.assert_allclose(pr.inverse_jacobian(robot, T), rows, atol=1e-14)
+    np.testing.assert_allclose(pr.determinant(robot, T), np.linalg.det(rows), rtol=1e-12)
+    assert pr.dgm(robot, pr.igm(robot, T).q[0], T).det == pytest.approx(np.linalg.det(rows))
+
+
+# --- batches and mistakes ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_batches_of_any_shape_and_empty_ones(name):
+    robot = ROBOTS[name]
+    T = poses_near_home(robot, 6).reshape(2, 3, 4, 4)
+    legs = pr.igm(robot, T.tolist())
+    q = legs.q[..., 0, :]
+    assert legs.q.shape == (2, 3, legs.q.shape[-2], robot.m)
+    modes, near = pr.assembly_modes(robot, q), pr.dgm(robot, q)
+    assert modes.T.shape[:2] == near.T.shape[:2] == modes.status.shape == (2, 3)
+    single = pr.assembly_modes(robot, q[1, 2])
+    np.testing.assert_array_equal(single.T, modes.T[1, 2, : single.T.shape[0]])
+    for result in (legs, modes, near):
+        assert pickle.loads(pickle.dumps(result)) == result
+        assert len(repr(result).splitlines()) <= 6
+        assert not (result.q if result is legs else result.T).flags.writeable
+    none = np.empty((0, 4, 4))
+    assert pr.igm(robot, none).q.shape[0] == 0
+    assert pr.inverse_jacobian(robot, none).shape == (0, robot.m, 6)
+    assert pr.assembly_modes(robot, np.empty((0, robot.m))).count.shape == (0,)
+    assert pr.dgm(robot, np.empty((0, robot.m))).T.shape == (0, 4, 4)
+    assert pr.ikm(robot, T, twists(robot, 1)[0]).shape == (2, 3, robot.m)
+
+
+GOOD = ROBOTS["SSM"]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: pr.gough(GOOD.base[:5], GOOD.platform[:5]), ShapeError, "6 points"),
+        (lambda: pr.gough(GOOD.base, GOOD.platform[[0, 0, 0, 0, 0, 0]]), InvalidValueError, "all"),
+        (lambda: pr.gough(GOOD.base[[0, 0, 1, 2, 3, 4]], GOOD.platform[[0, 0, 1, 2, 3, 4]]),
+         InvalidValueError, "legs 1 and 2"),
+        (lambda: pr.gough(GOOD.base * np.nan, GOOD.platform), InvalidValueError, "finite"),
+        (lambda: pr.gough(GOOD.base, GOOD.platform, lower=-1), InvalidValueError, "not negative"),
+        (lambda: pr.gough(GOOD.base, GOOD.platform, 2, 1), InvalidValueError, "lower below upper"),
+        (lambda: pr.five_bar([[0, 0], [1, 0]], -1, 1), InvalidValueError, "above 0"),
+        (lambda: pr.five_bar([[0, 0], [0, 0]], 1, 1), InvalidValueError, "coincide"),
+        (lambda: pr.planar_3rpr([[0, 0], [1, 0]], TRIANGLE), ShapeError, "3 points"),
+        (lambda: pr.gough_symmetric(1.0, kind="XSM"), InvalidValueError, "SSM, TSSM, MSSM"),
+        (lambda: pr.gough_symmetric(-1.0), InvalidValueError, "radius"),
+        (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1, -1.0]), InvalidValueError, "negative"),
+        (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1]), ShapeError, "q"),
+        (lambda: pr.dgm(GOOD, [1, 1, 1, 1, 1, np.nan]), InvalidValueError, "q"),
+        (lambda: pr.igm(GOOD, 2.0 * np.eye(4)), NotARotationError, "rotation|last row"),
+        (lambda: pr.igm(GOOD, np.full((4, 4), np.nan)), InvalidValueError, "finite"),
+        (lambda: pr.igm(ROBOTS["delta"], GOOD.pose([0, 0, -1, 0.1, 0, 0])), InvalidValueError,
+         "translates only"),
+        (lambda: pr.igm(ROBOTS["3-RPR"], GOOD.pose([0, 0, 1, 0, 0, 0])), InvalidValueError, "plane"),
+        (lambda: pr.igm("robot", np.eye(4)), InvalidValueError, "parallel.gough"),
+        (lambda: pr.inverse_jacobian(GOOD, np.eye(4), mode=1), InvalidValueError, "mode"),
+        (lambda: pr.inverse_jacobian(ROBOTS["delta"], ROBOTS["delta"].pose([9, 0, 0])),
+         InvalidValueError, "out of reach"),
+        (lambda: pr.dkm(GOOD, GOOD.home, [1, 2]), ShapeError, "q_rate"),
+        (lambda: pr.ikm(GOOD, np.tile(GOOD.home, (2, 1, 1)), np.zeros((3, 6))), ShapeError, "axes"),
+        (lambda: pr.assembly_modes(GOOD, [1.0] * 6).reason(3), InvalidValueError, "index"),
+    ],
+)  # fmt: skip
+def test_mistakes_say_what_to_do(call, error, words):
+    with pytest.raises(error, match=words):
+        call()
