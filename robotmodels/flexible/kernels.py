@@ -213,7 +213,9 @@ def section_at(
     # series in s = t.t of sin|t|/|t|, a = (1 - cos|t|)/s, b = (|t| - sin|t|)/|t|^3 and da, db by s
     s, sine, a, b, da, db = dot(t, t), 0.0, 0.0, 0.0, 0.0, 0.0
     term, before = 1.0, 0.0  # (-s)^n / (2 n + 1)! and its derivative divided by n
-    for n in range(14):
+    for n in range(20):
+        if abs(term) + abs(before) < 1e-24:
+            break
         even, odd = 1.0 / (2 * n + 2), 1.0 / ((2 * n + 2) * (2 * n + 3))
         sine += term
         a += term * even
@@ -259,17 +261,14 @@ def place(arm: Arm, k: int, q: Floats, i: int, work: Work) -> tuple[Matrix, Vect
 @compiled()
 def add_back(I: Floats, p: Floats, b: int, J: Floats, h: Floats, j: int, X: Floats) -> None:  # noqa: E741
     """Add inertia and load in row j, behind a transform, to row b."""
-    y = np.empty(6)
     for c in range(6):
         for r in range(6):
-            s = 0.0
-            for x in range(6):
-                s += J[j, r, x] * X[j, x, c]
-            y[r] = s
-        for r in range(6):
             p[b, c] += X[j, r, c] * h[j, r]
+            y = 0.0
             for x in range(6):
-                I[b, x, c] += X[j, r, x] * y[r]
+                y += J[j, r, x] * X[j, x, c]
+            for x in range(6):
+                I[b, x, c] += X[j, r, x] * y
 
 
 @compiled()
@@ -506,17 +505,27 @@ def loads(
     return failed
 
 
-@compiled(NOTHING(ARM, MATRIX, MATRIX, MATRIX, MATRIX, OUT4, OUT2))
+@compiled(NOTHING(ARM, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, OUT4, OUT2))
 def motions(
-    arm: Arm, q: Floats, e: Floats, v: Floats, ev: Floats, poses: Floats, out: Floats
+    arm: Arm,
+    q: Floats,
+    e: Floats,
+    v: Floats,
+    ev: Floats,
+    twist: Floats,
+    poses: Floats,
+    out: Floats,
 ) -> None:
     """Poses, energies, momenta, and the velocity of the tool, in world axes.
 
-    Shapes: q, v (N, n); e, ev (N, m) -> poses (N, f + 1, 3, 4), the last of the tip section at the
-    tool; out (N, 15): kinetic energy, energy of gravity, elastic energy, momenta (6), twist (6).
+    Shapes: q, v (N, n); e, ev (N, m); twist of the base (N, 6) -> poses (N, f + 1, 3, 4), the last
+    of the tip section, at the tool; out (N, 15): energies (kinetic, of gravity, elastic), momenta
+    (6), twist of the tool (6).
     """
     f, t, work = arm.pi.shape[0], arm.end, workspace(arm)
     for i in range(q.shape[0]):
+        put_vector(work.u, 0, part(twist, i, 0))
+        put_vector(work.w, 0, part(twist, i, 3))
         for x in range(15):
             out[i, x] = 0.0
         for k in range(f):

@@ -37,7 +37,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, SingularMassMatrixError
 from .robot import FlexibleRobot
 
-_FORCES, _INVERSE, _DIRECT = range(3)
+INVERSE, DIRECT = range(2)
 _NO_WRENCH = np.zeros((1, 6))
 
 
@@ -117,7 +117,7 @@ def jacobian(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Ar
     ndarray, shape (..., 6, n + m)
         The columns of the joints, then of the elastic coordinates.
     """
-    batch, (q, e) = _rows(arm, q=q, e=e)
+    batch, (q, e) = checked_rows(arm, q=q, e=e)
     n, size = arm.n, arm.n + arm.m
     unit = np.tile(np.eye(size), (len(q), 1))
     many = [np.repeat(x, size, axis=0) for x in (q, e)]
@@ -139,7 +139,7 @@ def energies(
     kinetic, potential : ndarray, shape (...)
         J; rotors included.
     """
-    batch, (q, e, v, e_v) = _rows(arm, q=q, e=e, v=v, e_v=e_v)
+    batch, (q, e, v, e_v) = checked_rows(arm, q=q, e=e, v=v, e_v=e_v)
     kinetic, potential, _ = states(arm, q, e, v, e_v)
     return kinetic.reshape(batch), potential.reshape(batch)
 
@@ -170,8 +170,8 @@ def idm(
     F. Boyer and W. Khalil, "An efficient calculation of flexible manipulator inverse dynamics",
     Int. J. Robotics Research 17 (1998).
     """
-    batch, rows = _rows(arm, q=q, e=e, v=v, e_v=e_v, a=a, wrench=wrench)
-    tau, e_a, _ = solved(arm, _INVERSE, *rows, drive=drive)
+    batch, rows = checked_rows(arm, q=q, e=e, v=v, e_v=e_v, a=a, wrench=wrench)
+    tau, e_a, _ = solved(arm, INVERSE, *rows, drive=drive)
     return tau.reshape(*batch, arm.n), e_a.reshape(*batch, arm.m)
 
 
@@ -200,8 +200,8 @@ def ddm(
     >>> a.shape, e_a.shape
     ((6,), (2,))
     """
-    batch, rows = _rows(arm, q=q, e=e, v=v, e_v=e_v, tau=tau, wrench=wrench)
-    a, e_a, base = solved(arm, _DIRECT, *rows, drive=drive)
+    batch, rows = checked_rows(arm, q=q, e=e, v=v, e_v=e_v, tau=tau, wrench=wrench)
+    a, e_a, base = solved(arm, DIRECT, *rows, drive=drive)
     status = base[:, 9].astype(np.int8).reshape(batch)
     return Accelerations((a.reshape(*batch, arm.n), e_a.reshape(*batch, arm.m)), status)
 
@@ -214,7 +214,7 @@ def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) ->
     ndarray, shape (..., n + m, n + m)
         Symmetric.
     """
-    batch, (q, e) = _rows(arm, q=q, e=e)
+    batch, (q, e) = checked_rows(arm, q=q, e=e)
     n, size = arm.n, arm.n + arm.m
     bare = arm.arrays.second.copy()
     bare[..., 16:] = 0.0  # no elastic forces
@@ -230,7 +230,7 @@ def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) ->
 # --- rows of samples, checked ------------------------------------------------------------------
 
 
-def _rows(arm: FlexibleRobot, **given: Any) -> tuple[tuple[int, ...], list[Array]]:
+def checked_rows(arm: FlexibleRobot, **given: Any) -> tuple[tuple[int, ...], list[Array]]:
     """Batch axes and rows (N, k) of vectors; None is zero."""
     if not isinstance(arm, FlexibleRobot):
         raise InvalidValueError(
@@ -250,8 +250,8 @@ def _rows(arm: FlexibleRobot, **given: Any) -> tuple[tuple[int, ...], list[Array
 def _of_links(arm: FlexibleRobot, q: Array, e: Array) -> tuple[Array, Array]:
     """Turns of the links (N, n), and modes (N, modes), of motors and elastic coordinates."""
     if not len(arm.joints):
-        return q, e
-    turns, modes = q.copy(), arm.modes
+        return np.ascontiguousarray(q), np.ascontiguousarray(e)
+    turns, modes = np.array(q, order="C"), arm.modes
     turns[:, arm.joints] += e[:, modes:]
     return turns, np.ascontiguousarray(e[:, :modes])
 
@@ -261,13 +261,13 @@ def _motions(arm: FlexibleRobot, q: Array, e: Array, v: Array, ev: Array) -> tup
     from .kernels import motions
 
     out, poses = np.empty((len(q), 15)), np.empty((len(q), arm.model.f + 1, 3, 4))
-    turns, rates = _of_links(arm, q, e), _of_links(arm, np.array(v), np.array(ev))
-    motions(arm.arrays, *turns, *rates, poses, out)
+    turns, rates = _of_links(arm, q, e), _of_links(arm, v, ev)
+    motions(arm.arrays, *turns, *rates, np.zeros((len(q), 6)), poses, out)
     return poses, out
 
 
 def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
-    batch, (q, e) = _rows(arm, q=q, e=e)
+    batch, (q, e) = checked_rows(arm, q=q, e=e)
     poses = np.zeros((len(q), arm.model.f + 1, 4, 4))
     poses[:, :, :3], poses[:, :, 3, 3] = _motions(arm, q, e, 0.0 * q, 0.0 * e)[0], 1.0
     return poses.reshape(*batch, *poses.shape[1:])
@@ -306,7 +306,7 @@ def solved(
     arrays, drives = arm.arrays, arm.model.drive_matrices if drive else None
     if not drive:
         arrays = arrays._replace(rotor=read_only(np.zeros(arm.n)))
-    direct = kind == _DIRECT
+    direct = kind == DIRECT
     rest = 0.0 if drives is None else drives.torque(v, None)
     value = given - rest if direct and drives is not None else given
     flags = np.full(arm.n, int(direct))
@@ -366,7 +366,6 @@ def generalized_forces(
     out, found, base = np.empty((N, arm.n)), np.empty((N, modes)), np.empty((N, 10))
     pull = wrench if len(wrench) == N else np.zeros((N, 6))
     flags = np.zeros(arm.n, np.int64)
-    given = [np.ascontiguousarray(x) for x in given]
     loads(
         arrays or arm.arrays, *turns, *rates, *given, pull, np.zeros((N, 6)), flags, 0, 0,
         out, found, base,

@@ -236,3 +236,16 @@ def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:
         return np.zeros_like(M)
     values, V = eigh(K, M)
     return M @ (V * (2.0 * ratios * np.sqrt(np.maximum(values, 0.0)))) @ V.T @ M
+
+
+def damping_matrix(arm: FlexibleRobot) -> Array:
+    """Viscous damping of (q, e): of the drives, the modes and the flexible joints."""
+    n, s, D = arm.n, 0, np.zeros((arm.n + arm.m,) * 2)
+    if arm.model.drive_matrices is not None:
+        D[:n, :n] = arm.model.drive_matrices.viscous
+    for link in arm.links.values():
+        here = slice(s, s + link.m)
+        s, at = s + link.m, slice(n + s, n + s + link.m)
+        D[at, at] = modal_damping_matrix(link.invariants, arm.modal_damping[here])  # type: ignore[index]
+    D[n + s :, n + s :] = np.diag(arm.joint_damping[arm.joints])  # type: ignore[index]
+    return D
