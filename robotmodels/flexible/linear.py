@@ -97,7 +97,7 @@ def static_deflection(
     """
     batch, (q, w) = checked_rows(arm, q=q, wrench=wrench)
     N, m, rest = len(q), arm.m, np.zeros((1, arm.n))
-    e, scale = np.zeros((N, m)), _scales(arm)[arm.n :]
+    e, scale = np.zeros((N, m)), scales(arm)[arm.n :]
     status = np.full(N, DeflectionStatus.NOT_FOUND, np.int8)
 
     def forces(rows: Array, e: Array, tile: int = 1) -> tuple[Array, Array]:
@@ -198,7 +198,7 @@ def stiffness_matrix(arm: FlexibleRobot) -> Array:
     return K
 
 
-def _scales(arm: FlexibleRobot) -> Array:
+def scales(arm: FlexibleRobot) -> Array:
     """Sizes of coordinates: 1 rad or m, of modes the amplitude with the tip at a length."""
     sizes = [np.full(link.m, link.length) for link in arm.links.values()]
     return np.concatenate([np.ones(arm.n), *sizes, np.ones(len(arm.joints))])
@@ -311,7 +311,7 @@ def tip_gain(J: Array, n: int) -> Array:
 
 def tangent(arm: FlexibleRobot, x: Array) -> Array:
     """Derivative of the forces at rest by (q, e). Shapes: x (n + m,) -> (n + m, n + m)."""
-    n, k, h = arm.n, len(x), 0.01 * _scales(arm)
+    n, k, h = arm.n, len(x), 0.01 * scales(arm)
     still = np.zeros((k, n)), np.zeros((k, arm.m))
 
     def forces(c: int) -> Array:

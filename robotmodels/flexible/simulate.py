@@ -13,15 +13,17 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
 from .._choices import chosen
 from .._outcomes import Outcome
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from ..geometry import DHTable
 from ..model import RobotModel
 from ..simulation import Integrator
+from .linear import scales
 from .link import FlexibleLink
 from .models import DIRECT, SpinStatus, ddm, jacobian, solved, states
 from .robot import FlexibleRobot, damping_matrix
 
 _LAW = Callable[..., ArrayLike]
+_LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
 _PER_SECOND = 30_000  # default budget of evaluations
 
 
@@ -30,7 +32,7 @@ class FlexibleMotionStatus(Outcome):
 
     FINISHED = 0, "The motion was followed to its end."
     NOT_CONVERGED = 1, "The allowed evaluations of the model were used up before the end."
-    STEP_TOO_SMALL = 2, "The steps became too small to go on: the motion grows without bound."
+    DIVERGED = 2, "The motion grew without bound."
     SOFTENED = 3, SpinStatus.SOFTENED.sentence
 
 
@@ -205,11 +207,14 @@ def simulate(
 
     y0 = np.concatenate([*(start[k] for k in (0, 1, 2, 3)), np.zeros(7)])
     options = (chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress)
-    times, Y, status, count = followed(rate, y0, t, *options)
+    largest = _LARGEST * scales(arm)[n:]
+    times, Y, status, count = followed(
+        rate, y0, t, *options, lambda y: bool((np.abs(y[n : n + m]) > largest).any())
+    )
     q, e, v, ev, rest = np.split(Y, cuts, axis=1)
     tau = np.array([law(time, *np.split(y, cuts)[:4]) for time, y in zip(times, Y, strict=True)])
     kinetic, potential, momentum = states(arm, *(np.ascontiguousarray(x) for x in (q, e, v, ev)))
-    if status == FlexibleMotionStatus.FINISHED and softened[0]:
+    if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
         status = FlexibleMotionStatus.SOFTENED
     return FlexibleMotion(
         arm, times, q, v, tau, e, ev, kinetic, potential, rest[:, 0], momentum, rest[:, 1:], status,
@@ -249,6 +254,7 @@ def followed(
     atol: float,
     budget: int | None,
     progress: Callable[[float], None] | None,
+    beyond: Callable[[Array], bool] = lambda y: False,
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """Times, states, status and evaluations of an initial value problem."""
     import scipy.integrate
@@ -270,9 +276,12 @@ def followed(
             if solver.nfev >= most:
                 status = FlexibleMotionStatus.NOT_CONVERGED
                 break
-            solver.step()
-            if solver.status == "failed":
-                status = FlexibleMotionStatus.STEP_TOO_SMALL
+            try:
+                solver.step()
+            except SingularMassMatrixError:  # accelerations that are not finite
+                solver.status = "failed"
+            if solver.status == "failed" or beyond(solver.y):
+                status = FlexibleMotionStatus.DIVERGED
                 break
             if wanted is None:
                 found.append((float(solver.t), solver.y.copy()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -20,8 +21,8 @@ from .robot import FlexibleRobot, damping_matrix
 _METHODS = ("stable_inversion", "causal")
 _TIME_CONSTANTS = 14.0  # of the slowest unstable zero: default preview
 _CORRECTIONS = 4
-_GRID, _START = 1001, 200  # samples; intervals that the boundary value problem starts with
-_TOLERANCE, _NODES, _ON_PATH = 1e-5, 5_000, 1e-8  # of the boundary value problem; rad or m
+_PART, _EVERY = 400, 8  # samples of each part; those that the problem starts with
+_TOLERANCE, _NODES, _ON_PATH = 1e-6, 5_000, 1e-8  # of the boundary value problem; rad or m
 _UNSTABLE = 1e-6  # least real part of an unstable zero, relative to its size
 
 
@@ -177,27 +178,43 @@ def tip_tracking(
     if method == "causal" and unstable.size:
         refused = TipStatus.NON_MINIMUM_PHASE
         return TipTracking(arm, np.zeros(0), *nothing, zeros, 0.0, refused)
-    grid = np.linspace(-before, T + (before if unstable.size else 0.0), _GRID)
-    path = np.array([at(float(np.clip(t, 0.0, T)))[0] for t in grid])
+    after = before if unstable.size else 0.0
+    ends = ((-before, 0.0), (0.0, T), (T, T + after))  # with nodes where the motion has kinks
+    parts = [np.linspace(a, b, _PART, endpoint=False) for a, b in ends if b > a]
+    grid = np.append(np.concatenate(parts), T + after)
+
+    def path(times: Array) -> list[Array]:
+        """Positions, velocities and accelerations (N, n), at rest before and after."""
+        inside = ((times > 0.0) & (times < T))[:, None]
+        if hasattr(motion, "a"):
+            q, v, a = at(np.clip(times, 0.0, T))  # type: ignore[arg-type]
+        else:
+            samples = [at(float(t)) for t in np.clip(times, 0.0, T)]
+            q, v, a = (np.array(x) for x in zip(*samples, strict=True))
+        return [q.reshape(-1, n), v.reshape(-1, n) * inside, a.reshape(-1, n) * inside]
+
     found = _inverted(arm, grid, path)
     if found is None:
         return TipTracking(arm, np.zeros(0), *nothing, zeros, before, TipStatus.NOT_FOUND)
     return TipTracking(arm, grid, *found, zeros, before, TipStatus.FOUND)
 
 
-def _inverted(arm: FlexibleRobot, grid: Array, path: Array) -> list[Array] | None:
-    """Motion and torques by a boundary value problem. Shapes: grid (N,), path (N, n)."""
+def _inverted(
+    arm: FlexibleRobot, grid: Array, reference: Callable[[Array], list[Array]]
+) -> list[Array] | None:
+    """Motion and torques at times (N,) by a boundary value problem."""
     from scipy.integrate import solve_bvp
     from scipy.interpolate import make_interp_spline
 
-    n, m, N = arm.n, arm.m, len(grid)
+    n, m, N, path = arm.n, arm.m, len(grid), reference(grid)[0]
     gain = tip_gain(jacobian(arm, path, np.zeros((N, m))), n).reshape(N, n * m)
     gains = make_interp_spline(grid, gain, k=5)
 
     def motors(t: Array, e: Array, ev: Array) -> tuple[Array, Array, Array, Array]:
         """Motion of the motors without the share of the elastic accelerations, and the gain."""
         H, dH, ddH = (gains(t, order).reshape(-1, n, m) for order in range(3))
-        y, dy, ddy = (output(t, order) for order in range(3))
+        wanted = reference(np.atleast_1d(t))
+        y, dy, ddy = (x - shift(t, order) for order, x in enumerate(wanted))
         x, dx = e[..., None], ev[..., None]
         v, a = dy - (dH @ x + H @ dx)[..., 0], ddy - (ddH @ x + 2.0 * dH @ dx)[..., 0]
         return y - (H @ x)[..., 0], v, a, H
@@ -226,10 +243,10 @@ def _inverted(arm: FlexibleRobot, grid: Array, path: Array) -> list[Array] | Non
             [upper, -np.linalg.solve(zero_mass(M, H), stiff)]
         )
 
-    correction, nodes = np.zeros_like(path), grid[:: (N - 1) // _START]
+    correction, nodes = np.zeros_like(path), grid[::_EVERY]
     guess, stiffness = np.zeros((2 * m, len(nodes))), stiffness_matrix(arm)[n:, n:]
     for k in range(_CORRECTIONS):
-        output = make_interp_spline(grid, path - correction, k=5)
+        shift = make_interp_spline(grid, correction, k=5)
         for _ in range(0 if k else _CORRECTIONS):  # deflection by the loads of the slow motion
             e, ev = guess[:m].T, guess[m:].T
             q, v, a, H = motors(nodes, e, ev)
