@@ -1,0 +1,343 @@
+"""Control of flexible robots: regulation, motion in fixed time, tracking of joints (7.3.3.1 to 3).
+
+A law is a function of (t, q, v, e, e_v) that `simulate` takes as its ``control``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Frozen, as_exact, as_number, as_reals
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, ShapeError
+from .linear import static_deflection
+from .models import INVERSE, idm, solved
+from .robot import FlexibleRobot
+
+Law = Callable[[float, Array, Array, Array, Array], Array]
+_FACTORS = 2  # free coefficients of each joint, for each elastic condition that one joint has
+_NEWTON = 12
+_FINE, _COARSE, _STEP = 1e-10, 1e-7, 1e-2  # tolerances of integration; step of differences
+_STILL = 1e-9  # relative to the largest deflection on the way: vibration at the end
+
+
+class RestStatus(Outcome):
+    """Outcome of a motion from rest to rest; fits int8."""
+
+    AT_REST = 0, "The arm ends at rest, its elastic coordinates included."
+    VIBRATES = 1, "Vibration is left at the end: the duration is too short for this arm."
+
+
+def regulator(
+    arm: FlexibleRobot, kp: ArrayLike, kd: ArrayLike, q_goal: ArrayLike | None = None
+) -> Law:
+    """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints.
+    kp, kd : array_like, shape () or (n,)
+        Positive gains, N m/rad and N m s/rad.
+    q_goal : array_like, shape (n,), optional
+        Goal of the motors; default zero.
+
+    Returns
+    -------
+    callable
+        The law.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Gains that are not positive; a goal without equilibrium.
+
+    References
+    ----------
+    Seed book section 7.3.3.1; A. De Luca and B. Siciliano, "Regulation of flexible arms under
+    gravity", IEEE Trans. Robotics and Automation 9 (1993).
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
+    >>> motion = flexible.simulate(arm, [0.0], control=regulator(arm, 1.0, 1.0, [0.2]), t=10.0)
+    >>> bool(abs(motion.q[-1] - 0.2) < 1e-3)
+    True
+    """
+    n = arm.n
+    goal = np.zeros(n) if q_goal is None else as_exact(q_goal, (n,), "q_goal").copy()
+    P, D = _gains(kp, n, "kp"), _gains(kd, n, "kd")
+    found = static_deflection(arm, goal)
+    if np.isnan(found.tau).any():
+        raise InvalidValueError(f"q_goal: the arm has no equilibrium there. {found.reason()}")
+    hold = found.tau
+    return lambda t, q, v, e=None, e_v=None: P * (goal - q) - D * v + hold
+
+
+def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
+    """Tracking of joint motions: the inverse model with the errors of the motors (section 7.3.3.3).
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints.
+    reference : Trajectory, RestToRest, or callable
+        Motion of the motors, or a function of t that returns (q, v, a).
+    kp, kd : array_like, shape () or (n,)
+        Positive gains, 1/s^2 and 1/s: the errors decay with ``s^2 + kd s + kp``.
+
+    Returns
+    -------
+    callable
+        The law, which uses e and e_v.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Gains that are not positive, a reference of another kind.
+
+    Examples
+    --------
+    >>> from robotmodels import load, flexible, trajectories
+    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
+    >>> motion = trajectories.quintic(np.zeros(6), np.ones(6), duration=1.0)
+    >>> law = joint_tracking(arm, motion, 100.0, 20.0)
+    >>> law(0.5, motion.q(0.5), motion.v(0.5), np.zeros(2), np.zeros(2)).shape
+    (6,)
+    """
+    P, D, at = _gains(kp, arm.n, "kp"), _gains(kd, arm.n, "kd"), motion_of(reference)
+
+    def law(t: float, q: Array, v: Array, e: Array, e_v: Array) -> Array:
+        qd, vd, ad = at(t)
+        return idm(arm, q, e, v, e_v, ad + D * (vd - v) + P * (qd - q))[0]
+
+    return law
+
+
+def motion_of(reference: Any) -> Callable[[float], tuple[Array, Array, Array]]:
+    """Function of t that returns (q, v, a), of a trajectory or of such a function."""
+    motion = getattr(reference, "trajectory", reference)
+    if hasattr(motion, "a"):
+        return lambda t: (motion.q(t), motion.v(t), motion.a(t))
+    if callable(motion):
+        return lambda t: tuple(np.asarray(x, np.float64) for x in motion(t))  # type: ignore[return-value]
+    raise InvalidValueError(
+        "reference: expected a trajectory, or a function of t that returns (q, v, a), got "
+        f"{type(reference).__name__}."
+    )
+
+
+def _gains(value: ArrayLike, n: int, name: str) -> Array:
+    gains = as_reals(value, name)
+    if gains.shape not in ((), (n,)):
+        raise ShapeError(f"{name}: expected one number or shape ({n},), got {gains.shape}.")
+    if not (np.isfinite(gains) & (gains > 0.0)).all():
+        raise InvalidValueError(f"{name}: expected positive gains, got {gains.tolist()}.")
+    return np.broadcast_to(gains, (n,)).copy()
+
+
+# --- rest to rest --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPolynomial(Frozen):
+    """Motion of the joints from rest to rest: ``q0 + (q1 - q0) p(s) + c_k p_k(s)``, s = t / T.
+
+    Parameters
+    ----------
+    q0, q1 : ndarray, shape (n,)
+        Ends.
+    duration : float
+        T, s.
+    factors : ndarray, shape (n, K)
+        Coefficients c.
+    """
+
+    q0: Array
+    q1: Array
+    duration: float
+    factors: Array
+
+    def _at(self, t: ArrayLike, order: int) -> Array:
+        s = np.asarray(t, np.float64) / self.duration
+        basis = _basis(np.clip(s, 0.0, 1.0), self.factors.shape[-1], order) / self.duration**order
+        if order:
+            basis = basis * ((s >= 0.0) & (s <= 1.0))[..., None]
+        return (order == 0) * self.q0 + basis @ np.hstack(
+            [(self.q1 - self.q0)[:, None], self.factors]
+        ).T
+
+    def q(self, t: ArrayLike) -> Array:
+        """Positions (..., n) at times (...), constant before and after the motion."""
+        return self._at(t, 0)
+
+    def v(self, t: ArrayLike) -> Array:
+        """Velocities (..., n) at times (...)."""
+        return self._at(t, 1)
+
+    def a(self, t: ArrayLike) -> Array:
+        """Accelerations (..., n) at times (...)."""
+        return self._at(t, 2)
+
+
+@lru_cache(maxsize=32)
+def _coefficients(K: int, order: int) -> Array:
+    """Of 1 + K polynomials in x = 2 s - 1: a step of order 9, and bumps that vanish at the ends.
+
+    Shapes: -> (degree + 1, 1 + K), ascending powers.
+    """
+    P, L = np.polynomial.Polynomial, np.polynomial.Legendre
+    bump = P((1.0, 0.0, -1.0)) ** 4
+    step = bump.integ(lbnd=-1)
+    rows = [step / step(1.0), *(bump * L.basis(k).convert(kind=P) for k in range(K))]
+    out = np.zeros((10 + K, 1 + K))
+    for k, row in enumerate(rows):
+        coef = (row.deriv(order) if order else row).coef * 2.0**order
+        out[: len(coef), k] = coef
+    return out
+
+
+def _basis(s: ArrayLike, K: int, order: int) -> Array:
+    """Derivatives by s of the polynomials. Shapes: s (...) -> (..., 1 + K)."""
+    coefficients = _coefficients(K, order)
+    x = 2.0 * np.asarray(s, np.float64)[..., None] - 1.0
+    return x ** np.arange(len(coefficients)) @ coefficients
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestToRest(Frozen):
+    """Motion from rest to rest in a fixed time.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot.
+    trajectory : JointPolynomial
+        Motion of the motors, with ``q(t)``, ``v(t)``, ``a(t)`` and ``duration``.
+    end : ndarray, shape (2 m,)
+        What is left of the elastic coordinates and their velocities at the end, relative to their
+        largest values on the way.
+    status : RestStatus
+        Whether the arm ends at rest.
+    """
+
+    arm: FlexibleRobot
+    trajectory: JointPolynomial
+    end: Array
+    status: RestStatus
+    _elastic: Any = field(repr=False)
+
+    def elastic(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Elastic coordinates and velocities (..., m) at times (...)."""
+        times = np.clip(np.asarray(t, np.float64), 0.0, self.trajectory.duration)
+        y = np.moveaxis(self._elastic(times.ravel()), 0, -1).reshape(*times.shape, -1)
+        return y[..., : self.arm.m], y[..., self.arm.m :]
+
+    def torque(self, t: ArrayLike) -> Array:
+        """Torques (..., n) at times (...), which hold the arm before and after the motion."""
+        e, e_v = self.elastic(t)
+        path = self.trajectory
+        return idm(self.arm, path.q(t), e, path.v(t), e_v, path.a(t))[0]
+
+    def reason(self) -> str:
+        """The sentence of the status."""
+        return self.status.sentence
+
+    def __repr__(self) -> str:
+        return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
+
+
+def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: float) -> RestToRest:
+    """Motion between equilibria in a fixed time, without vibration at the end (section 7.3.3.2).
+
+    The motion of the motors is a polynomial with free coefficients, of least size, with which the
+    elastic coordinates, integrated by the inverse model, begin and end at rest.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q0, q1 : array_like, shape (n,)
+        Start and end of the motors, rad or m.
+    duration : float
+        Time, s.
+
+    Returns
+    -------
+    RestToRest
+        The motion, its torques and its status.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        A duration that is not positive; ends of another length or without equilibrium.
+
+    References
+    ----------
+    Seed book section 7.3.3.2; M. Benosman and G. Le Vey, "Joint trajectory tracking for planar
+    multi-link flexible manipulator", ICRA 2002.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
+    >>> plan = rest_to_rest(arm, [0.0], [1.0], 2.0)
+    >>> plan.status, plan.trajectory.q(2.0)
+    (<RestStatus.AT_REST: 0>, array([1.]))
+    """
+    from scipy.integrate import solve_ivp
+
+    n, m, T = arm.n, arm.m, as_number(duration, "duration", above=0.0)
+    ends = [as_exact(q, (n,), name) for q, name in ((q0, "q0"), (q1, "q1"))]
+    rest = [static_deflection(arm, q) for q in ends]
+    if any(np.isnan(found.e).any() for found in rest):
+        raise InvalidValueError("q0, q1: expected postures in which the arm has an equilibrium.")
+    start, goal = (np.concatenate([found.e, np.zeros(m)]) for found in rest)
+    K = -(-_FACTORS * 2 * m // n) if m else 0
+
+    def elastic(factors: Array, rtol: float, dense: bool = False) -> Any:
+        """Solutions for several motions, factors (P, n, K)."""
+        P = len(factors)
+        span = np.broadcast_to((ends[1] - ends[0])[:, None], (P, n, 1))
+        spans = np.concatenate([span, factors], axis=2)
+
+        def rate(t: float, y: Array) -> Array:
+            e, e_v = (np.ascontiguousarray(x) for x in y.reshape(P, 2, m).swapaxes(0, 1))
+            q, v, a = (spans @ _basis(min(t / T, 1.0), K, order) / T**order for order in range(3))
+            e_a = solved(arm, INVERSE, ends[0] + q, e, v, e_v, a)[1]
+            return np.stack([e_v, e_a], axis=1).ravel()
+
+        y0 = np.tile(start, P)
+        return solve_ivp(
+            rate, (0.0, T), y0, "DOP853", rtol=rtol, atol=1e-3 * rtol, dense_output=dense
+        )
+
+    c, slope, before = np.zeros((n, K)), None, np.inf
+    for _ in range(_NEWTON if m else 0):
+        found = elastic(c[None], _FINE)
+        size = np.abs(found.y).max(axis=1) + 1e-12
+        left = (found.y[:, -1] - goal) / size
+        error = float(np.abs(left).max())
+        if error < _STILL:
+            break
+        if slope is None or error > 0.2 * before:  # else the last slope serves
+            moved = elastic(c + _STEP * np.eye(n * K).reshape(-1, n, K), _COARSE)
+            base = elastic(c[None], _COARSE).y[:, -1]
+            slope = (moved.y[:, -1].reshape(-1, 2 * m) - base).T / _STEP
+        before = error
+        c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(n, K)
+    path, found = JointPolynomial(*ends, T, c), elastic(c[None], _FINE, dense=True)
+    size = np.abs(found.y).max(axis=1, initial=0.0) + 1e-12
+    end = (found.y[:, -1] - goal) / size
+    still = (np.abs(end) < 10.0 * _STILL).all()
+    status = RestStatus.AT_REST if still else RestStatus.VIBRATES
+    return RestToRest(arm, path, end, status, found.sol)

@@ -1,0 +1,343 @@
+"""Static deflection, natural frequencies and linear models about an equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Frozen, Value, as_exact
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, SingularMassMatrixError
+from .models import checked_rows, generalized_forces, jacobian, mass_matrix
+from .robot import FlexibleRobot, damping_matrix
+
+_LARGE = 0.1  # of the length: deflections for which linear modes are within 1 %
+_ITERATIONS = 50
+_STEPS = ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0))  # central differences of order 6
+_SINGULAR = 1e-9
+
+
+class DeflectionStatus(Outcome):
+    """Outcome of a static deflection; fits int8."""
+
+    SMALL = 0, "The deflection of every link is small, so that its linear modes hold."
+    LARGE = (
+        1,
+        "The tip of a link moves by more than a tenth of its length: linear modes are no longer "
+        "within 1 %; `elastica` bends one beam exactly.",
+    )
+    NOT_FOUND = 2, "No equilibrium was found: the load is beyond the range of linear modes."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deflection(Frozen, Value):
+    """Elastic equilibrium of an arm whose joints are held.
+
+    Parameters
+    ----------
+    e : ndarray, shape (..., m)
+        Elastic coordinates; NaN where none was found.
+    tau : ndarray, shape (..., n)
+        Torques that hold the joints, N m.
+    deflection : ndarray, shape (...)
+        Largest displacement of a link's tip, relative to its length.
+    status : ndarray of int8, shape (...)
+        Codes of `DeflectionStatus`.
+    """
+
+    e: Array
+    tau: Array
+    deflection: Array
+    status: NDArray[np.int8]
+
+    def reason(self, i: Any = ()) -> str:
+        """The sentence of the status of sample i."""
+        return DeflectionStatus(int(self.status[i])).sentence
+
+
+def static_deflection(
+    arm: FlexibleRobot, q: ArrayLike, wrench: ArrayLike | None = None
+) -> Deflection:
+    """Deflection of an arm at rest under gravity and a wrench, joints held.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q : array_like, shape (..., n)
+        Angles of the motors.
+    wrench : array_like, shape (..., 6), optional
+        Of the tool on the environment, in world axes.
+
+    Returns
+    -------
+    Deflection
+        Elastic coordinates and status.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity.
+
+    References
+    ----------
+    Seed book section 7.2.5, at rest.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), gravity=(0, 0, 0))
+    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 10.0), modes=3)})
+    >>> found = static_deflection(arm, [0.0], [0, -0.3, 0, 0, 0, 0])       # F L^3 / (3 EI)
+    >>> bool(abs(found.deflection - 0.01) < 2e-5), found.reason()[:20]
+    (True, 'The deflection of ev')
+    """
+    batch, (q, w) = checked_rows(arm, q=q, wrench=wrench)
+    N, m, rest = len(q), arm.m, np.zeros((1, arm.n))
+    e, scale = np.zeros((N, m)), scales(arm)[arm.n :]
+    status = np.full(N, DeflectionStatus.NOT_FOUND, np.int8)
+
+    def forces(rows: Array, e: Array, tile: int = 1) -> tuple[Array, Array]:
+        many = [np.repeat(x[rows], tile, axis=0) for x in (q, w)]
+        still = np.repeat(rest, len(e), axis=0)
+        none = np.zeros_like(e)
+        return generalized_forces(arm, many[0], e, still, none, still, none, many[1])
+
+    todo = np.arange(N)
+    for _ in range(_ITERATIONS):
+        if not todo.size:
+            break
+        h = 1e-4 * scale
+        moved = np.concatenate([np.diag(h), -np.diag(h)])
+        steps = (e[todo, None] + moved).reshape(-1, m)
+        F = forces(todo, steps, 2 * m)[1].reshape(len(todo), 2, m, m)
+        K = (F[:, 0] - F[:, 1]) / (2.0 * h[:, None])
+        step = np.linalg.solve(K.swapaxes(1, 2), forces(todo, e[todo])[1][..., None])[..., 0]
+        size = np.abs(step / scale).max(axis=1, initial=0.0)
+        e[todo] -= step / np.maximum(2.0 * size, 1.0)[:, None]
+        done = size < 1e-11 * (1.0 + np.abs(e[todo] / scale).max(axis=1, initial=0.0))
+        status[todo[done]] = DeflectionStatus.SMALL
+        todo = todo[~done & (np.abs(e[todo] / scale).max(axis=1, initial=0.0) < 10.0)]
+    tau = forces(np.arange(N), e)[0]
+    deflection = np.zeros(N)
+    for row, link in arm.links.items():
+        here = slice(arm.arrays.start[row - 1], arm.arrays.start[row])
+        moved = np.linalg.norm(e[:, here] @ link.tip.Phi, axis=1) / link.length
+        deflection = np.maximum(deflection, moved)
+    found = status == DeflectionStatus.SMALL
+    status[found & (deflection > _LARGE)] = DeflectionStatus.LARGE
+    e, tau = (np.where(found[:, None], x, np.nan) for x in (e, tau))
+    return Deflection(
+        e.reshape(*batch, m), tau.reshape(*batch, arm.n),
+        np.where(found, deflection, np.nan).reshape(batch), status.reshape(batch),
+    )  # fmt: skip
+
+
+def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked") -> Array:
+    """Natural frequencies of the undeformed arm at rest, without gravity.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q : array_like, shape (..., n)
+        Angles of the motors.
+    joints : str
+        ``"locked"``: motors held; ``"free"``: motors without torque.
+
+    Returns
+    -------
+    ndarray, shape (..., m) or (..., n + m)
+        Ascending, rad/s; with free joints the n motions without vibration are zero.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError, SingularMassMatrixError
+        Unknown ``joints``; vectors of another length; a motor that moves no inertia.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), modes=2)})
+    >>> natural_frequencies(arm, [0.0], joints="free").round(3)
+    array([ 0.   , 15.44 , 50.92 ])
+    """
+    if joints not in ("locked", "free"):
+        raise InvalidValueError(f"joints: expected 'locked' or 'free', got {joints!r:.40}.")
+    from scipy.linalg import LinAlgError, eigh
+
+    batch, (q,) = checked_rows(arm, q=q)
+    first = arm.n if joints == "locked" else 0
+    K = stiffness_matrix(arm)[first:, first:]
+    found = np.empty((len(q), len(K)))
+    for i, M in enumerate(mass_matrix(arm, q)[:, first:, first:]):
+        try:
+            values = eigh(K, M, eigvals_only=True) if len(K) else np.zeros(0)
+        except LinAlgError:
+            raise SingularMassMatrixError(
+                f"{arm.model.name!r}: a coordinate moves no inertia in sample {i}. Give inertial "
+                "parameters with model.with_inertia(...) or Ia with model.with_drive(...)."
+            ) from None
+        found[i] = np.sqrt(np.maximum(values, 0.0))
+        if not first:
+            found[i, : arm.n] = 0.0
+    return found.reshape(*batch, len(K))
+
+
+def stiffness_matrix(arm: FlexibleRobot) -> Array:
+    """Elastic stiffness of (q, e), zero for q. Shapes: -> (n + m, n + m)."""
+    K, s = np.zeros((arm.n + arm.m,) * 2), arm.n
+    for link in arm.links.values():
+        here = slice(s, s + link.m)
+        K[here, here], s = link.invariants.modal_stiffness, s + link.m
+    K[s:, s:] = np.diag(arm.joint_stiffness[arm.joints])  # type: ignore[index]
+    return K
+
+
+def scales(arm: FlexibleRobot) -> Array:
+    """Sizes of coordinates: 1 rad or m, of modes the amplitude with the tip at a length."""
+    sizes = [np.full(link.m, link.length) for link in arm.links.values()]
+    return np.concatenate([np.ones(arm.n), *sizes, np.ones(len(arm.joints))])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearModel(Frozen, Value):
+    """Linear model about an equilibrium: ``x' = A x + B u``, ``y = C x + D u``.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shape (2 k, 2 k), (2 k, n), (n, 2 k), (n, n)
+        With k = n + m; the state is the deviation of (q, e, v, e_v), the input that of tau.
+    poles : ndarray of complex, shape (2 k,)
+        Eigenvalues of A, 1/s.
+    zeros : ndarray of complex, shape (up to 2 m,)
+        Finite transmission zeros, 1/s.
+    e : ndarray, shape (m,)
+        Elastic coordinates of the equilibrium.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    poles: NDArray[np.complex128]
+    zeros: NDArray[np.complex128]
+    e: Array
+
+    def __repr__(self) -> str:
+        return f"<LinearModel: {len(self.A)} states, {self.B.shape[1]} inputs>"
+
+
+def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> LinearModel:
+    """Linear model about the equilibrium at q under gravity, with its poles and zeros.
+
+    The output ``"joint"`` is q; ``"tip"`` the motion of the joints that would move the tool of the
+    rigid arm as the flexible one moves: ``q + J_q^+ J_e e``, of positions where they determine it,
+    else of poses. Its zeros on the right side are the reason why a tip is not tracked causally.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q : array_like, shape (n,)
+        Angles of the motors.
+    output : str
+        ``"joint"`` or ``"tip"``.
+
+    Returns
+    -------
+    LinearModel
+        Matrices, poles and zeros.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        No equilibrium at q, an unknown output, a singular posture for the tip.
+
+    References
+    ----------
+    Seed book sections 7.3.3.3 and 7.3.3.4.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> link = flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)
+    >>> arm = flexible.FlexibleRobot(model, {1: link})
+    >>> linearize(arm, [0.0]).zeros.imag.round(3)                # the clamped frequencies
+    array([-22.034,  -3.516,   3.516,  22.034])
+    >>> bool(linearize(arm, [0.0], "tip").zeros.real.max() > 1.0)
+    True
+    """
+    if output not in ("joint", "tip"):
+        raise InvalidValueError(f"output: expected 'joint' or 'tip', got {output!r:.40}.")
+    n, q = arm.n, as_exact(q, (arm.n,), "q")
+    k, found = n + arm.m, static_deflection(arm, q)
+    if found.status == DeflectionStatus.NOT_FOUND:
+        raise InvalidValueError(f"q: there is no equilibrium to linearise about. {found.reason()}")
+    e = found.e
+    M, K, D = mass_matrix(arm, q, e), tangent(arm, np.concatenate([q, e])), damping_matrix(arm)
+    H = np.zeros((n, arm.m)) if output == "joint" else tip_gain(jacobian(arm, q, e), n)
+    inverse = np.linalg.inv(M)
+    zero, one = np.zeros((k, k)), np.eye(k)
+    A = np.block([[zero, one], [-inverse @ K, -inverse @ D]])
+    E, F = slice(n, k), slice(0, n)
+    return LinearModel(
+        A=A,
+        B=np.vstack([np.zeros((k, n)), inverse[:, :n]]),
+        C=np.hstack([np.eye(n), H, np.zeros((n, k))]),
+        D=np.zeros((n, n)),
+        poles=_roots(M, D, K),
+        zeros=_roots(M[E, E] - M[E, F] @ H, D[E, E], K[E, E] - K[E, F] @ H),
+        e=e,
+    )
+
+
+def tip_gain(J: Array, n: int) -> Array:
+    """J_q^+ J_e of Jacobians (..., 6, n + m). Shapes: -> (..., n, m)."""
+    for rows in (3, 6):
+        values = np.linalg.svd(J[..., :rows, :n], compute_uv=False)
+        if n <= rows and (values[..., -1] > _SINGULAR * values[..., 0]).all():
+            return np.linalg.pinv(J[..., :rows, :n]) @ J[..., :rows, n:]
+    raise InvalidValueError(
+        "q: the joints do not determine the pose of the tool here: a singular posture, or more "
+        "joints than six. Take output='joint', or another posture."
+    )
+
+
+def tangent(arm: FlexibleRobot, x: Array) -> Array:
+    """Derivative of the forces at rest by (q, e). Shapes: x (n + m,) -> (n + m, n + m)."""
+    n, k, h = arm.n, len(x), 0.01 * scales(arm)
+    still = np.zeros((k, n)), np.zeros((k, arm.m))
+
+    def forces(c: int) -> Array:
+        y = x + c * np.diag(h)
+        return np.hstack(generalized_forces(arm, y[:, :n], y[:, n:], *still, *still))
+
+    return (sum(w * (forces(c) - forces(-c)) for c, w in _STEPS) / h[:, None]).T
+
+
+def _roots(M: Array, D: Array, K: Array) -> NDArray[np.complex128]:
+    """Finite s with M s^2 + D s + K singular, ordered by imaginary and real parts."""
+    from scipy.linalg import eig
+
+    k = len(M)
+    zero, one = np.zeros((k, k)), np.eye(k)
+    if not k:
+        return np.zeros(0, np.complex128)
+    pencil = (
+        (-K, M)
+        if not D.any()
+        else (np.block([[zero, one], [-K, -D]]), np.block([[one, zero], [zero, M]]))
+    )
+    alpha, beta = eig(*pencil, right=False, homogeneous_eigvals=True)
+    finite = np.abs(beta) > 1e-13 * np.abs(alpha)
+    s = alpha[finite] / beta[finite]
+    if not D.any():
+        root = np.sqrt(s.astype(np.complex128))
+        s = np.concatenate([root, -root])
+    return s[np.lexsort((s.real.round(9), s.imag.round(9)))]

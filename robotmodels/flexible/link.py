@@ -1,0 +1,179 @@
+"""Flexible links: the shapes of their modes and the integrals over their mass (7.2.2.12).
+
+A point X of the link is displaced by ``Phi_k(X) e_k``, in the axes of the frame at the root, which
+the link is clamped to. With foreshortening ``Gamma_kl(X) e_k e_l / 2`` is added (stiffening).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from .._arrays import Array, Frozen, Value
+
+
+class Section(NamedTuple):
+    """Undeformed position of the tip section, displacement and rotation of it by the modes.
+
+    Shapes: position (3,), Phi, Psi (m, 3), Gamma (m, m, 3).
+    """
+
+    position: Array
+    Phi: Array
+    Psi: Array
+    Gamma: Array
+
+
+class BeamData(NamedTuple):
+    """The uniform beam that a link is made of: for its lumped model."""
+
+    length: float
+    EI: tuple[float, float]
+    GJ: float
+    density: float
+    gyration: float
+    tip_mass: float
+    tip_com: tuple[float, ...]
+    tip_inertia: tuple[float, ...]
+    hub: float
+    pose: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Invariants(Frozen, Value):
+    """Integrals over the mass of an elastic body, r = X + Phi e + Gamma e e / 2 (7.2.2.12).
+
+    Parameters
+    ----------
+    mass : float
+        Integral of dm, kg.
+    first_moment : ndarray, shape (3,)
+        Of X dm.
+    inertia : ndarray, shape (3, 3)
+        About the root.
+    translation, rotation : ndarray, shape (m, 3)
+        Of Phi_k dm and of X x Phi_k dm: the modes' linear and angular momentum.
+    modal_mass, modal_stiffness : ndarray, shape (m, m)
+        Of Phi_k . Phi_l dm, and second derivatives of the elastic energy.
+    gyroscopic : ndarray, shape (m, m, 3)
+        Of (Phi_l x Phi_k + X x Gamma_kl) dm.
+    inertia_first, inertia_second : ndarray, shape (m, 3, 3) and (m, m, 3, 3)
+        First and second derivatives of the inertia by the elastic coordinates.
+    foreshortening : ndarray, shape (m, m, 3)
+        Of Gamma_kl dm; zero without stiffening.
+    """
+
+    mass: float
+    first_moment: Array
+    inertia: Array
+    translation: Array
+    rotation: Array
+    modal_mass: Array
+    modal_stiffness: Array
+    gyroscopic: Array
+    inertia_first: Array
+    inertia_second: Array
+    foreshortening: Array
+
+    @property
+    def m(self) -> int:
+        """Number of modes."""
+        return len(self.modal_mass)
+
+    def __repr__(self) -> str:
+        return f"<Invariants: {self.mass:g} kg, {self.m} modes>"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlexibleLink(Frozen, Value):
+    """An elastic body clamped to the frame at its root, made by `beam` or `from_modes`.
+
+    Parameters
+    ----------
+    invariants : Invariants
+        The integrals of section 7.2.2.
+    frequencies : ndarray, shape (m,)
+        Of its modes, rad/s.
+    tip : Section
+        Where what follows is fixed.
+    nodes : ndarray, shape (N, 3)
+        Undeformed points from root to tip, m.
+    shapes : ndarray, shape (N, 3, m)
+        Displacements of the nodes by the modes.
+    stiffening : bool
+        Whether foreshortening is part of the model.
+    source : BeamData or None
+        The uniform beam.
+
+    References
+    ----------
+    Seed book sections 7.2.2.3 and 7.2.2.12.
+
+    Examples
+    --------
+    >>> from robotmodels.flexible import beam
+    >>> link = beam(1.0, EI=(1.0, 1.0), density=1.0, modes=1)
+    >>> link.m, link.frequencies.round(4)
+    (2, array([3.516, 3.516]))
+    """
+
+    invariants: Invariants
+    frequencies: Array
+    tip: Section
+    nodes: Array
+    shapes: Array
+    stiffening: bool = False
+    source: BeamData | None = None
+
+    @property
+    def m(self) -> int:
+        """Number of modes."""
+        return self.invariants.m
+
+    @property
+    def length(self) -> float:
+        """Distance from the root to the tip, m."""
+        return float(np.linalg.norm(self.tip.position - self.nodes[0]))
+
+    @property
+    def _values(self) -> tuple[object, ...]:
+        rest = tuple(getattr(self, f.name) for f in fields(self) if f.name != "tip")
+        return (*self.tip, *rest)
+
+    def __repr__(self) -> str:
+        modes = ", ".join(f"{w:.4g}" for w in self.frequencies[:6])
+        return f"<FlexibleLink: {self.invariants.mass:g} kg, {self.m} modes, rad/s: {modes}>"
+
+
+def integrals(W: Array, X: Array, Phi: Array, Gamma: Array, stiffness: Array) -> Invariants:
+    """Invariants of points with the masses W, or of fields between them (W a matrix).
+
+    Shapes: W (N,) or (N, N), X (N, 3), Phi (N, 3, m), Gamma (N, 3, m, m), stiffness (m, m).
+    """
+    W = np.diag(W) if W.ndim == 1 else W
+    total = W.sum(axis=0)
+    XX, XP, XG = (np.tensordot(X, np.tensordot(W, b, 1), (0, 0)) for b in (X, Phi, Gamma))
+    PP = np.tensordot(Phi, np.tensordot(W, Phi, 1), (0, 0))  # (3, m, 3, m)
+
+    def inertia(S: Array) -> Array:
+        """Inertia tr(S) 1 - S of symmetrised second moments S (..., 3, 3)."""
+        S = 0.5 * (S + np.swapaxes(S, -1, -2))
+        return np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
+
+    a, b = [1, 2, 0], [2, 0, 1]  # components of vector products
+    cross = np.stack([PP[i, :, j].T - PP[j, :, i].T for i, j in zip(a, b, strict=True)], -1)
+    return Invariants(
+        mass=float(total.sum()),
+        first_moment=total @ X,
+        inertia=inertia(XX),
+        translation=np.tensordot(total, Phi, 1).T,
+        rotation=(XP[a, b] - XP[b, a]).T,
+        modal_mass=np.einsum("ikil->kl", PP),
+        modal_stiffness=stiffness,
+        gyroscopic=cross + np.moveaxis(XG[a, b] - XG[b, a], 0, -1),
+        inertia_first=2.0 * inertia(np.moveaxis(XP, 2, 0)),
+        inertia_second=2.0 * inertia(PP.transpose(1, 3, 0, 2) + np.moveaxis(XG, (2, 3), (0, 1))),
+        foreshortening=np.moveaxis(np.tensordot(total, Gamma, 1), 0, -1),
+    )

@@ -1,0 +1,208 @@
+"""Flexible links from modes, and reduction of finite elements by Craig and Bampton."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, read_only
+from ..errors import InvalidValueError, ShapeError
+from .link import FlexibleLink, Section, integrals
+
+_MIXED = 1e-6  # largest mixed mass or stiffness of two modes, relative to their own
+_MOVES = 1e-9  # largest displacement of the root, relative to the shape
+
+
+def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) -> FlexibleLink:
+    """Flexible link from modes of a finite element model, clamped at its first node.
+
+    Integrals linear in the shapes are those of M; quadratic ones take the mass between nodes from
+    its translations along one axis.
+
+    Parameters
+    ----------
+    M, K : array_like, shape (c, c)
+        Mass and stiffness of the nodes: c = 3 N displacements, or 6 N with rotations after the
+        displacements of each node. M may be the N masses of the nodes.
+    shapes : array_like, shape (c, m)
+        Orthogonal modes, zero at the first node.
+    nodes : array_like, shape (N, 3)
+        Places in the frame of the joint, m; the last is where the next link is fixed.
+
+    Returns
+    -------
+    FlexibleLink
+        The link.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Modes that are not orthogonal, or move the first node; more modes than nodes move; matrices
+        of another size, not symmetric, or not positive.
+
+    References
+    ----------
+    Seed book section 7.2.2.3.
+
+    Examples
+    --------
+    >>> nodes = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    >>> K = np.diag([1.0, 1.0, 1.0, 9.0, 4.0, 4.0])
+    >>> link = from_modes([1.0, 1.0], K, np.eye(6)[:, 4:5], nodes)
+    >>> link.frequencies
+    array([2.])
+    """
+    X = as_floats(nodes, "nodes")
+    if X.ndim != 2 or X.shape[1] != 3 or len(X) < 2:
+        raise ShapeError(f"nodes: expected shape (N, 3), N from 2, got {X.shape}.")
+    N, S = len(X), as_floats(shapes, "shapes")
+    if S.ndim != 2 or len(S) not in (3 * N, 6 * N):
+        raise ShapeError(f"shapes: expected ({3 * N}, m) or ({6 * N}, m), got {S.shape}.")
+    c, m = S.shape
+    if m > c - c // N:
+        raise InvalidValueError(
+            f"shapes: {m} modes of {N} nodes, of which one is clamped: expected at most "
+            f"{c - c // N}."
+        )
+    K, M = _symmetric(K, c, "K"), as_floats(M, "M")
+    if M.shape == (N,):
+        M = np.diag(np.repeat(M, c // N) * np.tile(np.arange(c // N) < 3, N))
+    M, free = _symmetric(M, c, "M"), c // N
+    size = np.abs(S).max(axis=0, initial=1e-300)
+    if (np.abs(S[:free]) > _MOVES * size).any():
+        raise InvalidValueError(
+            "shapes: the first node moves, and a link is clamped there. Take modes with that node "
+            "held, or subtract the rigid motion."
+        )
+    mass, stiffness = S.T @ M @ S, S.T @ K @ S
+    for name, matrix in (("M", mass), ("K", stiffness)):
+        own = np.sqrt(np.abs(np.diag(matrix)))
+        if (np.diag(matrix) <= 0.0).any() or (
+            np.abs(matrix - np.diag(np.diag(matrix))) > _MIXED * np.outer(own, own)
+        ).any():
+            raise InvalidValueError(
+                f"shapes: the modes are not orthogonal with respect to {name}, or without {name}. "
+                "Take the eigenvectors of K and M, as craig_bampton returns them."
+            )
+    parts = S.reshape(N, free, m)
+    Phi = parts[:, :3]
+    W = np.mean([M[i::free, i::free] for i in range(3)], axis=0)
+    found = integrals(W, X, Phi, np.zeros((N, 3, m, m)), np.diag(np.diag(stiffness)))
+    rigid = np.zeros((N, free, 6))  # displacements by unit translations and rotations
+    rigid[:, :3, :3] = np.eye(3)
+    rigid[:, :3, 3:] = np.cross(np.eye(3)[None], X[:, None]).swapaxes(1, 2)
+    if free == 6:
+        rigid[:, 3:, 3:] = np.eye(3)
+    R = rigid.reshape(c, 6)
+    own, mixed = R.T @ M @ R, (R.T @ M @ S).T
+    found = replace(
+        found, inertia=own[3:, 3:], translation=mixed[:, :3], rotation=mixed[:, 3:],
+        modal_mass=np.diag(np.diag(mass)),
+    )  # fmt: skip
+    if free == 6:
+        turn = parts[-1, 3:].T
+    else:  # of the line to the node before
+        along = X[-1] - X[-2]
+        turn = np.cross(along, (Phi[-1] - Phi[-2]).T) / (along @ along)
+    section = Section(*map(read_only, (X[-1], Phi[-1].T, turn, np.zeros((m, m, 3)))))
+    return FlexibleLink(found, np.sqrt(np.diag(stiffness) / np.diag(mass)), section, X, Phi)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedModel(Frozen, Value):
+    """Reduced finite elements.
+
+    Parameters
+    ----------
+    M, K : ndarray, shape (r, r)
+        Diagonal: the mass of each mode is 1.
+    shapes : ndarray, shape (c, r)
+        Orthogonal shapes of all c displacements.
+    frequencies : ndarray, shape (r,)
+        Ascending, rad/s.
+    """
+
+    M: Array
+    K: Array
+    shapes: Array
+    frequencies: Array
+
+    def __repr__(self) -> str:
+        return f"<ReducedModel: {len(self.M)} of {len(self.shapes)} displacements>"
+
+
+def craig_bampton(
+    M: ArrayLike, K: ArrayLike, interface: ArrayLike, modes: int, clamped: ArrayLike = ()
+) -> ReducedModel:
+    """Reduction of finite elements to an interface and modes with the interface held.
+
+    Its shapes are the static ones of unit displacements of the interface and the first modes,
+    made orthogonal, so that `from_modes` takes them.
+
+    Parameters
+    ----------
+    M, K : array_like, shape (c, c)
+        Mass and stiffness.
+    interface : array_like of int, shape (k,)
+        Displacements, from 0, by which the body is loaded, such as those of the last node.
+    modes : int
+        Modes with the interface held.
+    clamped : array_like of int, optional
+        Displacements that are zero, such as those of the first node.
+
+    Returns
+    -------
+    ReducedModel
+        With k + modes shapes.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Matrices that are not symmetric; displacements that do not exist or that are named twice;
+        more modes than there are displacements inside.
+
+    References
+    ----------
+    R. Craig and M. Bampton, "Coupling of substructures for dynamic analyses", AIAA J. 6 (1968).
+
+    Examples
+    --------
+    >>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
+    array([0.445, 1.247, 1.8019])
+    """
+    from scipy.linalg import eigh
+
+    M = as_floats(M, "M")
+    M, K = _symmetric(M, len(M) if M.ndim else 0, "M"), _symmetric(K, len(M), "K")
+    c = len(M)
+    chosen = [as_floats(x, name) for x, name in ((interface, "interface"), (clamped, "clamped"))]
+    named = np.concatenate([x.ravel() for x in chosen])
+    if len(set(named)) != len(named) or not np.isin(named, np.arange(c)).all():
+        raise InvalidValueError(
+            f"interface, clamped: expected different numbers from 0 to {c - 1}, got "
+            f"{named.tolist()}."
+        )
+    k = chosen[0].ravel().astype(np.int64)
+    inner = np.setdiff1d(np.arange(c), named.astype(np.int64))
+    if not isinstance(modes, int | np.integer) or not 0 <= modes <= len(inner):
+        raise InvalidValueError(f"modes: expected 0 to {len(inner)}, got {modes!r:.40}.")
+    T = np.zeros((c, len(k) + int(modes)))
+    T[k, np.arange(len(k))] = 1.0
+    if len(inner):
+        inside = np.ix_(inner, inner)
+        T[inner, : len(k)] = -np.linalg.solve(K[inside], K[np.ix_(inner, k)])
+        T[inner, len(k) :] = eigh(K[inside], M[inside])[1][:, : int(modes)]
+    values, V = eigh(T.T @ K @ T, T.T @ M @ T)
+    values = np.maximum(values, 0.0)
+    return ReducedModel(np.eye(len(values)), np.diag(values), T @ V, np.sqrt(values))
+
+
+def _symmetric(value: ArrayLike, c: int, name: str) -> Array:
+    """A symmetric matrix."""
+    matrix = as_exact(value, (c, c), name)
+    if np.abs(matrix - matrix.T).max(initial=0.0) > 1e-9 * np.abs(matrix).max(initial=0.0):
+        raise InvalidValueError(f"{name}: expected a symmetric matrix.")
+    return 0.5 * (matrix + matrix.T)

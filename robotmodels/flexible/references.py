@@ -1,0 +1,250 @@
+"""References of elastic models: exact large bending of one beam, and lumped rigid segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array, Frozen, Value, as_number
+from ..errors import InvalidValueError
+from ..geometry import DHTable
+from ..inertia import InertialParameters
+from ..model import RobotModel
+from .link import BeamData
+from .robot import FlexibleRobot
+
+_POINTS = 101
+_LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solution is continued
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Elastica(Frozen, Value):
+    """Exact shape of a bent cantilever.
+
+    Parameters
+    ----------
+    tip : ndarray, shape (4, 4)
+        Pose of the tip in the frame of the root, x along the beam.
+    points : ndarray, shape (N, 3)
+        The bent axis, m.
+    angle : ndarray, shape (N,)
+        Its slope, rad.
+    """
+
+    tip: Array
+    points: Array
+    angle: Array
+
+    def __repr__(self) -> str:
+        x, y, _ = self.tip[:3, 3]
+        return f"<Elastica: tip at ({x:.6g}, {y:.6g}) m, {self.angle[-1]:.6g} rad>"
+
+
+def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) -> Elastica:
+    """Exact static bending of one beam clamped along x: ``EI theta'' + force cos(theta) = 0``.
+
+    Parameters
+    ----------
+    length, EI : float
+        Length, m, and bending stiffness, N m^2.
+    force : float
+        On the tip along y, whatever its slope, N.
+    moment : float
+        On the tip about z, N m.
+
+    Returns
+    -------
+    Elastica
+        The shape that is continued from the straight beam.
+
+    Raises
+    ------
+    InvalidValueError
+        Length or stiffness that is not positive.
+
+    References
+    ----------
+    K. Bisshopp and D. Drucker, "Large deflection of cantilever beams", Quart. Appl. Math. 3 (1945).
+
+    Examples
+    --------
+    >>> elastica(1.0, 1.0, force=1.0).tip[:2, 3].round(5)
+    array([0.94357, 0.30172])
+    """
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import newton
+
+    L, stiff = as_number(length, "length", above=0.0), as_number(EI, "EI", above=0.0)
+    F = as_number(force, "force") * L * L / stiff
+    M = as_number(moment, "moment") * L / stiff
+
+    def bent(root: float, share: float, s: Array | None = None) -> Array:
+        """Slope, curvature and axis of a beam of length 1 from the curvature at its root."""
+
+        def rate(_: float, y: Array) -> list[float]:
+            cos, sin = np.cos(y[0]), np.sin(y[0])
+            return [y[1], -share * F * cos, cos, sin]
+
+        return solve_ivp(
+            rate, (0.0, 1.0), [0.0, root, 0.0, 0.0], "DOP853", s, rtol=1e-11, atol=1e-13
+        ).y
+
+    curvature, steps = 0.0, max(1, int(np.ceil(max(abs(F), abs(M)) / _LOAD_STEP)))
+    slope = (F + M) / steps
+    for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
+        found = float(
+            newton(
+                lambda c, share=share: bent(c, share)[1, -1] - share * M,
+                curvature + slope,
+                tol=1e-12,
+            )
+        )
+        slope, curvature = found - curvature, found
+    angle, _, x, y = bent(curvature, 1.0, np.linspace(0.0, 1.0, _POINTS))
+    points = L * np.stack([x, y, 0.0 * x], axis=-1)
+    cos, sin = np.cos(angle[-1]), np.sin(angle[-1])
+    tip = np.eye(4)
+    tip[:2, :2], tip[:3, 3] = [[cos, -sin], [sin, cos]], points[-1]
+    return Elastica(tip, points, angle)
+
+
+# --- segments with springs -----------------------------------------------------------------------
+
+
+def lumped(arm: FlexibleRobot, segments: int) -> tuple[RobotModel, Array]:
+    """Rigid segments and springs in place of the beams of an arm: an independent model of it.
+
+    Each beam becomes ``segments`` + 1 rigid parts, halves at the ends, with a joint for each
+    elastic direction between them. Its frequencies approach those of the beam with 1 / segments^2.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot; its flexible links are made by `beam`.
+    segments : int
+        Hinges of each beam, from 1.
+
+    Returns
+    -------
+    model : RobotModel
+        Robot whose last rows are moved behind the segments; the drives keep their joints.
+    stiffness : ndarray, shape (N,)
+        Of the springs in its N joints, N m/rad; 0 for the joints of the arm.
+
+    Raises
+    ------
+    InvalidValueError
+        Links that are not made by `beam`, flexible joints, a number of segments below 1.
+
+    Examples
+    --------
+    >>> from robotmodels.flexible import beam
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> arm = FlexibleRobot(model, {1: beam(1.0, EI=(np.inf, 1.0))})
+    >>> segmented, stiffness = lumped(arm, 3)
+    >>> segmented.n, stiffness.tolist()
+    (4, [0.0, 3.0, 3.0, 3.0])
+    """
+    if not isinstance(segments, int | np.integer) or segments < 1:
+        raise InvalidValueError(f"segments: expected a number from 1, got {segments!r:.40}.")
+    if len(arm.joints) or not all(link.source for link in arm.links.values()):
+        raise InvalidValueError(
+            "arm: lumped models are made of beams; links from modes and flexible joints have none."
+        )
+    model, table = arm.model, arm.model.table
+    rows, inertia, springs, ends = list[dict[str, float]](), [], [], [0]
+    columns = list[int]()
+    for k in range(model.f):
+        names = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+        row = {name: float(getattr(table, name)[k]) for name in names}
+        rows.append({**row, "antecedent": ends[int(table.antecedent[k])]})
+        inertia.append(model.inertia.values[k])
+        if row["sigma"] < 2:
+            columns.append(len(springs))
+            springs.append(0.0)
+        if link := arm.links.get(k + 1):
+            assert link.source is not None
+            inertia.pop()
+            _append_beam(link.source, int(segments), rows, inertia, springs)
+        ends.append(len(rows))
+    keys = rows[0]
+    made = DHTable(**{key: np.array([row[key] for row in rows]) for key in keys})  # type: ignore[arg-type]
+    drives = {name: np.zeros(made.n) for name in ("Ia", "Fv", "Fc", "offset")}
+    for name, values in drives.items():
+        values[columns] = getattr(model.drive, name)
+    tool = model.tool
+    if model.tip in arm.links and np.array_equal(tool, np.eye(4)):
+        tool = se3.translation(*arm.links[model.tip].tip.position)
+    segmented = RobotModel.from_table(
+        made, InertialParameters(np.array(inertia)), replace(model.drive, **drives), model.base,
+        tool, ends[model.tip], model.gravity, name=f"{model.name} in segments",
+    )  # fmt: skip
+    return segmented, np.array(springs)
+
+
+def _append_beam(
+    beam: BeamData, count: int, rows: list[dict[str, float]], inertia: list[Array],
+    springs: list[float],
+) -> None:  # fmt: skip
+    """Append the parts of a beam: their first is the row of the joint, their last where it was."""
+    h, T = beam.length / count, np.array(beam.pose).reshape(4, 4)
+    none = dict.fromkeys(("mu", "gamma", "b", "beta", "alpha", "d", "theta", "r"), 0.0)
+
+    def append(row: dict[str, float]) -> None:
+        """A row behind the last one."""
+        rows.append({**row, "antecedent": float(len(rows))})
+        inertia.append(np.zeros(10))
+
+    def fixed(T: Array) -> None:
+        """Two fixed rows: a translation, then a rotation, which is the frame of a part."""
+        x, y, z = T[:3, 3]
+        turn = float(np.arctan2(y, x))
+        yaw, pitch, roll = _euler(T[:3, :3])
+        moved = {"gamma": turn, "d": float(np.hypot(x, y)), "theta": -turn, "r": float(z)}
+        for row in (moved, {"gamma": yaw, "beta": pitch, "alpha": roll}):
+            append({**none, "sigma": 2.0, **row})
+
+    def part(start: float, end: float) -> None:
+        """Inertia of a part of the beam between places from its frame."""
+        length = end - start
+        mass, middle = beam.density * length, 0.5 * (start + end)
+        across = mass * (length**2 / 12.0)
+        spin = mass * beam.gyration**2
+        body = np.diag([spin, across + 0.5 * spin, across + 0.5 * spin])
+        own = InertialParameters.from_com([mass], [[middle, 0.0, 0.0]], [body])
+        inertia[-1] = inertia[-1] + own.values[0]
+
+    # bending about y and z, torsion: the angles that make z the axis of the hinge, and back
+    hinges = [
+        (stiffness / h, there, back)
+        for stiffness, there, back in (
+            (beam.EI[0], {"alpha": -np.pi / 2}, {"alpha": np.pi / 2}),
+            (beam.EI[1], {}, {}),
+            (beam.GJ, {"beta": np.pi / 2}, {"beta": -np.pi / 2}),
+        )
+        if np.isfinite(stiffness)
+    ]
+    inertia.append(np.r_[0.0, 0.0, 0.0, 0.0, 0.0, beam.hub, np.zeros(4)])
+    fixed(T)
+    part(0.0, 0.5 * h)
+    for k in range(count):
+        append({**none, "sigma": 2.0, "d": 0.5 * h if k == 0 else h})
+        for stiffness, there, back in hinges:
+            append({**none, "sigma": 0.0, **there})
+            append({**none, "sigma": 2.0, **back})
+            springs.append(stiffness)
+        part(0.0, h if k < count - 1 else 0.5 * h)
+    com = np.array(beam.tip_com) + np.array([0.5 * h, 0.0, 0.0])
+    J = np.array(beam.tip_inertia).reshape(3, 3)
+    inertia[-1] = inertia[-1] + InertialParameters.from_com([beam.tip_mass], [com], [J]).values[0]
+    fixed(se3.translation(0.5 * h - beam.length, 0.0, 0.0) @ np.linalg.inv(T))
+
+
+def _euler(R: Array) -> tuple[float, float, float]:
+    """Angles of Rot(z) Rot(y) Rot(x)."""
+    from scipy.spatial.transform import Rotation
+
+    yaw, pitch, roll = Rotation.from_matrix(R).as_euler("ZYX")
+    return float(yaw), float(pitch), float(roll)

@@ -1,0 +1,251 @@
+"""Flexible robots: a rigid model with some of its links and joints made elastic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, Value, as_reals, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel, check_model
+from .link import FlexibleLink
+
+if TYPE_CHECKING:
+    from .kernels import Arm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlexibleRobot(Value):
+    """A robot with flexible links and joints. Immutable, picklable.
+
+    Its coordinates are q (n,), the angles of the motors, and e (m,): the modes of the flexible
+    links by row, then the deflections of the flexible joints, so that a link turns by the sum of
+    both. The tip section of a flexible link carries what follows; where the last link is flexible
+    and the model has no tool, the tool is the end of the beam. Trees are supported.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The rigid robot, n joints, with its drives; independent motors.
+    links : mapping of int to FlexibleLink
+        By row of the table, from 1. A flexible link's inertia replaces that of the row.
+    joint_stiffness : array_like, shape (n,) or (), optional
+        N m/rad, infinite (default) for rigid joints. The motor side has the rotor inertia Ia.
+    joint_damping : array_like, shape (n,) or (), optional
+        N m s/rad, of the deflections of flexible joints.
+    modal_damping : array_like, shape () or that of all modes, optional
+        Damping ratios of the modes of the clamped links.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Rows that do not exist, or that are prismatic; stiffness that is not positive; negative
+        damping; motors that are coupled by a transmission.
+
+    References
+    ----------
+    Seed book sections 7.2.3, 7.2.5 and 7.2.7.
+
+    Examples
+    --------
+    >>> from robotmodels.flexible import beam
+    >>> from robotmodels.geometry import DHTable
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]))
+    >>> link = beam(0.5, EI=(np.inf, 1.0), density=0.2)
+    >>> arm = FlexibleRobot(model, {1: link, 2: link}, modal_damping=0.01)
+    >>> arm.n, arm.m
+    (2, 4)
+    """
+
+    model: RobotModel
+    links: Mapping[int, FlexibleLink]
+    joint_stiffness: Array | None = None
+    joint_damping: Array | None = None
+    modal_damping: Array | None = None
+    joints: NDArray[np.int64] = field(init=False)
+    """Columns of the flexible joints."""
+    _arm: Any = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        check_model(self.model)
+        model = self.model
+        set_ = object.__setattr__
+        set_(self, "links", MappingProxyType(_checked_links(model, self.links)))
+        n, modes = model.n, sum(link.m for link in self.links.values())
+        stiffness = _of(self.joint_stiffness, n, "joint_stiffness", np.inf)
+        if not (stiffness > 0.0).all():
+            raise InvalidValueError(
+                "joint_stiffness: expected positive numbers, N m/rad, infinite for rigid joints, "
+                f"got {stiffness.tolist()}."
+            )
+        joints = np.flatnonzero(np.isfinite(stiffness))
+        damping = _of(self.joint_damping, n, "joint_damping", 0.0)
+        modal = _of(self.modal_damping, modes, "modal_damping", 0.0)
+        for name, values in (("joint_damping", damping), ("modal_damping", modal)):
+            if not ((values >= 0.0) & np.isfinite(values)).all():
+                raise InvalidValueError(
+                    f"{name}: expected numbers from 0, got {values.tolist()}; energy would grow."
+                )
+        drives = model.drive_matrices
+        coupled = drives is not None and (
+            drives.coupling.size or (drives.rotor != np.diag(np.diag(drives.rotor))).any()
+        )
+        if coupled or (model.transmission is not None and not model.transmission.is_invertible):
+            raise InvalidValueError(
+                f"model: {model.name!r} has motors that are coupled by its transmission, which "
+                "flexible robots do not support; take model.with_transmission(None)."
+            )
+        values = (stiffness, damping, modal, joints)
+        names = ("joint_stiffness", "joint_damping", "modal_damping", "joints")
+        for name, value in zip(names, values, strict=True):
+            set_(self, name, read_only(value, value.dtype.type))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.model.n
+
+    @property
+    def modes(self) -> int:
+        """Number of modes of the links: the first entries of e."""
+        return sum(link.m for link in self.links.values())
+
+    @property
+    def m(self) -> int:
+        """Number of elastic coordinates: modes and deflections of joints."""
+        return self.modes + len(self.joints)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the elastic coordinates."""
+        modes = [
+            f"link {row} mode {k + 1}" for row, link in self.links.items() for k in range(link.m)
+        ]
+        return (*modes, *(f"joint {column + 1}" for column in self.joints))
+
+    @property
+    def arrays(self) -> Arm:
+        """What the compiled recursions take."""
+        if self._arm is None:
+            object.__setattr__(self, "_arm", _arrays_of(self))
+        return self._arm
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        damping = self.joint_stiffness, self.joint_damping, self.modal_damping
+        return (self.model, tuple(self.links.items()), *damping)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        model, links, *rest = self._values
+        return type(self), (model, dict(links), *rest)
+
+    def __repr__(self) -> str:
+        rows = ", ".join(map(str, self.links)) or "none"
+        return (
+            f"<FlexibleRobot {self.model.name!r}: n = {self.n}, m = {self.m}, flexible rows {rows}>"
+        )
+
+
+def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
+    """Links by row in the order of rows."""
+    if not isinstance(links, Mapping) or not all(
+        isinstance(link, FlexibleLink) for link in links.values()
+    ):
+        raise InvalidValueError(
+            "links: expected a mapping of rows to flexible links, such as {2: beam(...)}, got "
+            f"{links!r:.60}."
+        )
+    for row in links:
+        if (
+            isinstance(row, bool)
+            or not isinstance(row, int | np.integer)
+            or not 1 <= row <= model.f
+        ):
+            raise InvalidValueError(f"links: expected rows 1 to {model.f}, got {row!r:.20}.")
+        if model.table.sigma[row - 1] == 1:
+            raise InvalidValueError(
+                f"links: row {row} is prismatic, and a flexible link on a sliding joint is not "
+                "supported. Put the flexible link on a fixed row (sigma 2) behind the joint, or "
+                "leave the link rigid."
+            )
+    return {int(row): links[row] for row in sorted(links)}
+
+
+def _of(value: ArrayLike | None, count: int, name: str, default: float) -> Array:
+    """One number for all, an array, or the default. Shapes: -> (count,)."""
+    array = as_reals(default if value is None else value, name)
+    if array.shape not in ((), (count,)):
+        raise ShapeError(f"{name}: expected one number or shape ({count},), got {array.shape}.")
+    return np.broadcast_to(array, (count,)).copy()
+
+
+def _arrays_of(arm: FlexibleRobot) -> Arm:
+    """Chain from tip to root, inertia and elasticity of all bodies in packed arrays."""
+    from .kernels import Arm
+
+    model, f = arm.model, arm.model.f
+    counts = [arm.links[row].m if row in arm.links else 0 for row in range(1, f + 1)]
+    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    m, most = int(start[-1]), max([1, *counts])
+    pi, tip = model.inertia.values.copy(), np.zeros((f + 1, 3))
+    first, second = np.zeros((m, 18)), np.zeros((m, most, 18))
+    six = np.triu_indices(3)
+    for row, link in arm.links.items():
+        inv, k = link.invariants, link.m
+        pi[row - 1] = (*inv.inertia[six], *inv.first_moment, inv.mass)
+        tip[row] = link.tip.position
+        here = slice(start[row - 1], start[row])
+        first[here] = np.hstack(
+            [inv.translation, inv.inertia_first[:, *six], inv.rotation, link.tip.Phi, link.tip.Psi]
+        )
+        ratios = arm.modal_damping[here]  # type: ignore[index]
+        pairs = (inv.modal_mass, inv.modal_stiffness, modal_damping_matrix(inv, ratios))
+        second[here, :k] = np.concatenate(
+            [inv.foreshortening, inv.inertia_second[:, :, *six], inv.gyroscopic, link.tip.Gamma,
+             np.stack(pairs, -1)], axis=-1
+        )  # fmt: skip
+    chain = model.chain
+    rotor = np.zeros(arm.n) if model.drive_matrices is None else np.diag(model.drive_matrices.rotor)
+    rotor = np.where(np.isfinite(arm.joint_stiffness), 0.0, rotor)  # type: ignore[arg-type]
+    at_end = model.tip in arm.links and np.array_equal(model.tool, np.eye(4))
+    return Arm(
+        chain=chain._replace(position=read_only(chain.position - tip[chain.antecedent])),
+        pi=read_only(pi),
+        start=read_only(start, np.int64),
+        tip=read_only(tip[1:]),
+        first=read_only(first),
+        second=read_only(second),
+        rotor=read_only(rotor),
+        tool=read_only(np.zeros(3) if at_end else model.tool[:3, 3] - tip[model.tip]),
+        gravity=model.gravity,
+        end=int(model.tip),
+    )
+
+
+def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:
+    """Damping of clamped modes by their ratios. Shapes: ratios (m,) -> (m, m)."""
+    from scipy.linalg import eigh
+
+    M, K = invariants.modal_mass, invariants.modal_stiffness
+    if not ratios.any():
+        return np.zeros_like(M)
+    values, V = eigh(K, M)
+    return M @ (V * (2.0 * ratios * np.sqrt(np.maximum(values, 0.0)))) @ V.T @ M
+
+
+def damping_matrix(arm: FlexibleRobot) -> Array:
+    """Viscous damping of (q, e): of the drives, the modes and the flexible joints."""
+    n, s, D = arm.n, 0, np.zeros((arm.n + arm.m,) * 2)
+    if arm.model.drive_matrices is not None:
+        D[:n, :n] = arm.model.drive_matrices.viscous
+    for link in arm.links.values():
+        here = slice(s, s + link.m)
+        s, at = s + link.m, slice(n + s, n + s + link.m)
+        D[at, at] = modal_damping_matrix(link.invariants, arm.modal_damping[here])  # type: ignore[index]
+    D[n + s :, n + s :] = np.diag(arm.joint_damping[arm.joints])  # type: ignore[index]
+    return D

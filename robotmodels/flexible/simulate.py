@@ -1,0 +1,449 @@
+"""Simulation of flexible arms and of free elastic bodies, with their energies and momenta."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._choices import chosen
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from ..geometry import DHTable
+from ..model import RobotModel
+from ..simulation import Integrator
+from .linear import scales
+from .link import FlexibleLink
+from .models import DIRECT, SpinStatus, ddm, jacobian, solved, states
+from .robot import FlexibleRobot, damping_matrix
+
+_LAW = Callable[..., ArrayLike]
+_LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
+_PER_SECOND = 30_000  # default budget of evaluations
+
+
+class FlexibleMotionStatus(Outcome):
+    """Outcome of a simulation; fits int8. The motion until then is given for every status."""
+
+    FINISHED = 0, "The motion was followed to its end."
+    NOT_CONVERGED = 1, "The allowed evaluations of the model were used up before the end."
+    DIVERGED = 2, "The motion grew without bound."
+    SOFTENED = 3, SpinStatus.SOFTENED.sentence
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlexibleMotion(Frozen, Value):
+    """Simulated motion of a flexible arm.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    t : ndarray, shape (N,)
+        Times, s; they end early if the simulation did.
+    q, v, tau : ndarray, shape (N, n)
+        Angles, velocities and torques of the motors.
+    e, e_v : ndarray, shape (N, m)
+        Elastic coordinates and their velocities.
+    kinetic, potential, work : ndarray, shape (N,)
+        Energies; work since the start of the torques, less friction, damping and the tool's, J.
+    momentum, impulse : ndarray, shape (N, 6)
+        Linear and angular momentum about the origin of the world, and the impulse since the start
+        of the base, of gravity and of the environment; without rotors.
+    status : FlexibleMotionStatus
+        Why it ended; SOFTENED if a link ever spun too fast for its linear modes.
+    evaluations : int
+        Of the direct model.
+    """
+
+    arm: FlexibleRobot
+    t: Array
+    q: Array
+    v: Array
+    tau: Array
+    e: Array
+    e_v: Array
+    kinetic: Array
+    potential: Array
+    work: Array
+    momentum: Array
+    impulse: Array
+    status: FlexibleMotionStatus
+    evaluations: int
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic plus potential energy, J, shape (N,)."""
+        return self.kinetic + self.potential
+
+    @property
+    def energy_drift(self) -> float:
+        """Largest error of the energy balance, relative to the energy turned over."""
+        parts = self.kinetic, self.potential - self.potential[0], self.work
+        turnover = max(float(np.abs(part).max()) for part in parts)
+        return float(np.abs(self.energy - self.energy[0] - self.work).max()) / max(turnover, 1e-12)
+
+    @property
+    def momentum_drift(self) -> float:
+        """Largest error of the momentum balance, relative to the largest momentum and impulse."""
+        return _relative(
+            self.momentum - self.momentum[0] - self.impulse, self.momentum, self.impulse
+        )
+
+    def reason(self) -> str:
+        """The sentence of the status."""
+        return self.status.sentence
+
+    def __repr__(self) -> str:
+        return (
+            f"<FlexibleMotion: {self.t[-1] - self.t[0]:.6g} s, {len(self.t)} samples, energy drift "
+            f"{self.energy_drift:.1g}>"
+        )
+
+
+def simulate(
+    arm: FlexibleRobot,
+    q0: ArrayLike,
+    v0: ArrayLike | None = None,
+    control: _LAW | ArrayLike | None = None,
+    t: ArrayLike = 1.0,
+    wrench: _LAW | ArrayLike | None = None,
+    *,
+    e0: ArrayLike | None = None,
+    e_v0: ArrayLike | None = None,
+    method: Integrator | str = Integrator.DOP853,
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
+    max_evaluations: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FlexibleMotion:
+    """Simulate a flexible arm under torques.
+
+    Energy and momenta are integrated along: their drift measures the error of the integration.
+    Dry friction is taken with the sign of the velocity, without sticking.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q0, v0 : array_like, shape (n,)
+        Angles and velocities of the motors at the start; default at rest.
+    control : callable or array_like of shape (n,), optional
+        Torques: a function of (t, q, v) or of (t, q, v, e, e_v), or constant ones; default none.
+    t : array_like
+        A duration, with samples at the steps of the integrator, or ascending times (N,).
+    wrench : callable or array_like of shape (6,), optional
+        Of the tool on the environment, in world axes, given as ``control``.
+    e0, e_v0 : array_like, shape (m,), optional
+        Elastic coordinates and velocities at the start; default zero.
+    method : Integrator or str
+        As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
+    rtol, atol : float
+        Tolerances of a step.
+    max_evaluations : int, optional
+        Default 30 000 for each second and as many more.
+    progress : callable, optional
+        A function of the fraction done.
+
+    Returns
+    -------
+    FlexibleMotion
+        The motion, its energies and momenta, and the status.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, SingularMassMatrixError
+        Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
+
+    Examples
+    --------
+    >>> from robotmodels import RobotModel, DHTable, flexible
+    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
+    >>> motion = simulate(arm, [0.0], control=[0.1], t=0.5)
+    >>> motion.status, motion.energy_drift < 1e-8
+    (<FlexibleMotionStatus.FINISHED: 0>, True)
+    """
+    n, m, model = arm.n, arm.m, arm.model
+    start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in (
+        ("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))]  # fmt: skip
+    law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
+    ddm(
+        arm, start[0], start[1], start[2], start[3], np.zeros(n)
+    )  # its errors name what is singular
+    drives, D = model.drive_matrices, damping_matrix(arm)[n:, n:]
+    total = float(arm.arrays.pi[:, 9].sum())
+    cuts = np.cumsum([n, m, n, m])
+    Z = model.base
+
+    def at(time: float, y: Array) -> tuple[list[Array], Array, Array]:
+        parts = np.split(y, cuts)[:4]
+        return parts, law(time, *parts), push(time, *parts)
+
+    softened = [False]
+
+    def rate(time: float, y: Array) -> Array:
+        (q, e, v, ev), tau, w = at(time, y)
+        rows = [x.reshape(1, -1) for x in (q, e, v, ev, tau, w)]
+        a, ea, base = solved(arm, DIRECT, *rows)
+        softened[0] = softened[0] or base[0, 9] > 0.0
+        power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
+        force = Z[:3, :3] @ base[0, :3]
+        moment = Z[:3, :3] @ base[0, 3:6] + np.cross(Z[:3, 3], force)
+        force, moment = (
+            force + total * model.gravity,
+            moment + np.cross(base[0, 6:9], model.gravity),
+        )
+        if w.any():
+            power -= w @ jacobian(arm, q, e) @ np.concatenate([v, ev])
+            place = _tool(arm, q, e)
+            force, moment = force - w[:3], moment - w[3:] - np.cross(place, w[:3])
+        return np.concatenate([v, ev, a[0], ea[0], [power], force, moment])
+
+    y0 = np.concatenate([*(start[k] for k in (0, 1, 2, 3)), np.zeros(7)])
+    options = (chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress)
+    largest = _LARGEST * scales(arm)[n:]
+    times, Y, status, count = followed(
+        rate, y0, t, *options, lambda y: bool((np.abs(y[n : n + m]) > largest).any())
+    )
+    q, e, v, ev, rest = np.split(Y, cuts, axis=1)
+    tau = np.array([law(time, *np.split(y, cuts)[:4]) for time, y in zip(times, Y, strict=True)])
+    kinetic, potential, momentum = states(arm, *(np.ascontiguousarray(x) for x in (q, e, v, ev)))
+    if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
+        status = FlexibleMotionStatus.SOFTENED
+    return FlexibleMotion(
+        arm, times, q, v, tau, e, ev, kinetic, potential, rest[:, 0], momentum, rest[:, 1:], status,
+        count,
+    )  # fmt: skip
+
+
+def _tool(arm: FlexibleRobot, q: Array, e: Array) -> Array:
+    from .models import dgm
+
+    return dgm(arm, q, e)[:3, 3]
+
+
+def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
+    """Function (t, q, e, v, e_v) -> (size,) of a user's function or of constant values."""
+    if not callable(law):
+        values = as_exact(np.zeros(size) if law is None else law, (size,), name)
+        return lambda t, q, e, v, ev: values
+    try:
+        whole = len(signature(law).parameters) >= 5
+    except (TypeError, ValueError):
+        whole = False
+
+    def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
+        given = (q.copy(), v.copy(), e.copy(), ev.copy()) if whole else (q.copy(), v.copy())
+        return as_exact(law(t, *given), (size,), f"{name} at t = {t:.9g} s")
+
+    return value
+
+
+def followed(
+    rate: Callable[[float, Array], Array],
+    y: Array,
+    t: ArrayLike,
+    method: Integrator,
+    rtol: float,
+    atol: float,
+    budget: int | None,
+    progress: Callable[[float], None] | None,
+    beyond: Callable[[Array], bool] = lambda y: False,
+) -> tuple[Array, Array, FlexibleMotionStatus, int]:
+    """Times, states, status and evaluations of an initial value problem."""
+    import scipy.integrate
+
+    times = as_floats(t, "t")
+    if times.ndim == 0 and times > 0.0:
+        start, end, wanted = 0.0, float(times), None
+    elif times.ndim == 1 and times.size > 1 and (np.diff(times) > 0.0).all():
+        start, end, wanted = float(times[0]), float(times[-1]), times
+    else:
+        raise ShapeError(f"t: expected a duration above 0 or ascending times, got {t!r:.60}.")
+    rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
+    most = int(_PER_SECOND * (1.0 + end - start)) if budget is None else budget
+    kind: Any = getattr(scipy.integrate, method.value)
+    status, found = FlexibleMotionStatus.FINISHED, [(start, y)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        solver = kind(rate, start, y, end, rtol=max(rtol, 3e-14), atol=atol)
+        while solver.status == "running":
+            if solver.nfev >= most:
+                status = FlexibleMotionStatus.NOT_CONVERGED
+                break
+            try:
+                solver.step()
+            except SingularMassMatrixError:  # accelerations that are not finite
+                solver.status = "failed"
+            if solver.status == "failed" or beyond(solver.y):
+                status = FlexibleMotionStatus.DIVERGED
+                break
+            if wanted is None:
+                found.append((float(solver.t), solver.y.copy()))
+            else:
+                inside = wanted[(wanted > found[-1][0]) & (wanted <= solver.t)]
+                if inside.size:
+                    dense = solver.dense_output()
+                    found += [(float(x), dense(x)) for x in inside]
+            if progress is not None:
+                progress((float(solver.t) - start) / (end - start))
+    return (
+        np.array([x for x, _ in found]),
+        np.array([x for _, x in found]),
+        status,
+        int(solver.nfev),
+    )
+
+
+def _relative(error: Array, *sizes: Array) -> float:
+    """Largest error of linear and of angular momenta (N, 6), relative to their sizes."""
+    found = 0.0
+    for part in (slice(0, 3), slice(3, 6)):
+        size = max(float(np.linalg.norm(x[:, part], axis=1).max()) for x in sizes)
+        found = max(found, float(np.abs(error[:, part]).max()) / max(size, 1e-9))
+    return found
+
+
+# --- one body in space --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeBodyMotion(Frozen, Value):
+    """Motion of an elastic body without loads (section 7.2.2).
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times, s.
+    pose : ndarray, shape (N, 4, 4)
+        Of the frame at the root, in the world.
+    twist : ndarray, shape (N, 6)
+        Its velocity [v; w] in its own axes.
+    e, e_v : ndarray, shape (N, m)
+        Elastic coordinates and velocities.
+    energy : ndarray, shape (N,)
+        Kinetic and elastic energy, J.
+    momentum : ndarray, shape (N, 6)
+        Linear and angular momentum about the origin of the world.
+    status : FlexibleMotionStatus
+        Why it ended.
+    """
+
+    t: Array
+    pose: Array
+    twist: Array
+    e: Array
+    e_v: Array
+    energy: Array
+    momentum: Array
+    status: FlexibleMotionStatus
+
+    @property
+    def energy_drift(self) -> float:
+        """Largest change of the energy, relative to it."""
+        return float(np.abs(self.energy - self.energy[0]).max() / max(abs(self.energy[0]), 1e-300))
+
+    @property
+    def momentum_drift(self) -> float:
+        """Largest change of the momenta, relative to them."""
+        return _relative(self.momentum - self.momentum[0], self.momentum)
+
+    def reason(self) -> str:
+        """The sentence of the status."""
+        return self.status.sentence
+
+    def __repr__(self) -> str:
+        return f"<FreeBodyMotion: {self.t[-1]:.6g} s, energy drift {self.energy_drift:.1g}>"
+
+
+def free_body(
+    link: FlexibleLink,
+    e0: ArrayLike,
+    v0: ArrayLike,
+    t: ArrayLike,
+    e_v0: ArrayLike | None = None,
+    *,
+    rtol: float = 1e-11,
+    atol: float = 1e-13,
+    max_evaluations: int | None = None,
+) -> FreeBodyMotion:
+    """Motion of an elastic body that floats without loads (section 7.2.2).
+
+    Parameters
+    ----------
+    link : FlexibleLink
+        The body, m modes.
+    e0, e_v0 : array_like, shape (m,)
+        Elastic coordinates and velocities at the start.
+    v0 : array_like, shape (6,)
+        Velocity [v; w] of the root at the start, where its axes are those of the world.
+    t : array_like
+        A duration or ascending times (N,), s.
+    rtol, atol, max_evaluations
+        As for `simulate`.
+
+    Returns
+    -------
+    FreeBodyMotion
+        The motion with its energy and momenta.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity.
+
+    Examples
+    --------
+    >>> from robotmodels import flexible
+    >>> link = flexible.beam(1.0, EI=(5.0, 8.0), density=1.0, gyration=0.02, modes=1)
+    >>> motion = free_body(link, [0.01, 0.0], [0, 0, 0, 0.1, 0.2, 1.0], 1.0)
+    >>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
+    (True, True)
+    """
+    from scipy.spatial.transform import Rotation
+
+    from .kernels import loads, motions
+
+    if not isinstance(link, FlexibleLink):
+        raise InvalidValueError(f"link: expected a FlexibleLink, got {type(link).__name__}.")
+    m, none = link.m, np.zeros((1, 0))
+    start = [
+        as_exact(np.zeros(m) if x is None else x, (m,), s) for s, x in (("e0", e0), ("e_v0", e_v0))
+    ]
+    table = DHTable(antecedent=[0], sigma=[2])
+    arrays = FlexibleRobot(RobotModel.from_table(table, gravity=(0, 0, 0)), {1: link}).arrays
+    cuts = np.cumsum([m, m, 6, 4])
+    flags, nothing = np.zeros(1, np.int64), np.zeros((1, m))
+
+    def rate(t: float, y: Array) -> Array:
+        e, ev, twist, quaternion, _ = np.split(y, cuts)
+        e_a, base = np.empty((1, m)), np.empty((1, 10))
+        rows = [np.ascontiguousarray(x[None]) for x in (e, ev, twist)]
+        loads(
+            arrays, none, rows[0], none, rows[1], none, nothing, np.zeros((1, 6)), rows[2], flags,
+            1, 1, np.empty((1, 0)), e_a, base,
+        )  # fmt: skip
+        u, w = quaternion[:3], twist[3:]
+        turn = 0.5 * np.append(quaternion[3] * w + np.cross(u, w), -u @ w)
+        speed = Rotation.from_quat(quaternion).apply(twist[:3])
+        return np.concatenate([ev, e_a[0], base[0, :6], turn, speed])
+
+    y0 = np.concatenate([*start, as_exact(v0, (6,), "v0"), [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
+    times, Y, status, _ = followed(
+        rate, y0, t, Integrator.DOP853, rtol, atol, max_evaluations, None
+    )
+    e, ev, twist, quaternion, place = (np.ascontiguousarray(x) for x in np.split(Y, cuts, axis=1))
+    N = len(times)
+    out, empty = np.empty((N, 15)), np.zeros((N, 0))
+    motions(arrays, empty, e, empty, ev, twist, np.empty((N, 2, 3, 4)), out)
+    turn = Rotation.from_quat(quaternion)
+    pose = np.tile(np.eye(4), (N, 1, 1))
+    pose[:, :3, :3], pose[:, :3, 3] = turn.as_matrix(), place
+    p = turn.apply(out[:, 3:6])
+    momentum = np.hstack([p, turn.apply(out[:, 6:9]) + np.cross(place, p)])
+    return FreeBodyMotion(times, pose, twist, e, ev, out[:, 0] + out[:, 2], momentum, status)
