@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows
 from .._outcomes import Outcome
-from ..geometry import REVOLUTE
 from .robot import LoopedRobot, check_looped
 
 _STARTS = 5  # random starts for rows that do not close from the guess
