@@ -216,6 +216,59 @@ def test_a_four_bar_follows_freudenstein(rng):
     assert np.allclose(loops.velocity_map(robot, q)[:, 1, 0], slope, atol=1e-10)
 
 
+def test_a_bennett_linkage_moves_though_its_closure_has_five_rows(rng):
+    robot, q_a, guess = spatial_four_bar(rng)
+    found = loops.close(robot, rng.uniform(0.3, 2.8, (20, 1)), loops.close(robot, q_a, guess).q)
+    assert (found.status == ClosingStatus.CLOSED).all()
+    # opposite angles are equal but for sign, and the four axes alternate
+    assert np.ptp(np.tan(found.q[:, 0] / 2) * np.tan(found.q[:, 1] / 2)) < 1e-9
+    assert (np.asarray(loops.mobility(robot, found.q)) == 1).all()
+
+
+def test_full_closures_are_a_cut_body(rng):
+    """A welded cut of a four-bar's coupler is the same robot as its cut pin."""
+    cut_pin = four_bar(rng)
+    table = cut_pin.tree.table
+    rows = [
+        *({"antecedent": a, "sigma": s, "d": d} for a, s, d in [(0, 0, 0), (0, 0, 1), (1, 0, 0.3)]),
+        {"antecedent": 3, "sigma": 2, "d": 0.4, "theta": 0.5},
+        {"antecedent": 2, "sigma": 0, "d": 0.7},
+        {"antecedent": 5, "sigma": 2, "theta": 0.2, "alpha": 0.3},
+    ]
+    tree = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    ends = [tree.twin.frame(k) for k in (3, 5)]
+    assert [place.parent for place in ends] == [3, 5]
+    # a frame in the middle of the coupler, seen from the crank's side and from the rocker's
+    posture = loops.close(cut_pin, [0.7], [1.2, -0.5]).q
+    q = np.array([*posture, posture[0] + posture[2] - posture[1] + 0.3])
+    middle = rm.se3.inverse(rm.dgm(tree, q, 6)) @ rm.dgm(tree, q, 4)
+    tree = tree.with_frames({"middle": middle}, frame=6)
+    robot = loops.LoopedRobot(tree, [loops.Closure("weld", (4, "middle"), "full")], actuated=[0])
+    found = loops.close(robot, [0.9], q)
+    assert gap(robot, found.q) < 1e-12
+    expected = loops.close(cut_pin, [0.9], posture).q
+    assert np.allclose(found.q[:3], expected, atol=1e-12)
+    assert table.f == 5
+    h = 1e-6
+    J = loops.closure_jacobian(robot, found.q)
+    away = found.q + h * np.eye(4)
+    for k in range(4):
+        T = rm.se3.inverse(rm.dgm(tree, away[k], 4)) @ rm.dgm(tree, away[k], "middle")
+        turned = [T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]]
+        assert np.allclose(J[:, k], [*T[:3, 3] / h, *np.array(turned) / (2 * h)], atol=1e-5)
+
+
+def test_antiparallel_axes_are_not_closed(rng):
+    """A pin that would have to be turned over: origins meet, axes do not."""
+    robot = four_bar(rng)
+    tree = robot.tree.with_frames({"over": np.diag([1.0, -1.0, -1.0, 1.0])}, frame=5)
+    turned = loops.LoopedRobot(tree, [loops.Closure("cut", (4, "over"))], actuated=[0])
+    q = loops.close(robot, [0.7], [1.2, -0.5]).q
+    found = loops.close(turned, [0.7], q)
+    assert found.status in (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
+    assert found.residual > 0.1
+
+
 def test_a_gough_platform_has_its_inverse_jacobian(rng):
     robot, base, platform = gough(rng)
     guess = loops.close(robot, np.full(6, 1.2)).q

@@ -147,6 +147,14 @@ def test_mjcf_with_one_and_with_two_root_bodies(read):
     assert np.allclose(tau[0], tau[1][order], atol=1e-12)
 
 
+def test_mjcf_bodies_have_their_centres_and_tensors(read):
+    robot = read(FOUR_BAR, loops.read_mjcf, name="bars.xml")
+    expected = rm.InertialParameters.from_com([1.5], [[0.2, 0, 0]], [np.diag([0.1, 0.2, 0.3])])
+    row = robot.tree.table.names.index("j1")
+    # frame 1 has z along the joint's axis and the file's zero
+    assert np.allclose(robot.tree.inertia.values[row], expected.values[0], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
