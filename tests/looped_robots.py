@@ -107,3 +107,18 @@ def gough(rng, base=None, platform=None):
     closures = [loops.Closure(f"leg{k}", (f"b{k}", 4 * k + 4), "point") for k in range(1, 6)]
     sliders = [3 * k + 2 for k in range(6)]
     return loops.LoopedRobot(tree, closures, actuated=sliders), base, platform
+
+
+def spatial_four_bar(rng):
+    """A Bennett linkage: four revolute axes, overconstrained; its twists and lengths alternate."""
+    a, alpha, beta = 0.5, 0.6, 1.1
+    b = a * np.sin(beta) / np.sin(alpha)
+    rows = [
+        {"antecedent": 0, "sigma": 0},
+        {"antecedent": 1, "sigma": 0, "d": a, "alpha": alpha},
+        {"antecedent": 2, "sigma": 0, "d": b, "alpha": beta},
+        {"antecedent": 3, "sigma": 2, "d": a, "alpha": alpha},
+        {"antecedent": 0, "sigma": 2, "d": -b, "alpha": -beta},
+    ]
+    robot = loops.LoopedRobot(model(rows, rng), [loops.Closure("cut", (4, 5))], actuated=[0])
+    return robot, [0.8], [-2.0, 0.8]

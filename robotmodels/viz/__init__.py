@@ -12,8 +12,19 @@ from .calibration import (
     plot_calibration_residuals,
     plot_selection,
 )
-from .camera import Camera
-from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
+from .camera import (
+    Camera,
+)
+from .dynamics import (
+    plot_energy,
+    plot_inertia_map,
+    plot_torque_parts,
+)
+from .flexible import (
+    plot_frequencies,
+    plot_modes,
+    show_flexible,
+)
 from .identification import (
     plot_excitation,
     plot_identification_correlations,
@@ -22,24 +33,43 @@ from .identification import (
     plot_identification_standard_errors,
     plot_identification_torques,
 )
-from .motion import Motion
-from .over_time import Unit
-from .performance import (
-    plot_aspects,
-    plot_feasible_path,
-    plot_workspace,
-    show_workspace,
+from .motion import (
+    Motion,
+)
+from .over_time import (
+    Unit,
+)
 from .parallel import (
     jog_parallel,
     plot_assembly_modes,
     plot_platform_workspace,
     show_parallel,
 )
-from .processing import plot_processing
-from .report import html_report, identification_html
-from .scene import Scene
-from .show import animate, jog, show
-from .time_optimal import plot_phase_plane, plot_plan
+from .performance import (
+    plot_aspects,
+    plot_feasible_path,
+    plot_workspace,
+    show_workspace,
+)
+from .processing import (
+    plot_processing,
+)
+from .report import (
+    html_report,
+    identification_html,
+)
+from .scene import (
+    Scene,
+)
+from .show import (
+    animate,
+    jog,
+    show,
+)
+from .time_optimal import (
+    plot_phase_plane,
+    plot_plan,
+)
 from .trajectories import (
     plot_joint_motion,
     plot_joint_path,
@@ -47,8 +77,15 @@ from .trajectories import (
     plot_profiles,
     plot_trajectory,
 )
-from .velocities import plot_ellipsoids, plot_inverse_velocities, plot_singularities
-from .visual_servoing import plot_servo, show_servo
+from .velocities import (
+    plot_ellipsoids,
+    plot_inverse_velocities,
+    plot_singularities,
+)
+from .visual_servoing import (
+    plot_servo,
+    show_servo,
+)
 
 __all__ = [
     "Camera",
@@ -59,8 +96,8 @@ __all__ = [
     "html_report",
     "identification_html",
     "jog",
-    "plot_aspects",
     "jog_parallel",
+    "plot_aspects",
     "plot_assembly_modes",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
@@ -71,6 +108,7 @@ __all__ = [
     "plot_energy",
     "plot_excitation",
     "plot_feasible_path",
+    "plot_frequencies",
     "plot_identification_correlations",
     "plot_identification_parameters",
     "plot_identification_residuals",
@@ -80,6 +118,7 @@ __all__ = [
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
+    "plot_modes",
     "plot_phase_plane",
     "plot_plan",
     "plot_platform_workspace",
@@ -93,7 +132,8 @@ __all__ = [
     "plot_trajectory",
     "plot_workspace",
     "show",
+    "show_flexible",
+    "show_parallel",
     "show_servo",
     "show_workspace",
-    "show_parallel",
 ]

@@ -6,9 +6,7 @@ SECTIONS = "tests/test_performance.py -k "
 PATHS = "tests/test_performance_paths.py -k "
 
 
-def fault(
-    name: str, after: str, old: str, new: str, tests: str, compiled: bool = True
-) -> Mutation:
+def fault(name: str, after: str, old: str, new: str, tests: str, compiled: bool = True) -> Mutation:
     """A fault of the room."""
     return Mutation("performance", name, after, old, new, tests, compiled)
 
