@@ -14,6 +14,7 @@ from .calibration import (
 )
 from .camera import Camera
 from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
+from .flexible import plot_frequencies, plot_modes, show_flexible
 from .identification import (
     plot_excitation,
     plot_identification_correlations,
@@ -54,6 +55,7 @@ __all__ = [
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
+    "plot_frequencies",
     "plot_identification_correlations",
     "plot_identification_parameters",
     "plot_identification_residuals",
@@ -63,6 +65,7 @@ __all__ = [
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
+    "plot_modes",
     "plot_pose_path",
     "plot_processing",
     "plot_profiles",
@@ -71,4 +74,5 @@ __all__ = [
     "plot_torque_parts",
     "plot_trajectory",
     "show",
+    "show_flexible",
 ]
