@@ -57,6 +57,9 @@ class Deflection(Frozen, Value):
         """The sentence of the status of sample i."""
         return DeflectionStatus(int(self.status[i])).sentence
 
+    def __repr__(self) -> str:
+        return f"<Deflection: shape {self.e.shape}, up to {np.max(self.deflection, initial=0):.3g}>"
+
 
 def static_deflection(
     arm: FlexibleRobot, q: ArrayLike, wrench: ArrayLike | None = None

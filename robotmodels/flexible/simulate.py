@@ -134,7 +134,7 @@ def simulate(
     q0, v0 : array_like, shape (n,)
         Angles and velocities of the motors at the start; default at rest.
     control : callable or array_like of shape (n,), optional
-        Torques: a function of (t, q, v) or of (t, q, v, e, e_v), or constant ones; default none.
+        Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none.
     t : array_like
         A duration, with samples at the steps of the integrator, or ascending times (N,).
     wrench : callable or array_like of shape (6,), optional
@@ -234,13 +234,13 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
         values = as_exact(np.zeros(size) if law is None else law, (size,), name)
         return lambda t, q, e, v, ev: values
     try:
-        whole = len(signature(law).parameters) >= 5
+        count = len(signature(law).parameters)
     except (TypeError, ValueError):
-        whole = False
+        count = 3
 
     def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
-        given = (q.copy(), v.copy(), e.copy(), ev.copy()) if whole else (q.copy(), v.copy())
-        return as_exact(law(t, *given), (size,), f"{name} at t = {t:.9g} s")
+        given = (q, v, e, ev) if count >= 5 else (q, v) if count > 1 else ()
+        return as_exact(law(t, *(x.copy() for x in given)), (size,), f"{name} at t = {t:.9g} s")
 
     return value
 

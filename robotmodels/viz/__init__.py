@@ -25,6 +25,9 @@ from .flexible import (
     plot_modes,
     show_flexible,
 )
+from .camera import Camera
+from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
+from .flexible import plot_frequencies, plot_modes, show_flexible
 from .identification import (
     plot_excitation,
     plot_identification_correlations,

@@ -1,0 +1,205 @@
+"""Pictures of flexible robots: bent links, modes, frequencies over the workspace."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_exact, as_number, as_vector
+from ..errors import InvalidValueError
+from ..flexible import FlexibleLink, FlexibleRobot, dgm, link_poses, natural_frequencies
+from ..visual import Color, characteristic_length
+from . import style
+from .camera import framed
+from .scene import Scene
+from .shapes import Node, apply, floor_grid, path_tube
+from .style import PALETTE, as_instance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_RIGID: Color = (0.45, 0.47, 0.50, 1.0)
+_THICK = 0.018  # radius of links, relative to the size of the robot
+
+
+def show_flexible(
+    arm: FlexibleRobot,
+    q: ArrayLike | None = None,
+    e: ArrayLike | None = None,
+    *,
+    scale: float = 1.0,
+    grid: bool = True,
+    height: int = 480,
+) -> Scene:
+    """Draw a flexible robot: bent links as swept tubes in colour, rigid ones grey.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints and m elastic coordinates.
+    q, e : array_like, shape (..., n) and (..., m), optional
+        Configurations, drawn over each other; default zero.
+    scale : float
+        Factor by which deflections are exaggerated.
+    grid : bool
+        Whether the floor and the axes of the world are drawn.
+    height : int
+        Of the picture in a notebook, pixels.
+
+    Returns
+    -------
+    Scene
+        The picture.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors of another length; a scale that is not positive.
+
+    Examples
+    --------
+    >>> from robotmodels import load, flexible
+    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
+    >>> show_flexible(arm, np.zeros(6), [0.0, 0.05]).paths[0]
+    'configuration_1/row_1'
+    """
+    as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
+    q = as_vector(np.zeros(arm.n) if q is None else q, arm.n, "q")
+    e = as_vector(np.zeros(arm.m) if e is None else e, arm.m, "e")
+    e = as_number(scale, "scale", above=0.0) * e
+    batch = np.broadcast_shapes(q.shape[:-1], e.shape[:-1])
+    q, e = (np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, e))
+    size = characteristic_length(arm.model.table, arm.model.tool)
+    nodes, points = list[Node](), [np.zeros((1, 3))]
+    for k, (frames, tool) in enumerate(zip(link_poses(arm, q, e), dgm(arm, q, e), strict=True)):
+        ends = [arm.model.base, *frames]
+        for row in range(1, arm.model.f + 1):
+            before = int(arm.model.table.antecedent[row - 1])
+            if before not in arm.links:  # from the frame before to this one
+                line = np.stack([ends[before][:3, 3], ends[row][:3, 3]])
+                nodes += _tube(f"configuration_{k + 1}/row_{row}", line, size, _RIGID)
+                points.append(line)
+            if row in arm.links:
+                bent = apply(ends[row], _axis(arm, row, e[k]))
+                color = PALETTE[k % len(PALETTE)]
+                nodes += _tube(f"configuration_{k + 1}/link_{row}", bent, 1.2 * size, color)
+                points.append(bent)
+        if arm.model.tip not in arm.links:
+            line = np.stack([ends[arm.model.tip][:3, 3], tool[:3, 3]])
+            nodes += _tube(f"configuration_{k + 1}/tool", line, size, _RIGID)
+            points.append(line)
+    cloud = np.concatenate(points)
+    nodes += floor_grid(cloud, False) if grid else []
+    return Scene(f"{arm.model.name}, flexible", tuple(nodes), framed(cloud), height=height)
+
+
+def _tube(path: str, line: Array, size: float, color: Color) -> list[Node]:
+    """A tube along a line, or nothing where it has no length."""
+    tube = path_tube(line, _THICK * size)
+    return [] if tube is None else [Node(path, np.eye(4), tube, color)]
+
+
+def _axis(arm: FlexibleRobot, row: int, e: Array) -> Array:
+    """Bent axis of a link in its frame. Shapes: e (m,) -> (N, 3)."""
+    start = arm.arrays.start
+    link = arm.links[row]
+    return link.nodes + link.shapes @ e[start[row - 1] : start[row]]
+
+
+@style.plot
+def plot_modes(
+    link: FlexibleLink, title: str | None = None, size: ArrayLike | None = None
+) -> Figure:
+    """Mode shapes of a link: displacements along its axis, with their frequencies.
+
+    Parameters
+    ----------
+    link : FlexibleLink
+        The link, m modes.
+    title : str, optional
+        Text over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a link, or one without modes that move its axis.
+    """
+    as_instance(link, FlexibleLink, "link", "robotmodels.flexible")
+    along = np.linalg.norm(link.nodes - link.nodes[0], axis=1)
+    moved = [c for c in range(link.m) if np.abs(link.shapes[..., c]).max() > 0.0]
+    if not moved:
+        raise InvalidValueError("link: no mode moves the axis of this link; there is no figure.")
+    figure, axes = style.panels(style.COLUMN, 2.4, size)
+    for k, c in enumerate(moved):
+        shape = link.shapes[..., c]
+        axis = int(np.abs(shape).max(axis=0).argmax())
+        label = f"along {'xyz'[axis]}, {link.frequencies[c]:.4g} rad/s"
+        axes[0, 0].plot(along, shape[:, axis], label=label, **style.line(k))
+    axes[0, 0].axhline(0.0, **style.ZERO)
+    axes[0, 0].set_xlabel("distance from the root (m)")
+    axes[0, 0].set_ylabel("displacement (m)")
+    return style.finished(figure, title, ["modes"])
+
+
+@style.plot
+def plot_frequencies(
+    arm: FlexibleRobot,
+    joint: int,
+    span: ArrayLike = (-np.pi, np.pi),
+    q: ArrayLike | None = None,
+    joints: str = "locked",
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Natural frequencies of an arm over the range of a joint.
+
+    Parameters
+    ----------
+    arm : FlexibleRobot
+        The robot, n joints.
+    joint : int
+        Which joint moves, from 0.
+    span : array_like, shape (2,)
+        Its range, rad or m.
+    q : array_like, shape (n,), optional
+        The other joints; default zero.
+    joints : str
+        ``"locked"`` or ``"free"``, see `robotmodels.flexible.natural_frequencies`.
+    title : str, optional
+        Text over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        A joint that does not exist; vectors of another length.
+    """
+    as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
+    (column,) = style.as_choice([joint], arm.n, "joint", "a number")
+    low, high = as_exact(span, (2,), "span")
+    places = np.linspace(low, high, 61)
+    many = np.tile(np.zeros(arm.n) if q is None else as_exact(q, (arm.n,), "q"), (61, 1))
+    many[:, column] = places
+    found = natural_frequencies(arm, many, joints)
+    figure, axes = style.panels(style.COLUMN, 2.4, size)
+    for k in range(arm.n if joints == "free" else 0, found.shape[1]):
+        axes[0, 0].plot(places, found[:, k], label=f"_{k}", color=PALETTE[k % 8], linewidth=1.2)
+    axes[0, 0].set_xlabel(f"joint {column + 1} (rad or m)")
+    axes[0, 0].set_ylabel("natural frequency (rad/s)")
+    axes[0, 0].set_yscale("log")
+    return style.finished(figure, title)
