@@ -18,7 +18,35 @@ _TWO_TURNS = 4.0 * np.pi
 
 
 def as_positions(model: RobotModel, q: ArrayLike) -> Array:
-    """Joint positions of shape (..., n); angles that may be degrees warn once a robot."""
+    """Check joint positions; angles that may be degrees warn, once for a robot.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : array_like, shape (..., n)
+        Joint positions, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        The same as floats.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another length; NaN or infinity.
+
+    Warns
+    -----
+    RobotModelsWarning
+        A revolute joint is more than two turns away from zero, and beyond its limits.
+
+    Examples
+    --------
+    >>> as_positions(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0])), [0.5])
+    array([0.5])
+    """
     q = as_vector(q, model.n, "q")
     if model.twin.angles_warn:
         # quickly for one configuration: its norm is at least as large as each angle
