@@ -33,6 +33,7 @@ from .tape import Number, Scalar, Tape, function, pick
 
 _NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
 _BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may cause
+_LEAST = 1e-14  # of the largest coefficient: slopes that are zero
 _FREE, _DOUBTFUL = float(IGMStatus.REACHED_FAMILY), float(IGMStatus.INCOMPLETE)
 
 
@@ -273,6 +274,62 @@ def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
     return [Solution((Unknown(value),), 1.0, _status(size, limits.zero, limits.small))]
 
 
+def quartic(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``a0 + a1 C + a2 S + a3 cos(2 x) + a4 sin(2 x) = 0``, four solutions.
+
+    Ferrari's formulas for ``t = tan(x / 2)`` find them, Newton's method makes them exact.
+    """
+    a0, a1, a2, a3, a4 = g[:5]
+    size: Number = 0.0
+    start: Number = 0.0
+    for w in np.arange(0.1, 6.0, 0.4 * pi).tolist():  # x from an angle opposite to which f is large
+        f = a0 - a1 * cos(w) - a2 * sin(w) + a3 * cos(2.0 * w) + a4 * sin(2.0 * w)
+        start, size = pick(_size(f), size, w, start), _larger(_size(f), size)
+    C, S = function("cos", start), function("sin", start)
+    a1, a2 = a1 * C + a2 * S, a2 * C - a1 * S
+    C, S = C * C - S * S, 2.0 * (S * C)
+    a3, a4 = a3 * C + a4 * S, a4 * C - a3 * S
+    lead = pick(size, 0.0, a0 - a1 + a3, 1.0)
+    b, c = (2.0 * a2 - 4.0 * a4) / lead, (2.0 * a0 - 6.0 * a3) / lead
+    d, e = (2.0 * a2 + 4.0 * a4) / lead, (a0 + a1 + a3) / lead
+    # y^4 + p y^2 + q y + r = 0 with t = y - b / 4, and its resolvent with the largest root m
+    h = 0.25 * b
+    p, q = c - 6.0 * h * h, d - 2.0 * h * c + 8.0 * h * h * h
+    r = e - h * d + h * h * c - 3.0 * h * h * h * h
+    m = _larger(_largest_root(p, 0.25 * p * p - r, -0.125 * q * q), 1e-30)
+    root = function("sqrt", 2.0 * m)
+    free, out = _below(size, 0.0), []
+    for sign in (1.0, -1.0):
+        room = -2.0 * (p + m + sign * (q / root))
+        scale = _size(p) + m + _size(q / root)
+        near = pick(_size(room), _BEYOND * scale, 0.0, _DOUBTFUL)
+        half = function("sqrt", _larger(room, 0.0))
+        for other in (half, -half):
+            x = 2.0 * function("atan2", 0.5 * (sign * root + other) - h, 1.0)
+            for _ in range(4):
+                C, S = function("cos", x), function("sin", x)
+                f = a0 + a1 * C + a2 * S + a3 * (C * C - S * S) + 2.0 * a4 * (S * C)
+                slope = a2 * C - a1 * S - 4.0 * a3 * (S * C) + 2.0 * a4 * (C * C - S * S)
+                x = x - f / pick(_size(slope), _LEAST * size, slope, 1.0)
+            x = pick(free, 0.5, limits.wanted[0], x + start)
+            angle = Unknown(x, function("cos", x), function("sin", x))
+            valid = pick(free, 0.5, float(not out), _below(-room, _BEYOND * scale))
+            out.append(Solution((angle,), valid, pick(free, 0.5, _FREE, near)))
+    return out
+
+
+def _largest_root(a: Number, b: Number, c: Number) -> Number:
+    """Largest real root of ``m^3 + a m^2 + b m + c = 0``, by Cardano's formulas."""
+    P, Q = b - a * a / 3.0, c - a * b / 3.0 + 2.0 / 27.0 * (a * a * a)
+    square = 0.25 * Q * Q + P * P * P / 27.0
+    root = function("sqrt", _size(square))
+    u = function("exp", function("log", _larger(0.5 * _size(Q) + root, 1e-300)) / 3.0)
+    alone = pick(Q, 0.0, -1.0, 1.0) * (u - P / (3.0 * u))
+    angle = function("atan2", root, -0.5 * Q) / 3.0
+    largest = 2.0 * function("sqrt", _larger(-P / 3.0, 0.0)) * function("cos", angle)
+    return pick(square, 0.0, alone, largest) - a / 3.0
+
+
 _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.ANGLE: direct_angle,
     layout.OPPOSITE_ANGLES: opposite_angles,
@@ -280,4 +337,5 @@ _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
     layout.TWO_EQUATIONS: angle_of_two,
     layout.TWO_ANGLES: pair_of_angles,
     layout.LENGTH: length,
+    layout.QUARTIC: quartic,
 }

@@ -22,11 +22,12 @@ Vector = tuple[Number, ...]
 
 RUN: dict[str, Callable[..., Any]] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide,
-    "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "sign": np.sign, "floor": np.floor,
+    "sin": np.sin, "cos": np.cos, "exp": np.exp, "log": np.log,
+    "sqrt": np.sqrt, "sign": np.sign, "floor": np.floor,
     "atan2": np.arctan2, "pick": lambda a, b, x, y: np.where(a > b, x, y),
     "nan": lambda: np.float64(np.nan),
 }  # fmt: skip
-_FUNCTIONS = ("sin", "cos", "sqrt", "sign", "floor", "atan2")
+_FUNCTIONS = ("sin", "cos", "exp", "log", "sqrt", "sign", "floor", "atan2")
 
 
 class OperationCount(NamedTuple):
