@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
@@ -17,7 +17,19 @@ from .results import brief
 
 THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _TURN = 2.0 * np.pi
-Flags = NDArray[np.bool_]
+
+
+class Sight(NamedTuple):
+    """An object as a camera sees it."""
+
+    exists: Any
+    """Whether the feature exists, bool (...)."""
+    s: Array
+    """Measurement (..., k)."""
+    depth: Any
+    """Depths, or planes (A, B, C, D), that the rows need."""
+    image: Any = None
+    """Points (..., m, 2) that have to be inside the image, None where there are none."""
 
 
 class Feature(Value):
@@ -63,19 +75,16 @@ class Feature(Value):
     _period: ClassVar[tuple[float, ...]] = (0.0,)
     """Periods of the components of one element, 0 where there is none."""
 
-    _corners: ClassVar[Any]  # points (m, 3) of the object
-    _measure: ClassVar[Callable[..., Array]]  # (G): measurement (..., k)
-    _depth: ClassVar[Callable[..., Any]]  # (G): depths or planes that the rows need
-    _rows: ClassVar[Callable[..., Array]]  # (s, depth, G): interaction matrix (..., k, 6)
+    _see: ClassVar[Callable[..., Sight]]  # (T): what is seen of the object
+    _rows: ClassVar[Callable[..., Array]]  # (s, depth, image): interaction matrix (..., k, 6)
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
-        return self._measure(self._seen(T))
+        return self._seen(T).s
 
     def interaction(self, T: ArrayLike) -> Array:
         """Interaction matrix L (..., k, 6) at poses T, ``ds/dt = L [v; w]``."""
-        G = self._seen(T)
-        return self._rows(self._measure(G), self._depth(G), G)
+        return self._rows(*self._seen(T)[1:])
 
     @property
     def size(self) -> int:
@@ -87,34 +96,23 @@ class Feature(Value):
         objects = getattr(self, "object_points", getattr(self, "points", (0,)))
         return np.tile(self._period, len(objects))
 
-    def _placed(self, T: Array) -> Any:
-        """Geometry G of the object in the camera."""
-        return placed(T, self._corners)
-
-    def _visible(self, G: Any) -> Flags:
-        """Whether the feature exists. Shapes: -> (...)."""
-        return np.asarray((G[..., 2] > 0.0).all(axis=-1))
-
-    def _outline(self, s: Array, G: Any) -> Any:
-        """Points (..., m, 2) that the camera has to see, None where they are not known."""
-        return None if G is None else G[..., :2] / G[..., 2:]
-
     def _parallel(self, Z: float) -> Any:
         """Depth of an object parallel to the image."""
         return np.array((0.0, 0.0, 1.0, -Z))
 
-    def _seen(self, T: Any) -> Any:
-        """Geometry at checked poses, where the feature exists."""
-        G = self._placed(as_pose(T))
-        seen = self._visible(G)
-        if not np.all(seen):
-            row = "" if seen.ndim == 0 else f" (row {np.argwhere(~seen)[0].tolist()})"
+    def _seen(self, T: Any) -> Sight:
+        """Sight at checked poses, where the feature exists."""
+        poses = as_pose(T)
+        with np.errstate(all="ignore"):
+            sight = self._see(poses)
+        if not np.all(sight.exists):
+            row = f" (row {np.argwhere(~sight.exists)[0].tolist()})" if poses.ndim > 2 else ""
             raise InvalidValueError(
                 f"T: the feature of {type(self).__name__} does not exist there{row}: expected the "
                 "object in front of the plane of the camera, not seen edge-on and without the "
                 "camera inside; move the camera."
             )
-        return G
+        return sight
 
     def __repr__(self) -> str:
         return brief(self)
@@ -178,24 +176,16 @@ class Points(Feature):
             raise ShapeError(f"object_points: expected (k, 3), k from 1, got {points.shape}.")
         set_fields(self, object_points=read_only(points))
 
-    @property
-    def _corners(self) -> Array:  # type: ignore[override]
-        return self.object_points
-
-    def _measure(self, G: Array) -> Array:
-        return _flat(G[..., :2] / G[..., 2:])
-
-    def _depth(self, G: Array) -> Array:
-        return G[..., 2]
+    def _see(self, T: Array) -> Sight:
+        X = placed(T, self.object_points)
+        image = X[..., :2] / X[..., 2:]
+        return Sight((X[..., 2] > 0.0).all(axis=-1), _flat(image), X[..., 2], image)
 
     def _parallel(self, Z: float) -> Array:
         return np.full(len(self.object_points), Z)
 
-    def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         return point_rows(s[..., 0::2], s[..., 1::2], 1.0 / depth).reshape(*s.shape, 6)
-
-    def _outline(self, s: Array, G: Any) -> Array:
-        return s.reshape(*s.shape[:-1], len(self.object_points), 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -212,29 +202,19 @@ class Lines(Feature):
     def __post_init__(self) -> None:
         set_fields(self, points=_pairs(self.points))
 
-    def _placed(self, T: Array) -> tuple[Array, Array]:
+    def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
-        return X[..., 0::2, :], X[..., 1::2, :]
+        p, along = X[..., 0::2, :], X[..., 1::2, :] - X[..., 0::2, :]
+        normal = np.cross(p, along)
+        size = np.hypot(normal[..., 0], normal[..., 1])
+        exists = (X[..., 2] > 0.0).all(axis=-1) & (
+            size > THIN * (norm(p) * norm(along))[..., 0]
+        ).all(axis=-1)
+        plane = plane_at(p - inner(p, along) / inner(along, along) * along)
+        return Sight(exists, *lines_of(normal, plane))
 
-    def _visible(self, G: Any) -> Flags:
-        p, q = G
-        normal, along = np.cross(p, q), np.linalg.norm(q - p, axis=-1)
-        exists = np.hypot(*np.moveaxis(normal, -1, 0)[:2]) > THIN * along * norm(p)[..., 0]
-        return ((p[..., 2] > 0.0) & (q[..., 2] > 0.0) & exists).all(axis=-1)
-
-    def _measure(self, G: Any) -> Array:
-        return line_of(np.cross(*G))
-
-    def _depth(self, G: Any) -> Array:
-        p, along = G[0], G[1] - G[0]
-        return plane_at(p - inner(p, along) / inner(along, along) * along)
-
-    def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
-
-    def _outline(self, s: Array, G: Any) -> Array:
-        rho, theta = s[..., 0::2], s[..., 1::2]  # the point nearest to the optical axis
-        return np.stack((rho * np.cos(theta), rho * np.sin(theta)), axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -247,22 +227,21 @@ class Segments(Feature):
     def __post_init__(self) -> None:
         set_fields(self, points=_pairs(self.points))
 
-    @property
-    def _corners(self) -> Array:  # type: ignore[override]
-        return self.points.reshape(-1, 3)
-
-    def _measure(self, G: Array) -> Array:
-        p, q = ((G[..., :2] / G[..., 2:])[..., k::2, :] for k in (0, 1))
+    def _see(self, T: Array) -> Sight:
+        X = placed(T, self.points.reshape(-1, 3))
+        image, depth = (
+            X[..., :2] / X[..., 2:],
+            np.stack((X[..., 0::2, 2], X[..., 1::2, 2]), axis=-1),
+        )
+        p, q = image[..., 0::2, :], image[..., 1::2, :]
         (x, y), (dx, dy) = np.moveaxis(0.5 * (p + q), -1, 0), np.moveaxis(q - p, -1, 0)
-        return _flat(np.stack((x, y, np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1))
-
-    def _depth(self, G: Array) -> Array:
-        return np.stack((G[..., 0::2, 2], G[..., 1::2, 2]), axis=-1)
+        s = _flat(np.stack((x, y, np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1))
+        return Sight((X[..., 2] > 0.0).all(axis=-1), s, depth, image)
 
     def _parallel(self, Z: float) -> Array:
         return np.full((len(self.points), 2), Z)
 
-    def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         x, y, length, alpha = (s[..., k::4] for k in range(4))
         return _flat_rows(interaction_segment(x, y, length, alpha, depth))
 
@@ -287,11 +266,12 @@ def _flat_rows(L: Array) -> Array:
     return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
 
 
-def line_of(normal: Array) -> Array:
-    """Image lines of planes through the camera. Shapes: normal (..., n, 3) -> (..., 2 n)."""
-    length = np.hypot(normal[..., 0], normal[..., 1])
-    s = np.stack((-normal[..., 2] / length, np.arctan2(normal[..., 1], normal[..., 0])), axis=-1)
-    return _flat(s)
+def lines_of(normal: Array, plane: Array) -> tuple[Array, Array, Array]:
+    """Image lines (..., 2 n) of planes through the camera, depths, points nearest to its axis."""
+    x, y, z = np.moveaxis(normal, -1, 0)
+    rho, theta = -z / np.hypot(x, y), np.arctan2(y, x)
+    nearest = np.stack((rho * np.cos(theta), rho * np.sin(theta)), axis=-1)
+    return _flat(np.stack((rho, theta), axis=-1)), plane, nearest
 
 
 def wrapped(error: Array, periods: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from .._arrays import Array, as_exact, as_number, read_only
 from ..se3 import as_single_pose, inverse
 from ..se3.orientation import rotation_vectors_of
-from .features import Feature, Flags, placed, unit
+from .features import Feature, Sight, inner, placed, unit
 from .matrices import interaction_plane_3d, interaction_point_3d, interaction_theta_u, point_rows
 
 
@@ -23,20 +23,13 @@ class _InSpace(Feature):
     __slots__ = ()
     depends_on_depth = False
 
-    def _placed(self, T: Array) -> Array:
-        return T
 
-    def _visible(self, G: Array) -> Flags:
-        return np.ones(G.shape[:-2], bool)
-
-    def _depth(self, G: Array) -> None:
-        return None
-
-    def _outline(self, s: Array, G: Array | None) -> Array | None:
-        """The origin of the object."""
-        if G is None or not (G[..., 2, 3] > 0.0).all():
-            return None
-        return (G[..., :2, 3] / G[..., 2:3, 3])[..., None, :]
+def _sight(s: Array, point: Array | None) -> Sight:
+    """Sight of a feature in space; a point (..., 3) has to be in the image if it is in front."""
+    exists = np.ones(s.shape[:-1], bool)
+    if point is None or not (point[..., 2] > 0.0).all():
+        return Sight(exists, s, None)
+    return Sight(exists, s, None, (point[..., :2] / point[..., 2:])[..., None, :])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -61,11 +54,12 @@ class PoseError(_InSpace):
             desired = read_only(as_single_pose(self.desired, "desired"))
             object.__setattr__(self, "desired", desired)
 
-    def _measure(self, G: Array) -> Array:
-        M = inverse(G) if self.desired is None else self.desired @ inverse(G)
-        return np.concatenate((M[..., :3, 3], rotation_vectors_of(M[..., :3, :3])), axis=-1)
+    def _see(self, T: Array) -> Sight:
+        M = inverse(T) if self.desired is None else self.desired @ inverse(T)
+        s = np.concatenate((M[..., :3, 3], rotation_vectors_of(M[..., :3, :3])), axis=-1)
+        return _sight(s, T[..., :3, 3])
 
-    def _rows(self, s: Array, depth: Any, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         L = np.zeros((*s.shape, 6))
         L[..., :3, :3] = rotations(s[..., 3:])
         L[..., 3:, :] = interaction_theta_u(s[..., 3:])
@@ -82,10 +76,11 @@ class Point3D(_InSpace):
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
 
-    def _measure(self, G: Array) -> Array:
-        return placed(G, self.point[None])[..., 0, :]
+    def _see(self, T: Array) -> Sight:
+        X = placed(T, self.point[None])[..., 0, :]
+        return _sight(X, X)
 
-    def _rows(self, s: Array, depth: Any, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         return interaction_point_3d(s)
 
 
@@ -101,16 +96,12 @@ class Plane3D(_InSpace):
         object.__setattr__(self, "normal", unit(self.normal, "normal"))
         object.__setattr__(self, "distance", as_number(self.distance, "distance", least=-np.inf))
 
-    def _measure(self, G: Array) -> Array:
-        n = G[..., :3, :3] @ self.normal
-        distance = self.distance + (n * G[..., :3, 3]).sum(axis=-1, keepdims=True)
-        return np.concatenate((n, distance), axis=-1)
+    def _see(self, T: Array) -> Sight:
+        n = T[..., :3, :3] @ self.normal
+        return _sight(np.concatenate((n, self.distance + inner(n, T[..., :3, 3])), axis=-1), None)
 
-    def _rows(self, s: Array, depth: Any, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         return interaction_plane_3d(s[..., :3])
-
-    def _outline(self, s: Array, G: Array | None) -> None:
-        return None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -130,25 +121,20 @@ class PointAndRotation(_InSpace):
         object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
         object.__setattr__(self, "desired", read_only(as_single_pose(self.desired, "desired")))
 
-    def _visible(self, G: Array) -> Flags:
-        return placed(G, self.point[None])[..., 0, 2] > 0.0
-
-    def _measure(self, G: Array) -> Array:
-        X = placed(G, self.point[None])[..., 0, :]
-        R = self.desired[:3, :3] @ np.swapaxes(G[..., :3, :3], -1, -2)
+    def _see(self, T: Array) -> Sight:
+        X = placed(T, self.point[None])[..., 0, :]
+        R = self.desired[:3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
         image = X[..., :2] / X[..., 2:]
-        return np.concatenate((image, np.log(X[..., 2:]), rotation_vectors_of(R)), axis=-1)
+        s = np.concatenate((image, np.log(X[..., 2:]), rotation_vectors_of(R)), axis=-1)
+        return Sight(X[..., 2] > 0.0, s, None, image[..., None, :])
 
-    def _rows(self, s: Array, depth: Any, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         x, y, w = s[..., 0], s[..., 1], np.exp(-s[..., 2])
         L = np.zeros((*s.shape, 6))
         L[..., :2, :] = point_rows(x, y, w)
         L[..., 2, 2], L[..., 2, 3], L[..., 2, 4] = -w, -y, x
         L[..., 3:, :] = interaction_theta_u(s[..., 3:])
         return L
-
-    def _outline(self, s: Array, G: Array | None) -> Array:
-        return s[..., None, :2]
 
 
 def rotations(vectors: Array) -> Array:

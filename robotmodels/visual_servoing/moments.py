@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import Array, as_core, read_only
 from ..errors import InvalidValueError, ShapeError
-from .features import Feature, Flags, inner, norm, placed
+from .features import Feature, Sight, inner, norm, placed
 from .matrices import interaction_moment, point_rows
 
 _COMPONENTS = (
@@ -93,39 +93,29 @@ class Moments(Feature):
     def _periods(self) -> Array:
         return np.array([np.pi if name == "alpha" else 0.0 for name in self.components])
 
-    def _placed(self, T: Array) -> tuple[Array, Array]:
-        """Corners and normal in the camera."""
-        return placed(T, self._corners), T[..., :3, :3] @ _axes(self._corners)[2]
-
-    def _visible(self, G: Any) -> Flags:
-        X, n = G
-        corner = X[..., 0, :]
-        edge_on = (np.abs(inner(n, corner)) <= _FLAT * norm(corner))[..., 0]
-        return (X[..., 2] > 0.0).all(axis=-1) & ~(edge_on & (self.points is None))
-
-    def _depth(self, G: Any) -> Array:
-        X, n = G
-        if self.points is not None:
-            return X[..., 2]
-        return np.concatenate((n, -inner(n, X[..., 0, :])), axis=-1)
+    def _see(self, T: Array) -> Sight:
+        X = placed(T, self._corners)
+        image, corner, depth = X[..., :2] / X[..., 2:], X[..., 0, :], X[..., 2]
+        exists = (X[..., 2] > 0.0).all(axis=-1)
+        if self.points is None:
+            n = T[..., :3, :3] @ _axes(self._corners)[2]
+            exists &= (np.abs(inner(n, corner)) > _FLAT * norm(corner))[..., 0]  # not edge-on
+            depth = np.concatenate((n, -inner(n, corner)), axis=-1)
+        m, _ = self._raw(image, None)
+        if not exists.all():
+            return Sight(exists, m[..., 0, 0, None] * np.full(self.size, np.nan), depth, image)
+        return Sight(exists, self._of(m, np.zeros((*m.shape[:-2], 4, 4, 6)))[0], depth, image)
 
     def _parallel(self, Z: float) -> Array:
         return Feature._parallel(self, Z) if self.points is None else np.full(len(self.points), Z)
 
-    def _measure(self, G: Any) -> Array:
-        m, _ = self._raw(self._outline(None, G), None)
-        return self._of(m, np.zeros((*m.shape[:-2], 4, 4, 6)))[0]
-
-    def _rows(self, s: Any, depth: Any, G: Any = None) -> Array:
-        if G is None:
+    def _rows(self, s: Any, depth: Any, image: Any = None) -> Array:
+        if image is None:
             raise InvalidValueError(
                 "measurement: the interaction matrix of moments needs moments of higher order than "
                 'those measured; give the pose of the object, or interaction="desired" to the task.'
             )
-        return self._of(*self._raw(self._outline(None, G), depth))[1]
-
-    def _outline(self, s: Any, G: Any) -> Any:
-        return None if G is None else G[0][..., :2] / G[0][..., 2:]
+        return self._of(*self._raw(image, depth))[1]
 
     def _raw(self, image: Array, depth: Any) -> tuple[Array, Any]:
         """Raw moments (..., 5, 5) and their rates (..., 4, 4, 6), up to orders 4 and 3."""

@@ -60,7 +60,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points
 from .results import Result
-from .velocity import moved
+from .velocity import moved, sight_of
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-12  # of the squared sides
@@ -348,21 +348,21 @@ def _flipped(T: Array, P: Array) -> Array:
 
 def _refined(feature: Points, m: Array, T: Array) -> tuple[Array, float, bool]:
     """Levenberg-Marquardt on the image error: pose, squared error, whether it converged."""
-    damping, G = 1e-6, feature._placed(T)
-    if not feature._visible(G):
+    damping, sight = 1e-6, sight_of(feature, T)
+    if not sight.exists:
         return T, np.inf, False
-    e = feature._measure(G) - m
+    e = sight.s - m
     cost = float(e @ e)
     for _ in range(_ITERATIONS):
-        A = feature._rows(e + m, feature._depth(G))
+        A = feature._rows(sight.s, sight.depth)
         H, g = A.T @ A, A.T @ e
         step: Array = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]  # type: ignore[assignment]
         after = moved(T, step)
-        G_after = feature._placed(after)
-        e_after = feature._measure(G_after) - m if feature._visible(G_after) else e + np.inf
+        other = sight_of(feature, after)
+        e_after = other.s - m if other.exists else np.full(len(m), np.inf)
         small = float(np.abs(step).max()) <= 1e-11 * max(1.0, float(np.abs(T[:3, 3]).max()))
         if float(e_after @ e_after) <= cost or small:
-            T, G, e = after, G_after, e_after
+            T, sight, e = after, other, e_after
             cost, damping = float(e @ e), 0.1 * damping
         else:
             damping = max(10.0 * damping, 1e-6)

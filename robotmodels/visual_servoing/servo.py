@@ -20,7 +20,7 @@ from .camera import Camera
 from .results import Result, brief
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, law, moved
+from .velocity import ServoStatus, law, moved, sight_of
 
 _MOST = 1_000_000  # steps of a simulation
 
@@ -228,14 +228,14 @@ def servo(
     rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
         s = None
-        if sigma and feature._visible(G := feature._placed(T)):
-            s = feature._measure(G) + sigma * source.normal(size=own.size)
+        if sigma and (sight := sight_of(feature, T)).exists:
+            s = sight.s + sigma * source.normal(size=own.size)
         v, error, _, code, pseudo = law(task, s, T, camera)
         s, lost = error + primary.s_desired, code >= ServoStatus.OUT_OF_SIGHT
         if tracking is not None and not lost:
             estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
-            own = primary.matrix(s, feature._placed(T)) @ v
+            own = primary.matrix(s, sight_of(feature, T)) @ v
         camera_pose = object_pose @ inverse(T) if arm is None else arm.camera
         rows.append([k * h, T, camera_pose, None if arm is None else arm.q, s, error, v, code])
         if lost:

@@ -11,10 +11,10 @@ from .._arrays import Array
 from .features import (
     THIN,
     Feature,
-    Flags,
     Lines,
+    Sight,
     inner,
-    line_of,
+    lines_of,
     norm,
     placed,
     plane_at,
@@ -29,13 +29,9 @@ class _Ellipse(Feature):
     __slots__ = ()
     _period = (0.0,) * 5
 
-    def _rows(self, s: Array, depth: Array, G: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         x, y, n20, n02, n11 = np.moveaxis(s, -1, 0)
         return interaction_ellipse(x, y, n20, n02, n11, depth)
-
-    def _outline(self, s: Array, G: Any) -> Array:
-        reach = 2.0 * np.sqrt(np.maximum(s[..., 2:4], 0.0))
-        return np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -49,23 +45,14 @@ class Circle(_Ellipse):
     def __post_init__(self) -> None:
         set_fields(self, centre=self.centre, normal=self.normal, radius=self.radius)
 
-    def _placed(self, T: Array) -> tuple[Array, Array]:
-        return placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.normal
-
-    def _visible(self, G: Any) -> Flags:
-        c, n = G
+    def _see(self, T: Array) -> Sight:
+        c, n = placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.normal
         lowest = c[..., 2] - self.radius * np.sqrt(np.maximum(1.0 - n[..., 2] ** 2, 0.0))
-        return (lowest > 0.0) & (np.abs(inner(c, n)) > THIN * norm(c))[..., 0]
-
-    def _measure(self, G: Any) -> Array:
-        c, n = G
-        d, excess = inner(c, n)[..., None], inner(c, c)[..., None] - self.radius**2
+        d, excess = inner(c, n), (inner(c, c) - self.radius**2)[..., None]
         mixed = _outer(c, n) + _outer(n, c)
-        return _ellipse_of(d**2 * np.eye(3) - d * mixed + excess * _outer(n, n))
-
-    def _depth(self, G: Any) -> Array:
-        c, n = G
-        return np.concatenate((n, -inner(c, n)), axis=-1)
+        Q = d[..., None] ** 2 * np.eye(3) - d[..., None] * mixed + excess * _outer(n, n)
+        exists = (lowest > 0.0) & (np.abs(d) > THIN * norm(c))[..., 0]
+        return _ellipse_of(Q, exists, np.concatenate((n, -d), axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,17 +65,12 @@ class Sphere(_Ellipse):
     def __post_init__(self) -> None:
         set_fields(self, centre=self.centre, radius=self.radius)
 
-    def _placed(self, T: Array) -> Array:
-        return placed(T, self.centre[None])[..., 0, :]
-
-    def _visible(self, G: Array) -> Flags:
-        return G[..., 2] > self.radius
-
-    def _measure(self, G: Array) -> Array:
-        return _ellipse_of(_outer(G, G) - (inner(G, G)[..., None] - self.radius**2) * np.eye(3))
-
-    def _depth(self, G: Array) -> Array:  # the outline is in the polar plane
-        return np.concatenate((G, self.radius**2 - inner(G, G)), axis=-1)
+    def _see(self, T: Array) -> Sight:
+        p = placed(T, self.centre[None])[..., 0, :]
+        excess = inner(p, p) - self.radius**2
+        Q = _outer(p, p) - excess[..., None] * np.eye(3)
+        polar = np.concatenate((p, -excess), axis=-1)  # the plane of the outline
+        return _ellipse_of(Q, p[..., 2] > self.radius, polar)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -103,27 +85,19 @@ class Cylinder(Feature):
     def __post_init__(self) -> None:
         set_fields(self, centre=self.centre, axis=self.axis, radius=self.radius)
 
-    def _placed(self, T: Array) -> tuple[Array, Array, Array]:
-        """Centre, nearest point of the axis, normals of the planes of both outlines (..., 2, 3)."""
+    def _see(self, T: Array) -> Sight:
         p, u = placed(T, self.centre[None])[..., 0, :], T[..., :3, :3] @ self.axis
         nearest = p - inner(p, u) * u
-        d = np.maximum(norm(nearest), 1e-300)
-        sine = np.minimum(self.radius / d, 1.0)
-        towards, beside = sine * nearest / d, np.sqrt(1.0 - sine**2) * np.cross(u, nearest / d)
-        return p, nearest, np.stack((towards + beside, towards - beside), axis=-2)
+        sine = np.minimum(self.radius / norm(nearest), 1.0)
+        towards = nearest / norm(nearest)
+        beside = np.sqrt(1.0 - sine**2) * np.cross(u, towards)
+        n = np.stack((sine * towards + beside, sine * towards - beside), axis=-2)
+        outside = (sine < 1.0 - THIN)[..., 0]
+        exists = (p[..., 2] > 0.0) & outside & (np.hypot(n[..., 0], n[..., 1]) > THIN).all(axis=-1)
+        contact = nearest[..., None, :] - self.radius * n
+        return Sight(exists, *lines_of(n, plane_at(contact)))
 
-    def _visible(self, G: Any) -> Flags:
-        p, nearest, n = G
-        outside = norm(nearest)[..., 0] > self.radius * (1.0 + THIN)
-        return (p[..., 2] > 0.0) & outside & (np.hypot(n[..., 0], n[..., 1]) > THIN).all(axis=-1)
-
-    def _measure(self, G: Any) -> Array:
-        return line_of(G[2])
-
-    def _depth(self, G: Any) -> Array:
-        return plane_at(G[1][..., None, :] - self.radius * G[2])  # lines of contact
-
-    _rows, _outline = Lines._rows, Lines._outline
+    _rows = Lines._rows
 
 
 def _outer(a: Array, b: Array) -> Array:
@@ -131,11 +105,12 @@ def _outer(a: Array, b: Array) -> Array:
     return a[..., :, None] * b[..., None, :]
 
 
-def _ellipse_of(Q: Array) -> Array:
-    """Ellipse ``[x y 1] Q [x y 1]^T = 0``. Shapes: (..., 3, 3) -> (..., 5)."""
+def _ellipse_of(Q: Array, exists: Any, plane: Array) -> Sight:
+    """Sight of the ellipse ``[x y 1] Q [x y 1]^T = 0``. Shapes: Q (..., 3, 3)."""
     determinant = Q[..., 0, 0] * Q[..., 1, 1] - Q[..., 0, 1] ** 2
     x = (Q[..., 0, 1] * Q[..., 1, 2] - Q[..., 1, 1] * Q[..., 0, 2]) / determinant
     y = (Q[..., 0, 1] * Q[..., 0, 2] - Q[..., 0, 0] * Q[..., 1, 2]) / determinant
     scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
-    moments = scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]
-    return np.stack((x, y, *moments), axis=-1)
+    s = np.stack((x, y, scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]), axis=-1)
+    reach = 2.0 * np.sqrt(s[..., 2:4])
+    return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))

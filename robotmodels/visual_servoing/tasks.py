@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Value, as_core, as_exact, as_number, read_only
 from ..errors import InvalidValueError
 from ..se3 import as_single_pose, inverse
-from .features import Feature, as_measurement
+from .features import Feature, Sight, as_measurement
 from .features_3d import PointAndRotation, PoseError, rotations
 from .results import brief
 
@@ -100,7 +100,7 @@ class Task(Value):
                 "of the desired pose; give desired as a pose (4, 4), or depth in metres."
             )
         if depth == "desired":
-            w = None if T is None else feature._depth(feature._placed(T))
+            w = None if T is None else feature._see(T).depth
         L = None
         if self.interaction != "current":
             L = feature._rows(s, w) if T is None else feature.interaction(T)
@@ -123,17 +123,17 @@ class Task(Value):
         """The task itself; of a `Hybrid` its primary task."""
         return self
 
-    def matrix(self, s: Array, G: Any) -> Array:
-        """Current interaction matrix (k, 6) of a measurement, and of the geometry if known."""
-        w = self._w
+    def matrix(self, s: Array, sight: Sight | None) -> Array:
+        """Current interaction matrix (k, 6) of a measurement, and of the sight if it is known."""
+        w, image = self._w, None if sight is None else sight.image
         if w is None and self.feature.depends_on_depth:
-            if G is None:
+            if sight is None:
                 raise InvalidValueError(
                     'measurement: depth="true" needs the pose (4, 4) of the object in the camera; '
                     'give it, or a task with depth="desired" or depth in metres.'
                 )
-            w = self.feature._depth(G)
-        return self.feature._rows(s, w, G)
+            w = sight.depth
+        return self.feature._rows(s, w, image)
 
     def __repr__(self) -> str:
         return brief(self)

@@ -15,7 +15,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..se3 import as_pose, skew
 from .camera import Camera
-from .features import Feature, as_measurement, wrapped
+from .features import Feature, Points, Sight, as_measurement, wrapped
 from .results import Result
 from .tasks import Hybrid, Task
 
@@ -153,16 +153,16 @@ def law(
     """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
     primary = task.regulated
     feature, L_desired = primary.feature, primary.L_desired
-    G = None if T is None else feature._placed(T)
-    if G is not None and not feature._visible(G):
+    sight = None if T is None else sight_of(feature, T)
+    if sight is not None and not sight.exists:
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
-    measured: Array = feature._measure(G) if s is None else s
+    measured: Any = sight.s if s is None and sight is not None else s
     error = measured - primary.s_desired
     if primary.periods is not None:
         error = wrapped(error, primary.periods)
     mean = primary.interaction == "mean"
-    A = primary.matrix(measured, G) if L_desired is None or mean else L_desired
+    A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
     inverse, rank = own, _ = pseudo_inverse(A)
     if mean and L_desired is not None:
         inverse = 0.5 * (own + pseudo_inverse(L_desired)[0])
@@ -177,14 +177,22 @@ def law(
             status = ServoStatus.SINGULAR
         elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
-    outline = None if camera is None else feature._outline(measured, G)
-    if camera is not None and outline is not None and not camera.sees(outline):
+    image = None if sight is None else sight.image
+    if isinstance(feature, Points) and s is not None:
+        image = s.reshape(-1, 2)
+    if camera is not None and image is not None and not camera.sees(image):
         return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
     v = -primary.gain * direction
     if isinstance(task, Hybrid):
         z = _secondary(task, s, T)
         v = v + task.weight * (z - own @ (A @ z))
     return v, error, rank, status, inverse
+
+
+def sight_of(feature: Feature, T: Array) -> Sight:
+    """Sight of an object that may be behind the camera."""
+    with np.errstate(all="ignore"):
+        return feature._see(T)
 
 
 @cache
@@ -212,7 +220,7 @@ def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
         return True
     reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
     poses = [moved(T, twist * reach) for twist in _NEARBY]
-    seen = [nearby for nearby in poses if feature._visible(feature._placed(nearby))]
+    seen = [nearby for nearby in poses if sight_of(feature, nearby).exists]
     return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
 
 
