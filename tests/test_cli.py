@@ -347,6 +347,22 @@ def test_demo_identifies_the_real_robot(run, tmp_path, monkeypatch):
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("chapter", "words"),
+    [
+        (2, "All assembly modes are listed"), (3, "4 cusps. A path between two postures"),
+        (4, "The motion is the quickest along the path"), (5, "The last error (rad)"),
+        (6, "Largest error"), (7, "Clamped frequencies (rad/s)"),
+    ],
+)  # fmt: skip
+def test_demo_shows_the_chapters_of_the_book(run, tmp_path, chapter, words):
+    code, out, _ = run("demo", "--chapter", chapter, "--out", tmp_path)
+    assert code == 0
+    assert words in out
+    assert (tmp_path / f"chapter_{chapter}.png").stat().st_size > 10_000
+
+
+@pytest.mark.nightly
 def test_demo_of_the_real_robot_goes_on_without_extras(tmp_path):
     words = (
         "import sys; sys.modules['matplotlib'] = sys.modules['clarabel'] = None\n"

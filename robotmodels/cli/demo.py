@@ -28,7 +28,8 @@ from .terminal import ending
 _EXAMPLES = """\
 examples:
   robotmodels demo
-  robotmodels demo --real --out tx40/"""
+  robotmodels demo --real --out tx40/
+  robotmodels demo --chapter 3"""
 _TERMINAL = 80  # columns
 _SAMPLES = 1000
 _BATCH = 100_000
@@ -44,13 +45,18 @@ def add_command(commands: Any) -> None:
         "demo",
         description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
         "from its URDF to its table; print every direct model of both and every posture that "
-        "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead.",
+        "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead; "
+        "with --chapter, run an example of another chapter of the book.",
         epilog=ending(_EXAMPLES),
     )
     parser.add_argument(
         "--real", action="store_true",
         help="identify the dynamic parameters of a real TX40 from the log that is shipped, beside "
         "published values",
+    )  # fmt: skip
+    parser.add_argument(
+        "--chapter", type=int, choices=range(1, 8), metavar="N",
+        help="chapter 1 (this demonstration) to 7 of the book",
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
@@ -71,6 +77,13 @@ def run(arguments: argparse.Namespace) -> None:
 
         _say("Staubli TX40: from a log of its motion to a robot that predicts its torques")
         identify_tx40(folder, partial(progress, arguments))
+        print(f"\nDone in {time.perf_counter() - started:.1f} s.")
+        return
+    if arguments.chapter not in (None, 1):
+        from .demo_chapters import CHAPTERS, show_chapter
+
+        _say(f"Chapter {arguments.chapter}: {CHAPTERS[arguments.chapter][0]}")
+        show_chapter(arguments.chapter, folder)
         print(f"\nDone in {time.perf_counter() - started:.1f} s.")
         return
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
