@@ -17,7 +17,7 @@ MUTATIONS = [
     Mutation(ROOM, "half the growth in the forward pass", "after = min(",
              "x + 2.0 * step * u", "x + step * u", PATH + "trapezoid"),
     Mutation(ROOM, "active limits with a tolerance below zero", "def path_rates(",
-             "least, code = _ACTIVE", "least, code = -_ACTIVE", PATH + "results_are or jerk"),
+             "least, code = _ACTIVE", "least, code = -_ACTIVE", PATH + "most_of_the"),
     Mutation(ROOM, "the end may be faster than its limit", "def path_rates(",
              "if given[1] > top[N]", "if 0.1 * given[1] > top[N]", PATH + "rates_at_the_ends"),
     Mutation(ROOM, "the start is not compared with what is controllable", "x = given[0]",

@@ -114,6 +114,7 @@ def test_most_of_the_time_a_torque_is_at_its_limit():
     at = timed.trajectory.at(np.linspace(0, timed.duration, 5000))
     share = (np.abs(rm.idm(planar(), at.q, at.v, at.a)) / [120, 40]).max(axis=1)
     assert (share > 0.98).mean() > 0.95
+    assert (timed.active != "").mean() > 0.95
 
 
 def test_reversed_and_scaled_paths():
@@ -297,6 +298,8 @@ def test_a_path_of_poses_needs_the_robot():
         ({"model": planar(), "torque": [-1.0, 1.0]}, InvalidValueError, "torque"),
         ({"model": planar(), "torque": [1.0, 1.0, 1.0]}, ShapeError, "torque"),
         ({"model": rm.load("rx90")}, ShapeError, "6 joints"),
+        ({"model": planar(), "torque": 9e2, "torque_rate": 0.0}, InvalidValueError, "above zero"),
+        ({"torque_rate": 5.0}, InvalidValueError, "torque_rate"),
         ({"points": 1}, InvalidValueError, "points"),
         ({"points": 2.5}, InvalidValueError, "points"),
         ({"start_rate": -1.0}, InvalidValueError, "start_rate"),
