@@ -20,7 +20,7 @@ from .limits import MotionLimits
 from .motions import TimedMotion
 from .random_profiles import half_width
 from .time_optimal import law_of, time_optimal
-from .time_scaling import stretched, time_scaled
+from .time_scaling import at_rest, stretched, time_scaled
 from .trajectory import Samples, Trajectory
 
 RATE = 500  # evaluations for each second
@@ -270,7 +270,7 @@ def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array
 def _shares(model: RobotModel, seen: Samples, bound: Array) -> Array:
     """Torques over their limits (N, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        tau = idm(model, seen.q, seen.v, seen.a)
+        tau = idm(model, seen.q, at_rest(seen.v), seen.a)
         return np.where(tau != 0.0, tau / bound, 0.0)
 
 
