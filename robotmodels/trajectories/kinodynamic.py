@@ -195,7 +195,7 @@ def kinodynamic(
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
     limits : MotionLimits
-        Of velocity, acceleration and position.
+        Of velocity, acceleration, jerk and position.
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     via : sequence of array_like, shape (n,), or Pose
@@ -253,6 +253,8 @@ def kinodynamic(
     count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
     seconds = as_number(seconds, "seconds", above=0.0)
+    if cost.torque and not problem.loaded.size:
+        raise InvalidValueError("cost: a weight of the torques needs limits of torque.")
     given = [q0, *_listed(via), q1]
     postures = [_postures(model, each, k, given, problem) for k, each in enumerate(given)]
     missing = [k for k, each in enumerate(postures) if not len(each)]
@@ -275,10 +277,14 @@ def kinodynamic(
     tasks = []
     for choice in product(*postures):
         stations = np.array(choice)
+        if not np.any(np.diff(stations, axis=0), axis=1).all():
+            continue
         at = knots_of(stations, count)
         optimal = timing is Timing.OPTIMAL
         task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
         tasks.append((task.evaluated(task.straight()).penalized, len(tasks), task))
+    if not tasks:
+        raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
     search = Search(seconds, progress)
     results = []

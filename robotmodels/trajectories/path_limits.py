@@ -68,6 +68,8 @@ class PathLimits:
         jerk = np.minimum(bounds.jerk, -bounds.jerk_lower)
         none = np.full(n, np.inf)
         pull = none if torque_rate is None else checked_torque(torque_rate, model, n, "torque_rate")
+        if (np.stack((jerk, pull)) <= 0.0).any():
+            raise InvalidValueError("limits of jerk, torque_rate: expected limits above zero.")
         rows = np.isfinite([bounds.acceleration, bounds.acceleration_lower, jerk]).any(axis=0)
         self.acceleration = np.flatnonzero(rows)
         self.loaded = np.flatnonzero(np.isfinite([self.torque, pull]).any(axis=0))

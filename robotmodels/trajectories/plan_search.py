@@ -20,10 +20,10 @@ from .limits import MotionLimits
 from .motions import TimedMotion
 from .random_profiles import half_width
 from .time_optimal import law_of, time_optimal
-from .time_scaling import stretched, time_scaled
-from .trajectory import Trajectory
+from .time_scaling import at_rest, stretched, time_scaled
+from .trajectory import Samples, Trajectory
 
-_RATE = 500  # evaluations for each second
+RATE = 500  # evaluations for each second
 RESTARTS = 3
 _LEVELS = (9, 19, 29)  # nodes of the profiles that are improved; the last only of the best one
 _MOST = 120  # variables of a linear program
@@ -73,7 +73,7 @@ class Search:
     def __init__(self, seconds: float, progress: bool | Callable[[int, float], Any]) -> None:
         self.start, self.seconds = time.monotonic(), seconds
         self.share(1.0)
-        self.allowed = int(_RATE * seconds) + 1
+        self.allowed = int(RATE * seconds) + 1
         self.best = np.inf
         self.history: list[tuple[int, float, float]] = []
         self.report = progress if callable(progress) else (_printed if progress else None)
@@ -178,6 +178,7 @@ def best_motion(
     search: Search, results: list[Restart], model: RobotModel, limits: MotionLimits | None
 ) -> Best | None:
     """The best motion from the restarts in the order of their costs; the first is refined."""
+    smooth = limits is not None and np.isfinite([limits.jerk, limits.jerk_lower]).any()
     for k, (done, task, free, path) in enumerate(results):
         options: list[Trajectory | None] = []
         if np.isfinite(done.cost) and not task.optimal:
@@ -187,8 +188,8 @@ def best_motion(
                 finer, then = descended(fine, start, _STEPS, search.evaluated)
                 if then.penalized < done.penalized:
                     task, free = fine, finer
-            options = _finished(search, task, free, model, limits, path is not None)
-        if path is not None:
+            options = _finished(search, task, free, model, limits, path is not None and not smooth)
+        if path is not None and not smooth:
             options.append(_retimed(task, path, model))
         kept = []
         for motion in (o for o in options if o is not None and _short(task, o) <= 1e-9):
@@ -251,9 +252,10 @@ def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array
     """Greatest torques over their limits (n,), and the greatest ratio to any limit."""
     seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
     bound, limits = task.limits.torque, task.limits.limits
+    use = np.zeros(bound.size)
+    if np.isfinite(bound).any():
+        use = np.abs(_shares(model, seen, bound)).max(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        torque = np.abs(idm(model, seen.q, seen.v, seen.a)).max(axis=0)
-        use = np.where(torque > 0.0, torque / bound, 0.0)
         rates = [
             np.where(side * x > 0.0, x / most, 0.0).max()
             for x, upper, lower in (
@@ -265,13 +267,20 @@ def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array
     return use, float(max(use.max(), *rates))
 
 
+def _shares(model: RobotModel, seen: Samples, bound: Array) -> Array:
+    """Torques over their limits (N, n)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tau = idm(model, seen.q, at_rest(seen.v), seen.a)
+        return np.where(tau != 0.0, tau / bound, 0.0)
+
+
 def _cost_of(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[float, Array]:
     """Cost of a motion and the greatest torques over their limits (n,)."""
     use, _ = _use(task, model, motion)
     cost = task.cost.time * motion.duration
     if task.cost.torque:
         seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
-        ratio = idm(model, seen.q, seen.v, seen.a) / task.limits.torque
+        ratio = _shares(model, seen, task.limits.torque)
         cost += task.cost.torque * float((ratio**2).sum(axis=1).mean()) * motion.duration
     return cost, use
 

@@ -16,7 +16,7 @@ from .pose_trajectory import PoseTrajectory
 from .splines import cubic_spline
 from .trajectory import Trajectory
 
-_SLOW = 1e-2  # of the greatest rate: a path that is slower somewhere is parametrised by its length
+_SLOW, _STILL = 1e-3, 2e-5  # of the greatest rate: slower ends, and rests inside, need the length
 _BEND = 1e-3  # of the greatest rate: changes between samples that are looked at more closely
 _ZOOM = 17
 _ROUNDS = 5
@@ -60,10 +60,13 @@ def _regular(motion: Motion, points: int) -> Motion | str:
     """The motion itself where its velocity is continuous and nowhere small, else by its length."""
     end = float(motion.duration)
     t = np.linspace(0.0, end, _SAMPLES * points + 1)
-    q, rate = motion.derivatives(t, (0, 1))
+    q, rate, bend = motion.derivatives(t, (0, 1, 2))
     speed = np.sqrt((rate * rate).sum(axis=1))
     most = float(speed.max())
-    if speed.min() > _SLOW * most and not _jumps(motion, t, q, most):
+    # inside, a path may turn back in its own parameter, which goes on, but not rest in it
+    inner = speed + np.sqrt((bend * bend).sum(axis=1)) * (t[1] - t[0])
+    moves = min(speed[0], speed[-1]) > _SLOW * most and inner.min() > _STILL * most
+    if moves and not _jumps(motion, t, q, most):
         return motion
     return _by_length(motion, np.linspace(0.0, end, 10 * _KNOTS + 1))
 

@@ -30,6 +30,7 @@ _ROUNDS = 4
 _WORST = 4
 """Samples around which the least duration is refined between samples."""
 _MARGIN = 1.0 + 1e-12
+_STILL = 1e-12  # of the greatest velocity
 
 
 class ScalingStatus(Outcome):
@@ -178,7 +179,7 @@ def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Ar
     """A, B and C of ``A / T^2 + B / T + C`` at fractions (N,) of a motion, each (N, n)."""
     T = float(motion.duration)
     q, v, a = motion.derivatives(fraction * T, (0, 1, 2))
-    v, a, rest = v * T, a * T * T, np.zeros(q.shape)
+    v, a, rest = at_rest(v) * T, a * T * T, np.zeros(q.shape)
     C = rigid_torques(model, q, rest, rest)
     A = rigid_torques(model, q, v, a) - C
     B = rest
@@ -187,6 +188,11 @@ def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Ar
         B = v @ drives.viscous
         C = C + drives.torque(v, None) - B
     return A, B, C
+
+
+def at_rest(v: Array) -> Array:
+    """Velocities (N, n) with those that are nothing but rounding made zero: no dry friction."""
+    return np.where(np.abs(v) > _STILL * np.abs(v).max(initial=0.0), v, 0.0)
 
 
 def windows_of(parts: tuple[Array, Array, Array], bound: Array, least: float) -> Array:
