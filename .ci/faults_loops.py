@@ -14,7 +14,7 @@ MUTATIONS = [
     Mutation("loops", "rows of the first frame with the sign of the second",
         "linear = scale(side, transpose_times(Ra, linear))", "side", "1.0", ROWS),
     Mutation("loops", "levers of joints from the first frame",
-        "linear = axis\n", "subtract(pb,", "subtract(pa,", LOOPS + "full"),
+        "linear = axis\n", "subtract(pb,", "subtract(pa,", LOOPS + "open_postures_too"),
     Mutation("loops", "tilt about x with the other sign",
         "x, y, turn, cosine = -z[1]", "-z[1]", "z[1]", LOOPS + "bennett"),
     Mutation("loops", "antiparallel axes count as closed",

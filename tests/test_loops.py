@@ -172,6 +172,18 @@ def test_jacobian_rows_are_relative_twists(robot, q_ref, rng):
 
 
 @every_robot
+def test_position_rows_are_derivatives_in_open_postures_too(robot, q_ref, rng):
+    q, h = rng.uniform(-1.0, 1.0, robot.n), 1e-6
+    J = loops.closure_jacobian(robot, q)
+    moved = q + h * np.vstack((np.eye(robot.n), -np.eye(robot.n)))
+    for closure in robot.closures:
+        first, second = (rm.dgm(robot.tree, moved, frame) for frame in closure.frames)
+        p = (rm.se3.inverse(first) @ second)[:, :3, 3]
+        rows = [robot.rows.index(f"{closure.name}.{axis}") for axis in "xyz"]
+        assert np.allclose(J[rows].T, (p[: robot.n] - p[robot.n :]) / (2 * h), atol=1e-7)
+
+
+@every_robot
 def test_mobility_is_the_rank_and_names_redundant_rows(robot, q_ref, rng):
     q = motion(robot, q_ref, rng)[0]
     found = loops.mobility(robot, q)
