@@ -573,8 +573,28 @@ def test_actuated_joints_that_do_not_determine_the_others(rng):
     assert loops.close(none, [], q).status == ClosingStatus.SINGULAR_THERE
 
 
+def test_a_tree_is_a_robot_without_closures(rng):
+    tree = FLEET[0][0].tree
+    robot = loops.LoopedRobot(tree, [], [0, 1, 2])
+    q, v, a = rng.normal(size=(3, 4, 3))
+    assert (loops.close(robot, q).q == q).all()
+    assert np.array_equal(loops.mobility(robot, q), [3] * 4)
+    assert loops.mobility(robot, q).redundant == ()
+    assert np.allclose(loops.velocity_map(robot, q), np.eye(3))
+    tau = loops.idm(robot, q, v, a)
+    assert np.allclose(tau, rm.idm(tree, q, v, a))
+    assert np.allclose(loops.ddm(robot, q, v, tau), a)
+    assert len(loops.base_parameters(robot)) == len(rm.base_parameters(tree))
+
+
 def test_arguments_that_cannot_be_meant(rng):
     robot, q = FLEET[0]
+    with pytest.raises(InvalidValueError, match="q_guess"):
+        loops.close(robot, [1.0], [[1.0], [1.0, 2.0]])
+    with pytest.raises(InvalidValueError, match="rtol"):
+        loops.simulate(robot, q, rtol=-1.0)
+    with pytest.raises(InvalidValueError, match="smoothing"):
+        loops.simulate(robot, q, smoothing=0.0)
     with pytest.raises(ShapeError, match="q_actuated"):
         loops.close(robot, [1.0, 2.0])
     with pytest.raises(InvalidValueError, match="q_guess"):
