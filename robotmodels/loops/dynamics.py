@@ -162,7 +162,7 @@ def tree_torques(
 
 def closed(robot: LoopedRobot, q: Array) -> Array:
     """The same posture, refused where a loop is open."""
-    residual = np.atleast_2d(np.abs(closure_rows(robot, q)[0] * np.sqrt(robot.cuts.weight)))
+    residual = np.abs(closure_rows(robot, q)[0] * np.sqrt(robot.cuts.weight))
     residual = residual.reshape(int(np.prod(q.shape[:-1])), len(robot.rows))
     for i in np.flatnonzero((residual > _OPEN).any(axis=-1))[:1]:
         row = robot.rows[int(np.argmax(residual[i]))]

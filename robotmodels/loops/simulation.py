@@ -76,8 +76,7 @@ def simulate(
 
     References
     ----------
-    J. Baumgarte, "Stabilization of constraints and integrals of motion in dynamical systems",
-    CMAME 1, 1972. Seed book section 1.5.
+    J. Baumgarte, "Stabilization of constraints", CMAME 1, 1972. Seed book section 1.5.
 
     Examples
     --------
