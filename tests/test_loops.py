@@ -186,6 +186,16 @@ def test_position_rows_are_derivatives_in_open_postures_too(robot, q_ref, rng):
 
 
 @every_robot
+def test_rates_of_the_rows_are_derivatives_in_open_postures_too(robot, q_ref, rng):
+    from robotmodels.loops.constraints import row_rates
+
+    q, v = rng.uniform(-1.0, 1.0, (2, 3, robot.n))
+    h = 1e-6
+    sides = [loops.closure_jacobian(robot, q + s * v) for s in (h, -h)]
+    assert np.allclose(row_rates(robot, q, v), (sides[0] - sides[1]) / (2 * h), atol=1e-7)
+
+
+@every_robot
 def test_mobility_is_the_rank_and_names_redundant_rows(robot, q_ref, rng):
     q = motion(robot, q_ref, rng)[0]
     found = loops.mobility(robot, q)
