@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_vector, batch_rows
+from .._arrays import Array, Frozen, Value, as_floats, as_vector, batch_rows
 from .._outcomes import Outcome
 from .robot import LoopedRobot, check_looped
 
@@ -110,7 +110,7 @@ def close(
     check_looped(robot)
     n, passive = robot.n, robot.passive
     given = as_vector(q_actuated, len(robot.actuated), "q_actuated")
-    guess = np.zeros(len(passive)) if q_guess is None else np.asarray(q_guess)
+    guess = np.zeros(len(passive)) if q_guess is None else as_floats(q_guess, "q_guess")
     follow = guess.shape[-1:] != passive.shape
     guess = as_vector(guess, n if follow else len(passive), "q_guess")
     batch, (target, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))

@@ -21,8 +21,8 @@ Raises
 ShapeError, InvalidValueError
     Arguments of the wrong length, or with NaN or infinity.
 LoopError
-    Loops that are open at q; actuated joints that do not determine the others; velocities that
-    violate the closures.
+    Loops that are open at q (which `ddm` does not check); actuated joints that do not determine the
+    others; velocities that violate the closures.
 SingularMassMatrixError
     Free motions without inertia.
 
@@ -162,9 +162,8 @@ def tree_torques(
 
 def closed(robot: LoopedRobot, q: Array) -> Array:
     """The same posture, refused where a loop is open."""
-    residual = np.abs(closure_rows(robot, q)[0] * np.sqrt(robot.cuts.weight)).reshape(
-        -1, len(robot.rows)
-    )
+    residual = np.abs(closure_rows(robot, q)[0] * np.sqrt(robot.cuts.weight))
+    residual = residual.reshape(int(np.prod(q.shape[:-1])), len(robot.rows))
     for i in np.flatnonzero((residual > _OPEN).any(axis=-1))[:1]:
         row = robot.rows[int(np.argmax(residual[i]))]
         where = f" of sample {i}" if q.ndim > 1 else ""

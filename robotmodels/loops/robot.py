@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Value, read_only
+from .._arrays import Array, Value, as_floats, read_only
 from ..errors import InvalidValueError, LoopError
 from ..geometry import FIXED, PRISMATIC, constant_factors
 from ..kernels import Chain
@@ -217,9 +217,9 @@ def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     """Columns of the actuated joints."""
     if actuated is None:
         return read_only(np.flatnonzero(tree.table.mu[tree.table.joint_rows]), np.int64)
-    given = np.asarray(actuated)
-    is_whole = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
-    if not is_whole or not np.isin(given, range(tree.n)).all() or len({*given}) < given.size:
+    given = as_floats(actuated, "actuated")
+    known = given.ndim == 1 and np.isin(given, np.arange(tree.n)).all()
+    if not known or len({*given.tolist()}) < given.size:
         raise InvalidValueError(
             f"actuated: expected different columns of q, from 0 to {tree.n - 1}, got "
             f"{actuated!r:.60}."

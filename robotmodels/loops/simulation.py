@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact
+from .._arrays import Array, as_exact, as_number
 from ..drive import check_all_or_none
 from ..dynamics import kinetic_energy, potential_energy
 from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
@@ -76,8 +76,7 @@ def simulate(
 
     References
     ----------
-    J. Baumgarte, "Stabilization of constraints and integrals of motion in dynamical systems",
-    CMAME 1, 1972. Seed book section 1.5.
+    J. Baumgarte, "Stabilization of constraints", CMAME 1, 1972. Seed book section 1.5.
 
     Examples
     --------
@@ -100,7 +99,7 @@ def simulate(
     start, end, times = times_of(t)
     law, knots = law_of(control, len(robot.actuated), times, "control")
     tool, tool_knots = law_of(wrench, 6, times, "wrench")
-    width = None if smoothing is None else np.full(n, as_exact(smoothing, (), "smoothing"))
+    width = None if smoothing is None else np.full(n, as_number(smoothing, "smoothing", above=0.0))
     drives = tree.drive_matrices if drive else None
     if width is None and drives is not None and (drives.coulomb.any() or drives.coupling.size):
         raise InvalidValueError(
@@ -114,7 +113,11 @@ def simulate(
             f"v0: these velocities open the loops of {robot.name!r}; take "
             "v0 = velocity_map(robot, q0) @ v_actuated."
         )
-    tolerances = {"rtol": float(rtol), "atol": float(atol), "max_step": np.inf}
+    tolerances = {
+        "rtol": as_number(rtol, "rtol", least=1e-13),
+        "atol": as_number(atol, "atol", above=0.0),
+        "max_step": np.inf,
+    }
     cuts = sorted({start, end, *(x for x in (*knots, *tool_knots) if start < x < end)})
     run = _Integration(
         motion, times, None, Integrator.DOP853, tolerances, int(max_evaluations), None
