@@ -95,9 +95,9 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
         frame, antecedent = k + 1, int(table.antecedent[k])
         b, d, r = float(table.b[k]), float(table.d[k]), float(table.r[k])
         before = se3.rotation("z", float(table.gamma[k]))
-        shapes += _rod(antecedent, before, b, rod, size)
+        shapes += link_rod(antecedent, before, b, rod, size)
         before = before @ se3.translation(0.0, 0.0, b) @ se3.rotation("y", float(table.beta[k]))
-        shapes += _rod(antecedent, before @ se3.rotation("y", np.pi / 2), d, rod, size)
+        shapes += link_rod(antecedent, before @ se3.rotation("y", np.pi / 2), d, rod, size)
         if table.sigma[k] == PRISMATIC:
             i = motion[k]
             low, high = r + float(table.lower[i]), r + float(table.upper[i])
@@ -117,7 +117,7 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
             shapes.append(Visual(frame, np.eye(4), block, _JOINT_COLOR))
             continue
         # the rod along r turns about itself, so it may move with the link it leads to
-        shapes += _rod(frame, se3.translation(0.0, 0.0, -r), r, rod, size)
+        shapes += link_rod(frame, se3.translation(0.0, 0.0, -r), r, rod, size)
         if table.sigma[k] != FIXED:
             same_point = max(abs(b), abs(d), abs(r)) < 1e-3 * size
             if same_point and antecedent and table.sigma[antecedent - 1] == REVOLUTE:
@@ -127,7 +127,7 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
             shapes.append(Visual(frame, np.eye(4), cylinder, _JOINT_COLOR))
     reach = float(np.linalg.norm(tool[:3, 3]))
     if reach > 1e-3 * size:
-        shapes += _rod(tip, _z_along(tool[:3, 3] / reach), reach, 0.7 * rod, size)
+        shapes += link_rod(tip, z_along(tool[:3, 3] / reach), reach, 0.7 * rod, size)
     if axes:
         shapes += triad(tip, tool, 0.1 * size)
     return tuple(shapes)
@@ -143,7 +143,7 @@ def triad(frame: int, pose: Array, length: float) -> tuple[Visual, ...]:
     )  # fmt: skip
 
 
-def _rod(frame: int, start: Array, length: float, radius: float, size: float) -> list[Visual]:
+def link_rod(frame: int, start: Array, length: float, radius: float, size: float) -> list[Visual]:
     """A rod from the origin of ``start`` along its z axis; none if it is too short to see."""
     if abs(length) < 1e-3 * size:
         return []
@@ -157,7 +157,7 @@ def _bar(frame: int, start: Array, low: float, high: float, radius: float) -> Vi
     return Visual(frame, pose, Box((0.9 * radius, 0.9 * radius, high - low)), _SLIDE_COLOR)
 
 
-def _z_along(u: Array) -> Array:
+def z_along(u: Array) -> Array:
     """A rotation whose z axis is the unit vector ``u``."""
     T = np.eye(4)
     x = np.cross((0.0, 1.0, 0.0) if abs(u[1]) < 0.9 else (1.0, 0.0, 0.0), u)

@@ -107,3 +107,34 @@ def gough(rng, base=None, platform=None):
     closures = [loops.Closure(f"leg{k}", (f"b{k}", 4 * k + 4), "point") for k in range(1, 6)]
     sliders = [3 * k + 2 for k in range(6)]
     return loops.LoopedRobot(tree, closures, actuated=sliders), base, platform
+
+
+def spatial_four_bar(rng):
+    """A Bennett linkage: four revolute axes, overconstrained; its twists and lengths alternate."""
+    a, alpha, beta = 0.5, 0.6, 1.1
+    b = a * np.sin(beta) / np.sin(alpha)
+    rows = [
+        {"antecedent": 0, "sigma": 0},
+        {"antecedent": 1, "sigma": 0, "d": a, "alpha": alpha},
+        {"antecedent": 2, "sigma": 0, "d": b, "alpha": beta},
+        {"antecedent": 3, "sigma": 2, "d": a, "alpha": alpha},
+        {"antecedent": 0, "sigma": 2, "d": -b, "alpha": -beta},
+    ]
+    robot = loops.LoopedRobot(model(rows, rng), [loops.Closure("cut", (4, 5))], actuated=[0])
+    return robot, [0.8], [-2.0, 0.8]
+
+
+def seven_revolutes(rng):
+    """A spatial loop of seven revolute joints, the last one cut: one motion, five rows."""
+    rows = [
+        {"sigma": 0, "d": d, "alpha": alpha, "r": r}
+        for d, alpha, r in zip(*rng.uniform(0.2, 0.6, (3, 6)) * [[1], [3], [1]], strict=True)
+    ]
+    tree = model([*rows, {"sigma": 2, "d": 0.3, "alpha": 0.7}], rng)
+    q = rng.uniform(-1.0, 1.0, 6)
+    socket = np.linalg.inv(tree.base) @ rm.dgm(tree, q)
+    tree = tree.with_frames({"socket": socket}, frame=0)
+    robot = loops.LoopedRobot(tree, [loops.Closure("cut", (7, "socket"))], actuated=[0])
+    if np.abs(loops.velocity_map(robot, q)).max() > 1.5:  # too near to a dead point
+        return seven_revolutes(rng)
+    return robot, q[:1], q

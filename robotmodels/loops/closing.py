@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows
 from .._outcomes import Outcome
-from ..geometry import REVOLUTE
 from .robot import LoopedRobot, check_looped
 
-_STARTS = 12  # random starts for rows that do not close from the guess
+_STARTS = 5  # random starts for rows that do not close from the guess
 
 
 class ClosingStatus(Outcome):
@@ -72,8 +71,7 @@ def close(
     From a guess of all joints, the actuated joints move straight to their positions while damped
     Newton iterations keep the loops closed, which keeps the assembly of the guess. Where that
     fails, and with a guess of the passive joints alone, the iterations start at the positions
-    themselves, and last at random passive joints. Each row is independent of the others; angles
-    are within half a turn of the guess.
+    themselves, and last at random passive joints. Each row is independent of the others.
 
     Parameters
     ----------
@@ -120,13 +118,9 @@ def close(
     if not follow:
         q = np.empty((len(start), n))
         q[:, passive], q[:, robot.actuated] = start, target
-    guess = q.copy()
     residual, status = np.empty(len(q)), np.empty(len(q))
     _close(robot, target, int(follow), q, residual, status)
     _start_again(robot, target, q, residual, status)
-    turns = robot.tree.table.sigma[robot.tree.table.joint_rows] == REVOLUTE
-    turns[robot.actuated] = False
-    q -= turns * 2.0 * np.pi * np.round((q - guess) / (2.0 * np.pi))
     return ClosedPostures(
         q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)
     )

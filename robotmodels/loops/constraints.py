@@ -18,6 +18,21 @@ References
 ----------
 Seed book section 2.3; W. Khalil and E. Dombre, *Modeling, Identification and Control of
 Robots*, section 7.7, for the reduction of tree models by ``v = G v_a``.
+
+Examples
+--------
+A parallelogram: two cranks on the base, a coupler on the first one that meets the second.
+
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.loops import Closure
+>>> from robotmodels.model import RobotModel
+>>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+>>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
+>>> q = v = [1.0, 1.0, -1.0]
+>>> closure_jacobian(robot, q).shape, mobility(robot, q)
+((5, 3), <Mobility 1, redundant rows: cut.z, cut.rx, cut.ry>)
+>>> velocity_map(robot, q).T.round(12), velocity_map_rate(robot, q, v).T.round(12) + 0.0
+(array([[ 1.,  1., -1.]]), array([[0., 0., 0.]]))
 """
 
 from __future__ import annotations
@@ -96,16 +111,6 @@ def closure_jacobian(robot: LoopedRobot, q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., c, n)
         Metres or 1 for each rad/s or m/s.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> (closure_jacobian(robot, [1.0, 1.0, -1.0]) @ [1.0, 1.0, -1.0]).round(12) + 0.0
-    array([0., 0., 0., 0., 0.])
     """
     return closure_rows(robot, *checked(robot, q=q))[1]
 
@@ -117,16 +122,6 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
     -------
     Mobility
         Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> mobility(robot, [1.0, 1.0, -1.0])
-    <Mobility 1, redundant rows: cut.z, cut.rx, cut.ry>
     """
     (q,) = checked(robot, q=q)
     J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
@@ -153,16 +148,6 @@ def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., n, n_a)
         The rows of the actuated joints are the identity.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> velocity_map(robot, [1.0, 1.0, -1.0]).round(12).T
-    array([[ 1.,  1., -1.]])
     """
     return maps(robot, *checked(robot, q=q))[0]
 
@@ -174,16 +159,6 @@ def velocity_map_rate(robot: LoopedRobot, q: ArrayLike, v: ArrayLike) -> Array:
     -------
     ndarray, shape (..., n, n_a)
         The rows of the actuated joints are zero.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> robot = LoopedRobot(RobotModel.from_table(table), [Closure("cut", (4, 5))], actuated=[0])
-    >>> velocity_map_rate(robot, [1.0, 1.0, -1.0], [1.0, 1.0, -1.0]).round(12).T + 0.0
-    array([[0., 0., 0.]])
     """
     return maps(robot, *checked(robot, q=q, v=v))[1]
 
@@ -204,7 +179,7 @@ def closure_rows(robot: LoopedRobot, q: Array) -> tuple[Array, Array]:
     return e.reshape(*batch, *e.shape[1:]), J.reshape(*batch, *J.shape[1:])
 
 
-def jacobian_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
+def row_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
     """Time derivative of the Jacobian of the closures (..., c, n) at q, v (..., n)."""
     tree, rates = robot.tree, []
     batch = batch_shape((q, v), ("q", "v"))
@@ -252,7 +227,7 @@ def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, A
     if v is None:
         return G * scales, np.zeros_like(G)
     rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
-    dJ = weight * jacobian_rates(robot, q, v) * robot.units
+    dJ = weight * row_rates(robot, q, v) * robot.units
     rate[..., passive, :] = -inverse @ (dJ @ G)
     return G * scales, rate * scales
 

@@ -16,7 +16,7 @@ from .._arrays import Array, batch_rows
 from ..dynamics import mass_matrix
 from ..dynamics.inverse import rigid_torques
 from ..errors import LoopError, SingularMassMatrixError
-from .constraints import closure_rows, jacobian_rates
+from .constraints import closure_rows, row_rates
 from .robot import LoopedRobot
 
 _FLOAT64 = np.dtype(np.float64)
@@ -117,7 +117,7 @@ def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, rotor: Array) 
     """Accelerations by projection on the free motions, for any masses. Shapes: (N, n) -> (N, n)."""
     units, weight = robot.units, np.sqrt(robot.cuts.weight)
     J = weight[:, None] * closure_rows(robot, q)[1] * units
-    bias = weight * np.einsum("kij,kj->ki", jacobian_rates(robot, q, v), v)
+    bias = weight * np.einsum("kij,kj->ki", row_rates(robot, q, v), v)
     h = rigid_torques(robot.tree, q, v, np.zeros_like(q))
     M = (mass_matrix(robot.tree, q, False) + rotor) * units * units[:, None]
     out = np.empty_like(q)

@@ -51,9 +51,10 @@ from .robot import Cuts
 CUTS = types.NamedTuple((CHAIN, INTS, INTS, INTS, STACK, MATRIX, INTS, VECTOR, VECTOR), Cuts)
 CLOSED, CANNOT_CLOSE, NOT_CONVERGED, SINGULAR_THERE = 0, 1, 2, 3
 _CLOSED = 1e-13  # largest residual of closed loops, relative to the robot's size, or rad
-_STATIONARY = 1e-9  # largest slope of the error at a minimum, relative to the error
+_STATIONARY = 1e-6  # largest slope of the error at a minimum, relative to the error
+_APART = 1e-20  # least squared error of loops that cannot close
 _FLAT = 1e-10  # least squared sine between columns of passive joints
-_STEPS, _HEAVIEST = 80, 1e8  # iterations; damping
+_STEPS, _HEAVIEST = 150, 1e8  # iterations; damping
 _NEAR, _STRIDE = 0.01, 1.0  # squared error up to which actuated joints move on; rad a step
 
 
@@ -239,9 +240,9 @@ def closed_postures(
             guess[a] = q[i, passive[a]]
         moving = follow > 0
         jump = not moving
-        before, damping, least = np.inf, 0.0, 0.0
+        before, damping, least, halfway = np.inf, 0.0, 0.0, np.inf
         code[i] = NOT_CONVERGED
-        for _ in range(_STEPS):
+        for step in range(_STEPS):
             if jump:  # start at the target
                 for a in range(actuated.shape[0]):
                     q[i, actuated[a]] = target[i, a]
@@ -253,6 +254,10 @@ def closed_postures(
             cost = 0.0
             for k in range(c):
                 cost += cuts.weight[k] * e[k] * e[k]
+            if step == _STEPS // 2:
+                halfway = cost
+            if step == _STEPS - 1 and cost > 0.5 * halfway and not moving:
+                code[i] = CANNOT_CLOSE  # the error hardly decreases
             if cost < before:
                 residual[i] = 0.0
                 for k in range(c):
@@ -261,25 +266,24 @@ def closed_postures(
                 if moved:
                     moving = move_along(q, i, target, actuated, cuts, e, J)
                 steepest = normal_equations(cuts.weight, passive, e, J, N, g, D)
-                damping = damping * 0.1 if damping > 1e-6 else 0.0
+                damping *= 0.1 if cost < 0.3 * before else 0.6
+                damping = damping if damping > 1e-6 else 0.0
                 least = damped_step(N, g, damping, L, x)
                 if cost <= _CLOSED * _CLOSED and not moved:
                     code[i] = CLOSED if least > _FLAT else SINGULAR_THERE
                     for a in range(m):  # the last digits
                         q[i, passive[a]] += x[a] / D[a] if least > _FLAT else 0.0
                     break
-                stuck = steepest <= _STATIONARY * sqrt(cost) and not moved
+                stuck = steepest <= _STATIONARY * sqrt(cost) and cost > _APART and not moved
                 for a in range(m):
                     start[a] = q[i, passive[a]]
                 before = np.inf if moved else cost
             else:
                 stuck = damping > _HEAVIEST
-                damping = max(damping * 10.0, 1e-3)
+                damping = max(damping * 4.0, 1e-3)
                 least = 0.0
             if stuck and (follow == 2 or not moving):
                 code[i] = CANNOT_CLOSE
-                for a in range(m):
-                    q[i, passive[a]] = start[a]
                 break
             jump = stuck
             if not least > _FLAT:
@@ -287,3 +291,6 @@ def closed_postures(
                 damped_step(N, g, damping, L, x)
             for a in range(m):
                 q[i, passive[a]] = start[a] + x[a] / D[a]
+        if code[i] == CANNOT_CLOSE or code[i] == NOT_CONVERGED:  # back to the least error
+            for a in range(m):
+                q[i, passive[a]] = start[a]

@@ -16,7 +16,7 @@ from .direct import checked_actuators, rods
 from .legs import check_robot, leg_states
 from .looped import LoopedPlatform
 from .results import Result, at_index
-from .robot import Family, ParallelRobot, pose_of
+from .robot import Family, ParallelRobot, pose_at
 
 _ACCURACIES = 3e-2, 1e-3, 1e-4  # of predictions, and what is tried where paths are missing
 _REAL = 1e-6  # imaginary parts, relative, at simple ends of paths
@@ -314,7 +314,7 @@ def _poses(robot: ParallelRobot, x: Array, unit: float) -> Array:
     size = np.linalg.norm(v, axis=1, keepdims=True)
     turn = 2.0 * np.arctan2(size, w) * v / np.maximum(size, 1e-300)
     p = 2.0 * (g * w - x[:, 4:5] * v - np.cross(g, v)) / (x[:, :4] ** 2).sum(axis=1)[:, None]
-    T = pose_of(np.concatenate((unit * p, turn), axis=1))
+    T = pose_at(np.concatenate((unit * p, turn), axis=1))
     T[:, :3, 3] += robot.base[0] - T[:, :3, :3] @ robot.platform[0]
     return T
 
@@ -322,7 +322,7 @@ def _poses(robot: ParallelRobot, x: Array, unit: float) -> Array:
 def _is_singular_everywhere(robot: ParallelRobot) -> bool:
     """Whether the lines of the legs depend on each other at random poses."""
     random = np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6)) * np.repeat([robot.size, 2.0], 3)
-    rows = leg_states(robot, pose_of(random), np.zeros(4, np.int64)).rows
+    rows = leg_states(robot, pose_at(random), np.zeros(4, np.int64)).rows
     s = np.linalg.svd(rows / np.repeat([1.0, robot.length], 3), compute_uv=False)
     return bool((s[:, -1] < _FLAT * s[:, 0]).all())
 

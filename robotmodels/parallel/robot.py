@@ -149,7 +149,7 @@ class ParallelRobot(Value):
         full = np.zeros((*X.shape[:-1], 6))
         full[..., :3] = self.home[:3, 3]
         full[..., list(self.columns)] = X
-        return pose_of(full)
+        return pose_at(full)
 
     def checked(self, T: Any, name: str = "T") -> Array:
         """Poses (..., 4, 4), checked that the platform can have them."""
@@ -191,8 +191,8 @@ class ParallelRobot(Value):
         parts = ((0.0, 0.0, 0.0),) * 2 if legs is None else tuple(legs)
         if len(tuple(platform)) != 3 or len(parts) != 2 or any(len(part) != 3 for part in parts):
             raise ShapeError(
-                "platform, legs: expected (mass, com, inertia), and for legs two parts, each (mass, "
-                "position, inertia)."
+                "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
+                "(mass, position, inertia)."
             )
         mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
@@ -228,7 +228,7 @@ def _for_legs(value: ArrayLike, m: int) -> Array:
     return np.broadcast_to(given, (m,))
 
 
-def pose_of(twist: Array) -> Array:
+def pose_at(twist: Array) -> Array:
     """Poses of position and rotation vector. Shapes: (..., 6) -> (..., 4, 4)."""
     T = np.zeros((*twist.shape[:-1], 4, 4))
     w = twist[..., 3:]

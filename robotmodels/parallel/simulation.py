@@ -17,7 +17,7 @@ from .dynamics import ddm, energies
 from .legs import check_robot, leg_states
 from .looped import LoopedPlatform
 from .results import Result
-from .robot import ParallelRobot, pose_of
+from .robot import ParallelRobot, pose_at
 from .velocities import Mode, ikm, modes_of, only_freedoms, scales
 
 _TOO_NEAR = 1e-6  # least singular value, relative, and sine of an elbow
@@ -136,7 +136,7 @@ def simulate(
     columns, unit = list(robot.columns), scales(robot, robot.length)
 
     def pose(x: Array) -> Array:
-        T = pose_of(x[:6])
+        T = pose_at(x[:6])
         T[:3, :3] = T[:3, :3] @ start[:3, :3]
         return T
 

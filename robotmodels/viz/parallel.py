@@ -271,7 +271,8 @@ def plot_platform_workspace(
     axes = places.flat[0]
     x, y = (np.unique(column) for column in workspace.points.T)
     margin = workspace.margin.reshape(workspace.shape).T
-    axes.contourf(x, y, margin, levels=[0.0, max(margin.max(), 1e-9)], colors=[PALETTE[5]], alpha=0.5)
+    inside = [0.0, max(margin.max(), 1e-9)]
+    axes.contourf(x, y, margin, levels=inside, colors=[PALETTE[5]], alpha=0.5)
     axes.contour(x, y, margin, levels=[0.0], colors=[PALETTE[0]], linewidths=1.2)
     names = ["reached"]
     axes.fill([], [], color=PALETTE[5], alpha=0.5, label="reached")
@@ -322,7 +323,8 @@ def _between(start: Array, end: Array) -> Array:
     z = end - start
     z = z / np.linalg.norm(z, axis=1)[:, None]
     yaw, pitch = np.unwrap(np.arctan2(z[:, 1], z[:, 0])), np.arccos(np.clip(z[:, 2], -1.0, 1.0))
-    T = np.array([se3.rotation("z", a) @ se3.rotation("y", b) for a, b in zip(yaw, pitch, strict=True)])
+    pairs = zip(yaw, pitch, strict=True)
+    T = np.array([se3.rotation("z", a) @ se3.rotation("y", b) for a, b in pairs])
     T[:, :3, 3] = start
     return T
 
@@ -418,9 +420,7 @@ def _view(flat: bool) -> Array:
     )
 
 
-def _slider(
-    k: int, name: str, path: str, home: float, size: float, leads: bool
-) -> dict[str, Any]:
+def _slider(k: int, name: str, path: str, home: float, size: float, leads: bool) -> dict[str, Any]:
     """A component of the pose as data of the panel."""
     reach = 0.4 * size if k < 3 else (np.pi if k == 3 else 0.5 * np.pi) * 0.9
     ends = (home - reach, home + reach) if k < 3 else (-reach, reach)

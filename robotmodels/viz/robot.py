@@ -78,7 +78,7 @@ def draw_robot(
                 stacklevel=3,
             )
     seen = q if seen is None else seen
-    table = _with_strokes(model.table, seen)
+    table = with_strokes(model.table, seen)
     size = characteristic_length(table, model.tool)
     pieces = _pieces(model, table, style, size)
     one = len(q) == 1
@@ -98,7 +98,7 @@ def draw_robot(
     return RobotDrawing(tuple(nodes), _extent(model, seen, pieces), joints, size, tuple(paths[0]))
 
 
-def _with_strokes(table: DHTable, q: Array) -> DHTable:
+def with_strokes(table: DHTable, q: Array) -> DHTable:
     """Table with limits for every prismatic joint, the ends of the motion where it has none."""
     needed = (table.sigma[table.joint_rows] == PRISMATIC) & ~np.isfinite(table.upper - table.lower)
     return table.replace(

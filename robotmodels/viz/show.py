@@ -53,12 +53,14 @@ from .._arrays import Array, as_exact, as_floats, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import link_poses
 from ..kinematics.ellipsoid import Ellipsoid
+from ..loops import LoopedRobot
 from ..model import RobotModel, check_model
 from ..trajectories.joint_path import JointPath
 from ..trajectories.resolved_motion import ResolvedMotion
 from ..trajectories.trajectory import Samples, Trajectory
 from ..visual import Color, characteristic_length
 from .camera import framed
+from .loops import with_closures
 from .motion import Motion, Track, keyframes, timed_samples
 from .over_time import is_prismatic
 from .robot import MESH_COLOR, RobotDrawing, RobotStyle, draw_robot
@@ -86,7 +88,7 @@ _TURN, _STROKE = np.radians(25.0), 0.4
 
 
 def show(
-    model: RobotModel | Sequence[RobotModel],
+    model: RobotModel | LoopedRobot | Sequence[RobotModel | LoopedRobot],
     q: ArrayLike | str | Sequence[ArrayLike | str] | None = None,
     *,
     frames: bool = False,
@@ -109,7 +111,7 @@ def show(
 
     Parameters
     ----------
-    model : RobotModel or sequence of RobotModel
+    model : RobotModel, LoopedRobot or sequence of these
         The robot, or R robots that stand where their bases are.
     q : array_like, shape (n,) or (N, n), or str, optional
         Joint variables in radians or metres; with N > 1 the postures are drawn together, each in
@@ -145,6 +147,7 @@ def show(
     >>> show(arm, [[0.0, 0.5], [0.4, -0.5]], frames=True)
     <Scene 'robot': 29 shapes>
     """
+    model = with_closures(model, q)
     models = _as_models(model)
     postures = [
         _as_postures(value, item)
@@ -176,7 +179,7 @@ def show(
 
 
 def animate(
-    model: RobotModel | Sequence[RobotModel],
+    model: RobotModel | LoopedRobot | Sequence[RobotModel | LoopedRobot],
     q: Moving | Sequence[Moving],
     dt: float | None = None,
     fps: float | None = None,
@@ -201,7 +204,7 @@ def animate(
 
     Parameters
     ----------
-    model : RobotModel or sequence of RobotModel
+    model : RobotModel, LoopedRobot or sequence of these
         The robot, or R robots.
     q : array_like, shape (N, n) or (N, 1, n), or Trajectory, Samples, JointPath or ResolvedMotion
         Joint variables in radians or metres, N >= 2, or a motion with its own times; for several
@@ -233,6 +236,7 @@ def animate(
     >>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
     1.5
     """
+    model = with_closures(model, q)
     models = _as_models(model)
     values = _as_many(q, model, len(models))
     samples = [timed_samples(v, m.n, dt, fps, "q") for m, v in zip(models, values, strict=True)]

@@ -1,0 +1,76 @@
+"""Faults in robots with loops, each of which a test must see."""
+
+from mutation_list import Mutation
+
+__all__ = ["MUTATIONS"]
+
+LOOPS = "tests/test_loops.py -k "
+FILES = "tests/test_loops_files.py -k "
+ROWS, RATES = LOOPS + "relative_twists", LOOPS + "velocity_maps_are"
+INVERSE, DENSE = LOOPS + "models_are_inverse", LOOPS + "dense_equations"
+CLOSING = LOOPS + "by_the_direct_model_alone"
+
+MUTATIONS = [
+    Mutation("loops", "rows of the first frame with the sign of the second",
+        "linear = scale(side, transpose_times(Ra, linear))", "side", "1.0", ROWS),
+    Mutation("loops", "levers of joints from the first frame",
+        "linear = axis\n", "subtract(pb,", "subtract(pa,", LOOPS + "open_postures_too"),
+    Mutation("loops", "tilt about x with the other sign",
+        "x, y, turn, cosine = -z[1]", "-z[1]", "z[1]", LOOPS + "bennett"),
+    Mutation("loops", "antiparallel axes count as closed",
+        "return (pi, 0.0, 0.0) if cosine", "pi, 0.0, 0.0", "x, y, turn", LOOPS + "antiparallel"),
+    Mutation("loops", "second frame of a closure turned as the first",
+        "rotation=read_only(np.array([T[:3, :3]", "T[:3, :3]", "T[:3, :3].T", LOOPS + "full"),
+    Mutation("loops", "actuated joints jump to their positions",
+        "share = min(1.0,", "_STRIDE / furthest", "1.0", LOOPS + "assembly"),
+    Mutation("loops", "a dead point is called closed",
+        "code[i] = CLOSED if least >", "_FLAT else SINGULAR_THERE", "_FLAT else CLOSED",
+        LOOPS + "dead_point"),
+    Mutation("loops", "open loops are called not converged",
+        "if stuck and (follow == 2 or not moving):", "CANNOT_CLOSE", "NOT_CONVERGED",
+        LOOPS + "cannot_close"),
+    Mutation("loops", "redundant rows are not named",
+        "redundant[..., k] = ~(length >", "_INDEPENDENT", "-1.0 + 0.0 * _INDEPENDENT",
+        LOOPS + "redundant"),
+    Mutation("loops", "velocity map with the wrong sign",
+        "G[..., passive, :] = -inverse", "-inverse", "inverse", RATES),
+    Mutation("loops", "rate of the map with the wrong sign",
+        "rate[..., passive, :] = -inverse", "-inverse", "inverse", RATES),
+    Mutation("loops", "rate without the motion of the second frame's origin",
+        "dlinear = dV + np.cross(dW, point)", "np.cross(W, speed)", "0.0 * W", RATES),
+    Mutation("loops", "rate in axes that do not turn",
+        "parts = [(X @ R)", "dW - np.cross(turn, W)", "dW", RATES),
+    Mutation("loops", "actuated joints that depend on each other are accepted",
+        "_CONSISTENT = 1e-5", "1e-5", "1e5", LOOPS + "do_not_determine"),
+    Mutation("loops", "torques of passive joints are dropped",
+        "G = maps(robot, closed(robot, q))[0]", 'G, tau)', "G * (G == 1.0), tau)", INVERSE),
+    Mutation("loops", "friction helps the motion",
+        "full = full - drives.torque(v, None)", "full - ", "full + ", INVERSE),
+    Mutation("loops", "the wrench acts on the tool",
+        "full = full - wrench_torque(", "full - ", "full + ", INVERSE),
+    Mutation("loops", "closure forces on the other body",
+        "inverse = np.linalg.pinv(J, rcond=1e-8)\n    return", "np.einsum(", "-np.einsum(", DENSE),
+    Mutation("loops", "rotors are left out of the direct model",
+        "self.model.armature = np.diag(rotor)[", "np.diag(rotor)", "0.0 * np.diag(rotor)", INVERSE),
+    Mutation("loops", "a revolute closure is one point",
+        "points = [pin.SE3.Identity(), along][", '2 if closure.kind == "revolute" else 1', "1",
+        DENSE),
+    Mutation("loops", "bias of the closures is dropped in the projection",
+        "start, Z = -Vt[:rank].T @", "-Vt", "0.0 * Vt", LOOPS + "projection"),
+    Mutation("loops", "samples of a simulation are not projected",
+        "super()._sample(", "self.motion.projected(y[:n], y[n : 2 * n])", "(y[:n], y[n : 2 * n])",
+        LOOPS + "stay_closed"),
+    Mutation("loops", "a simulation passes singular closures",
+        "return min(map(abs, turned)) > _SAME and", "turned[0] * turned[1] < 0.0", "False",
+        LOOPS + "become_singular"),
+    Mutation("loops", "base parameters of any assembly",
+        "found = followed(robot, reference[actuated] + by, reference)", "reference)",
+        "np.zeros(robot.n))", LOOPS + "known_robots"),
+    Mutation("loops", "a passive joint of a file is actuated",
+        "driven = {element.get(", 'if name in driven', "if name not in driven",
+        FILES + "root_bodies"),
+    Mutation("loops", "the second frame of a cut joint is the next one",
+        "cuts = [(j + 1, joints + j - links", "+ 1)", "+ 0)", FILES + "symoro"),
+    Mutation("loops", "masses of an MJCF file at the joint",
+        "<link name='body_{k}'><inertial>", "Y.lever", "0.0 * Y.lever", FILES + "centres"),
+]  # fmt: skip

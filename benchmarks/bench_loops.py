@@ -1,0 +1,155 @@
+"""Speed of robots with loops beside Pinocchio called from Python, in one run.
+
+    python -m benchmarks.bench_loops [--out benchmarks/results] [--rounds 15]
+
+Contestants of a row take turns. Pinocchio's direct model runs bare, with the constraints and
+settings of ours and with twenty proximal iterations; its closing is the Newton iteration that users
+write, one posture after the other. toolbox-parallel-robots needs Pinocchio's CasADi bindings,
+which the wheel of the package index does not have; it is named and left out where it is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import robotmodels as rm
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import Contestant, in_turns
+from robotmodels import loops
+from robotmodels.loops.engine import engine_of
+
+Array = NDArray[np.float64]
+OURS, POSTURES, CALLS, FEW = "robotmodels", 10_000, 500, 100
+PEER = "toolbox_parallel_robots"
+
+
+@dataclass
+class Row:
+    """A line of the table: medians in microseconds, and the goal that was set."""
+
+    work: str
+    microseconds: dict[str, float]
+    goal: str
+
+
+def measure(work: str, contestants: list[Contestant], rounds: int, goal: str = "") -> Row:
+    """Time the contestants of a row, taking turns."""
+    found = {name: t.processor.times(1e6) for name, t in in_turns(contestants, rounds).items()}
+    median = {name: spread.median for name, spread in found.items()}
+    print(f"{work}: " + "; ".join(f"{name} {value:.2f} us" for name, value in median.items()))
+    return Row(work, median, goal)
+
+
+def planar(rows: list[dict], frames: tuple[int, int], actuated: list[int]) -> loops.LoopedRobot:
+    """A planar robot of bars with unit masses."""
+    table = rm.DHTable.from_rows(rows)
+    bars = rm.InertialParameters.from_com(
+        np.ones(table.f), np.full((table.f, 3), 0.1), [0.1 * np.eye(3)] * table.f
+    )
+    tree = rm.RobotModel.from_table(table, bars, gravity=(0.0, -9.81, 0.0))
+    return loops.LoopedRobot(tree, [loops.Closure("pin", frames)], actuated)
+
+
+def robots() -> dict[str, tuple[loops.LoopedRobot, Array]]:
+    """Robots and closed postures."""
+    first = [{"sigma": 0}, {"antecedent": 0, "sigma": 0, "d": 1.0}]
+    four = planar(
+        [*first, {"antecedent": 1, "sigma": 0, "d": 0.3},
+         {"antecedent": 3, "sigma": 2, "d": 0.9}, {"antecedent": 2, "sigma": 2, "d": 0.7}],
+        (4, 5), [0],
+    )  # fmt: skip
+    bars = [{"antecedent": k, "sigma": 0, "d": 0.6} for k in (1, 2)]
+    ends = [{"antecedent": k, "sigma": 2, "d": 0.8} for k in (3, 4)]
+    five = planar([*first, *bars, *ends], (5, 6), [0, 1])
+    return {
+        "four-bar": (four, loops.close(four, [0.7], [1.2, -0.5]).q),
+        "five-bar": (five, loops.close(five, [2.0, 1.0], [-1.0, 1.0]).q),
+    }
+
+
+def closing_row(robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
+    """Postures of a four-bar at positions of its crank within a radian."""
+    angles = q[0] + np.random.default_rng(0).uniform(-1.0, 1.0, (POSTURES, 1))
+    engine, passive = engine_of(robot), robot.passive
+    model, data, constraints = engine.model, engine.data, engine.models
+
+    def by_hand() -> None:
+        for angle in angles[:FEW, 0]:
+            x = q.copy()
+            x[0] = angle
+            for _ in range(20):
+                pin.computeJointJacobians(model, data, x[engine.order])
+                for constraint, found in zip(constraints, engine.datas, strict=True):
+                    constraint.calc(model, data, found)
+                e = np.concatenate([found.c1Mc2.translation for found in engine.datas])
+                if np.abs(e).max() < 1e-12:
+                    break
+                J = pin.getConstraintsJacobian(model, data, constraints, engine.datas)
+                x[passive] -= np.linalg.lstsq(-J[:, engine.back][:, passive], e, rcond=None)[0]
+
+    contestants = [
+        Contestant(OURS, lambda: loops.close(robot, angles, q), POSTURES),
+        Contestant("Pinocchio, Newton in Python", by_hand, FEW, rounds=3),
+    ]
+    return measure("close a four-bar", contestants, rounds, "1e4 postures <= 20 ms: 2 us each")
+
+
+def direct_row(name: str, robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
+    """The direct model, one sample a call and in a batch."""
+    rng = np.random.default_rng(0)
+    v = loops.velocity_map(robot, q) @ rng.normal(size=len(robot.actuated))
+    tau = rng.normal(size=len(robot.actuated))
+    engine = engine_of(robot)
+    full = np.zeros(robot.n)
+    full[robot.actuated] = tau
+    given = (engine.model, engine.data, *(x[engine.order] for x in (q, v, full)))
+    finer = pin.ProximalSettings(1e-14, 1e-10, 20)
+
+    def bare(settings: pin.ProximalSettings) -> None:
+        for _ in range(CALLS):
+            pin.constraintDynamics(*given, engine.models, engine.datas, settings)
+
+    contestants = [
+        Contestant(OURS, lambda: [loops.ddm(robot, q, v, tau) for _ in range(CALLS)], CALLS),
+        Contestant("Pinocchio, same settings", lambda: bare(engine.settings), CALLS),
+        Contestant("Pinocchio, 20 iterations", lambda: bare(finer), CALLS),
+        Contestant(
+            f"{OURS}, batch",
+            lambda: loops.ddm(robot, np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau), CALLS,
+        ),
+    ]  # fmt: skip
+    return measure(f"direct model, {name}", contestants, rounds, "<= 1.3 of Pinocchio, bare")
+
+
+def main() -> None:
+    """Measure, print and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--rounds", type=int, default=15)
+    given = parser.parse_args()
+    about = machine(["pin"])
+    try:
+        importlib.import_module(PEER)
+    except ImportError as error:
+        print(f"left out: {PEER} ({error})")
+    rows = [closing_row(*robots()["four-bar"], given.rounds)]
+    rows += [direct_row(name, *robot, given.rounds) for name, robot in robots().items()]
+    text = [*head("Kinematic loops: measured side by side", about), "| us each | goal | medians |"]
+    text.append("|---|---|---|")
+    for row in rows:
+        medians = "; ".join(f"{name} {value:.2f}" for name, value in row.microseconds.items())
+        text.append(f"| {row.work} | {row.goal} | {medians} |")
+    numbers = {"machine": about, "rows": [asdict(row) for row in rows]}
+    keep(given.out, "loops", "\n".join(text) + "\n", numbers)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,607 @@
+"""Robots with loops: closing, constraints, dynamics, base parameters, simulation, mistakes."""
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from looped_robots import (
+    five_bar,
+    four_bar,
+    gough,
+    parallelogram,
+    seven_revolutes,
+    slider_crank,
+    spatial_four_bar,
+)
+
+import robotmodels as rm
+from robotmodels import loops
+from robotmodels.errors import InvalidValueError, LoopError, ShapeError
+from robotmodels.loops import ClosingStatus
+
+GRAVITY = 9.81
+
+
+def driven(robot, rng):
+    """The same robot with drives on all joints."""
+    values = rng.uniform(0.1, 1.0, (4, robot.n))
+    drive = rm.DriveParameters(**dict(zip(("Ia", "Fv", "Fc", "offset"), values, strict=True)))
+    return loops.LoopedRobot(robot.tree.with_drive(drive), robot.closures, robot.actuated)
+
+
+def fleet():
+    """(robot, actuated positions, guess) of every structure."""
+    rng = np.random.default_rng(3)
+    yield four_bar(rng), [0.7], [1.2, -0.5]
+    yield four_bar(rng, kind="point"), [0.7], [1.2, -0.5]
+    yield parallelogram(rng), [0.7], [0.7, -0.7]
+    yield slider_crank(rng), [0.7], [1.0, -0.3]
+    yield five_bar(rng), [2.0, 1.0], [-1.0, 1.0]
+    yield spatial_four_bar(rng)
+    yield gough(rng)[0], np.full(6, 1.2), None
+    yield driven(five_bar(rng), rng), [2.0, 1.0], [-1.0, 1.0]
+    yield seven_revolutes(rng)
+
+
+FLEET = [(robot, loops.close(robot, q_a, guess).q) for robot, q_a, guess in fleet()]
+ids = [f"{k}-{robot.n} joints" for k, (robot, _) in enumerate(FLEET)]
+every_robot = pytest.mark.parametrize(("robot", "q_ref"), FLEET, ids=ids)
+
+
+def motion(robot, q_ref, rng, N=5):
+    """Closed postures near a reference, velocities and accelerations that keep the loops closed."""
+    by = 0.1 * rng.uniform(-1.0, 1.0, (N, len(robot.actuated)))
+    found = loops.close(robot, q_ref[robot.actuated] + by, q_ref)
+    assert (found.status == ClosingStatus.CLOSED).all()
+    G = loops.velocity_map(robot, found.q)
+    v_a, a_a = rng.normal(size=(2, N, len(robot.actuated)))
+    v = np.einsum("kij,kj->ki", G, v_a)
+    rate = loops.velocity_map_rate(robot, found.q, v)
+    return found.q, v, np.einsum("kij,kj->ki", G, a_a) + np.einsum("kij,kj->ki", rate, v_a)
+
+
+def gap(robot, q):
+    """Largest distance or angle between frames that should coincide, by the direct model."""
+    most = 0.0
+    for closure in robot.closures:
+        first, second = (rm.dgm(robot.tree, q, frame) for frame in closure.frames)
+        most = max(most, np.abs(first[..., :3, 3] - second[..., :3, 3]).max())
+        columns = {"point": [], "revolute": [2], "full": [0, 1, 2]}[closure.kind]
+        turned = np.abs(first[..., :3, columns] - second[..., :3, columns])
+        most = max(most, turned.max(initial=0.0))
+    return most
+
+
+# --- closing -------------------------------------------------------------------------------------
+
+
+@every_robot
+def test_closed_postures_close_by_the_direct_model_alone_and_in_batches(robot, q_ref, rng):
+    by = 0.1 * rng.normal(size=(2, 3, len(robot.actuated)))
+    found = loops.close(robot, q_ref[robot.actuated] + by, q_ref)
+    assert found.q.shape == (2, 3, robot.n)
+    assert found.residual.shape == found.status.shape == (2, 3)
+    assert gap(robot, found.q) < 1e-12
+    assert np.array_equal(found.q[..., robot.actuated], q_ref[robot.actuated] + by)
+    one = loops.close(robot, (q_ref[robot.actuated] + by[1, 2]).tolist(), q_ref.tolist())
+    assert np.array_equal(one.q, found.q[1, 2])
+    assert found.reason((0, 1)) == "The loops are closed."
+    assert loops.close(robot, by[:0], q_ref).q.shape == (0, 3, robot.n)
+    assert pickle.loads(pickle.dumps(found)) == found
+    assert len(repr(found).splitlines()) <= 6
+
+
+def test_a_parallelogram_stays_one_all_around(rng):
+    robot = parallelogram(rng)
+    q = rng.uniform(0.02, np.pi - 0.02, (2000, 1)) * rng.choice([-1.0, 1.0], (2000, 1))
+    for sign in (-1.0, 1.0):  # the flat posture between is a bifurcation
+        rows = q[np.sign(q[:, 0]) == sign]
+        found = loops.close(robot, rows, sign * np.array([0.7, 0.7, -0.7]))
+        assert np.abs(found.q - rows * [1.0, 1.0, -1.0]).max() < 1e-12
+
+
+def test_the_assembly_of_the_guess_is_kept(rng):
+    robot = four_bar(rng)
+    angles = np.linspace(-np.pi, np.pi, 400)[:, None]
+    for guess in ([0.7, 1.2, -0.5], [0.7, -1.2, -2.0]):
+        start = loops.close(robot, [0.7], guess[1:]).q
+        found = loops.close(robot, angles, start)
+        assert (found.status == ClosingStatus.CLOSED).all()
+        steps = np.abs(np.diff(found.q, axis=0))
+        assert steps.max() < 0.1  # one continuous motion
+        assert np.allclose(np.sin(found.q[0]), np.sin(found.q[-1]), atol=1e-9)
+
+
+def test_loops_that_cannot_close_say_so_with_the_least_residual(rng):
+    robot = four_bar(rng, crank=0.3, coupler=0.2, rocker=0.2)
+    found = loops.close(robot, [[0.0], [np.pi]], [1.0, 1.0])
+    assert (found.status == ClosingStatus.CANNOT_CLOSE).all()
+    # the links, stretched out
+    assert found.residual == pytest.approx([0.3, 0.9], rel=0.05)
+    assert "cannot be closed" in found.reason(0)
+    assert "m or rad" in found.reason(0)
+    assert gap(robot, found.q[0]) == pytest.approx(found.residual[0], abs=1e-12)
+
+
+def test_a_dead_point_is_closed_and_singular(rng):
+    robot = slider_crank(rng)
+    by_slider = loops.LoopedRobot(robot.tree, robot.closures, actuated=[1])
+    stretched = loops.close(robot, [0.0], [1.1, 0.0]).q
+    found = loops.close(by_slider, stretched[[1]], stretched)
+    assert found.status == ClosingStatus.SINGULAR_THERE
+    assert "do not determine" in found.reason()
+    with pytest.raises(LoopError, match="dead point"):
+        loops.velocity_map(by_slider, stretched)
+    # the direct model has an answer there, and it is that of the crank
+    v = np.zeros(3)
+    a = loops.ddm(by_slider, stretched, v, [5.0])
+    assert a == pytest.approx(loops.ddm(robot, stretched, v, [0.0]), abs=1e-9)
+
+
+# --- constraints ---------------------------------------------------------------------------------
+
+
+@every_robot
+def test_velocity_maps_are_derivatives(robot, q_ref, rng):
+    q, v, _ = motion(robot, q_ref, rng)
+    h = 1e-6
+    sides = [loops.close(robot, (q + s * v)[:, robot.actuated], q).q for s in (h, -h)]
+    assert np.allclose((sides[0] - sides[1]) / (2 * h), v, atol=2e-8)
+    rate = np.subtract(*(loops.velocity_map(robot, x) for x in sides)) / (2 * h)
+    G, dG = loops.velocity_map(robot, q), loops.velocity_map_rate(robot, q, v)
+    assert np.allclose(rate, dG, atol=1e-6 * (1.0 + np.abs(dG).max()))
+    J = loops.closure_jacobian(robot, q)
+    assert np.abs(J @ G).max() < 1e-11
+    assert np.array_equal(G[:, robot.actuated], np.tile(np.eye(len(robot.actuated)), (5, 1, 1)))
+    assert np.allclose(loops.velocity_map(robot, q[3]), G[3], atol=1e-13)
+    assert np.allclose(loops.velocity_map_rate(robot, q[3], v[3]), dG[3], atol=1e-10)
+
+
+@every_robot
+def test_jacobian_rows_are_relative_twists(robot, q_ref, rng):
+    q = motion(robot, q_ref, rng)[0]
+    rows = iter(np.moveaxis(loops.closure_jacobian(robot, q), -2, 0))
+    for closure in robot.closures:
+        first, second = closure.frames
+        R = rm.dgm(robot.tree, q, first)[:, :3, :3].swapaxes(1, 2)
+        J = np.subtract(*(rm.jacobian(robot.tree, q, frame) for frame in (second, first)))
+        both = np.concatenate((R @ J[:, :3], R @ J[:, 3:]), axis=1)
+        for k, name in enumerate(closure.rows):
+            assert name.startswith(f"{closure.name}.")
+            assert np.allclose(next(rows), both[:, k], atol=1e-11)
+    assert len(robot.rows) == loops.closure_jacobian(robot, q[0]).shape[0]
+
+
+@every_robot
+def test_position_rows_are_derivatives_in_open_postures_too(robot, q_ref, rng):
+    q, h = rng.uniform(-1.0, 1.0, robot.n), 1e-6
+    J = loops.closure_jacobian(robot, q)
+    moved = q + h * np.vstack((np.eye(robot.n), -np.eye(robot.n)))
+    for closure in robot.closures:
+        first, second = (rm.dgm(robot.tree, moved, frame) for frame in closure.frames)
+        p = (rm.se3.inverse(first) @ second)[:, :3, 3]
+        rows = [robot.rows.index(f"{closure.name}.{axis}") for axis in "xyz"]
+        assert np.allclose(J[rows].T, (p[: robot.n] - p[robot.n :]) / (2 * h), atol=1e-7)
+
+
+@every_robot
+def test_mobility_is_the_rank_and_names_redundant_rows(robot, q_ref, rng):
+    q = motion(robot, q_ref, rng)[0]
+    found = loops.mobility(robot, q)
+    J = loops.closure_jacobian(robot, q)
+    assert np.array_equal(np.asarray(found), robot.n - np.linalg.matrix_rank(J, tol=1e-9))
+    assert (found == len(robot.actuated)).all()
+    kept = [name not in found.redundant for name in robot.rows]
+    assert np.linalg.matrix_rank(J[0][kept], tol=1e-9) == sum(kept) == robot.n - int(found.count[0])
+    assert int(loops.mobility(robot, q[0])) == found.count[0]
+    assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_redundant_closures_and_planar_rows_are_named(rng):
+    robot = four_bar(rng)
+    twice = [*robot.closures, loops.Closure("again", frames=(4, 5))]
+    double = loops.LoopedRobot(robot.tree, twice, actuated=[0])
+    q = loops.close(double, [0.7], [1.2, -0.5]).q
+    assert loops.mobility(robot, q).redundant == ("cut.z", "cut.rx", "cut.ry")
+    found = loops.mobility(double, q)
+    assert found.redundant == (
+        "cut.z",
+        "cut.rx",
+        "cut.ry",
+        *(f"again.{x}" for x in ["x", "y", "z", "rx", "ry"]),
+    )
+    assert int(found) == 1
+    assert np.allclose(loops.velocity_map(double, q), loops.velocity_map(robot, q), atol=1e-12)
+    assert np.allclose(
+        loops.ddm(double, q, np.zeros(3), [1.0]), loops.ddm(robot, q, np.zeros(3), [1.0]), atol=1e-9
+    )
+
+
+def test_a_four_bar_follows_freudenstein(rng):
+    a, c, d = 0.3, 0.7, 1.0
+    robot = four_bar(rng, crank=a, coupler=0.9, rocker=c, ground=d)
+    q = loops.close(robot, rng.uniform(-3.0, 3.0, (50, 1)), [0.7, 1.2, -0.5]).q
+    crank, rocker = q[:, 0], q[:, 1]
+    K1, K2 = d / a, d / c
+    slope = (np.sin(crank - rocker) + K2 * np.sin(crank)) / (
+        np.sin(crank - rocker) + K1 * np.sin(rocker)
+    )
+    assert np.allclose(loops.velocity_map(robot, q)[:, 1, 0], slope, atol=1e-10)
+
+
+def test_a_bennett_linkage_moves_though_its_closure_has_five_rows(rng):
+    robot, q_a, guess = spatial_four_bar(rng)
+    found = loops.close(robot, rng.uniform(0.3, 2.8, (20, 1)), loops.close(robot, q_a, guess).q)
+    assert (found.status == ClosingStatus.CLOSED).all()
+    # opposite angles are equal but for sign, and the four axes alternate
+    assert np.ptp(np.tan(found.q[:, 0] / 2) * np.tan(found.q[:, 1] / 2)) < 1e-9
+    assert (np.asarray(loops.mobility(robot, found.q)) == 1).all()
+
+
+def test_full_closures_are_a_cut_body(rng):
+    """A welded cut of a four-bar's coupler is the same robot as its cut pin."""
+    cut_pin = four_bar(rng)
+    table = cut_pin.tree.table
+    rows = [
+        *({"antecedent": a, "sigma": s, "d": d} for a, s, d in [(0, 0, 0), (0, 0, 1), (1, 0, 0.3)]),
+        {"antecedent": 3, "sigma": 2, "d": 0.4, "theta": 0.5},
+        {"antecedent": 2, "sigma": 0, "d": 0.7},
+        {"antecedent": 5, "sigma": 2, "theta": 0.2, "alpha": 0.3},
+    ]
+    tree = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    ends = [tree.twin.frame(k) for k in (3, 5)]
+    assert [place.parent for place in ends] == [3, 5]
+    # a frame in the middle of the coupler, seen from the crank's side and from the rocker's
+    posture = loops.close(cut_pin, [0.7], [1.2, -0.5]).q
+    q = np.array([*posture, posture[0] + posture[2] - posture[1] + 0.3])
+    middle = rm.se3.inverse(rm.dgm(tree, q, 6)) @ rm.dgm(tree, q, 4)
+    tree = tree.with_frames({"middle": middle}, frame=6)
+    robot = loops.LoopedRobot(tree, [loops.Closure("weld", (4, "middle"), "full")], actuated=[0])
+    found = loops.close(robot, [0.9], q)
+    assert gap(robot, found.q) < 1e-12
+    expected = loops.close(cut_pin, [0.9], posture).q
+    assert np.allclose(found.q[:3], expected, atol=1e-12)
+    assert table.f == 5
+    h = 1e-6
+    J = loops.closure_jacobian(robot, found.q)
+    away = found.q + h * np.eye(4)
+    for k in range(4):
+        T = rm.se3.inverse(rm.dgm(tree, away[k], 4)) @ rm.dgm(tree, away[k], "middle")
+        turned = [T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]]
+        assert np.allclose(J[:, k], [*T[:3, 3] / h, *np.array(turned) / (2 * h)], atol=1e-5)
+
+
+def test_antiparallel_axes_are_not_closed(rng):
+    """A pin that would have to be turned over: origins meet, axes do not."""
+    robot = four_bar(rng)
+    tree = robot.tree.with_frames({"over": np.diag([1.0, -1.0, -1.0, 1.0])}, frame=5)
+    turned = loops.LoopedRobot(tree, [loops.Closure("cut", (4, "over"))], actuated=[0])
+    q = loops.close(robot, [0.7], [1.2, -0.5]).q
+    found = loops.close(turned, [0.7], q)
+    assert found.status in (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
+    assert found.residual > 0.1
+
+
+def test_a_gough_platform_has_its_inverse_jacobian(rng):
+    robot, base, platform = gough(rng)
+    guess = loops.close(robot, np.full(6, 1.2)).q
+    q = motion(robot, guess, rng)[0]
+    T = rm.dgm(robot.tree, q, "center")
+    arms = np.einsum("nij,kj->nki", T[:, :3, :3], platform)
+    legs = T[:, None, :3, 3] + arms - base
+    lengths = np.linalg.norm(legs, axis=-1)
+    assert np.allclose(lengths, q[:, robot.actuated], atol=1e-12)
+    u = legs / lengths[..., None]
+    inverse = np.concatenate((u, np.cross(arms, u)), axis=-1)
+    J = rm.jacobian(robot.tree, q, "center") @ loops.velocity_map(robot, q)
+    assert np.abs(inverse @ J - np.eye(6)).max() < 1e-12
+
+
+# --- dynamics ------------------------------------------------------------------------------------
+
+
+@every_robot
+def test_inverse_and_direct_models_are_inverse(robot, q_ref, rng):
+    q, v, a = motion(robot, q_ref, rng)
+    wrench = rng.normal(size=(5, 6))
+    tau = loops.idm(robot, q, v, a, wrench=wrench)
+    assert tau.shape == (5, len(robot.actuated))
+    back = loops.ddm(robot, q, v, tau, wrench=wrench)
+    size = 1.0 + np.abs(a).max()
+    assert np.abs(back - a).max() < 1e-9 * size
+    assert np.abs(loops.ddm(robot, q[2], v[2], tau[2], wrench[2]) - a[2]).max() < 1e-9 * size
+    assert np.abs(loops.idm(robot, q[2], v[2], a[2], wrench[2]) - tau[2]).max() < 1e-9 * size
+    assert loops.ddm(robot, q[:0], v[:0], tau[:0]).shape == (0, robot.n)
+    assert loops.idm(robot, q[:0], v[:0], a[:0]).shape == (0, len(robot.actuated))
+    with ThreadPoolExecutor(2) as pool:
+        same = pool.submit(loops.ddm, robot, q, v, tau, wrench).result()
+    assert np.array_equal(same, back)
+
+
+def kkt(robot, q, v, tau):
+    """Accelerations and closure forces of one sample, by the dense equations of motion."""
+    J = loops.closure_jacobian(robot, q)
+    h, c = 1e-6, len(J)
+    bias = (loops.closure_jacobian(robot, q + h * v) - loops.closure_jacobian(robot, q - h * v)) @ v
+    full = np.zeros(robot.n)
+    full[robot.actuated] = tau
+    M = rm.mass_matrix(robot.tree, q)
+    rest = full - rm.idm(robot.tree, q, v, np.zeros(robot.n))
+    A = np.block([[M, -J.T], [J, np.zeros((c, c))]])
+    found = np.linalg.lstsq(A, np.concatenate((rest, -bias / (2 * h))), rcond=1e-13)[0]
+    return found[: robot.n], found[robot.n :]
+
+
+@every_robot
+def test_the_direct_model_solves_the_dense_equations(robot, q_ref, rng):
+    q, v, _ = motion(robot, q_ref, rng)
+    tau = rng.normal(size=(5, len(robot.actuated)))
+    still = np.zeros(robot.n)
+    for k in range(5):
+        a, forces = kkt(robot, q[k], still, tau[k])
+        assert np.abs(loops.ddm(robot, q[k], still, tau[k]) - a).max() < 1e-12 * (
+            1.0 + np.abs(a).max()
+        ) * np.linalg.cond(rm.mass_matrix(robot.tree, q[k]))
+        a = kkt(robot, q[k], v[k], tau[k])[0]  # its bias is a difference
+        assert np.abs(loops.ddm(robot, q[k], v[k], tau[k]) - a).max() < 1e-7 * (
+            1.0 + np.abs(a).max()
+        )
+        J = loops.closure_jacobian(robot, q[k])
+        found = loops.closure_forces(robot, q[k], still, tau[k])
+        assert np.allclose(J.T @ found, J.T @ forces, atol=1e-9 * (1.0 + np.abs(forces).max()))
+    batch = loops.closure_forces(robot, q, v, tau)
+    missing = rm.idm(robot.tree, q, v, loops.ddm(robot, q, v, tau))
+    missing[:, robot.actuated] -= tau
+    J = loops.closure_jacobian(robot, q)
+    assert np.allclose(np.einsum("kij,ki->kj", J, batch), missing, atol=1e-8)
+
+
+@every_robot
+def test_pinocchio_and_the_projection_on_free_motions_agree(robot, q_ref, rng):
+    from robotmodels.loops.dynamics import tree_torques
+    from robotmodels.loops.engine import engine_of, projected
+
+    q, v, _ = motion(robot, q_ref, rng)
+    tau = rng.normal(size=(5, len(robot.actuated)))
+    engine = engine_of(robot)
+    assert engine.serves
+    full = tree_torques(robot, q, v, tau, None, True)
+    reference = projected(robot, q, v, full, engine.rotor)
+    found = loops.ddm(robot, q, v, tau)
+    assert np.abs(found - reference).max() < 1e-10 * (1.0 + np.abs(reference).max())
+
+
+@every_robot
+def test_power_is_the_change_of_energy(robot, q_ref, rng):
+    q, v, a = motion(robot, q_ref, rng)
+    tree, d = robot.tree, robot.tree.drive
+    friction = v * d.Fv + np.sign(v) * d.Fc + d.offset
+    power = (loops.idm(robot, q, v, a) * v[:, robot.actuated]).sum(1) - (friction * v).sum(1)
+    h = 1e-5
+    ends = [(q + s * v + s * s / 2 * a, v + s * a) for s in (h, -h)]
+    energies = [rm.kinetic_energy(tree, *x) + rm.potential_energy(tree, x[0]) for x in ends]
+    change = (energies[0] - energies[1]) / (2 * h)
+    assert np.allclose(power, change, rtol=1e-7, atol=1e-7)
+
+
+def test_a_parallelogram_has_its_reduced_model(rng):
+    length = 0.5
+    robot = parallelogram(rng, length=length)
+    pi = dict(
+        zip(
+            rm.parameter_names(robot.tree, drive=False),
+            robot.tree.inertia.values.ravel(),
+            strict=True,
+        )
+    )
+    M = pi["M3"] + pi["M4"]
+    # the rocker carries frame 5 at its end; the coupler does not turn
+    inertia = (
+        pi["ZZ1"] + pi["ZZ2"] + pi["ZZ5"] + 2 * length * pi["MX5"] + length**2 * (pi["M5"] + M)
+    )
+    X = pi["MX1"] + pi["MX2"] + pi["MX5"] + length * (pi["M5"] + M)
+    Y = pi["MY1"] + pi["MY2"] + pi["MY5"]
+    angle, rate, change = rng.uniform(0.2, 2.9, 20), *rng.normal(size=(2, 20))
+    signs = np.array([1.0, 1.0, -1.0])
+    q, v, a = (x[:, None] * signs for x in (angle, rate, change))
+    expected = inertia * change + GRAVITY * (X * np.cos(angle) - Y * np.sin(angle))
+    assert np.allclose(loops.idm(robot, q, v, a)[:, 0], expected, rtol=1e-10, atol=1e-10)
+
+
+def test_massless_links_and_singular_masses(rng):
+    robot = five_bar(rng)
+    q = FLEET[4][1]
+    inertia = robot.tree.inertia.values.copy()
+    inertia[[2, 3]] = (
+        0.0  # rods without mass: the tree's mass matrix is singular, the robot's is not
+    )
+    inertia[[4, 5]] = 0.0
+    light = loops.LoopedRobot(
+        robot.tree.with_inertia(rm.InertialParameters(inertia)), robot.closures, robot.actuated
+    )
+    v = loops.velocity_map(light, q) @ [0.3, -0.5]
+    tau = [1.0, 2.0]
+    a = loops.ddm(light, q, v, tau)
+    assert np.allclose(loops.idm(light, q, v, a), tau, atol=1e-9)
+    none = loops.LoopedRobot(robot.tree.with_inertia(None), robot.closures, robot.actuated)
+    with pytest.raises(rm.errors.SingularMassMatrixError, match="inertial parameters"):
+        loops.ddm(none, q, v, tau)
+    negative = inertia * -1.0
+    odd = loops.LoopedRobot(
+        robot.tree.with_inertia(rm.InertialParameters(negative)), robot.closures, robot.actuated
+    )
+    assert np.allclose(loops.idm(odd, q, v, loops.ddm(odd, q, v, tau)), tau, atol=1e-9)
+
+
+# --- simulation ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("k", [0, 3, 4], ids=lambda k: ids[k])
+def test_simulated_loops_stay_closed_and_keep_their_energy(k):
+    robot, q = FLEET[k]
+    found = loops.simulate(robot, q, t=np.linspace(0.0, 10.0, 101))
+    assert found.status == rm.simulation.SimulationStatus.FINISHED
+    assert np.ptp(found.q, axis=0).max() > 1.0
+    assert gap(robot, found.q) < 1e-12
+    assert np.abs(loops.closure_jacobian(robot, found.q) @ found.v[..., None]).max() < 1e-11
+    assert found.relative_drift < 1e-8
+    a = loops.ddm(robot, found.q, found.v, np.zeros((101, len(robot.actuated))))
+    assert np.allclose(a, found.a, atol=1e-6 * (1.0 + np.abs(a).max()))
+
+
+def test_simulated_controls_wrenches_and_friction(rng):
+    robot = driven(five_bar(rng), rng)
+    q = FLEET[7][1]
+    with pytest.raises(InvalidValueError, match="smoothing"):
+        loops.simulate(robot, q)
+    found = loops.simulate(
+        robot, q, None, lambda t, q, v: -20.0 * v[[0, 1]] + [np.sin(t), 1.0], 0.5,
+        wrench=[1.0, 0.0, 2.0, 0.0, 0.0, 0.0], smoothing=1e-2, rtol=1e-8,
+    )  # fmt: skip
+    assert found.tau[:, 2:].max() == found.tau[:, 2:].min() == 0.0
+    assert found.tau[0, :2] == pytest.approx([0.0, 1.0])
+    assert found.relative_drift < 1e-6
+    with pytest.raises(LoopError, match="v0"):
+        loops.simulate(robot, q, [1.0, 0.0, 0.0, 0.0], smoothing=1e-2)
+
+
+def test_a_simulation_ends_where_the_closures_become_singular(rng):
+    robot, q = FLEET[2]
+    found = loops.simulate(robot, q, control=[0.0], t=20.0)
+    # a parallelogram that falls flat may go on as an antiparallelogram
+    assert found.status == rm.simulation.SimulationStatus.SINGULAR
+    assert np.allclose(found.q, found.q[:, [0]] * [1, 1, -1], atol=1e-9)
+    assert found.relative_drift < 1e-8
+
+
+# --- base parameters -----------------------------------------------------------------------------
+
+
+# the one motion of the loop of seven joints is short: its parameters have no clear rank
+@pytest.mark.parametrize(("robot", "q_ref"), FLEET[:-1], ids=ids[:-1])
+def test_base_parameters_span_the_reduced_regressor(robot, q_ref, rng):
+    q, v, a = motion(robot, q_ref, rng, N=60)
+    W = loops.torque_regressor(robot, q, v, a, drive=("Ia", "Fv", "Fc"))
+    values = rng.normal(size=W.shape[-1])
+    base = loops.base_parameters(robot, q_ref)
+    reduced = base.reduce(W)
+    assert np.allclose(reduced @ (base.matrix @ values), W @ values, atol=1e-9 * np.abs(W).max())
+    flat = reduced.reshape(-1, len(base))
+    assert np.linalg.matrix_rank(flat / np.linalg.norm(flat, axis=0), tol=1e-9) == len(base)
+    assert len(base) <= len(rm.base_parameters(robot.tree))
+    own = loops.torque_regressor(robot, q, v, a)
+    pi = rm.parameter_vector(robot.tree)
+    assert np.allclose(own @ pi, loops.idm(robot, q, v, a), atol=1e-9)
+    chosen = loops.torque_regressor(robot, q, v, a, drive=("Ia", "Fv", "Fc"), columns=base)
+    assert np.allclose(chosen, reduced)
+    assert loops.torque_regressor(robot, q[0], v[0], a[0]).shape == own.shape[1:]
+    assert loops.torque_regressor(robot, q[:0], v[:0], a[:0]).shape == (0, *own.shape[1:])
+
+
+def test_a_rank_that_is_not_clear_is_said(rng):
+    notes = " ".join(loops.base_parameters(*FLEET[-1], drive=False).notes)
+    assert "With closed loops" in notes
+    assert "No clear gap" in notes
+
+
+def test_base_parameters_of_known_robots(rng):
+    robot = parallelogram(rng)
+    base = loops.base_parameters(robot, [0.7, 0.7, -0.7], drive=False)
+    assert base.names == ("ZZ1", "MX1", "MY1")
+    anti = loops.close(robot, [0.7], [-0.5, -1.0]).q
+    assert abs(anti[0] - anti[1]) > 0.1
+    assert len(loops.base_parameters(robot, anti, drive=False)) > 3
+    assert base.regrouping["ZZ1"]["M3"] == pytest.approx(0.25)
+    general = loops.base_parameters(four_bar(rng), FLEET[0][1], drive=False)
+    assert len(general) < len(rm.base_parameters(FLEET[0][0].tree, drive=False))
+
+
+def test_a_simulated_log_gives_its_base_parameters_back(rng):
+    robot = driven(four_bar(rng), rng)
+    q = loops.close(robot, [0.7], [1.2, -0.5]).q
+    log = loops.simulate(
+        robot, q, None, lambda t, q, v: [300.0 * (0.7 + np.sin(5.0 * t) - q[0]) - 20.0 * v[0]],
+        np.linspace(0.0, 4.0, 300),
+        smoothing=1e-4, rtol=1e-9,
+    )  # fmt: skip
+    base = loops.base_parameters(robot, q, drive=True)
+    W = base.reduce(loops.torque_regressor(robot, log.q, log.v, log.a))
+    moving = (np.abs(log.v) > 0.01).all(axis=1)  # beyond the smoothing of friction
+    W, y = W[moving].reshape(-1, len(base)), log.tau[moving][:, robot.actuated].ravel()
+    beta = base.matrix @ rm.parameter_vector(robot.tree)
+    assert np.allclose(W @ beta, y, atol=1e-8 * np.abs(y).max())
+    found = np.linalg.lstsq(W, y, rcond=None)[0]
+    assert np.abs(found - beta).max() < 1e-8 * np.abs(beta).max()
+
+
+# --- mistakes ------------------------------------------------------------------------------------
+
+
+def test_descriptions_that_cannot_be_meant(rng):
+    robot = four_bar(rng)
+    tree, cut = robot.tree, loops.Closure("cut", (4, 5))
+    for frames in ((1, 1), (3, 4), (2, 5)):
+        with pytest.raises(LoopError, match="on the same body"):
+            loops.LoopedRobot(tree, [loops.Closure("cut", frames)])
+    with pytest.raises(LoopError, match="add no constraint"):
+        loops.LoopedRobot(tree, [loops.Closure("axis", (0, 1), "revolute")])
+    with pytest.raises(rm.errors.FrameNotFoundError):
+        loops.LoopedRobot(tree, [loops.Closure("cut", (4, 9))])
+    for wrong in ([3], [-1], [0, 0], [0.5], "a", [[0]]):
+        with pytest.raises(InvalidValueError, match="actuated"):
+            loops.LoopedRobot(tree, [cut], actuated=wrong)
+    with pytest.raises(InvalidValueError, match="own name"):
+        loops.LoopedRobot(tree, [cut, cut])
+    with pytest.raises(InvalidValueError, match="kind"):
+        loops.Closure("cut", (4, 5), "hinge")
+    with pytest.raises(InvalidValueError, match="frames"):
+        loops.Closure("cut", (4, 5, 6))
+    with pytest.raises(InvalidValueError, match="expected a LoopedRobot, got RobotModel"):
+        loops.close(tree, [0.0])
+    with pytest.raises(InvalidValueError, match="spanning tree"):
+        loops.LoopedRobot("rx90", [cut])
+
+
+def test_actuated_joints_that_do_not_determine_the_others(rng):
+    robot, q = FLEET[0]
+    for actuated, words in (([], "stand still"), ([0, 1], "depend on each other")):
+        wrong = loops.LoopedRobot(robot.tree, robot.closures, actuated)
+        with pytest.raises(LoopError, match=words):
+            loops.velocity_map(wrong, np.stack((q, q)))
+    none = loops.LoopedRobot(robot.tree, robot.closures, [])
+    assert loops.close(none, [], q).status == ClosingStatus.SINGULAR_THERE
+
+
+def test_arguments_that_cannot_be_meant(rng):
+    robot, q = FLEET[0]
+    with pytest.raises(ShapeError, match="q_actuated"):
+        loops.close(robot, [1.0, 2.0])
+    with pytest.raises(InvalidValueError, match="q_guess"):
+        loops.close(robot, [1.0], [np.nan, 0.0, 0.0])
+    for function, arguments in ((loops.idm, (q, q)), (loops.ddm, (q, [1.0])), (loops.simulate, ())):
+        with pytest.raises((LoopError, ShapeError, InvalidValueError)):
+            function(robot, [0.0, np.nan, 0.0], *arguments)
+    for function in (loops.idm, loops.torque_regressor):
+        with pytest.raises(LoopError, match="open in the posture"):
+            function(robot, [0.0, 1.0, 0.0], q, q)
+    with pytest.raises(LoopError, match="open in the posture"):
+        loops.simulate(robot, [0.0, 1.0, 0.0])
+    with pytest.raises(ShapeError, match="tau"):
+        loops.ddm(robot, q, q, [1.0, 2.0, 3.0])
+    with pytest.raises(InvalidValueError, match="tau"):
+        loops.ddm(robot, q, np.zeros(3), np.array([np.nan]))
+
+
+def test_robots_are_values(rng):
+    robot, q = FLEET[0]
+    again = pickle.loads(pickle.dumps(robot))
+    assert again == robot
+    assert hash(again) == hash(robot)
+    assert np.array_equal(loops.ddm(again, q, 0 * q, [1.0]), loops.ddm(robot, q, 0 * q, [1.0]))
+    assert robot != loops.LoopedRobot(robot.tree, robot.closures, [1])
+    with pytest.raises(AttributeError):
+        robot.tree = None
+    table = robot.tree.table
+    passive = robot.tree.with_table(table.replace(mu=[0, 1, 0, 0, 0]))
+    assert loops.LoopedRobot(passive, robot.closures).actuated.tolist() == [1]

@@ -1,0 +1,189 @@
+"""Looped robots from SYMORO's and MuJoCo's files, and their pictures."""
+
+import warnings
+
+import numpy as np
+import pytest
+from looped_robots import gough
+
+import robotmodels as rm
+from robotmodels import loops
+from robotmodels.errors import LoopError, ParFileError, RobotModelsWarning
+
+SR400 = """(* Robotname = 'SR400' *)
+NL = 8
+NJ = 9
+NF = 10
+Type = 2
+ant = {0,1,2,3,4,5,1,7,8,3}
+sigma = {0,0,0,0,0,0,0,0,0,2}
+d = {0,D2,D3,D4,0,0,D2,D8,D3,-D8}
+r = {0,0,0,RL4,0,0,0,0,0,0}
+gamma = {0,0,0,0,0,0,0,0,0,pi/2}
+b = {0,0,0,0,0,0,0,0,0,0}
+alpha = {0,-pi/2,0,-pi/2,pi/2,-pi/2,-pi/2,0,0,0}
+mu = {1,1,0,1,1,1,1,0,0,0}
+theta = {th1,th2,th3,th4,th5,th6,th7,th8,th9,0}
+IA = {IA1,IA2,IA3,IA4,IA5,IA6,IA7,IA8}
+"""
+LENGTHS = {"D2": 0.4, "D3": 0.8, "D4": -0.2, "RL4": 1.0, "D8": 1.0}
+TWO_LOOPS = """(* Robotname = 'TwoLoops' *)
+NL = 8
+NJ = 10
+NF = 12
+Type = 2
+ant = {0,1,2,3,4,1,4,3,7,6,8,11}
+sigma = {0,0,0,0,0,0,0,0,0,0,2,2}
+b = {0,0,0,0,0,d12*cos(g12),0,0,0,0,0,0}
+d = {0,0,d3,d4,0,-d12*sin(g12),d7,0,d4,d3,d7,0}
+r = {0,0,0,0,0,0,0,0,0,0,0,0}
+gamma = {0,0,0,0,0,0,g12 + pi/2,0,0,0,g12 + pi/2,0}
+alpha = {0,pi/2,0,0,pi/2,pi/2,0,0,0,0,0,0}
+mu = {1,1,1,0,1,0,0,0,0,0,0,0}
+theta = {th1,th2,th3,th4,th5,th6,th7,th8,th9,th10,0,0}
+"""
+BAR = '<inertial pos="0.2 0 0" mass="1.5" diaginertia="0.1 0.2 0.3"/>'
+FOUR_BAR = f"""<mujoco model="bars"><compiler angle="radian"/>
+<worldbody>
+  <body name="crank"><joint name="j1" axis="0 0 1" damping="0.2" armature="0.1"/>{BAR}
+    <body name="rod" pos="0.3 0 0"><joint name="j2" axis="0 0 1" range="-3 2" limited="true"/>{BAR}
+    </body></body>
+  <body name="rocker" pos="1 0 0" euler="0.3 0 0"><joint name="j3" axis="0 0 1"/>{BAR}</body>
+</worldbody>
+<equality><connect body1="rod" body2="rocker" anchor="0.7 0 0"/></equality>
+<actuator><motor joint="j1"/></actuator></mujoco>"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_text(text, reader, name="robot.par", **options):
+        (tmp_path / name).write_text(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RobotModelsWarning)
+            return reader(tmp_path / name, **options)
+
+    return read_text
+
+
+def test_a_parallelogram_robot_of_symoro(read):
+    robot = read(SR400, loops.read_par, values=LENGTHS)
+    assert robot.name == "SR400"
+    assert robot.actuated.tolist() == [0, 1, 3, 4, 5, 6]
+    assert robot.closures == (loops.Closure("cut_9", (9, 10), "revolute"),)
+    found = loops.close(robot, [0.3, 0.5, 0.2, 0.4, 0.1, 1.2])
+    assert found.status == loops.ClosingStatus.CLOSED
+    first, second = (rm.dgm(robot.tree, found.q, frame) for frame in (9, 10))
+    assert np.allclose(first[:3, 2:], second[:3, 2:], atol=1e-12)
+    mobility = loops.mobility(robot, found.q)
+    assert int(mobility) == 6
+    assert mobility.redundant == ("cut_9.z", "cut_9.rx", "cut_9.ry")
+    # as many as an independent rank of G^T W, with rotors and without friction
+    assert len(loops.base_parameters(robot, found.q, drive=("Ia",))) == 51
+    assert len(rm.base_parameters(robot.tree, drive=("Ia",))) == 55
+
+
+def test_two_loops_of_symoro(read):
+    lengths = {"d3": 0.7, "d4": 0.6, "d7": 0.35, "d12": 0.3, "g12": 0.4}
+    robot = read(TWO_LOOPS, loops.read_par, values=lengths)
+    assert [closure.frames for closure in robot.closures] == [(9, 11), (10, 12)]
+    found = loops.close(robot, [0.87, 0.54, 0.34, 0.31])
+    assert found.status == loops.ClosingStatus.CLOSED
+    assert int(loops.mobility(robot, found.q)) == 4
+    assert len(loops.base_parameters(robot, found.q, drive=("Ia",))) == 48
+
+
+def test_a_cut_slider_stays_a_joint(read):
+    text = """NL = 2
+NJ = 3
+NF = 4
+Type = 2
+ant = {0,1,0,2}
+sigma = {0,0,1,2}
+d = {0,0.3,0,0.8}
+alpha = {0,0,-pi/2,-pi/2}
+gamma = {0,0,-pi/2,0}
+b = {0,0,0,0}
+mu = {1,0,0,0}
+theta = {t1,t2,0,0}
+r = {0,0,r3,0}
+"""
+    robot = read(text, loops.read_par)
+    assert robot.n == 3
+    assert robot.closures[0].kind == "full"
+    found = loops.close(robot, [0.4])
+    assert found.status in list(loops.ClosingStatus)
+
+
+def test_par_files_that_are_no_looped_robots(read):
+    tree = SR400.replace("NJ = 9", "NJ = 8").replace("NF = 10", "NF = 10")
+    with pytest.raises(ParFileError):
+        read(tree, loops.read_par, values=LENGTHS)
+    with pytest.raises(ParFileError, match="second frame"):
+        read(SR400.replace("NF = 10", "NF = 9"), loops.read_par, values=LENGTHS)
+    with pytest.raises(ParFileError, match=r"loops\.read_par"):
+        read(SR400, rm.read_par, values=LENGTHS)
+
+
+def test_mjcf_with_one_and_with_two_root_bodies(read):
+    robot = read(FOUR_BAR, loops.read_mjcf, name="bars.xml")
+    assert robot.name == "bars"
+    assert sorted(robot.tree.table.joint_names) == ["j1", "j2", "j3"]
+    assert robot.tree.drive.Ia.sum() == pytest.approx(0.1)
+    assert robot.tree.drive.Fv[robot.actuated[0]] == pytest.approx(0.2)
+    assert robot.tree.upper[robot.tree.table.joint_names.index("j2")] == 2.0
+    poses = {name: rm.dgm(robot.tree, np.zeros(3), f"connect_1_{name}") for name in ("1", "2")}
+    assert np.allclose(poses["1"][:3, 3], [1.0, 0.0, 0.0], atol=1e-12)
+    assert np.allclose(poses["2"][:3, 3], [1.0, 0.0, 0.0], atol=1e-12)
+    assert robot.tree.inertia.values[:, 9].sum() == pytest.approx(4.5)
+    inside = FOUR_BAR.replace("<worldbody>", '<worldbody><body name="ground">').replace(
+        "</worldbody>", "</body></worldbody>"
+    )
+    one = read(inside, loops.read_mjcf, name="one.xml")
+    q, v, a = np.random.default_rng(0).normal(size=(3, 3))
+    order = [one.tree.table.joint_names.index(name) for name in robot.tree.table.joint_names]
+    tau = [
+        rm.idm(r.tree, q[o], v[o], a[o]) for r, o in ((robot, [0, 1, 2]), (one, np.argsort(order)))
+    ]
+    assert np.allclose(tau[0], tau[1][order], atol=1e-12)
+
+
+def test_mjcf_bodies_have_their_centres_and_tensors(read):
+    robot = read(FOUR_BAR, loops.read_mjcf, name="bars.xml")
+    expected = rm.InertialParameters.from_com([1.5], [[0.2, 0, 0]], [np.diag([0.1, 0.2, 0.3])])
+    row = robot.tree.table.names.index("j1")
+    # frame 1 has z along the joint's axis and the file's zero
+    assert np.allclose(robot.tree.inertia.values[row], expected.values[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("<mujoco", "<robot><mujoco", "cannot read"),
+        ("<worldbody>", "<nothing>", "cannot read"),
+        ("connect", "joint", "not supported"),
+        ('<joint name="j3" axis="0 0 1"/>', '<freejoint name="j3"/>', "'j3' is a"),
+        ('body2="rocker"', 'body2="nobody"', "nobody"),
+    ],
+)
+def test_mjcf_files_that_are_refused_by_name(read, old, new, words):
+    with pytest.raises(LoopError, match=words):
+        read(FOUR_BAR.replace(old, new), loops.read_mjcf, name="bars.xml")
+
+
+def test_files_that_are_not_there(tmp_path):
+    with pytest.raises(LoopError, match="cannot read"):
+        loops.read_mjcf(tmp_path / "none.xml")
+    with pytest.raises(ParFileError, match="cannot read"):
+        loops.read_par(tmp_path / "none.par")
+
+
+def test_a_scene_draws_the_closures():
+    robot = gough(np.random.default_rng(1))[0]
+    q = loops.close(robot, np.full(6, 1.2)).q
+    scene = rm.viz.show(robot, q)
+    bare = rm.viz.show(robot.tree, q)
+    # a ring and a ball for each closure, and rods to frames that lie on no row of the table
+    assert len(scene.paths) >= len(bare.paths) + 2 * len(robot.closures)
+    path = np.linspace(q, q + 0.01, 5)
+    assert rm.viz.animate(robot, path, dt=0.1).motion.samples == 5
+    assert len(rm.viz.show([robot, robot.tree], [q, q]).paths) > len(scene.paths)
