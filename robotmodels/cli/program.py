@@ -81,6 +81,8 @@ COMMANDS = {
     "calibrate": "geometric parameters of a robot from measurements",
     "excite": "a motion for the dynamic identification of a robot",
     "identify": "dynamic parameters of a robot from logs of its motion",
+    "workspace": "what a robot reaches, and in how many postures",
+    "follow": "whether a path of poses can be followed, and where it breaks",
     "view": "open a robot with joint sliders in the browser",
     "compile": "compile everything in advance, so that first calls are fast",
 }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_mask, read_only
+from .._arrays import Array, as_mask, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..igm import IGMStatus, igm
@@ -20,6 +20,7 @@ from ..kinematics import dgm
 from ..model import RobotModel, check_model
 from .arms import (
     Free,
+    Result,
     checked_flag,
     checked_word,
     free_predicate,
@@ -45,7 +46,7 @@ class AccessStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Accessibility(Value):
+class Accessibility(Result):
     """Accessibility of poses.
 
     Parameters
@@ -191,14 +192,16 @@ def postures_of(
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Postures q (N, S, n), valid (N, S), and poses (N,) that lack only the orientation."""
     section = section_arm(arm)
-    if section is not None and mask is not None and not mask[3:].any():
-        if mask[:3].all() or section.columns[0] < 0:
-            positions = poses[:, :3, 3]
-            if not mask[:3].all():
-                # what is not asked is that of the plane
-                positions = np.where(mask[:3], positions, section.frame[:3, 3])
-            q, valid = section.postures(positions)
-            return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
+    if (
+        section is not None
+        and mask is not None
+        and not mask[3:].any()
+        and (mask[:3].all() or section.columns[0] < 0)
+    ):
+        # in a plane what is not asked is that of the plane
+        positions = np.where(mask[:3], poses[:, :3, 3], section.frame[:3, 3])
+        q, valid = section.postures(positions)
+        return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
     known = known_arm(arm, mask is None)
     task = Task() if mask is None else Task(mask=tuple(mask.tolist()))
     solver = solver_for(arm, known, task)

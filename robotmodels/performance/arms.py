@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import pi, tau
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_mask, read_only
+from .._arrays import Array, Rebuilt, as_mask, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
 from ..igm.loop import JointChain, joint_chain
@@ -23,6 +23,46 @@ from ..model import RobotModel, check_model
 from ..obstacles import clearance
 from ..obstacles.clearance import checked_obstacles
 
+
+class Result(Rebuilt):
+    """Base of results: read-only, equal if their fields are, NaN included."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for value in self._fields():
+            _freeze(value)
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return _same(self._fields(), other._fields())
+
+    def __hash__(self) -> int:
+        return hash((type(self).__name__, *map(str, self._fields())))
+
+    def _fields(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
+
+
+def _freeze(value: Any) -> None:
+    """Make arrays read-only, also inside tuples."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, tuple):
+        for item in value:
+            _freeze(item)
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Equality of values that are or contain arrays."""
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(_same, a, b))
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    return bool(a == b) or (a != a and b != b)
+
+
 Free = Callable[[Array], NDArray[np.bool_]]
 _FULL_TURN = tau - 1e-9
 _CHUNK = 65536  # positions solved at a time
@@ -32,12 +72,9 @@ _CELL_BYTES = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionArm:
-    """Three joints for a position as the kernels take them; the first may be virtual, a slide.
+    """Three joints for a position as the kernels take them, ``frame`` from section to world.
 
-    An arm of two joints that moves the tool in a plane slides along its normal, at zero. The
-    section does not change with the first joint: half a plane through its axis if it turns, a
-    plane across it if it slides. Shapes: kinds (3,), D (4, 4, 4), columns (3,) of q or -1;
-    ``frame`` maps (u, v, w) of the section to the world.
+    Of two joints in a plane the first is a virtual slide, column -1. Shapes: D (4, 4, 4).
     """
 
     kinds: NDArray[np.int64]
@@ -202,25 +239,31 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray
     return moved if moved.sum() == k else np.ones(6, np.bool_)
 
 
-def joint_ranges(model: RobotModel, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
-    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves."""
+def joint_ranges(
+    model: RobotModel, limits: bool, columns: ArrayLike | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves.
+
+    A slide among the columns (default those that move the tool) needs limits.
+    """
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (limits | ~turning)
-    slides = np.flatnonzero(~turning & ~bounded)
+    asked = chain_of(model).columns if columns is None else np.asarray(columns)
+    slides = np.intersect1d(np.flatnonzero(~turning & ~bounded), asked)
     if slides.size:
         raise InvalidValueError(
             f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "
             "infinite; give the table `lower` and `upper`."
         )
-    low = np.where(bounded, model.lower, -pi)
-    high = np.where(bounded, model.upper, pi)
+    low = np.where(bounded, model.lower, np.where(turning, -pi, -np.inf))
+    high = np.where(bounded, model.upper, np.where(turning, pi, np.inf))
     return np.stack((low, high), axis=1), turning & ~bounded
 
 
 def turned_inside(model: RobotModel, q: Array, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
     """Postures (..., n) turned by whole turns to lie inside the limits, and whether they do."""
     if not limits:
-        return q, np.isfinite(q).all(axis=-1)
+        return q, np.asarray(np.isfinite(q).all(axis=-1))
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     lower, upper = model.lower, model.upper
     with np.errstate(invalid="ignore"):
@@ -228,7 +271,7 @@ def turned_inside(model: RobotModel, q: Array, limits: bool) -> tuple[Array, NDA
         turns = np.where((q < lower) | (q > upper), low, 0.0)
         moved = q + tau * np.where(turning, turns, 0.0)
         inside = (moved >= lower - 1e-9) & (moved <= upper + 1e-9)
-    return moved, inside.all(axis=-1)
+    return moved, np.asarray(inside.all(axis=-1))
 
 
 def free_predicate(model: RobotModel, free: Any) -> Free | None:
@@ -286,7 +329,7 @@ def checked_word(value: Any, words: tuple[str, ...], name: str) -> str:
 
 
 def sequence(count: int, dimensions: int) -> Array:
-    """Points (count, dimensions) that fill the unit cube evenly: additive recurrence (R sequence)."""
+    """Points (count, dimensions) that fill the unit cube evenly: additive recurrence."""
     g = 2.0
     for _ in range(60):
         g = (1.0 + g) ** (1.0 / (dimensions + 1))

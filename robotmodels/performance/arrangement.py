@@ -8,6 +8,7 @@ middle of a trapezoid are those of all of it.
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from math import pi
 from typing import NamedTuple
 
@@ -32,10 +33,16 @@ class Line(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Trapezoids: area (m,), middle (m, 2). Crossings (k, 2, 2): line, and place along it."""
+    """Trapezoids: area (m,), middle (m, 2), strip (m,), sides (m, 4) in y; ends of strips (k + 1,).
+
+    Sides are the lower left and right end, then the upper ones. Crossings (k, 2, 2): line, place.
+    """
 
     area: Array
     middle: Array
+    strip: NDArray[np.int64]
+    sides: Array
+    ends: Array
     crossings: Array
 
 
@@ -78,7 +85,9 @@ def _image(arm: SectionArm, curve: Curve) -> Array:
 def cut(lines: list[Line]) -> Cut:
     """Trapezoids between the lines, and where lines cross."""
     if not lines:
-        return Cut(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+        none = np.zeros(0)
+        return Cut(none, np.zeros((0, 2)), np.zeros(0, int), np.zeros((0, 4)), none,
+                   np.zeros((0, 2, 2)))  # fmt: skip
     first = np.concatenate([line.section[:-1] for line in lines])
     last = np.concatenate([line.section[1:] for line in lines])
     place = np.concatenate(
@@ -111,7 +120,8 @@ def cut(lines: list[Line]) -> Cut:
     for k in range(2):
         along = last[pairs[:, k], 0] - first[pairs[:, k], 0]
         places[:, k, 1] += (at - first[pairs[:, k], 0]) / along
-    return Cut(area, middle, places)
+    sides = np.column_stack((left[:-1], right[:-1], left[1:], right[1:]))[same]
+    return Cut(area, middle, strip[1:][same], sides, xs, places)
 
 
 def count_postures(
@@ -133,13 +143,13 @@ def measures(model: RobotModel, limits: bool) -> tuple[Array, Array]:
     arm = section_arm(model)
     assert arm is not None
     lines = section_lines(model, arm, limits)
-    area, middle, _ = cut(lines)
+    area, middle, *_ = cut(lines)
     kept = area > 1e-12 * arm.size**2
     area, middle = area[kept], middle[kept]
     counts = count_postures(model, arm, arm.world(middle), limits)
-    areas = np.bincount(counts, area, 5)
+    areas = np.asarray(np.bincount(counts, area, 5), float)
     sweep = 2.0 * pi * middle[:, 0] if arm.radial else np.full(len(middle), np.nan)
-    volumes = np.bincount(counts, area * sweep, 5)
+    volumes = np.asarray(np.bincount(counts, area * sweep, 5), float)
     areas[0] = volumes[0] = 0.0
     return areas, volumes
 
@@ -160,7 +170,7 @@ def pieces(model: RobotModel, limits: bool) -> tuple[tuple[Piece, ...], tuple[Li
             stops = np.append(places, places[0] + last)
         else:
             stops = np.unique(np.concatenate(([0.0], places, [last])))
-        for start, stop in zip(stops[:-1], stops[1:], strict=True):
+        for start, stop in pairwise(stops):
             if stop - start > 1e-6:
                 found.append((k, *_part(line, start, stop, last)))
     if not found:
@@ -178,7 +188,7 @@ def pieces(model: RobotModel, limits: bool) -> tuple[tuple[Piece, ...], tuple[Li
         side = count_postures(model, arm, arm.world(at), limits)
         sides.append(np.where(arm.radial & (at[:, 0] < 0.0), 0, side))
     whole = zip(found, *sides, strict=True)
-    return tuple(Piece(*part, int(a), int(b)) for part, a, b in whole), tuple(lines)
+    return tuple(Piece(k, x, s, int(a), int(b)) for (k, x, s), a, b in whole), tuple(lines)
 
 
 def _part(line: Line, start: float, stop: float, last: int) -> tuple[Array, Array]:
@@ -195,32 +205,36 @@ def _part(line: Line, start: float, stop: float, last: int) -> tuple[Array, Arra
     return x, section
 
 
-def boundary(model: RobotModel, limits: bool) -> list[Array]:
+@lru_cache(maxsize=32)
+def boundary(model: RobotModel, limits: bool) -> tuple[Array, ...]:
     """Closed polylines around what is reached, which lies on their left."""
     arm = section_arm(model)
     assert arm is not None
-    found, _ = pieces(model, limits)
-    parts = [
-        p.section if p.left else p.section[::-1] for p in found if (p.left == 0) != (p.right == 0)
-    ]
-    near = 1e-4 * arm.size
-    if arm.radial and parts:
-        # the axis closes what reaches it
-        heights = np.concatenate([p[p[:, 0] < near, 1] for p in parts])
-        heights = np.sort(heights)
-        stops = heights[np.append(True, np.diff(heights) > 10.0 * near)] if heights.size else []
-        for low, high in zip(stops[:-1], stops[1:], strict=True):
-            middle = np.array([[near, 0.5 * (low + high)]])
-            if count_postures(model, arm, arm.world(middle), limits)[0]:
-                parts.append(np.array([[0.0, high], [0.0, low]]))
-    loops = []
-    while parts:
-        loop = parts.pop()
-        while parts and np.hypot(*(loop[-1] - loop[0])) > 1e-9 * arm.size:
-            away = [float(np.hypot(*(part[0] - loop[-1]))) for part in parts]
-            best = int(np.argmin(away))
-            if away[best] >= np.hypot(*(loop[-1] - loop[0])):
-                break
-            loop = np.concatenate((loop, parts.pop(best)))
-        loops.append(np.concatenate((loop, loop[:1])))
-    return loops
+    area, middle, strip, sides, ends, _ = cut(section_lines(model, arm, limits))
+    kept = np.flatnonzero(area > 1e-12 * arm.size**2)
+    reached = count_postures(model, arm, arm.world(middle[kept]), limits) > 0
+    parts = kept[reached]
+    # trapezoids that lie on each other are one: what is left are their lower and upper ends
+    apart = (strip[parts[1:]] != strip[parts[:-1]]) | (
+        np.abs(sides[parts[1:], :2] - sides[parts[:-1], 2:]).max(axis=1) > 1e-9 * arm.size
+    )
+    first = parts[np.append(True, apart)] if parts.size else parts
+    last = parts[np.append(apart, True)] if parts.size else parts
+    # lower ends run to the right, upper ends to the left: columns are start and end of each
+    x = np.concatenate((strip[first] + [[0], [1]], strip[last] + [[1], [0]]), axis=1)
+    y = np.concatenate((sides[first, :2].T, sides[last, :1:-1].T), axis=1)
+    # at each end of a strip the next start in height belongs to an end
+    order = [np.lexsort((y[k], x[k])) for k in (0, 1)]
+    follows = np.empty(len(x[0]), np.int64)
+    follows[order[1]] = order[0]
+    points = np.stack((ends[x], y), axis=-1)
+    loops, open_ones = [], np.ones(len(follows), np.bool_)
+    for start in range(len(follows)):
+        loop, k = [], start
+        while open_ones[k]:
+            open_ones[k] = False
+            loop += [points[0, k], points[1, k]]
+            k = int(follows[k])
+        if loop:
+            loops.append(np.array([*loop, loop[0]]))
+    return tuple(loops)

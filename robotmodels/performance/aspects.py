@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_vector, read_only
+from .._arrays import Array, as_vector, read_only
 from .._outcomes import Outcome
 from ..model import RobotModel, check_model
 from .arms import (
     Free,
+    Result,
     chain_of,
     checked_flag,
     checked_resolution,
@@ -21,7 +22,7 @@ from .arms import (
     joint_ranges,
     turned_inside,
 )
-from .factors import Factors, factors_of
+from .factors import Factors, sign_factors
 
 # cells along each of so many joints: at first, and when a grid does not separate all aspects
 _CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
@@ -55,7 +56,7 @@ class Group(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Aspects(Value):
+class Aspects(Result):
     """Parts of the joint space: aspects, or components of the free space.
 
     Parameters
@@ -127,7 +128,7 @@ class Aspects(Value):
             is_free = free_predicate(self.model, self.free)
             if is_free is not None:
                 inside &= is_free(rows)
-            factors = factors_of(self.model) if self.names else None
+            factors = sign_factors(self.model) if self.names else None
             values = None if factors is None else factors.values(rows)
             place = np.stack([_labels(g, rows, values) for g in self.groups], axis=-1)
             sizes = [len(g.volumes) + 1 for g in self.groups]
@@ -188,7 +189,7 @@ def aspects(
     (2, array([-1,  1], dtype=int8), array([1, 0]))
     """
     check_model(arm)
-    return _divided(arm, factors_of(arm), True, limits, free, resolution)
+    return _divided(arm, sign_factors(arm), True, limits, free, resolution)
 
 
 def free_components(
@@ -240,8 +241,9 @@ def _divided(
     names = () if factors is None else factors.names
     if not columns or (signed and factors is None):
         return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)
-    ranges, circle = joint_ranges(arm, bounded)
     parts = _apart(columns, factors, is_free is not None)
+    needed = [j for joints, members in parts for j in joints if members or is_free is not None]
+    ranges, circle = joint_ranges(arm, bounded, needed)
     groups = []
     for joints, members in parts:
         first, last = _CELLS.get(len(joints), (6, 6))
@@ -286,7 +288,9 @@ def _group(
     """The parts of the space of some joints, by connected cells of equal signs."""
     d = len(joints)
     low, high = ranges[list(joints)].T
-    side = (high - low) / cells
+    width = high - low
+    low = np.where(np.isfinite(width), low, 0.0)  # a slide without limits, in one cell
+    side = np.where(np.isfinite(width), width, 1.0) / cells
     closed = tuple(bool(circle[j]) for j in joints)
     axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, side, strict=True)]
     q = np.zeros((cells**d, arm.n))
@@ -311,7 +315,7 @@ def _group(
     codes[labels[labels > 0] - 1] = code[labels > 0]
     return Group(
         joints, read_only(low), read_only(side), closed, members, read_only(labels, np.int32),
-        read_only(codes, np.int64), read_only(sizes * float(np.prod(side))), separates,
+        read_only(codes, np.int64), read_only(sizes * float(np.prod(width / cells))), separates,
     )  # fmt: skip
 
 

@@ -65,6 +65,9 @@ def space_of(
     ``turned``: whether a turn of the first joint leaves the question as it is.
     """
     rows = None if mask is None else as_mask(mask)
+    chain = chain_of(model)
+    if chain.k < 2:
+        return None
     if rows is not None and rows[:3].sum() == 2:
         normal = np.eye(3)[int(np.argmin(rows[:3]))]
     else:
@@ -75,7 +78,6 @@ def space_of(
         e3 = frame[:3, 2]
         frame[:3, 3] = e3 * (e3 @ dgm(model, np.zeros(model.n))[:3, 3])
         return Space("plane", read_only(frame))
-    chain = chain_of(model)
     if chain.k < 3:
         return None
     first = int(chain.columns[0])
@@ -134,8 +136,8 @@ def grid_of(
 
 def _of_section(model: RobotModel, arm: SectionArm, limits: bool) -> Array:
     """Points of the section on a grid of the last two joints, the ends included."""
-    ranges, _ = joint_ranges(model, limits)
-    axes = [np.linspace(*ranges[c], _GRID) for c in arm.columns[1:]]
+    ranges, _ = joint_ranges(model, limits, arm.columns[1:])
+    axes = [np.linspace(low, high, _GRID) for low, high in ranges[arm.columns[1:]]]
     x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     return arm.values(x)[:, :2]
 

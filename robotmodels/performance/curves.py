@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from .._arrays import Array, Value, read_only
+from .._arrays import Array, read_only
 from .._outcomes import Outcome
 from ..model import RobotModel, check_model
-from .arms import SectionArm, checked_flag, section_arm
+from .arms import Result, SectionArm, checked_flag, section_arm
 from .arrangement import Line, cut, pieces
 from .level_curves import Curve, last_two_ranges, level_curves
 
+Equations = Callable[[SectionArm, Array], Array]
 _SAME = 1e-6  # rad or m, between special points
 _STEPS = 30
 
@@ -30,7 +32,13 @@ class SectionStatus(Outcome):
 
 
 class CurveKind(Enum):
-    """What a curve of the section separates; the value is a word."""
+    """What a curve of the section separates; the value is a word.
+
+    Examples
+    --------
+    >>> CurveKind("limit")
+    <CurveKind.LIMIT: 'limit'>
+    """
 
     BOUNDARY = "boundary"
     INTERNAL = "internal"
@@ -38,7 +46,7 @@ class CurveKind(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SingularCurves(Value):
+class SingularCurves(Result):
     """Singular curves of an arm in joint space and in its section.
 
     Parameters
@@ -70,7 +78,7 @@ class SingularCurves(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SpecialPoints(Value):
+class SpecialPoints(Result):
     """Cusps or nodes of the singular curves in the section of an arm.
 
     Parameters
@@ -133,7 +141,7 @@ def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
     >>> from robotmodels.robots import load
     >>> curves = singular_curves(load("planar_2r"), limits=False)
     >>> [kind.value for kind in curves.kind], curves.joint[0].shape[1]
-    (['boundary', 'boundary'], 2)
+    (['boundary', 'internal'], 2)
     """
     check_model(arm)
     section = section_arm(arm)
@@ -155,7 +163,8 @@ def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
             joint.append(read_only(_postures(arm, section, np.concatenate(x))))
             image.append(read_only(np.concatenate(points)))
             kinds.append(kind)
-    status = SectionStatus.FOUND if _complete(lines, section) else SectionStatus.INCOMPLETE
+    own = [Curve(line.x, line.closed) for line in lines if not line.of_limit]
+    status = _status(own, last_two_ranges(arm, section, limits).bounds)
     return SingularCurves(tuple(joint), tuple(image), tuple(kinds), status)
 
 
@@ -182,7 +191,7 @@ def cusps(arm: RobotModel) -> SpecialPoints:
 
     References
     ----------
-    Seed book section 3.4; M. Baili, P. Wenger and D. Chablat, "A classification of 3R orthogonal
+    Seed book section 3.4.4; M. Baili, P. Wenger and D. Chablat, "A classification of 3R orthogonal
     manipulators by the topology of their workspace", ICRA 2004.
 
     Examples
@@ -195,14 +204,14 @@ def cusps(arm: RobotModel) -> SpecialPoints:
     section = section_arm(arm)
     if section is None:
         return _nothing(arm.n, False)
-    curves = level_curves(section, last_two_ranges(arm, section, False))
+    ranges = last_two_ranges(arm, section, False)
+    curves = level_curves(section, ranges)
     x, residual = cusps_of(section, curves)
-    status = SectionStatus.FOUND if _complete(curves, section) else SectionStatus.INCOMPLETE
     return SpecialPoints(
         read_only(_postures(arm, section, x)),
         read_only(section.values(x)[:, :2]),
         read_only(residual),
-        status,
+        _status(curves, ranges.bounds),
     )
 
 
@@ -226,7 +235,7 @@ def nodes(arm: RobotModel) -> SpecialPoints:
 
     References
     ----------
-    Seed book section 3.4; the paper at `cusps`.
+    Seed book section 3.4.4; the paper at `cusps`.
 
     Examples
     --------
@@ -238,7 +247,8 @@ def nodes(arm: RobotModel) -> SpecialPoints:
     section = section_arm(arm)
     if section is None:
         return _nothing(arm.n, True)
-    curves = level_curves(section, last_two_ranges(arm, section, False))
+    ranges = last_two_ranges(arm, section, False)
+    curves = level_curves(section, ranges)
     lines = [Line(c.x, section.values(c.x)[:, :2], c.closed, False) for c in curves]
     pairs = []
     for places in cut(lines).crossings:
@@ -252,12 +262,11 @@ def nodes(arm: RobotModel) -> SpecialPoints:
     good = (residual < 1e-9) & (away > 1e-3)
     x, residual = _distinct(section, x[good], residual[good])
     both = np.stack((x[:, :2], x[:, 2:]), axis=1)
-    status = SectionStatus.FOUND if _complete(curves, section) else SectionStatus.INCOMPLETE
     return SpecialPoints(
         read_only(_postures(arm, section, both)),
         read_only(section.values(both[:, 0])[:, :2]),
         read_only(residual),
-        status,
+        _status(curves, ranges.bounds),
     )
 
 
@@ -280,9 +289,11 @@ def cusps_of(arm: SectionArm, curves: list[Curve]) -> tuple[Array, Array]:
         starts.append(curve.x[at] + share[:, None] * (curve.x[at + 1] - curve.x[at]))
     x = np.concatenate([np.zeros((0, 2)), *starts])
     x, residual = _solved(arm, x, _cusp_equations)
-    good = residual < 1e-8
+    values = arm.values(x)
+    # where the determinant has no slope, singular curves touch or cross: no fold either
+    good = (residual < 1e-8) & (np.linalg.norm(values[:, 7:9], axis=1) > 1e-7 * arm.size**3)
     if arm.radial:
-        good &= arm.values(x)[:, 0] > 1e-6 * arm.size
+        good &= values[:, 0] > 1e-6 * arm.size
     return _distinct(arm, x[good], residual[good])
 
 
@@ -295,7 +306,7 @@ def _forward(values: Array) -> Array:
 
 
 def _cusp_equations(arm: SectionArm, x: Array) -> Array:
-    """Determinant, and its slope in the direction that does not move the point. (N, 2) -> (N, 2)."""
+    """Determinant, and its slope in the direction that keeps the point. (N, 2) -> (N, 2)."""
     values = arm.values(x)
     forward = _forward(values)
     still = np.column_stack((-forward[:, 1], forward[:, 0]))
@@ -312,9 +323,8 @@ def _node_equations(arm: SectionArm, x: Array) -> Array:
     return np.column_stack((det, (a[:, :2] - b[:, :2]) / arm.size))
 
 
-def _solved(arm: SectionArm, x: Array, equations: object) -> tuple[Array, Array]:
+def _solved(arm: SectionArm, x: Array, equations: Equations) -> tuple[Array, Array]:
     """Newton's method from starts (N, d) with central differences; the points and residuals."""
-    assert callable(equations)
     d, h = x.shape[1], 1e-6
     for _ in range(_STEPS if len(x) else 0):
         F = equations(arm, x)
@@ -358,10 +368,13 @@ def _postures(model: RobotModel, arm: SectionArm, x: Array) -> Array:
     return arm.model_postures(model, np.concatenate((np.zeros((*x.shape[:-1], 1)), x), axis=-1))
 
 
-def _complete(curves: object, arm: SectionArm) -> bool:
+def _status(curves: list[Curve], bounds: Array) -> SectionStatus:
     """Whether every curve closes, or ends on a bound."""
-    assert isinstance(curves, (list, tuple))
-    return bool((arm.periods > 0.0).any() or len(curves) >= 0)
+    for curve in (c for c in curves if not c.closed):
+        away = np.abs(curve.x[[0, -1], :, None] - bounds).min(axis=(1, 2))
+        if away.max() > 1e-6:
+            return SectionStatus.INCOMPLETE
+    return SectionStatus.FOUND
 
 
 def _nothing(n: int, pairs: bool) -> SpecialPoints:
@@ -370,4 +383,3 @@ def _nothing(n: int, pairs: bool) -> SpecialPoints:
         read_only(np.zeros(shape)), read_only(np.zeros((0, 2))), read_only(np.zeros(0)),
         SectionStatus.NOT_DEFINED,
     )  # fmt: skip
-

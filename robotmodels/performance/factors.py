@@ -46,7 +46,7 @@ class Factors:
         return np.asarray((self.values(q) > 0.0) @ (1 << np.arange(len(self.joints))))
 
 
-def factors_of(model: RobotModel, mask: ArrayLike | str | None = None) -> Factors | None:
+def sign_factors(model: RobotModel, mask: ArrayLike | str | None = None) -> Factors | None:
     """Factors of the square matrix that decides; None if it is not square, or never regular."""
     rows = task_rows(model, mask)
     columns = chain_of(model).columns

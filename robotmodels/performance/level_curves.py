@@ -6,6 +6,7 @@ from math import tau
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..model import RobotModel
@@ -18,7 +19,7 @@ _MOST_CURVES = 400
 
 
 class Curve(NamedTuple):
-    """A curve of the last two joints (K, 2), and whether it closes (its last point is its first)."""
+    """A curve of the last two joints (K, 2), and whether its last point is its first."""
 
     x: Array
     closed: bool
@@ -29,13 +30,13 @@ class Ranges(NamedTuple):
 
     low: Array
     high: Array
-    circle: Array
+    circle: NDArray[np.bool_]
     bounds: Array
 
 
 def last_two_ranges(model: RobotModel, arm: SectionArm, limits: bool) -> Ranges:
     """Where the last two joints move; bounds are infinite on a whole circle."""
-    ranges, circle = joint_ranges(model, limits)
+    ranges, circle = joint_ranges(model, limits, arm.columns[1:])
     ranges, circle = ranges[arm.columns[1:]], circle[arm.columns[1:]]
     turning = arm.periods > 0.0
     low = np.where(turning, -np.pi, ranges[:, 0])

@@ -37,7 +37,7 @@ def reached_cells(
         cell = np.floor((space.of_world(dgm(model, part)[:, :3, 3]) - low) / size).astype(int)
         good = np.all((cell >= 0) & (cell < shape), axis=1)
         q_of[np.ravel_multi_index(tuple(cell[good].T), shape)] = part[good]
-    hit = ~np.isnan(q_of).any(axis=1)
+    hit = np.isfinite(q_of[:, 0])
     # a sample in a cell says nothing of its centre where the border passes
     inner = ~neighbours(~hit.reshape(shape)).ravel()
     reached, tried = inner.copy(), inner.copy()
@@ -74,7 +74,7 @@ def _starts(q_of: Array, rows: NDArray[np.int64], shape: tuple[int, ...]) -> Arr
 def _moved_to(
     model: RobotModel, space: Space, goals: Array, q: Array, limits: bool
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures (N, n) whose tool is at points of the space, by damped Newton steps in the limits."""
+    """Postures (N, n) whose tool is at points of the space, by damped Newton steps."""
     ranges, circle = joint_ranges(model, limits)
     low = np.where(circle, -np.inf, ranges[:, 0])
     high = np.where(circle, np.inf, ranges[:, 1])

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, as_mask, as_reals, read_only
+from .._arrays import Array, as_exact, as_mask, as_reals, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..kinematics import dgm
 from ..model import RobotModel, check_model
 from .accessibility import in_every_orientation, posture_counts
-from .arms import checked_flag, checked_word, free_predicate, section_arm
+from .arms import Result, checked_flag, checked_word, free_predicate, section_arm
 from .arrangement import boundary, measures
 from .cells import SECTIONS, Space, grid_of, measure_of_cells, space_of
 from .reach import reached_cells
@@ -37,7 +37,7 @@ class WorkspaceStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Workspace(Value):
+class Workspace(Result):
     """Workspace of an arm on a grid of cells, with numbers of postures.
 
     Parameters
@@ -155,7 +155,7 @@ class Workspace(Value):
                 f"{given.shape}."
             )
         rows = given.reshape(-1, given.shape[-1])
-        inside = np.isfinite(rows).all(axis=1)
+        inside = np.asarray(np.isfinite(rows).all(axis=1))
         safe = np.where(inside[:, None], rows, 0.0)
         local = safe if safe.shape[1] == len(self.size) else self._space.of_world(safe)
         if safe.shape[1] == 2 and len(self.size) == 3:
@@ -180,7 +180,7 @@ class Workspace(Value):
         the outlines of the cells.
         """
         if self._by_curves:
-            return boundary(self.model, self.limits)
+            return [line.copy() for line in boundary(self.model, self.limits)]
         if self.coordinates == "space":
             raise InvalidValueError("boundary: expected a workspace in a plane, got one in space.")
         return _outlines(self)
@@ -292,7 +292,10 @@ def workspace(
     space = space_of(arm, section, bounded, turned, mask)
     if space is None:
         return _nothing(arm, kind, bounded, free, rows, rotation)
-    counted = section_arm(arm) is not None and kind in ("positions", "free")
+    # a planar question to an arm in space leaves a coordinate open
+    three = section_arm(arm)
+    counted = three is not None and kind in ("positions", "free")
+    counted &= three is None or space.kind != "plane" or not three.radial
     default = _RESOLUTION["reached"]
     if kind not in ("positions", "free"):
         default = _RESOLUTION["oriented"]
@@ -303,7 +306,7 @@ def workspace(
     points, size, shape = grid_of(arm, space, bounded, resolution, default)
     world = space.world(points)
     status = WorkspaceStatus.COUNTED
-    if counted and (rows is None or rows[:3].sum() == 3 or section_arm(arm).radial is False):  # type: ignore[union-attr]
+    if counted:
         count = _count_positions(arm, world, bounded, free)
     elif kind in ("positions", "free"):
         reached, _ = reached_cells(arm, space, points, size, shape, bounded, is_free)
@@ -346,9 +349,7 @@ def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | No
     return read_only(poses_of(T)[:3, :3])
 
 
-def _count_positions(
-    model: RobotModel, world: Array, limits: bool, free: Any
-) -> NDArray[np.int64]:
+def _count_positions(model: RobotModel, world: Array, limits: bool, free: Any) -> NDArray[np.int64]:
     """Postures of world positions by the quartic."""
     T = np.tile(np.eye(4), (len(world), 1, 1))
     T[:, :3, 3] = world
@@ -363,9 +364,7 @@ def _positions(
     """Which cells are reached in any orientation."""
     if section_arm(model) is not None:
         return _count_positions(model, space.world(points), limits, free) > 0, None
-    return reached_cells(
-        model, space, points, size, shape, limits, free_predicate(model, free)
-    )
+    return reached_cells(model, space, points, size, shape, limits, free_predicate(model, free))
 
 
 def _nothing(

@@ -30,6 +30,12 @@ from .parallel import (
     plot_platform_workspace,
     show_parallel,
 )
+from .performance import (
+    plot_aspects,
+    plot_feasible_path,
+    plot_workspace,
+    show_workspace,
+)
 from .processing import plot_processing
 from .report import html_report, identification_html
 from .scene import Scene
@@ -53,6 +59,7 @@ __all__ = [
     "identification_html",
     "jog",
     "jog_parallel",
+    "plot_aspects",
     "plot_assembly_modes",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
@@ -62,6 +69,7 @@ __all__ = [
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
+    "plot_feasible_path",
     "plot_identification_correlations",
     "plot_identification_parameters",
     "plot_identification_residuals",
@@ -79,6 +87,8 @@ __all__ = [
     "plot_singularities",
     "plot_torque_parts",
     "plot_trajectory",
+    "plot_workspace",
     "show",
     "show_parallel",
+    "show_workspace",
 ]

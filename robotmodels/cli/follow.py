@@ -1,0 +1,133 @@
+"""``robotmodels follow``: can a path of poses be followed, from which postures, where it breaks."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..csv_table import is_number
+from ..errors import InvalidValueError
+from ..performance import FeasiblePath, feasible_path
+from ..se3 import from_rpy, translation
+from .arguments import add_source, revolute, robot_of
+from .igm import mask_of
+from .output import add_json, print_json
+from .terminal import ExitStatus, ending
+
+_EXAMPLES = """\
+examples:
+  robotmodels follow rx90 poses.csv --degrees
+  robotmodels follow crx10ia weld.csv --through-singular --motion joints.csv
+  robotmodels follow lab_trr points.csv --no-limits --picture graph.png
+
+Each row of the file is a pose in world axes: x y z; x y z roll pitch yaw; x y z and a unit
+quaternion qx qy qz qw; or the 16 numbers of the 4x4 matrix. A row of names may stand first."""
+_WIDTHS = (3, 6, 7, 16)
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "follow",
+        description="Follow a path of poses from every posture of its first pose: from which ones "
+        "it reaches the end without a jump, and where it breaks for the others.",
+        epilog=ending(_EXAMPLES, "no posture follows the path to its end"),
+    )
+    add_source(parser)
+    parser.add_argument("poses", type=Path, help="file with one pose in each row")
+    parser.add_argument("--degrees", action="store_true",
+                        help="angles in degrees, those given and those printed")  # fmt: skip
+    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
+    parser.add_argument("--mask", metavar="NUMBERS",
+                        help="1 or 0 for each of x y z rx ry rz: what has to be met")  # fmt: skip
+    parser.add_argument("--through-singular", action="store_true",
+                        help="allow motions through singular positions")  # fmt: skip
+    parser.add_argument("--cost", choices=("length", "conditioning"), default="length",
+                        help="what the best motion minimises (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--motion", type=Path, metavar="FILE",
+                        help="write the best joint motion as CSV")  # fmt: skip
+    parser.add_argument("--picture", type=Path, metavar="FILE",
+                        help="draw the graph of all postures (.png, .pdf, .svg)")  # fmt: skip
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command: follow, write and print."""
+    model = robot_of(arguments)
+    poses = read_poses(arguments.poses, arguments.degrees)
+    found = feasible_path(
+        model, poses, not arguments.no_limits, mask_of(arguments.mask),
+        arguments.through_singular, arguments.cost,
+    )  # fmt: skip
+    scale = np.where(revolute(model), 180.0 / np.pi, 1.0) if arguments.degrees else 1.0
+    if arguments.motion is not None:
+        head = ",".join(model.table.joint_names)
+        np.savetxt(arguments.motion, found.q * scale, delimiter=",", header=head, comments="")
+    if arguments.picture is not None:
+        from ..viz import plot_feasible_path
+
+        plot_feasible_path(found).savefig(arguments.picture)
+    if arguments.json:
+        print_json({
+            "robot": model.name, "status": found.status.name, "reason": found.reason(),
+            "reached": found.reached, "breaks": found.breaks, "q": found.q * scale,
+            "start": found.postures[0] * scale if len(poses) else [],
+        })  # fmt: skip
+    else:
+        print(as_text(found, scale))
+    return ExitStatus.DONE if found.reached.any() else ExitStatus.NOT_REACHED
+
+
+def as_text(found: FeasiblePath, scale: Array | float) -> str:
+    """The outcome for people."""
+    lines = [f"{len(found.q)} poses: {found.reason()}"]
+    rows = found.postures[0] if len(found.q) else np.zeros((0, 0))
+    starts = rows[~np.isnan(rows).any(axis=1)] * scale
+    for q, last, good in zip(starts, found.breaks, found.reached, strict=True):
+        numbers = " ".join(f"{v + 0.0:9.4f}" for v in q)
+        text = "followed to the end" if good else f"breaks before pose {last} (from 0)"
+        lines.append(f"  from q = [{numbers}]: {text}")
+    return "\n".join(lines)
+
+
+def read_poses(path: Path, degrees: bool) -> Array:
+    """Poses (N, 4, 4) of a file."""
+    text = path.read_text(encoding="utf-8-sig").replace(";", ",")
+    rows = [line.replace(",", " ").split() for line in text.splitlines() if line.strip()]
+    if rows and not all(map(is_number, rows[0])):
+        rows = rows[1:]
+    width = len(rows[0]) if rows else 0
+    if width not in _WIDTHS or any(len(row) != width for row in rows):
+        raise InvalidValueError(
+            f"{path}: expected rows of 3, 6, 7 or 16 numbers, all alike; see robotmodels follow "
+            "--help."
+        )
+    bad = next((k for k, row in enumerate(rows) if not all(map(is_number, row))), None)
+    if bad is not None:
+        raise InvalidValueError(f"{path}: row {bad + 1} of the poses has a word that is no number.")
+    values = np.array(rows, dtype=np.float64)
+    if width == 16:
+        return values.reshape(-1, 4, 4)
+    if width == 7:
+        return np.array([_of_quaternion(row) for row in values])
+    if width == 6:
+        angles = np.deg2rad(values[:, 3:]) if degrees else values[:, 3:]
+        return np.array([from_rpy(a, p) for a, p in zip(angles, values[:, :3], strict=True)])
+    return np.array([translation(*row) for row in values])
+
+
+def _of_quaternion(row: Array) -> Array:
+    """Pose of a position and a unit quaternion x y z w."""
+    from scipy.spatial.transform import Rotation
+
+    length = float(np.linalg.norm(row[3:]))
+    if abs(length - 1.0) > 1e-3:
+        raise InvalidValueError(f"expected unit quaternions qx qy qz qw, got one of {length:.4g}.")
+    T = translation(*row[:3])
+    T[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
+    return T

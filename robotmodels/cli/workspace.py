@@ -1,0 +1,125 @@
+"""``robotmodels workspace``: what a robot reaches, and in how many postures."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..performance import Workspace, cusps
+from ..performance import workspace as reached
+from .arguments import add_source, robot_of
+from .igm import mask_of
+from .output import add_json, print_json
+from .terminal import ExitStatus, ending
+
+_EXAMPLES = """\
+examples:
+  robotmodels workspace planar_2r --no-limits
+  robotmodels workspace puma560 --resolution 120 --picture section.png
+  robotmodels workspace planar_3r --kind primary --mask 1 1 0 0 0 0 --json"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "workspace",
+        description="Workspace of a robot: area or volume by the number of postures, in a section "
+        "where the first joint turns freely, else in space. Lengths are in m.",
+        epilog=ending(_EXAMPLES, "nothing is reached"),
+    )
+    add_source(parser)
+    parser.add_argument("--kind", choices=("positions", "primary", "secondary"),
+                        default="positions",
+                        help="positions in any orientation, in every one, or in some but not "
+                        "every one (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--section", choices=("auto", "plane", "space"), default="auto",
+                        help="half a plane through the first axis, or space (default: the plane "
+                        "where it stands for all)")  # fmt: skip
+    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
+    parser.add_argument("--resolution", type=int, metavar="CELLS",
+                        help="cells along each coordinate")  # fmt: skip
+    parser.add_argument("--mask", metavar="NUMBERS",
+                        help="1 or 0 for each of x y z rx ry rz: what is asked for")  # fmt: skip
+    parser.add_argument("--picture", type=Path, metavar="FILE",
+                        help="draw the section or two views (.png, .pdf, .svg), or write a page "
+                        "with the robot (.html)")  # fmt: skip
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command: compute, draw and print."""
+    model = robot_of(arguments)
+    found = reached(
+        model, arguments.kind, arguments.section, not arguments.no_limits,
+        resolution=arguments.resolution, mask=mask_of(arguments.mask),
+    )  # fmt: skip
+    if arguments.picture is not None:
+        draw(found, arguments.picture)
+    data = numbers_of(found)
+    if arguments.json:
+        print_json(data)
+    else:
+        print(as_text(data))
+        if arguments.picture is not None:
+            print(f"Written: {arguments.picture}")
+    return ExitStatus.DONE if found.count.any() else ExitStatus.NOT_REACHED
+
+
+def numbers_of(w: Workspace) -> dict[str, Any]:
+    """Areas, volumes and special points as JSON data."""
+    counts = [int(n) for n in np.unique(w.count[w.count > 0])]
+    planar, swept = w.coordinates != "space", w.coordinates != "plane"
+    return {
+        "robot": w.model.name,
+        "kind": w.kind,
+        "coordinates": w.coordinates,
+        "cells": list(w.shape),
+        "status": w.status.name,
+        "reason": w.reason(),
+        "area": w.area if planar else None,
+        "volume": w.volume if swept else None,
+        "by_postures": [
+            {
+                "postures": n,
+                "area": w.area_of(n) if planar else None,
+                "volume": w.volume_of(n) if swept else None,
+            }
+            for n in counts
+        ],
+        "grid_error": w.grid_error if counts else None,
+        "cusps": cusps(w.model).section if planar and counts else [],
+    }
+
+
+def as_text(data: dict[str, Any]) -> str:
+    """The same for people."""
+    lines = [
+        f"Workspace of {data['robot']} ({data['kind']}, {data['coordinates']}): {data['reason']}"
+    ]
+    rows = [("all", data), *((str(part["postures"]), part) for part in data["by_postures"])]
+    for name, part in rows if data["by_postures"] else ():
+        values = [
+            f"{word} {part[word]:.6g} {unit}"
+            for word, unit in (("area", "m^2"), ("volume", "m^3"))
+            if part[word] is not None
+        ]
+        lines.append(f"  {name:>3} posture{'s' if name != '1' else ' '}: {', '.join(values)}")
+    if data["grid_error"] is not None:
+        lines.append(f"Sums of cells are good to about {data['grid_error']:.2%}.")
+    for u, v in np.asarray(data["cusps"]).reshape(-1, 2):
+        lines.append(f"Cusp at {u:.6f}, {v:.6f} m.")
+    return "\n".join(lines)
+
+
+def draw(w: Workspace, path: Path) -> None:
+    """Write a figure, or a page."""
+    from ..viz import plot_workspace, show_workspace
+
+    if path.suffix.lower() in (".html", ".htm"):
+        show_workspace(w).save(path)
+    else:
+        plot_workspace(w).savefig(path)

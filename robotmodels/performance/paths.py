@@ -1,0 +1,267 @@
+"""Feasibility of paths of poses: section 3.5.3 of the book."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import tau
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_mask, read_only
+from .._outcomes import Outcome
+from ..errors import ShapeError
+from ..geometry import REVOLUTE
+from ..igm.request import poses_of
+from ..kinematics.lengths import characteristic_length
+from ..model import RobotModel, check_model
+from .accessibility import postures_of
+from .arms import Result, chain_of, checked_flag, checked_word, section_arm, task_rows
+from .certificate import bound_of
+from .continuation import successors
+from .factors import sign_factors
+
+COSTS = ("length", "conditioning")
+_THROUGH = 0.5  # rad or m: longest step through a singular position
+
+
+class PathStatus(Outcome):
+    """Outcome of `feasible_path`."""
+
+    FOLLOWED = 0, "The path is followed from at least one starting posture."
+    BROKEN = 1, "The path is followed to its end from no starting posture."
+    NOT_DEFINED = (
+        2, "The task leaves infinitely many postures: lock a joint, or ask for more components.",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FeasiblePath(Result):
+    """Joint motions that follow a path of poses, from every starting posture.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        The best motion, rad or m; NaN from where it breaks.
+    reached : ndarray of bool, shape (S,)
+        Whether the path is followed to its end from each posture of the first pose.
+    breaks : ndarray of int64, shape (S,)
+        First pose that is not reached from it: N if none, 0 if it starts outside the limits.
+    aspect : ndarray of int64, shape (N,)
+        Signs of the factors of the determinant along ``q`` as one number: bit i is set where
+        factor i is positive; -1 where there is no motion.
+    postures : ndarray, shape (N, S, n)
+        All postures of all poses, NaN where there are fewer.
+    following : ndarray of int64, shape (N - 1, S)
+        Number of the posture of the next pose that continues each posture; -1 for none.
+    status : PathStatus
+        Outcome.
+    """
+
+    q: Array
+    reached: NDArray[np.bool_]
+    breaks: NDArray[np.int64]
+    aspect: NDArray[np.int64]
+    postures: Array
+    following: NDArray[np.int64]
+    status: PathStatus
+
+    def reason(self) -> str:
+        """The status as a sentence, with where the path breaks."""
+        if self.status is not PathStatus.BROKEN:
+            return self.status.sentence
+        if not len(self.breaks):
+            return f"{self.status.sentence} The first pose has no posture."
+        last, count = int(self.breaks.max()), len(self.breaks)
+        if last == 0:
+            return f"{self.status.sentence} All {count} start outside the limits."
+        text = f"Of {count} the best breaks before pose {last}"
+        there = not np.isnan(self.postures[last]).all()
+        why = "its posture ends at a singular position or a limit" if there else "it has none"
+        return f"{self.status.sentence} {text}: {why}."
+
+    def __repr__(self) -> str:
+        return (
+            f"<FeasiblePath of {len(self.q)} poses: {self.status.name} from "
+            f"{int(self.reached.sum())} of {len(self.reached)} postures; {self.reason()}>"
+        )
+
+
+def feasible_path(
+    arm: RobotModel,
+    poses: ArrayLike,
+    limits: bool = True,
+    mask: ArrayLike | str | None = None,
+    through_singular: bool = False,
+    cost: str = "length",
+) -> FeasiblePath:
+    """Follow a path of poses from every posture of its first pose.
+
+    A posture is continued to the next pose by Newton steps along the straight motion between the
+    two, not by nearness, so that it never changes to another one unnoticed.
+
+    Parameters
+    ----------
+    arm : RobotModel
+        The robot.
+    poses : array_like, shape (N, 4, 4)
+        World poses of the tool.
+    limits : bool
+        Whether the joint limits count; whole turns are added so that as much as possible of the
+        path lies within them.
+    mask : array_like, shape (6,), optional
+        Components that are asked; default the task of the arm: the position for three joints.
+    through_singular : bool
+        Whether a motion may pass singular positions, to the posture that goes on most smoothly.
+    cost : {"length", "conditioning"}
+        The best motion is the shortest, or has the least mean of one over the least singular
+        value.
+
+    Returns
+    -------
+    FeasiblePath
+        The best motion, and for every starting posture where it breaks.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Matrices that are no poses, not of shape (N, 4, 4); an unknown cost.
+
+    See Also
+    --------
+    robotmodels.trajectories.joint_path : one motion near given positions, with events.
+
+    References
+    ----------
+    Seed book section 3.5.3; A. Elias and J. Wen, arXiv 2501.18505.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> arm, t = load("rx90"), np.linspace(0.0, 1.0, 50)[:, None]
+    >>> q = [0.1, 0.2, 1.3, 0.4, 0.5, 0.6] + t * [0.5, 0.2, 0.1, 0.3, 0.4, 1.0]
+    >>> found = feasible_path(arm, dgm(arm, q), limits=False)
+    >>> found.status.name, len(found.reached)
+    ('FOLLOWED', 8)
+    """
+    check_model(arm)
+    checked_word(cost, COSTS, "cost")
+    bounded = checked_flag(limits, "limits")
+    through = checked_flag(through_singular, "through_singular")
+    T = poses_of(poses)
+    if T.ndim != 3:
+        raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
+    rows = task_rows(arm, mask)
+    k = chain_of(arm).k
+    if len(T) == 0 or k == 0 or (rows.sum() < k and section_arm(arm) is None):
+        return _nothing(len(T), arm.n, PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED)
+    asked = None if mask is None else as_mask(mask)
+    if mask is None and section_arm(arm) is not None:
+        asked = np.repeat((True, False), 3)
+    q, valid, _ = postures_of(arm, T, asked)
+    length = characteristic_length(arm)
+    following, way = successors(
+        arm, T[:-1], T[1:], q[:-1], valid[:-1], q[1:], valid[1:], rows, length
+    )
+    start = np.flatnonzero(valid[0])
+    U, ends = _chains(arm, q, valid, following, way, start, through)
+    breaks, turns = _within(arm, U, ends, bounded)
+    reached = breaks == len(T)
+    best = _best(arm, U, breaks, rows, cost)
+    path = np.full((len(T), arm.n), np.nan)
+    if best >= 0:
+        last = int(breaks[best])
+        path[:last] = U[:last, best] + tau * turns[max(last - 1, 0), best]
+    there = ~np.isnan(path).any(axis=1)
+    aspect = np.full(len(T), -1)
+    factors = sign_factors(arm, mask)
+    if factors is not None and there.any():
+        aspect[there] = factors.codes(path[there]) if factors.joints else 0
+    return FeasiblePath(
+        read_only(path), read_only(reached, np.bool_), read_only(breaks, np.int64),
+        read_only(aspect, np.int64), read_only(np.where(valid[..., None], q, np.nan)),
+        read_only(following, np.int64),
+        PathStatus.FOLLOWED if reached.any() else PathStatus.BROKEN,
+    )  # fmt: skip
+
+
+def _nothing(count: int, n: int, status: PathStatus) -> FeasiblePath:
+    """A result without postures."""
+    return FeasiblePath(
+        read_only(np.full((count, n), np.nan)), read_only(np.zeros(0), np.bool_),
+        read_only(np.zeros(0), np.int64), read_only(np.full(count, -1), np.int64),
+        read_only(np.zeros((count, 0, n))), read_only(np.zeros((max(count - 1, 0), 0)), np.int64),
+        status,
+    )  # fmt: skip
+
+
+def _chains(
+    arm: RobotModel, q: Array, valid: NDArray[np.bool_], following: NDArray[np.int64], way: Array,
+    start: NDArray[np.int64], through: bool,
+) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
+    """Continuous motions (N, S, n) from the starting postures, and how many poses each reaches."""
+    N, _, n = q.shape
+    turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
+    U = np.full((N, len(start), n), np.nan)
+    at, ends = start.copy(), np.zeros(len(start), np.int64)
+    alive = np.ones(len(start), np.bool_)
+    if len(start):
+        U[0], ends[:] = q[0, start], 1
+    step = np.zeros((len(start), n))
+    for k in range(N - 1):
+        to, move = following[k, at], way[k, at]
+        alive_now = alive & (to >= 0)
+        if through:
+            for s in np.flatnonzero(alive & (to < 0)):
+                # the posture that goes on most smoothly
+                gap = q[k + 1] - q[k, at[s]]
+                gap = np.where(turning, (gap + np.pi) % tau - np.pi, gap)
+                off = np.where(valid[k + 1], np.linalg.norm(gap - step[s], axis=1), np.inf)
+                r = int(off.argmin()) if off.size else -1
+                if r >= 0 and np.abs(gap[r]).max() < _THROUGH and np.isfinite(off[r]):
+                    to[s], move[s], alive_now[s] = r, gap[r], True
+        alive = alive_now
+        if not alive.any():
+            break
+        at = np.where(alive, to, 0)
+        step = np.where(alive[:, None], move, 0.0)
+        U[k + 1, alive] = U[k, alive] + move[alive]
+        ends[alive] = k + 2
+    return U, ends
+
+
+def _within(
+    arm: RobotModel, U: Array, ends: NDArray[np.int64], limits: bool
+) -> tuple[NDArray[np.int64], Array]:
+    """First pose not reached within the limits (S,), and whole turns (N, S, n) up to each pose."""
+    turns = np.zeros(U.shape)
+    if not limits or not U.size:
+        return ends.copy(), turns
+    turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
+    low, high = np.fmin.accumulate(U, axis=0), np.fmax.accumulate(U, axis=0)
+    outside = (low < arm.lower) | (high > arm.upper)
+    with np.errstate(invalid="ignore"):
+        least = np.ceil((arm.lower - low - 1e-9) / tau)
+        turns = np.where(turning & outside & np.isfinite(least), least, 0.0)
+        fits = (low + tau * turns >= arm.lower - 1e-9) & (high + tau * turns <= arm.upper + 1e-9)
+    lost = ~fits.all(axis=2)
+    first = np.where(lost.any(axis=0), lost.argmax(axis=0), len(U))
+    return np.minimum(ends, first), turns
+
+
+def _best(
+    arm: RobotModel, U: Array, breaks: NDArray[np.int64], rows: NDArray[np.bool_], cost: str
+) -> int:
+    """The motion that goes farthest, of several the one of least cost; -1 without any."""
+    if not len(breaks) or breaks.max() == 0:
+        return -1
+    last = int(breaks.max())
+    chosen = np.flatnonzero(breaks == last)
+    part = U[:last, chosen]
+    if cost == "length":
+        price = np.linalg.norm(np.diff(part, axis=0), axis=2).sum(axis=0)
+    else:
+        least = bound_of(arm, rows).least(part.reshape(-1, arm.n)).reshape(last, -1)
+        price = (1.0 / np.maximum(least, 1e-12)).mean(axis=0)
+    return int(chosen[price.argmin()])

@@ -1,0 +1,525 @@
+"""Workspaces, singular curves, aspects, cuspidality: published results, identities, refusals."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels import performance as pf
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.geometry import DHTable
+from robotmodels.obstacles import Plane, Sphere
+from robotmodels.se3 import rotation, translation
+
+POSITION = [1, 1, 1, 0, 0, 0]
+PLANE = [1, 1, 0, 0, 0, 0]
+
+
+def three(d3, d4, r2, alpha3=np.pi / 2, r3=0.0, **limits):
+    """3R arm: orthogonal by default, with d2 = 1."""
+    table = DHTable(
+        antecedent=[0, 1, 2], sigma=[0, 0, 0], alpha=[0, -np.pi / 2, alpha3], d=[0, 1, d3],
+        theta=[0, 0, 0], r=[0, r2, r3], **limits,
+    )  # fmt: skip
+    return rm.RobotModel.from_table(table, tool=translation(d4, 0, 0))
+
+
+def planar(*lengths, **limits):
+    """Planar arm with turning joints."""
+    n = len(lengths)
+    table = DHTable(antecedent=range(n), sigma=[0] * n, d=[0, *lengths[:-1]], **limits)
+    return rm.RobotModel.from_table(table, tool=translation(lengths[-1], 0, 0))
+
+
+def published_cusps(d3, d4, r2):
+    """Number of cusps by the surfaces of Baili, Wenger and Chablat, and the distance to one."""
+    A, B = np.hypot(d3 + 1, r2), np.hypot(d3 - 1, r2)
+    s = d3**2 + r2**2
+    C1 = np.sqrt((s - (s**2 - d3**2 + r2**2) / (A * B)) / 2)
+    C2, C3 = A * d3 / (1 + d3), B * d3 / abs(d3 - 1)
+    count = 0 if d4 < C1 else 4 if d4 < C2 else 2 if d4 < C3 else 4 if d3 > 1 else 0
+    return count, min(abs(d4 - C) for C in (C1, C2, C3))
+
+
+def shoelace(line):
+    x, y = line[:-1].T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+WENGER = three(2, 1.5, 1)
+TWO = planar(1.0, 0.6)
+SEEDS = np.random.default_rng(7)
+PARAMETERS = [p for p in SEEDS.uniform(0.1, 3, (40, 3)) if published_cusps(*p)[1] > 1e-3]
+
+
+# --- singular curves, cusps, nodes ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("p", PARAMETERS[:25], ids=lambda p: "-".join(f"{v:.2f}" for v in p))
+def test_numbers_of_cusps_of_orthogonal_arms(p):
+    found = pf.cusps(three(*p))
+    assert len(found) == published_cusps(*p)[0]
+    assert found.status is pf.SectionStatus.FOUND
+
+
+@pytest.mark.parametrize(
+    ("d4", "count"), [(0.1, 0), (0.25, 4), (1.6, 4), (2.0, 4), (2.15, 2), (2.7, 2), (3.1, 4)]
+)
+def test_a_sweep_through_the_surfaces(d4, count):
+    assert published_cusps(2, d4, 1)[0] == count
+    assert len(pf.cusps(three(2, d4, 1))) == count
+
+
+def test_a_cusp_is_a_triple_root():
+    found = pf.cusps(WENGER)
+    assert len(found) == 4
+    assert found.residual.max() < 1e-12
+    for q in found.q:
+        # along the direction in which the arm moves the tool not, the position changes as s^3
+        J = rm.jacobian(WENGER, q)[:3]
+        v = np.linalg.svd(J)[2][2]
+        left = np.linalg.svd(J)[0][:, 2]
+        p = lambda s: rm.dgm(WENGER, q + s * v)[:3, 3]  # noqa: B023, E731
+        second = left @ (p(1e-3) - 2 * p(0) + p(-1e-3)) / 1e-6
+        assert abs(second) < 1e-5
+
+
+def test_cusps_do_not_depend_on_base_and_first_joint():
+    base = rotation("x", 0.7) @ translation(0.3, -0.2, 0.5)
+    moved = pf.cusps(WENGER.with_base(base))
+    np.testing.assert_allclose(np.sort(moved.q, axis=0), np.sort(pf.cusps(WENGER).q, axis=0),
+                               atol=1e-9)  # fmt: skip
+
+
+def test_nodes_change_where_published():
+    A, B = np.hypot(3, 1), np.hypot(1, 1)
+    for E in ((A - B) / 2, (A + B) / 2):
+        counts = [len(pf.nodes(three(2, d4, 1))) for d4 in (E - 0.01, E + 0.01)]
+        assert counts[0] != counts[1]
+
+
+def test_two_configurations_of_a_node_reach_one_point():
+    found = pf.nodes(three(2, 2.6, 1))
+    assert len(found) > 0
+    assert found.residual.max() < 1e-9
+    p = rm.dgm(three(2, 2.6, 1), found.q)[..., :3, 3]
+    rho = np.hypot(p[..., 0], p[..., 1])
+    np.testing.assert_allclose(rho[:, 0], rho[:, 1], atol=1e-9)
+    np.testing.assert_allclose(p[:, 0, 2], p[:, 1, 2], atol=1e-9)
+    assert np.abs(found.q[:, 0] - found.q[:, 1]).max() > 1e-3
+
+
+def test_curves_are_singular_and_their_kind_holds():
+    curves = pf.singular_curves(WENGER)
+    assert sorted(k.value for k in curves.kind) == ["boundary", "internal"]
+    for q, kind in zip(curves.joint, curves.kind, strict=True):
+        s = np.linalg.svd(rm.jacobian(WENGER, q)[:, :3], compute_uv=False)[:, 2]
+        assert s.max() < 1e-9
+        assert kind in pf.CurveKind
+
+
+def test_limits_cut_curves_and_add_their_own():
+    curves = pf.singular_curves(planar(1.0, 0.6, lower=[-1, -2], upper=[1, 2]))
+    assert [k.value for k in curves.kind].count("limit") == 4
+    for q in curves.joint:
+        assert (np.abs(q) <= [1 + 1e-9, 2 + 1e-9]).all()
+
+
+# --- workspaces ----------------------------------------------------------------------------------
+
+
+def test_annulus():
+    w = pf.workspace(TWO)
+    assert w.area == pytest.approx(4 * np.pi * 0.6, rel=1e-6)
+    assert w.grid_area == pytest.approx(w.area, rel=1e-3)
+    assert w.grid_error < 1e-3
+    assert w.area_of(2) == pytest.approx(w.area, rel=1e-9)
+    assert w.area_of(1) == 0
+    loops = w.boundary()
+    assert sum(map(shoelace, loops)) == pytest.approx(w.area, rel=1e-6)
+    np.testing.assert_array_equal(w.contains([[1, 1], [1.7, 0], [0.1, 0]]), [True, False, False])
+    np.testing.assert_array_equal(w.contains([[[1, 1, 0], [0, 0, 3]]]), [[True, False]])
+
+
+def test_counts_of_the_published_arm_are_those_of_igm():
+    w = pf.workspace(WENGER, resolution=60)
+    assert set(np.unique(w.count)) == {0, 2, 4}
+    assert w.coordinates == "half plane"
+    T = np.tile(np.eye(4), (len(w.points), 1, 1))
+    T[:, [0, 2], 3] = w.points
+    np.testing.assert_array_equal(w.count, rm.igm(WENGER, T, mask=POSITION).count)
+    assert w.grid_area == pytest.approx(w.area, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    "arm",
+    [WENGER, three(0.5, 0.4, 0.7), three(1.3, 0.9, 0.4, alpha3=1.1, r3=0.3), TWO],
+    ids=["wenger", "short", "general", "planar"],
+)
+def test_change_of_variables(arm):
+    """The integral of |det J| over the joints is that of the number of postures over space."""
+    w = pf.workspace(arm, resolution=10)
+    n = 400
+    angle = -np.pi + 2 * np.pi * (np.arange(n) + 0.5) / n
+    q = np.zeros((n * n, arm.n))
+    q[:, -2:] = np.stack(np.meshgrid(angle, angle), -1).reshape(-1, 2)
+    J = rm.jacobian(arm, q)[:, : 3 if arm.n == 3 else 2]
+    integral = np.abs(np.linalg.det(J)).mean() * (2 * np.pi) ** arm.n
+    of = w.volume_of if arm.n == 3 else w.area_of
+    assert sum(k * of(k) for k in range(5)) == pytest.approx(integral, rel=1e-4)
+
+
+def test_limits_bound_an_area():
+    arm = planar(1.0, 0.8, lower=[-1, -2], upper=[1, 2])
+    w = pf.workspace(arm, resolution=300)
+    assert w.grid_area == pytest.approx(w.area, rel=2e-3)
+    assert sum(map(shoelace, w.boundary())) == pytest.approx(w.area, rel=1e-5)
+    integral = 4.0 * 0.8 * (1 - np.cos(2.0))  # of |sin q2| over the box
+    assert w.area_of(1) + 2 * w.area_of(2) == pytest.approx(integral, rel=1e-6)
+
+
+def test_first_joint_with_limits_makes_space():
+    arm = three(2, 1.5, 1, lower=[-1, -9, -9], upper=[1, 9, 9])
+    w = pf.workspace(arm, resolution=20)
+    assert w.points.shape == (8000, 3)
+    assert np.isnan(w.area)
+    T = np.tile(np.eye(4), (8000, 1, 1))
+    T[:, :3, 3] = w.points
+    found = pf.accessibility(arm, T, level="position")
+    np.testing.assert_array_equal(found.count, w.count)
+
+
+def test_primary_space_of_a_planar_arm_is_a_disc_and_a_ring():
+    w = pf.workspace(planar(1, 0.8, 0.3), kind="primary", mask=PLANE, resolution=60)
+    r = np.hypot(*w.points.T)
+    inside = (r < 0.1 - 1e-3) | ((r > 0.5 + 1e-3) & (r < 1.5 - 1e-3))
+    outside = ((r > 0.1 + 1e-3) & (r < 0.5 - 1e-3)) | (r > 1.5 + 1e-3)
+    assert w.count[inside].min() == 2
+    assert w.count[outside].max() == 0
+    rest = pf.workspace(planar(1, 0.8, 0.3), kind="secondary", mask=PLANE, resolution=60)
+    assert not ((w.count > 0) & (rest.count > 0)).any()
+
+
+def test_orientation_workspace_is_that_of_igm():
+    arm = rm.load("puma560")
+    R = rotation("y", 0.4)[:3, :3]
+    w = pf.workspace(arm, kind="orientation", orientation=R, resolution=10, limits=False)
+    T = np.tile(np.eye(4), (1000, 1, 1))
+    T[:, :3, :3], T[:, :3, 3] = R, w.points
+    np.testing.assert_array_equal(w.count, rm.igm(arm, T).count)
+
+
+def test_positions_of_an_arm_with_six_joints():
+    w = pf.workspace(rm.load("puma560"), limits=False, resolution=100)
+    assert w.status is pf.WorkspaceStatus.REACHED_ONLY
+    assert set(np.unique(w.count)) == {0, 1}
+    rng = np.random.default_rng(1)
+    p = rm.dgm(rm.load("puma560"), rng.uniform(-3, 3, (300, 6)))[:, :3, 3]
+    assert w.contains(p).mean() > 0.93
+    assert not w.contains(2.5 * p / np.linalg.norm(p, axis=1)[:, None]).any()
+
+
+def test_free_workspace_and_an_empty_one():
+    body = Sphere([1.0, 0.4, 0.0], 0.2)
+    w = pf.workspace(TWO, kind="free", free=body, resolution=40)
+    whole = pf.workspace(TWO, resolution=40)
+    assert (w.count <= whole.count).all()
+    assert (w.count < whole.count).any()
+    assert not w.contains([1.0, 0.4])
+    none = pf.workspace(TWO, kind="free", free=Sphere([0, 0, 0], 5.0), resolution=20)
+    assert none.status is pf.WorkspaceStatus.EMPTY
+    assert none.area == 0.0
+
+
+def test_a_mirrored_arm_has_a_mirrored_workspace():
+    arm, other = three(2, 1.5, 1), three(2, 1.5, -1)
+    a, b = (pf.workspace(x, resolution=40) for x in (arm, other))
+    grid = b.count.reshape(40, 40)[:, ::-1].ravel()
+    assert (a.count == grid).mean() > 0.999
+    assert a.volume_of(4) == pytest.approx(b.volume_of(4), rel=1e-6)
+    assert len(pf.cusps(other)) == 4
+
+
+# --- accessibility -------------------------------------------------------------------------------
+
+
+def test_accessibility_says_why():
+    arm = planar(1, 0.6, lower=[-0.5, 0], upper=[0.5, 2])
+    T = rm.dgm(arm, [[0.2, 1.0], [2.5, 1.0], [0.2, 1.0]])
+    T[2, :3, 3] *= 3
+    found = pf.accessibility(arm, T, level="position")
+    assert [found.reason(i) for i in range(3)] == [
+        s.sentence
+        for s in (
+            pf.AccessStatus.ACCESSIBLE,
+            pf.AccessStatus.ONLY_OUTSIDE_LIMITS,
+            pf.AccessStatus.OUT_OF_REACH,
+        )
+    ]
+    wall = Plane([0.0, -2.0, 0.0], [0.0, 1.0, 0.0])
+    assert pf.accessibility(arm, T[0], "position", free=wall).count == 1
+    blocked = pf.accessibility(arm, T[0], "position", free=lambda q: q[:, 0] > 9)
+    assert blocked.status == pf.AccessStatus.ONLY_IN_COLLISION
+    assert pf.accessibility(arm, np.zeros((0, 4, 4))).count.shape == (0,)
+
+
+def test_accessible_poses_and_orientations():
+    arm = rm.load("puma560")
+    q = np.random.default_rng(2).uniform(-2, 2, (5, 6))
+    T = rm.dgm(arm, q)
+    assert (pf.accessibility(arm, T, limits=False).count == rm.igm(arm, T).count).all()
+    places = [translation(x, 0, 0.672) for x in (0.5, 0.8, 2.0)]
+    arm = arm.with_tool(translation(0, 0, 0.2))
+    found = pf.accessibility(arm, places, "every_orientation", limits=False)
+    assert found.status.tolist() == [0, 4, 1]
+    assert found.count[0] > 0
+
+
+# --- aspects -------------------------------------------------------------------------------------
+
+
+def test_aspects_of_known_arms():
+    for arm, count in ((TWO, 2), (WENGER, 2), (rm.load("puma560"), 8), (rm.load("ur5e"), 8)):
+        found = pf.aspects(arm, limits=False)
+        assert found.count == count
+        assert found.is_complete
+        assert found.volume.sum() == pytest.approx((2 * np.pi) ** arm.n, rel=1e-9)
+
+
+def test_the_postures_of_a_puma_are_in_eight_aspects():
+    arm = rm.load("puma560")
+    q = np.random.default_rng(3).uniform(-3, 3, (50, 6))
+    found = rm.igm(arm, rm.dgm(arm, q))
+    label = np.sort(pf.aspects(arm, limits=False).of(found.q), axis=1)
+    sure = (label >= 0).all(axis=1)
+    assert sure.sum() > 40
+    assert (label[sure] == np.arange(8)).all()
+
+
+@pytest.mark.parametrize("arm", [WENGER, three(0.7, 1.4, 0.3), rm.load("puma560")],
+                         ids=["wenger", "four", "puma"])  # fmt: skip
+def test_aspects_are_constant_along_regular_paths(arm):
+    divided = pf.aspects(arm, limits=False)
+    rows = slice(0, 3 if arm.n == 3 else 6)
+    rng, seen = np.random.default_rng(4), 0
+    for _ in range(300):
+        a, b = rng.uniform(-3, 3, (2, arm.n))
+        path = a + np.linspace(0, 1, 300)[:, None] * (b - a) * 0.5
+        s = np.linalg.svd(rm.jacobian(arm, path)[:, rows], compute_uv=False)[:, -1]
+        if s.min() > np.abs(np.diff(s)).max() * 2:
+            seen += 1
+            assert np.ptp(divided.of(path)) == 0
+    assert seen > 20
+
+
+def test_limits_and_obstacles_divide_the_joint_space():
+    gap = lambda q: np.abs(q[:, 1]) > 0.3  # noqa: E731
+    arm = planar(1, 0.6, lower=[-1, -3], upper=[1, 3])
+    parts = pf.free_components(arm, gap)
+    assert parts.count == 2
+    assert parts.volume.sum() == pytest.approx(2 * 5.4, rel=1e-2)
+    np.testing.assert_array_equal(parts.of([[0, 0], [2, 1], [0, 1]]) >= 0, [False, False, True])
+    # without limits the gap at zero leaves a way around
+    assert pf.free_components(TWO, gap, limits=False).count == 1
+    assert pf.free_components(TWO, lambda q: q[:, 0] > 9).status is pf.AspectStatus.NO_FREE_SPACE
+
+
+def test_aspects_of_redundant_arms_are_not_defined():
+    for name in ("iiwa14", "lab_rr"):
+        found = pf.aspects(rm.load(name), limits=False)
+        assert found.status is pf.AspectStatus.NOT_DEFINED
+        assert found.count == 0
+        assert (found.of(np.zeros(rm.load(name).n)) == -1).all()
+
+
+# --- cuspidality ---------------------------------------------------------------------------------
+
+
+def proof_holds(arm, found, rows):
+    """The path joins two postures of one pose, and is regular at many points between its own."""
+    t = np.linspace(0, 1, 20)[:, None, None]
+    q = (found.path[:-1] + t * np.diff(found.path, axis=0)).reshape(-1, arm.n)
+    J = rm.jacobian(arm, q)[:, rows]
+    T = rm.dgm(arm, found.ends)
+    away = np.abs((np.diff(found.ends, axis=0) + np.pi) % (2 * np.pi) - np.pi).max()
+    same = T[:, :3, 3] if rows.stop == 3 else T
+    return (
+        np.ptp(np.sign(np.linalg.det(J))) == 0
+        and np.abs(same[0] - same[1]).max() < 1e-8
+        and away > 1e-3
+        and found.margin > 0
+    )
+
+
+@pytest.mark.parametrize("p", PARAMETERS[:12], ids=lambda p: "-".join(f"{v:.2f}" for v in p))
+def test_an_orthogonal_arm_is_cuspidal_if_and_only_if_it_has_cusps(p):
+    arm, cuspidal = three(*p), published_cusps(*p)[0] > 0
+    found = pf.cuspidality(arm)
+    assert (found.status is pf.CuspidalityStatus.CUSPIDAL) == cuspidal
+    if cuspidal:
+        assert proof_holds(arm, found, slice(0, 3))
+
+
+@pytest.mark.parametrize("name", ["puma560", "rx90", "irb6640", "ur5e", "planar_2r"])
+def test_arms_whose_factors_are_labels_are_not_cuspidal(name):
+    found = pf.cuspidality(rm.load(name), poses=50)
+    assert found.status is pf.CuspidalityStatus.NOT_CUSPIDAL
+    assert len(found.path) == 0
+
+
+@pytest.mark.parametrize("name", ["crx10ia", "xarm6"])
+def test_cuspidal_arms_with_six_joints(name):
+    arm = rm.load(name)
+    found = pf.cuspidality(arm, poses=30)
+    assert found.status is pf.CuspidalityStatus.CUSPIDAL
+    assert proof_holds(arm, found, slice(0, 6))
+
+
+def test_the_bound_holds_for_random_pairs():
+    from robotmodels.performance.certificate import bound_of
+
+    rng = np.random.default_rng(5)
+    for arm in (WENGER, rm.load("crx10ia"), rm.load("ur5e"), rm.load("lab_rrt")):
+        rows = np.arange(6) < (3 if arm.n == 3 else 6)
+        bound = bound_of(arm, rows, np.full(arm.n, 3.0))
+        a = rng.uniform(-3, 3, (2000, arm.n))
+        b = a + rng.normal(0, 0.05, a.shape)
+        b = np.clip(b, -3, 3)
+        change = np.abs(bound.least(a) - bound.least(b))
+        assert (change <= np.abs(a - b) @ bound.slopes + 1e-12).all()
+
+
+def test_bound_of_the_proof():
+    from robotmodels.performance.certificate import bound_of, certified
+
+    bound = bound_of(TWO, np.array(PLANE, bool))
+    assert certified(bound, np.array([[0.0, 0.5], [1.0, -0.5]])) == 0.0
+    path = np.array([[0.0, 0.5], [1.0, 1.5]])
+    dense = path[0] + np.linspace(0, 1, 500)[:, None] * (path[1] - path[0])
+    assert 0.0 < certified(bound, path) <= bound.least(dense).min()
+
+
+def test_cuspidality_of_a_redundant_arm_is_not_defined():
+    found = pf.cuspidality(rm.load("iiwa14"))
+    assert found.status is pf.CuspidalityStatus.NOT_DEFINED
+
+
+# --- regions -------------------------------------------------------------------------------------
+
+
+LIMITED = planar(1.0, 0.8, lower=[-1, -2], upper=[1, 2])
+
+
+@pytest.mark.parametrize(
+    ("arm", "free"),
+    [(LIMITED, None), (WENGER, None), (LIMITED, Sphere([1.2, 0.3, 0], 0.2))],
+    ids=["limits", "cuspidal", "obstacle"],
+)
+def test_every_path_in_a_t_region_is_followed(arm, free):
+    w = pf.workspace(arm, "positions" if free is None else "free", free=free, resolution=50)
+    n, t = (pf.regions(arm, c, w) for c in "nt")
+    assert t.count >= 1
+    assert all(any((cells <= outer).all() for outer in n.cells) for cells in t.cells)
+    rng, followed = np.random.default_rng(6), 0
+    frame = w.frame[:3]
+    for cells in t.cells[:3]:
+        inside = np.flatnonzero(cells)
+        for _ in range(25):
+            ends = w.points[rng.choice(inside, 2)]
+            line = ends[0] + np.linspace(0, 1, 100)[:, None] * (ends[1] - ends[0])
+            at = np.floor((line - w.points[0]) / w.size + 0.5).astype(int)
+            if cells.reshape(w.shape)[tuple(at.T)].all():
+                T = np.tile(np.eye(4), (100, 1, 1))
+                T[:, :3, 3] = line @ frame[:, :2].T + frame[:, 3]
+                assert pf.feasible_path(arm, T, mask=POSITION).status == 0
+                followed += 1
+    assert followed > 10
+
+
+def test_components_make_n_regions():
+    gap = lambda q: np.abs(q[:, 0]) > 0.3  # noqa: E731
+    w = pf.workspace(LIMITED, "free", free=gap, resolution=50)
+    assert pf.regions(LIMITED, "n", w).count == 2
+    assert pf.regions(rm.load("iiwa14"), "t", limits=False).status is pf.RegionStatus.NOT_DEFINED
+
+
+# --- refusals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: pf.workspace("puma560"), InvalidValueError, "load it first"),
+        (lambda: pf.workspace(TWO, "everything"), InvalidValueError, "kind: expected one of"),
+        (lambda: pf.workspace(TWO, resolution=0), InvalidValueError, "at least 2"),
+        (lambda: pf.workspace(TWO, resolution=10**6), InvalidValueError, "at most"),
+        (lambda: pf.workspace(TWO, limits=1), InvalidValueError, "True or False"),
+        (lambda: pf.workspace(TWO, "free"), InvalidValueError, "obstacles"),
+        (lambda: pf.workspace(TWO, "orientation"), InvalidValueError, "rotation"),
+        (lambda: pf.workspace(TWO, free=lambda q: 1), ShapeError, "bool"),
+        (lambda: pf.workspace(rm.load("gantry").with_table(_unlimited())), InvalidValueError,
+         "slides without limits"),
+        (lambda: pf.workspace(three(2, 1, 1, lower=[-1] * 3, upper=[1] * 3), section="plane"),
+         InvalidValueError, "section='space'"),
+        (lambda: pf.accessibility(TWO, np.eye(3)), ShapeError, "4, 4"),
+        (lambda: pf.accessibility(TWO, np.eye(4), "reach"), InvalidValueError, "level"),
+        (lambda: pf.cuspidality(TWO, poses=0), InvalidValueError, "at least 1"),
+        (lambda: pf.feasible_path(TWO, np.eye(4)), ShapeError, "N, 4, 4"),
+        (lambda: pf.regions(WENGER, "t", pf.workspace(TWO, resolution=5)), InvalidValueError,
+         "workspace of"),
+        (lambda: pf.dexterity_map(TWO, index="beauty"), InvalidValueError, "index"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_refused(call, error, words):
+    with pytest.raises(error, match=words):
+        call()
+
+
+def _unlimited():
+    from dataclasses import replace
+
+    table = rm.load("gantry").table
+    return replace(table, lower=np.full(6, -np.inf), upper=np.full(6, np.inf))
+
+
+def test_arms_of_one_joint_and_slides():
+    one = planar(1.0)
+    w = pf.workspace(one)
+    assert w.status is pf.WorkspaceStatus.NOT_DEFINED
+    assert w.count.size == 0
+    assert pf.cusps(one).status is pf.SectionStatus.NOT_DEFINED
+    assert pf.singular_curves(rm.load("puma560")).status is pf.SectionStatus.NOT_DEFINED
+    slides = rm.RobotModel.from_table(
+        DHTable(antecedent=[0, 1, 2], sigma=[1, 1, 1], alpha=[0, np.pi / 2, np.pi / 2],
+                theta=[0, np.pi / 2, 0], lower=[0, 0, 0], upper=[1, 2, 3])
+    )  # fmt: skip
+    w = pf.workspace(slides, resolution=40)
+    assert w.volume == pytest.approx(6.0, rel=0.1)
+    assert pf.cuspidality(slides).status is pf.CuspidalityStatus.NOT_CUSPIDAL
+    assert pf.aspects(slides).count == 1
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: pf.workspace(TWO, resolution=6),
+        lambda: pf.singular_curves(TWO),
+        lambda: pf.cusps(WENGER),
+        lambda: pf.aspects(TWO, resolution=20),
+        lambda: pf.cuspidality(TWO),
+        lambda: pf.regions(TWO, "n", pf.workspace(TWO, resolution=20)),
+        lambda: pf.accessibility(TWO, np.eye(4)),
+        lambda: pf.feasible_path(TWO, rm.dgm(TWO, [[0.1, 1.0], [0.2, 1.0]])),
+        lambda: pf.polytope(rm.load("ur5e"), np.ones(6), mask="position"),
+    ],
+)
+def test_results_are_values(make):
+    found = make()
+    again = pickle.loads(pickle.dumps(found))
+    assert len(repr(found).splitlines()) <= 6
+    assert found.reason(*([] if not isinstance(found, pf.Accessibility) else [()]))
+    assert again == found
+    assert hash(again) == hash(found)
+    arrays = [getattr(again, name) for name in again.__slots__]
+    assert not any(a.flags.writeable for a in arrays if isinstance(a, np.ndarray))
