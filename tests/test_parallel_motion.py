@@ -205,7 +205,7 @@ def test_area_of_a_constant_orientation():
     found = pr.workspace(robot, orientation=np.eye(3))
     exact = area_of_three_annuli(base - platform, robot.lower, robot.upper)
     assert found.area == pytest.approx(exact, rel=1e-4)
-    assert isinstance(found, performance.workspace.Workspace)
+    assert isinstance(found, performance.Workspace)
     assert found.points.shape == (90_000, 2)
     assert set(found.count) == {0, 1}
     inside = pr.igm(robot, found.poses).within_limits[:, 0]
@@ -257,7 +257,7 @@ def test_cones_and_legs_that_touch_cut_the_workspace():
     assert inside.max() <= 0.25 + 1e-9
     turned = pr.workspace(robot, orientation=np.deg2rad(170), leg_radius=0.05, **options)
     assert turned.area == 0.0  # the legs cross
-    assert turned.status == performance.workspace.WorkspaceStatus.EMPTY
+    assert turned.status == performance.WorkspaceStatus.EMPTY
 
 
 def leg_directions(robot, T):

@@ -13,7 +13,7 @@ from .. import se3
 from .._arrays import Array, as_bounded, as_core, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
-from ..performance.workspace import Workspace, WorkspaceStatus
+from ..performance import Workspace, WorkspaceStatus
 from .families import checked_limits
 from .legs import LegStates, check_robot, leg_states
 from .robot import ParallelRobot
