@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -155,8 +155,10 @@ def _packed(found: Found, batch: tuple[int, ...]) -> AssemblyModes:
         valid, residual, det = (np.take_along_axis(x, order, 1) for x in (valid, residual, det))
         T = np.take_along_axis(T, order[..., None, None], 1)
     residual[~valid] = det[~valid] = np.nan
-    rows = (x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det))
-    return AssemblyModes(*rows, status.reshape(batch), complex_count.reshape(batch))
+    fields: list[Any] = [
+        x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
+    ]
+    return AssemblyModes(*fields, status.reshape(batch), complex_count.reshape(batch))
 
 
 def _planar(robot: ParallelRobot, q: Array) -> Found:
@@ -251,7 +253,10 @@ def _spatial(robot: ParallelRobot, q: Array) -> Found:
 @cache
 def _stored() -> tuple[Array, Array]:
     """The stored member and its 40 solutions: real and imaginary parts in turns."""
-    with files(__package__).joinpath("start.npz").open("rb") as file, np.load(file) as data:
+    with (
+        files("robotmodels.parallel").joinpath("start.npz").open("rb") as file,
+        np.load(file) as data,
+    ):
         return data["member"], data["solutions"]
 
 

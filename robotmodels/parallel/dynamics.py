@@ -145,7 +145,7 @@ def _masses(robot: ParallelRobot) -> Masses:
 
 
 def _rows(
-    robot: Robot, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike | None
+    robot: ParallelRobot, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike | None
 ) -> tuple[tuple[int, ...], Array, Array, Array, Array]:
     """Checked arguments as N rows."""
     T = robot.checked(T)

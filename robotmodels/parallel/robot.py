@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 from typing import Any
 
@@ -99,8 +99,8 @@ class ParallelRobot(Value):
     masses: Masses | None = None
 
     def __post_init__(self) -> None:
-        for name in self.__slots__[1:-1]:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        for field in fields(self)[1:-1]:
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
     @property
     def m(self) -> int:
@@ -110,7 +110,8 @@ class ParallelRobot(Value):
     @property
     def columns(self) -> tuple[int, ...]:
         """Components of the twist [v; w] that the platform has, from 0."""
-        return self.family.value[1]
+        columns: tuple[int, ...] = self.family.value[1]
+        return columns
 
     @property
     def freedoms(self) -> tuple[str, ...]:

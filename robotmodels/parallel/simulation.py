@@ -171,7 +171,7 @@ def simulate(
         status = MotionStatus.STEP_TOO_SMALL if stuck else MotionStatus.SINGULAR
     x = found.y.T
     T, V = np.array([pose(row) for row in x]), x[:, 6:12]
-    energy = sum(energies(robot, T, V, mode))
+    energy = np.add(*energies(robot, T, V, mode))
     tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)])
     q = leg_states(robot, T, modes_of(robot, mode, (len(T),))).q
     return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - x[:, 12], status)
@@ -180,9 +180,11 @@ def simulate(
 def _law(law: Any, size: int, name: str) -> Callable[[float, Array, Array], Array]:
     """A function of (t, T, V) from one, a constant or nothing."""
     if law is None or not callable(law):
-        constant = np.zeros(size) if law is None else as_exact(law, (size,), name).copy()
+        given: Any = np.zeros(size) if law is None else law
+        constant = as_exact(given, (size,), name).copy()
         return lambda t, T, V: constant
-    return lambda t, T, V: as_exact(law(t, T.copy(), V.copy()), (size,), f"{name}(t, T, V)")
+    function: Callable[..., Any] = law
+    return lambda t, T, V: as_exact(function(t, T.copy(), V.copy()), (size,), f"{name}(t, T, V)")
 
 
 def _vector_rate(r: Array, w: Array) -> Array:
