@@ -89,13 +89,13 @@ def rows(rounds: int) -> list[Row]:
     planar = pr.planar_3rpr(*rng.normal(size=(2, 3, 2)))
     places = pr.igm(planar, planar.pose(rng.normal(size=(ROWS, 3)))).q[:, 0]
     polynomial = np.r_[1.0, rng.normal(size=6)]
-    add("all modes of a 3-RPR, batch", 50.0, ROWS, lambda: pr.assembly_modes(planar, places),
-        (EIGENVALUES, lambda: [np.roots(polynomial) for _ in range(100)], 100))  # fmt: skip
+    bare = (EIGENVALUES, lambda: [np.roots(polynomial) for _ in range(100)], 100)
+    add("all modes of a 3-RPR, batch", 50.0, ROWS, lambda: pr.assembly_modes(planar, places), bare)
     first = newton_in_numpy(hexapod, q[0], hexapod.home)
     if np.abs(first - T[0]).max() > 1e-9:
         raise SystemExit("The two direct models differ.")
-    add("iterative direct model, batch", 15.0, ROWS, lambda: pr.dgm(hexapod, q),
-        (NUMPY, lambda: [newton_in_numpy(hexapod, x, hexapod.home) for x in q[:50]], 50))  # fmt: skip
+    slow = (NUMPY, lambda: [newton_in_numpy(hexapod, x, hexapod.home) for x in q[:50]], 50)
+    add("iterative direct model, batch", 15.0, ROWS, lambda: pr.dgm(hexapod, q), slow)
     add("inverse Jacobian, batch", 5.0, ROWS, lambda: pr.inverse_jacobian(hexapod, T))
     return table
 

@@ -121,7 +121,8 @@ def lines_of(kind, rng):
         p[:2] = 0.0
         p[2:5, 2] = d[2:5, 2] = 0.0
     elif kind == "5a":  # a null plane for each point of a screw of pitch 0.4
-        null = np.cross(p, [0, 0, 1.0]) + [0, 0, -0.4]
+        null = np.cross(p, [0, 0, 1.0])
+        null[:, 2] -= 0.4
         d -= (d * null).sum(1)[:, None] * null / (null * null).sum(1)[:, None]
     elif kind == "5b":  # K. Hunt: all legs meet a line
         p[:] = p[0] + rng.normal(size=(6, 1)) * d[0]
@@ -204,7 +205,7 @@ def test_area_of_a_constant_orientation():
     found = pr.workspace(robot, orientation=np.eye(3))
     exact = area_of_three_annuli(base - platform, robot.lower, robot.upper)
     assert found.area == pytest.approx(exact, rel=1e-4)
-    assert isinstance(found, performance.workspace.Workspace)
+    assert isinstance(found, performance.Workspace)
     assert found.points.shape == (90_000, 2)
     assert set(found.count) == {0, 1}
     inside = pr.igm(robot, found.poses).within_limits[:, 0]
@@ -256,7 +257,7 @@ def test_cones_and_legs_that_touch_cut_the_workspace():
     assert inside.max() <= 0.25 + 1e-9
     turned = pr.workspace(robot, orientation=np.deg2rad(170), leg_radius=0.05, **options)
     assert turned.area == 0.0  # the legs cross
-    assert turned.status == performance.workspace.WorkspaceStatus.EMPTY
+    assert turned.status == performance.WorkspaceStatus.EMPTY
 
 
 def leg_directions(robot, T):
@@ -435,9 +436,9 @@ def gough_as_loops(robot):
     links, joints = ["<link name='world'/>"], []
 
     def link(name, mass=0.0, com=(0, 0, 0), inertia=None):
-        I = np.zeros((3, 3)) if inertia is None else inertia
+        moments = np.zeros((3, 3)) if inertia is None else inertia
         values = " ".join(
-            f"{a}='{float(I[i, j])!r}'"
+            f"{a}='{float(moments[i, j])!r}'"
             for a, i, j in zip(
                 ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), *np.triu_indices(3), strict=True
             )
@@ -452,8 +453,8 @@ def gough_as_loops(robot):
         place = " ".join(repr(float(x)) for x in xyz)
         limit = "<limit lower='-9' upper='9' velocity='9' effort='9'/>" if kind != "fixed" else ""
         joints.append(
-            f"<joint name='to_{child}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>"
-            f"<origin xyz='{place}'/><axis xyz='{axis}'/>{limit}</joint>"
+            f"<joint name='to_{child}' type='{kind}'><parent link='{parent}'/>"
+            f"<child link='{child}'/><origin xyz='{place}'/><axis xyz='{axis}'/>{limit}</joint>"
         )
 
     last = "world"

@@ -131,8 +131,8 @@ def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
 def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
     """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
     c = np.ascontiguousarray(knees(robot, q))
-    l = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
-    return c, robot.platform, np.ascontiguousarray(l)
+    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
+    return c, robot.platform, np.ascontiguousarray(lengths)
 
 
 def _start(robot: ParallelRobot, q: Array) -> Array:

@@ -67,7 +67,7 @@ from .. import se3
 from .._arrays import Array, as_exact, as_floats, as_number, as_reals
 from ..errors import InvalidValueError, ShapeError
 from .legs import leg_states
-from .robot import Family, ParallelRobot, pose_of
+from .robot import Family, ParallelRobot, pose_at
 
 Limit = ArrayLike | None
 _YAWS = np.pi * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 8, -8, 10, -10, 12]) / 12
@@ -266,7 +266,7 @@ def _home(robot: ParallelRobot) -> Array:
         place[2] -= np.sqrt(max(square, 0.25 * rod.min() ** 2))
     twist = np.zeros((len(_YAWS), 6))
     twist[:, :3], twist[:, 5] = place, _YAWS if 5 in robot.columns else 0.0
-    T = pose_of(twist)
+    T = pose_at(twist)
     legs = leg_states(robot, T, np.zeros(len(T), np.int64))
     J = legs.rows / np.repeat([1.0, robot.length], 3)
     det = np.abs(np.linalg.det(J[..., list(robot.columns)])) * legs.reached

@@ -88,20 +88,27 @@ def determinant(J: Floats, pivots: Ints) -> float:
 
 @compiled()
 def newton(
-    T: Floats, c: Floats, b: Floats, l: Floats, columns: Ints, J: Floats, work: Floats, pivots: Ints
+    T: Floats,
+    c: Floats,
+    b: Floats,
+    rods: Floats,
+    columns: Ints,
+    J: Floats,
+    work: Floats,
+    pivots: Ints,
 ) -> int:
     """Newton's method on the pose, in place: iterations, negative where it does not converge."""
     m = b.shape[0]
     size = 0.0
     for i in range(m):
-        size = max(size, abs(l[i]), abs(b[i, 0]), abs(b[i, 1]), abs(b[i, 2]))
+        size = max(size, abs(rods[i]), abs(b[i, 0]), abs(b[i, 1]), abs(b[i, 2]))
     best = 1e300
     for iteration in range(1, _ITERATIONS + 1):
         errors(T, c, b, columns, work, J)
         factor(J, pivots)
         rest = 0.0
         for i in range(m):
-            work[i] = l[i] - work[i]
+            work[i] = rods[i] - work[i]
             rest = max(rest, abs(work[i]))
         solve(J, pivots, work, False)
         step = 0.0
@@ -125,13 +132,13 @@ def newton(
 
 @compiled()
 def worst_error(
-    T: Floats, c: Floats, b: Floats, l: Floats, columns: Ints, work: Floats, J: Floats
+    T: Floats, c: Floats, b: Floats, rods: Floats, columns: Ints, work: Floats, J: Floats
 ) -> float:
     """Largest error of a rod's length."""
     errors(T, c, b, columns, work, J)
     worst = 0.0
-    for i in range(l.size):
-        worst = max(worst, abs(work[i] - l[i]))
+    for i in range(rods.size):
+        worst = max(worst, abs(work[i] - rods[i]))
     return worst
 
 
@@ -147,7 +154,7 @@ def copy_pose(A: Floats, B: Floats) -> None:
 def direct(
     c: Floats,
     b: Floats,
-    l: Floats,
+    rods: Floats,
     T0: Floats,
     columns: Ints,
     T: Floats,
@@ -155,7 +162,7 @@ def direct(
 ) -> None:
     """Poses near T0 by Newton's method, else by continuation of the lengths.
 
-    Shapes: c (N, m, 3), b (m, 3), l (N, m), T0 (N, 4, 4) -> T (N, 4, 4), out (N, 4): code,
+    Shapes: c (N, m, 3), b (m, 3), rods (N, m), T0 (N, 4, 4) -> T (N, 4, 4), out (N, 4): code,
     iterations, residual, determinant.
     """
     m = b.shape[0]
@@ -167,7 +174,7 @@ def direct(
         copy_pose(T0[s], X)
         errors(X, c[s], b, columns, first, J)
         side = determinant(J, pivots)
-        done = newton(X, c[s], b, l[s], columns, J, work, pivots)
+        done = newton(X, c[s], b, rods[s], columns, J, work, pivots)
         total = abs(done)
         errors(X, c[s], b, columns, work, J)
         det = determinant(J, pivots)
@@ -182,7 +189,7 @@ def direct(
                 pieces += 1
                 after = min(1.0, now + h)
                 for i in range(m):
-                    target[i] = first[i] + after * (l[s, i] - first[i])
+                    target[i] = first[i] + after * (rods[s, i] - first[i])
                 done = newton(piece, c[s], b, target, columns, J, work, pivots)
                 total += abs(done)
                 errors(piece, c[s], b, columns, work, J)
@@ -195,29 +202,29 @@ def direct(
             if now == 1.0:
                 code = CONVERGED
                 copy_pose(piece, X)
-        worst = worst_error(X, c[s], b, l[s], columns, work, J)
+        worst = worst_error(X, c[s], b, rods[s], columns, work, J)
         out[s, 0], out[s, 1], out[s, 2], out[s, 3] = code, total, worst, determinant(J, pivots)
 
 
 @compiled(NOTHING(STACK, MATRIX, MATRIX, INTS, OUT4, OUT2, OUT2))
 def polish(
-    c: Floats, b: Floats, l: Floats, columns: Ints, T: Floats, residual: Floats, det: Floats
+    c: Floats, b: Floats, rods: Floats, columns: Ints, T: Floats, residual: Floats, det: Floats
 ) -> None:
     """Newton's method on every candidate pose, NaN rows left out.
 
-    Shapes: c (N, m, 3), b (m, 3), l (N, m), T (N, S, 4, 4) overwritten -> residual, det (N, S).
+    Shapes: c (N, m, 3), b (m, 3), rods (N, m), T (N, S, 4, 4) overwritten -> residual, det (N, S).
     """
     m = b.shape[0]
     J, work, pivots = np.zeros((m, m)), np.zeros(m), np.zeros(m, np.int64)
     X = np.zeros((4, 4))
     for s in range(c.shape[0]):
         for k in range(T.shape[1]):
-            if not T[s, k, 0, 3] == T[s, k, 0, 3]:
+            if np.isnan(T[s, k, 0, 3]):
                 continue
             copy_pose(T[s, k], X)
-            before = worst_error(X, c[s], b, l[s], columns, work, J)
-            newton(X, c[s], b, l[s], columns, J, work, pivots)
-            after = worst_error(X, c[s], b, l[s], columns, work, J)
+            before = worst_error(X, c[s], b, rods[s], columns, work, J)
+            newton(X, c[s], b, rods[s], columns, J, work, pivots)
+            after = worst_error(X, c[s], b, rods[s], columns, work, J)
             moved = 0.0
             for i in range(3):
                 for j in range(3):
@@ -225,12 +232,12 @@ def polish(
             # at a double solution the derivative is singular and a step may be anything
             if after <= before and moved < _FAR:
                 copy_pose(X, T[s, k])
-            residual[s, k] = worst_error(T[s, k], c[s], b, l[s], columns, work, J)
+            residual[s, k] = worst_error(T[s, k], c[s], b, rods[s], columns, work, J)
             det[s, k] = determinant(J, pivots)
 
 
 @compiled()
-def loop_of(c: Floats, b: Floats, l: Floats, z: complex, inverse: complex) -> tuple:
+def loop_of(c: Floats, b: Floats, rods: Floats, z: complex, inverse: complex) -> tuple:
     """Vectors w_2, w_3 and numbers k_2, k_3 of the equations p . w = k, in isotropic coordinates.
 
     With z = exp(i phi): w = b z - a, its conjugate with 1/z, p . w = (p w* + p* w)/2 = k.
@@ -241,17 +248,22 @@ def loop_of(c: Floats, b: Floats, l: Floats, z: complex, inverse: complex) -> tu
     a3 = complex(c[2, 0] - c[0, 0], c[2, 1] - c[0, 1])
     u2, u3 = b2 * z - a2, b3 * z - a3
     v2, v3 = b2.conjugate() * inverse - a2.conjugate(), b3.conjugate() * inverse - a3.conjugate()
-    k2 = 0.5 * (l[1] * l[1] - l[0] * l[0] - u2 * v2)
-    k3 = 0.5 * (l[2] * l[2] - l[0] * l[0] - u3 * v3)
+    k2 = 0.5 * (rods[1] * rods[1] - rods[0] * rods[0] - u2 * v2)
+    k3 = 0.5 * (rods[2] * rods[2] - rods[0] * rods[0] - u3 * v3)
     return u2, u3, v2, v3, k2, k3
 
 
 @compiled()
-def closure(c: Floats, b: Floats, l: Floats, z: complex) -> tuple[complex, complex]:
-    """Closure equation of three planar legs at z = exp(i phi), and the determinant of p's system."""
-    u2, u3, v2, v3, k2, k3 = loop_of(c, b, l, z, 1.0 / z)
+def closure(c: Floats, b: Floats, rods: Floats, z: complex) -> tuple[complex, complex]:
+    """Closure equation of three planar legs at z = exp(i phi), and the determinant D for p."""
+    u2, u3, v2, v3, k2, k3 = loop_of(c, b, rods, z, 1.0 / z)
     D = (v2 * u3 - v3 * u2) * 0.5j
-    F = k2 * k2 * u3 * v3 + k3 * k3 * u2 * v2 - k2 * k3 * (u2 * v3 + u3 * v2) - l[0] * l[0] * D * D
+    F = (
+        k2 * k2 * u3 * v3
+        + k3 * k3 * u2 * v2
+        - k2 * k3 * (u2 * v3 + u3 * v2)
+        - rods[0] * rods[0] * D * D
+    )
     return F, D
 
 
@@ -298,7 +310,7 @@ def candidate(T: Floats, p: complex, z: complex, c: Floats, b: Floats) -> None:
 def planar(
     c: Floats,
     b: Floats,
-    l: Floats,
+    rods: Floats,
     columns: Ints,
     T: Floats,
     residual: Floats,
@@ -307,7 +319,7 @@ def planar(
 ) -> None:
     """All poses of a platform on three planar legs, packed, by ascending phi.
 
-    Shapes: c (N, 3, 3), b (3, 3), l (N, 3) -> T (N, 6, 4, 4), residual, det (N, 6), out (N, 3):
+    Shapes: c (N, 3, 3), b (3, 3), rods (N, 3) -> T (N, 6, 4, 4), residual, det (N, 6), out (N, 3):
     count, complex count, 1 for a continuum.
     """
     f, z, phi = np.zeros(7, np.complex128), np.zeros(6, np.complex128), np.zeros(6)
@@ -316,13 +328,13 @@ def planar(
     for s in range(c.shape[0]):
         size = 0.0
         for i in range(3):
-            size = max(size, l[s, i], abs(b[i, 0] - b[0, 0]), abs(b[i, 1] - b[0, 1]))
+            size = max(size, rods[s, i], abs(b[i, 0] - b[0, 0]), abs(b[i, 1] - b[0, 1]))
             size = max(size, abs(c[s, i, 0] - c[s, 0, 0]), abs(c[s, i, 1] - c[s, 0, 1]))
         for k in range(7):
             f[k] = 0j
         for j in range(7):
             angle = 2.0 * pi * j / 7.0
-            value, _ = closure(c[s], b, l[s], complex(cos(angle), sin(angle)))
+            value, _ = closure(c[s], b, rods[s], complex(cos(angle), sin(angle)))
             for k in range(7):
                 f[k] += value * complex(cos((k - 3) * angle), -sin((k - 3) * angle)) / 7.0
         largest = 0.0
@@ -333,7 +345,7 @@ def planar(
         on = complex(c[s, 1, 0] - c[s, 0, 0], c[s, 1, 1] - c[s, 0, 1])
         on *= complex(b[1, 0] - b[0, 0], b[0, 1] - b[1, 1])
         on /= max(abs(on), 1e-300)
-        u2, u3, v2, v3, k2, k3 = loop_of(c[s], b, l[s], on, on.conjugate())
+        u2, u3, _, _, k2, k3 = loop_of(c[s], b, rods[s], on, on.conjugate())
         equal = abs(u2) + abs(u3) < 1e-9 * size and abs(k2) + abs(k3) < 1e-9 * size * size
         if equal or largest <= 1e-14 * size**6:
             out[s, 2] = 1.0
@@ -345,7 +357,7 @@ def planar(
         roots_of(f, low, degree, z)
         count = 0
         for k in range(degree):
-            F, D = closure(c[s], b, l[s], z[k])
+            _, D = closure(c[s], b, rods[s], z[k])
             flat = abs(D) < 1e-7 * size * size
             off = abs(abs(z[k]) - 1.0)
             twin = False
@@ -360,7 +372,7 @@ def planar(
                 twin = twin or (abs(z[j]) < 1.0 + 1e-6 and abs(z[j] / abs(z[j]) - on) < 2e-6)
             if twin:
                 continue
-            u2, u3, v2, v3, k2, k3 = loop_of(c[s], b, l[s], on, 1.0 / on)
+            u2, u3, _, _, k2, k3 = loop_of(c[s], b, rods[s], on, 1.0 / on)
             tries = 1
             p = 1j * (k2 * u3 - k3 * u2)
             shift = 0j
@@ -375,12 +387,12 @@ def planar(
                 h /= abs(u)
                 u /= abs(u)
                 p = h * u
-                shift = 1j * u * sqrt(max(0.0, l[s, 0] ** 2 - h * h))
+                shift = 1j * u * sqrt(max(0.0, rods[s, 0] ** 2 - h * h))
                 tries = 2
             for side in range(tries):
                 candidate(X, p + (1.0 - 2.0 * side) * shift, on, c[s], b)
-                newton(X, c[s], b, l[s], columns, J, work, pivots)
-                worst = worst_error(X, c[s], b, l[s], columns, work, J)
+                newton(X, c[s], b, rods[s], columns, J, work, pivots)
+                worst = worst_error(X, c[s], b, rods[s], columns, work, J)
                 if not worst <= 1e-11 * size or count == 6:
                     continue
                 angle = np.arctan2(X[1, 0], X[0, 0])

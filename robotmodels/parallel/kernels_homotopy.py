@@ -140,7 +140,6 @@ def track(
     t, h, last = 0.0, 0.01, 0.0
     c = 0
     steps = 0
-    fresh = True
     while steps < _STEPS:
         # chart
         best = 0

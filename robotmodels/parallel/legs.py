@@ -88,10 +88,10 @@ def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64]) -> LegSt
     arm = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2)
     d = T[:, None, :3, 3] + arm - robot.base
     knee = np.broadcast_to(robot.base, d.shape)
-    reached = np.ones(len(T), np.bool_)
+    reached, q = np.ones(len(T), np.bool_), np.zeros(d.shape[:-1])
     if robot.has_cranks:
         q, cosine = _angles(robot, d, mode)
-        reached = (np.abs(cosine) <= 1.0 + _TOUCHING).all(axis=1)
+        reached = np.asarray((np.abs(cosine) <= 1.0 + _TOUCHING).all(axis=1))
         swing = robot.crank[:, None] * _radial(robot, q)
         knee, d = knee + swing, d - swing
     size = np.linalg.norm(d, axis=-1)
@@ -192,7 +192,8 @@ def igm(robot: ParallelRobot | LoopedPlatform, T: ArrayLike) -> LegSolutions:
         np.where(keep, residual, np.nan),
         status,
     )
-    return LegSolutions(*(x.reshape((*batch, *x.shape[1:])) for x in found))
+    fields: list[Any] = [x.reshape((*batch, *x.shape[1:])) for x in found]
+    return LegSolutions(*fields)
 
 
 def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
@@ -200,7 +201,8 @@ def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
     if robot.has_cranks:
         turns = np.ceil((robot.lower - 1e-12 - q) / (2.0 * np.pi))
         q = q + 2.0 * np.pi * np.where(np.isfinite(turns), turns, 0.0)
-    return ((q >= robot.lower - 1e-12) & (q <= robot.upper + 1e-12)).all(axis=-1)
+    inside = (q >= robot.lower - 1e-12) & (q <= robot.upper + 1e-12)
+    return np.asarray(inside.all(axis=-1))
 
 
 def check_robot(robot: Any) -> None:
@@ -217,5 +219,5 @@ def _igm_looped(robot: LoopedPlatform, T: ArrayLike) -> LegSolutions:
     q, residual, reached = robot.postures(T)
     q = np.where(reached[..., None], q[..., robot.actuated], np.nan)
     mode, status = np.where(reached, 0, -1), np.where(reached, 0, 2).astype(np.int8)
-    rows = (x[..., None] for x in (mode, reached, reached, np.where(reached, residual, np.nan)))
-    return LegSolutions(q[..., None, :], *rows, status)
+    rows: list[Any] = [mode, reached, reached, np.where(reached, residual, np.nan)]
+    return LegSolutions(q[..., None, :], *(x[..., None] for x in rows), status)

@@ -17,7 +17,7 @@ from ..errors import InvalidValueError, LoopError
 from ..geometry import PRISMATIC
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..kinematics.lengths import characteristic_length
-from .robot import pose_of, rotation_vector
+from .robot import pose_at, rotation_vector
 
 _STEPS, _PIECES, _STARTS = 60, 16, 64
 _CLOSED = 1e-10
@@ -116,8 +116,8 @@ class LoopedPlatform(Value):
         q, residual, reached = self.postures(T)
         if not reached.all():
             raise InvalidValueError(
-                f"T: the platform does not reach this pose near home (residual {residual.max():.2g});"
-                " see igm(robot, T).status."
+                "T: the platform does not reach this pose near home (residual "
+                f"{residual.max():.2g}); see igm(robot, T).status."
             )
         return q
 
@@ -279,8 +279,8 @@ def from_loops(
     found = loops.close(looped_robot, start[looped_robot.actuated], start)
     if not found.residual < 1e-8:
         raise InvalidValueError(
-            f"q_home: the loops do not close near this posture (residual {found.residual:.2g}); give "
-            "all joints of an assembled posture."
+            f"q_home: the loops do not close near this posture (residual {found.residual:.2g}); "
+            "give all joints of an assembled posture."
         )
     P = jacobian(looped_robot.tree, found.q, platform_frame)
     P = P @ loops.velocity_map(looped_robot, found.q)
@@ -312,7 +312,7 @@ def _difference(T: Array, target: Array) -> Array:
 def _between(start: Array, end: Array) -> Array:
     """Poses between two, the last included. Shapes: -> (N, 4, 4)."""
     share = np.linspace(0.0, 1.0, _PIECES + 1)[1:, None]
-    T = pose_of(share * _difference(start[None], end[None]))
+    T = pose_at(share * _difference(start[None], end[None]))
     T[:, :3, :3] = T[:, :3, :3] @ start[:3, :3]
     T[:, :3, 3] += start[:3, 3]
     return T

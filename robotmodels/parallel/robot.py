@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 from typing import Any
 
@@ -99,8 +99,8 @@ class ParallelRobot(Value):
     masses: Masses | None = None
 
     def __post_init__(self) -> None:
-        for name in self.__slots__[1:-1]:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        for field in fields(self)[1:-1]:
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
     @property
     def m(self) -> int:
@@ -110,7 +110,8 @@ class ParallelRobot(Value):
     @property
     def columns(self) -> tuple[int, ...]:
         """Components of the twist [v; w] that the platform has, from 0."""
-        return self.family.value[1]
+        columns: tuple[int, ...] = self.family.value[1]
+        return columns
 
     @property
     def freedoms(self) -> tuple[str, ...]:
@@ -149,7 +150,7 @@ class ParallelRobot(Value):
         full = np.zeros((*X.shape[:-1], 6))
         full[..., :3] = self.home[:3, 3]
         full[..., list(self.columns)] = X
-        return pose_of(full)
+        return pose_at(full)
 
     def checked(self, T: Any, name: str = "T") -> Array:
         """Poses (..., 4, 4), checked that the platform can have them."""
@@ -191,8 +192,8 @@ class ParallelRobot(Value):
         parts = ((0.0, 0.0, 0.0),) * 2 if legs is None else tuple(legs)
         if len(tuple(platform)) != 3 or len(parts) != 2 or any(len(part) != 3 for part in parts):
             raise ShapeError(
-                "platform, legs: expected (mass, com, inertia), and for legs two parts, each (mass, "
-                "position, inertia)."
+                "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
+                "(mass, position, inertia)."
             )
         mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
@@ -228,7 +229,7 @@ def _for_legs(value: ArrayLike, m: int) -> Array:
     return np.broadcast_to(given, (m,))
 
 
-def pose_of(twist: Array) -> Array:
+def pose_at(twist: Array) -> Array:
     """Poses of position and rotation vector. Shapes: (..., 6) -> (..., 4, 4)."""
     T = np.zeros((*twist.shape[:-1], 4, 4))
     w = twist[..., 3:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,7 @@ from .dynamics import ddm, energies
 from .legs import check_robot, leg_states
 from .looped import LoopedPlatform
 from .results import Result
-from .robot import ParallelRobot, pose_of
+from .robot import ParallelRobot, pose_at
 from .velocities import Mode, ikm, modes_of, only_freedoms, scales
 
 _TOO_NEAR = 1e-6  # least singular value, relative, and sine of an elbow
@@ -51,6 +51,7 @@ class ParallelMotion(Result):
         Outcome.
     """
 
+    outcomes: ClassVar = MotionStatus
     t: Array
     T: Array
     V: Array
@@ -58,16 +59,6 @@ class ParallelMotion(Result):
     tau: Array
     energy_drift: Array
     status: MotionStatus
-
-    def reason(self) -> str:
-        """Outcome as a sentence.
-
-        Returns
-        -------
-        str
-            The sentence of the status.
-        """
-        return self.status.sentence
 
 
 Law = Callable[[float, Array, Array], ArrayLike]
@@ -141,74 +132,59 @@ def simulate(
     if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
         raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
     drive, load = _law(control, robot.m, "control"), _law(wrench, 6, "wrench")
-    sign = leg_states(robot, start[None], modes_of(robot, mode, (1,))).speed[0]
     ddm(robot, start, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
+    columns, unit = list(robot.columns), scales(robot, robot.length)
 
     def pose(x: Array) -> Array:
-        T = pose_of(np.concatenate((np.zeros(3), x[3:6])))
+        T = pose_at(x[:6])
         T[:3, :3] = T[:3, :3] @ start[:3, :3]
-        T[:3, 3] = x[:3]
         return T
 
     def rates(time: float, x: Array) -> Array:
         T, V = pose(x), x[6:12]
-        tau, W = drive(time, T, V), load(time, T, V)
-        a = ddm(robot, T, V, tau, W, mode)
-        power = tau @ ikm(robot, T, V, mode) - W @ V
+        try:
+            tau, W = drive(time, T, V), load(time, T, V)
+            a = ddm(robot, T, V, tau, W, mode)
+            power = tau @ ikm(robot, T, V, mode) - W @ V
+        except InvalidValueError:  # beyond a straight leg: a shorter step is tried
+            return np.full(13, np.nan)
         return np.concatenate((V[:3], _vector_rate(x[3:6], V[3:]), a, [power]))
 
-    def margin(time: float, x: Array) -> float:
+    def sides(x: Array) -> Array:
+        """Determinant of the lines and speeds of the knees, zero at singular positions."""
         legs = leg_states(robot, pose(x)[None], modes_of(robot, mode, (1,)))
-        if not legs.reached[0]:
-            return -1.0
-        rows = legs.rows[0][:, list(robot.columns)] * scales(robot, robot.length)
-        s = np.linalg.svd(rows, compute_uv=False)
-        elbow = legs.speed[0] * np.sign(sign) / np.maximum(robot.crank, 1e-300)
-        elbow = elbow if robot.has_cranks else legs.q[0] / robot.size
-        side = np.sign(np.linalg.det(rows)) * side0
-        return float(min(side * s[-1] / s[0], elbow.min())) - _TOO_NEAR
+        det = np.linalg.det(legs.rows[0][:, columns] * unit)
+        return np.append(det, legs.speed[0]) * legs.reached[0]
 
-    first = leg_states(robot, start[None], modes_of(robot, mode, (1,)))
-    lines = first.rows[0][:, list(robot.columns)] * scales(robot, robot.length)
-    side0 = np.sign(np.linalg.det(lines))
-    margin.terminal = True  # type: ignore[attr-defined]
     x0 = np.concatenate((start[:3, 3], np.zeros(3), V, [0.0]))
-    status = MotionStatus.FINISHED
+    first = sides(x0)
+
+    def margin(time: float, x: Array) -> float:
+        return float((sides(x) / first).min()) - _TOO_NEAR
+
+    margin.terminal = True  # type: ignore[attr-defined]
     span = (float(times[0]), float(times[-1]))
-    reached: list[Any] = []
-
-    def guarded(time: float, x: Array) -> Array:
-        try:
-            return rates(time, x)
-        except InvalidValueError:
-            # beyond a straight leg: the step is rejected, and shortened up to the event
-            return np.full(13, np.nan)
-
-    found = solve_ivp(
-        guarded, span, x0, "DOP853", times, events=margin, rtol=rtol, atol=atol, max_step=np.inf
-    )
-    if found.status == 1:
-        status = MotionStatus.SINGULAR
-    elif found.status < 0:
-        near = margin(0.0, found.y[:, -1]) < 1e-2 if found.y.size else True
-        status = MotionStatus.SINGULAR if near else MotionStatus.STEP_TOO_SMALL
+    found = solve_ivp(rates, span, x0, "DOP853", times, events=margin, rtol=rtol, atol=atol)
+    status = MotionStatus.FINISHED
+    if found.status != 0:
+        stuck = found.status < 0 and margin(0.0, found.y[:, -1]) > 0.05
+        status = MotionStatus.STEP_TOO_SMALL if stuck else MotionStatus.SINGULAR
     x = found.y.T
-    reached = [pose(row) for row in x]
-    T = np.array(reached).reshape(-1, 4, 4)
-    V = x[:, 6:12]
-    kinetic, potential = energies(robot, T, V, mode)
-    total = kinetic + potential
-    tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)]).reshape(-1, robot.m)
+    T, V = np.array([pose(row) for row in x]), x[:, 6:12]
+    energy = np.add(*energies(robot, T, V, mode))
+    tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)])
     q = leg_states(robot, T, modes_of(robot, mode, (len(T),))).q
-    return ParallelMotion(found.t, T, V, q, tau, total - total[:1] - x[:, 12], status)
+    return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - x[:, 12], status)
 
 
 def _law(law: Any, size: int, name: str) -> Callable[[float, Array, Array], Array]:
     """A function of (t, T, V) from one, a constant or nothing."""
     if law is None or not callable(law):
-        constant = np.zeros(size) if law is None else as_exact(law, (size,), name).copy()
+        given: Any = np.zeros(size) if law is None else law
+        constant = as_exact(given, (size,), name).copy()
         return lambda t, T, V: constant
-    return lambda t, T, V: as_exact(law(t, T.copy(), V.copy()), (size,), f"{name}(t, T, V)")
+    function: Callable[..., Any] = law
+    return lambda t, T, V: as_exact(function(t, T.copy(), V.copy()), (size,), f"{name}(t, T, V)")
 
 
 def _vector_rate(r: Array, w: Array) -> Array:

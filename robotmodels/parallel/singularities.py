@@ -1,4 +1,4 @@
-"""Singular configurations of parallel robots: kinds, motions gained, Grassmann varieties of lines."""
+"""Singular configurations: kinds, motions gained, Grassmann varieties of the legs' lines."""
 
 from __future__ import annotations
 

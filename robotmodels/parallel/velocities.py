@@ -190,8 +190,8 @@ def broadcast(first: tuple[int, ...], second: tuple[int, ...]) -> tuple[int, ...
         return np.broadcast_shapes(first, second)
     except ValueError:
         raise ShapeError(
-            f"The batch axes {first} and {second} do not broadcast; give the same number of rows in "
-            "each, or a single one."
+            f"The batch axes {first} and {second} do not broadcast; give the same number of rows "
+            "in each, or a single one."
         ) from None
 
 

@@ -13,7 +13,7 @@ from .. import se3
 from .._arrays import Array, as_bounded, as_core, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
-from ..performance.workspace import Workspace, WorkspaceStatus
+from ..performance import Workspace, WorkspaceStatus
 from .families import checked_limits
 from .legs import LegStates, check_robot, leg_states
 from .robot import ParallelRobot
@@ -244,7 +244,8 @@ def _rotations(robot: ParallelRobot, kind: str, orientation: Any) -> Array:
         turns, first = np.array([as_number(orientation, "orientation")]), np.eye(3)
     if turns is not None:
         return np.array([se3.rotation("z", angle)[:3, :3] for angle in turns]) @ first
-    R = as_floats(orientation, "orientation")
+    given: Any = orientation
+    R = as_floats(given, "orientation")
     if R.shape[-2:] != (3, 3) or R.ndim > 3 or not len(R):
         raise ShapeError(
             f"orientation: expected an angle, or rotations (3, 3) or (K, 3, 3), got {R.shape}."
@@ -267,7 +268,8 @@ def _limits(robot: ParallelRobot, limits: Any) -> tuple[Array, Array]:
         raise InvalidValueError(
             f"limits: expected True, False or (lower, upper), got {limits!r:.60}."
         )
-    return checked_limits(*limits, robot.m, not robot.has_cranks)
+    low, high = limits
+    return checked_limits(low, high, robot.m, not robot.has_cranks)
 
 
 def _margins(

@@ -28,6 +28,7 @@ from ..kernels._compile import (
 from ..kernels.continuation import CLOSED, curve_of, curves_of, workspace
 
 FLOAT = types.float64
+COUNTS = types.Array(types.int64, 1, "C")
 VALUES = 9  # of a point of the section, see `section_values`
 
 
@@ -183,3 +184,164 @@ def gram_values(J: Floats, weights: Floats, out: Floats) -> None:
                 else:
                     G[i, j] = total / G[j, j] if G[j, j] > 0.0 else 0.0
         out[s, 0], out[s, 1] = det, trace_of
+
+
+@compiled()
+def turned_order(
+    P: Floats, members: Ints, count: int, normal: Floats, half: bool, angles: Floats
+) -> None:
+    """Sort members (rows of P) by their angle about a normal, of lines by the half turn."""
+    for i in range(count):
+        a, b, along, across = members[0], members[i], 0.0, 0.0
+        for c in range(3):
+            e, f = (c + 1) % 3, (c + 2) % 3
+            along += P[a, c] * P[b, c]
+            across += normal[c] * (P[a, e] * P[b, f] - P[a, f] * P[b, e])
+        angle = np.arctan2(across, along)
+        if half and (angle < -1e-12 or angle > np.pi - 1e-12):
+            angle += np.pi if angle < 0.0 else -np.pi
+        angles[i] = angle
+    for i in range(1, count):
+        j = i
+        while j > 0 and angles[j - 1] > angles[j]:
+            angles[j - 1], angles[j] = angles[j], angles[j - 1]
+            members[j - 1], members[j] = members[j], members[j - 1]
+            j -= 1
+
+
+@compiled(FLOAT(MATRIX, FLOAT, OUT2, COUNTS, COUNTS, COUNTS))
+def zonotope_faces(
+    G: Floats, zero: float, vertices: Floats, corners: Ints, sizes: Ints, counts: Ints
+) -> float:
+    """Vertices and faces of the sums of rows of G (k, 3) times factors in [-1, 1]; the radius.
+
+    ``corners`` holds the numbers of the vertices of all faces in turn, ``sizes`` how many each has,
+    ``counts`` the numbers of vertices, faces and corners.
+    """
+    k = G.shape[0]
+    number = np.full(1 << k, -1)
+    sign, members, n = np.zeros(k), np.zeros(k, np.int64), np.zeros(3)
+    angles, flip = np.zeros(k), np.zeros(k)
+    radius, found, faces, used = np.inf, 0, 0, 0
+    for i in range(k):
+        for j in range(i + 1, k):
+            length = 0.0
+            for c in range(3):
+                e, f = (c + 1) % 3, (c + 2) % 3
+                n[c] = G[i, e] * G[j, f] - G[i, f] * G[j, e]
+                length += n[c] * n[c]
+            length, inside, height, first = sqrt(length), 0, 0.0, True
+            for m in range(k):
+                dot = (n[0] * G[m, 0] + n[1] * G[m, 1] + n[2] * G[m, 2]) / length
+                height += abs(dot)
+                sign[m] = 1.0 if dot > 0.0 else -1.0
+                if m == i or m == j or abs(dot) <= zero:
+                    if m < j and m != i:
+                        first = False  # an earlier pair spans the same plane
+                    members[inside] = m
+                    inside += 1
+            if not first:
+                continue
+            radius = min(radius, height)
+            for c in range(3):
+                n[c] /= length
+            turned_order(G, members, inside, n, True, angles)
+            base = members[0]
+            for m in range(inside):
+                # a column runs with or against its place in the half turn
+                b, across, along = members[m], 0.0, 0.0
+                for c in range(3):
+                    e, f = (c + 1) % 3, (c + 2) % 3
+                    along += G[base, c] * G[b, c]
+                    across += n[c] * (G[base, e] * G[b, f] - G[base, f] * G[b, e])
+                flip[m] = 1.0 if across > 0.0 or (abs(across) <= 1e-300 and along > 0.0) else -1.0
+            for side in range(2):
+                turn = 1.0 if side == 0 else -1.0
+                for step in range(2 * inside):
+                    for m in range(inside):
+                        up = (m <= step) if step < inside else (m > step - inside)
+                        sign[members[m]] = flip[m] if up else -flip[m]
+                    code = 0
+                    for m in range(k):
+                        code |= (1 if sign[m] * turn > 0.0 else 0) << m
+                    if number[code] < 0:
+                        number[code] = found
+                        for c in range(3):
+                            vertices[found, c] = 0.0
+                            for m in range(k):
+                                vertices[found, c] += sign[m] * turn * G[m, c]
+                        found += 1
+                    corners[used] = number[code]
+                    used += 1
+                sizes[faces] = 2 * inside
+                faces += 1
+    counts[0], counts[1], counts[2] = found, faces, used
+    return radius
+
+
+@compiled(FLOAT(MATRIX, FLOAT, OUT2, COUNTS, COUNTS, COUNTS))
+def strip_faces(
+    A: Floats, zero: float, vertices: Floats, corners: Ints, sizes: Ints, counts: Ints
+) -> float:
+    """Vertices and faces of ``|A x| <= 1`` in space, A (n, 3); the radius. As `zonotope_faces`."""
+    n = A.shape[0]
+    x, angles, middle = np.zeros(3), np.zeros(vertices.shape[0]), np.zeros(3)
+    members, P = np.zeros(vertices.shape[0], np.int64), np.zeros(vertices.shape)
+    found, faces, used, longest = 0, 0, 0, 0.0
+    for i in range(n):
+        longest = max(longest, A[i, 0] ** 2 + A[i, 1] ** 2 + A[i, 2] ** 2)
+        for j in range(i + 1, n):
+            for m in range(j + 1, n):
+                det = 0.0
+                for c in range(3):
+                    e, f = (c + 1) % 3, (c + 2) % 3
+                    det += A[i, c] * (A[j, e] * A[m, f] - A[j, f] * A[m, e])
+                if abs(det) <= zero:
+                    continue
+                for side in range(4):
+                    # corners come in opposite pairs
+                    s, t = 1.0 if side & 1 else -1.0, 1.0 if side & 2 else -1.0
+                    for c in range(3):
+                        e, f = (c + 1) % 3, (c + 2) % 3
+                        x[c] = A[j, e] * A[m, f] - A[j, f] * A[m, e]
+                        x[c] += s * (A[m, e] * A[i, f] - A[m, f] * A[i, e])
+                        x[c] = (x[c] + t * (A[i, e] * A[j, f] - A[i, f] * A[j, e])) / det
+                    inside = True
+                    for r in range(n):
+                        height = A[r, 0] * x[0] + A[r, 1] * x[1] + A[r, 2] * x[2]
+                        inside &= abs(height) <= 1.0 + 1e-9
+                    for v in range(found if inside else 0):
+                        away, size = 0.0, 0.0
+                        for c in range(3):
+                            away = max(away, abs(vertices[v, c] - x[c]))
+                            size = max(size, abs(x[c]))
+                        inside &= away > 1e-8 * size
+                    if inside:
+                        for c in range(3):
+                            vertices[found, c], vertices[found + 1, c] = x[c], -x[c]
+                        found += 2
+    for r in range(n):
+        for side in range(2):
+            sign, count = 1.0 if side == 0 else -1.0, 0
+            for c in range(3):
+                middle[c] = 0.0
+            for v in range(found):
+                height = A[r, 0] * vertices[v, 0] + A[r, 1] * vertices[v, 1]
+                if abs(sign * (height + A[r, 2] * vertices[v, 2]) - 1.0) <= 1e-8:
+                    members[count] = v
+                    count += 1
+                    for c in range(3):
+                        middle[c] += vertices[v, c]
+            if count < 3:
+                continue
+            for i in range(count):
+                for c in range(3):
+                    P[members[i], c] = vertices[members[i], c] - middle[c] / count
+            turned_order(P, members, count, A[r], False, angles)
+            for i in range(count):
+                corners[used] = members[i]
+                used += 1
+            sizes[faces] = count
+            faces += 1
+    counts[0], counts[1], counts[2] = found, faces, used
+    return 1.0 / sqrt(longest)

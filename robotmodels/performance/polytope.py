@@ -166,7 +166,7 @@ def _zonotope(G: Array) -> Polytope:
         cross = vertices[:, 0] * edges[:, 1] - vertices[:, 1] * edges[:, 0]
         radius = float((np.abs(cross) / np.linalg.norm(edges, axis=1)).min())
         return _polytope(vertices, faces, radius)
-    return _zonotope_in_space(G) if m == 3 else _zonotope_of_corners(G)
+    return _in_space(G.T, False) if m == 3 else _zonotope_of_corners(G)
 
 
 def _merged(G: Array) -> Array:
@@ -185,56 +185,22 @@ def _merged(G: Array) -> Array:
     return np.stack([(G * sign)[:, first == k].sum(axis=1) for k in np.unique(first)], axis=1)
 
 
-def _zonotope_in_space(G: Array) -> Polytope:
-    """A zonotope in three dimensions: each pair of columns spans a face and its opposite."""
-    k = G.shape[1]
-    i, j = np.triu_indices(k, 1)
-    g = G.T
-    N = np.cross(g[i], g[j])
-    N /= np.linalg.norm(N, axis=1, keepdims=True)
-    height = N @ G
-    size = float(np.linalg.norm(G, axis=0).max())
-    above = np.where(np.abs(height) <= _ZERO * size, 0.0, np.sign(height))
-    in_plane = above == 0.0
-    simple = in_plane.sum(axis=1) == 2
-    # four corners of each parallelogram: the signs of the two columns, the others fixed
-    corners = np.repeat(above[simple][:, None], 4, axis=1)
-    rows = np.arange(int(simple.sum()))
-    for c, (a, b) in enumerate(((1, 1), (1, -1), (-1, -1), (-1, 1))):
-        corners[rows, c, i[simple]] = a
-        corners[rows, c, j[simple]] = b
-    loops = [*corners, *(-corners)]
-    seen: set[bytes] = set()
-    for p in np.flatnonzero(~simple):
-        members = np.flatnonzero(in_plane[p])
-        if (key := members.tobytes()) in seen:
-            continue  # several pairs span the same plane
-        seen.add(key)
-        loop = _around(G[:, members], N[p])
-        signs = np.repeat(above[p][None], len(loop), axis=0)
-        signs[:, members] = loop
-        loops += [signs, -signs]
-    sizes = [len(loop) for loop in loops]
-    signs = np.concatenate(loops)
-    codes = (signs > 0.0) @ (1 << np.arange(k))
-    _, index, number = np.unique(codes, return_index=True, return_inverse=True)
-    vertices = signs[index] @ G.T
-    faces = tuple(np.split(number, np.cumsum(sizes)[:-1]))
-    return _polytope(vertices, faces, float(np.abs(height).sum(axis=1).min()))
+def _in_space(A: Array, of_strips: bool) -> Polytope:
+    """A zonotope of rows of A (k, 3), or the intersection of the strips ``|A x| <= 1``."""
+    from .kernels import strip_faces, zonotope_faces
 
-
-def _around(G: Array, normal: Array) -> Array:
-    """Signs (2 k, k) of the corners of a zonogon in a plane, in order."""
-    x = G[:, 0] / np.linalg.norm(G[:, 0])
-    angle = np.arctan2(np.cross(normal, x) @ G, x @ G)
-    flip = np.where((angle < -1e-12) | (angle > np.pi - 1e-12), -1.0, 1.0)
-    order = np.argsort(np.where(flip < 0.0, (angle + 2.0 * np.pi) % np.pi, angle))
-    k = len(order)
-    steps = np.where(np.tri(k, dtype=np.bool_), 1.0, -1.0)
-    half = np.empty((k, k))
-    half[:, order] = steps
-    half *= flip
-    return np.concatenate((half, -half))
+    k = len(A)
+    faces = 2 * k if of_strips else k * (k - 1)
+    room = 8 * k * (k - 1) * (k - 2) // 6 if of_strips else faces + 2
+    vertices, sizes = np.empty((room, 3)), np.empty(faces, np.int64)
+    corners, counts = np.empty(room * (2 * k if of_strips else 8), np.int64), np.zeros(3, np.int64)
+    size = float(np.sqrt(np.einsum("ij,ij->i", A, A).max()))
+    zero = _ZERO * (size**3 if of_strips else size)
+    run = strip_faces if of_strips else zonotope_faces
+    radius = run(np.ascontiguousarray(A), zero, vertices, corners, sizes, counts)
+    ends = np.cumsum(sizes[: counts[1]])
+    loops = [corners[b - n : b] for b, n in zip(ends.tolist(), sizes.tolist(), strict=False)]
+    return Polytope(vertices[: counts[0]].copy(), tuple(loops), radius, PolytopeStatus.BOUNDED)
 
 
 def _zonotope_of_corners(G: Array) -> Polytope:
@@ -287,6 +253,8 @@ def _strips(J: Array, tau: Array) -> Polytope:
         if rank == 0:
             return _polytope(np.zeros((1, m)), (), float("inf"), status)
         A = A @ basis.T
+    if rank == m == 3:
+        return _in_space(A, True)
     chosen = np.array(list(combinations(range(n), rank)))
     if len(chosen) * 2**rank > _MOST_CORNERS:
         raise InvalidValueError(
@@ -312,16 +280,8 @@ def _strips(J: Array, tau: Array) -> Polytope:
         for side in (1.0, -1.0):
             face = np.flatnonzero(codes[:, c] == side)
             if len(face) >= rank:
-                faces.append(_ordered(corners, face, A[c]) if rank == 3 else face)
+                faces.append(face)
     return _polytope(corners @ basis, tuple(faces), float(1.0 / length.max()), status)
-
-
-def _ordered(vertices: Array, face: NDArray[np.int64], normal: Array) -> NDArray[np.int64]:
-    """Vertices of a face in order around it."""
-    p = vertices[face] - vertices[face].mean(axis=0)
-    x = p[0] / np.linalg.norm(p[0])
-    y = np.cross(normal / np.linalg.norm(normal), x)
-    return face[np.argsort(np.arctan2(p @ y, p @ x))]
 
 
 def _polytope(
