@@ -13,6 +13,7 @@ from .calibration import (
     plot_selection,
 )
 from .camera import Camera
+from .control import animate_control, plot_control, plot_surface
 from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
 from .identification import (
     plot_excitation,
@@ -43,6 +44,7 @@ __all__ = [
     "Scene",
     "Unit",
     "animate",
+    "animate_control",
     "html_report",
     "identification_html",
     "jog",
@@ -51,6 +53,7 @@ __all__ = [
     "plot_calibration_normality",
     "plot_calibration_parameters",
     "plot_calibration_residuals",
+    "plot_control",
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
@@ -68,6 +71,7 @@ __all__ = [
     "plot_profiles",
     "plot_selection",
     "plot_singularities",
+    "plot_surface",
     "plot_torque_parts",
     "plot_trajectory",
     "show",
