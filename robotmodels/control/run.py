@@ -113,6 +113,10 @@ def run(
         disturbance = as_exact(disturbance, (model.n,), "disturbance")
     # between samples the torque is constant: order 5 is enough
     options.setdefault("method", Integrator.DOP853 if period is None else Integrator.RK45)
+    seconds = float(np.ptp(times)) if times.size else 0.0
+    options.setdefault(
+        "max_evaluations", int(2e4 * (1.0 + seconds) + 20 * seconds / (period or 1.0))
+    )
     wall = loop.wrench if loop.walls else None
     motion = simulate(
         *(model, q0, v0, loop, times, wall),

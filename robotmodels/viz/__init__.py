@@ -26,6 +26,7 @@ from .flexible import (
     show_flexible,
 )
 from .camera import Camera
+from .control import animate_control, plot_control, plot_surface
 from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
 from .flexible import plot_frequencies, plot_modes, show_flexible
 from .identification import (
@@ -96,6 +97,7 @@ __all__ = [
     "Scene",
     "Unit",
     "animate",
+    "animate_control",
     "html_report",
     "identification_html",
     "jog",
@@ -107,6 +109,7 @@ __all__ = [
     "plot_calibration_normality",
     "plot_calibration_parameters",
     "plot_calibration_residuals",
+    "plot_control",
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
@@ -131,6 +134,7 @@ __all__ = [
     "plot_selection",
     "plot_servo",
     "plot_singularities",
+    "plot_surface",
     "plot_torque_parts",
     "plot_trajectory",
     "plot_workspace",

@@ -1,0 +1,234 @@
+"""Figures and scenes of controlled robots: errors, torques and forces, sliding surfaces, arrows.
+
+Functions of figures return a `matplotlib.figure.Figure`, `animate_control` a `Scene`; they raise
+`InvalidValueError` for what is no run of a controlled robot. ``title`` is a text over the figure,
+``size`` its width and height in inches, shape (2,).
+
+Returns
+-------
+matplotlib.figure.Figure or Scene
+
+References
+----------
+Seed book sections 5.2.3 and 5.3.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array
+from ..control import ControlledMotion, SpringWall
+from ..errors import InvalidValueError
+from ..kinematics import dgm
+from ..trajectories import Samples
+from ..visual import Box, Cylinder
+from . import over_time, style
+from .motion import Track, keyframes
+from .scene import Scene
+from .shapes import Node, Triangles
+from .show import animate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COMPONENTS = np.array(["x", "y", "z", "rx", "ry", "rz"])
+_PIECES = 8  # of the shaft of an arrow
+_ARROW = (0.85, 0.2, 0.1, 1.0)
+_WALL = (0.45, 0.55, 0.7, 0.45)
+
+
+@style.plot
+def plot_control(
+    run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
+) -> Figure:
+    """Error, torques, force on the environment and Lyapunov function of a run over time.
+
+    Panels of a force that is zero all the time, and of a law without Lyapunov function, are left
+    out.
+
+    Parameters
+    ----------
+    run : ControlledMotion
+        As `robotmodels.control.run` gives it.
+
+    Examples
+    --------
+    >>> from robotmodels.control import ComputedTorque, run
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> figure = plot_control(run(arm, ComputedTorque(np.full(6, 0.1), model=arm), np.zeros(6)))
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['error', 'torque (N m)', 'V']
+    """
+    run = style.as_instance(run, ControlledMotion, "run", "control.run")
+    names = over_time.joint_names(None, run.q.shape[1], run.simulation.model)
+    panels = [("error", run.error, _error_names(run, names))] if run.error.size else []
+    slides = over_time.is_prismatic(run.simulation.model)
+    unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
+    panels.append((f"torque ({unit})", run.tau, names))
+    felt = np.abs(run.wrench).max(axis=0) > 1e-9 * max(np.abs(run.wrench).max(), 1e-9)
+    if felt.any():
+        labels = [f"f{c}" if k < 3 else f"m{c[1]}" for k, c in enumerate(_COMPONENTS)]
+        parts = [label for label, seen in zip(labels, felt, strict=True) if seen]
+        units = "force (N)" if not felt[3:].any() else "force, moment\n(N, N m)"
+        panels.append((units, run.wrench[:, felt], parts))
+    if run.lyapunov is not None:
+        panels.append(("V", run.lyapunov[:, None], ["V"]))
+    return _figure(run.t, panels, title, size)
+
+
+@style.plot
+def plot_surface(
+    run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
+) -> Figure:
+    """The surface ``s = e' + slope e`` of sliding modes, passivity and adaptive control over time.
+
+    Parameters
+    ----------
+    run : ControlledMotion
+        As `robotmodels.control.run` gives it, of a law with a surface.
+
+    Examples
+    --------
+    >>> from robotmodels.control import Passivity, run
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> law = Passivity(np.full(6, 0.1), slope=5.0, gain=50.0, model=arm)
+    >>> len(plot_surface(run(arm, law, np.zeros(6), t=0.2)).axes)
+    1
+    """
+    run = style.as_instance(run, ControlledMotion, "run", "control.run")
+    if (s := run.surface) is None:
+        raise InvalidValueError(
+            f"run: {type(run.law).__name__} has no surface; sliding modes, passivity and adaptive "
+            "control have one."
+        )
+    names = over_time.joint_names(None, s.shape[1], run.simulation.model)
+    return _figure(run.t, [("s (rad/s or m/s)", s, names)], title, size)
+
+
+def animate_control(
+    run: ControlledMotion,
+    *,
+    walls: SpringWall | Sequence[SpringWall] = (),
+    length: float | None = None,
+    **options: Any,
+) -> Scene:
+    """Draw the robot of a run as it moves, with the force on the environment as an arrow.
+
+    Parameters
+    ----------
+    run : ControlledMotion
+        As `robotmodels.control.run` gives it.
+    walls : SpringWall or sequence of SpringWall
+        Walls that are drawn.
+    length : float, optional
+        Length of the arrow of the largest force, m; default some part of the scene.
+    **options
+        As for `animate`.
+
+    Examples
+    --------
+    >>> from robotmodels.control import PDGravity, SpringWall, run
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> law = PDGravity(np.full(6, 0.1), kp=300.0, kd=60.0, model=arm)
+    >>> animate_control(run(arm, law, np.zeros(6), t=0.5)).motion.duration
+    0.5
+    """
+    run = style.as_instance(run, ControlledMotion, "run", "control.run")
+    sim, still = run.simulation, 0.0 * run.q
+    moving = animate(sim.model, Samples(run.t, run.q, run.v, sim.a, still), **options)
+    if moving.motion is None:  # animations have one
+        return moving
+    tips, size = dgm(sim.model, run.q)[:, :3, 3], 0.15 * moving.camera.distance
+    size = size if length is None else float(length)
+    nodes, tracks = _arrow(run.t - run.t[0], tips, run.wrench[:, :3], size)
+    given = (walls,) if isinstance(walls, SpringWall) else tuple(walls)
+    nodes += [_wall(wall, tips, size, f"walls/{k}") for k, wall in enumerate(given, 1)]
+    motion = replace(moving.motion, tracks=(*moving.motion.tracks, *tracks))
+    return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)
+
+
+def _error_names(run: ControlledMotion, names: list[str]) -> list[str]:
+    """Names of the components of the error."""
+    rows = getattr(getattr(run.law, "inner", run.law), "rows", None)
+    count = run.error.shape[1]
+    if getattr(run.law, "space", "") == "joint" or rows is None or len(rows) != count:
+        return names if count == len(names) else [f"component {k + 1}" for k in range(count)]
+    return _COMPONENTS[rows].tolist()
+
+
+def _figure(
+    t: Array, panels: Sequence[tuple[str, Array, list[str]]], title: str | None, size: Any
+) -> Figure:
+    """Panels over each other with one axis of time."""
+    height = 0.6 + 1.5 * len(panels)
+    figure, grid = style.panels(style.COLUMN, height, size, len(panels), sharex=True)
+    for axes, (label, values, names) in zip(grid[:, 0], panels, strict=True):
+        axes.axhline(0.0, **style.ZERO)
+        # hidden from the legend of the figure: each panel has its own
+        over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names])
+        axes.set_ylabel(label)
+        if len(names) > 1:
+            lines = axes.get_lines()[-len(names) :]
+            axes.legend(lines, names, loc="upper right", ncols=min(len(names), 3))
+    grid[-1, 0].set_xlabel("time (s)")
+    return style.finished(figure, title)
+
+
+def _arrow(t: Array, tips: Array, force: Array, size: float) -> tuple[list[Node], list[Track]]:
+    """An arrow that begins at the tool: shifts along x, y, z, two turns, and pieces that spread."""
+    norms = np.linalg.norm(force, axis=1)
+    if not norms.max() > 0.0:
+        return [], []
+    seen = np.where(norms[:, None] > 1e-3 * norms.max(), force, 0.0)
+    turn = np.unwrap(np.arctan2(seen[:, 1], seen[:, 0]))
+    tilt = np.unwrap(np.arctan2(np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]))
+    along = size * norms / norms.max()
+    times, values = keyframes(t, np.column_stack([tips, turn, tilt, along]))
+    path, nodes, tracks = "force", list[Node](), list[Track]()
+    # turned so that the axis of each shift or turn is z: x, y, z, then z and y of the arrow
+    before = np.eye(3)
+    for k, (name, first) in enumerate((("x", 1), ("y", 2), ("z", 0), ("turn", 0), ("tilt", 2))):
+        axes = np.eye(3)[:, [first, (first + 1) % 3, (first + 2) % 3]]
+        pose = np.eye(4)
+        pose[:3, :3], before = before.T @ axes, axes
+        nodes += [Node(f"{path}/{name}", pose), Node(f"{path}/{name}/moved", np.eye(4))]
+        path += f"/{name}/moved"
+        tracks.append(Track(path, k < 3, times, values[:, k]))
+    pose = np.eye(4)
+    pose[:3, :3] = before.T
+    nodes.append(Node(f"{path}/arrow", pose))
+    ring = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+    circle = 0.045 * size * np.column_stack([np.cos(ring), np.sin(ring), 0.0 * ring])
+    points = np.vstack([circle, [[0.0, 0.0, 0.0], [0.0, 0.0, 0.13 * size]]]).astype(np.float32)
+    sides = [(k, (k + 1) % 24, apex) for k in range(24) for apex in (24, 25)]
+    shapes = [(f"piece_{k}", (k + 0.5) / _PIECES) for k in range(_PIECES)] + [("head", 1.0)]
+    for name, part in shapes:
+        at = f"{path}/arrow/{name}"
+        rod = Cylinder(0.015 * size, size / _PIECES)
+        shape = rod if name != "head" else Triangles(points, np.array(sides, dtype=np.uint32))
+        nodes += [Node(at, se3.translation(0.0, 0.0, part * values[0, 5]))]
+        nodes += [Node(f"{at}/shape", np.eye(4), shape, _ARROW)]
+        tracks.append(Track(at, True, times, part * values[:, 5]))
+    return nodes, tracks
+
+
+def _wall(wall: SpringWall, tips: Array, size: float, path: str) -> Node:
+    """A square plate below the surface, at the point nearest to the path of the tool."""
+    above = (tips - wall.point) @ wall.normal
+    centre = tips[above.argmin()] - above.min() * wall.normal
+    pose, thin = np.eye(4), 0.03 * size
+    side = np.cross(wall.normal, np.eye(3)[np.abs(wall.normal).argmin()])
+    side /= np.linalg.norm(side)
+    pose[:3, :3] = np.column_stack([side, np.cross(wall.normal, side), wall.normal])
+    pose[:3, 3] = centre - 0.5 * thin * wall.normal
+    return Node(path, pose, Box((1.6 * size, 1.6 * size, thin)), _WALL)

@@ -1,0 +1,67 @@
+"""Figures and scenes of controlled robots."""
+
+import numpy as np
+import pytest
+from test_control import Q0, WALL, arm, hybrid
+
+import robotmodels as rm
+from robotmodels import control
+from robotmodels.errors import InvalidValueError
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    return control.run(arm(), hybrid(), Q0, t=np.linspace(0, 0.5, 51), environment=WALL)
+
+
+def test_figures_have_the_panels_of_the_law(pushed):
+    figure = rm.viz.plot_control(pushed, title="hybrid")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["error", "torque (N m)", "force (N)"]
+    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert texts == ["x", "y"]
+    drawn = figure.axes[2].get_lines()[-1].get_ydata()
+    assert np.allclose(drawn, pushed.wrench[:, 0])
+    law = control.SlidingMode(Q0, 5.0, 30.0, layer=0.1, model=arm())
+    run = control.run(arm(), law, Q0 - 0.1, t=np.linspace(0, 0.2, 5))
+    assert len(rm.viz.plot_control(run).axes) == 3
+    lines = rm.viz.plot_surface(run).axes[0].get_lines()[-2:]
+    assert np.allclose([line.get_ydata() for line in lines], run.surface.T)
+    with pytest.raises(InvalidValueError, match="ParallelHybrid has no surface"):
+        rm.viz.plot_surface(pushed)
+    with pytest.raises(InvalidValueError, match="run: expected"):
+        rm.viz.plot_control(law)
+
+
+def test_the_force_is_an_arrow_at_the_tool(pushed):
+    scene = rm.viz.animate_control(pushed, walls=[WALL], length=0.5)
+    tracks = {track.path: track for track in scene.motion.tracks if "force" in track.path}
+    poses = {node.path: node.pose for node in scene.nodes}
+
+    def place(path, k):
+        """World pose of a node at keyframe k."""
+        T, parts = np.eye(4), path.split("/")
+        for end in range(1, len(parts) + 1):
+            at = "/".join(parts[:end])
+            T = T @ poses.get(at, np.eye(4))
+            if at in tracks:
+                value, moved = tracks[at].values[k], np.eye(4)
+                if tracks[at].prismatic:
+                    moved[2, 3] = value - poses[at][2, 3]
+                else:
+                    c, s = np.cos(value), np.sin(value)
+                    moved[:2, :2] = [[c, -s], [s, c]]
+                T = T @ moved
+        return T
+
+    head = next(path for path in tracks if path.endswith("head"))
+    start = head.removesuffix("/head")
+    tips = rm.dgm(arm(), pushed.q)[:, :3, 3]
+    times = tracks[head].times
+    k = len(times) - 1
+    assert np.allclose(place(start, k)[:3, 3], tips[-1], atol=1e-6)
+    force = pushed.wrench[-1, :3]
+    expected = 0.5 * force / np.linalg.norm(pushed.wrench[:, :3], axis=1).max()
+    assert np.allclose(place(head, k)[:3, 3] - tips[-1], expected, atol=1e-3)
+    assert "walls/1" in scene.paths
+    free = control.run(arm(), control.PDGravity(Q0, 9, 9, arm()), Q0 + 0.1, t=0.2)
+    assert not any("force" in path for path in rm.viz.animate_control(free).paths)
