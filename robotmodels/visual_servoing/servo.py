@@ -236,8 +236,8 @@ def servo(
             estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
             own = primary.matrix(s, sight_of(feature, T)) @ v
-        camera_pose = object_pose @ inverse(T) if arm is None else arm.camera
-        rows.append([k * h, T, camera_pose, None if arm is None else arm.q, s, error, v, code])
+        place, q = (object_pose, None) if arm is None else (arm.camera, arm.q)
+        rows.append([k * h, T, place, q, s, error, v, code])
         if lost:
             break
         given: Any = target(k * h) if callable(target) else target
@@ -250,7 +250,8 @@ def servo(
             T = (moved(T, h * v) if sampled else _continued(task, T, v, h)) @ shift
             object_pose = object_pose @ shift
     t, T, cameras, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
-    joints, codes = None if arm is None else q, codes.astype(np.int8)
+    cameras, joints = (cameras @ inverse(T), None) if arm is None else (cameras, q)
+    codes = codes.astype(np.int8)
     return ServoMotion(task, t, T, cameras, joints, s, error, velocity, codes, camera)
 
 
@@ -317,5 +318,10 @@ def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
 
 def _bracket(a: Array, b: Array) -> Array:
     """Lie bracket of twists."""
-    linear = np.cross(a[3:], b[:3]) - np.cross(b[3:], a[:3])
-    return np.concatenate((linear, np.cross(a[3:], b[3:])))
+    (p, q, r, x, y, z), (i, j, k, u, v, w) = a.tolist(), b.tolist()
+    linear = (
+        y * k - z * j + q * w - r * v,
+        z * i - x * k + r * u - p * w,
+        x * j - y * i + p * v - q * u,
+    )
+    return np.array((*linear, y * w - z * v, z * u - x * w, x * v - y * u))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .._arrays import Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-from ..se3 import as_pose, skew
+from ..se3 import as_pose
 from .camera import Camera
 from .features import Feature, Points, Sight, as_measurement, wrapped
 from .results import Result
@@ -272,7 +272,8 @@ def moved(T: Array, twist: Array) -> Array:
         angle = math.sqrt(square)
         a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
         c = (1.0 - a) / square
-    W = skew(w)
+    x, y, z = w.tolist()
+    W = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
     WW = W @ W
     after = np.eye(4)
     after[:3, :3] += a * W + b * WW
