@@ -148,8 +148,8 @@ def test_a_linear_model_is_the_derivative_of_the_accelerations(rng):
 @pytest.mark.parametrize("stiffening", [False, True])
 def test_a_free_body_keeps_its_momenta_and_energy(stiffening):
     tip = (0.2, (0.1, 0.05, 0), 0.02)
-    link = flexible.beam(1.0, (20.0, 30.0), tip=tip, modes=1, stiffening=stiffening, gyration=0.05)
-    found = flexible.free_body(link, [0.02, 0.01], [0.1, 0.2, 0.3, 0.3, 0.5, 1.0], 10.0)
+    link = flexible.beam(1.0, (4.0, 6.0), tip=tip, modes=1, stiffening=stiffening, gyration=0.05)
+    found = flexible.free_body(link, [0.02, 0.01], [0.1, 0.2, 0.3, 0.2, 0.1, 0.6], 10.0)
     assert found.status == FlexibleMotionStatus.FINISHED
     assert found.t[-1] == 10.0
     assert found.energy_drift < 1e-8

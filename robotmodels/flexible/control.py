@@ -335,7 +335,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
             slope = (moved.y[:, -1].reshape(-1, 2 * m) - base).T / _STEP
         before = error
         c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(n, K)
-    path, found = JointPolynomial(*ends, T, c), elastic(c[None], _FINE, dense=True)
+    path, found = JointPolynomial(ends[0], ends[1], T, c), elastic(c[None], _FINE, dense=True)
     size = np.abs(found.y).max(axis=1, initial=0.0) + 1e-12
     end = (found.y[:, -1] - goal) / size
     still = (np.abs(end) < 10.0 * _STILL).all()

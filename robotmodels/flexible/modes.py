@@ -171,7 +171,7 @@ def craig_bampton(
     --------
     >>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     >>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
-    array([0.445, 1.247, 1.8019])
+    array([0.445 , 1.247 , 1.8019])
     """
     from scipy.linalg import eigh
 

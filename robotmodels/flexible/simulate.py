@@ -240,7 +240,8 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
 
     def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
         given = (q, v, e, ev) if count >= 5 else (q, v) if count > 1 else ()
-        return as_exact(law(t, *(x.copy() for x in given)), (size,), f"{name} at t = {t:.9g} s")
+        answer: Any = law(t, *(x.copy() for x in given))
+        return as_exact(answer, (size,), f"{name} at t = {t:.9g} s")
 
     return value
 
