@@ -194,15 +194,15 @@ def simulate(
         softened[0] = softened[0] or base[0, 9] > 0.0
         power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
         force = Z[:3, :3] @ base[0, :3]
-        moment = Z[:3, :3] @ base[0, 3:6] + np.cross(Z[:3, 3], force)
+        moment = Z[:3, :3] @ base[0, 3:6] + _cross(Z[:3, 3], force)
         force, moment = (
             force + total * model.gravity,
-            moment + np.cross(base[0, 6:9], model.gravity),
+            moment + _cross(base[0, 6:9], model.gravity),
         )
         if w.any():
             power -= w @ jacobian(arm, q, e) @ np.concatenate([v, ev])
             place = _tool(arm, q, e)
-            force, moment = force - w[:3], moment - w[3:] - np.cross(place, w[:3])
+            force, moment = force - w[:3], moment - w[3:] - _cross(place, w[:3])
         return np.concatenate([v, ev, a[0], ea[0], [power], force, moment])
 
     y0 = np.concatenate([*(start[k] for k in (0, 1, 2, 3)), np.zeros(7)])
@@ -308,6 +308,11 @@ def _relative(error: Array, *sizes: Array) -> float:
         size = max(float(np.linalg.norm(x[:, part], axis=1).max()) for x in sizes)
         found = max(found, float(np.abs(error[:, part]).max()) / max(size, 1e-9))
     return found
+
+
+def _cross(a: Any, b: Any) -> list[float]:
+    """Vector product of short sequences, quicker than NumPy's."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 # --- one body in space --------------------------------------------------------------------------
@@ -422,17 +427,26 @@ def free_body(
     flags, nothing = np.zeros(1, np.int64), np.zeros((1, m))
 
     def rate(t: float, y: Array) -> Array:
-        e, ev, twist, quaternion, _ = np.split(y, cuts)
         e_a, base = np.empty((1, m)), np.empty((1, 10))
-        rows = [np.ascontiguousarray(x[None]) for x in (e, ev, twist)]
+        rows = [y[None, a:b].copy() for a, b in ((0, m), (m, 2 * m), (2 * m, 2 * m + 6))]
         loads(
             arrays, none, rows[0], none, rows[1], none, nothing, np.zeros((1, 6)), rows[2], flags,
             1, 1, np.empty((1, 0)), e_a, base,
         )  # fmt: skip
-        u, w = quaternion[:3], twist[3:]
-        turn = 0.5 * np.append(quaternion[3] * w + np.cross(u, w), -u @ w)
-        speed = Rotation.from_quat(quaternion).apply(twist[:3])
-        return np.concatenate([ev, e_a[0], base[0, :6], turn, speed])
+        v, w, (*u, s) = (
+            y[2 * m : 2 * m + 3].tolist(),
+            y[2 * m + 3 :][:3].tolist(),
+            y[2 * m + 6 :][:4],
+        )
+        turned, lever = _cross(u, w), _cross(u, v)
+        again = _cross(u, lever)
+        out = np.empty_like(y)
+        out[:m], out[m : 2 * m], out[2 * m : 2 * m + 6] = rows[1][0], e_a[0], base[0, :6]
+        for k in range(3):
+            out[2 * m + 6 + k] = 0.5 * (s * w[k] + turned[k])
+            out[2 * m + 10 + k] = v[k] + 2.0 * (s * lever[k] + again[k])
+        out[2 * m + 9] = -0.5 * sum(a * b for a, b in zip(u, w, strict=True))
+        return out
 
     y0 = np.concatenate([*start, as_exact(v0, (6,), "v0"), [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
     times, Y, status, _ = followed(
