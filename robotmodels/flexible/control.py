@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_exact, as_number, as_reals
+from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .linear import static_deflection
@@ -148,7 +148,7 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPolynomial(Frozen):
+class JointPolynomial(Frozen, Value):
     """Motion of the joints from rest to rest: ``q0 + (q1 - q0) p(s) + c_k p_k(s)``, s = t / T.
 
     Parameters
@@ -213,7 +213,7 @@ def _basis(s: ArrayLike, K: int, order: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RestToRest(Frozen):
+class RestToRest(Frozen, Value):
     """Motion from rest to rest in a fixed time.
 
     Parameters
@@ -234,6 +234,10 @@ class RestToRest(Frozen):
     end: Array
     status: RestStatus
     _elastic: Any = field(repr=False)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return self.arm, self.trajectory, self.end, self.status
 
     def elastic(self, t: ArrayLike) -> tuple[Array, Array]:
         """Elastic coordinates and velocities (..., m) at times (...)."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Frozen, as_number
+from .._arrays import Array, Frozen, Value, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
@@ -40,7 +40,7 @@ class TipStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipTracking(Frozen):
+class TipTracking(Frozen, Value):
     """Motion of the joints that moves the tip of a flexible arm along a reference.
 
     Parameters
@@ -79,6 +79,10 @@ class TipTracking(Frozen):
         values = np.hstack([self.tau, self.q, self.v])
         spline = CubicSpline(self.t, values) if len(self.t) else None
         object.__setattr__(self, "_spline", spline)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     def torque(self, t: float) -> Array:
         """Torques (n,) at a time, constant outside the motion."""
