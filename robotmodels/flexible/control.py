@@ -151,14 +151,7 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 class JointPolynomial(Frozen, Value):
     """Motion of the joints from rest to rest: ``q0 + (q1 - q0) p(s) + c_k p_k(s)``, s = t / T.
 
-    Parameters
-    ----------
-    q0, q1 : ndarray, shape (n,)
-        Ends.
-    duration : float
-        T, s.
-    factors : ndarray, shape (n, K)
-        Coefficients c.
+    Shapes: q0, q1 (n,), factors c (n, K).
     """
 
     q0: Array
