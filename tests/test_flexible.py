@@ -351,6 +351,14 @@ def test_the_end_of_a_flexible_last_link_is_the_tool():
     np.testing.assert_allclose(flexible.dgm(ONE, [0.0], e)[:2, 3], [1.0, moved], atol=1e-15)
 
 
+def test_a_bent_tip_points_where_its_slope_leads():
+    both = flexible.FlexibleRobot(PIVOT, {1: flexible.beam(1.0, EI=1.0, modes=1)})
+    for column, axis in ((0, 2), (1, 1)):
+        bent = flexible.dgm(both, [0.0], 0.1 * np.eye(2)[column])
+        assert bent[axis, 3] == pytest.approx(0.1)
+        assert np.arcsin(bent[axis, 0]) == pytest.approx(0.1376506, rel=1e-6)  # slope of the mode
+
+
 SLIDE = RobotModel.from_table(DHTable(antecedent=[0], sigma=[1]))
 NODES, STIFF = np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.diag([1.0, 1, 1, 9, 4, 4])
 BAD = {
@@ -370,7 +378,7 @@ BAD = {
         [1.0, 1.0], STIFF, np.array([[0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 1, 0]]).T, NODES
     ),
     "moving root": lambda: flexible.from_modes([1.0, 1.0], STIFF, np.ones((6, 1)), NODES),
-    "too many modes": lambda: flexible.from_modes([1.0, 1.0], STIFF, np.eye(6)[:, 2:], NODES),
+    "too many modes": lambda: flexible.from_modes([1.0, 1.0], STIFF, np.eye(6)[:, 3:], NODES),
     "interface twice": lambda: flexible.craig_bampton(np.eye(3), np.eye(3), [2, 2], 1),
     "not a robot": lambda: flexible.dgm(PIVOT, [0.0]),
     "joints": lambda: flexible.natural_frequencies(ONE, [0.0], "held"),

@@ -1,14 +1,7 @@
 """Flexible robots (chapter 7): elastic links and joints, their dynamics and control."""
 
 from .beams import beam
-from .control import (
-    JointPolynomial,
-    RestStatus,
-    RestToRest,
-    joint_tracking,
-    regulator,
-    rest_to_rest,
-)
+from .control import RestStatus, RestToRest, joint_tracking, regulator, rest_to_rest
 from .linear import (
     Deflection,
     DeflectionStatus,
@@ -47,7 +40,6 @@ __all__ = [
     "FlexibleRobot",
     "FreeBodyMotion",
     "Invariants",
-    "JointPolynomial",
     "LinearModel",
     "ReducedModel",
     "RestStatus",

@@ -43,6 +43,7 @@ def beam(
     stiffening: bool = False,
     *,
     gyration: float | None = None,
+    carried: Any = None,
     pose: ArrayLike | None = None,
 ) -> FlexibleLink:
     """Flexible link from a uniform Euler-Bernoulli beam along the x axis of its frame.
@@ -77,6 +78,9 @@ def beam(
         Whether foreshortening is included, which keeps a spinning beam stiff.
     gyration : float, optional
         Polar radius of gyration of the section, m; default ``length / 50`` with torsion, else 0.
+    carried : float, (mass, inertia) or (mass, com, inertia), optional
+        What the next links and their load are at the tip, for the shapes of the modes alone: fewer
+        modes suffice. It is no part of this link's mass.
     pose : array_like, shape (4, 4), optional
         Pose of the beam's root in the frame of its joint; default identity.
 
@@ -126,15 +130,19 @@ def beam(
         raise InvalidValueError("gyration: torsion needs a positive radius of gyration, got 0.")
     T = np.eye(4) if pose is None else se3.as_single_pose(pose, "pose")
 
-    kinds = list[Mode]()
+    more, lever, spin = _tip_body(carried)
+    kinds, all_mass = list[Mode](), mass + more
+    place = (mass * com[0] + more * lever[0]) / all_mass if all_mass else 0.0
     for axis in (1, 2):
         if np.isfinite(EI_p := float(stiff[axis - 1])):
-            loads = (mass / (rho * L), com[0] / L, J[axis, axis] / (rho * L**3))
+            about = J[axis, axis] + spin[axis, axis]
+            about += mass * (com[0] - place) ** 2 + more * (lever[0] - place) ** 2
+            loads = (all_mass / (rho * L), place / L, about / (rho * L**3))
             root = h / (rho * L**3) if ends == "pinned-hub" and axis == 2 else None
             for b, shape in bending_modes(int(modes), loads, root):
                 kinds.append(Mode(axis, EI_p, (b / L) ** 2 * np.sqrt(EI_p / rho), shape))
     if np.isfinite(torsion):
-        polar = J[0, 0] + mass * float(com[1] ** 2 + com[2] ** 2)
+        polar = J[0, 0] + spin[0, 0] + mass * float(com[1] ** 2 + com[2] ** 2)
         for b, shape in torsion_modes(int(modes), polar / (rho * L * k * k)):
             kinds.append(Mode(0, torsion, b / L * np.sqrt(torsion / (rho * k * k)), shape))
     body = BeamData(

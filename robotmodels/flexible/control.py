@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_exact, as_number, as_reals
+from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .linear import static_deflection
@@ -148,17 +148,10 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPolynomial(Frozen):
+class JointPolynomial(Frozen, Value):
     """Motion of the joints from rest to rest: ``q0 + (q1 - q0) p(s) + c_k p_k(s)``, s = t / T.
 
-    Parameters
-    ----------
-    q0, q1 : ndarray, shape (n,)
-        Ends.
-    duration : float
-        T, s.
-    factors : ndarray, shape (n, K)
-        Coefficients c.
+    Shapes: q0, q1 (n,), factors c (n, K).
     """
 
     q0: Array
@@ -213,7 +206,7 @@ def _basis(s: ArrayLike, K: int, order: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RestToRest(Frozen):
+class RestToRest(Frozen, Value):
     """Motion from rest to rest in a fixed time.
 
     Parameters
@@ -234,6 +227,10 @@ class RestToRest(Frozen):
     end: Array
     status: RestStatus
     _elastic: Any = field(repr=False)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return self.arm, self.trajectory, self.end, self.status
 
     def elastic(self, t: ArrayLike) -> tuple[Array, Array]:
         """Elastic coordinates and velocities (..., m) at times (...)."""
@@ -335,7 +332,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
             slope = (moved.y[:, -1].reshape(-1, 2 * m) - base).T / _STEP
         before = error
         c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(n, K)
-    path, found = JointPolynomial(*ends, T, c), elastic(c[None], _FINE, dense=True)
+    path, found = JointPolynomial(ends[0], ends[1], T, c), elastic(c[None], _FINE, dense=True)
     size = np.abs(found.y).max(axis=1, initial=0.0) + 1e-12
     end = (found.y[:, -1] - goal) / size
     still = (np.abs(end) < 10.0 * _STILL).all()

@@ -518,9 +518,8 @@ def motions(
 ) -> None:
     """Poses, energies, momenta, and the velocity of the tool, in world axes.
 
-    Shapes: q, v (N, n); e, ev (N, m); twist of the base (N, 6) -> poses (N, f + 1, 3, 4), the last
-    of the tip section, at the tool; out (N, 15): energies (kinetic, of gravity, elastic), momenta
-    (6), twist of the tool (6).
+    Shapes: twist of the base (N, 6) -> poses (N, f + 1, 3, 4), the last of the tip section at the
+    tool; out (N, 15): energies (kinetic, gravity, elastic), momenta (6), twist of the tool (6).
     """
     f, t, work = arm.pi.shape[0], arm.end, workspace(arm)
     for i in range(q.shape[0]):

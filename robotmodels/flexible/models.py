@@ -120,9 +120,9 @@ def jacobian(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Ar
     batch, (q, e) = checked_rows(arm, q=q, e=e)
     n, size = arm.n, arm.n + arm.m
     unit = np.tile(np.eye(size), (len(q), 1))
-    many = [np.repeat(x, size, axis=0) for x in (q, e)]
-    _, out = _motions(arm, *many, unit[:, :n], unit[:, n:])
-    return out[:, 9:].reshape(len(q), size, 6).swapaxes(1, 2).reshape(*batch, 6, size)
+    q, e = (np.repeat(x, size, axis=0) for x in (q, e))
+    _, out = _motions(arm, q, e, unit[:, :n], unit[:, n:])
+    return out[:, 9:].reshape(*batch, size, 6).swapaxes(-1, -2).copy()
 
 
 def energies(
@@ -220,10 +220,10 @@ def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) ->
     bare[..., 16:] = 0.0  # no elastic forces
     arrays = arm.arrays._replace(second=read_only(bare), gravity=read_only(np.zeros(3)))
     unit = np.tile(np.eye(size), (len(q), 1))
-    many = [np.repeat(x, size, axis=0) for x in (q, e)]
-    rest = [np.zeros((len(unit), k)) for k in (n, arm.m)]
-    given = (unit[:, :n], unit[:, n:])
-    forces = generalized_forces(arm, *many, *rest, *given, arrays=arrays, elastic=False)
+    q, e = (np.repeat(x, size, axis=0) for x in (q, e))
+    forces = generalized_forces(
+        arm, q, e, 0.0 * q, 0.0 * e, unit[:, :n], unit[:, n:], arrays=arrays, elastic=False
+    )
     return np.hstack(forces).reshape(*batch, size, size)
 
 
@@ -310,6 +310,7 @@ def solved(
     rest = 0.0 if drives is None else drives.torque(v, None)
     value = given - rest if direct and drives is not None else given
     flags = np.full(arm.n, int(direct))
+    net = spring = np.zeros((N, 0))
     turns, rates = _of_links(arm, q, e), _of_links(arm, v, ev)
     if len(joints):
         k, d = arm.joint_stiffness[joints], arm.joint_damping[joints]  # type: ignore[index]

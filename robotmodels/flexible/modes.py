@@ -26,8 +26,8 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     M, K : array_like, shape (c, c)
         Mass and stiffness of the nodes: c = 3 N displacements, or 6 N with rotations after the
         displacements of each node. M may be the N masses of the nodes.
-    shapes : array_like, shape (c, m)
-        Orthogonal modes, zero at the first node.
+    shapes : array_like, shape (c, m) or (N, 3, m)
+        Orthogonal modes, zero at the first node; at most N.
     nodes : array_like, shape (N, 3)
         Places in the frame of the joint, m; the last is where the next link is fixed.
 
@@ -58,13 +58,15 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     if X.ndim != 2 or X.shape[1] != 3 or len(X) < 2:
         raise ShapeError(f"nodes: expected shape (N, 3), N from 2, got {X.shape}.")
     N, S = len(X), as_floats(shapes, "shapes")
+    if S.ndim == 3 and S.shape[0] == N:  # (N, 3, m), as the shapes of a link are
+        S = S.reshape(-1, S.shape[2])
     if S.ndim != 2 or len(S) not in (3 * N, 6 * N):
         raise ShapeError(f"shapes: expected ({3 * N}, m) or ({6 * N}, m), got {S.shape}.")
     c, m = S.shape
-    if m > c - c // N:
+    if m > N:
         raise InvalidValueError(
-            f"shapes: {m} modes of {N} nodes, of which one is clamped: expected at most "
-            f"{c - c // N}."
+            f"shapes: expected at most as many modes as nodes, got {m} modes of {N} nodes; take "
+            "fewer modes, or a finer mesh."
         )
     K, M = _symmetric(K, c, "K"), as_floats(M, "M")
     if M.shape == (N,):
@@ -171,7 +173,7 @@ def craig_bampton(
     --------
     >>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     >>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
-    array([0.445, 1.247, 1.8019])
+    array([0.445 , 1.247 , 1.8019])
     """
     from scipy.linalg import eigh
 

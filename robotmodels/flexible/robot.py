@@ -133,7 +133,7 @@ class FlexibleRobot(Value):
         """What the compiled recursions take."""
         if self._arm is None:
             object.__setattr__(self, "_arm", _arrays_of(self))
-        return self._arm
+        return self._arm  # type: ignore[return-value]
 
     @property
     def _values(self) -> tuple[Any, ...]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Frozen, as_number
+from .._arrays import Array, Frozen, Value, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
@@ -40,7 +40,7 @@ class TipStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipTracking(Frozen):
+class TipTracking(Frozen, Value):
     """Motion of the joints that moves the tip of a flexible arm along a reference.
 
     Parameters
@@ -79,6 +79,10 @@ class TipTracking(Frozen):
         values = np.hstack([self.tau, self.q, self.v])
         spline = CubicSpline(self.t, values) if len(self.t) else None
         object.__setattr__(self, "_spline", spline)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     def torque(self, t: float) -> Array:
         """Torques (n,) at a time, constant outside the motion."""
@@ -174,10 +178,10 @@ def tip_tracking(
     slowest = float(unstable.real.min()) if unstable.size else np.inf
     before = _TIME_CONSTANTS / slowest if preview is None else preview
     before = as_number(before, "preview", least=0.0)
-    nothing = [np.zeros((0, k)) for k in (n, n, n, m, m)]
+    nothing: Any = [np.zeros((0, k)) for k in (n, n, n, m, m)]
     if method == "causal" and unstable.size:
         refused = TipStatus.NON_MINIMUM_PHASE
-        return TipTracking(arm, np.zeros(0), *nothing, zeros, 0.0, refused)
+        return TipTracking(arm, np.zeros(0), *nothing, zeros=zeros, preview=0.0, status=refused)
     after = before if unstable.size else 0.0
     ends = ((-before, 0.0), (0.0, T), (T, T + after))  # with nodes where the motion has kinks
     parts = [np.linspace(a, b, _PART, endpoint=False) for a, b in ends if b > a]
@@ -193,10 +197,12 @@ def tip_tracking(
             q, v, a = (np.array(x) for x in zip(*samples, strict=True))
         return [q.reshape(-1, n), v.reshape(-1, n) * inside, a.reshape(-1, n) * inside]
 
-    found = _inverted(arm, grid, path)
+    found: Any = _inverted(arm, grid, path)
     if found is None:
-        return TipTracking(arm, np.zeros(0), *nothing, zeros, before, TipStatus.NOT_FOUND)
-    return TipTracking(arm, grid, *found, zeros, before, TipStatus.FOUND)
+        return TipTracking(
+            arm, np.zeros(0), *nothing, zeros=zeros, preview=before, status=TipStatus.NOT_FOUND
+        )
+    return TipTracking(arm, grid, *found, zeros=zeros, preview=before, status=TipStatus.FOUND)
 
 
 def _inverted(
@@ -212,24 +218,25 @@ def _inverted(
 
     def motors(t: Array, e: Array, ev: Array) -> tuple[Array, Array, Array, Array]:
         """Motion of the motors without the share of the elastic accelerations, and the gain."""
+        t = np.atleast_1d(t)
         H, dH, ddH = (gains(t, order).reshape(-1, n, m) for order in range(3))
-        wanted = reference(np.atleast_1d(t))
+        wanted = reference(t)
         y, dy, ddy = (x - shift(t, order) for order, x in enumerate(wanted))
         x, dx = e[..., None], ev[..., None]
         v, a = dy - (dH @ x + H @ dx)[..., 0], ddy - (ddH @ x + 2.0 * dH @ dx)[..., 0]
         return y - (H @ x)[..., 0], v, a, H
 
-    def rate(t: Array, z: Array) -> Array:
+    def rate(t: Array, z: Array) -> Any:
         e, ev = z[:m].T, z[m:].T
         q, v, a, H = motors(t, e, ev)
         M = mass_matrix(arm, q, e)
         force = generalized_forces(arm, q, e, v, ev, a, 0.0 * e)[1]
         return np.vstack([ev.T, np.linalg.solve(zero_mass(M, H), -force[..., None])[..., 0].T])
 
-    def zero_mass(M: Array, H: Array) -> Array:
+    def zero_mass(M: Array, H: Array) -> Any:
         return M[..., n:, n:] - M[..., n:, :n] @ H
 
-    def rest(t: float) -> tuple[Array, Array]:
+    def rest(t: float) -> tuple[Any, Any]:
         """Equilibrium with the tip on the path, and matrix of the zero dynamics about it."""
         e = np.zeros((1, m))
         for _ in range(_CORRECTIONS):

@@ -63,7 +63,7 @@ def show_flexible(
     >>> from robotmodels import load, flexible
     >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
     >>> show_flexible(arm, np.zeros(6), [0.0, 0.05]).paths[0]
-    'configuration_1/row_1'
+    'configuration_1/row_3'
     """
     as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
     q = as_vector(np.zeros(arm.n) if q is None else q, arm.n, "q")
