@@ -6,9 +6,7 @@ SECTIONS = "tests/test_performance.py -k "
 PATHS = "tests/test_performance_paths.py -k "
 
 
-def fault(
-    name: str, after: str, old: str, new: str, tests: str, compiled: bool = True
-) -> Mutation:
+def fault(name: str, after: str, old: str, new: str, tests: str, compiled: bool = True) -> Mutation:
     """A fault of the room."""
     return Mutation("performance", name, after, old, new, tests, compiled)
 
@@ -34,17 +32,15 @@ MUTATIONS = [
           "(low[k], high[k])", "(low[k],)", SECTIONS + "limits_cut_curves"),
     fault("only the first factor counts", "return np.asarray((self.values(q) > 0.0)",
           "(1 << np.arange(len(self.joints)))", "(1 >> np.arange(len(self.joints)))",
-          SECTIONS + "known_arms or eight_aspects or factors_are_labels or regular_paths"),
-    fault("the torus does not close", "graph = sparse.coo_matrix((np.ones(a.size), (a, b))",
-          "np.ones(a.size)", "np.zeros(a.size)", SECTIONS + "known_arms"),
+          PATHS + "joint_motion"),
+    fault("the torus does not close", "for axis, joined in enumerate(closed):", "if joined",
+          "if not joined", SECTIONS + "known_arms"),
     fault("the wrong side of a singular position", "wanted = (values[:, members] > 0.0)",
           "> 0.0", "< 0.0", SECTIONS + "eight_aspects"),
-    fault("levers of the bound too short", "levers = np.array([", "links[j + 1 :].sum()",
-          "0.0 * links[j + 1 :].sum()", SECTIONS + "bound_holds"),
+    fault("a bound that is too small", "return Bound(model, rows, chain.columns, length,",
+          "np.sqrt(squares)", "0.1 * np.sqrt(squares)", SECTIONS + "bound_holds"),
     fault("a path is proved by its ends alone", "fall = np.abs(b - a)", "@ bound.slopes",
           "@ (0.0 * bound.slopes)", SECTIONS + "bound_of_the_proof"),
-    fault("postures with other signs are joined", "if code[s] == code[r] >= 0",
-          "code[s] == code[r] >= 0", "code[s] >= 0 and code[r] >= 0", SECTIONS + "six_joints"),
     fault("labels without a proof", "return bool((np.abs(products)", "== 1.0", "<= 1.0",
           SECTIONS + "six_joints"),
     fault("a prediction meets any posture", "near = _AGREES * size", "_AGREES * size + 1e-9",
@@ -55,15 +51,17 @@ MUTATIONS = [
     fault("the longest motion is the best", "return int(chosen[price", "argmin", "argmax",
           PATHS + "least_cost"),
     fault("accessible outside the limits",
-          "q, inside = turned_inside(arm, q, limits)\n        valid", "&= inside", "&= True", SECTIONS + "says_why"),
+          "q, inside = turned_inside(arm, q, limits)\n        valid", "&= inside", "&= True",
+          SECTIONS + "says_why"),
     fault("collisions do not count", "kept[valid] =", "is_free(q[valid])", "True",
           SECTIONS + "free_workspace or says_why"),
-    fault("faces of a zonotope too near", "_polytope(vertices, faces, float(np.abs(height)",
-          ".sum(axis=1)", ".max(axis=1)", PATHS + "extremes_of_the_box"),
-    fault("strips of double width", "inside = np.abs(heights)", "1.0 + 1e-9", "2.0",
+    fault("faces of a zonotope too near", "height += abs(dot)\n                sign[m]",
+          "dot > 0.0", "dot < 0.0", PATHS + "extremes_of_the_box"),
+    fault("strips of double width", "inside &= abs(height) <=", "1.0 + 1e-9", "2.0",
           PATHS + "torques_balance"),
-    fault("mean over all rows", "count = np.maximum(valid.sum(axis=1), 1)", "valid.sum(axis=1)",
-          "valid.shape[1]", PATHS + "maps_are_those"),
+    fault("mean over all rows", "values[valid] = index_values(arm, q[valid]",
+          "valid.sum(axis=1)", "valid.shape[1] + 0 * valid.sum(axis=1)",
+          PATHS + "maps_are_those"),
     fault("the border stays in a region", "good &= ~neighbours(", "~inside", "inside",
           SECTIONS + "t_region"),
 ]  # fmt: skip
