@@ -38,6 +38,8 @@ def test_a_known_joint_motion_is_found(name):
     for row in found.following:
         chain.append(int(row[chain[-1]]))
     assert away[np.arange(60), chain].max() < 1e-6  # the posture that goes on is the one that was
+    factors = rm.explain_singularities(arm).values(found.q) > 0
+    assert (found.aspect == factors @ (1 << np.arange(factors.shape[1]))).all()
 
 
 def test_a_line_breaks_for_some_postures():
@@ -77,6 +79,13 @@ def test_limits_and_whole_turns():
     far = pf.feasible_path(arm, rm.dgm(arm, q + np.array([1.0, 0.0])))
     assert far.status is pf.PathStatus.BROKEN
     assert far.breaks.max() == np.argmax(q[:, 0] + 1 > 9)
+
+
+def test_a_start_beyond_half_a_turn():
+    arm = planar(1.0, 0.6, lower=[2, 0.1], upper=[9, 2])
+    q = np.column_stack((np.linspace(3.5, 8.0, 100), np.full(100, 1.0)))
+    found = pf.feasible_path(arm, rm.dgm(arm, q))
+    np.testing.assert_allclose(found.q, q, atol=1e-6)
 
 
 def test_through_a_singular_position():

@@ -1,11 +1,4 @@
-"""Performance analysis (chapter 3): accessibility, workspaces, aspects, cusps, paths, dexterity.
-
-Terms that come back: ``limits`` (whether joint limits count), ``free`` (a function of q (N, n)
-that returns bool (N,), or obstacles), ``mask`` (six 0/1 for x y z rx ry rz), ``length`` (metres
-that count as much as a radian). The section of an arm whose position three joints determine is
-half a plane through its first axis, or a plane across it if that joint slides; of two joints that
-move the tool in a plane it is that plane.
-"""
+"""Performance analysis (chapter 3): accessibility, workspaces, aspects, cusps, paths, dexterity."""
 
 from .accessibility import Accessibility, AccessStatus, accessibility
 from .aspects import Aspects, AspectStatus, aspects, free_components

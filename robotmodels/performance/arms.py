@@ -15,9 +15,9 @@ from .. import se3
 from .._arrays import Array, Rebuilt, as_mask, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
-from ..igm.loop import JointChain, joint_chain
+from ..igm.loop import joint_chain
 from ..igm.position import prepare_position
-from ..kinematics import jacobian
+from ..kinematics import dgm, jacobian
 from ..kinematics.lengths import characteristic_length, spread_configurations
 from ..model import RobotModel, check_model
 from ..obstacles import clearance
@@ -162,7 +162,7 @@ def _section_arm(model: RobotModel) -> SectionArm | None:
         slide[:3, :3] = _axes(normal)
         rest = np.array([se3.inverse(slide) @ D, *rest])
         D, kinds, columns = slide, np.array([1, *kinds]), np.array([-1, *columns])
-        tip = _tip(model, np.zeros(model.n))
+        tip = dgm(model, np.zeros(model.n))[:3, 3]  # any position gives the height of the plane
         D[:3, 3] = normal * (normal @ tip)
         rest[0] = se3.inverse(D) @ model.base @ chain.D[0]
     elif chain.k != 3 or prepare_position(chain) is None:
@@ -214,12 +214,6 @@ def plane_normal(model: RobotModel) -> Array | None:
     return np.asarray(vectors[2])
 
 
-def _tip(model: RobotModel, q: Array) -> Array:
-    from ..kinematics import dgm
-
-    return np.asarray(dgm(model, q)[..., :3, 3])
-
-
 def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray[np.bool_]:
     """Components of the twist that the postures of an arm mean (6,): by the mask, or by its joints.
 
@@ -248,7 +242,7 @@ def joint_ranges(
     """
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (limits | ~turning)
-    asked = chain_of(model).columns if columns is None else np.asarray(columns)
+    asked = joint_chain(model).columns if columns is None else np.asarray(columns)
     slides = np.intersect1d(np.flatnonzero(~turning & ~bounded), asked)
     if slides.size:
         raise InvalidValueError(
@@ -335,8 +329,3 @@ def sequence(count: int, dimensions: int) -> Array:
         g = (1.0 + g) ** (1.0 / (dimensions + 1))
     steps = g ** -np.arange(1.0, dimensions + 1)
     return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0)
-
-
-def chain_of(model: RobotModel) -> JointChain:
-    """The joints that move the tool."""
-    return joint_chain(model)

@@ -1,33 +1,53 @@
-"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book."""
+"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book.
+
+Parameters
+----------
+arm : RobotModel
+    The robot.
+limits : bool
+    Whether the joint limits cut the joint space.
+free : callable or obstacles, optional
+    Function of q (N, n) that returns bool (N,), or obstacles: parts of the free space.
+resolution : int, optional
+    Cells along each joint.
+
+Raises
+------
+InvalidValueError
+    A slide without limits, a resolution that is no number of cells or needs more than 1 GB.
+
+References
+----------
+Seed book sections 3.4.1 to 3.4.4.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, tau
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_vector, read_only
 from .._outcomes import Outcome
+from ..igm.loop import joint_chain
 from ..model import RobotModel, check_model
 from .arms import (
     Free,
     Result,
-    chain_of,
     checked_flag,
     checked_resolution,
     free_predicate,
     joint_ranges,
     turned_inside,
 )
+from .components import Group, connected, core_cells, labels_of
 from .factors import Factors, sign_factors
 
 # cells along each of so many joints: at first, and when a grid does not separate all aspects
 _CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
 _FEW = 7
-_SPECKS = 1e-4  # of all cells: components without a core that belong to another
 
 
 class AspectStatus(Outcome):
@@ -39,20 +59,6 @@ class AspectStatus(Outcome):
     NOT_DEFINED = (
         3, "Aspects are not defined: the Jacobian of the task is not square, or never regular.",
     )  # fmt: skip
-
-
-class Group(NamedTuple):
-    """A grid over some joints (columns of q): lower ends, sides, which close, labels from 1."""
-
-    joints: tuple[int, ...]
-    low: Array
-    side: Array
-    closed: tuple[bool, ...]
-    factors: tuple[int, ...]
-    labels: NDArray[np.int32]
-    codes: NDArray[np.int64]
-    volumes: Array
-    separates: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -130,7 +136,7 @@ class Aspects(Result):
                 inside &= is_free(rows)
             factors = sign_factors(self.model) if self.names else None
             values = None if factors is None else factors.values(rows)
-            place = np.stack([_labels(g, rows, values) for g in self.groups], axis=-1)
+            place = np.stack([labels_of(g, rows, values) for g in self.groups], axis=-1)
             sizes = [len(g.volumes) + 1 for g in self.groups]
             number = np.full(sizes, -1)
             number[tuple(self.order.T)] = np.arange(self.count)
@@ -156,30 +162,10 @@ def aspects(
     others the pose. The joint space is cut by every factor of the determinant on a grid that
     closes in itself where no limit cuts it.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    limits : bool
-        Whether the joint limits cut the joint space.
-    free : callable or obstacles, optional
-        Function of q (N, n) that returns bool (N,), or obstacles: aspects of the free space.
-    resolution : int, optional
-        Cells along each joint.
-
     Returns
     -------
     Aspects
         The parts with their volumes and signs; none, with a status, for redundant arms.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits, a resolution that is no number of cells or needs more than 1 GB.
-
-    References
-    ----------
-    Seed book sections 3.4.1 to 3.4.4.
 
     Examples
     --------
@@ -197,30 +183,10 @@ def free_components(
 ) -> Aspects:
     """Connected components of the free joint space, singular positions included.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    free : callable or obstacles, optional
-        Function of q (N, n) that returns bool (N,), or obstacles.
-    limits : bool
-        Whether the joint limits cut the joint space.
-    resolution : int, optional
-        Cells along each joint.
-
     Returns
     -------
     Aspects
         The components with their volumes; ``signs`` is empty.
-
-    Raises
-    ------
-    InvalidValueError
-        As for `aspects`.
-
-    References
-    ----------
-    Seed book section 3.4.3.
 
     Examples
     --------
@@ -237,7 +203,7 @@ def _divided(
     resolution: int | None,
 ) -> Aspects:  # fmt: skip
     bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
-    columns = tuple(int(c) for c in chain_of(arm).columns)
+    columns = tuple(int(c) for c in joint_chain(arm).columns)
     names = () if factors is None else factors.names
     if not columns or (signed and factors is None):
         return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)
@@ -304,11 +270,11 @@ def _group(
         values = factors.values(q)[:, list(members)].T.reshape(-1, *shape)
         for k, value in zip(members, values, strict=True):
             code |= (value > 0.0).astype(np.int64) << k
-            certain &= _core(value, closed)
+            certain &= core_cells(value, closed)
     if is_free is not None:
         flags = is_free(q).reshape(shape)
         code = np.where(flags, code, -1)
-    labels, separates = _connected(code, certain & (code >= 0), closed)
+    labels, separates = connected(code, certain & (code >= 0), closed)
     count = int(labels.max())
     sizes = np.bincount(labels.ravel(), minlength=count + 1)[1:]
     codes = np.zeros(count, np.int64)
@@ -317,96 +283,6 @@ def _group(
         joints, read_only(low), read_only(side), closed, members, read_only(labels, np.int32),
         read_only(codes, np.int64), read_only(sizes * float(np.prod(width / cells))), separates,
     )  # fmt: skip
-
-
-def _core(value: Array, closed: tuple[bool, ...]) -> NDArray[np.bool_]:
-    """Cells in which a factor cannot vanish, judged by its differences to the next cells."""
-    change = np.zeros_like(value)
-    for axis in range(value.ndim):
-        step = np.abs(np.diff(value, axis=axis, append=np.take(value, [0], axis=axis)))
-        if not closed[axis]:
-            last = [slice(None)] * value.ndim
-            last[axis] = slice(-1, None)
-            step[tuple(last)] = 0.0
-        change += np.maximum(step, np.roll(step, 1, axis=axis))
-    return np.abs(value) > change
-
-
-def _connected(
-    code: NDArray[np.int64], certain: NDArray[np.bool_], closed: tuple[bool, ...]
-) -> tuple[NDArray[np.int32], bool]:
-    """Labels, from 1, of connected cells with equal codes; whether the grid separates them all."""
-    from scipy import ndimage
-
-    labels = np.zeros(code.shape, np.int32)
-    separates, specks = True, _SPECKS * code.size
-    for value in np.unique(code[code >= 0]):
-        same = code == value
-        whole, count = _torus_labels(same, closed)
-        cores, _ = _torus_labels(same & certain, closed)
-        sizes = np.bincount(whole.ravel(), minlength=count + 1)
-        pairs = np.unique(np.stack((whole[cores > 0], cores[cores > 0])), axis=1)
-        per_part = np.bincount(pairs[0], minlength=count + 1)
-        kept = (per_part > 0) | (sizes > specks)
-        kept[0] = False
-        if not kept.any():
-            kept[1:] = sizes[1:] == sizes[1:].max()
-        separates &= bool((per_part[kept] == 1).all())
-        number = np.where(kept, np.cumsum(kept), 0)
-        own = number[whole]
-        lost = same & (own == 0)
-        if lost.any():
-            # the cut-off tips of a part belong to it
-            near = ndimage.distance_transform_edt(own == 0, False, True)
-            own[lost] = own[tuple(axis[lost] for axis in near)]
-        labels[same] = own[same] + labels.max()
-    return labels, separates
-
-
-def _torus_labels(
-    flags: NDArray[np.bool_], closed: tuple[bool, ...]
-) -> tuple[NDArray[np.int64], int]:
-    """Labels of connected cells, the ends of closed axes joined."""
-    from scipy import ndimage, sparse
-
-    labels, count = ndimage.label(flags)
-    pairs = [np.zeros((2, 0), np.int64)]
-    for axis, joined in enumerate(closed):
-        if joined:
-            ends = np.stack((np.take(labels, 0, axis).ravel(), np.take(labels, -1, axis).ravel()))
-            pairs.append(ends[:, (ends > 0).all(axis=0)])
-    a, b = np.unique(np.concatenate(pairs, axis=1), axis=1)
-    graph = sparse.coo_matrix((np.ones(a.size), (a, b)), (count + 1, count + 1))
-    total, parts = sparse.csgraph.connected_components(graph, directed=False)
-    # the background keeps zero
-    parts = np.where(parts == parts[0], 0, parts + (parts < parts[0]))
-    return parts[labels], int(total) - 1
-
-
-def _labels(group: Group, q: Array, values: Array | None) -> NDArray[np.int64]:
-    """Label of the part of a group for configurations (N, n); 0 where there is none."""
-    cells = np.array(group.labels.shape)
-    x = q[:, list(group.joints)]
-    closed = np.array(group.closed)
-    x = np.where(closed, (x + pi) % tau - pi, x)
-    at = np.clip(np.floor((x - group.low) / group.side).astype(int), 0, cells - 1)
-    labels = group.labels[tuple(at.T)].astype(np.int64)
-    if values is None or not group.factors:
-        return labels
-    members = list(group.factors)
-    wanted = (values[:, members] > 0.0) @ (1 << np.array(members))
-    codes = np.append(-1, group.codes)
-    # beside a singular position the cell may be of another aspect: look around
-    for reach in (1, 2):
-        wrong = np.flatnonzero(codes[labels] != wanted)
-        for step in np.ndindex(*(2 * reach + 1,) * len(cells)) if wrong.size else ():
-            to = at[wrong] + np.array(step) - reach
-            good = np.all(closed | ((to >= 0) & (to < cells)), axis=1)
-            other = group.labels[tuple((to % cells).T)]
-            good &= codes[other] == wanted[wrong]
-            labels[wrong[good]] = other[good]
-            wrong = wrong[~good]
-    return np.where(codes[labels] == wanted, labels, 0)
 
 
 def _products(

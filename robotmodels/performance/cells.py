@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_mask, read_only
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
+from ..igm.loop import joint_chain
 from ..kinematics import dgm
 from ..model import RobotModel
 from .arms import (
     SectionArm,
     _axes,
-    chain_of,
     checked_resolution,
     joint_ranges,
     plane_normal,
@@ -65,7 +65,7 @@ def space_of(
     ``turned``: whether a turn of the first joint leaves the question as it is.
     """
     rows = None if mask is None else as_mask(mask)
-    chain = chain_of(model)
+    chain = joint_chain(model)
     if chain.k < 2:
         return None
     if rows is not None and rows[:3].sum() == 2:
@@ -105,7 +105,7 @@ def space_of(
 
 def samples(model: RobotModel, limits: bool, count: int) -> Array:
     """Configurations (count, n) that fill the joint ranges evenly; still joints at zero."""
-    columns = chain_of(model).columns
+    columns = joint_chain(model).columns
     ranges, _ = joint_ranges(model, limits)
     q = np.zeros((count, model.n))
     span = ranges[columns, 1] - ranges[columns, 0]
@@ -164,3 +164,34 @@ def neighbours(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
             grown[tuple(to)] |= out[tuple(of)]
         out = grown
     return out
+
+
+def outlines(
+    reached: NDArray[np.bool_], points: Array, size: Array, shape: tuple[int, ...]
+) -> list[Array]:
+    """Outlines of the cells that are reached, which lie on their left."""
+    flags = np.pad(reached.reshape(shape), 1)
+    follows: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for i, j in zip(*np.nonzero(flags), strict=True):
+        sides = (
+            (flags[i, j - 1], (i, j), (i + 1, j)),
+            (flags[i + 1, j], (i + 1, j), (i + 1, j + 1)),
+            (flags[i, j + 1], (i + 1, j + 1), (i, j + 1)),
+            (flags[i - 1, j], (i, j + 1), (i, j)),
+        )
+        for other, start, end in sides:
+            if not other:
+                follows.setdefault(start, []).append(end)
+    origin = points[0] - 1.5 * size
+    loops = []
+    while follows:
+        start = next(iter(follows))
+        path = [start]
+        while path[-1] in follows:
+            ends = follows[path[-1]]
+            step = ends.pop()
+            if not ends:
+                del follows[path[-1]]
+            path.append(step)
+        loops.append(origin + size * np.array(path))
+    return loops

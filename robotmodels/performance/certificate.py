@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..igm.loop import joint_chain
 from ..kinematics import jacobian
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .arms import chain_of
 
 _EVALUATIONS = 200000
 _SLACK = 1e-12  # of singular values by rounding
@@ -46,7 +46,7 @@ def bound_of(model: RobotModel, rows: NDArray[np.bool_], strokes: Array | None =
     """
     if rows.all():
         model = model.with_tool(np.eye(4))
-    chain = chain_of(model)
+    chain = joint_chain(model)
     k, D, sigma = chain.k, chain.D, chain.sigma
     slides = np.zeros(k) if strokes is None else np.where(sigma == 1, strokes[chain.columns], 0.0)
     links = np.linalg.norm(D[1:, :3, 3], axis=1) + np.append(slides[1:], 0.0)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import REVOLUTE
+from ..igm.loop import joint_chain
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel
 from ..se3.orientation import rotation_vectors_of
-from .arms import chain_of
 
 _SHORTEST = 2.0**-10  # part of the motion between two poses
 _CORRECTIONS = 6
@@ -37,7 +37,7 @@ def successors(
     Shapes: poses, following (M, 4, 4), q (M, S, n), q_next (M, R, n) -> (M, S), (M, S, n).
     """
     M, S, n = q.shape
-    chain = chain_of(model)
+    chain = joint_chain(model)
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     out, way = np.full((M, S), -1), np.zeros((M, S, n))
     step = _error(following, poses, rows, length)

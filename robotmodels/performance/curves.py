@@ -1,4 +1,27 @@
-"""Singular curves of three-joint arms, their cusps and nodes."""
+"""Singular curves of three-joint arms, their cusps and nodes.
+
+They are the same for all values of the first joint: the section is half a plane through its axis,
+or a plane across it if it slides; for a planar arm of two joints its plane. Other arms have a
+status instead.
+
+Parameters
+----------
+arm : RobotModel
+    The robot.
+limits : bool
+    Whether the limits of the last two joints cut the curves and add curves of their own; for
+    cusps and nodes limits of revolute joints do not count.
+
+Raises
+------
+InvalidValueError
+    A slide without limits, or something that is no robot.
+
+References
+----------
+Seed book sections 3.3.6, 3.4.2 and 3.4.4; M. Baili, P. Wenger and D. Chablat, "A classification of
+3R orthogonal manipulators by the topology of their workspace", ICRA 2004.
+"""
 
 from __future__ import annotations
 
@@ -112,29 +135,10 @@ class SpecialPoints(Result):
 def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
     """Singular curves of an arm whose position three joints determine, or two in a plane.
 
-    They are the same for all values of the first joint: the section is half a plane through its
-    axis, or a plane across it if it slides; for a planar arm of two joints its plane.
-
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    limits : bool
-        Whether the limits of the last two joints cut the curves and add curves of their own.
-
     Returns
     -------
     SingularCurves
-        Curves in joint space and in the section; none, with a status, for other arms.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits, or something that is no robot.
-
-    References
-    ----------
-    Seed book sections 3.3.6 and 3.4.2.
+        Curves in joint space and in the section.
 
     Examples
     --------
@@ -174,25 +178,10 @@ def cusps(arm: RobotModel) -> SpecialPoints:
     There the singular curve in joint space is tangent to the direction in which the arm moves
     without moving its tool. An arm with cusps can change posture without being singular.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot; limits of revolute joints do not count.
-
     Returns
     -------
     SpecialPoints
         One configuration for each cusp.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits, or something that is no robot.
-
-    References
-    ----------
-    Seed book section 3.4.4; M. Baili, P. Wenger and D. Chablat, "A classification of 3R orthogonal
-    manipulators by the topology of their workspace", ICRA 2004.
 
     Examples
     --------
@@ -218,24 +207,10 @@ def cusps(arm: RobotModel) -> SpecialPoints:
 def nodes(arm: RobotModel) -> SpecialPoints:
     """Nodes: points of the section where singular curves cross.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot; limits of revolute joints do not count.
-
     Returns
     -------
     SpecialPoints
         Two configurations for each node.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits, or something that is no robot.
-
-    References
-    ----------
-    Seed book section 3.4.4; the paper at `cusps`.
 
     Examples
     --------

@@ -3,6 +3,34 @@
 The indices: ``inverse_condition``, least over largest singular value; ``manipulability``, the
 product of the singular values; ``least_singular_value``; ``isotropy``, geometric over arithmetic
 mean of the eigenvalues of ``J J^T``. Linear rows next to angular ones are divided by ``length``.
+
+Parameters
+----------
+arm : RobotModel
+    The robot.
+q : array_like, shape (..., n)
+    Configurations, rad or m.
+over : Workspace, optional
+    Of the same arm; default its positions. Its limits and obstacles count.
+index : {"inverse_condition", "manipulability", "least_singular_value", "isotropy"}
+    Which index.
+measure : {"workspace", "joints"}
+    Mean over the area or volume that is reached, of the best posture; or over the joints.
+mask : array_like, shape (6,), optional
+    Components that count; default the task of the arm.
+length : float, optional
+    Metres that count as much as a radian; default the reach of the arm.
+
+Raises
+------
+ShapeError, InvalidValueError
+    ``q`` of the wrong length, a length that is not above zero, an unknown index, a workspace of
+    another arm or one in which nothing is reached.
+
+References
+----------
+Seed book sections 3.6.1 to 3.6.4; C. Gosselin and J. Angeles, "A global performance index for the
+kinematic optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
 """
 
 from __future__ import annotations
@@ -72,32 +100,10 @@ def isotropy_index(
 ) -> Array:
     """Isotropy index: geometric over arithmetic mean of the eigenvalues of ``J J^T``.
 
-    It is 1 where the tool moves equally well in all directions and 0 in singular positions.
-
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    q : array_like, shape (..., n)
-        Configurations, rad or m.
-    mask : array_like, shape (6,), optional
-        Components that count; default the task of the arm.
-    length : float, optional
-        Metres that count as much as a radian; default the reach of the arm.
-
     Returns
     -------
     ndarray, shape (...)
-        From 0 to 1.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, a length that is not above zero.
-
-    References
-    ----------
-    Seed book section 3.6.3.
+        1 where the tool moves equally well in all directions, 0 in singular positions.
 
     Examples
     --------
@@ -126,33 +132,11 @@ def dexterity_map(
 ) -> DexterityMap:
     """Index of dexterity at the cells of a workspace.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    over : Workspace, optional
-        Of the same arm; default its positions.
-    index : {"inverse_condition", "manipulability", "least_singular_value", "isotropy"}
-        Which one, see the head of the file.
-    mask : array_like, shape (6,), optional
-        Components that count; default the task of the arm.
-    length : float, optional
-        Metres that count as much as a radian; default the reach of the arm.
-
     Returns
     -------
     DexterityMap
         ``best`` and ``mean`` over the postures of each cell, aligned with ``over.points``. Where
         infinitely many postures reach a cell, over 200 000 samples of the joints.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        A workspace of another arm, an unknown index, a length that is not above zero.
-
-    References
-    ----------
-    Seed book section 3.6.1.
 
     Examples
     --------
@@ -203,33 +187,10 @@ def global_index(
 
     The two differ: configurations in which the tool moves far fill more of the workspace.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        The robot.
-    index : str
-        As for `dexterity_map`.
-    measure : {"workspace", "joints"}
-        Mean over the area or volume that is reached, of the best posture; or over the joints.
-    over : Workspace, optional
-        For the measure of the workspace, and whose limits and obstacles count.
-    mask, length
-        As for `dexterity_map`.
-
     Returns
     -------
     GlobalIndex
         The mean, a float, with its ``spread``.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        As for `dexterity_map`; nothing is reached.
-
-    References
-    ----------
-    Seed book section 3.6.1; C. Gosselin and J. Angeles, "A global performance index for the
-    kinematic optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
 
     Examples
     --------

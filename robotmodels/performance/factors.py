@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array
+from ..igm.loop import joint_chain
 from ..kinematics import jacobian
 from ..model import RobotModel
 from ..symbolic import explain_singularities
-from .arms import chain_of, section_arm, task_rows
+from .arms import section_arm, task_rows
 
 _CHUNK = 65536
 
@@ -35,7 +36,7 @@ class Factors:
         if arm is not None and not self.rows[3:].any():
             return arm.values(q[:, arm.columns[1:]])[:, 6:7]
         out = np.empty((len(q), 1))
-        columns = chain_of(self.model).columns
+        columns = joint_chain(self.model).columns
         for k in range(0, len(q), _CHUNK):
             J = jacobian(self.model, q[k : k + _CHUNK])[:, self.rows][..., columns]
             out[k : k + _CHUNK, 0] = np.linalg.det(J)
@@ -49,7 +50,7 @@ class Factors:
 def sign_factors(model: RobotModel, mask: ArrayLike | str | None = None) -> Factors | None:
     """Factors of the square matrix that decides; None if it is not square, or never regular."""
     rows = task_rows(model, mask)
-    columns = chain_of(model).columns
+    columns = joint_chain(model).columns
     if columns.size == 0 or (rows.sum() != columns.size and section_arm(model) is None):
         return None
     if mask is None:

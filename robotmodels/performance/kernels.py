@@ -235,7 +235,7 @@ def zonotope_faces(
                 dot = (n[0] * G[m, 0] + n[1] * G[m, 1] + n[2] * G[m, 2]) / length
                 height += abs(dot)
                 sign[m] = 1.0 if dot > 0.0 else -1.0
-                if m == i or m == j or abs(dot) <= zero:
+                if m in (i, j) or abs(dot) <= zero:
                     if m < j and m != i:
                         first = False  # an earlier pair spans the same plane
                     members[inside] = m

@@ -12,11 +12,12 @@ from .._arrays import Array, as_mask, read_only
 from .._outcomes import Outcome
 from ..errors import ShapeError
 from ..geometry import REVOLUTE
+from ..igm.loop import joint_chain
 from ..igm.request import poses_of
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
 from .accessibility import postures_of
-from .arms import Result, chain_of, checked_flag, checked_word, section_arm, task_rows
+from .arms import Result, checked_flag, checked_word, section_arm, task_rows
 from .certificate import bound_of
 from .continuation import successors
 from .factors import sign_factors
@@ -153,7 +154,7 @@ def feasible_path(
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
     rows = task_rows(arm, mask)
-    k = chain_of(arm).k
+    k = joint_chain(arm).k
     if len(T) == 0 or k == 0 or (rows.sum() < k and section_arm(arm) is None):
         return _nothing(len(T), arm.n, PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED)
     asked = None if mask is None else as_mask(mask)

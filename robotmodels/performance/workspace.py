@@ -17,7 +17,7 @@ from ..model import RobotModel, check_model
 from .accessibility import in_every_orientation, posture_counts
 from .arms import Result, checked_flag, checked_word, free_predicate, section_arm
 from .arrangement import boundary, measures
-from .cells import SECTIONS, Space, grid_of, measure_of_cells, space_of
+from .cells import SECTIONS, Space, grid_of, measure_of_cells, outlines, space_of
 from .reach import reached_cells
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
@@ -183,7 +183,7 @@ class Workspace(Result):
             return [line.copy() for line in boundary(self.model, self.limits)]
         if self.coordinates == "space":
             raise InvalidValueError("boundary: expected a workspace in a plane, got one in space.")
-        return _outlines(self)
+        return outlines(self.count > 0, self.points, self.size, self.shape)
 
     @property
     def _space(self) -> Space:
@@ -376,32 +376,3 @@ def _nothing(
         read_only(np.zeros(0), np.int64), read_only(np.ones(3)), (0, 0, 0), "space",
         read_only(np.eye(4)), WorkspaceStatus.NOT_DEFINED,
     )  # fmt: skip
-
-
-def _outlines(w: Workspace) -> list[Array]:
-    """Outlines of the cells that are reached, which lie on their left."""
-    flags = np.pad((w.count > 0).reshape(w.shape), 1)
-    follows: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for i, j in zip(*np.nonzero(flags), strict=True):
-        sides = (
-            (flags[i, j - 1], (i, j), (i + 1, j)),
-            (flags[i + 1, j], (i + 1, j), (i + 1, j + 1)),
-            (flags[i, j + 1], (i + 1, j + 1), (i, j + 1)),
-            (flags[i - 1, j], (i, j + 1), (i, j)),
-        )
-        for other, start, end in sides:
-            if not other:
-                follows.setdefault(start, []).append(end)
-    origin = w.points[0] - 1.5 * w.size
-    loops = []
-    while follows:
-        start = next(iter(follows))
-        path = [start]
-        while path[-1] in follows:
-            ends = follows[path[-1]]
-            step = ends.pop()
-            if not ends:
-                del follows[path[-1]]
-            path.append(step)
-        loops.append(origin + w.size * np.array(path))
-    return loops
