@@ -214,7 +214,9 @@ def test_six_joints_through_a_point_and_around_a_body():
     puma = rm.load("puma560")
     limits = MotionLimits(velocity=5.0)
     quintic = time_scaled(tr.quintic(START, END, duration=1.0), puma, PUMA_TORQUE, limits)
-    straight = time_optimal(tr.linear(START, END, duration=1.0), limits, puma, PUMA_TORQUE)
+    straight = time_optimal(  # limits kept between the points of the grid too, as of a plan
+        tr.linear(START, END, duration=1.0), limits, puma, PUMA_TORQUE, points=400, both_ends=True
+    )
     plan = kinodynamic(puma, START, END, limits, PUMA_TORQUE, seconds=30.0)
     assert plan.duration <= 0.9 * quintic.duration
     assert plan.duration <= straight.duration
