@@ -271,14 +271,8 @@ def plot_platform_workspace(
     axes = places.flat[0]
     x, y = (np.unique(column) for column in workspace.points.T)
     margin = workspace.margin.reshape(workspace.shape).T
-<<<<<<< HEAD
-    axes.contourf(
-        x, y, margin, levels=[0.0, max(margin.max(), 1e-9)], colors=[PALETTE[5]], alpha=0.5
-    )
-=======
     inside = [0.0, max(margin.max(), 1e-9)]
     axes.contourf(x, y, margin, levels=inside, colors=[PALETTE[5]], alpha=0.5)
->>>>>>> 24d14616ba61e184f61c39aff53fbe30666f6c45
     axes.contour(x, y, margin, levels=[0.0], colors=[PALETTE[0]], linewidths=1.2)
     names = ["reached"]
     axes.fill([], [], color=PALETTE[5], alpha=0.5, label="reached")
@@ -329,14 +323,8 @@ def _between(start: Array, end: Array) -> Array:
     z = end - start
     z = z / np.linalg.norm(z, axis=1)[:, None]
     yaw, pitch = np.unwrap(np.arctan2(z[:, 1], z[:, 0])), np.arccos(np.clip(z[:, 2], -1.0, 1.0))
-<<<<<<< HEAD
-    T = np.array(
-        [se3.rotation("z", a) @ se3.rotation("y", b) for a, b in zip(yaw, pitch, strict=True)]
-    )
-=======
     pairs = zip(yaw, pitch, strict=True)
     T = np.array([se3.rotation("z", a) @ se3.rotation("y", b) for a, b in pairs])
->>>>>>> 24d14616ba61e184f61c39aff53fbe30666f6c45
     T[:, :3, 3] = start
     return T
 
