@@ -15,6 +15,11 @@ from .calibration import (
 from .camera import (
     Camera,
 )
+from .control import (
+    animate_control,
+    plot_control,
+    plot_surface,
+)
 from .dynamics import (
     plot_energy,
     plot_inertia_map,
@@ -25,10 +30,6 @@ from .flexible import (
     plot_modes,
     show_flexible,
 )
-from .camera import Camera
-from .control import animate_control, plot_control, plot_surface
-from .dynamics import plot_energy, plot_inertia_map, plot_torque_parts
-from .flexible import plot_frequencies, plot_modes, show_flexible
 from .identification import (
     plot_excitation,
     plot_identification_correlations,
