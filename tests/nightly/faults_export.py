@@ -73,7 +73,7 @@ MUTATIONS = [
           POSTURES),
     fault("angles are not brought into one turn", "def _keep(", "2.0 * pi", "0.0",
           POSTURES),
-    fault("brackets of a difference", "def lines_of(", "operand(b, level + 1)",
+    fault("brackets of a difference", "def lines_of(program", "operand(b, level + 1)",
           "operand(b, level)", LANGUAGE),
     fault("columns of a matrix in MATLAB and C", "def element(self, port", "port.shape[-1]", "3",
           LANGUAGE),
