@@ -2,16 +2,15 @@
 
     python -m benchmarks.bench_loops [--out benchmarks/results] [--rounds 15]
 
-Contestants of a row take turns. Pinocchio's direct model runs bare, with the constraints and
-settings of ours and with twenty proximal iterations; its closing is the Newton iteration that users
-write, one posture after the other. toolbox-parallel-robots needs Pinocchio's CasADi bindings,
-which the wheel of the package index does not have; it is named and left out where it is missing.
+Contestants of a row take turns. Pinocchio's direct model runs bare, with the settings of
+ours and with twenty proximal iterations; its closing is the Newton iteration that users write.
+toolbox-parallel-robots needs Pinocchio's CasADi bindings, which the wheel does not have.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
+import importlib.util
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -104,9 +103,8 @@ def closing_row(robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
 
 def direct_row(name: str, robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
     """The direct model, one sample a call and in a batch."""
-    rng = np.random.default_rng(0)
-    v = loops.velocity_map(robot, q) @ rng.normal(size=len(robot.actuated))
-    tau = rng.normal(size=len(robot.actuated))
+    v_a, tau = np.random.default_rng(0).normal(size=(2, len(robot.actuated)))
+    v = loops.velocity_map(robot, q) @ v_a
     engine = engine_of(robot)
     full = np.zeros(robot.n)
     full[robot.actuated] = tau
@@ -136,10 +134,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=15)
     given = parser.parse_args()
     about = machine(["pin"])
-    try:
-        importlib.import_module(PEER)
-    except ImportError as error:
-        print(f"left out: {PEER} ({error})")
+    if importlib.util.find_spec(PEER) is None:
+        print(f"left out: {PEER}, which is not installed")
     rows = [closing_row(*robots()["four-bar"], given.rounds)]
     rows += [direct_row(name, *robot, given.rounds) for name, robot in robots().items()]
     text = [*head("Kinematic loops: measured side by side", about), "| us each | goal | medians |"]
@@ -147,8 +143,7 @@ def main() -> None:
     for row in rows:
         medians = "; ".join(f"{name} {value:.2f}" for name, value in row.microseconds.items())
         text.append(f"| {row.work} | {row.goal} | {medians} |")
-    numbers = {"machine": about, "rows": [asdict(row) for row in rows]}
-    keep(given.out, "loops", "\n".join(text) + "\n", numbers)
+    keep(given.out, "loops", "\n".join(text) + "\n", [asdict(row) for row in rows])
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from .robot import LoopedRobot, check_looped
 _PIECE = 512  # samples at a time
 _ROWS_A_COLUMN = 4  # rows of random motion per parameter
 _NARROWER = 12  # halvings of the range of the actuated joints
-_CHECKED = 40  # samples of the final check
+_CHECKED, _PROBES = 40, 16  # samples of the final check, and to find the range
 
 
 def torque_regressor(
@@ -176,9 +176,12 @@ def _motion(
     units, spread = robot.units[actuated], np.pi
     for _ in range(_NARROWER):
         by = rng.uniform(-spread, spread, (4 * count, len(actuated))) * units
-        found = followed(robot, reference[actuated] + by, reference)
-        q = found.q[found.status == ClosingStatus.CLOSED]
-        if len(q) >= 2 * count:
+        for some in (by[:_PROBES], by):  # a range in which at least half of the postures close
+            found = followed(robot, reference[actuated] + some, reference)
+            q = found.q[found.status == ClosingStatus.CLOSED]
+            if 2 * len(q) < len(some):
+                break
+        else:
             break
         spread *= 0.5
     else:

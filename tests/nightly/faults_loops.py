@@ -65,7 +65,7 @@ MUTATIONS = [
         "return min(map(abs, turned)) > _SAME and", "turned[0] * turned[1] < 0.0", "False",
         LOOPS + "become_singular"),
     Mutation("loops", "base parameters of any assembly",
-        "found = followed(robot, reference[actuated] + by, reference)", "reference)",
+        "found = followed(robot, reference[actuated] + some, reference)", "reference)",
         "np.zeros(robot.n))", LOOPS + "known_robots"),
     Mutation("loops", "a passive joint of a file is actuated",
         "driven = {element.get(", 'if name in driven', "if name not in driven",
