@@ -40,7 +40,7 @@ Examples
 >>> from robotmodels.parallel import gough_symmetric
 >>> robot = gough_symmetric(1.0).with_masses(platform=(6.0, [0, 0, 0], 0.1 * np.eye(3)))
 >>> idm(robot, robot.home, np.zeros(6), np.zeros(6)).round(3)
-array([13.15, 13.15, 13.15, 13.15, 13.15, 13.15])
+array([11.772, 11.772, 11.772, 11.772, 11.772, 11.772])
 >>> ddm(robot, robot.home, np.zeros(6), np.zeros(6)).round(2) + 0.0
 array([ 0.  ,  0.  , -9.81,  0.  ,  0.  ,  0.  ])
 >>> float(energies(robot, robot.home, [0, 0, 1, 0, 0, 0])[0].round(6))

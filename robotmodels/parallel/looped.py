@@ -264,9 +264,10 @@ def from_loops(
     >>> from robotmodels.geometry import DHTable
     >>> from robotmodels.loops import Closure, LoopedRobot
     >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 2, 3], sigma=[0, 0, 0, 0, 2], d=[0, 1, 1, 1, 1])
+    >>> table = DHTable(antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2],
+    ...                 d=[0, 0.5, 0.4, 0.4, 0.6, 0.6])
     >>> tree = RobotModel.from_table(table)
-    >>> five = LoopedRobot(tree, [Closure("cut", (4, 5), "point")], actuated=[0, 1])
+    >>> five = LoopedRobot(tree, [Closure("cut", (5, 6), "point")], actuated=[0, 1])
     >>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
     2
     """

@@ -35,7 +35,7 @@ Examples
 >>> from robotmodels.parallel import gough_symmetric
 >>> robot = gough_symmetric(1.0)
 >>> leg_forces(robot, robot.home, [0, 0, 60, 0, 0, 0]).forces.round(2)
-array([13.4, 13.4, 13.4, 13.4, 13.4, 13.4])
+array([12., 12., 12., 12., 12., 12.])
 >>> stiffness(robot, robot.home, 1e6).shape, bool(condition(robot, robot.home) < 10.0)
 ((6, 6), True)
 >>> turned = robot.pose([0, 0, 1, 0, 0, np.pi / 2])

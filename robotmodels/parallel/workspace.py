@@ -141,7 +141,7 @@ def workspace(
     >>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
     >>> found = workspace(robot, orientation=0.1, resolution=100)
     >>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
-    (1.34, array([ True, False]))
+    (1.2, array([ True, False]))
     """
     check_robot(robot)
     if not isinstance(robot, ParallelRobot):

@@ -77,7 +77,7 @@ def show_parallel(
     --------
     >>> from robotmodels.parallel import gough_symmetric
     >>> show_parallel(gough_symmetric(1.0))
-    <Scene 'Gough-Stewart platform': 23 shapes>
+    <Scene 'Gough-Stewart platform': 36 shapes>
     """
     poses = (robot.home if T is None else robot.checked(T)).reshape(-1, 4, 4)
     points, legs = _points(robot, poses)
@@ -127,7 +127,7 @@ def jog_parallel(
     --------
     >>> from robotmodels.parallel import gough_symmetric
     >>> jog_parallel(gough_symmetric(1.0, lower=0.8, upper=1.4))
-    <Scene 'Gough-Stewart platform': 29 shapes, 6 sliders>
+    <Scene 'Gough-Stewart platform': 30 shapes, 6 sliders>
     """
     if robot.has_cranks:
         raise InvalidValueError("robot: sliders of the platform need legs of variable length.")
@@ -199,7 +199,7 @@ def plot_assembly_modes(
     >>> from robotmodels.parallel import assembly_modes, planar_3rpr
     >>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
     >>> len(plot_assembly_modes(robot, assembly_modes(robot, [14.98, 15.38, 12.0])).axes)
-    6
+    8
     """
     T = np.asarray(modes.T)[modes.valid]
     if modes.valid.ndim != 1 or not len(T):
