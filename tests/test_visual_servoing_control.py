@@ -208,8 +208,9 @@ def test_statuses_out_of_sight_and_behind():
     assert run.status is S.OUT_OF_SIGHT
     assert len(run.t) == 1
     assert vs.servo(task, translation(0, 0, -1.0)).status is S.BEHIND
-    for feature in (vs.Sphere([0, 0, 0], 0.1), vs.Moments([*SQUARE[:3], [-0.15, 0.12, 0]]),
-                    vs.Lines([SQUARE[1:3]]), vs.Segments([SQUARE[:2]]), vs.PoseError()):  # fmt: skip
+    plate = vs.Moments([*SQUARE[:3], [-0.15, 0.12, 0]])
+    others = (vs.Lines([SQUARE[1:3]]), vs.Segments([SQUARE[:2]]), vs.PoseError())
+    for feature in (vs.Sphere([0, 0, 0], 0.1), plate, *others):
         law = vs.Task(feature, GOAL)
         assert vs.camera_velocity(law, aside, camera).status is S.OUT_OF_SIGHT
         assert vs.camera_velocity(law, GOAL, camera).status is S.CONVERGES

@@ -10,6 +10,9 @@ COUNTS = f"{TESTS} -k (operations or exact or tape_shares)"
 NAMES = f"{TESTS} -k (names or symbols or value or refused)"
 
 
+MOTIONS = "Motions of all links; the base"
+
+
 def fault(text: str, after: str, old: str, new: str, tests: str = MODELS) -> Mutation:
     """A fault of this room."""
     return Mutation("export", text, after, old, new, tests)
@@ -33,10 +36,10 @@ MUTATIONS = [
     fault("inward is outward", "def inward(self, a: Vector)", "c, -s", "c, s"),
     fault("shift of d before alpha", "d lies along the axis x", "*before[1]", "*before[0]"),
     fault("offset of a prismatic joint", "def links_of(model", "q[j] + r if", "q[j] if"),
-    fault("gravity is not replaced by an acceleration", "Motions of all links; the base", "-model.gravity",
+    fault("gravity is not replaced by an acceleration", MOTIONS, "-model.gravity",
           "model.gravity"),
-    fault("Coriolis acceleration of a prismatic joint", "Motions of all links; the base", "2.0 * rate", "rate"),
-    fault("velocity product of a revolute joint", "Motions of all links; the base", "dw[1] - w[0] * rate",
+    fault("Coriolis acceleration of a prismatic joint", MOTIONS, "2.0 * rate", "rate"),
+    fault("velocity product of a revolute joint", MOTIONS, "dw[1] - w[0] * rate",
           "dw[1] + w[0] * rate"),
     fault("gyroscopic moment", "Force ``M u + U MS`` and moment", "(ZZ - YY)", "(ZZ + YY)"),
     fault("first moments times acceleration", "Force ``M u + U MS`` and moment", "cross(MS, u)",
