@@ -22,7 +22,7 @@ def _collect(
     i: int, step: float, a: Floats, b: Floats, c: Floats, lower: Floats, upper: Floats,
     ends: Ints, rows: Floats,
 ) -> int:  # fmt: skip
-    """Rows ``(p, r, h)`` of ``p u + r x <= h`` on the interval i; -1 if no u can keep one."""
+    """Rows ``(p, r, h)`` of ``p u + r x <= h`` on the interval i; how many there are."""
     count = 0
     for k in range(a.shape[1]):
         for end in range(1 + ends[k]):

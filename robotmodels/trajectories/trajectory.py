@@ -106,8 +106,9 @@ class Trajectory(Value):
     ) -> Self:
         """Motion by functions of times t (N,), which return arrays (N, n), or (N,) for scalars.
 
-        Derivatives that are not given are differences of the last one given (errors of about
-        1e-12 of a first, 1e-10 of a second derivative). `check` looks at samples of such a motion.
+        Derivatives that are not given are differences of the last one given (relative errors
+        of about 1e-10 of a first, 1e-8 of a second derivative if it is smooth). `check`
+        looks at samples of such a motion.
         """
         end = as_number(duration, "duration", above=0.0)
         functions = (q, *(f for f in (v, a, jerk) if f is not None))
