@@ -68,7 +68,7 @@ def checked_symbols(
 
 
 _SYMBOLIC = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
-_SYMBOL = re.compile(r"(?=.*[A-Za-z_])[\w(+-][\w+*/(). -]{0,59}")
+_SYMBOL = re.compile(r"[-+(]*(?:[\d.]+[*/])?[-+(]*[A-Za-z_][\w+*/(). -]{0,59}")
 _NO_SYMBOLS: Mapping[tuple[str, int], str] = MappingProxyType({})
 _DEFAULT = {
     "gamma": "G", "b": "BL", "beta": "B", "alpha": "A", "d": "D", "theta": "TH", "r": "RL",
