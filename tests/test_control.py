@@ -685,6 +685,8 @@ def test_laws_and_runs_are_values():
             )
     run = control.run(arm(), laws()[0], Q0 - 0.1, t=0.2)
     again = pickle.loads(pickle.dumps(run))
+    assert again == run
+    assert hash(again) == hash(run)
     assert np.array_equal(again.error, run.error)
     assert again.status is run.status
     assert len(repr(run).splitlines()) <= 6

@@ -67,6 +67,12 @@ class ControlledMotion(Value):
                 value.setflags(write=False)
 
     @property
+    def _values(self) -> tuple[Any, ...]:
+        sim, rest = self.simulation, (self.status, self.notes)
+        motion = sim.model, sim.t, sim.q, sim.v, sim.tau, sim.state
+        return (self.law, *motion, self.error, self.wrench, self.lyapunov, *rest)
+
+    @property
     def t(self) -> Array:
         """Times, s, shape (N,)."""
         return self.simulation.t
