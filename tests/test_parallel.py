@@ -2,6 +2,7 @@
 
 import pickle
 from collections import Counter
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -207,6 +208,27 @@ def test_forty_assembly_modes_of_dietmaier():
     apart = np.abs(modes.T[:, None] - modes.T).max(axis=(-1, -2)) + 9.0 * np.eye(40)
     assert apart.min() > 1e-3
     assert modes.status == pr.AssemblyStatus.ALL
+
+
+def test_stored_solutions_are_forty_of_one_member():
+    with np.load(resources.files("robotmodels.parallel") / "start.npz") as data:
+        m, x = (
+            data[name].reshape(shape)
+            for name, shape in (("member", (81, 2)), ("solutions", (40, 8, 2)))
+        )
+    m, x = m @ [1, 1j], x @ [1, 1j]
+    e, g = x[:, :4], x[:, 4:]
+    errors = [(e * g).sum(axis=1), 4 * (g * g).sum(axis=1) - m[0] * (e * e).sum(axis=1)]
+    i, j = np.triu_indices(4)
+    for leg in m[1:].reshape(5, 16):
+        A, B = np.zeros((2, 4, 4), complex)
+        A[i, j] = A[j, i] = leg[:10]
+        B[i[i != j], j[i != j]] = leg[10:]
+        B = B - B.T
+        errors.append(np.einsum("si,ij,sj->s", e, A, e) + np.einsum("si,ij,sj->s", g, B, e))
+    assert np.abs(errors).max() < 1e-12
+    apart = np.abs(x[:, None] - x).max(axis=-1) + 9.0 * np.eye(40)
+    assert apart.min() > 1e-2
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from test_parallel import ROBOTS, moved, poses_near_home, random_gough, twists
 
 from robotmodels import parallel as pr
-from robotmodels import performance
+from robotmodels import performance, viz
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import fit_nonlinear
 from robotmodels.geometry import DHTable
@@ -507,6 +507,30 @@ def test_a_gough_platform_as_loops_is_the_gough_platform():
     forces = pr.leg_forces(robot, T, W).forces
     np.testing.assert_allclose(pr.leg_forces(looped, T, W).forces, forces, atol=1e-9)
     assert pr.classify_singularity(looped, T[0]).kind == Kind.REGULAR
+
+
+# --- pictures ------------------------------------------------------------------------------------
+
+
+def test_pictures_show_the_legs_where_they_are():
+    robot = pr.gough_symmetric(1.0, lower=0.8, upper=1.5)
+    T = robot.pose([0.1, 0.0, 1.0, 0.1, 0.2, 0.3])
+    scene = viz.show_parallel(robot, T)
+    anchor = T[:3, :3] @ robot.platform[2] + T[:3, 3]
+    np.testing.assert_allclose(scene.pose("piston_2")[:3, 3], anchor, atol=1e-12)
+    np.testing.assert_allclose(scene.pose("platform"), T, atol=1e-12)
+    moving = viz.show_parallel(robot, robot.pose([[0, 0, 1, 0, 0, 0], [0.1, 0, 1.1, 0, 0.1, 0]]))
+    assert moving.motion.samples == 2
+    sliders = viz.jog_parallel(robot, T)
+    frame = next(path for path in sliders.paths if path.endswith("/end"))
+    np.testing.assert_allclose(sliders.pose(frame), T, atol=1e-12)
+    assert len(sliders.sliders.data()["struts"]) == 6
+    with pytest.raises(InvalidValueError, match="variable length"):
+        viz.jog_parallel(ROBOTS["delta"])
+    with pytest.raises(InvalidValueError, match="plane"):
+        viz.plot_platform_workspace(pr.workspace(robot, resolution=5))
+    modes = pr.assembly_modes(ROBOTS["delta"], [0.1, 0.2, 0.3])
+    assert len(viz.plot_assembly_modes(ROBOTS["delta"], modes).axes) == 2
 
 
 # --- calibration ---------------------------------------------------------------------------------

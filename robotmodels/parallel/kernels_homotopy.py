@@ -13,6 +13,10 @@ the coefficients. A path is tracked in the chart in which its largest component 
 with cubic Hermite prediction and Newton correction.
 
 Coefficients of a member, ``m (81,)``: l^2, then for each leg ten of A and six of B.
+
+The stored member (``start.npz``) has normal complex coefficients, of which the first entries of A
+were solved for one random point with e.g = 0. Its other solutions were found by monodromy: all that
+were known were tracked around triangles of random members until there were 40.
 """
 
 from math import cos, sin, sqrt
