@@ -2,6 +2,7 @@
 
 from .beams import beam
 from .control import RestStatus, RestToRest, joint_tracking, regulator, rest_to_rest
+from .floating import FreeBodyMotion, free_body
 from .linear import (
     Deflection,
     DeflectionStatus,
@@ -26,7 +27,7 @@ from .modes import ReducedModel, craig_bampton, from_modes
 from .references import Elastica, elastica, lumped
 from .robot import FlexibleRobot
 from .shaper import Shaper, input_shaper
-from .simulate import FlexibleMotion, FlexibleMotionStatus, FreeBodyMotion, free_body, simulate
+from .simulate import FlexibleMotion, FlexibleMotionStatus, simulate
 from .tip import TipStatus, TipTracking, tip_tracking
 
 __all__ = [

@@ -300,7 +300,7 @@ def solved(
 
     Also the rows (N, 10) of the base: its load, first moment of the arm, whether it is softened.
     """
-    from .kernels import loads
+    from .kernels_loads import loads
 
     N, joints, modes = len(q), arm.joints, arm.modes
     arrays, drives = arm.arrays, arm.model.drive_matrices if drive else None
@@ -360,7 +360,7 @@ def generalized_forces(
     elastic: bool = True,
 ) -> tuple[Array, Array]:
     """Forces on (q, e) that given accelerations need, rows (N, n) and (N, m), without friction."""
-    from .kernels import loads
+    from .kernels_loads import loads
 
     N, joints, modes = len(q), arm.joints, arm.modes
     turns, rates, given = _of_links(arm, q, e), _of_links(arm, v, ev), _of_links(arm, a, ea)

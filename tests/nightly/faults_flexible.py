@@ -95,7 +95,7 @@ MUTATIONS = [
         "Displacements and rotations of the axis by modes.",
         "(1.0 if axis == 2 else -1.0)",
         "1.0",
-        f"{ONE} -k finite",
+        f"{ONE} -k bent_tip",
     ),
     Mutation(
         "flexible",
