@@ -503,3 +503,38 @@ def test_command_line(tmp_path, capsys):
     assert "np.asarray" in capsys.readouterr().out
     assert main(["export", "crx10ia", "igm"]) == 2
     assert main(["export", "rx90", "igd"]) == 2
+
+
+def test_a_symbol_that_is_the_usual_name_of_another_length_stays_its_own(rng):
+    q = rng.normal(size=2)
+    for symbols in ({("d", 2): "D1"}, {("d", 1): "L1+L2", ("d", 2): "D1"}):
+        table = rm.DHTable(
+            antecedent=[0, 1], sigma=[0, 0], d=[0.2, 0.3], r=[0, 0.1], symbols=symbols
+        )
+        arm = rm.RobotModel.from_table(table)
+        code = export.program(arm, "dgm", geometry="symbols")
+        assert len(set(code.elements[-1])) == 3
+        np.testing.assert_allclose(code(q, code.values[-1]), rm.dgm(arm, q), atol=1e-15)
+
+
+def test_ddm_of_a_robot_that_is_singular_at_rest_alone_is_written():
+    body = rm.InertialParameters.from_com([0.0, 2.0], [[0, 0, 0], [0.4, 0, 0]], np.zeros((2, 3, 3)))
+    arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), body)
+    code = export.program(arm, "ddm")
+    state = [0.0, 1.0], [0.0, 0.0], [1.0, 2.0]
+    np.testing.assert_allclose(code(*state), rm.ddm(arm, *state), rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("idm", {"frame": np.array([1, 2])}), ("idm", {"frame": 0})],
+)
+def test_arguments_that_a_model_does_not_have_are_refused(kind, words):
+    with pytest.raises(InvalidValueError, match=next(iter(words))):
+        export.program(rm.load("rx90"), kind, **words)
+
+
+def test_an_infinite_family_is_stated_before_missing_postures():
+    arm = rm.load("ur5")
+    _, _, status = export.program(arm, "igm")(rm.dgm(arm, np.zeros(6)))
+    assert status == rm.IGMStatus.REACHED_FAMILY

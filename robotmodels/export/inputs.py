@@ -24,7 +24,8 @@ casadi smooth batch select_ q v a tau T wrench geometry parameters J M h Q W val
 """
 """Words of the languages, names of their libraries and those that generated code uses."""
 _WORDS = {*keyword.kwlist, *_RESERVED.split()}
-_TAKEN = re.compile(r"[tCS]\d+")  # of lines, cosines and sines
+_TAKEN = re.compile(r"[tCS]\d+|(FP|HUGE|MATH|M|math)_\w*|linux|unix")
+"""Names of lines, cosines and sines, and macros of C's mathematics."""
 _LETTERS = dict(zip(COLUMNS, ("G", "BL", "B", "A", "D", "TH", "RL"), strict=True))
 _EXACT = 1e-13
 
@@ -69,9 +70,10 @@ class Draft:
 def dynamic_parameters(
     draft: Draft, choice: str, is_general: bool
 ) -> tuple[dict[str, Number], dict[str, Number] | None]:
-    """Standard parameters by name (missing ones are zero), and simpler ones of equal torques.
+    """Standard parameters by name, and fewer equivalent ones that give the same torques.
 
-    The simpler ones are base parameters, which have no numbers where the geometry ``is_general``.
+    A missing name is zero. The fewer ones are base parameters; they have no numbers, so that there
+    are none (None), where the geometry ``is_general``.
     """
     names = parameter_names(draft.model, draft.kinds)
     numbers = parameter_vector(draft.model, draft.kinds).tolist()
@@ -104,12 +106,14 @@ def geometric_parameters(draft: Draft) -> Constant:
     for (column, row), value in numbers.items():
         own = table.symbols.get((column, row))
         usual = f"{_LETTERS[column]}{row}"
+        while usual in table.symbols.values() and usual != own:  # it means another number
+            usual += "_"
         if own is not None:
             # a formula, or one name of different numbers: the usual name
             same = {numbers[key] for key, name in table.symbols.items() if name == own}
             names[column, row] = own if own.isidentifier() and len(same) == 1 else usual
             if names[column, row] != own:
-                draft.notes.append(f"{comment(own)} is written {usual}")
+                draft.notes.append(f"{comment(own)} is written {names[column, row]}")
         elif column in ("b", "d", "r") and value != 0.0:
             names[column, row] = usual
         if (column, row) in names:
@@ -128,7 +132,7 @@ def identifier(text: str) -> str:
 
 
 def _mended(name: str, taken: set[str]) -> str:
-    """An identifier that is not taken yet; it is taken then."""
+    """Make an unused identifier of a name, and reserve it."""
     name = identifier(name)
     while name in _WORDS or name in taken or _TAKEN.fullmatch(name):
         name += "_"

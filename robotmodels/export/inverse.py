@@ -34,7 +34,8 @@ from .tape import Number, Scalar, Tape, function, pick
 _NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
 _BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may cause
 _LEAST = 1e-14  # of the largest coefficient: slopes that are zero
-_FREE, _DOUBTFUL = float(IGMStatus.REACHED_FAMILY), float(IGMStatus.INCOMPLETE)
+_FREE, _DOUBTFUL = 9.0, float(IGMStatus.INCOMPLETE)
+"""Statuses while the branches are compared: the largest holds, and a family is the worst."""
 
 
 class Unknown(NamedTuple):
@@ -54,7 +55,7 @@ class Solution(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Amplitudes of an equation that are zero, or small; values of unknowns that are free."""
+    """Thresholds below which an amplitude is zero, or small; values of unknowns that are free."""
 
     zero: float
     small: float
@@ -115,14 +116,15 @@ def inverse_model(model: RobotModel, tape: Tape, T: Sequence[Number]) -> tuple[l
         worse = pick(reached, 0.5, _larger(status, solution.status), solution.status)
         status = pick(solution.valid, 0.5, worse, status)
         reached = pick(solution.valid, 0.5, 1.0, reached)
+    status = pick(status, 8.5, float(IGMStatus.REACHED_FAMILY), status)
     return q, [solution.valid for _, solution in plan.found], [status]
 
 
 def status_notes() -> list[str]:
     """The statuses of a pose in sentences."""
-    more = {_FREE: " Joints that are free are 0.", _DOUBTFUL: " The pose is nearly singular."}
+    more = {1: " Joints that are free are 0.", 7: " The pose is nearly singular."}
     codes = (IGMStatus(k) for k in (0, 1, 6, 7))
-    return [f"  status {int(code)}: {code.sentence}{more.get(float(code), '')}" for code in codes]
+    return [f"  status {int(code)}: {code.sentence}{more.get(int(code), '')}" for code in codes]
 
 
 def _solve(plan: _Plan, level: int, x: list[Number], valid: Number, status: Number) -> None:
@@ -207,7 +209,7 @@ def direct_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
 def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
     """``X S = g0, X C = g1`` with X of any sign: an angle and the opposite one."""
     (first,), (second,) = direct_angle(g, limits), direct_angle([-g[0], -g[1]], limits)
-    is_free = pick(first.status, _FREE, 0.0, pick(first.status, 0.5, 1.0, 0.0))
+    is_free = pick(first.status, 8.5, 1.0, 0.0)
     return [first, second._replace(valid=_below(is_free, 0.5))]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
-from ..errors import InvalidValueError, nearest_names
+from ..errors import InvalidValueError, SingularMassMatrixError, nearest_names
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
@@ -78,8 +78,8 @@ def program(
     """Write a model of a robot as straight-line code: Khalil's customised symbolic models.
 
     The recursion runs once over the scalars of a tape: operations on constants are carried out,
-    zeros and ones removed, equal operations shared, what no result needs is dropped. With
-    numbers, the links have their base parameters, which are fewer.
+    zeros and ones removed, equal operations shared, what no result needs is dropped. With numbers
+    for both, base parameters replace those of the model where they give the same torques.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def program(
         ``DHTable.symbols`` names, as an input before the parameters. Base, tool and gravity are
         numbers.
     drive : bool or collection of DriveKind or str
-        Terms of the drives, coupled motors included: all, none, or some kinds. `gravity_torque`
-        has none.
+        Terms of the drives, coupled motors included: all, none, or some kinds. Geometric models
+        and `gravity_torque` have none.
     wrench : bool
         Whether `idm`, `bias` and `ddm` have an input ``[f; m]`` as in `robotmodels.idm`.
     frame : str or int, optional
@@ -118,14 +118,16 @@ def program(
     FrameNotFoundError
         No such frame.
     SingularMassMatrixError, InertiaError
-        `ddm` of a robot whose mass matrix is not positive definite.
+        `ddm` with numbers of a robot whose mass matrix is singular in every configuration. Code
+        divides by its pivots and does not check them.
 
     Notes
     -----
     ``"igm"`` returns all branches ``q (S, n)`` in (-pi, pi], ``valid (S,)`` and a ``status`` of
     `IGMStatus`: ``REACHED``; ``REACHED_FAMILY``: a joint that the pose leaves free is 0;
-    ``INCOMPLETE``: near a singular pose, where postures may be missing or appear twice;
-    ``NOT_CONVERGED``: no posture. Code does not check its inputs.
+    ``INCOMPLETE``: near a singular pose or on the boundary of the workspace, where postures may be
+    missing or appear twice; ``NOT_CONVERGED``: no posture (`igm` tells why). Joint limits are
+    ignored, and inputs are not checked: ``T`` must be a pose.
 
     References
     ----------
@@ -161,11 +163,8 @@ def program(
         own, simpler = dynamic_parameters(draft, parameters, geometry == "symbols")
         if simpler is not None and _same_torques(model, own, simpler):
             own = simpler
-    if kind == "ddm" and parameters == "numbers":  # refuses singular mass matrices
-        still, K = np.zeros(model.n), model.transmission
-        ddm(
-            model, still if K is None else K.offset, still, still, drive=DriveKind.IA in draft.kinds
-        )
+    if kind == "ddm" and parameters == "numbers":
+        _check_mass_matrix(model, DriveKind.IA in draft.kinds)
     if kind in ("dgm", "jacobian"):
         rows = _geometric(draft, kind, links, frame)
     elif "regressor" in kind:
@@ -195,11 +194,27 @@ def _check(kind: str, given: dict[str, Any]) -> None:
     if not isinstance(given["wrench"], (bool, np.bool_)):
         raise InvalidValueError(f"wrench: expected True or False, got {given['wrench']!r:.60}.")
     for name, value in given.items():
-        if name not in _KINDS[kind].accepts and value not in ("numbers", False, None):
+        is_default = value is None if name == "frame" else value in ("numbers", False)
+        if name not in _KINDS[kind].accepts and not is_default:
             able = ", ".join(repr(k) for k, row in _KINDS.items() if name in row.accepts)
             raise InvalidValueError(
                 f"{name}: {kind!r} has no {name}={value!r:.40}, only {able} have."
             )
+
+
+def _check_mass_matrix(model: RobotModel, drive: bool) -> None:
+    """Refuse robots whose mass matrix is singular in every one of some random configurations."""
+    still, K = np.zeros(model.n), model.transmission
+    G = None if K is None else free_motion(K)
+    for k, x in enumerate(np.random.default_rng(0).normal(size=(_STATES, model.n))):
+        q = x if G is None or K is None else K.offset + G @ x[: G.shape[1]]
+        try:
+            ddm(model, q, still, still, drive=drive)
+        except SingularMassMatrixError:
+            if k == _STATES - 1:
+                raise
+        else:
+            return
 
 
 def _numbers(model: RobotModel) -> Constant:
@@ -295,7 +310,9 @@ def _finished(
         pairs = zip(names, values, strict=True)
         notes += [f"  {k} {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
     notes += [f"Output {port.name} {port.shape}: {row.unit}" for port in outputs[:1]]
-    notes += [f"Output {port.name} {port.shape}" for port in outputs[1:]] + draft.notes
+    words = {"valid": "1 where the row is a posture, else 0", "status": "see below"}
+    notes += [f"Output {port.name} {port.shape}: {words[port.name]}" for port in outputs[1:]]
+    notes += draft.notes
     sigma = model.table.sigma[model.table.joint_rows]
     joints = zip(model.table.joint_names, np.where(sigma == PRISMATIC, "m", "rad"), strict=True)
     named = (f"{k} {comment(name)} [{unit}]" for k, (name, unit) in enumerate(joints))

@@ -1,7 +1,7 @@
 """A program, a model of a robot as straight-line code, and its printers.
 
-A language is what its elements and functions look like; the lines are made once for all. Products
-and sums that are used once are written into the line that uses them.
+A `Language` holds the syntax; the list of assignments is the same for all languages. Products and
+sums that are used once are written into the line that uses them.
 """
 
 from __future__ import annotations
@@ -167,8 +167,9 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
     text = program.code(suffixes[path.suffix.lower()] if language is None else language)
     try:
         path.write_bytes(text.encode("ascii"))
-    except OSError as error:
-        raise InvalidValueError(f"path: cannot write {str(path)!r}: {error.strerror}.") from None
+    except (OSError, ValueError) as error:  # the latter for a zero in the name
+        words = getattr(error, "strerror", None) or error
+        raise InvalidValueError(f"path: cannot write {str(path)!r}: {words}.") from None
 
 
 class Language(NamedTuple):
@@ -305,7 +306,7 @@ def _result(of: Language, name: str, shape: tuple[int, ...], elements: Sequence[
         if not shape:
             return [f"{name} = {elements[0]}"]
         if is_matrix:
-            at = range(0, len(elements), max(columns, 1))
+            at = [k * columns for k in range(rows)]
             elements = [f"[{', '.join(elements[k : k + columns])}]" for k in at]
     elif of.name == "numpy":
         opening, closing = "np.array([", "])"

@@ -120,7 +120,7 @@ class Scalar:
 
 
 class Tape:
-    """Operations in the order in which they were asked for first."""
+    """Operations in the order of their first use."""
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
