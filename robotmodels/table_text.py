@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from math import pi
 from typing import NamedTuple
@@ -31,7 +31,7 @@ def boxed(columns: list[tuple[str, list[str]]]) -> str:
     return "\n".join([rule("┌", "┬", "┐"), head, rule("├", "┼", "┤"), *body, rule("└", "┴", "┘")])
 
 
-def joints_text(columns: dict[str, Iterable[float]]) -> str:
+def joints_text(columns: Mapping[str, Iterable[float]]) -> str:
     """Box with one line a joint and a column for each quantity."""
     cells = [(name, [f"{x:.6g}" for x in values]) for name, values in columns.items()]
     return boxed([("j", [str(j + 1) for j in range(len(cells[0][1]))]), *cells])

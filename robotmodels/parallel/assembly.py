@@ -158,7 +158,8 @@ def _packed(found: Found, batch: tuple[int, ...]) -> AssemblyModes:
     fields: list[Any] = [
         x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
     ]
-    return AssemblyModes(*fields, status.reshape(batch), complex_count.reshape(batch))
+    fields += [status.reshape(batch), complex_count.reshape(batch)]
+    return AssemblyModes(*fields)
 
 
 def _planar(robot: ParallelRobot, q: Array) -> Found:

@@ -80,7 +80,8 @@ def idm(
     columns, unit = list(robot.columns), scales(robot, robot.length)
     B = np.swapaxes(legs.jacobian[..., columns] * unit, -1, -2)
     _check_regular(B)
-    return np.linalg.solve(B, (total[..., columns] * unit)[..., None]).reshape(*batch, robot.m)
+    tau: Array = np.linalg.solve(B, (total[..., columns] * unit)[..., None])  # type: ignore[assignment]
+    return tau.reshape(*batch, robot.m)
 
 
 def ddm(

@@ -220,4 +220,5 @@ def _igm_looped(robot: LoopedPlatform, T: ArrayLike) -> LegSolutions:
     q = np.where(reached[..., None], q[..., robot.actuated], np.nan)
     mode, status = np.where(reached, 0, -1), np.where(reached, 0, 2).astype(np.int8)
     rows: list[Any] = [mode, reached, reached, np.where(reached, residual, np.nan)]
-    return LegSolutions(q[..., None, :], *(x[..., None] for x in rows), status)
+    mode, valid, within, error = (x[..., None] for x in rows)
+    return LegSolutions(q[..., None, :], mode, valid, within, error, status)

@@ -97,7 +97,8 @@ def dkm(robot: Robot, T: ArrayLike, q_rate: ArrayLike, mode: Mode = None) -> Arr
     rate = as_core(q_rate, (robot.m,), "q_rate")
     columns, unit = list(robot.columns), scales(robot, robot.length)
     J = inverse_jacobian(robot, T, mode)[..., columns] * unit
-    part = _times(np.linalg.pinv(J, rcond=_SINGULAR), rate) * unit
+    inverse: Array = np.linalg.pinv(J, rcond=_SINGULAR)  # type: ignore[assignment]
+    part = _times(inverse, rate) * unit
     V = np.zeros((*part.shape[:-1], 6))
     V[..., columns] = part
     return V
@@ -133,7 +134,8 @@ def rates_of_rows(robot: ParallelRobot, legs: LegStates, V: Array) -> Array:
         turn = (v + spin - rate * turning) / robot.rod[:, None]
     else:
         turn = (v + spin - rate * u) / legs.q[..., None]
-    rows = np.concatenate((turn, np.cross(spin, u) + np.cross(legs.arm, turn)), axis=-1)
+    moments: Array = np.cross(spin, u) + np.cross(legs.arm, turn)
+    rows: Array = np.concatenate((turn, moments), axis=-1)  # type: ignore[assignment]
     rows = only_freedoms(robot, rows)
     if robot.has_cranks:
         slower = (turn * turning).sum(-1, keepdims=True) - rate * (u * swing).sum(-1, keepdims=True)

@@ -90,7 +90,7 @@ def plot_workspace(
     return style.finished(figure, title, ("boundary", "internal", "limit", "cusp"))
 
 
-def _cells(figure: Figure, axes: Any, x: Array, y: Array, counts: Array, numbers: Array) -> None:
+def _cells(figure: Figure, axes: Any, x: Array, y: Array, counts: Any, numbers: Any) -> None:
     """Cells in a colour for each number, with a bar that names the numbers."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
