@@ -134,8 +134,8 @@ def rates_of_rows(robot: ParallelRobot, legs: LegStates, V: Array) -> Array:
         turn = (v + spin - rate * turning) / robot.rod[:, None]
     else:
         turn = (v + spin - rate * u) / legs.q[..., None]
-    moments: Array = np.cross(spin, u) + np.cross(legs.arm, turn)
-    rows: Array = np.concatenate((turn, moments), axis=-1)  # type: ignore[assignment]
+    moments: Array = np.cross(spin, u) + np.cross(legs.arm, turn)  # type: ignore[assignment]
+    rows = np.concatenate((turn, moments), axis=-1)
     rows = only_freedoms(robot, rows)
     if robot.has_cranks:
         slower = (turn * turning).sum(-1, keepdims=True) - rate * (u * swing).sum(-1, keepdims=True)
