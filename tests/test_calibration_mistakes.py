@@ -335,6 +335,7 @@ KINDS = ["position", "pose", "pivot", "pair", "camera", "relative"]
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("factor", "sentence"), [*FACTORS, (1.0, ""), (1.5, "")])
+@pytest.mark.nightly
 def test_the_unit_of_lengths_is_named(kind, factor, sentence):
     for seed in range(2):
         arm = Arm(seed)

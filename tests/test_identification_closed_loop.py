@@ -253,6 +253,7 @@ def test_nearly_equal_columns_have_large_standard_errors_or_are_refused(
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.nightly
 def test_instruments_and_didim_recover_exact_parameters(kind):
     arm, control, log, width = recorded(kind)
     if kind == "prismatic":  # two recordings

@@ -245,6 +245,7 @@ def sliding_arm(slides, seed):
 @pytest.mark.parametrize(
     "slides", [*combinations(range(6), 2)][::2] + [*combinations(range(6), 3)][::3]
 )
+@pytest.mark.nightly
 def test_two_and_three_prismatic_joints(slides):
     model = sliding_arm(slides, 21 + sum(slides))
     q = drawn(model, 20)

@@ -97,6 +97,7 @@ def rods(model, q):
 
 
 @pytest.mark.parametrize("name", ["rx90", "stanford_arm"])
+@pytest.mark.nightly
 def test_clearance_of_robots_by_brute_force(name):
     arm = rm.load(name).with_tool(rm.se3.translation(0.05, 0, 0.3))
     rng, bent = np.random.default_rng(7), []

@@ -361,6 +361,7 @@ def test_side_joints_stand_still_on_a_path(name):
 
 
 @pytest.mark.parametrize("name", TREES)
+@pytest.mark.nightly
 def test_postures_of_trees(name):
     """igm finds the posture again, the other joints at their reference."""
     model = rm.load(name)

@@ -220,6 +220,7 @@ def found():
     return idn.fit(model, log, test=log_of(model, seconds=4.0, seed=1), checked=False)
 
 
+@pytest.mark.nightly
 def test_figures_of_identifications_hold_together(found):
     for plot in (
         viz.plot_identification_torques,
@@ -359,6 +360,7 @@ def test_excitation_shows_its_motion_and_its_search():
 # ---------------------------------------------------------------- reports and mistakes
 
 
+@pytest.mark.nightly
 def test_a_report_is_one_offline_file(found, calibrated, tmp_path):
     test = log_of(found.model, seconds=4.0, seed=1)
     viz.identification_html(found, tmp_path / "i.html", test)

@@ -376,6 +376,7 @@ def test_flat_ellipsoids_are_discs_bars_and_dots():
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.nightly
 def test_any_robot_gives_a_page_and_a_figure(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, f=1 + seed, tree=True, fixed=True)
