@@ -22,7 +22,8 @@ PoseSolutions
 Raises
 ------
 ShapeError, InvalidValueError, NotARotationError
-    Arrays that do not fit each other, points on a line, a first pose with points behind the camera.
+    Arrays that do not fit each other, points on a line, an image of one point, a first pose with
+    points behind the camera.
 
 References
 ----------
@@ -42,7 +43,7 @@ array([0. , 0. , 0.5])
 array([0. , 0. , 0.5])
 >>> triangle = [[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]]
 >>> p3p(triangle, np.array(triangle)[:, :2] / 12**0.5)
-<PoseSolutions: 4 poses. The poses found are all that fit the image.>
+<PoseSolutions: 4 poses. Each pose found is a minimum of the image error.>
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points
-from .results import Result
+from .results import Result, code_of
 from .velocity import moved, sight_of
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
@@ -73,7 +74,7 @@ _NEAR = 0.02  # of the depth: entries of poses that lead to the same minimum
 class PoseStatus(Outcome):
     """Outcome of an estimation of a pose; fits int8."""
 
-    FOUND = 0, "The poses found are all that fit the image."
+    FOUND = 0, "Each pose found is a minimum of the image error."
     TWO_MINIMA = 1, "Two poses are minima of the image error, the first with the smaller one."
     NONE_FOUND = 2, "No pose in front of the camera fits the image."
     NOT_CONVERGED = 3, "The image error still decreases after the allowed iterations."
@@ -109,10 +110,7 @@ class PoseSolutions(Result):
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
-        code = np.asarray(self.status[i])
-        if code.ndim:
-            raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
-        return PoseStatus(int(code)).sentence
+        return PoseStatus(code_of(self.status, i)).sentence
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.T, dtype=dtype)
@@ -151,8 +149,6 @@ def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     if len(P) == 3:
         return p3p(P, images)
     singular = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
-    if singular[1] <= _THIN * singular[0]:
-        raise InvalidValueError("points: expected points that are not all on one line.")
     planar = bool(singular[2] <= 1e-6 * singular[0])
     found = [_minima(P, m, planar) for m in images.reshape(-1, len(P), 2)]
     return _packed(found, images.shape[:-2])
@@ -269,7 +265,7 @@ def _triad(P: Array) -> Array:
 
 
 def _sine(P: Array) -> Array:
-    """Area of triangles beside the square of their longest side. Shapes: (..., 3, 3) -> (...)."""
+    """Double area by the square of the longest side. Shapes: (..., 3, 3) -> (...)."""
     a, b = P[..., 1, :] - P[..., 0, :], P[..., 2, :] - P[..., 0, :]
     longest = np.maximum(np.maximum((a**2).sum(-1), (b**2).sum(-1)), ((a - b) ** 2).sum(-1))
     return np.linalg.norm(np.cross(a, b), axis=-1) / np.where(longest > 0.0, longest, 1.0)
@@ -318,7 +314,7 @@ def _minima(P: Array, m: Array, planar: bool) -> tuple[list[Array], list[float],
 
 
 def _frontal(P: Array, m: Array) -> Array:
-    """The object parallel to the image with the size and the place of its image, a last start."""
+    """The object parallel to the image with the size and the place of its image: the last start."""
     flat = np.linalg.svd(P - P.mean(axis=0))[2]
     flat[2] *= np.linalg.det(flat)
     depth = np.linalg.norm(P - P.mean(axis=0)) / (np.linalg.norm(m - m.mean(axis=0)) + 1e-12)
@@ -377,7 +373,13 @@ def _checked(points: Any, image: Any) -> tuple[Array, Array]:
     P = as_core(points, (3,), "points")
     if P.ndim != 2 or len(P) < 3:
         raise ShapeError(f"points: expected shape (n, 3), n from 3, got {P.shape}.")
-    return P, as_core(image, (len(P), 2), "image")
+    m = as_core(image, (len(P), 2), "image")
+    sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
+    if sizes[1] <= _THIN * sizes[0]:
+        raise InvalidValueError("points: expected points that are not all on one line.")
+    if (np.ptp(m, axis=-2) <= _THIN * np.abs(m).max(axis=-2)).all(axis=-1).any():
+        raise InvalidValueError("image: expected image points that do not all coincide.")
+    return P, m
 
 
 def _batch(*shapes: tuple[int, ...]) -> tuple[int, ...]:
