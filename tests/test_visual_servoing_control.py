@@ -446,6 +446,19 @@ def test_the_true_pose_is_among_those_of_three_points():
     assert found.reason(3) == vs.PoseStatus.FOUND.sentence
 
 
+def test_three_points_from_their_cylinder():
+    """Two poses coincide there: the true one is found to the root of rounding."""
+    rng = np.random.default_rng(13)
+    corner = np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
+    angle, height = rng.uniform(0.0, 2.0 * np.pi, 300), rng.uniform(1.5, 4.0, 300)
+    eyes = np.c_[np.cos(angle), np.sin(angle), height]
+    T = np.array([looking(eye, np.zeros(3)) for eye in eyes])
+    X = corner @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
+    found = vs.p3p(corner, X[..., :2] / X[..., 2:])
+    assert np.nanmin(abs(found.T - T[:, None]).max(axis=(2, 3)), axis=1).max() < 1e-4
+    assert found.residual[found.valid].max() < 1e-9
+
+
 def test_pose_of_many_points():
     rng = np.random.default_rng(6)
     both = 0

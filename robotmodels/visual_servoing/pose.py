@@ -1,6 +1,8 @@
 """Pose of an object from image points: three points, many points, virtual visual servoing.
 
-`p3p` finds all poses of three points. `pnp` finds the pose of least squared image error, of planar
+`p3p` finds the poses of three points; where the camera is on the cylinder through them, two poses
+coincide, are found to about 1e-6 and are given once, and thin or small triangles near it may lack
+one. `pnp` finds the pose of least squared image error, of planar
 objects both minima: it starts from triples of points and refines on all points. `refine_pose` is
 virtual visual servoing: a virtual camera is moved from a first pose until its image fits, with
 steps that are damped where the error would grow (Levenberg-Marquardt).
@@ -65,7 +67,7 @@ from .velocity import moved, sight_of
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-12  # of the squared sides
-_SAME = 1e-7  # of distances or poses
+_SAME = 1e-6  # of distances or poses
 _TURNED = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 _TRIPLES, _STARTS, _ITERATIONS = 24, 6, 60
 _NEAR = 0.02  # of the depth: entries of poses that lead to the same minimum
@@ -122,7 +124,7 @@ class PoseSolutions(Result):
 
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
-    """All poses of three points, at most four."""
+    """Poses of three points, at most four."""
     P, m = as_core(points, (3, 3), "points"), as_core(image, (3, 2), "image")
     batch = _batch(P.shape[:-2], m.shape[:-2])
     P = np.broadcast_to(P, (*batch, 3, 3)).reshape(-1, 3, 3)
@@ -191,24 +193,31 @@ def _p3p(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
     companion = np.zeros((N, 4, 4))
     companion[:, row + 1, row] = 1.0
     companion[:, :, 3] = -quartic[:, :4] / np.where(quartic[:, 4:] == 0.0, 1e-300, quartic[:, 4:])
-    x = np.linalg.eigvals(companion) + 0j  # (N, 4)
+    x = np.linalg.eigvals(companion)  # (N, 4); rounding turns two near roots into a complex pair
+    x = np.concatenate((x.real + np.abs(x.imag), x.real - np.abs(x.imag)), axis=-1)
     powers = np.stack([x**k for k in range(5)], axis=-1)
     top, bottom = (np.einsum("npk,nk->np", powers, p[:, :5]) for p in (ac, ab))
     y = -top / np.where(bottom == 0.0, 1e-300, bottom)
-    s = np.stack((x.real, y.real, np.ones(x.shape)), axis=-1) @ _TURNED.T
+    s = np.stack((x, y, np.ones(x.shape)), axis=-1) @ _TURNED.T
     s = s * np.sign(s.sum(axis=-1, keepdims=True))
     size = np.einsum("npi,neij,npj->np", s, E, s)
     s = s * np.sqrt(sides.sum(axis=-1)[:, None] / np.maximum(size, 1e-300))[..., None]
     chords = ((rays[:, i] - rays[:, j]) ** 2).sum(axis=-1)[:, None]
-    for _ in range(12):
-        s = s - _newton(s, chords, sides[:, None])[0]
-    off = np.abs(_newton(s, chords, sides[:, None])[1]).max(axis=-1)
+    part, (step, residual) = np.ones(s.shape[:2]), _newton(s, chords, sides[:, None])
+    off = np.abs(residual).max(axis=-1)
+    for _ in range(24):  # steps that increase the residual, near double roots, are cut
+        after = s - part[..., None] * step
+        step_after, residual = _newton(after, chords, sides[:, None])
+        off_after = np.abs(residual).max(axis=-1)
+        better = off_after < off
+        s, step = (np.where(better[..., None], b, a) for a, b in ((s, after), (step, step_after)))
+        off, part = np.where(better, off_after, off), np.where(better, 1.0, 0.25 * part)
     good = (off <= _FITS * sides.max(axis=-1)[:, None]) & (s > 0.0).all(axis=-1)
     near = (
         np.abs(s[:, :, None] - s[:, None]).max(axis=-1) <= _SAME * np.abs(s).max(axis=-1)[:, None]
     )
-    good &= ~np.any(near & np.tril(good[:, None] & np.ones((4, 4), bool), -1), axis=-1)
-    order = np.argsort(~good, axis=-1, kind="stable")
+    good &= ~np.any(near & np.tril(good[:, None] & np.ones((8, 8), bool), -1), axis=-1)
+    order = np.argsort(~good, axis=-1, kind="stable")[:, :4]
     s, good = (np.take_along_axis(s, order[..., None], 1), np.take_along_axis(good, order, 1))
     C = np.where(good[..., None], s, 1.0)[..., None] * rays[:, None]
     T = np.zeros((N, 4, 4, 4))
