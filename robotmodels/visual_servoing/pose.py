@@ -66,7 +66,7 @@ from .results import Result, code_of
 from .velocity import moved, sight_of
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
-_FITS = 1e-12  # of the squared sides
+_FITS = 1e-10  # of the squared sides
 _SAME = 1e-6  # of distances or poses
 _TURNED = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 _TRIPLES, _STARTS, _ITERATIONS = 24, 6, 60
@@ -205,13 +205,15 @@ def _p3p(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
     chords = ((rays[:, i] - rays[:, j]) ** 2).sum(axis=-1)[:, None]
     part, (step, residual) = np.ones(s.shape[:2]), _newton(s, chords, sides[:, None])
     off = np.abs(residual).max(axis=-1)
-    for _ in range(24):  # steps that increase the residual, near double roots, are cut
+    for _ in range(40):  # steps that increase the residual, near double roots, are cut
         after = s - part[..., None] * step
         step_after, residual = _newton(after, chords, sides[:, None])
         off_after = np.abs(residual).max(axis=-1)
         better = off_after < off
         s, step = (np.where(better[..., None], b, a) for a, b in ((s, after), (step, step_after)))
         off, part = np.where(better, off_after, off), np.where(better, 1.0, 0.25 * part)
+    best = np.argsort(off, axis=-1)  # of starts that lead to the same pose the best is kept
+    s, off = np.take_along_axis(s, best[..., None], 1), np.take_along_axis(off, best, 1)
     good = (off <= _FITS * sides.max(axis=-1)[:, None]) & (s > 0.0).all(axis=-1)
     near = (
         np.abs(s[:, :, None] - s[:, None]).max(axis=-1) <= _SAME * np.abs(s).max(axis=-1)[:, None]
