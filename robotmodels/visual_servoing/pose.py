@@ -78,7 +78,7 @@ class PoseStatus(Outcome):
 
     FOUND = 0, "Each pose found is a minimum of the image error."
     TWO_MINIMA = 1, "Two poses are minima of the image error, the first with the smaller one."
-    NONE_FOUND = 2, "No pose in front of the camera fits the image."
+    NONE_FOUND = 2, "No pose was found in front of the camera that fits the image."
     NOT_CONVERGED = 3, "The image error still decreases after the allowed iterations."
 
 
