@@ -214,6 +214,45 @@ def test_skewness_turns_with_the_image_and_ignores_shift_and_scale():
     ) == pytest.approx([0, 0], abs=1e-9)
 
 
+def test_skewness_of_points_ignores_scale_and_repetition():
+    P = np.random.default_rng(11).uniform(-0.3, 0.3, (5, 3)) * (1, 1, 0)
+    T, words = translation(0.0, 0.0, 1.0), ("c_x", "c_y")
+    c = vs.Moments(points=P, components=words).measure(T)
+    assert vs.Moments(points=P, components=words).measure(
+        translation(0.3, 0.1, 2.5)
+    ) == pytest.approx(c)
+    assert vs.Moments(points=np.r_[P, P], components=words).measure(T) == pytest.approx(c)
+
+
+def test_a_closed_list_of_corners_is_the_same_polygon():
+    T = pose(np.random.default_rng(12))
+    closed = vs.Moments([*PLATE, PLATE[0]])
+    assert closed.measure(T) == pytest.approx(vs.Moments(PLATE).measure(T))
+
+
+def test_a_sphere_of_known_depth_has_its_exact_matrix():
+    sphere = vs.Sphere([0.1, 0.1, 0.0], 0.2)
+    for T in (pose(np.random.default_rng(k)) for k in range(5)):
+        Z = (T[:3, :3] @ sphere.centre + T[:3, 3])[2]
+        law = vs.Task(sphere, translation(0, 0, 1), depth=float(Z))
+        exact = vs.camera_velocity(vs.Task(sphere, translation(0, 0, 1)), T)
+        assert vs.camera_velocity(law, sphere.measure(T)).v == pytest.approx(exact.v, abs=1e-9)
+
+
+def test_a_cylinder_is_seen_wherever_its_reference_point_is():
+    places = [vs.Cylinder([a, 0, 0], [1, 0, 0], 0.05) for a in (0.0, 5.0, -5.0)]
+    s = [c.measure(translation(0, 0, 1.0) @ rotation("y", 0.5)) for c in places]
+    assert s[1] == pytest.approx(s[0])
+    assert s[2] == pytest.approx(s[0])
+
+
+def test_segments_of_several_depths_broadcast():
+    L = vs.interaction_segment(0.1, 0.2, 0.3, 0.4, np.ones((5, 2)))
+    assert L.shape == (5, 4, 6)
+    assert vs.interaction_moment(np.ones((5, 5)), 1, 1, np.ones((3, 4))).shape == (3, 1, 6)
+    assert vs.broyden(np.zeros((1, 6)), [1e-170], 1e-170 * np.eye(6)[0])[0, 0] == pytest.approx(1.0)
+
+
 def test_corners_in_the_other_sense_are_the_same_region():
     T = pose(np.random.default_rng(5))
     assert vs.Moments(PLATE[::-1]).measure(T) == pytest.approx(vs.Moments(PLATE).measure(T))
@@ -288,14 +327,14 @@ def test_learnt_matrices():
 @pytest.mark.parametrize(
     ("feature", "link_class", "name"),
     [
-        (vs.Points([[0.1, 0.0, 0.0]]), 4, "linear annular"),
-        (vs.Lines([[[0, 0, 0], [1, 0, 0]]]), 4, "rectilinear"),
+        (vs.Points([[0.1, 0.0, 0.0]]), 4, "sphere in a cylinder"),
+        (vs.Lines([[[0, 0, 0], [1, 0, 0]]]), 4, "line contact"),
         (vs.Points(SQUARE[:2]), 2, ""),
         (vs.Points(SQUARE[:3]), 0, "rigid"),
         (vs.Sphere([0, 0, 0], 0.2), 3, "ball joint"),
         (vs.Circle([0, 0, 0], [0, 0.3, 1], 0.2), 1, "revolute"),
-        (vs.Cylinder([0, 0, 0], [1, 0, 0], 0.1), 2, "sliding pivot"),
-        (vs.Plane3D([0, 0, 1], 0.1), 3, "plane on plane"),
+        (vs.Cylinder([0, 0, 0], [1, 0, 0], 0.1), 2, "cylindrical joint"),
+        (vs.Plane3D([0, 0, 1], 0.1), 3, "planar joint"),
         (vs.Lines([[[0, 0, 0], [1, 0, 0]], [[0, 0.1, 0], [1, 0.1, 0]]]), 2, ""),
         (vs.Points([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]), 1, "revolute"),
     ],
@@ -324,6 +363,7 @@ def test_a_circle_seen_centred_has_a_larger_class():
 
 GOAL = translation(0.0, 0.0, 0.5)
 TASK = vs.Task(vs.Points(SQUARE), GOAL)
+EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
 
 
 @pytest.mark.parametrize(
@@ -392,6 +432,38 @@ TASK = vs.Task(vs.Points(SQUARE), GOAL)
         (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), InvalidValueError, "determine"),
         (lambda: vs.decompose_homography(np.ones((3, 3))), InvalidValueError, "regular"),
         (lambda: vs.TargetMotion(noise=0.0), InvalidValueError, "noise"),
+        (lambda: vs.Moments(np.r_[SQUARE, SQUARE]), InvalidValueError, "touch"),
+        (lambda: vs.Moments(EIGHT), InvalidValueError, "touch"),
+        (lambda: vs.Moments([*SQUARE[:3], [0, -0.1, 0], SQUARE[3]]), InvalidValueError,
+         "touch|cross"),
+        (lambda: vs.Moments([*SQUARE, [-0.1, 0.3, 0]]), InvalidValueError, "touch|cross"),
+        (lambda: vs.Moments(SQUARE, components=5), InvalidValueError, "components"),
+        (lambda: vs.Moments(SQUARE, components=[["area"]]), InvalidValueError, "components"),
+        (lambda: vs.Camera(focal=[[1, 2], [3]]), InvalidValueError, "focal"),
+        (lambda: vs.Task(vs.Points(SQUARE), [[1, 2], [3]]), InvalidValueError, "desired"),
+        (lambda: vs.camera_velocity(TASK, [[1, 2], [3]]), InvalidValueError, "measurement"),
+        (lambda: vs.Task(vs.Points(SQUARE), GOAL, interaction=np.zeros(3)), InvalidValueError,
+         "interaction"),
+        (lambda: vs.Task(vs.Sphere([0, 0, 0], 1.0), GOAL @ translation(0, 0, 1), depth=0.5),
+         InvalidValueError, "depth"),
+        (lambda: vs.interaction_segment([1, 2], 0, 1, 0, np.ones((5, 2))), ShapeError, "broadcast"),
+        (lambda: vs.interaction_moment(np.ones((3, 5, 5)), 1, 1, np.ones((5, 4))), ShapeError,
+         "broadcast"),
+        (lambda: vs.interaction_moment(np.ones((5, 5)), 0.5, 1, [0, 0, 1, -1]), InvalidValueError,
+         "integer"),
+        (lambda: vs.interaction_moment(np.ones((5, 5)), "a", 1, [0, 0, 1, -1]), InvalidValueError,
+         "integer"),
+        (lambda: vs.interaction_theta_u([0, 0, 2 * np.pi]), InvalidValueError, "turn"),
+        (lambda: vs.interaction_plane_3d([0, 0, 5]), InvalidValueError, "unit"),
+        (lambda: vs.refine_pose(np.outer(range(4), [1, 0, 0]), SQUARE[:, :2], GOAL),
+         InvalidValueError, "line"),
+        (lambda: vs.pnp(SQUARE, np.zeros((4, 2))), InvalidValueError, "coincide"),
+        (lambda: vs.TargetMotion(kalman="x"), InvalidValueError, "kalman"),
+        (lambda: vs.TargetMotion().update(None, [0.0], [0.0], 0.1), InvalidValueError, "last"),
+        (lambda: vs.camera_velocity(TASK, [GOAL]).reason(5), InvalidValueError, "index"),
+        (lambda: vs.pnp(SQUARE, [SQUARE[:, :2]]).reason(5), InvalidValueError, "index"),
+        (lambda: vs.camera_velocity(vs.Hybrid(vs.Task(vs.Points(SQUARE), GOAL, depth=0.5), vs.Task(
+            vs.Points(SQUARE[::-1]), GOAL, depth=0.5)), np.ones(8)), InvalidValueError, "second"),
     ],
 )  # fmt: skip
 def test_refused(call, kind, words):

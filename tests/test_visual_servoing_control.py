@@ -216,6 +216,46 @@ def test_statuses_out_of_sight_and_behind():
         assert vs.camera_velocity(law, GOAL, camera).status is S.CONVERGES
 
 
+def test_lines_are_in_the_image_where_they_cross_it():
+    camera = vs.Camera()
+    for feature, seen in (
+        (vs.Lines([[[0.0, 0.9, 0], [0.8, 0.0, 0]]]), False),
+        (vs.Lines([[[0.0, 0.6, 0], [0.65, 0.0, 0]]]), True),  # its foot is outside the image
+        (vs.Cylinder([0.0, 0.6, 0], [0.65, -0.6, 0], 0.01), True),
+    ):
+        at = translation(0, 0, 1.0)
+        found = vs.camera_velocity(vs.Task(feature, at @ rotation("z", 0.01)), at, camera)
+        assert (found.status is S.CONVERGES) == seen
+        assert (found.status is S.OUT_OF_SIGHT) != seen
+
+
+def test_measurements_alone_are_not_called_singular():
+    plane, ball = vs.Plane3D([0, 0, 1], 0.1), vs.Sphere([0, 0, 0], 0.1)
+    law = vs.Task(plane, plane.measure(GOAL))
+    assert vs.camera_velocity(law, plane.measure(START)).status is S.CONVERGES
+    law = vs.Task(ball, ball.measure(GOAL), depth=0.6)
+    step = vs.camera_velocity(law, ball.measure(START))
+    assert (step.status, step.rank) == (S.CONVERGES, 3)
+    points = vs.Points(SQUARE[:3])
+    centred = vs.Task(vs.Circle([0, 0, 0], [0, 0, 1], 0.1), np.zeros(5), depth=0.5)
+    assert vs.camera_velocity(centred, [0, 0, 0.01, 0.01, 0]).status is S.SINGULAR
+    assert vs.camera_velocity(vs.Task(points, np.zeros(6), depth=0.5), np.ones(6)).status in S
+
+
+def test_the_mean_matrix_near_half_a_turn_is_singular():
+    law = vs.Task(POINTS, GOAL, interaction="mean")
+    for angle in (np.pi, np.pi - 1e-6, 3.1415):
+        assert vs.camera_velocity(law, GOAL @ rotation("z", angle)).status is S.SINGULAR
+    assert vs.camera_velocity(law, GOAL @ rotation("z", 2.0)).status is S.CONVERGES
+
+
+def test_measurements_of_runs_are_taken_back():
+    for law in (vs.task_3d(GOAL), vs.Task(POINTS, GOAL, depth=0.5)):
+        run = vs.servo(law, START, duration=0.1)
+        step = vs.camera_velocity(law, run.s[0])
+        assert step.v == pytest.approx(run.velocity[0])
+
+
 def test_angles_of_errors_take_the_short_way():
     line = vs.Lines([[[0.1, -1, 0], [0.1, 1, 0]]])
     near = [GOAL @ rotation("z", np.pi / 2 + a) for a in (-0.05, 0.05)]
@@ -342,6 +382,20 @@ def test_limits_are_kept_and_named():
         vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=POSTURE, mounting="hand")
 
 
+def test_bounds_without_a_step_are_kept_too():
+    near = POSTURE.copy()
+    near[0] = UR5.upper[0] - 0.01
+    run = vs.servo(vs.Task(POINTS, GOAL, 3.0), translation(0.3, 0.3, 1.0), robot=UR5, q0=near,
+                   duration=2.0, limits=rm.kinematics.JointBounds())  # fmt: skip
+    assert (run.q <= UR5.upper).all()
+    other = vs.servo(vs.Task(POINTS, GOAL, 3.0), translation(-0.3, -0.3, 1.0), robot=UR5, q0=near,
+                     duration=2.0, limits=rm.kinematics.JointBounds())  # fmt: skip
+    assert (other.q <= UR5.upper).all()
+    with pytest.raises(InvalidValueError, match="inside the limits"):
+        vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=POSTURE,
+                 limits=rm.kinematics.JointBounds(upper=POSTURE - 0.1))  # fmt: skip
+
+
 def test_runs_are_values():
     run = vs.servo(vs.Task(POINTS, GOAL), START, duration=0.5, noise=1e-3, rng=1)
     again = vs.servo(vs.Task(POINTS, GOAL), START, duration=0.5, noise=1e-3, rng=1)
@@ -390,6 +444,19 @@ def test_the_true_pose_is_among_those_of_three_points():
     assert np.asarray(again).shape == found.T.shape
     assert vs.p3p(P[:0], X[:0, :, :2]).T.shape == (0, 0, 4, 4)
     assert found.reason(3) == vs.PoseStatus.FOUND.sentence
+
+
+def test_three_points_from_their_cylinder():
+    """Two poses coincide there: the true one is found to the root of rounding."""
+    rng = np.random.default_rng(13)
+    corner = np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
+    angle, height = rng.uniform(0.0, 2.0 * np.pi, 300), rng.uniform(1.5, 4.0, 300)
+    eyes = np.c_[np.cos(angle), np.sin(angle), height]
+    T = np.array([looking(eye, np.zeros(3)) for eye in eyes])
+    X = corner @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
+    found = vs.p3p(corner, X[..., :2] / X[..., 2:])
+    assert np.nanmin(abs(found.T - T[:, None]).max(axis=(2, 3)), axis=1).max() < 1e-4
+    assert found.residual[found.valid].max() < 1e-9
 
 
 def test_pose_of_many_points():
@@ -460,6 +527,14 @@ def test_homographies():
             assert (off + abs(motions.n - n).max(axis=1)).min() < 1e-8
             back = motions.R + motions.t[:, :, None] * motions.n[:, None]
             assert back == pytest.approx(np.broadcast_to(H, back.shape), abs=1e-9)
+    n = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
+    for size in (0.3, -0.3):  # translation along the normal
+        R = rotation("z", 0.4)[:3, :3]
+        both = vs.decompose_homography(R + np.outer(size * (R @ n), n))
+        assert abs(both.R - R).max() < 1e-7
+        assert both.R.shape == (2, 3, 3)
+        assert abs(abs(both.n @ n) - 1.0).max() < 1e-9
+        assert (both.n[0] == -both.n[1]).all()
     turn = vs.decompose_homography(rotation("x", 0.3)[:3, :3])
     assert turn.R.shape == (1, 3, 3)
     assert turn.t.tolist() == [[0.0, 0.0, 0.0]]

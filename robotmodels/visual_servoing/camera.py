@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_core, as_exact, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_floats, read_only
 from ..errors import InvalidValueError
 
 
@@ -49,7 +49,8 @@ class Camera(Value):
     size: Array = (640.0, 480.0)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        focal = np.broadcast_to(self.focal, (2,)) if np.ndim(self.focal) == 0 else self.focal
+        focal = as_floats(self.focal, "focal")
+        focal = np.broadcast_to(focal, (2,)) if focal.ndim == 0 else focal
         for name, value in (("focal", focal), ("centre", self.centre), ("size", self.size)):
             object.__setattr__(self, name, read_only(as_exact(value, (2,), name)))
         if not self.focal.all():
@@ -77,5 +78,5 @@ class Camera(Value):
 
     def sees(self, image: ArrayLike) -> NDArray[np.bool_]:
         """Whether all of the normalised points (..., k, 2) are inside the image."""
-        u = self.pixels(image)
+        u = np.atleast_2d(self.pixels(image))
         return np.all((u >= 0.0) & (u <= self.size), axis=(-2, -1))

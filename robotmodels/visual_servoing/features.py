@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
+from .camera import Camera
 from .matrices import interaction_line, interaction_segment, point_rows
 from .results import brief
 
@@ -114,6 +115,10 @@ class Feature(Value):
             )
         return sight
 
+    def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
+        """Whether a camera has a measurement (k,), of points (m, 2), inside its image."""
+        return image is None or bool(camera.sees(image))
+
     def __repr__(self) -> str:
         return brief(self)
 
@@ -184,6 +189,9 @@ class Points(Feature):
     def _parallel(self, Z: float) -> Array:
         return np.full(len(self.object_points), Z)
 
+    def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
+        return bool(camera.sees(s.reshape(-1, 2)))
+
     def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         return point_rows(s[..., 0::2], s[..., 1::2], 1.0 / depth).reshape(*s.shape, 6)
 
@@ -212,6 +220,13 @@ class Lines(Feature):
         ).all(axis=-1)
         plane = plane_at(p - inner(p, along) / inner(along, along) * along)
         return Sight(exists, *lines_of(normal, plane))
+
+    def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
+        ends = camera.normalise((0.0 * camera.size, camera.size))
+        x, y = np.repeat(ends[:, 0], 2), np.tile(ends[:, 1], 2)
+        rho, theta = s[0::2, None], s[1::2, None]
+        side = x * np.cos(theta) + y * np.sin(theta) - rho  # of the corners of the image
+        return bool(((side.min(axis=1) <= 0.0) & (side.max(axis=1) >= 0.0)).all())
 
     def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
         return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
@@ -266,12 +281,11 @@ def _flat_rows(L: Array) -> Array:
     return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
 
 
-def lines_of(normal: Array, plane: Array) -> tuple[Array, Array, Array]:
-    """Image lines (..., 2 n) of planes through the camera, depths, points nearest to its axis."""
+def lines_of(normal: Array, plane: Array) -> tuple[Array, Array]:
+    """Image lines (..., 2 n) of planes through the camera, and their depths."""
     x, y, z = np.moveaxis(normal, -1, 0)
     rho, theta = -z / np.hypot(x, y), np.arctan2(y, x)
-    nearest = np.stack((rho * np.cos(theta), rho * np.sin(theta)), axis=-1)
-    return _flat(np.stack((rho, theta), axis=-1)), plane, nearest
+    return _flat(np.stack((rho, theta), axis=-1)), plane
 
 
 def wrapped(error: Array, periods: Array) -> Array:

@@ -14,11 +14,11 @@ from .._arrays import Array, as_exact, as_number, read_only
 from ..se3 import as_single_pose, inverse
 from ..se3.orientation import rotation_vectors_of
 from .features import Feature, Sight, inner, placed, unit
-from .matrices import interaction_plane_3d, interaction_point_3d, interaction_theta_u, point_rows
+from .matrices import interaction_point_3d, interaction_theta_u, plane_rows, point_rows
 
 
 class _InSpace(Feature):
-    """A feature whose rows need no depth besides the measurement."""
+    """A feature whose rows need its measurement alone."""
 
     __slots__ = ()
     depends_on_depth = False
@@ -101,7 +101,7 @@ class Plane3D(_InSpace):
         return _sight(np.concatenate((n, self.distance + inner(n, T[..., :3, 3])), axis=-1), None)
 
     def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        return interaction_plane_3d(s[..., :3])
+        return plane_rows(s[..., :3])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -141,5 +141,5 @@ def rotations(vectors: Array) -> Array:
     """Rotation matrices of rotation vectors. Shapes: (..., 3) -> (..., 3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    matrices = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix()
+    matrices = Rotation.from_rotvec(np.array(vectors).reshape(-1, 3)).as_matrix()
     return matrices.reshape(*vectors.shape, 3)

@@ -54,7 +54,7 @@ class PlaneMotions(Result):
     R : ndarray, shape (k, 3, 3)
         Rotations from the first camera to the second, ``X_2 = R X_1 + t``.
     t : ndarray, shape (k, 3)
-        Translations beside the distance of the plane from the first camera.
+        Translations divided by the distance of the plane from the first camera.
     n : ndarray, shape (k, 3)
         Unit normals of the plane in the first camera, ``n . X_1 = distance``; NaN without
         translation, where k is 1.
@@ -100,7 +100,9 @@ def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneM
         U, _, Wt = np.linalg.svd(A)
         return PlaneMotions((U @ Wt)[None], np.zeros((1, 3)), np.full((1, 3), np.nan))
     found = []
-    for sign in (1.0, -1.0):
+    if min(a, c) <= 1e-13:  # translation along the normal: both signs are the same motion
+        a, c = (a, 0.0) if a > c else (0.0, c)
+    for sign in (1.0, -1.0) if min(a, c) > 0.0 else (1.0,):
         u = (np.sqrt(max(c, 0.0)) * v1 + sign * np.sqrt(max(a, 0.0)) * v3) / np.sqrt(a + c)
         before = np.stack((v2, u, np.cross(v2, u)), axis=-1)
         after = np.stack((A @ v2, A @ u, np.cross(A @ v2, A @ u)), axis=-1)

@@ -2,7 +2,7 @@
 
 Parameters
 ----------
-feature : Points, Lines, Segments, Circle, ...
+f : Points, Lines, Segments, Circle, ...
     Feature that is kept.
 T : array_like, shape (4, 4)
     Pose of the object in the camera.
@@ -59,9 +59,9 @@ from .results import Result
 from .velocity import RANK_TOLERANCE
 
 _NAMES = {
-    (0, 0): "rigid", (1, 1): "prismatic", (1, 0): "revolute", (2, 1): "sliding pivot",
-    (3, 2): "plane on plane", (3, 0): "ball joint", (4, 2): "rectilinear", (4, 1): "linear annular",
-    (5, 2): "point on plane", (6, 3): "free",
+    (0, 0): "rigid", (1, 1): "prismatic", (1, 0): "revolute", (2, 1): "cylindrical joint",
+    (3, 2): "planar joint", (3, 0): "ball joint", (4, 2): "line contact",
+    (4, 1): "sphere in a cylinder", (5, 2): "point contact", (6, 3): "free",
 }  # fmt: skip
 
 
@@ -87,11 +87,11 @@ class VirtualLink(Result):
     name: str = ""
 
 
-def virtual_link(feature: Feature, T: ArrayLike) -> VirtualLink:
+def virtual_link(f: Feature, T: ArrayLike) -> VirtualLink:
     """Virtual link between a camera and an object: the kernel of the interaction matrix."""
-    if not isinstance(feature, Feature):
-        raise InvalidValueError(f"feature: expected a feature, got {type(feature).__name__}.")
-    _, sizes, Vt = np.linalg.svd(feature.interaction(as_single_pose(T, "T")))
+    if not isinstance(f, Feature):
+        raise InvalidValueError(f"f: expected a feature, got {type(f).__name__}.")
+    _, sizes, Vt = np.linalg.svd(f.interaction(as_single_pose(T, "T")))
     rank = int((sizes > RANK_TOLERANCE * sizes[0]).sum())
     kernel = Vt[rank:]
     turns = int(np.linalg.matrix_rank(kernel[:, 3:], tol=1e-6)) if len(kernel) else 0
@@ -124,5 +124,12 @@ def broyden(L: ArrayLike, ds: ArrayLike, dx: ArrayLike, factor: float = 1.0) -> 
     part = as_number(factor, "factor", above=0.0)
     if part > 1.0:
         raise InvalidValueError(f"factor: expected a number in (0, 1], got {factor}.")
-    square = float(x @ x)
-    return A.copy() if square == 0.0 else A + part * np.outer(s - A @ x, x / square)
+    size = float(np.abs(x).max())
+    if size == 0.0:
+        return A.copy()
+    unit = x / size
+    with np.errstate(over="ignore"):
+        B = A + part * np.outer((s - A @ x) / size, unit / (unit @ unit))
+    if not np.isfinite(B).all():
+        raise InvalidValueError(f"dx: expected a displacement that can cause ds, got {dx!r:.60}.")
+    return B

@@ -38,7 +38,7 @@ Raises
 ------
 ShapeError, InvalidValueError
     Arguments that do not fit each other, NaN; a depth that is not positive; a plane through the
-    centre of the camera.
+    centre of the camera; a rotation of a turn or more; a normal of another length than 1.
 
 References
 ----------
@@ -97,13 +97,15 @@ def interaction_segment(
 ) -> Array:
     """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2)."""
     depth = _in_front(as_core(Z, (2,), "Z"))
-    x, y, length, alpha = _together(x=x, y=y, length=length, alpha=alpha)
+    x, y, length, alpha, near, far = _together(
+        x=x, y=y, length=length, alpha=alpha, Z_1=depth[..., 0], Z_2=depth[..., 1]
+    )
     if not (length > 0.0).all():
         raise InvalidValueError(f"length: expected numbers above 0, got {length.min():.4g}.")
     cos, sin = np.cos(alpha), np.sin(alpha)
     dx, dy = 0.5 * length * cos, 0.5 * length * sin
-    first = point_rows(x - dx, y - dy, 1.0 / depth[..., 0])
-    last = point_rows(x + dx, y + dy, 1.0 / depth[..., 1])
+    first = point_rows(x - dx, y - dy, 1.0 / near)
+    last = point_rows(x + dx, y + dy, 1.0 / far)
     middle, along = 0.5 * (first + last), last - first
     cos, sin, length = cos[..., None], sin[..., None], length[..., None]
     stretch = cos * along[..., 0, :] + sin * along[..., 1, :]
@@ -139,12 +141,16 @@ def interaction_ellipse(
 def interaction_moment(moments: ArrayLike, i: int, j: int, plane: ArrayLike) -> Array:
     """Interaction matrix (..., 1, 6) of the raw moment m_ij of a region."""
     m = as_floats(moments, "moments")
+    for name, value in (("i", i), ("j", j)):
+        if not isinstance(value, int | np.integer):
+            raise InvalidValueError(f"{name}: expected an integer from 0, got {value!r:.40}.")
     if min(i, j) < 0 or m.ndim < 2 or min(m.shape[-2:]) < i + j + 2:
         raise ShapeError(
             f"moments: expected shape (..., K, K) with K from i + j + 2 = {i + j + 2} and i, j not "
             f"negative, got {m.shape}."
         )
     a, b, c = _inverse_depth(plane)
+    _, a, b, c = _together(moments=m[..., 0, 0], A=a, B=b, C=c)
     here, right, up = m[..., i, j], m[..., i + 1, j], m[..., i, j + 1]
     left, down = m[..., i - 1, j], m[..., i, j - 1]  # without effect where i or j is 0
     left_up, right_down = m[..., i - 1, j + 1], m[..., i + 1, j - 1]
@@ -165,6 +171,8 @@ def interaction_theta_u(theta_u: ArrayLike) -> Array:
     w = as_core(theta_u, (3,), "theta_u")
     L = np.zeros((*w.shape[:-1], 3, 6))
     half = 0.5 * np.linalg.norm(w, axis=-1)[..., None, None]
+    if not (half < np.pi - 1e-9).all():
+        raise InvalidValueError("theta_u: expected rotations of less than a turn, 2 pi.")
     small = half < 0.02
     safe = np.where(small, 1.0, half)
     # (1 - h cot h) / (2 h)^2, by its series near 0
@@ -190,6 +198,13 @@ def interaction_point_3d(point: ArrayLike) -> Array:
 def interaction_plane_3d(normal: ArrayLike) -> Array:
     """Interaction matrix of a plane in space, ``normal . X = distance``: normal, distance."""
     n = as_core(normal, (3,), "normal")
+    if not (np.abs(np.linalg.norm(n, axis=-1) - 1.0) <= 1e-6).all():
+        raise InvalidValueError("normal: expected unit vectors; divide them by their length.")
+    return plane_rows(n)
+
+
+def plane_rows(n: Array) -> Array:
+    """The same without checks. Shapes: (..., 3) -> (..., 4, 6)."""
     L = np.zeros((*n.shape[:-1], 4, 6))
     L[..., :3, 3:] = skew(n)
     L[..., 3, :3] = -n

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from math import comb
@@ -11,7 +12,7 @@ import numpy as np
 
 from .._arrays import Array, as_core, read_only
 from ..errors import InvalidValueError, ShapeError
-from .features import Feature, Sight, inner, norm, placed
+from .features import THIN, Feature, Sight, inner, norm, placed
 from .matrices import interaction_moment, point_rows
 
 _COMPONENTS = (
@@ -31,7 +32,8 @@ class Moments(Feature):
     object's own area: ``an = c / sqrt(a)``, the depth of an object parallel to the image, and
     ``xn = an x``, ``yn = an y``. Skewness in x and y, zero for centrally symmetric images:
     ``c_x = sqrt(a) (mu30 + mu12) / (mu20 + mu02)^(3/2)`` and ``c_y`` with mu03 + mu21; they keep
-    their values when the image is shifted or scaled, and turn with it as a vector.
+    their values when the image is shifted or scaled, and turn with it as a vector. Sums over k
+    points have the factor sqrt(k) instead of sqrt(a).
 
     Parameters
     ----------
@@ -41,13 +43,15 @@ class Moments(Feature):
         Which, in this order.
     points : array_like, shape (k, 3), optional
         Instead of a polygon: moments are sums over points, which need not be coplanar. Their
-        ``area`` is mu20 + mu02, and n20, n02, n11 are divided by their number k.
+        ``area`` is mu20 + mu02, ``c`` the root of the sum of the squared distances from their
+        mean, and n20, n02, n11 are divided by their number k.
 
     Raises
     ------
     ShapeError, InvalidValueError
-        A polygon with fewer than three corners, without area, not planar or that crosses itself;
-        unknown components; ``alpha`` of an image without orientation, such as a square.
+        A polygon with fewer than three corners, without area, not planar or that crosses or
+        touches itself; unknown components; ``alpha`` of an image without
+        orientation, such as a square.
 
     References
     ----------
@@ -74,8 +78,12 @@ class Moments(Feature):
         corners = as_core(getattr(self, name), (3,), name)
         if corners.ndim != 2 or len(corners) < least:
             raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {corners.shape}.")
-        words = (self.components,) if isinstance(self.components, str) else tuple(self.components)
-        if not words or len(set(words)) < len(words) or not set(words) <= set(_COMPONENTS):
+        words: Any = self.components
+        words = (
+            (words,) if isinstance(words, str) or not isinstance(words, Iterable) else tuple(words)
+        )
+        known = [name for name in words if isinstance(name, str) and name in _COMPONENTS]
+        if not words or len(set(known)) < len(words):
             raise InvalidValueError(
                 f"components: expected some of {', '.join(_COMPONENTS)}, each once, got {words}."
             )
@@ -156,7 +164,7 @@ class Moments(Feature):
         spread_3d = self._corners - self._corners.mean(axis=0)
         own = (spread_3d**2).sum() if self.points is not None else _area(self._corners)
         an = area**-0.5 * float(np.sqrt(own))
-        skewness = area**0.5 * spread**-1.5
+        skewness = whole**0.5 * spread**-1.5
         found = {
             "area": area, "x": x, "y": y, "n20": mu20 / whole, "n02": mu02 / whole,
             "n11": mu11 / whole, "xn": an * x, "yn": an * y, "an": an,
@@ -169,7 +177,7 @@ class Moments(Feature):
 
 
 class _Rate:
-    """A number (...) and its row (..., 6) of the interaction matrix, with rules of derivation."""
+    """A number (...) and its row (..., 6) of the interaction matrix, with its rules."""
 
     def __init__(self, value: Array, rate: Array) -> None:
         self.value, self.rate = value, rate
@@ -235,17 +243,18 @@ def _area(corners: Array) -> float:
 
 
 def _check_polygon(corners: Array) -> None:
-    """Raise for polygons without area, that are not planar or cross themselves."""
+    """Raise for polygons without area, that are not planar, or cross or touch themselves."""
     p = (corners - corners.mean(axis=0)) @ _axes(corners).T
     size = float(np.abs(p).max())
     if not _area(corners) > _FLAT * size**2:
         raise InvalidValueError("polygon: expected corners that enclose an area, which is zero.")
     if np.abs(p[:, 2]).max() > _FLAT * size:
         raise InvalidValueError("polygon: expected corners in one plane; points= need not be.")
+    p = p[(np.abs(p - np.roll(p, -1, axis=0)) > THIN * size).any(axis=1), :2]  # repeated corners
     x, y = p[:, 0], p[:, 1]
     X, Y = np.roll(x, -1), np.roll(y, -1)
 
-    def side(u: Array, v: Array) -> Array:  # of points (u, v), beside each edge
+    def side(u: Array, v: Array) -> Array:  # on which of each edge points (u, v) are
         return (X - x)[:, None] * (v - y[:, None]) - (Y - y)[:, None] * (u - x[:, None])
 
     apart = side(x, y) * side(X, Y) < -((_FLAT * size) ** 4)
@@ -253,4 +262,15 @@ def _check_polygon(corners: Array) -> None:
         i, j = np.argwhere(apart & apart.T)[0]
         raise InvalidValueError(
             f"polygon: its edges {i} and {j} cross; expected the corners in order."
+        )
+    along, n = np.roll(p, -1, axis=0) - p, np.arange(len(p))
+    part = np.einsum("ejk,ek->ej", p - p[:, None], along) / (along**2).sum(axis=1)[:, None]
+    foot = p[:, None] + np.clip(part, 0.0, 1.0)[..., None] * along[:, None]
+    gap = np.linalg.norm(p - foot, axis=2)  # of each edge and corner
+    gap[n, n] = gap[n, (n + 1) % len(p)] = np.inf
+    if gap.min() <= THIN * size:
+        edge, corner = np.argwhere(gap <= THIN * size)[0]
+        raise InvalidValueError(
+            f"polygon: corner {corner} is on edge {edge}; expected an outline that does not touch "
+            "itself."
         )

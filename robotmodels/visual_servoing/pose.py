@@ -1,6 +1,8 @@
 """Pose of an object from image points: three points, many points, virtual visual servoing.
 
-`p3p` finds all poses of three points. `pnp` finds the pose of least squared image error, of planar
+`p3p` finds the poses of three points; where the camera is on the cylinder through them, two poses
+coincide, are found to about 1e-6 and are given once, and thin or small triangles near it may lack
+one. `pnp` finds the pose of least squared image error, of planar
 objects both minima: it starts from triples of points and refines on all points. `refine_pose` is
 virtual visual servoing: a virtual camera is moved from a first pose until its image fits, with
 steps that are damped where the error would grow (Levenberg-Marquardt).
@@ -22,7 +24,8 @@ PoseSolutions
 Raises
 ------
 ShapeError, InvalidValueError, NotARotationError
-    Arrays that do not fit each other, points on a line, a first pose with points behind the camera.
+    Arrays that do not fit each other, points on a line, an image of one point, a first pose with
+    points behind the camera.
 
 References
 ----------
@@ -42,7 +45,7 @@ array([0. , 0. , 0.5])
 array([0. , 0. , 0.5])
 >>> triangle = [[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]]
 >>> p3p(triangle, np.array(triangle)[:, :2] / 12**0.5)
-<PoseSolutions: 4 poses. The poses found are all that fit the image.>
+<PoseSolutions: 4 poses. Each pose found is a minimum of the image error.>
 """
 
 from __future__ import annotations
@@ -59,12 +62,12 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points
-from .results import Result
+from .results import Result, code_of
 from .velocity import moved, sight_of
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
-_FITS = 1e-12  # of the squared sides
-_SAME = 1e-7  # of distances or poses
+_FITS = 1e-10  # of the squared sides
+_SAME = 1e-6  # of distances or poses
 _TURNED = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 _TRIPLES, _STARTS, _ITERATIONS = 24, 6, 60
 _NEAR = 0.02  # of the depth: entries of poses that lead to the same minimum
@@ -73,9 +76,9 @@ _NEAR = 0.02  # of the depth: entries of poses that lead to the same minimum
 class PoseStatus(Outcome):
     """Outcome of an estimation of a pose; fits int8."""
 
-    FOUND = 0, "The poses found are all that fit the image."
+    FOUND = 0, "Each pose found is a minimum of the image error."
     TWO_MINIMA = 1, "Two poses are minima of the image error, the first with the smaller one."
-    NONE_FOUND = 2, "No pose in front of the camera fits the image."
+    NONE_FOUND = 2, "No pose was found in front of the camera that fits the image."
     NOT_CONVERGED = 3, "The image error still decreases after the allowed iterations."
 
 
@@ -109,10 +112,7 @@ class PoseSolutions(Result):
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
-        code = np.asarray(self.status[i])
-        if code.ndim:
-            raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
-        return PoseStatus(int(code)).sentence
+        return PoseStatus(code_of(self.status, i)).sentence
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.T, dtype=dtype)
@@ -124,7 +124,7 @@ class PoseSolutions(Result):
 
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
-    """All poses of three points, at most four."""
+    """Poses of three points, at most four."""
     P, m = as_core(points, (3, 3), "points"), as_core(image, (3, 2), "image")
     batch = _batch(P.shape[:-2], m.shape[:-2])
     P = np.broadcast_to(P, (*batch, 3, 3)).reshape(-1, 3, 3)
@@ -151,8 +151,6 @@ def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     if len(P) == 3:
         return p3p(P, images)
     singular = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
-    if singular[1] <= _THIN * singular[0]:
-        raise InvalidValueError("points: expected points that are not all on one line.")
     planar = bool(singular[2] <= 1e-6 * singular[0])
     found = [_minima(P, m, planar) for m in images.reshape(-1, len(P), 2)]
     return _packed(found, images.shape[:-2])
@@ -195,24 +193,33 @@ def _p3p(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
     companion = np.zeros((N, 4, 4))
     companion[:, row + 1, row] = 1.0
     companion[:, :, 3] = -quartic[:, :4] / np.where(quartic[:, 4:] == 0.0, 1e-300, quartic[:, 4:])
-    x = np.linalg.eigvals(companion) + 0j  # (N, 4)
+    x = np.linalg.eigvals(companion)  # (N, 4); rounding turns two near roots into a complex pair
+    x = np.concatenate((x.real + np.abs(x.imag), x.real - np.abs(x.imag)), axis=-1)
     powers = np.stack([x**k for k in range(5)], axis=-1)
     top, bottom = (np.einsum("npk,nk->np", powers, p[:, :5]) for p in (ac, ab))
     y = -top / np.where(bottom == 0.0, 1e-300, bottom)
-    s = np.stack((x.real, y.real, np.ones(x.shape)), axis=-1) @ _TURNED.T
+    s = np.stack((x, y, np.ones(x.shape)), axis=-1) @ _TURNED.T
     s = s * np.sign(s.sum(axis=-1, keepdims=True))
     size = np.einsum("npi,neij,npj->np", s, E, s)
     s = s * np.sqrt(sides.sum(axis=-1)[:, None] / np.maximum(size, 1e-300))[..., None]
     chords = ((rays[:, i] - rays[:, j]) ** 2).sum(axis=-1)[:, None]
-    for _ in range(12):
-        s = s - _newton(s, chords, sides[:, None])[0]
-    off = np.abs(_newton(s, chords, sides[:, None])[1]).max(axis=-1)
+    part, (step, residual) = np.ones(s.shape[:2]), _newton(s, chords, sides[:, None])
+    off = np.abs(residual).max(axis=-1)
+    for _ in range(40):  # steps that increase the residual, near double roots, are cut
+        after = s - part[..., None] * step
+        step_after, residual = _newton(after, chords, sides[:, None])
+        off_after = np.abs(residual).max(axis=-1)
+        better = off_after < off
+        s, step = (np.where(better[..., None], b, a) for a, b in ((s, after), (step, step_after)))
+        off, part = np.where(better, off_after, off), np.where(better, 1.0, 0.25 * part)
+    best = np.argsort(off, axis=-1)  # of starts that lead to the same pose the best is kept
+    s, off = np.take_along_axis(s, best[..., None], 1), np.take_along_axis(off, best, 1)
     good = (off <= _FITS * sides.max(axis=-1)[:, None]) & (s > 0.0).all(axis=-1)
     near = (
         np.abs(s[:, :, None] - s[:, None]).max(axis=-1) <= _SAME * np.abs(s).max(axis=-1)[:, None]
     )
-    good &= ~np.any(near & np.tril(good[:, None] & np.ones((4, 4), bool), -1), axis=-1)
-    order = np.argsort(~good, axis=-1, kind="stable")
+    good &= ~np.any(near & np.tril(good[:, None] & np.ones((8, 8), bool), -1), axis=-1)
+    order = np.argsort(~good, axis=-1, kind="stable")[:, :4]
     s, good = (np.take_along_axis(s, order[..., None], 1), np.take_along_axis(good, order, 1))
     C = np.where(good[..., None], s, 1.0)[..., None] * rays[:, None]
     T = np.zeros((N, 4, 4, 4))
@@ -269,7 +276,7 @@ def _triad(P: Array) -> Array:
 
 
 def _sine(P: Array) -> Array:
-    """Area of triangles beside the square of their longest side. Shapes: (..., 3, 3) -> (...)."""
+    """Double area by the square of the longest side. Shapes: (..., 3, 3) -> (...)."""
     a, b = P[..., 1, :] - P[..., 0, :], P[..., 2, :] - P[..., 0, :]
     longest = np.maximum(np.maximum((a**2).sum(-1), (b**2).sum(-1)), ((a - b) ** 2).sum(-1))
     return np.linalg.norm(np.cross(a, b), axis=-1) / np.where(longest > 0.0, longest, 1.0)
@@ -318,7 +325,7 @@ def _minima(P: Array, m: Array, planar: bool) -> tuple[list[Array], list[float],
 
 
 def _frontal(P: Array, m: Array) -> Array:
-    """The object parallel to the image with the size and the place of its image, a last start."""
+    """The object parallel to the image with the size and the place of its image: the last start."""
     flat = np.linalg.svd(P - P.mean(axis=0))[2]
     flat[2] *= np.linalg.det(flat)
     depth = np.linalg.norm(P - P.mean(axis=0)) / (np.linalg.norm(m - m.mean(axis=0)) + 1e-12)
@@ -377,7 +384,13 @@ def _checked(points: Any, image: Any) -> tuple[Array, Array]:
     P = as_core(points, (3,), "points")
     if P.ndim != 2 or len(P) < 3:
         raise ShapeError(f"points: expected shape (n, 3), n from 3, got {P.shape}.")
-    return P, as_core(image, (len(P), 2), "image")
+    m = as_core(image, (len(P), 2), "image")
+    sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
+    if sizes[1] <= _THIN * sizes[0]:
+        raise InvalidValueError("points: expected points that are not all on one line.")
+    if (np.ptp(m, axis=-2) <= _THIN * np.abs(m).max(axis=-2)).all(axis=-1).any():
+        raise InvalidValueError("image: expected image points that do not all coincide.")
+    return P, m
 
 
 def _batch(*shapes: tuple[int, ...]) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Frozen, value_hash
+from ..errors import InvalidValueError
 
 _SHOWN = 6  # numbers of an array that are printed
 
@@ -33,6 +34,18 @@ class Result(Frozen):
 
     def __repr__(self) -> str:
         return brief(self)
+
+
+def code_of(status: Any, i: Any) -> int:
+    """Code of row i of a batch of codes, or the code of one result."""
+    codes = np.asarray(status)
+    try:
+        code = np.asarray(codes[i] if codes.ndim else codes)
+    except (IndexError, TypeError):
+        code = np.zeros(1)
+    if code.ndim:
+        raise InvalidValueError(f"i: expected the index of one row of {codes.shape}, got {i!r}.")
+    return int(code)
 
 
 def brief(value: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,8 @@ def servo(
     tracking : TargetMotion, optional
         Estimates and compensates the motion of the target.
     limits : JointBounds or bool
-        Limits of the joints, see `ikm`; True takes those of the robot.
+        Limits of the joints, see `ikm`, for the step of the simulation; True takes those of the
+        robot.
 
     Returns
     -------
@@ -267,9 +268,11 @@ class _Arm:
             got = type(mounting).__name__
             raise InvalidValueError(f"mounting: expected EyeInHand or EyeToHand, got {got}.")
         self.model, self.h, self.q = robot, h, as_exact(q0, (robot.n,), "q0")
-        bounds = limits if isinstance(limits, JointBounds) else JointBounds(step=h)
+        bounds = replace(limits if isinstance(limits, JointBounds) else JointBounds(), step=h)
         self.limits = None if limits is False else bounds
-        if limits is True and not ((robot.lower <= self.q) & (self.q <= robot.upper)).all():
+        lower = robot.lower if bounds.lower is None else bounds.lower
+        upper = robot.upper if bounds.upper is None else bounds.upper
+        if self.limits is not None and not ((lower <= self.q) & (self.q <= upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
         tool = dgm(robot, self.q)
         self.in_hand = isinstance(mounting, EyeInHand)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
+from ..errors import InvalidValueError
 from .features import (
     THIN,
     Feature,
@@ -66,11 +67,28 @@ class Sphere(_Ellipse):
         set_fields(self, centre=self.centre, radius=self.radius)
 
     def _see(self, T: Array) -> Sight:
-        p = placed(T, self.centre[None])[..., 0, :]
+        return self._outline(placed(T, self.centre[None])[..., 0, :])
+
+    def _outline(self, p: Array) -> Sight:
+        """Sight of the sphere with its centre at p (..., 3)."""
         excess = inner(p, p) - self.radius**2
         Q = _outer(p, p) - excess[..., None] * np.eye(3)
+        return _ellipse_of(Q, p[..., 2] > self.radius, p[..., 2])
+
+    def _parallel(self, Z: float) -> float:
+        if not self.radius < Z:
+            raise InvalidValueError(
+                f"depth: expected the depth of the centre of the sphere, above its radius "
+                f"{self.radius:g} m, got {Z:g} m."
+            )
+        return Z
+
+    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
+        Z = np.broadcast_to(depth, s.shape[:-1])[..., None]
+        p = np.concatenate((s[..., :2] * (Z - self.radius**2 / Z), Z), axis=-1)
+        excess = inner(p, p) - self.radius**2
         polar = np.concatenate((p, -excess), axis=-1)  # the plane of the outline
-        return _ellipse_of(Q, p[..., 2] > self.radius, polar)
+        return _Ellipse._rows(self, self._outline(p).s, polar)  # of rank 3 at any depth
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -93,10 +111,12 @@ class Cylinder(Feature):
         beside = np.sqrt(1.0 - sine**2) * np.cross(u, towards)
         n = np.stack((sine * towards + beside, sine * towards - beside), axis=-2)
         outside = (sine < 1.0 - THIN)[..., 0]
-        exists = (p[..., 2] > 0.0) & outside & (np.hypot(n[..., 0], n[..., 1]) > THIN).all(axis=-1)
         contact = nearest[..., None, :] - self.radius * n
+        ahead = (p[..., 2] > 0.0) | (contact[..., 2] > 0.0).all(axis=-1)
+        exists = ahead & outside & (np.hypot(n[..., 0], n[..., 1]) > THIN).all(axis=-1)
         return Sight(exists, *lines_of(n, plane_at(contact)))
 
+    _in_image = Lines._in_image
     _rows = Lines._rows
 
 

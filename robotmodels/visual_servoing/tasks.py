@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError
 from ..se3 import as_single_pose, inverse
 from .features import Feature, Sight, as_measurement
@@ -36,7 +36,7 @@ class Task(Value):
         Matrix of the law; "mean" is half the sum of the pseudo-inverses of the other two.
     depth : {"true", "desired"} or float
         Of the object in the current matrix: of its pose, of the desired pose, or of an object
-        parallel to the image at this depth, m.
+        parallel to the image at this depth, m; of a sphere the depth of its centre.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Task(Value):
     >>> task = Task(square, desired=translation(0, 0, 0.5))
     >>> step = camera_velocity(task, translation(0, 0, 1.0))
     >>> step.v.round(6) + 0.0, step.reason()
-    (array([0.  , 0.  , 0.5, 0.  , 0.  , 0.  ]), 'The velocity reduces the error, or it is zero.')
+    (array([0.  , 0.  , 0.5, 0.  , 0.  , 0.  ]), 'The law gives a velocity, or the error is zero.')
     """
 
     feature: Feature
@@ -78,7 +78,7 @@ class Task(Value):
                 f"{type(self.feature).__name__}."
             )
         feature, s, T = _goal(self.feature, self.desired)
-        if self.interaction not in _MATRICES:
+        if not isinstance(self.interaction, str) or self.interaction not in _MATRICES:
             words = ", ".join(_MATRICES)
             raise InvalidValueError(
                 f"interaction: expected one of {words}, got {self.interaction!r:.40}."
@@ -248,7 +248,7 @@ def _goal(feature: Feature, desired: Any) -> tuple[Feature, Array, Array | None]
             f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} or a "
             f"pose (4, 4), got {type(desired).__name__}; give its measure(T)."
         )
-    if hasattr(desired, "homogeneous") or np.shape(desired) == (4, 4):
+    if hasattr(desired, "homogeneous") or as_floats(desired, "desired").shape == (4, 4):
         T = as_single_pose(desired, "desired")
     else:
         s = as_exact(as_measurement(desired, feature, "desired"), (feature.size,), "desired")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_exact, as_floats, as_number
+from ..errors import InvalidValueError
 from .results import Result
 
 
@@ -63,6 +64,8 @@ class TargetMotion(Value):
     noise: float = 1e-4
 
     def __post_init__(self) -> None:
+        if not isinstance(self.kalman, bool | np.bool_):
+            raise InvalidValueError(f"kalman: expected True or False, got {self.kalman!r:.40}.")
         for name in ("process", "noise"):
             object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
 
@@ -75,6 +78,10 @@ class TargetMotion(Value):
         self, last: TargetEstimate, s: ArrayLike, own: ArrayLike, step: float
     ) -> TargetEstimate:
         """Estimate with the next measurement s (k,); ``own`` (k,) is the rate by the camera."""
+        if not isinstance(last, TargetEstimate):
+            raise InvalidValueError(
+                f"last: expected the estimate of start or update, got {type(last).__name__}."
+            )
         s, own = (as_exact(x, last.s.shape, name) for x, name in ((s, "s"), (own, "own")))
         h = as_number(step, "step", above=0.0)
         seen = (s - last.s) / h - own

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import Array, as_exact, as_floats, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..se3 import as_pose
 from .camera import Camera
-from .features import Feature, Points, Sight, as_measurement, wrapped
-from .results import Result
+from .features import Feature, Sight, as_measurement, wrapped
+from .results import Result, code_of
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -29,6 +29,10 @@ _NEARBY = 0.05 * np.random.default_rng(0).normal(size=(3, 6))  # motions off a s
 class ServoStatus(Outcome):
     """Outcome of a visual servoing law; fits int8.
 
+    With the current matrix at true depths the velocity of ``CONVERGES`` reduces the error. With
+    other matrices or depths the error may grow, as with the desired matrix of an object that is
+    turned by more than a quarter.
+
     Attributes
     ----------
     sentence : str
@@ -37,18 +41,25 @@ class ServoStatus(Outcome):
     Examples
     --------
     >>> ServoStatus.BEHIND.sentence
-    'A part of the object is at or behind the plane of the camera, or is seen edge-on.'
+    'A part of the object is not in front of the plane of the camera, or is seen edge-on.'
     """
 
-    CONVERGES = 0, "The velocity reduces the error, or it is zero."
+    CONVERGES = 0, "The law gives a velocity, or the error is zero."
     AT_MINIMUM = (
         1,
         "The error is not zero, yet no velocity of this law reduces it: a local minimum.",
     )
     SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
-    BEHIND = 4, "A part of the object is at or behind the plane of the camera, or is seen edge-on."
-    LIMITED = 5, "The robot cannot give the camera its velocity: limits, singular, too few joints."
+    BEHIND = (
+        4,
+        "A part of the object is not in front of the plane of the camera, or is seen edge-on.",
+    )
+    LIMITED = (
+        5,
+        "The robot cannot give the camera the velocity of the law: its joints are at their limits, "
+        "its posture is singular, or it has too few joints.",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -70,7 +81,7 @@ class ServoStep(Result):
     Examples
     --------
     >>> ServoStep(np.zeros(6), np.zeros(8), 6, ServoStatus.CONVERGES).reason()
-    'The velocity reduces the error, or it is zero.'
+    'The law gives a velocity, or the error is zero.'
     """
 
     v: Array
@@ -83,10 +94,7 @@ class ServoStep(Result):
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
-        code = self.status[i] if isinstance(self.status, np.ndarray) else self.status
-        if np.ndim(code):
-            raise InvalidValueError(f"i: expected the index of one row, got {i!r}.")
-        return ServoStatus(int(code)).sentence
+        return ServoStatus(code_of(self.status, i)).sentence
 
 
 def camera_velocity(
@@ -177,10 +185,10 @@ def law(
             status = ServoStatus.SINGULAR
         elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
+            if mean and np.linalg.norm(A @ (own @ error)) > _REDUCIBLE * size:
+                status = ServoStatus.SINGULAR  # the two pseudo-inverses nearly cancel each other
     image = None if sight is None else sight.image
-    if isinstance(feature, Points) and s is not None:
-        image = s.reshape(-1, 2)
-    if camera is not None and image is not None and not camera.sees(image):
+    if camera is not None and not feature._in_image(camera, measured, image):
         return np.zeros(6), error, rank, ServoStatus.OUT_OF_SIGHT, inverse
     v = -primary.gain * direction
     if isinstance(task, Hybrid):
@@ -216,17 +224,29 @@ def pseudo_inverse(A: Array) -> tuple[Array, int]:
 
 def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
     """Whether the rank is less than at poses nearby."""
-    if T is None:
-        return True
+    T = _somewhere(feature) if T is None else T
     reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
     poses = [moved(T, twist * reach) for twist in _NEARBY]
     seen = [nearby for nearby in poses if sight_of(feature, nearby).exists]
     return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
 
 
+@lru_cache(maxsize=64)
+def _somewhere(feature: Feature) -> Array:
+    """A pose at which a feature exists."""
+    turns = [moved(np.eye(4), twist) for twist in 20.0 * _NEARBY]
+    poses = [moved(R, np.eye(6)[2] * -(10.0**k)) for k in range(-2, 8) for R in turns]
+    return next((T for T in poses if sight_of(feature, T).exists), np.eye(4))
+
+
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
     """Twist that the secondary motion asks for."""
     if isinstance(task.secondary, Task):
+        if T is None and task.secondary.feature != task.primary.feature:
+            raise InvalidValueError(
+                "measurement: the secondary task has another feature, so expected the pose (4, 4) "
+                "of the object in the camera; give it instead of s."
+            )
         return law(task.secondary, None if T is not None else s, T)[0]
     if not callable(task.secondary):
         return task.secondary
@@ -238,7 +258,8 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
 
 def _sensed(feature: Feature, measurement: Any) -> tuple[Array, bool]:
     """Checked measurements or poses, and whether they are poses."""
-    shape = np.shape(getattr(measurement, "homogeneous", measurement))
+    given = getattr(measurement, "homogeneous", measurement)
+    shape = given.shape if type(given) is np.ndarray else as_floats(given, "measurement").shape
     if shape[-2:] == (4, 4):
         if type(measurement) is np.ndarray and len(shape) == 2 and _is_exact(measurement):
             return measurement, True
