@@ -67,7 +67,7 @@ Free = Callable[[Array], NDArray[np.bool_]]
 _FULL_TURN = tau - 1e-9
 _CHUNK = 65536  # positions solved at a time
 _MOST_BYTES = 1e9
-_CELL_BYTES = 64
+_CELL_BYTES = 170
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -261,7 +261,8 @@ def turned_inside(model: RobotModel, q: Array, limits: bool) -> tuple[Array, NDA
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     lower, upper = model.lower, model.upper
     with np.errstate(invalid="ignore"):
-        low = np.where(turning & np.isfinite(lower), np.ceil((lower - q - 1e-9) / tau), 0.0)
+        low = np.ceil((lower - q - 1e-9) / tau)
+        low = np.where(np.isfinite(lower), low, np.floor((upper - q + 1e-9) / tau))
         turns = np.where((q < lower) | (q > upper), low, 0.0)
         moved = q + tau * np.where(turning, turns, 0.0)
         inside = (moved >= lower - 1e-9) & (moved <= upper + 1e-9)

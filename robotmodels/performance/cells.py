@@ -119,7 +119,7 @@ def grid_of(
     """Centres (N, d) of cells over the reach of an arm, their sizes (d,), and the grid's shape."""
     cells = checked_resolution(resolution, default, space.dimensions)
     arm = section_arm(model)
-    if arm is not None and space.dimensions == 2:
+    if arm is not None and is_section(space.frame, space.kind, arm):
         points = _of_section(model, arm, limits)
     else:
         points = space.of_world(dgm(model, samples(model, limits, _SAMPLES))[:, :3, 3])
@@ -132,6 +132,13 @@ def grid_of(
     axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, size, strict=True)]
     mesh = np.meshgrid(*axes, indexing="ij")
     return np.stack(mesh, axis=-1).reshape(-1, space.dimensions), size, mesh[0].shape
+
+
+def is_section(frame: Array, kind: str, arm: SectionArm | None) -> bool:
+    """Whether coordinates are those of the section of an arm."""
+    if arm is None or kind != ("half plane" if arm.radial else "plane"):
+        return False
+    return np.allclose(frame, arm.frame, rtol=0.0, atol=1e-9 * max(arm.size, 1.0))
 
 
 def _of_section(model: RobotModel, arm: SectionArm, limits: bool) -> Array:

@@ -40,7 +40,7 @@ from .level_curves import Curve, last_two_ranges, level_curves
 
 Equations = Callable[[SectionArm, Array], Array]
 _SAME = 1e-6  # rad or m, between special points
-_STEPS = 30
+_STEPS = 50
 
 
 class SectionStatus(Outcome):
@@ -262,14 +262,36 @@ def cusps_of(arm: SectionArm, curves: list[Curve]) -> tuple[Array, Array]:
         at = np.flatnonzero((speed[1:] > 0.0) != (speed[:-1] > 0.0))
         share = speed[at] / (speed[at] - speed[at + 1])
         starts.append(curve.x[at] + share[:, None] * (curve.x[at + 1] - curve.x[at]))
-    x = np.concatenate([np.zeros((0, 2)), *starts])
+    if not starts:
+        return np.zeros((0, 2)), np.zeros(0)
+    x = np.concatenate([*starts, _cusp_cells(arm, curves)])
     x, residual = _solved(arm, x, _cusp_equations)
     values = arm.values(x)
     # where the determinant has no slope, singular curves touch or cross: no fold either
-    good = (residual < 1e-8) & (np.linalg.norm(values[:, 7:9], axis=1) > 1e-7 * arm.size**3)
+    good = (residual < 1e-12) & (np.linalg.norm(values[:, 7:9], axis=1) > 1e-7 * arm.size**3)
+    # on a curve whose image is a point the equations hold along it
+    s = np.linalg.svd(_slopes(arm, x, _cusp_equations), compute_uv=False)
+    good &= s[:, 1] > 1e-6 * s[:, 0]
     if arm.radial:
         good &= values[:, 0] > 1e-6 * arm.size
-    return _distinct(arm, x[good], residual[good])
+    x, residual = _distinct(arm, x[good], residual[good])
+    # a cusp takes three of at most four postures, so that a point has no second one
+    points = arm.values(x)[:, :2]
+    away = np.linalg.norm(points[:, None] - points, axis=2) > 1e-7 * arm.size
+    first = np.array([away[k, :k].all() for k in range(len(x))], np.bool_)
+    return x[first], residual[first]
+
+
+def _cusp_cells(arm: SectionArm, curves: list[Curve]) -> Array:
+    """Points of curves at which both equations of a cusp change sign beside them: (N, 2)."""
+    x = np.concatenate([curve.x for curve in curves])
+    values = arm.values(x)
+    A, slope = values[:, 2:6].reshape(-1, 2, 2), values[:, 7:9]
+    # both of the rows are across the direction that keeps the point
+    still = np.stack((-A[..., 1], A[..., 0]), axis=-1)
+    along = np.einsum("nij,nj->ni", still, slope)
+    change = (along[1:] > 0.0) != (along[:-1] > 0.0)
+    return x[:-1][change.any(axis=1)]
 
 
 def _forward(values: Array) -> Array:
@@ -300,13 +322,9 @@ def _node_equations(arm: SectionArm, x: Array) -> Array:
 
 def _solved(arm: SectionArm, x: Array, equations: Equations) -> tuple[Array, Array]:
     """Newton's method from starts (N, d) with central differences; the points and residuals."""
-    d, h = x.shape[1], 1e-6
     for _ in range(_STEPS if len(x) else 0):
         F = equations(arm, x)
-        J = np.stack(
-            [(equations(arm, x + h * e) - equations(arm, x - h * e)) / (2.0 * h)
-             for e in np.eye(d)], axis=2,
-        )  # fmt: skip
+        J = _slopes(arm, x, equations)
         step = -np.einsum("nij,nj->ni", np.linalg.pinv(J, rcond=1e-13), F)
         size = np.abs(step).max(axis=1, keepdims=True)
         x = x + step * np.minimum(1.0, 0.02 / np.maximum(size, 1e-300))
@@ -314,6 +332,15 @@ def _solved(arm: SectionArm, x: Array, equations: Equations) -> tuple[Array, Arr
             break
     residual = np.abs(equations(arm, x)).max(axis=1) if len(x) else np.zeros(0)
     return x, residual
+
+
+def _slopes(arm: SectionArm, x: Array, equations: Equations) -> Array:
+    """Derivatives of equations by central differences. (N, d) -> (N, d, d)."""
+    h, d = 1e-6, x.shape[1]
+    columns = [
+        (equations(arm, x + h * e) - equations(arm, x - h * e)) / (2.0 * h) for e in np.eye(d)
+    ]
+    return np.stack(columns, axis=2)
 
 
 def _distinct(arm: SectionArm, x: Array, residual: Array) -> tuple[Array, Array]:

@@ -341,11 +341,10 @@ def _by_search(
         if via:
             offset = rng.normal(0.0, 0.25 + 0.05 * via, step.shape) * (bound.slopes > 0.0)
         best = _most_regular(arm, factors, bound, start, step, offset)
-        for k, knots in best:
+        for _, knots in best:
             margin = certified(bound, knots)
             if margin > 0.0:
                 return _with(arm, _dense(knots), margin, tried * (via + 1))
-            del k
     return _without(arm, CuspidalityStatus.NONE_FOUND, tried * (1 + _VIAS))
 
 

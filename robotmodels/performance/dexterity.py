@@ -35,7 +35,9 @@ kinematic optimization of robotic manipulators", Journal of Mechanical Design 11
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,7 +48,7 @@ from ..kinematics import dgm, jacobian
 from ..kinematics.lengths import length_of
 from ..model import RobotModel, check_model
 from .accessibility import postures_of, with_free
-from .arms import checked_word, free_predicate, section_arm, task_rows, turned_inside
+from .arms import Result, checked_word, free_predicate, section_arm, task_rows, turned_inside
 from .cells import Space, measure_of_cells, samples
 from .workspace import Workspace, workspace
 
@@ -55,7 +57,8 @@ _AT_A_TIME = 16384
 _SAMPLES = 200000
 
 
-class DexterityMap(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class DexterityMap(Result):
     """Index of dexterity at the cells of a workspace.
 
     Parameters
@@ -67,6 +70,15 @@ class DexterityMap(NamedTuple):
     best: Array
     mean: Array
 
+    def __iter__(self) -> Iterator[Array]:
+        """The best and the mean, to be unpacked."""
+        return iter((self.best, self.mean))
+
+    def __repr__(self) -> str:
+        known = self.best[~np.isnan(self.best)]
+        text = f"best {known.min():.4g} to {known.max():.4g}" if known.size else "none"
+        return f"<DexterityMap of {self.best.size} cells, {known.size} reached: {text}>"
+
 
 class GlobalIndex(float):
     """Mean of an index.
@@ -77,13 +89,19 @@ class GlobalIndex(float):
         Standard deviation over the same measure.
     """
 
-    spread: float
+    __slots__ = ("_spread",)
+    _spread: float
 
     def __new__(cls, value: float, spread: float = 0.0) -> GlobalIndex:
         """A mean with its spread."""
         self = super().__new__(cls, value)
-        self.spread = spread
+        self._spread = float(spread)
         return self
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation over the same measure."""
+        return self._spread
 
     def __getnewargs__(self) -> tuple[float, float]:  # type: ignore[override]
         return float(self), self.spread
@@ -155,7 +173,7 @@ def dexterity_map(
     if w.kind in ("positions", "free", "primary", "secondary") and section_arm(arm) is None:
         _by_samples(arm, w, index, rows, length, best, mean)
         return DexterityMap(read_only(best), read_only(mean))
-    place = None if w.kind == "orientation" else np.repeat((True, False), 3)
+    place = place_of(w)
     is_free = free_predicate(arm, w.free)
     inner = np.flatnonzero(w.count > 0)
     T = w.poses[inner]
@@ -245,7 +263,9 @@ def index_values(
             values = np.empty((len(J), 2))
             gram_values(J, weights, values)
             out[part] = np.sqrt(values[:, 0])
-            if index == "isotropy":
+            if index == "isotropy" and J.shape[1] > J.shape[2]:
+                out[part] = 0.0  # some direction of the task is not reached at all
+            elif index == "isotropy":
                 mean = values[:, 1] / small
                 root = values[:, 0] ** (1.0 / small)
                 out[part] = np.divide(root, mean, out=np.zeros(len(J)), where=mean > 0.0)
@@ -256,6 +276,13 @@ def index_values(
             top = s[:, 0]
             out[part] = np.divide(s[:, -1], top, out=np.zeros(len(J)), where=top > 0.0)
     return out
+
+
+def place_of(w: Workspace) -> NDArray[np.bool_] | None:
+    """The mask with which the postures of cells are solved."""
+    if w.kind != "orientation":
+        return np.repeat((True, False), 3)
+    return None if w.coordinates == "plane" else w.mask
 
 
 def _rows_of(arm: RobotModel, mask: ArrayLike | str | None) -> NDArray[np.bool_]:

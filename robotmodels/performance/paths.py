@@ -244,6 +244,8 @@ def _within(
     outside = (low < arm.lower) | (high > arm.upper)
     with np.errstate(invalid="ignore"):
         least = np.ceil((arm.lower - low - 1e-9) / tau)
+        most = np.floor((arm.upper - high + 1e-9) / tau)
+        least = np.where(np.isfinite(arm.lower), least, most)
         turns = np.where(turning & outside & np.isfinite(least), least, 0.0)
         fits = (low + tau * turns >= arm.lower - 1e-9) & (high + tau * turns <= arm.upper + 1e-9)
     lost = ~fits.all(axis=2)

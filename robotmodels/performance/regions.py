@@ -27,7 +27,7 @@ from .arms import (
 from .aspects import Aspects, free_components
 from .cells import Space, measure_of_cells, neighbours, samples
 from .continuation import successors
-from .dexterity import _over
+from .dexterity import _over, place_of
 from .workspace import Workspace, WorkspaceStatus, workspace
 
 _SAMPLES = 400000
@@ -177,7 +177,7 @@ def _result(
 
 def _cell_postures(arm: RobotModel, w: Workspace) -> tuple[Array, NDArray[np.bool_]]:
     """Postures of all cells within the limits and free: q (N, S, n), valid (N, S)."""
-    q, valid, _ = postures_of(arm, w.poses, _place(w))
+    q, valid, _ = postures_of(arm, w.poses, place_of(w))
     q, inside = turned_inside(arm, q, w.limits)
     valid &= inside & (w.count > 0)[:, None]
     is_free = free_predicate(arm, w.free)
@@ -251,7 +251,7 @@ def _to_corners(
     arm: RobotModel, w: Workspace, cells: NDArray[np.int64], q: Array, rows: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which postures (m, n) of cells go on to all corners of their cell."""
-    T, length, place = w.poses[cells], characteristic_length(arm), _place(w)
+    T, length, place = w.poses[cells], characteristic_length(arm), place_of(w)
     frame, is_free = w.frame[:3, : w.size.size], free_predicate(arm, w.free)
     good = np.ones(len(cells), np.bool_)
     one = np.ones((len(cells), 1), np.bool_)
@@ -271,13 +271,6 @@ def _to_corners(
         end = r[np.arange(len(cells)), to[:, 0]]
         good &= (to[:, 0] >= 0) & ~_jumps(arm, w, end - q - way[:, 0])
     return good
-
-
-def _place(w: Workspace) -> NDArray[np.bool_] | None:
-    """The mask with which the postures of cells are solved."""
-    if w.kind != "orientation":
-        return np.repeat((True, False), 3)
-    return None if w.coordinates == "plane" else w.mask
 
 
 def _jumps(arm: RobotModel, w: Workspace, gap: Array) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ from ..model import RobotModel, check_model
 from .accessibility import in_every_orientation, posture_counts
 from .arms import Result, checked_flag, checked_word, free_predicate, section_arm
 from .arrangement import boundary, measures
-from .cells import SECTIONS, Space, grid_of, measure_of_cells, outlines, space_of
+from .cells import SECTIONS, Space, grid_of, is_section, measure_of_cells, outlines, space_of
 from .reach import reached_cells
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
@@ -127,13 +127,13 @@ class Workspace(Result):
 
     @property
     def grid_error(self) -> float:
-        """Estimated relative error of sums of cells, from those at the border."""
+        """Bound of the relative error of sums of cells: half of each cell along the border."""
         flags = (self.count > 0).reshape(self.shape)
         if not flags.any():
             return 0.0
-        edges = sum(int((np.diff(flags, axis=k) != 0).sum()) for k in range(flags.ndim))
-        # half a cell at random for each edge of the border
-        return float(0.5 * np.sqrt(edges) / flags.sum())
+        padded = np.pad(flags, 1)  # the border of the grid is one too
+        edges = sum(int(np.diff(padded, axis=k).sum()) for k in range(flags.ndim))
+        return float(0.5 * edges / flags.sum())
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether points are reached.
@@ -160,7 +160,7 @@ class Workspace(Result):
         local = safe if safe.shape[1] == len(self.size) else self._space.of_world(safe)
         if safe.shape[1] == 2 and len(self.size) == 3:
             raise ShapeError("points: expected world positions (..., 3) of this workspace.")
-        if section_arm(self.model) is not None and self.kind in ("positions", "free"):
+        if self._counted:
             world = self._space.world(local)
             if safe.shape[1] == 3 and self.coordinates == "plane":
                 world = safe
@@ -194,12 +194,21 @@ class Workspace(Result):
         return measure_of_cells(self._space, self.points, self.size)
 
     @property
+    def _counted(self) -> bool:
+        """Whether the count of a point is that of the postures of its position."""
+        return self.kind in ("positions", "free") and _is_counted(self._space, self.model)
+
+    @property
     def _by_curves(self) -> bool:
         """Whether singular curves and limits bound what is reached."""
         planar = self.coordinates != "space" and self.free is None and self.kind == "positions"
-        return planar and self.status <= 1 and section_arm(self.model) is not None
+        section = is_section(self.frame, self.coordinates, section_arm(self.model))
+        return planar and self.status <= 1 and section
 
     def _total(self, which: int, count: int | None) -> float:
+        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
+        if count is not None and not whole:
+            raise InvalidValueError(f"count: expected a number of postures, got {count!r:.60}.")
         if self.coordinates == ("space", "plane")[which]:
             return float("nan")
         if self._by_curves:
@@ -293,9 +302,7 @@ def workspace(
     if space is None:
         return _nothing(arm, kind, bounded, free, rows, rotation)
     # a planar question to an arm in space leaves a coordinate open
-    three = section_arm(arm)
-    counted = three is not None and kind in ("positions", "free")
-    counted &= three is None or space.kind != "plane" or not three.radial
+    counted = kind in ("positions", "free") and _is_counted(space, arm)
     default = _RESOLUTION["reached"]
     if kind not in ("positions", "free"):
         default = _RESOLUTION["oriented"]
@@ -349,6 +356,14 @@ def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | No
     return read_only(poses_of(T)[:3, :3])
 
 
+def _is_counted(space: Space, arm: RobotModel) -> bool:
+    """Whether a point of the space is a position that three joints determine."""
+    three = section_arm(arm)
+    if three is None:
+        return False
+    return space.kind != "plane" or is_section(space.frame, space.kind, three)
+
+
 def _count_positions(model: RobotModel, world: Array, limits: bool, free: Any) -> NDArray[np.int64]:
     """Postures of world positions by the quartic."""
     T = np.tile(np.eye(4), (len(world), 1, 1))
@@ -362,7 +377,7 @@ def _positions(
     limits: bool, free: Any,
 ) -> tuple[NDArray[np.bool_], Array | None]:  # fmt: skip
     """Which cells are reached in any orientation."""
-    if section_arm(model) is not None:
+    if _is_counted(space, model):
         return _count_positions(model, space.world(points), limits, free) > 0, None
     return reached_cells(model, space, points, size, shape, limits, free_predicate(model, free))
 
