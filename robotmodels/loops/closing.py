@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_floats, as_vector, batch_rows
 from .._outcomes import Outcome
+from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from .robot import LoopedRobot, check_looped
 
@@ -51,7 +52,16 @@ class ClosedPostures(Frozen, Value):
 
     def reason(self, index: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status of one posture, with the residual where its loops are open."""
-        status = ClosingStatus(int(self.status[index]))
+        try:
+            code = self.status[index]
+        except (IndexError, TypeError):
+            code = self.status[None]
+        if np.ndim(code):
+            raise InvalidValueError(
+                f"index: expected the index of a posture of a batch of shape {self.status.shape}, "
+                f"got {index!r:.40}."
+            )
+        status = ClosingStatus(int(code))
         left = f" Least residual: {self.residual[index]:.3g} m or rad."
         return status.sentence + (left if status in _OPEN else "")
 
@@ -122,9 +132,14 @@ def close(
     residual, status = np.empty(len(q)), np.empty(len(q))
     first = q.copy()
     _close(robot, target, int(follow), q, residual, status)
+    # motions that ended on the way: once more from the guess, at the positions that are asked for
+    away = np.isin(status, _OPEN) & (q[:, robot.actuated] != target).any(axis=1)
+    if away.any():
+        again, least, code = first[away], residual[away], status[away]
+        _close(robot, target[away], 0, again, least, code)
+        q[away], residual[away], status[away] = again, least, code
     jumped = _start_again(robot, target, q, residual, status)
-    if not follow:
-        jumped[:] = True
+    jumped |= away if follow else True
     q[jumped] = _without_turns(robot, q[jumped], first[jumped])  # motions keep their turns
     return ClosedPostures(
         q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)

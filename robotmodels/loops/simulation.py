@@ -119,10 +119,9 @@ def simulate(
         "atol": as_number(atol, "atol", above=0.0),
         "max_step": np.inf,
     }
+    budget = int(min(as_number(max_evaluations, "max_evaluations", least=1.0), 2**62))
     cuts = sorted({start, end, *(x for x in (*knots, *tool_knots) if start < x < end)})
-    run = _Integration(
-        motion, times, None, Integrator.DOP853, tolerances, int(max_evaluations), None
-    )
+    run = _Integration(motion, times, None, Integrator.DOP853, tolerances, budget, None)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(
             *moved, [(float(x), False) for x in cuts] if len(cuts) > 1 else [(start, False)] * 2
