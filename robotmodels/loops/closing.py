@@ -133,7 +133,8 @@ def close(
     first = q.copy()
     _close(robot, target, int(follow), q, residual, status)
     # motions that ended on the way: once more from the guess, at the positions that are asked for
-    away = np.isin(status, _OPEN) & (q[:, robot.actuated] != target).any(axis=1)
+    away = (q[:, robot.actuated] != target).any(axis=1) & np.isin(status, _OPEN)
+    away |= bool(follow) & (status == ClosingStatus.NOT_CONVERGED)
     if away.any():
         again, least, code = first[away], residual[away], status[away]
         _close(robot, target[away], 0, again, least, code)
