@@ -448,6 +448,11 @@ def test_a_five_bar_as_loops_is_the_five_bar():
     assert modes.status == pr.AssemblyStatus.SOME_LOST
     np.testing.assert_allclose(np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8)
     assert pr.classify_singularity(looped, T).kind == Kind.REGULAR
+    np.testing.assert_allclose(looped.coordinates(T), place[:2], atol=1e-12)
+    with pytest.raises(InvalidValueError, match="mode"):
+        pr.inverse_jacobian(looped, T, mode=3)
+    with pytest.raises(InvalidValueError, match="loops"):
+        pr.determinant(looped, T)
     far = pr.igm(looped, five.pose([3.0, 0.0]))
     assert (far.count, far.status) == (0, pr.LegStatus.OUT_OF_REACH)
     with pytest.raises(InvalidValueError, match="LoopedRobot"):

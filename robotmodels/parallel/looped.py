@@ -84,6 +84,12 @@ class LoopedPlatform(Value):
         turns = np.round((q - self.q_home) / (2.0 * np.pi))
         return np.where(self._slides, q, q - 2.0 * np.pi * turns)
 
+    def coordinates(self, T: ArrayLike) -> Array:
+        """Coordinates (..., m) of poses: independent entries of position and rotation vector."""
+        T = se3.as_pose(T)
+        full = np.concatenate((T[..., :3, 3], rotation_vector(T)), axis=-1)
+        return np.asarray(full[..., list(self.columns)])
+
     def postures(self, T: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:
         """All joints (..., n) at poses near home, residuals, and whether the poses are reached."""
         poses = se3.as_pose(T)

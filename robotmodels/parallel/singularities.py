@@ -89,8 +89,9 @@ class Singularity(Result):
         """
         if not self.form:
             return self.kind.sentence
-        names = ", ".join(str(i) for i in self.legs)
-        return f"{self.kind.sentence} Legs {names}, class {self.form}: {_WORDS[self.form]}."
+        names = ", ".join(str(i + 1) for i in self.legs)
+        words = f"Legs {names} (from 1), class {self.form}: {_WORDS[self.form]}."
+        return f"{self.kind.sentence} {words}"
 
     def __repr__(self) -> str:
         return f"<Singularity {self.kind.name}: {self.reason()}>"
