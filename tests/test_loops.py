@@ -101,6 +101,21 @@ def test_a_parallelogram_stays_one_all_around(rng):
         assert np.abs(found.q - rows * [1.0, 1.0, -1.0]).max() < 1e-12
 
 
+def test_postures_that_cannot_close_are_at_the_positions_that_were_asked_for(rng):
+    robot = four_bar(rng, crank=0.9, coupler=0.3, rocker=0.7, kind="point")
+    q = loops.close(robot, [0.6], [1.2, 1.0]).q
+    assert gap(robot, q) < 1e-12
+    angles = np.linspace(1.2, 2.0 * np.pi - 1.2, 40)[:, None]
+    found = loops.close(robot, angles, q)
+    assert (found.status == ClosingStatus.CANNOT_CLOSE).all()
+    assert np.array_equal(found.q[:, :1], angles)
+    # what is left between the crank's end and the stretched coupler and rocker, by its larger entry
+    ends = 0.9 * np.c_[np.cos(angles), np.sin(angles)]
+    left = np.linalg.norm(ends - [1.0, 0.0], axis=1) - 1.0
+    assert (found.residual < left + 1e-6).all()
+    assert (found.residual > left / np.sqrt(2.0) - 1e-6).all()
+
+
 def test_the_assembly_of_the_guess_is_kept(rng):
     robot = four_bar(rng)
     angles = np.linspace(-np.pi, np.pi, 400)[:, None]
@@ -604,6 +619,13 @@ def test_arguments_that_cannot_be_meant(rng):
         loops.close(robot, [1.0], [[1.0], [1.0, 2.0]])
     with pytest.raises(InvalidValueError, match="rtol"):
         loops.simulate(robot, q, rtol=-1.0)
+    with pytest.raises(InvalidValueError, match="max_evaluations"):
+        loops.simulate(robot, q, max_evaluations="x")
+    with pytest.raises(InvalidValueError, match="index"):
+        loops.close(robot, [[1.0]], q).reason(9)
+    with pytest.raises(ShapeError, match="q_ref"):
+        loops.base_parameters(robot, [q, q])
+    assert loops.mobility(robot, np.empty((0, 3))).redundant == ()
     with pytest.raises(InvalidValueError, match="smoothing"):
         loops.simulate(robot, q, smoothing=0.0)
     with pytest.raises(ShapeError, match="q_actuated"):

@@ -163,11 +163,32 @@ def test_mjcf_bodies_have_their_centres_and_tensors(read):
         ("connect", "joint", "not supported"),
         ('<joint name="j3" axis="0 0 1"/>', '<freejoint name="j3"/>', "'j3' is a"),
         ('body2="rocker"', 'body2="nobody"', "nobody"),
+        ('anchor="0.7 0 0"', 'anchor="0.7 a 0"', "anchor with 3 numbers"),
+        (' anchor="0.7 0 0"', "", "anchor with 3 numbers"),
     ],
 )
 def test_mjcf_files_that_are_refused_by_name(read, old, new, words):
     with pytest.raises(LoopError, match=words):
         read(FOUR_BAR.replace(old, new), loops.read_mjcf, name="bars.xml")
+
+
+def test_mjcf_equalities_keep_their_order_and_inactive_ones_are_none(read):
+    connect = '<connect body1="rod" body2="rocker" anchor="0.7 0 0"/>'
+    other = connect.replace("0.7", "0.4")
+    weld = '<weld name="z" body1="crank" body2="rod"/>'
+    off = weld.replace("/>", ' active="false"/>')
+    many = FOUR_BAR.replace(connect, off + weld + connect + other)
+    robot = read(many, loops.read_mjcf, name="many.xml")
+    names = [(closure.name, closure.kind) for closure in robot.closures]
+    assert names == [("weld_1", "full"), ("connect_2", "point"), ("connect_3", "point")]
+    place = {
+        name: rm.dgm(robot.tree, np.zeros(3), name)[:3, 3]
+        for closure in robot.closures
+        for name in closure.frames
+    }
+    assert np.allclose(place["weld_1_1"], place["weld_1_2"], atol=1e-12)
+    assert np.allclose(place["connect_2_1"], [1.0, 0.0, 0.0], atol=1e-12)
+    assert np.allclose(place["connect_3_1"], [0.7, 0.0, 0.0], atol=1e-12)
 
 
 def test_files_that_are_not_there(tmp_path):

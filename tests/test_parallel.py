@@ -319,6 +319,20 @@ def test_robots_that_move_with_locked_legs_are_degenerate():
         assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
 
 
+def test_platforms_similar_to_their_base_have_fewer_solutions():
+    """Paths that end at translations at infinity are no assembly modes."""
+    rng = np.random.default_rng(4)
+    for flat, factor, bound in ((False, 0.6, 24), (True, 0.4, 16), (False, 0.85, 24)):
+        base = rng.normal(size=(6, 3)) * [1.0, 1.0, 1.0 - flat]
+        robot = pr.gough(base, factor * base)
+        T = robot.pose([0.1, -0.2, 1.1, 0.3, -0.2, 0.4])
+        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+        assert modes.status == pr.AssemblyStatus.ALL
+        assert modes.complex_count == bound
+        assert modes.count % 2 == 0
+        assert np.abs(modes.T - T).max(axis=(1, 2)).min() < 1e-8
+
+
 def test_legs_that_do_not_meet_give_no_mode_and_a_sentence():
     robot = ROBOTS["SSM"]
     modes = pr.assembly_modes(robot, [[1, 1, 1, 1, 1, 9.0], [1.0] * 6])
@@ -507,6 +521,9 @@ GOOD = ROBOTS["SSM"]
         (lambda: pr.dkm(GOOD, GOOD.home, [1, 2]), ShapeError, "q_rate"),
         (lambda: pr.ikm(GOOD, np.tile(GOOD.home, (2, 1, 1)), np.zeros((3, 6))), ShapeError, "axes"),
         (lambda: pr.assembly_modes(GOOD, [1.0] * 6).reason(3), InvalidValueError, "index"),
+        (lambda: pr.determinant(None, np.eye(4)), InvalidValueError, "parallel.gough"),
+        (lambda: GOOD.with_masses(5.0), ShapeError, "two parts"),
+        (lambda: GOOD.with_masses((1.0, [0, 0, 0], np.eye(3)), (1, 2)), ShapeError, "two parts"),
     ],
 )  # fmt: skip
 def test_mistakes_say_what_to_do(call, error, words):

@@ -1,6 +1,7 @@
 """Parallel robots: statics, singular positions, workspaces, dynamics, loops, calibration."""
 
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -147,6 +148,17 @@ def test_grassmann_varieties_of_constructed_legs(kind):
         assert kind in found.reason()
 
 
+def test_parallel_lines_in_space_are_a_bundle():
+    ring = np.array([[1, 0], [0.5, 0.9], [-0.5, 0.8], [-1, 0], [-0.5, -0.8], [0.4, -0.9]])
+    base = np.c_[ring, np.zeros(6)]
+    robot = pr.gough(base, base)
+    found = pr.classify_singularity(robot, robot.pose([0, 0, 1, 0, 0, 0]))
+    assert (found.form, found.legs) == ("3c", (0, 1, 2, 3))
+    turned = ROBOTS["SSM"].pose([0, 0, 1, 0, 0, np.pi / 2])
+    assert pr.maneuverability(ROBOTS["SSM"], turned) == np.inf
+    assert pr.condition(ROBOTS["SSM"], turned) == np.inf
+
+
 def test_singular_positions_of_robots_with_cranks():
     five = pr.five_bar([[0, 0], [1.0, 0]], 0.3, 0.5)
     T = five.pose([0.5, 0.3])  # rods on one line
@@ -271,6 +283,11 @@ def test_robots_with_cranks_count_working_modes():
     modes = pr.igm(five, found.poses)
     np.testing.assert_array_equal(found.count, modes.count)
     assert found.count.max() == 4
+    limited = pr.five_bar([[0, 0], [0.5, 0]], 0.4, 0.6, lower=[4.0, -np.inf], upper=[5.0, 3.0])
+    some = pr.workspace(limited, resolution=60)
+    inside = pr.igm(limited, some.poses).within_limits.any(axis=-1)
+    assert inside.sum() > 100
+    np.testing.assert_array_equal(some.margin >= 0.0, inside)
     delta = ROBOTS["delta"]
     space = pr.workspace(delta, resolution=16)
     np.testing.assert_array_equal(space.count > 0, pr.igm(delta, space.poses).count > 0)
@@ -379,6 +396,10 @@ def test_simulation_ends_at_singular_positions():
     assert pr.simulate(five, five.home, t=2.0).status == pr.MotionStatus.SINGULAR
 
 
+def nan_from(start, t, T, V):
+    return np.full(6, np.nan if t >= start else 8.0)
+
+
 def test_mistakes_in_dynamics():
     robot = ROBOTS["SSM"]
     with pytest.raises(InvalidValueError, match="with_masses"):
@@ -392,6 +413,9 @@ def test_mistakes_in_dynamics():
         pr.idm(heavy, robot.pose([0, 0, 1, 0, 0, np.pi / 2]), np.zeros(6), np.zeros(6))
     with pytest.raises(ShapeError, match="control"):
         pr.simulate(heavy, robot.home, control=lambda t, T, V: [1.0], t=0.1)
+    for start in (0.0, 0.05):  # once without an end
+        with pytest.raises(InvalidValueError, match=r"control.*finite"):
+            pr.simulate(heavy, robot.home, None, partial(nan_from, start), 0.1)
 
 
 # --- kinematic loops -----------------------------------------------------------------------------
@@ -424,6 +448,11 @@ def test_a_five_bar_as_loops_is_the_five_bar():
     assert modes.status == pr.AssemblyStatus.SOME_LOST
     np.testing.assert_allclose(np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8)
     assert pr.classify_singularity(looped, T).kind == Kind.REGULAR
+    np.testing.assert_allclose(looped.coordinates(T), place[:2], atol=1e-12)
+    with pytest.raises(InvalidValueError, match="mode"):
+        pr.inverse_jacobian(looped, T, mode=3)
+    with pytest.raises(InvalidValueError, match="loops"):
+        pr.determinant(looped, T)
     far = pr.igm(looped, five.pose([3.0, 0.0]))
     assert (far.count, far.status) == (0, pr.LegStatus.OUT_OF_REACH)
     with pytest.raises(InvalidValueError, match="LoopedRobot"):

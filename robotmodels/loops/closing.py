@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_floats, as_vector, batch_rows
 from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..geometry import PRISMATIC
 from .robot import LoopedRobot, check_looped
 
 _STARTS = 5  # random starts for rows that do not close from the guess
@@ -50,7 +52,16 @@ class ClosedPostures(Frozen, Value):
 
     def reason(self, index: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status of one posture, with the residual where its loops are open."""
-        status = ClosingStatus(int(self.status[index]))
+        try:
+            code = self.status[index]
+        except (IndexError, TypeError):
+            code = self.status[None]
+        if np.ndim(code):
+            raise InvalidValueError(
+                f"index: expected the index of a posture of a batch of shape {self.status.shape}, "
+                f"got {index!r:.40}."
+            )
+        status = ClosingStatus(int(code))
         left = f" Least residual: {self.residual[index]:.3g} m or rad."
         return status.sentence + (left if status in _OPEN else "")
 
@@ -119,8 +130,18 @@ def close(
         q = np.empty((len(start), n))
         q[:, passive], q[:, robot.actuated] = start, target
     residual, status = np.empty(len(q)), np.empty(len(q))
+    first = q.copy()
     _close(robot, target, int(follow), q, residual, status)
-    _start_again(robot, target, q, residual, status)
+    # motions that ended on the way: once more from the guess, at the positions that are asked for
+    away = (q[:, robot.actuated] != target).any(axis=1) & np.isin(status, _OPEN)
+    away |= bool(follow) & (status == ClosingStatus.NOT_CONVERGED)
+    if away.any():
+        again, least, code = first[away], residual[away], status[away]
+        _close(robot, target[away], 0, again, least, code)
+        q[away], residual[away], status[away] = again, least, code
+    jumped = _start_again(robot, target, q, residual, status)
+    jumped |= away if follow else True
+    q[jumped] = _without_turns(robot, q[jumped], first[jumped])  # motions keep their turns
     return ClosedPostures(
         q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)
     )
@@ -131,7 +152,15 @@ def followed(robot: LoopedRobot, target: Array, start: Array) -> ClosedPostures:
     q = np.tile(start, (len(target), 1))
     residual, status = np.empty(len(q)), np.empty(len(q))
     _close(robot, target, 2, q, residual, status)
-    return ClosedPostures(q, residual, status.astype(np.int8))
+    return ClosedPostures(_without_turns(robot, q, start), residual, status.astype(np.int8))
+
+
+def _without_turns(robot: LoopedRobot, q: Array, start: Array) -> Array:
+    """The same postures (N, n), without the whole turns that iterations added to the start."""
+    table = robot.tree.table
+    turns = np.round((q - start) / (2.0 * np.pi)) * (table.sigma[table.joint_rows] != PRISMATIC)
+    turns[:, robot.actuated] = 0.0
+    return q - 2.0 * np.pi * turns
 
 
 def _close(
@@ -145,17 +174,19 @@ def _close(
 
 def _start_again(
     robot: LoopedRobot, target: Array, q: Array, residual: Array, status: Array
-) -> None:
-    """Close rows that are still open from random starts, and keep the least residual."""
+) -> NDArray[np.bool_]:
+    """Close rows that are still open from random starts; whether a row has another posture."""
     rng = np.random.default_rng(0)
-    passive = robot.passive
+    passive, jumped = robot.passive, np.zeros(len(q), np.bool_)
     for _ in range(_STARTS):
         rows = np.flatnonzero(np.isin(status, _OPEN))
         if not rows.size:
-            return
+            break
         again, least, code = q[rows], residual[rows], status[rows]
         again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
         _close(robot, target[rows], 0, again, least, code)
         better = least < residual[rows]
         kept = rows[better]
         q[kept], residual[kept], status[kept] = again[better], least[better], code[better]
+        jumped[kept] = True
+    return jumped

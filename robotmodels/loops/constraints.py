@@ -78,8 +78,9 @@ class Mobility(Frozen, Value):
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """Names of the rows that are redundant in every posture."""
-        everywhere = self.is_redundant.all(axis=tuple(range(self.is_redundant.ndim - 1)))
+        """Names of the rows that are redundant in every posture; none of no postures."""
+        rows = self.is_redundant.reshape(-1, len(self.rows)) if self.is_redundant.size else None
+        everywhere = [] if rows is None else rows.all(axis=0)
         return tuple(self.rows[k] for k in np.flatnonzero(everywhere))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:

@@ -22,7 +22,7 @@ ShapeError, InvalidValueError
     Arguments of the wrong length, or with NaN or infinity.
 LoopError
     Loops that are open at q (which `ddm` does not check); actuated joints that do not determine the
-    others; velocities that violate the closures.
+    others; velocities that violate the closures (which `idm` does not check).
 SingularMassMatrixError
     Free motions without inertia.
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import regressors
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import Array, as_exact, batch_rows
 from ..drive import Drives, drive_kinds
 from ..errors import LoopError
 from ..estimation.columns import NOTHING
@@ -156,7 +156,7 @@ def base_parameters(
 def _reference(robot: LoopedRobot, q_ref: ArrayLike | None) -> Array:
     """A closed posture (n,): the given one, or the first that closes at random positions."""
     if q_ref is not None:
-        q = as_vector(q_ref, robot.n, "q_ref")
+        q = as_exact(q_ref, (robot.n,), "q_ref")
         found = close(robot, q[..., robot.actuated], q)
     else:
         spread = np.pi * robot.units[robot.actuated]

@@ -133,17 +133,22 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
     world = root.find("worldbody")
     if root.tag != "mujoco" or world is None:
         raise LoopError(f"{path.name}: expected an MJCF file, <mujoco> with a <worldbody>.")
+    for group in root.findall("equality"):
+        for equality in [e for e in group if e.get("active") == "false"]:
+            group.remove(equality)
     equalities = root.findall("equality/*")
-    for equality in equalities:
+    for k, equality in enumerate(equalities, start=1):
         if equality.tag not in ("connect", "weld") or equality.get("body1") is None:
             raise LoopError(
                 f"{path.name}: the equality {ET.tostring(equality, encoding='unicode').strip()} "
                 "is not supported; closures are <connect> and <weld> of body1 and body2."
             )
+        _check_numbers(equality, path.name)
+        equality.set("name", f"{equality.tag}_{k:06d}")  # Pinocchio sorts by kind and by name
     with TemporaryDirectory() as folder:
         try:
             model, constraints = pin.buildModelAndLegacyConstraintsFromMJCF(
-                str(_with_one_root(root, world, path, Path(folder)))
+                str(_with_one_root(root, world, Path(folder) / path.name))
             )
         except (ValueError, RuntimeError) as error:
             raise LoopError(f"{path.name}: Pinocchio cannot read it: {error}") from None
@@ -156,8 +161,15 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
     tree = tree.with_table(tree.table.replace(**limits))
     Ia, Fv, Fc = (getattr(model, key)[order] for key in ("armature", "damping", "friction"))
     closures = []
-    for k, (constraint, equality) in enumerate(zip(constraints, equalities, strict=True), start=1):
-        name, frames = f"{equality.tag}_{k}", []
+    if len(constraints) != len(equalities):
+        raise LoopError(
+            f"{path.name}: Pinocchio reads {len(constraints)} of {len(equalities)} equalities; "
+            "check the names of their bodies."
+        )
+    places = sorted(range(len(equalities)), key=lambda k: str(equalities[k].get("name")))
+    found = dict(zip(places, constraints, strict=True))
+    for k, equality in enumerate(equalities):
+        constraint, name, frames = found[k], f"{equality.tag}_{k + 1}", []
         for side in ("1", "2"):
             body = getattr(constraint, f"joint{side}_id")
             place = getattr(constraint, f"joint{side}_placement").homogeneous
@@ -171,17 +183,33 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
     return LoopedRobot(tree, closures, actuated)  # type: ignore[arg-type]
 
 
-def _with_one_root(root: ET.Element, world: ET.Element, path: Path, folder: Path) -> Path:
+def _check_numbers(equality: ET.Element, label: str) -> None:
+    """Raise for anchors and poses that are not numbers, which Pinocchio reads as any number."""
+    for key, count in (("anchor", 3), ("relpose", 7)):
+        text = equality.get(key)
+        if text is None and not (key == "anchor" and equality.tag == "connect"):
+            continue
+        try:
+            values = [float(word) for word in (text or "").split()]
+        except ValueError:
+            values = []
+        if len(values) != count or not np.isfinite(values).all():
+            raise LoopError(
+                f"{label}: expected {key} with {count} numbers, got {text!r} in "
+                f"{ET.tostring(equality, encoding='unicode').strip()}."
+            )
+
+
+def _with_one_root(root: ET.Element, world: ET.Element, path: Path) -> Path:
     """A file with one body that carries all root bodies: Pinocchio leaves out all but one."""
     bodies = world.findall("body")
-    if len(bodies) == 1:
-        return path
-    together = ET.SubElement(world, "body", name="robotmodels_roots")
-    for body in bodies:
-        world.remove(body)
-        together.append(body)
-    ET.ElementTree(root).write(folder / path.name)
-    return folder / path.name
+    if len(bodies) != 1:
+        together = ET.SubElement(world, "body", name="robotmodels_roots")
+        for body in bodies:
+            world.remove(body)
+            together.append(body)
+    ET.ElementTree(root).write(path)
+    return path
 
 
 def _urdf(model: Any, name: str, label: str) -> str:

@@ -12,6 +12,7 @@ from ..drive import check_all_or_none
 from ..dynamics import kinetic_energy, potential_energy
 from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
 from ..simulation import Integrator, Simulation
+from ..simulation.feedback import Feedback
 from ..simulation.integration import Integration
 from ..simulation.motion import Law, Loads, Motion
 from ..simulation.simulate import law_of, times_of
@@ -118,15 +119,15 @@ def simulate(
         "atol": as_number(atol, "atol", above=0.0),
         "max_step": np.inf,
     }
+    budget = int(min(as_number(max_evaluations, "max_evaluations", least=1.0), 2**62))
     cuts = sorted({start, end, *(x for x in (*knots, *tool_knots) if start < x < end)})
-    run = _Integration(
-        motion, times, None, Integrator.DOP853, tolerances, int(max_evaluations), None
-    )
+    run = _Integration(motion, times, None, Integrator.DOP853, tolerances, budget, None)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(
             *moved, [(float(x), False) for x in cuts] if len(cuts) > 1 else [(start, False)] * 2
         )
-    q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
+    rows = zip(*run.rows, strict=True)
+    q, v, a, tau, taken, held, works, state = (np.array(x) for x in rows)
     kinetic, potential = kinetic_energy(tree, q, v, drive), potential_energy(tree, q)
     return Simulation(
         *(tree, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
@@ -136,6 +137,7 @@ def simulate(
         status=run.status,
         evaluations=motion.evaluations,
         steps=run.steps,
+        state=state,
     )
 
 
@@ -150,21 +152,21 @@ class LoopMotion(Motion):
         drive: bool,
         width: Array | None,
     ) -> None:
-        def torques(t: float, q: Array, v: Array) -> Array:
+        def torques(t: float, q: Array, v: Array, x: Array) -> Array:
             tau = np.zeros(robot.n)
             if control is not None:
                 tau[robot.actuated] = control(t, q, v)
             return tau
 
-        super().__init__(robot.tree, torques, wrench, drive, None, width)
+        super().__init__(robot.tree, Feedback(torques), wrench, drive, None, width)
         self.robot, self.engine = robot, Engine(robot, drive, _RATE)
         self._weakest: tuple[Array, Array] | None = None
         self._passed = False
 
-    def at(self, t: float, q: Array, v: Array) -> Loads:
+    def at(self, t: float, q: Array, v: Array, x: Array) -> Loads:
         """Accelerations and torques at one time; NaN accelerations where there are none."""
         self.evaluations += 1
-        load, tau, friction, tool = self.load(t, q, v)
+        load, tau, friction, tool = self.load(t, q, v, x)
         self._passed = self._passed or self._passes(q)
         try:
             if self._passed:

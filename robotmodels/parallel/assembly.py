@@ -23,6 +23,7 @@ _REAL = 1e-6  # imaginary parts, relative, at simple ends of paths
 _SAME = 1e-7  # distance of ends of two paths
 _NEAR = 1e-3  # the same for paths that get stuck at multiple solutions
 _FINITE = 1e-9  # |e.e| beside |e|^2
+_FAR = 1e4  # |g| beside |e|, in units of the robot, of stuck paths to translations at infinity
 _CONJUGATE = 1e-5  # distance of conjugate ends
 _TURNS = np.array([0.0, 1.1, 2.3, 3.1, 4.7, 5.2, 0.4])  # phases of the equations in new attempts
 _PROJECTION = np.array([0.71, 0.37, 0.53, 0.29])  # no vector that symmetric robots prefer
@@ -289,6 +290,7 @@ def _finite(x: Complex, codes: Array) -> tuple[Complex, NDArray[np.bool_]]:
     ee, norm = (x[:, :4] ** 2).sum(axis=1), np.linalg.norm(x[:, :4], axis=1)
     kept = (codes < 2) & np.isfinite(x).all(axis=1)
     kept &= np.abs(ee) > _FINITE * norm**2
+    kept &= (codes == 0) | (np.linalg.norm(x[:, 4:], axis=1) <= _FAR * norm)
     return _normalised(x[kept]), codes[kept] == 1
 
 

@@ -71,8 +71,24 @@ class LoopedPlatform(Value):
     @property
     def units(self) -> Array:
         """Natural unit of each joint of the tree: 1 rad, or the characteristic length in metres."""
+        return np.where(self._slides, self.length, 1.0)
+
+    @property
+    def _slides(self) -> NDArray[np.bool_]:
+        """Which joints of the tree are prismatic."""
         table = self.robot.tree.table
-        return np.where(table.sigma[table.joint_rows] == PRISMATIC, self.length, 1.0)
+        return np.asarray(table.sigma[table.joint_rows] == PRISMATIC)
+
+    def _without_turns(self, q: Array) -> Array:
+        """The same postures (..., n), angles within half a turn of home."""
+        turns = np.round((q - self.q_home) / (2.0 * np.pi))
+        return np.where(self._slides, q, q - 2.0 * np.pi * turns)
+
+    def coordinates(self, T: ArrayLike) -> Array:
+        """Coordinates (..., m) of poses: independent entries of position and rotation vector."""
+        T = se3.as_pose(T)
+        full = np.concatenate((T[..., :3, 3], rotation_vector(T)), axis=-1)
+        return np.asarray(full[..., list(self.columns)])
 
     def postures(self, T: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:
         """All joints (..., n) at poses near home, residuals, and whether the poses are reached."""
@@ -108,7 +124,7 @@ class LoopedPlatform(Value):
             found = loops.close(self.robot, q[active][:, self.actuated] + step, q[active])
             good = np.asarray(found.residual) < _CLOSED
             active = active[good]
-            q[active] = found.q[good]
+            q[active] = self._without_turns(found.q[good])
         return q, rest
 
     def _reached(self, T: ArrayLike) -> Array:
@@ -181,11 +197,12 @@ class LoopedPlatform(Value):
         for s, row in enumerate(q):
             starts = self.q_home + random * self.units
             found = loops.close(self.robot, np.broadcast_to(row, (_STARTS, self.m)), starts)
-            poses = dgm(self.robot.tree, found.q, self.frame)
+            joints = self._without_turns(found.q)
+            poses = dgm(self.robot.tree, joints, self.frame)
             for k in np.flatnonzero(np.asarray(found.residual) < 1e-9):
                 if not (np.abs(T[s] - poses[k]).max(axis=(1, 2)) < 1e-6).any():
                     T[s, k], residual[s, k] = poses[k], found.residual[k]
-                    det[s, k] = self._side(found.q[k])
+                    det[s, k] = self._side(joints[k])
         return T, residual, det, np.full(len(q), 2, np.int8), (~np.isnan(det)).sum(axis=1)
 
     def _motion(self, T: ArrayLike, V: ArrayLike, A: ArrayLike) -> tuple[Array, ...]:

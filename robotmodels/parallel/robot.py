@@ -189,8 +189,12 @@ class ParallelRobot(Value):
         gravity : array_like, shape (3,), optional
             Acceleration in the world, m/s^2; default unchanged.
         """
-        parts = ((0.0, 0.0, 0.0),) * 2 if legs is None else tuple(legs)
-        if len(tuple(platform)) != 3 or len(parts) != 2 or any(len(part) != 3 for part in parts):
+        parts = ((0.0, 0.0, 0.0),) * 2 if legs is None else legs
+        try:
+            sizes = (len(platform), *map(len, parts))
+        except TypeError:
+            sizes = ()
+        if sizes != (3, 3, 3):
             raise ShapeError(
                 "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
                 "(mass, position, inertia)."
@@ -214,8 +218,11 @@ class ParallelRobot(Value):
 
     def __repr__(self) -> str:
         q = "angle" if self.has_cranks else "length"
-        limited = np.isfinite(self.lower).any() or np.isfinite(self.upper).any()
-        limits = f"{q} {self.lower.min():.4g} to {self.upper.max():.4g}" if limited else "no limits"
+        ends = (self.lower.min(), self.upper.max())
+        least = {0.0, -np.inf} if not self.has_cranks else {-np.inf}
+        words = [] if ends[0] in least else [f"from {ends[0]:.4g}"]
+        words += [f"to {ends[1]:.4g}"] if np.isfinite(ends[1]) else []
+        limits = " ".join([q, *words]) if words else "no limits"
         words = "with" if self.masses is not None else "without"
         name = self.family.value[0]
         return f"<{name}: {self.m} legs of actuated {q}, {limits}, {words} masses>"

@@ -141,9 +141,11 @@ def simulate(
         return T
 
     def rates(time: float, x: Array) -> Array:
+        if not np.isfinite(x).all():  # a later stage of such a step
+            return np.full(13, np.nan)
         T, V = pose(x), x[6:12]
+        tau, W = drive(time, T, V), load(time, T, V)  # errors of the laws are the caller's
         try:
-            tau, W = drive(time, T, V), load(time, T, V)
             a = ddm(robot, T, V, tau, W, mode)
             power = tau @ ikm(robot, T, V, mode) - W @ V
         except InvalidValueError:  # beyond a straight leg: a shorter step is tried

@@ -20,7 +20,6 @@ from .velocities import Mode, Robot, modes_of
 _WORDS = {
     "": "the lines are independent",
     "1": "two lines coincide",
-    "2a": "lines of two skew directions",
     "2b": "a flat pencil: lines in one plane through one point, or parallel",
     "3a": "a regulus: lines of one family of a hyperboloid",
     "3b": "two flat pencils with a line in common",
@@ -90,8 +89,9 @@ class Singularity(Result):
         """
         if not self.form:
             return self.kind.sentence
-        names = ", ".join(str(i) for i in self.legs)
-        return f"{self.kind.sentence} Legs {names}, class {self.form}: {_WORDS[self.form]}."
+        names = ", ".join(str(i + 1) for i in self.legs)
+        words = f"Legs {names} (from 1), class {self.form}: {_WORDS[self.form]}."
+        return f"{self.kind.sentence} {words}"
 
     def __repr__(self) -> str:
         return f"<Singularity {self.kind.name}: {self.reason()}>"
@@ -225,7 +225,8 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
     if rank == 3:
         if not meet.all():
             return "3a" if not (meet & ~np.eye(4, dtype=bool)).any() else "3b"
-        return "3d" if flat else "3c"
+        parallel = np.linalg.svd(u, compute_uv=False)[1] <= np.sqrt(epsilon)
+        return "3d" if flat and not parallel else "3c"
     # reciprocal screws: what meets all lines, if it is a line itself
     _, _, Vt = np.linalg.svd(L)
     others = Vt[rank:][:, [3, 4, 5, 0, 1, 2]]

@@ -54,7 +54,8 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_core, as_floats, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
-from .legs import leg_states
+from .legs import check_robot, leg_states
+from .looped import LoopedPlatform
 from .results import Result
 from .robot import ParallelRobot
 from .velocities import Mode, Robot, broadcast, inverse_jacobian, modes_of, scales
@@ -118,14 +119,15 @@ def maneuverability(
 
     Yoshikawa's manipulability of the Jacobian J; infinite at parallel singularities.
     """
-    det = np.abs(np.linalg.det(_unitless(robot, T, length, mode)))
+    s = np.linalg.svd(_unitless(robot, T, length, mode), compute_uv=False)
+    det = np.where(s[..., -1] <= _SINGULAR * s[..., 0], 0.0, s.prod(axis=-1))
     return np.divide(1.0, det, out=np.full(det.shape, np.inf), where=det > 0.0)
 
 
 def condition(robot: Robot, T: ArrayLike, length: float | None = None, mode: Mode = None) -> Array:
     """Condition number of the Jacobian: 1 where isotropic, infinite at parallel singularities."""
     s = np.linalg.svd(_unitless(robot, T, length, mode), compute_uv=False)
-    singular = s[..., -1] <= 1e-15 * s[..., 0]
+    singular = s[..., -1] <= _SINGULAR * s[..., 0]
     return np.where(singular, np.inf, s[..., 0] / np.where(singular, 1.0, s[..., -1]))
 
 
@@ -135,6 +137,12 @@ def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
     Its sign tells the sides of singular positions apart, see `assembly_modes`; its zeros in a
     section are the singular curves. Unit m for each rotation of the platform.
     """
+    check_robot(robot)
+    if isinstance(robot, LoopedPlatform):
+        raise InvalidValueError(
+            "robot: the legs of kinematic loops are not known; see condition and "
+            "classify_singularity."
+        )
     poses = robot.checked(T)
     modes = modes_of(robot, mode, poses.shape[:-2])
     legs = leg_states(robot, poses.reshape(-1, 4, 4), modes)

@@ -64,6 +64,7 @@ def inverse_jacobian(robot: Robot, T: ArrayLike, mode: Mode = None) -> Array:
     """
     check_robot(robot)
     if isinstance(robot, LoopedPlatform):
+        _only_mode_zero(mode)
         return robot.inverse_jacobian(T)
     poses, legs = states(robot, T, mode)
     return legs.jacobian.reshape(*poses.shape[:-2], robot.m, 6)
@@ -74,6 +75,7 @@ def inverse_jacobian_rate(robot: Robot, T: ArrayLike, twist: ArrayLike, mode: Mo
     check_robot(robot)
     V = as_core(twist, (6,), "twist")
     if isinstance(robot, LoopedPlatform):
+        _only_mode_zero(mode)
         return robot.inverse_jacobian_rate(T, V)
     poses = robot.checked(T)
     batch = broadcast(poses.shape[:-2], V.shape[:-1])
@@ -179,6 +181,15 @@ def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArra
     if broadcast(given.shape, batch) != batch:
         raise ShapeError(f"mode: expected a number or shape {batch}, got {given.shape}.")
     return np.broadcast_to(given, batch).reshape(-1).astype(np.int64)
+
+
+def _only_mode_zero(mode: Mode) -> None:
+    """Raise for working modes of kinematic loops, which are not numbered."""
+    if mode is not None and np.any(np.asarray(mode) != 0):
+        raise InvalidValueError(
+            f"mode: a robot from from_loops has the working mode of its home alone, got "
+            f"{mode!r:.40}; give from_loops another q_home."
+        )
 
 
 def only_freedoms(robot: Robot, V: Array) -> Array:

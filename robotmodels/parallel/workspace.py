@@ -302,7 +302,8 @@ def _margin(
         legs = leg_states(robot, T, np.full(len(T), mode))
         q = legs.q
         if robot.has_cranks:
-            q = low + np.mod(q - low, 2.0 * np.pi) if np.isfinite(low).all() else q
+            first = np.where(np.isfinite(low), low, 0.0)
+            q = np.where(np.isfinite(low), first + np.mod(q - first, 2.0 * np.pi), q)
         inside = np.minimum(q - low, high - q)
         if robot.has_cranks:
             d = np.linalg.norm(T[:, None, :3, 3] + legs.arm - robot.base, axis=-1)
