@@ -72,12 +72,21 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, as_floats, as_mask, as_vector
 from ..dynamics import mass_matrix
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
 from .law import Law, as_gains, as_word, model_torques
 from .reference import Desired, as_reference, wrench_reference
-from .task import RANK, accelerations, frozen_mask, row_gains, task_error, task_rows, tool_motion
+from .task import (
+    RANK,
+    accelerations,
+    frozen_mask,
+    row_gains,
+    singular_notes,
+    task_error,
+    task_rows,
+    tool_motion,
+)
 from .task_laws import ComputedTorque, Impedance
 
 _ALL = np.arange(6)
@@ -124,6 +133,10 @@ class ForceTracking(Law):
         f_d, rate, second = desired
         return (second + self.kv * (rate - self.ke * twist) + self.kp * (f_d - f)) / self.ke
 
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return singular_notes(self.model, t, q, self.rows)
+
     def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Error of the wrench, shape (m,)."""
         return (self._desired(t)[0] - self._measured(q, v, wrench)[2])[self.rows]
@@ -165,6 +178,10 @@ class _Split(Law):
         damping[position.rows] = 2.0 * position.zeta * position.omega
         self._set(selection=selection.astype(float), _gains=(w, damping), **{frame: given})
         self._set(mask=frozen_mask(self.mask))
+
+    def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return singular_notes(self.model, t, q, self.rows)
 
     def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Errors of position and force in the axes of the task, shape (m,)."""
@@ -217,7 +234,7 @@ class ParallelHybrid(_Split):
             a = prioritised(M, tasks, -2.0 * np.max(self.position.omega) * v)
             return model_torques(self.model, q, v, a, f)
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), v, 0.0)
-        mass = np.linalg.pinv(J[forced] @ np.linalg.solve(M, J[forced].T), RANK)
+        mass = np.linalg.pinv(J[forced] @ _inverse(M) @ J[forced].T, RANK)
         f_d = (self._turn @ self.force._desired(t)[0])[self.rows][forced]
         push = J[forced].T @ (mass @ wanted[forced] + f_d)
         return servo + push + model_torques(self.model, q, v, np.zeros(self.n))
@@ -297,10 +314,25 @@ class ExternalForceLoop(Law):
         """Velocity of the shift, shape (m,)."""
         return self.gain / self.stiffness * self.error(t, q, v, wrench)
 
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return self.inner.notes(t, q, v)
+
     def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Error of the wrench, shape (m,)."""
         missing = self._desired(t)[0] - self._measured(q, v, wrench)[2]
         return self._active * missing[self.inner.rows]
+
+
+def _inverse(M: Array) -> Array:
+    """Inverse of the mass matrix of the believed model."""
+    try:
+        return np.linalg.inv(M)
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError(
+            "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
+            "inertia."
+        ) from None
 
 
 def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Array:
@@ -309,7 +341,7 @@ def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Arra
     By dynamically consistent pseudo-inverses in the null spaces of the tasks before; what remains
     free has the accelerations `free`.
     """
-    inverse, N, a = np.linalg.inv(M), np.eye(len(M)), np.zeros(len(M))
+    inverse, N, a = _inverse(M), np.eye(len(M)), np.zeros(len(M))
     for J, wanted in tasks:
         mobility = N @ inverse @ J.T
         P = mobility @ np.linalg.pinv(J @ mobility, RANK)

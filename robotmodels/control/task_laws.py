@@ -59,6 +59,7 @@ from .task import (
     accelerations,
     frozen_mask,
     row_gains,
+    singular_notes,
     task_error,
     task_rows,
     tool_motion,
@@ -84,6 +85,12 @@ class TaskLaw(Law):
         """Error of the task, shape (m,), or of the joints."""
         q, v, _ = self._measured(q, v)
         return self._task(t, q, v).e
+
+    def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        if getattr(self, "space", "task") == "joint":
+            return ()
+        return singular_notes(self.model, t, q, self.rows, getattr(self, "frame", None))
 
     def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
         frame = getattr(self, "frame", None)
