@@ -780,7 +780,7 @@ BAD = [
     (lambda: control.Impedance(np.eye(4), 1, 1, -5, model=arm()), "K: expected gains above 0"),
     (lambda: control.Impedance(np.eye(4), [1, 2, 3], 1, 5, model=arm()), "M: expected one"),
     (lambda: hybrid(selection=[0.5, 0, 0, 0, 0, 0]), "selection: expected zeros and ones"),
-    (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "the force of no component"),
+    (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "expected a force-controlled"),
     (lambda: hybrid(inverse="pinv"), "'consistent' or 'jacobian'"),
     (lambda: hybrid(inverse="jacobian", mask=[1, 0, 0, 0, 0, 0]), "as many components as joints"),
     (lambda: hybrid(task_frame=np.eye(2)), "task_frame: expected shape"),
@@ -852,3 +852,10 @@ def test_mistakes_in_runs_are_named(arguments, message):
     given = {"law": laws()[0], "q0": Q0, "t": 0.1} | arguments
     with pytest.raises((InvalidValueError, ShapeError, TypeError), match=message):
         control.run(arm(), **given)
+
+
+def test_laws_print_one_number_for_equal_gains():
+    law = control.ComputedTorque([0.1, 0.2], omega=[5.0, 6.0], model=arm())
+    assert repr(law) == (
+        "ComputedTorque(reference=[0.1, 0.2], omega=[5.0, 6.0], zeta=1.0, model=2R, space=joint)"
+    )

@@ -22,7 +22,7 @@ position : ComputedTorque or reference
     A law in task space, or a reference for one with its default gains.
 force, reference : ForceTracking or reference
     A wrench (a constant (6,), or a function of t that returns it with its rate and second rate);
-    hybrid laws take the gains of a force law, too.
+    hybrid laws take the gains of a force law, too; of a wrench alone, kp = 400, kv = 40, ke = 2000.
 inverse : {"consistent", "jacobian"}
     ``"consistent"``: positions through the dynamically consistent pseudo-inverse of their rows,
     forces in its null space. ``"jacobian"``: joint servos of equal gains through ``J^-1 S``, the
@@ -90,6 +90,7 @@ from .task import (
 from .task_laws import ComputedTorque, Impedance
 
 _ALL = np.arange(6)
+_FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -163,14 +164,16 @@ class _Split(Law):
         selection = as_mask(self.selection, name="selection")
         rows = task_rows(self.model, self.mask, turn=turn)
         if not selection[rows].any():
-            raise InvalidValueError("selection: the force of no component is controlled.")
+            raise InvalidValueError(
+                "selection: expected a force-controlled component of the task, got none."
+            )
         position, force = self.position, self.force
         if not isinstance(position, ComputedTorque):
             position = ComputedTorque(position, model=self.model, space="task")
         elif position.space != "task":
             raise InvalidValueError("position: expected a law in task space, space='task'.")
         if not isinstance(force, ForceTracking):
-            force = ForceTracking(400.0, 40.0, 2000.0, reference=force, model=self.model)
+            force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
         self._set(position=position, force=force, rows=rows, _forced=selection[rows], _turn=turn)
         w = np.full(6, np.max(position.omega))
         damping = 2.0 * w * np.max(position.zeta)
@@ -270,9 +273,10 @@ class ExternalForceLoop(Law):
     """Force control by an external loop, which moves the reference of a position control.
 
     The reference moves by the force error over the stiffness, and by gain times the integral of
-    that, the state; the measured wrench is compensated. With a gain below ``2 zeta omega`` of the
-    inner law this is stable for every stiffness of the environment. Directions without contact and
-    without a desired force stay where they are.
+    that, the state. With a gain below ``2 zeta omega`` (``B / M``) of the inner law this is stable
+    for every stiffness of the environment. An inner `ComputedTorque` compensates the measured
+    wrench, and holds the position in directions without a desired force whose wrench is zero; an
+    inner `Impedance` also gives way to the wrench.
     """
 
     inner: ComputedTorque | Impedance

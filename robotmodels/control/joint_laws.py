@@ -103,7 +103,7 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class JointLaw(Law):
-    """Parts of laws of the joints: their number, the reference, and its error."""
+    """Base of the laws of the joints: number of joints, reference and error."""
 
     n: int = field(init=False)
     _desired: Desired = field(init=False)

@@ -147,7 +147,7 @@ def run(
 
 
 class Loop:
-    """The law as the plant sees it: with what is measured, and limited torques."""
+    """A law in a simulation: it gets measured values, and its torques are limited."""
 
     def __init__(
         self, model: RobotModel, law: Any, environment: Any, noise: Any, rng: Any, period: Any

@@ -8,7 +8,7 @@ Parameters
 ----------
 reference : Trajectory, PoseTrajectory, array_like or callable
     Positions (n,), or in task space a world pose (4, 4): a motion, a constant, or a function of t
-    that returns (q, v, a) or (T, twist, acceleration); it is called with t = 0 at once.
+    that returns (q, v, a) or (T, twist, acceleration), evaluated at t = 0 when the law is made.
 model : RobotModel
     The robot as the controller believes it to be, n joints; friction of its drives is compensated.
 mask : array_like, shape (6,), optional
@@ -157,7 +157,7 @@ class ComputedTorque(TaskLaw):
 
 
 class _Compliant(TaskLaw):
-    """Impedance ``M e'' + B e' + K e = f``: the tool leads a wall by ``f / K``."""
+    """Impedance ``M e'' + B e' + K e = f``: the error at rest is ``f / K``."""
 
     __slots__ = ()
 
