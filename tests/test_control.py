@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from robotmodels import control
 from robotmodels.control import ControlStatus
-from robotmodels.control.task import task_error, tool_motion
+from robotmodels.control.task import accelerations, task_error, tool_motion
 from robotmodels.drive import DriveParameters
 from robotmodels.dynamics import coriolis_matrix, gravity_torque, mass_matrix
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from robotmodels.geometry import DHTable
 from robotmodels.inertia import InertialParameters
 from robotmodels.kinematics import dgm, jacobian
@@ -630,6 +630,58 @@ def test_statuses_name_what_happened():
     assert still.status == ControlStatus.FOLLOWED
 
 
+def test_growth_of_the_reference_is_no_divergence_and_slow_growth_is():
+    rail = slider(2.0)
+
+    def quartic(t):
+        return [t**4], [4 * t**3], [12 * t**2]
+
+    lag = control.DecentralizedPID(quartic, 500.0, 0.0, 50.0)
+    assert control.run(rail, lag, [0.0], t=1.0).status == ControlStatus.FOLLOWED
+
+    def cubic(t):
+        f = np.zeros((3, 6))
+        f[:, 2] = 50 * t**3, 150 * t**2, 300 * t
+        return tuple(f)
+
+    law = control.ForceTracking(400.0, 40.0, 1e3, reference=cubic, model=rail)
+    wall = control.SpringWall([0, 0, 0], [0, 0, -1], 1e4)
+    assert control.run(rail, law, [0.0], t=1.0, environment=wall).status == ControlStatus.FOLLOWED
+    gains = control.pid_gains(2.0, 0.0, 5.0)
+    law = control.DecentralizedPID([0.1], gains.kp, 1.05 * gains.critical_ki, gains.kd)
+    run = control.run(rail, law, [0.0], t=20.0)
+    assert run.status == ControlStatus.DIVERGED
+    assert "grows exponentially" in run.reason()
+
+
+def test_singular_postures_have_bounded_torques_and_are_named():
+    model, rest = load("rx90"), np.zeros(6)
+    for bend in (0.0, 1e-12):
+        q = np.array([0.1, -0.3, 1.2, 0.2, bend, 0.1])
+        goal = moved(dgm(model, q), 0.01, 0.01, 0.01)
+        for law in (
+            control.ComputedTorque(goal, model=model, space="task"),
+            control.Impedance(goal, 2.0, 40.0, 800.0, model=model),
+            control.ConstrainedDecoupling(np.eye(4), goal, np.zeros(6), model=model),
+        ):
+            assert np.abs(law.command(0.0, q, rest)).max() < 1e3
+    straight = [0.3, 0.0]
+    goal = moved(dgm(arm(), straight), -0.02 * np.cos(0.3), -0.02 * np.sin(0.3), 0)
+    law = control.ComputedTorque(goal, model=arm(), space="task")
+    weight = gravity_torque(arm(), straight)
+    assert np.allclose(law.command(0.0, straight, [0.0, 0.0]), weight, atol=1e-6)
+    assert np.allclose(law.command(0.0, [0.3, 1e-12], [0.0, 0.0]), weight, atol=1e-6)
+    run = control.run(arm(), law, straight, t=0.1)
+    assert "At t = 0 s the posture is singular" in run.reason()
+    # fewer rows than joints, and rows that depend: the rest is met, free motions are damped
+    J = np.array([[1.0, 0, 1, 0], [0, 1, 0, 0], [1, 1e-12, 1, 0]])
+    v = np.array([0.0, 0.0, 0.0, 2.0])
+    a = accelerations(J, np.array([1.0, 2.0, 1.0]), v, 3.0)
+    assert np.allclose(a, [0.5, 2.0, 0.5, -6.0])
+    near, wanted = np.array([[1.0, 0, 1, 0], [1, 1e-6, 1, 0]]), np.array([1, 1 + 1e-6])
+    assert np.allclose(near @ accelerations(near, wanted, v, 3.0), wanted)
+
+
 class Own:
     """A law of a user: proportional with an integral, sampled or not."""
 
@@ -640,6 +692,13 @@ class Own:
 
     def rate(self, t, q, v, x):
         return 100.0 * (Q0 - q)
+
+
+class Wrong(Own):
+    """A law that returns words."""
+
+    def command(self, t, q, v, x):
+        return "a"
 
 
 def test_laws_of_users_and_laws_in_simulate():
@@ -721,7 +780,7 @@ BAD = [
     (lambda: control.Impedance(np.eye(4), 1, 1, -5, model=arm()), "K: expected gains above 0"),
     (lambda: control.Impedance(np.eye(4), [1, 2, 3], 1, 5, model=arm()), "M: expected one"),
     (lambda: hybrid(selection=[0.5, 0, 0, 0, 0, 0]), "selection: expected zeros and ones"),
-    (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "the force of no component"),
+    (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "expected a force-controlled"),
     (lambda: hybrid(inverse="pinv"), "'consistent' or 'jacobian'"),
     (lambda: hybrid(inverse="jacobian", mask=[1, 0, 0, 0, 0, 0]), "as many components as joints"),
     (lambda: hybrid(task_frame=np.eye(2)), "task_frame: expected shape"),
@@ -732,13 +791,30 @@ BAD = [
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 0], 1.0), "normal: expected a vector"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 0.0), "stiffness: expected"),
     (lambda: control.SpringWall([0, 0], [0, 0, 1], 1.0), "point: expected shape"),
+    (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 1.0, bilateral="no"), "True or False"),
+    (lambda: control.ComputedTorque(lambda t: ("a", Q0, Q0), model=arm()), "real numbers"),
+    (lambda: control.ComputedTorque(lambda t: ([1, [2]], Q0, Q0), model=arm()), "regular array"),
+    (lambda: control.DecentralizedPID(Q0, 1, 0, 1, feedforward="x"), "feedforward: expected"),
+    (lambda: control.SlidingMode(None, 1, 1).error(0, Q0, Q0), "this one is scalar"),
+    (lambda: control.SuperTwisting(Q0, 1, 1, 1).command(0, Q0, Q0), "x: expected shape"),
+    (lambda: control.SlidingMode(Q0, 1, 1).command(0, Q0, Q0, [1.0]), "x: expected shape"),
+    (lambda: control.PIDGains(1, 0, 1, 0).critical_ki, "inertia: expected"),
+    (lambda: control.first_order(lambda s: [1, 2, 3], 1, 0, 1, 0.1), r"law\(s\): expected one"),
+    (lambda: control.first_order(lambda s: "a", 1, 0, 1, 0.1), r"law\(s\): expected real"),
+    (lambda: control.first_order(control.SlidingMode(None, 1, 1), 1, [1, 2], 1, 0.1),
+     "disturbance: expected one"),
+    (lambda: control.first_order(control.SlidingMode(None, 1, [2, 3]), [1, 1, 1], 0, 1, 0.1),
+     "gain: expected one"),
+    (lambda: control.ComputedTorque(dgm(arm(), Q0), model=arm(), space="task").command(
+        0, [Q0, Q0], [Q0, Q0]), "expected one posture"),
+    (lambda: hybrid(model=arm(masses=(0.0, 0.0))).command(0, Q0, Q0), "mass matrix is singular"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("make", "message"), BAD)
 @pytest.mark.filterwarnings("ignore:divide by zero")
 def test_mistakes_in_laws_are_named(make, message):
-    with pytest.raises((InvalidValueError, ShapeError), match=message):
+    with pytest.raises((InvalidValueError, ShapeError, SingularMassMatrixError), match=message):
         make()
 
 
@@ -750,9 +826,18 @@ def test_mistakes_in_laws_are_named(make, message):
             {"law": control.PDGravity([0.0], 1, 1)},
             "law: expected a law for 2 joints, got one for 1",
         ),
-        ({"period": 1e-3, "delay": 2.0}, "delay: expected at most the duration"),
+        ({"period": 1e-3, "delay": 2.0}, "delay: expected less than the duration"),
         ({"delay": 0.1}, "only a sampled control is delayed"),
         ({"period": 0.0}, "period: expected a finite number above 0"),
+        ({"period": "a"}, "period: expected a finite number above 0"),
+        ({"period": [1e-3]}, "period: expected a finite number above 0"),
+        ({"period": np.nan}, "period: expected a finite number above 0"),
+        ({"period": 1e-320}, "would sample more than"),
+        ({"period": 0.1, "delay": 0.1}, "delay: expected less than the duration"),
+        ({"noise": 1e-3, "rng": -1, "period": 1e-3}, "rng: expected a whole number"),
+        ({"noise": 1e-3, "rng": "a", "period": 1e-3}, "rng: expected a whole number"),
+        ({"wrench": np.zeros(6)}, "wrench: give environment="),
+        ({"law": Wrong()}, "law.command.*: expected real numbers"),
         ({"noise": 1e-3, "period": 1e-3}, "noise: give rng"),
         ({"noise": 1e-3, "rng": 0}, "noise: give period"),
         ({"noise": -1.0, "rng": 0, "period": 1e-3}, "noise: expected one standard deviation"),
@@ -767,3 +852,10 @@ def test_mistakes_in_runs_are_named(arguments, message):
     given = {"law": laws()[0], "q0": Q0, "t": 0.1} | arguments
     with pytest.raises((InvalidValueError, ShapeError, TypeError), match=message):
         control.run(arm(), **given)
+
+
+def test_laws_print_one_number_for_equal_gains():
+    law = control.ComputedTorque([0.1, 0.2], omega=[5.0, 6.0], model=arm())
+    assert repr(law) == (
+        "ComputedTorque(reference=[0.1, 0.2], omega=[5.0, 6.0], zeta=1.0, model=2R, space=joint)"
+    )

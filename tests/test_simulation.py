@@ -531,7 +531,7 @@ class Broken(WithIntegral):
         ({"period": 0.0}, "period: expected a finite number above 0"),
         ({"period": 0.1, "delay": -1.0}, "delay: expected a finite number of at least 0"),
         ({"delay": 0.1}, "only a sampled control is delayed"),
-        ({"period": 0.1, "delay": 2.0}, "at most the duration 1 s, got 2 s"),
+        ({"period": 0.1, "delay": 2.0}, "less than the duration 1 s, got 2 s"),
         ({"period": 1e-9}, "would sample more than"),
         ({"period": 0.1, "control": None}, "no control to sample"),
         ({"control": Broken(1.0)}, r"control.rate\(t, q, v, x\) at t = 0 s: expected finite"),

@@ -22,7 +22,7 @@ position : ComputedTorque or reference
     A law in task space, or a reference for one with its default gains.
 force, reference : ForceTracking or reference
     A wrench (a constant (6,), or a function of t that returns it with its rate and second rate);
-    hybrid laws take the gains of a force law, too.
+    hybrid laws take the gains of a force law, too; of a wrench alone, kp = 400, kv = 40, ke = 2000.
 inverse : {"consistent", "jacobian"}
     ``"consistent"``: positions through the dynamically consistent pseudo-inverse of their rows,
     forces in its null space. ``"jacobian"``: joint servos of equal gains through ``J^-1 S``, the
@@ -72,15 +72,25 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, as_floats, as_mask, as_vector
 from ..dynamics import mass_matrix
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
 from .law import Law, as_gains, as_word, model_torques
 from .reference import Desired, as_reference, wrench_reference
-from .task import RANK, accelerations, frozen_mask, row_gains, task_error, task_rows, tool_motion
+from .task import (
+    RANK,
+    accelerations,
+    frozen_mask,
+    row_gains,
+    singular_notes,
+    task_error,
+    task_rows,
+    tool_motion,
+)
 from .task_laws import ComputedTorque, Impedance
 
 _ALL = np.arange(6)
+_FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -124,6 +134,10 @@ class ForceTracking(Law):
         f_d, rate, second = desired
         return (second + self.kv * (rate - self.ke * twist) + self.kp * (f_d - f)) / self.ke
 
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return singular_notes(self.model, t, q, self.rows)
+
     def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Error of the wrench, shape (m,)."""
         return (self._desired(t)[0] - self._measured(q, v, wrench)[2])[self.rows]
@@ -150,14 +164,16 @@ class _Split(Law):
         selection = as_mask(self.selection, name="selection")
         rows = task_rows(self.model, self.mask, turn=turn)
         if not selection[rows].any():
-            raise InvalidValueError("selection: the force of no component is controlled.")
+            raise InvalidValueError(
+                "selection: expected a force-controlled component of the task, got none."
+            )
         position, force = self.position, self.force
         if not isinstance(position, ComputedTorque):
             position = ComputedTorque(position, model=self.model, space="task")
         elif position.space != "task":
             raise InvalidValueError("position: expected a law in task space, space='task'.")
         if not isinstance(force, ForceTracking):
-            force = ForceTracking(400.0, 40.0, 2000.0, reference=force, model=self.model)
+            force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
         self._set(position=position, force=force, rows=rows, _forced=selection[rows], _turn=turn)
         w = np.full(6, np.max(position.omega))
         damping = 2.0 * w * np.max(position.zeta)
@@ -165,6 +181,10 @@ class _Split(Law):
         damping[position.rows] = 2.0 * position.zeta * position.omega
         self._set(selection=selection.astype(float), _gains=(w, damping), **{frame: given})
         self._set(mask=frozen_mask(self.mask))
+
+    def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return singular_notes(self.model, t, q, self.rows)
 
     def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Errors of position and force in the axes of the task, shape (m,)."""
@@ -217,7 +237,7 @@ class ParallelHybrid(_Split):
             a = prioritised(M, tasks, -2.0 * np.max(self.position.omega) * v)
             return model_torques(self.model, q, v, a, f)
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), v, 0.0)
-        mass = np.linalg.pinv(J[forced] @ np.linalg.solve(M, J[forced].T), RANK)
+        mass = np.linalg.pinv(J[forced] @ _inverse(M) @ J[forced].T, RANK)
         f_d = (self._turn @ self.force._desired(t)[0])[self.rows][forced]
         push = J[forced].T @ (mass @ wanted[forced] + f_d)
         return servo + push + model_torques(self.model, q, v, np.zeros(self.n))
@@ -253,9 +273,10 @@ class ExternalForceLoop(Law):
     """Force control by an external loop, which moves the reference of a position control.
 
     The reference moves by the force error over the stiffness, and by gain times the integral of
-    that, the state; the measured wrench is compensated. With a gain below ``2 zeta omega`` of the
-    inner law this is stable for every stiffness of the environment. Directions without contact and
-    without a desired force stay where they are.
+    that, the state. With a gain below ``2 zeta omega`` (``B / M``) of the inner law this is stable
+    for every stiffness of the environment. An inner `ComputedTorque` compensates the measured
+    wrench, and holds the position in directions without a desired force whose wrench is zero; an
+    inner `Impedance` also gives way to the wrench.
     """
 
     inner: ComputedTorque | Impedance
@@ -297,10 +318,25 @@ class ExternalForceLoop(Law):
         """Velocity of the shift, shape (m,)."""
         return self.gain / self.stiffness * self.error(t, q, v, wrench)
 
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        return self.inner.notes(t, q, v)
+
     def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Error of the wrench, shape (m,)."""
         missing = self._desired(t)[0] - self._measured(q, v, wrench)[2]
         return self._active * missing[self.inner.rows]
+
+
+def _inverse(M: Array) -> Array:
+    """Inverse of the mass matrix of the believed model."""
+    try:
+        return np.linalg.inv(M)
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError(
+            "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
+            "inertia."
+        ) from None
 
 
 def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Array:
@@ -309,7 +345,7 @@ def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Arra
     By dynamically consistent pseudo-inverses in the null spaces of the tasks before; what remains
     free has the accelerations `free`.
     """
-    inverse, N, a = np.linalg.inv(M), np.eye(len(M)), np.zeros(len(M))
+    inverse, N, a = _inverse(M), np.eye(len(M)), np.zeros(len(M))
     for J, wanted in tasks:
         mobility = N @ inverse @ J.T
         P = mobility @ np.linalg.pinv(J @ mobility, RANK)

@@ -41,7 +41,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, Value, as_number, as_vector
+from .._arrays import Array, Value, as_exact, as_number, as_vector
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
@@ -62,7 +62,8 @@ class PIDGains(Value):
     @property
     def critical_ki(self) -> float:
         """Integral gain at the border of stability (Routh): ``(kd + viscous) kp / inertia``."""
-        return (self.kd + self.viscous) * self.kp / self.inertia
+        inertia = as_number(self.inertia, "inertia", above=0.0)
+        return (self.kd + self.viscous) * self.kp / inertia
 
     @property
     def margin(self) -> float:
@@ -102,7 +103,7 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class JointLaw(Law):
-    """Parts of laws of the joints: their number, the reference, and its error."""
+    """Base of the laws of the joints: number of joints, reference and error."""
 
     n: int = field(init=False)
     _desired: Desired = field(init=False)
@@ -156,7 +157,7 @@ class DecentralizedPID(JointLaw):
         model = given if isinstance(given, RobotModel) else None
         self._prepare(("kp", "ki", "kd"), model, zero="ki")
         if given is not None and model is None:
-            self._set(feedforward=as_vector(np.asarray(given, float), self.n, "feedforward"))
+            self._set(feedforward=as_exact(given, (self.n,), "feedforward"))
 
     @property
     def state0(self) -> Array:
@@ -180,8 +181,9 @@ class DecentralizedPID(JointLaw):
 class PDGravity(JointLaw):
     """PD control with gravity compensation (Takegaki and Arimoto), PD+ for motions (Paden, Panja).
 
-    ``tau = A(q) q_d'' + C(q, q') q_d' + Q(q) + kp e + kd e'``. Without a model nothing is
-    compensated, and there is no Lyapunov function.
+    ``tau = A(q) q_d'' + C(q, q') q_d' + Q(q) + kp e + kd e'``. Friction of the drives is not
+    compensated: at a set point it dissipates as kd does. Without a model nothing is compensated,
+    and there is no Lyapunov function.
     """
 
     reference: Any
@@ -204,7 +206,7 @@ class PDGravity(JointLaw):
         return tau if model.drive_matrices is None else tau + model.drive_matrices.rotor @ a_d
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
-        """``(e'^T A e' + e^T kp e) / 2``, with the rate ``-e'^T kd e'``."""
+        """``(e'^T A e' + e^T kp e) / 2``, with the rate ``-e'^T kd e'`` without friction."""
         e, de = self.error(t, q, v), self._desired(t)[1] - v
         V = 0.5 * float(de @ mass_matrix(plant, q) @ de + e @ (self.kp * e))
         return None if self.model is None else V

@@ -63,8 +63,10 @@ class Law(Value):
         shown = []
         for f in fields(self):  # type: ignore[arg-type]
             value = getattr(self, f.name)
-            if isinstance(value, np.ndarray) and value.size <= 7:
+            if isinstance(value, np.ndarray) and value.ndim < 2 and value.size <= 7:
                 value = value.tolist()
+                if isinstance(value, list) and len(value) > 1 and len(set(value)) == 1:
+                    value = value[0]
             elif isinstance(value, RobotModel):
                 value = value.name
             elif not isinstance(value, (int, float, str, Law)):
@@ -96,7 +98,7 @@ def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
 def model_torques(
     model: RobotModel, q: Array, v: Array, a: Array, wrench: ArrayLike | None = None
 ) -> Array:
-    """Inverse dynamics; dry friction of a joint at rest is that of the way it is to be moved."""
+    """Inverse dynamics; a joint at rest has the dry friction of its direction of acceleration."""
     return idm(model, q, started(v, a), a, wrench)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, as_exact, as_floats, read_only
+from .._arrays import Array, as_exact, as_floats, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from ..trajectories import PoseTrajectory, Trajectory
@@ -106,5 +106,5 @@ def _answers(law: Callable[[float], Any], t: float) -> tuple[Array, Array, Array
             f"reference({t:g}): expected three arrays, the value with its first and second "
             f"derivative, got {type(answer).__name__}."
         )
-    value, rate, second = (np.asarray(x, dtype=np.float64) for x in answer)
+    value, rate, second = (as_reals(x, f"reference({t:g})") for x in answer)
     return value, rate, second

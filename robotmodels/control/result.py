@@ -19,7 +19,7 @@ class ControlStatus(Outcome):
     FOLLOWED = 0, "The law was followed to the end, within the limits of the robot."
     SATURATED = 1, "Torques were limited to the efforts of the joints."
     LEFT_LIMITS = 2, "Joints left their limits."
-    DIVERGED = 3, "The error grows without bound, or the motion could not be simulated to its end."
+    DIVERGED = 3, "The law was not followed to the end."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -8,16 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats
+from .._arrays import Array, as_exact, as_floats, as_number, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian
+from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..simulation import Integrator, Simulation, SimulationStatus, simulate
 from .law import Law
 from .result import ControlledMotion, ControlStatus
 
 _SAMPLES = 1000
-_GROWS = 2.0  # ratio of the largest errors of successive thirds of a run that diverges
+_WINDOWS = 6  # parts of a run whose largest errors tell whether it diverges
+_GROWS = 2.0  # least ratio of the last of them to the first
+_STEADY = 1.05  # least ratio of successive ones
+_STAYS = 0.85  # least part of the ratio at first that remains at the end
 _SMALL = 1e-6  # errors that may grow
 
 Environment = Callable[[float, Array, Array], ArrayLike]
@@ -77,7 +81,7 @@ def run(
     ------
     ShapeError, InvalidValueError
         Arguments of the wrong shape; a law for another number of joints, or one that switches, in
-        continuous time; a delay longer than the run; noise without rng or period.
+        continuous time; a delay as long as the run; noise without rng or period.
 
     References
     ----------
@@ -104,10 +108,15 @@ def run(
             "law: its torque or its state switches, which stalls a continuous simulation; give a "
             "sampling period, or a boundary layer (layer=)."
         )
+    if period is not None:
+        period = as_number(period, "period", above=0.0)
+    for name, instead in (("wrench", "environment="), ("control", "law=")):
+        if name in options:
+            raise InvalidValueError(f"{name}: give {instead} of run.")
     times = as_floats(t, "t")
     if times.ndim == 0 and times > 0.0:
-        count = max(1, round(float(times / period))) if period and period > 0.0 else _SAMPLES
-        times = np.linspace(0.0, float(times), min(count, _SAMPLES * _SAMPLES) + 1)
+        ratio = float(times) / period if period else _SAMPLES
+        times = np.linspace(0.0, float(times), max(1, round(min(ratio, _SAMPLES * _SAMPLES))) + 1)
     loop = Loop(model, law, environment, noise, rng, period)
     if disturbance is not None and not callable(disturbance):
         disturbance = as_exact(disturbance, (model.n,), "disturbance")
@@ -115,7 +124,8 @@ def run(
     options.setdefault("method", Integrator.DOP853 if period is None else Integrator.RK45)
     seconds = float(np.ptp(times)) if times.size else 0.0
     options.setdefault(
-        "max_evaluations", int(2e4 * (1.0 + seconds) + 20 * seconds / (period or 1.0))
+        "max_evaluations",
+        int(min(2e4 * (1.0 + seconds) + 20 * seconds / (period or 1.0), 2**62)),
     )
     wall = loop.wrench if loop.walls else None
     motion = simulate(
@@ -137,7 +147,7 @@ def run(
 
 
 class Loop:
-    """The law as the plant sees it: with what is measured, and limited torques."""
+    """A law in a simulation: it gets measured values, and its torques are limited."""
 
     def __init__(
         self, model: RobotModel, law: Any, environment: Any, noise: Any, rng: Any, period: Any
@@ -153,13 +163,14 @@ class Loop:
         self.effort = np.where(np.isnan(model.table.effort), np.inf, model.table.effort)
         self.saturated = np.zeros(model.n, dtype=np.bool_)
         self._deviations = _deviations(noise, rng, period)
-        self._rng = np.random.default_rng(rng)
+        self._rng = generator_of(rng)
         self._last: Any = (None,)
         self._sample: Any = None, []
 
     def command(self, t: float, q: Array, v: Array, x: Array) -> Array:
         """Torques of the law within the efforts, shape (n,)."""
-        tau = np.asarray(self.law.command(t, *self._measured(t, q, v, x)), dtype=np.float64)
+        answer = self.law.command(t, *self._measured(t, q, v, x))
+        tau = as_exact(answer, self.effort.shape, "law.command(t, q, v, x)")
         over = np.abs(tau) > self.effort
         if over.any():
             self.saturated |= over
@@ -186,7 +197,8 @@ class Loop:
         """Error of the law, empty for a law without."""
         if not hasattr(self.law, "error"):
             return np.zeros(0)
-        return self.law.error(t, q, v, wrench) if self.feels else self.law.error(t, q, v)
+        e = self.law.error(t, q, v, wrench) if self.feels else self.law.error(t, q, v)
+        return as_vector(e, np.size(e), "law.error(t, q, v)")
 
     def _measured(self, t: float, q: Array, v: Array, x: Array) -> tuple[Array, ...]:
         f = self.wrench(t, q, v) if self.feels and self.walls else None
@@ -215,6 +227,29 @@ def _deviations(noise: Any, rng: Any, period: Any) -> tuple[float, ...] | None:
     return tuple(given) if given.size == 3 else (given[0], given[-1], 0.0)
 
 
+def _growing(errors: Array) -> Array:
+    """Peaks of the error in the windows of a run if they grow exponentially, empty if not.
+
+    Ratios of successive peaks stay then; those of a power of time fall.
+    """
+    if len(errors) < 2 * _WINDOWS:
+        return np.zeros(0)
+    peaks = np.array([np.abs(x).max(initial=0.0) for x in np.array_split(errors, _WINDOWS)])
+    if peaks[-1] <= max(_GROWS * peaks[0], _GROWS * np.abs(errors[0]).max(initial=0.0), _SMALL):
+        return np.zeros(0)
+    ratios = peaks[2:] / np.maximum(peaks[1:-1], 1e-300)
+    grows = (ratios > _STEADY).all() and ratios[-1] > _STAYS * ratios[0]
+    return peaks if grows else np.zeros(0)
+
+
+def _moved(law: Any, t: Array) -> float:
+    """How far the reference of a law moves from its start."""
+    if (desired := getattr(law, "_desired", None)) is None:
+        return 0.0
+    values = np.array([desired(float(x))[0] for x in t])
+    return float(np.abs(values - values[0]).max(initial=0.0))
+
+
 def _outcome(
     model: RobotModel, motion: Simulation, errors: Array, loop: Loop
 ) -> tuple[ControlStatus, tuple[str, ...]]:
@@ -223,9 +258,11 @@ def _outcome(
         late = motion.status is SimulationStatus.NOT_CONVERGED
         advice = ("Give method='Radau' for stiff walls, or a period.",) * late
         return ControlStatus.DIVERGED, (f"At t = {motion.t[-1]:.6g} s: {motion.reason}", *advice)
-    first, second, third = (np.abs(x).max(initial=0.0) for x in np.array_split(errors, 3))
-    if third > max(_GROWS * second, _SMALL) and second > _GROWS * first:
-        return ControlStatus.DIVERGED, ()
+    if (peaks := _growing(errors)).size and peaks[-1] > _moved(loop.law, motion.t):
+        shown = ", ".join(f"{x:.3g}" for x in peaks)
+        return ControlStatus.DIVERGED, (
+            f"The error grows exponentially: its peaks in sixths of the run are {shown}.",
+        )
     beyond = (motion.q < model.lower) | (motion.q > model.upper)
     for status, at in (
         (ControlStatus.LEFT_LIMITS, beyond.any(axis=0)), (ControlStatus.SATURATED, loop.saturated)

@@ -40,8 +40,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_number
-from ..errors import InvalidValueError
+from .._arrays import Array, as_floats, as_number, as_reals, as_vector
+from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from .joint_laws import SurfaceLaw
 from .law import NONE, as_gains, model_torques
@@ -64,13 +64,20 @@ class _Sliding(SurfaceLaw):
     def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
         """Torques, shape (n,)."""
         q, v, v_r, a_r = self._rates(t, q, v)
-        u = -self.reaching(v_r - v, np.asarray(x, dtype=np.float64))[0]
+        u = -self.reaching(v_r - v, as_vector(x, len(self.state0), "x"))[0]
         return u if self.model is None else model_torques(self.model, q, v, a_r + u)
 
+    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
+        """Error of the joints, shape (n,)."""
+        return SurfaceLaw.error(self._of_robot(), t, q, v)
+
     def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
+        return SurfaceLaw._rates(self._of_robot(), t, q, v)
+
+    def _of_robot(self: Any) -> Any:
         if self.reference is None:
             raise InvalidValueError("reference: a law for a robot needs one, this one is scalar.")
-        return SurfaceLaw._rates(self, t, q, v)
+        return self
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -172,8 +179,9 @@ def first_order(
 
     Raises
     ------
-    InvalidValueError
-        A step that is not positive, a negative duration, values that are not finite.
+    ShapeError, InvalidValueError
+        Gains, rates or disturbances that do not broadcast to s0; a step that is not positive, a
+        negative duration, values that are not finite.
 
     References
     ----------
@@ -194,18 +202,33 @@ def first_order(
             f"law: expected a sliding mode or a function of s, got {type(law).__name__}."
         )
     if disturbance is None or not callable(disturbance):
-        constant = as_floats(0.0 if disturbance is None else disturbance, "disturbance")
+        constant = _fitting(0.0 if disturbance is None else disturbance, s, "disturbance")
+    for name in ("gain", "layer", "k1", "k2"):
+        _fitting(getattr(law, name, 0.0) if reaching else 0.0, s, name)
     out = np.empty((round(end / h) + 1, *s.shape))
     out[0], x = s, np.zeros(s.shape)
     for k in range(len(out) - 1):
-        push: Any = disturbance(k * h) if callable(disturbance) else constant
+        push = (
+            _fitting(disturbance(k * h), s, "disturbance(t)") if callable(disturbance) else constant
+        )
         if reaching is None:
-            rate, change = law(s), NONE  # type: ignore[operator]
+            rate, change = _fitting(law(s), s, "law(s)"), NONE  # type: ignore[operator]
         else:
             rate, change = reaching(s, x)
-        s = out[k + 1] = s + h * (np.asarray(rate) + push)
+        s = out[k + 1] = s + h * (rate + push)
         if change is not NONE:
             x = x + h * change
     if not np.isfinite(out).all():
         raise InvalidValueError("law, disturbance: s is not finite; expected finite values.")
     return out
+
+
+def _fitting(value: ArrayLike, s: Array, name: str) -> Array:
+    """Numbers that broadcast to the shape of s."""
+    array = as_reals(value, name)
+    short = s.shape[max(s.ndim - array.ndim, 0) :]
+    if array.ndim > s.ndim or any(k not in (1, n) for k, n in zip(array.shape, short, strict=True)):
+        raise ShapeError(
+            f"{name}: expected one number or shape {s.shape}, that of s0, got {array.shape}."
+        )
+    return array

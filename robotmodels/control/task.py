@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_mask
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..model import RobotModel
 from .law import NO_WRENCH
 
 RANK = 1e-9  # relative singular value
+_SQUARES = 1e-10  # relative pivot of J J^T
 Desired = tuple[Array, Array, Array]
 
 
@@ -41,6 +42,10 @@ class ToolMotion(NamedTuple):
 
 def tool_motion(model: RobotModel, q: Array, v: Array, frame: Any = None) -> ToolMotion:
     """Where a frame is and how it moves, in world axes."""
+    if q.ndim != 1 or v.ndim != 1:
+        raise ShapeError(
+            f"q, v: expected one posture, shape ({model.n},), got {q.shape}, {v.shape}."
+        )
     J = jacobian(model, q, frame)
     return ToolMotion(dgm(model, q, frame), J, J @ v, jacobian_rate(model, q, v, frame) @ v)
 
@@ -84,21 +89,43 @@ def task_rows(
 def accelerations(J: Array, wanted: Array, v: Array, damping: Any) -> Array:
     """Joint accelerations a with ``J a = wanted``; motions of no effect are damped.
 
-    Least squares where the rows cannot all be met.
+    Least squares where the rows cannot all be met: directions whose singular value is below RANK of
+    the largest are left out, as motions of no effect.
     """
     from scipy.linalg.lapack import dgesv
 
-    a: Any
-    (m, n), a, singular = J.shape, wanted, False
+    m, n = J.shape
     if m == n:
-        *_, a, singular = dgesv(J, wanted)
-    elif m < n:
-        free = -np.max(damping) * v
-        *_, forces, singular = dgesv(J @ J.T, wanted - J @ free)
-        a = free + J.T @ forces
-    if m > n or singular:
-        a = np.linalg.lstsq(J, wanted, RANK)[0]
-    return a
+        upper, _, a, _ = dgesv(J, wanted)
+        if _regular(upper, RANK):
+            return a
+    free = -np.max(damping) * v
+    missing = wanted - J @ free
+    if m < n:  # squares of singular values: near RANK they are rounding
+        upper, _, forces, _ = dgesv(J @ J.T, missing)
+        if _regular(upper, _SQUARES):
+            return free + J.T @ forces
+    return free + np.linalg.lstsq(J, missing, RANK)[0]
+
+
+def _regular(factors: Array, least: float) -> bool:
+    """Whether the pivots of a triangular factorisation are of one size."""
+    pivots = list(map(abs, factors.diagonal().tolist()))
+    return min(pivots) > least * max(pivots)
+
+
+def singular_notes(
+    model: RobotModel, t: Array, q: Array, rows: NDArray[np.int64], frame: Any = None
+) -> tuple[str, ...]:
+    """A sentence for a motion (N, n) in whose postures components of the task depend."""
+    J = jacobian(model, q, frame)[:, rows]
+    less = np.linalg.matrix_rank(J, rtol=RANK) < min(J.shape[1:])
+    if not less.any():
+        return ()
+    return (
+        f"At t = {t[np.argmax(less)]:.6g} s the posture is singular for the task: motions of the "
+        "tool that the joints cannot make there are left out.",
+    )
 
 
 def frozen_mask(mask: Any) -> Any:

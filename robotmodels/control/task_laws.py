@@ -8,7 +8,7 @@ Parameters
 ----------
 reference : Trajectory, PoseTrajectory, array_like or callable
     Positions (n,), or in task space a world pose (4, 4): a motion, a constant, or a function of t
-    that returns (q, v, a) or (T, twist, acceleration); it is called with t = 0 at once.
+    that returns (q, v, a) or (T, twist, acceleration), evaluated at t = 0 when the law is made.
 model : RobotModel
     The robot as the controller believes it to be, n joints; friction of its drives is compensated.
 mask : array_like, shape (6,), optional
@@ -59,6 +59,7 @@ from .task import (
     accelerations,
     frozen_mask,
     row_gains,
+    singular_notes,
     task_error,
     task_rows,
     tool_motion,
@@ -84,6 +85,12 @@ class TaskLaw(Law):
         """Error of the task, shape (m,), or of the joints."""
         q, v, _ = self._measured(q, v)
         return self._task(t, q, v).e
+
+    def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence for singular postures of a motion (N, n)."""
+        if getattr(self, "space", "task") == "joint":
+            return ()
+        return singular_notes(self.model, t, q, self.rows, getattr(self, "frame", None))
 
     def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
         frame = getattr(self, "frame", None)
@@ -150,7 +157,7 @@ class ComputedTorque(TaskLaw):
 
 
 class _Compliant(TaskLaw):
-    """Impedance ``M e'' + B e' + K e = f``: the tool leads a wall by ``f / K``."""
+    """Impedance ``M e'' + B e' + K e = f``: the error at rest is ``f / K``."""
 
     __slots__ = ()
 

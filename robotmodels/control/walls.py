@@ -71,6 +71,10 @@ class SpringWall(Value):
         numbers |= {"damping": {"least": 0.0}, "friction": {"least": 0.0}}
         for name, bound in numbers.items():
             object.__setattr__(self, name, as_number(getattr(self, name), name, **bound))
+        if not isinstance(self.bilateral, (bool, np.bool_)):
+            raise InvalidValueError(
+                f"bilateral: expected True or False, got {self.bilateral!r:.40}."
+            )
         object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
         object.__setattr__(self, "normal", read_only(normal / np.linalg.norm(normal)))
 

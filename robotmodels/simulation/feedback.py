@@ -75,9 +75,9 @@ class Feedback:
             raise InvalidValueError(
                 f"period: {period:.3g} s would sample more than {_MOST_SAMPLES} times."
             )
-        if delay > end - start:
+        if delay and delay >= end - start:
             raise InvalidValueError(
-                f"delay: expected at most the duration {end - start:.6g} s, got {delay:.6g} s; "
+                f"delay: expected less than the duration {end - start:.6g} s, got {delay:.6g} s; "
                 "no torque would act."
             )
         taken: Array = start + period * np.arange(

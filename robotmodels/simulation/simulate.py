@@ -120,7 +120,7 @@ def simulate(
         Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
         a start outside the limits, or so fast that its energy is not finite; limits requested that
         no joint has; negative dry friction; joints that mimic others; a delay without a period, or
-        longer than the simulation.
+        as long as the simulation.
 
     References
     ----------
