@@ -16,6 +16,7 @@ from .link import BeamData, FlexibleLink, Section, integrals
 
 _ENDS = ("clamped-free", "pinned-hub")
 _SLENDER = 0.02  # default radius of gyration of the section, relative to the length
+_LEAST = 1e-4  # least wave number of a mode of a beam of length 1
 _DRAWN = 41  # nodes of a beam
 _X, _Y, _Z = np.eye(3)
 Shape = Callable[[Array, int], Array]
@@ -308,7 +309,9 @@ def bending_modes(
         size = float(w[np.argmax(np.abs(w))])
         return shape
 
-    roots = _roots(lambda b: np.linalg.det(_conditions(b, loads, hub)), count)
+    bare = _conditions(np.array([_LEAST]), (0.0, 0.0, 0.0), None if hub is None else 0.0)
+    before = float(np.linalg.det(bare)[0])
+    roots = _roots(lambda b: np.linalg.det(_conditions(b, loads, hub)), count, before)
     return [(b, shape_of(b)) for b in roots]
 
 
@@ -318,23 +321,23 @@ def torsion_modes(count: int, J: float) -> list[tuple[float, Shape]]:
     def shape_of(b: float) -> Shape:
         return lambda x, order: b**order * (np.cos(b * x) if order else np.sin(b * x)) / np.sin(b)
 
-    return [(b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count)]
+    return [(b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count, 1.0)]
 
 
-def _roots(function: Callable[[Array], Array], count: int) -> list[float]:
-    """The first positive roots of a function of b."""
+def _roots(function: Callable[[Array], Array], count: int, before: float) -> list[float]:
+    """The first positive roots of a function of b, which has the sign of ``before`` before them."""
     from scipy.optimize import brentq
 
-    b = np.concatenate([np.geomspace(1e-4, 0.5, 130), np.arange(0.51, np.pi * (count + 2), 0.01)])
+    b = np.concatenate([np.geomspace(_LEAST, 0.5, 130), np.arange(0.51, np.pi * (count + 2), 0.01)])
     signs = np.sign(function(b))
 
     def at(x: float) -> float:
         return float(function(np.array([x]))[0])
 
     changes = np.flatnonzero(signs[1:] != signs[:-1])[:count]
-    if len(changes) < count:
+    if count and (len(changes) < count or signs[0] != np.sign(before)):
         raise InvalidValueError(
-            f"tip, hub, density: only {len(changes)} of {count} modes were found, because the "
-            "masses differ too much. Take a density nearer to that of the loads, or fewer modes."
+            "tip, hub, density: not all modes were found, because the beam is too light for its "
+            "loads. Take a greater density or radius of gyration."
         )
     return [float(brentq(at, b[i], b[i + 1], xtol=1e-14)) for i in changes]  # type: ignore[arg-type]

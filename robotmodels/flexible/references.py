@@ -16,7 +16,7 @@ from .link import BeamData
 from .robot import FlexibleRobot, check_arm
 
 _POINTS = 101
-_MOST = 200.0  # greatest load of `elastica`, of the same
+_MOST = 100.0  # greatest load of `elastica`, of the same
 _LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solution is continued
 
 
@@ -64,7 +64,7 @@ def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) 
     ------
     InvalidValueError
         Length or stiffness that is not positive; ``force length^2 / EI`` or ``moment length / EI``
-        above 200.
+        above 100.
 
     References
     ----------
