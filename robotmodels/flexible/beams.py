@@ -321,14 +321,18 @@ def torsion_modes(count: int, J: float) -> list[tuple[float, Shape]]:
     def shape_of(b: float) -> Shape:
         return lambda x, order: b**order * (np.cos(b * x) if order else np.sin(b * x)) / np.sin(b)
 
-    return [(b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count, 1.0)]
+    return [
+        (b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count, 1.0, 1e-9)
+    ]
 
 
-def _roots(function: Callable[[Array], Array], count: int, before: float) -> list[float]:
+def _roots(
+    function: Callable[[Array], Array], count: int, before: float, least: float = _LEAST
+) -> list[float]:
     """The first positive roots of a function of b, which has the sign of ``before`` before them."""
     from scipy.optimize import brentq
 
-    b = np.concatenate([np.geomspace(_LEAST, 0.5, 130), np.arange(0.51, np.pi * (count + 2), 0.01)])
+    b = np.concatenate([np.geomspace(least, 0.5, 200), np.arange(0.51, np.pi * (count + 2), 0.01)])
     signs = np.sign(function(b))
 
     def at(x: float) -> float:
@@ -340,4 +344,4 @@ def _roots(function: Callable[[Array], Array], count: int, before: float) -> lis
             "tip, hub, density: not all modes were found, because the beam is too light for its "
             "loads. Take a greater density or radius of gyration."
         )
-    return [float(brentq(at, b[i], b[i + 1], xtol=1e-14)) for i in changes]  # type: ignore[arg-type]
+    return [float(brentq(at, b[i], b[i + 1], xtol=1e-20)) for i in changes]  # type: ignore[arg-type]
