@@ -76,6 +76,41 @@ def test_clamped_beam_has_the_roots_of_its_frequency_equation():
     np.testing.assert_allclose(b, [roots, roots], rtol=1e-10)
 
 
+def test_first_modes_of_a_heavy_tip_on_a_light_beam():
+    light = flexible.beam(1.0, EI=(INF, 1.0), density=1e-9, tip=1.0, modes=1)
+    np.testing.assert_allclose(light.frequencies, np.sqrt(3.0), rtol=1e-6)  # 3 EI / (m L^3)
+    bar = flexible.beam(
+        0.5, EI=INF, GJ=50.0, density=0.2, tip=(1.0, 0.005), gyration=0.002, modes=2
+    )
+    np.testing.assert_allclose(bar.frequencies[0], np.sqrt(50.0 / 0.5 / 0.005), rtol=1e-4)
+    with pytest.raises(InvalidValueError, match="too light"):
+        flexible.beam(1.0, EI=(INF, 1.0), density=1e-24, tip=1.0, modes=1)
+
+
+def test_modes_of_a_tip_off_the_axis_are_those_of_finite_elements():
+    link = flexible.beam(
+        0.7, EI=(3.0, 2.0), density=0.4, tip=(0.3, [0, 0.1, 0], [0.002] * 3), modes=3
+    )
+    N, EI, rho = 30, 2.0, 0.4
+    h = 0.7 / N
+    k = EI / h**3 * np.array(
+        [[12, 6*h, -12, 6*h], [6*h, 4*h*h, -6*h, 2*h*h], [-12, -6*h, 12, -6*h],
+         [6*h, 2*h*h, -6*h, 4*h*h]]
+    )  # fmt: skip
+    m = rho * h / 420 * np.array(
+        [[156, 22*h, 54, -13*h], [22*h, 4*h*h, 13*h, -3*h*h], [54, 13*h, 156, -22*h],
+         [-13*h, -3*h*h, -22*h, 4*h*h]]
+    )  # fmt: skip
+    K, M = np.zeros((2, 2 * N + 2, 2 * N + 2))
+    for i in range(0, 2 * N, 2):
+        K[i : i + 4, i : i + 4] += k
+        M[i : i + 4, i : i + 4] += m
+    M[-2, -2] += 0.3
+    M[-1, -1] += 0.002 + 0.3 * 0.1**2
+    exact = np.sqrt(eigh(K[2:, 2:], M[2:, 2:], eigvals_only=True)[:3])
+    np.testing.assert_allclose(link.frequencies[3:], exact, rtol=1e-5)
+
+
 @pytest.mark.parametrize(("hub", "tip"), [(0.1, None), (0.0, 0.4), (0.7, (0.5, (0.1, 0, 0), 0.03))])
 def test_hub_beam_has_the_roots_of_its_determinant(hub, tip):
     L, EI, rho = 1.3, 2.0, 1.4
@@ -408,3 +443,17 @@ def test_bodies_and_shapes_are_refused():
         flexible.ddm(soft, [0.0], None, [0.0], None, [0.0])
     with pytest.raises(SingularMassMatrixError):
         flexible.ddm(flexible.FlexibleRobot(PIVOT, {}), [0.0], None, [0.0], None, [0.0])
+
+
+def test_finite_elements_that_are_no_body_are_refused():
+    K, nodes = np.diag([1.0, 1, 1, 2, 3, 4]), [[0, 0, 0], [1, 0, 0]]
+    shape = np.eye(6)[:, 4:5]
+    for M, S, X, match in (
+        (np.eye(6), shape, np.zeros((2, 3)), "same place"),
+        (np.diag([1.0, 1, 1, 1, 1, -1]), shape, nodes, "negative"),
+        (np.eye(6), 0.0 * shape, nodes, "zero"),
+    ):
+        with pytest.raises(InvalidValueError, match=match):
+            flexible.from_modes(M, K, S, X)
+    with pytest.raises(InvalidValueError, match="singular"):
+        flexible.craig_bampton(np.eye(3), np.zeros((3, 3)), [2], 1)

@@ -8,6 +8,7 @@ from test_flexible import INF, ONE, PIVOT, close, random_arm
 
 import robotmodels as rm
 from robotmodels import DHTable, DriveParameters, InertialParameters, RobotModel, flexible, se3
+from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.flexible import (
     DeflectionStatus,
     FlexibleMotionStatus,
@@ -63,9 +64,53 @@ def test_equilibrium_is_where_nothing_accelerates(rng):
     arm = random_arm(rng, joint_stiffness=200.0)
     q, w = rng.normal(size=(2, arm.n)), rng.normal(size=(2, 6))
     found = flexible.static_deflection(arm, q, w)
-    friction = arm.model.drive_matrices.torque(0 * q, None)
-    a, ea = flexible.ddm(arm, q, found.e, 0 * q, None, found.tau + friction, w)
+    a, ea = flexible.ddm(arm, q, found.e, 0 * q, None, found.tau, w)  # offsets included
     assert max(np.abs(a).max(), np.abs(ea).max()) < 1e-6
+
+
+def test_a_beam_pushed_beyond_its_load_of_buckling_is_unstable():
+    arm = swinging(stiffening=True)
+    euler = np.pi**2 * 9.0 / 4.0
+    loads = np.array([0.99, 1.01])[:, None] * np.array([euler, 0, 0, 0, 0, 0])
+    found = flexible.static_deflection(arm, [0.0], loads)
+    assert found.status.tolist() == [DeflectionStatus.SMALL, DeflectionStatus.UNSTABLE]
+    assert "buckles" in found.reason(1)
+
+
+def test_an_arm_that_stays_where_it_is_ends_at_rest():
+    heavy = PIVOT.with_gravity((0, -9.81, 0))
+    arm = flexible.FlexibleRobot(heavy, {1: flexible.beam(1.0, EI=(INF, 30.0), hub=0.1)})
+    assert flexible.rest_to_rest(arm, [0.3], [0.3], 1.0).status == RestStatus.AT_REST
+    assert flexible.rest_to_rest(arm, [0.3], [0.8], 0.05).status == RestStatus.VIBRATES
+
+
+def test_torques_of_the_tip_at_several_times_and_accelerations_compared():
+    motion = rm.trajectories.quintic([0.0], [0.5], duration=1.0)
+    found = flexible.tip_tracking(swinging(), motion)
+    np.testing.assert_allclose(found.torque([0.2, 0.5])[1], found.torque(0.5))
+    one, other = (flexible.ddm(ONE, [0.0], None, [0.0], None, [x]) for x in (0.0, 1.0))
+    assert one == flexible.ddm(ONE, [0.0], None, [0.0], None, [0.0])
+    assert one != other
+
+
+def test_a_rigid_robot_or_a_motion_of_other_joints_is_refused():
+    motion = rm.trajectories.quintic([0.0, 0.0], [0.5, 0.5], duration=1.0)
+    for call in (
+        lambda arm: flexible.linearize(arm, [0.0]),
+        lambda arm: flexible.rest_to_rest(arm, [0.0], [1.0], 1.0),
+        lambda arm: flexible.simulate(arm, [0.0]),
+        lambda arm: flexible.lumped(arm, 2),
+        lambda arm: flexible.tip_tracking(arm, motion),
+        lambda arm: flexible.joint_tracking(arm, motion, 1.0, 1.0),
+    ):
+        with pytest.raises(InvalidValueError, match="FlexibleRobot"):
+            call(PIVOT)
+    with pytest.raises(ShapeError, match="reference"):
+        flexible.joint_tracking(ONE, motion, 1.0, 1.0)
+    with pytest.raises(ShapeError, match="reference"):
+        flexible.tip_tracking(ONE, motion)
+    with pytest.raises(InvalidValueError, match="up to 100"):
+        flexible.elastica(1.0, 1.0, 1e3)
 
 
 # --- frequencies, poles and zeros -----------------------------------------------------

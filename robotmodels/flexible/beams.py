@@ -16,6 +16,7 @@ from .link import BeamData, FlexibleLink, Section, integrals
 
 _ENDS = ("clamped-free", "pinned-hub")
 _SLENDER = 0.02  # default radius of gyration of the section, relative to the length
+_LEAST = 1e-4  # least wave number of a mode of a beam of length 1
 _DRAWN = 41  # nodes of a beam
 _X, _Y, _Z = np.eye(3)
 Shape = Callable[[Array, int], Array]
@@ -67,13 +68,13 @@ def beam(
         Body fixed to the tip: kg; centre of mass (3,) from the tip, m; inertia about it, kg m^2, a
         number, shape (3,) or (3, 3).
     hub : float, optional
-        Rotary inertia about z at the root, kg m^2.
+        Rotary inertia about z at the root, kg m^2; default 0.
     modes : int
         Of each bending plane and of torsion.
     ends : str
         ``"clamped-free"``, for joints whose angle or torque is given, or ``"pinned-hub"``: the
-        modes about z are those with a free joint and the hub on it. Their shapes are taken from the
-        tangent at the root, so that q remains the angle of the hub.
+        modes about z, and their frequencies, are those with a free joint and the hub on it. Their
+        shapes are taken from the tangent at the root, so that q remains the angle of the hub.
     stiffening : bool
         Whether foreshortening is included, which keeps a spinning beam stiff.
     gyration : float, optional
@@ -137,12 +138,14 @@ def beam(
         if np.isfinite(EI_p := float(stiff[axis - 1])):
             about = J[axis, axis] + spin[axis, axis]
             about += mass * (com[0] - place) ** 2 + more * (lever[0] - place) ** 2
+            about += mass * com[3 - axis] ** 2 + more * lever[3 - axis] ** 2
             loads = (all_mass / (rho * L), place / L, about / (rho * L**3))
             root = h / (rho * L**3) if ends == "pinned-hub" and axis == 2 else None
             for b, shape in bending_modes(int(modes), loads, root):
                 kinds.append(Mode(axis, EI_p, (b / L) ** 2 * np.sqrt(EI_p / rho), shape))
     if np.isfinite(torsion):
-        polar = J[0, 0] + spin[0, 0] + mass * float(com[1] ** 2 + com[2] ** 2)
+        polar = J[0, 0] + spin[0, 0] + mass * float(com[1:] @ com[1:])
+        polar += more * float(lever[1:] @ lever[1:])
         for b, shape in torsion_modes(int(modes), polar / (rho * L * k * k)):
             kinds.append(Mode(0, torsion, b / L * np.sqrt(torsion / (rho * k * k)), shape))
     body = BeamData(
@@ -168,8 +171,10 @@ def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> Fl
 
     def shortened(x: Array) -> Array:
         """Second displacement of the axis, along the beam. Shapes: (N,) -> (N, 3, m, m)."""
+        if not stiffening:
+            return np.zeros((len(x), 3, m, m))
         slope = _fields(kinds, L, np.outer(x, points).ravel())[1].reshape(len(x), count, 3, m)
-        slope = slope[:, :, 1:] * stiffening  # of torsion none
+        slope = slope[:, :, 1:]  # of torsion none
         inner = np.einsum("n,g,ngsk,ngsl->nkl", x, weights, slope, slope)
         return -_X[:, None, None] * inner[:, None]
 
@@ -304,7 +309,9 @@ def bending_modes(
         size = float(w[np.argmax(np.abs(w))])
         return shape
 
-    roots = _roots(lambda b: np.linalg.det(_conditions(b, loads, hub)), count)
+    bare = _conditions(np.array([_LEAST]), (0.0, 0.0, 0.0), None if hub is None else 0.0)
+    before = float(np.linalg.det(bare)[0])
+    roots = _roots(lambda b: np.linalg.det(_conditions(b, loads, hub)), count, before)
     return [(b, shape_of(b)) for b in roots]
 
 
@@ -314,18 +321,27 @@ def torsion_modes(count: int, J: float) -> list[tuple[float, Shape]]:
     def shape_of(b: float) -> Shape:
         return lambda x, order: b**order * (np.cos(b * x) if order else np.sin(b * x)) / np.sin(b)
 
-    return [(b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count)]
+    return [
+        (b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count, 1.0, 1e-9)
+    ]
 
 
-def _roots(function: Callable[[Array], Array], count: int) -> list[float]:
-    """The first positive roots of a function of b."""
+def _roots(
+    function: Callable[[Array], Array], count: int, before: float, least: float = _LEAST
+) -> list[float]:
+    """The first positive roots of a function of b, which has the sign of ``before`` before them."""
     from scipy.optimize import brentq
 
-    b = np.concatenate([np.geomspace(0.01, 0.5, 60), np.arange(0.51, np.pi * (count + 2), 0.01)])
+    b = np.concatenate([np.geomspace(least, 0.5, 200), np.arange(0.51, np.pi * (count + 2), 0.01)])
     signs = np.sign(function(b))
 
     def at(x: float) -> float:
         return float(function(np.array([x]))[0])
 
     changes = np.flatnonzero(signs[1:] != signs[:-1])[:count]
-    return [float(brentq(at, b[i], b[i + 1], xtol=1e-14)) for i in changes]  # type: ignore[arg-type]
+    if count and (len(changes) < count or signs[0] != np.sign(before)):
+        raise InvalidValueError(
+            "tip, hub, density: not all modes were found, because the beam is too light for its "
+            "loads. Take a greater density or radius of gyration."
+        )
+    return [float(brentq(at, b[i], b[i + 1], xtol=1e-20)) for i in changes]  # type: ignore[arg-type]

@@ -16,14 +16,15 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
-from .linear import static_deflection
-from .models import INVERSE, idm, solved
-from .robot import FlexibleRobot
+from .linear import DeflectionStatus, scales, static_deflection, stiffness_matrix
+from .models import INVERSE, idm, mass_matrix, solved
+from .robot import FlexibleRobot, check_arm
 
 Law = Callable[[float, Array, Array, Array, Array], Array]
 _FACTORS = 2  # free coefficients of each joint, for each elastic condition that one joint has
 _NEWTON = 12
 _FINE, _COARSE, _STEP = 1e-10, 1e-7, 1e-2  # tolerances of integration; step of differences
+_NEGLIGIBLE = 1e-4  # of a length or 1 rad: deflections that count as none at 1e-8 of it
 _STILL = 1e-9  # relative to the largest deflection on the way: vibration at the end
 
 
@@ -72,7 +73,7 @@ def regulator(
     >>> bool(abs(motion.q[-1] - 0.2) < 1e-3)
     True
     """
-    n = arm.n
+    n = check_arm(arm).n
     goal = np.zeros(n) if q_goal is None else as_exact(q_goal, (n,), "q_goal").copy()
     P, D = _gains(kp, n, "kp"), _gains(kd, n, "kd")
     found = static_deflection(arm, goal)
@@ -113,7 +114,8 @@ def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayL
     >>> law(0.5, motion.q(0.5), motion.v(0.5), np.zeros(2), np.zeros(2)).shape
     (6,)
     """
-    P, D, at = _gains(kp, arm.n, "kp"), _gains(kd, arm.n, "kd"), motion_of(reference)
+    n = check_arm(arm).n
+    P, D, at = _gains(kp, n, "kp"), _gains(kd, n, "kd"), motion_of(reference, n)
 
     def law(t: float, q: Array, v: Array, e: Array, e_v: Array) -> Array:
         qd, vd, ad = at(t)
@@ -122,13 +124,23 @@ def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayL
     return law
 
 
-def motion_of(reference: Any) -> Callable[[float], tuple[Array, Array, Array]]:
-    """Function of t that returns (q, v, a), of a trajectory or of such a function."""
+def motion_of(reference: Any, n: int) -> Callable[[float], tuple[Array, Array, Array]]:
+    """Function of t that returns (q, v, a), of a trajectory or of such a function, n joints."""
     motion = getattr(reference, "trajectory", reference)
-    if hasattr(motion, "a"):
+    if all(callable(getattr(motion, name, None)) for name in "qva"):
+        as_exact(motion.q(0.0), (n,), "reference at t = 0 s")
         return lambda t: (motion.q(t), motion.v(t), motion.a(t))
     if callable(motion):
-        return lambda t: tuple(np.asarray(x, np.float64) for x in motion(t))  # type: ignore[return-value]
+
+        def at(t: float) -> tuple[Array, Array, Array]:
+            given: Any = motion(t)
+            if not isinstance(given, tuple | list | np.ndarray) or len(given) != 3:
+                raise InvalidValueError(f"reference: expected (q, v, a) at t = {t:.6g} s.")
+            q, v, a = (as_exact(x, (n,), f"reference at t = {t:.6g} s") for x in given)
+            return q, v, a
+
+        at(0.0)
+        return at
     raise InvalidValueError(
         "reference: expected a trajectory, or a function of t that returns (q, v, a), got "
         f"{type(reference).__name__}."
@@ -217,7 +229,7 @@ class RestToRest(Frozen, Value):
         Motion of the motors, with ``q(t)``, ``v(t)``, ``a(t)`` and ``duration``.
     end : ndarray, shape (2 m,)
         What is left of the elastic coordinates and their velocities at the end, relative to their
-        largest values on the way.
+        largest values on the way, and at least to 1e-4 of the length.
     status : RestStatus
         Whether the arm ends at rest.
     """
@@ -293,11 +305,13 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
     """
     from scipy.integrate import solve_ivp
 
-    n, m, T = arm.n, arm.m, as_number(duration, "duration", above=0.0)
+    n, m, T = check_arm(arm).n, arm.m, as_number(duration, "duration", above=0.0)
     ends = [as_exact(q, (n,), name) for q, name in ((q0, "q0"), (q1, "q1"))]
     rest = [static_deflection(arm, q) for q in ends]
-    if any(np.isnan(found.e).any() for found in rest):
-        raise InvalidValueError("q0, q1: expected postures in which the arm has an equilibrium.")
+    if any(found.status > DeflectionStatus.LARGE for found in rest):
+        raise InvalidValueError(
+            "q0, q1: expected postures in which the arm has a stable equilibrium."
+        )
     start, goal = (np.concatenate([found.e, np.zeros(m)]) for found in rest)
     K = -(-_FACTORS * 2 * m // n) if m else 0
 
@@ -318,10 +332,20 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
             rate, (0.0, T), y0, "DOP853", rtol=rtol, atol=1e-3 * rtol, dense_output=dense
         )
 
+    floor = _NEGLIGIBLE * scales(arm)[n:]
+    stiff, mass = np.diag(stiffness_matrix(arm))[n:], np.diag(mass_matrix(arm, ends[0]))[n:]
+    rates = np.sqrt(stiff / mass)
+
+    def sizes(y: Array) -> Array:
+        """Largest elastic coordinates (m,), and velocities (m,) of vibrations as large as these."""
+        most = np.abs(y).max(axis=1, initial=0.0)
+        most[:m] = np.maximum(most[:m], floor)
+        return np.concatenate([most[:m], np.maximum(most[m:], rates * most[:m])])
+
     c, slope, before = np.zeros((n, K)), None, np.inf
     for _ in range(_NEWTON if m else 0):
         found = elastic(c[None], _FINE)
-        size = np.abs(found.y).max(axis=1) + 1e-12
+        size = sizes(found.y)
         left = (found.y[:, -1] - goal) / size
         error = float(np.abs(left).max())
         if error < _STILL:
@@ -333,8 +357,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         before = error
         c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(n, K)
     path, found = JointPolynomial(ends[0], ends[1], T, c), elastic(c[None], _FINE, dense=True)
-    size = np.abs(found.y).max(axis=1, initial=0.0) + 1e-12
-    end = (found.y[:, -1] - goal) / size
+    end = (found.y[:, -1] - goal) / sizes(found.y)
     still = (np.abs(end) < 10.0 * _STILL).all()
     status = RestStatus.AT_REST if still else RestStatus.VIBRATES
     return RestToRest(arm, path, end, status, found.sol)

@@ -12,12 +12,13 @@ from .._arrays import Array, Frozen, Value, as_exact
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, SingularMassMatrixError
 from .models import checked_rows, generalized_forces, jacobian, mass_matrix
-from .robot import FlexibleRobot, damping_matrix
+from .robot import FlexibleRobot, check_arm, damping_matrix
 
 _LARGE = 0.1  # of the length: deflections for which linear modes are within 1 %
 _ITERATIONS = 50
 _STEPS = ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0))  # central differences of order 6
 _SINGULAR = 1e-9
+_SOFT = 1e-12  # least stiffness of a stable equilibrium, relative to the greatest
 
 
 class DeflectionStatus(Outcome):
@@ -30,6 +31,11 @@ class DeflectionStatus(Outcome):
         "within 1 %; `elastica` bends one beam exactly.",
     )
     NOT_FOUND = 2, "No equilibrium was found: the load is beyond the range of linear modes."
+    UNSTABLE = (
+        3,
+        "The equilibrium is unstable: the load exceeds the one at which the arm buckles, and the "
+        "arm leaves it at the least disturbance.",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +45,7 @@ class Deflection(Frozen, Value):
     Parameters
     ----------
     e : ndarray, shape (..., m)
-        Elastic coordinates; NaN where none was found.
+        Elastic coordinates; NaN where no equilibrium was found.
     tau : ndarray, shape (..., n)
         Torques that hold the joints, N m.
     deflection : ndarray, shape (...)
@@ -118,20 +124,30 @@ def static_deflection(
         steps = (e[todo, None] + moved).reshape(-1, m)
         F = forces(todo, steps, 2 * m)[1].reshape(len(todo), 2, m, m)
         K = (F[:, 0] - F[:, 1]) / (2.0 * h[:, None])
-        step = np.linalg.solve(K.swapaxes(1, 2), forces(todo, e[todo])[1][..., None])[..., 0]
+        K, left = K.swapaxes(1, 2), forces(todo, e[todo])[1][..., None]
+        try:
+            step = np.linalg.solve(K, left)[..., 0]
+        except np.linalg.LinAlgError:  # exactly at the load of buckling
+            step = (np.linalg.pinv(K) @ left)[..., 0]
         size = np.abs(step / scale).max(axis=1, initial=0.0)
         e[todo] -= step / np.maximum(2.0 * size, 1.0)[:, None]
         done = size < 1e-11 * (1.0 + np.abs(e[todo] / scale).max(axis=1, initial=0.0))
-        status[todo[done]] = DeflectionStatus.SMALL
+        K = scale[:, None] * (K + K.swapaxes(1, 2)) * scale
+        stiff = np.linalg.eigvalsh(K)
+        stable = (stiff > _SOFT * np.abs(stiff).max(axis=1, initial=0.0)[:, None]).all(axis=1)
+        status[todo[done]] = np.where(
+            stable[done], DeflectionStatus.SMALL, DeflectionStatus.UNSTABLE
+        )
         todo = todo[~done & (np.abs(e[todo] / scale).max(axis=1, initial=0.0) < 10.0)]
-    tau = forces(np.arange(N), e)[0]
+    tau, drives = forces(np.arange(N), e)[0], arm.model.drive_matrices
+    tau += 0.0 if drives is None else drives.offset
     deflection = np.zeros(N)
     for row, link in arm.links.items():
         here = slice(arm.arrays.start[row - 1], arm.arrays.start[row])
         moved = np.linalg.norm(e[:, here] @ link.tip.Phi, axis=1) / link.length
         deflection = np.maximum(deflection, moved)
-    found = status == DeflectionStatus.SMALL
-    status[found & (deflection > _LARGE)] = DeflectionStatus.LARGE
+    found = status != DeflectionStatus.NOT_FOUND
+    status[(status == DeflectionStatus.SMALL) & (deflection > _LARGE)] = DeflectionStatus.LARGE
     e, tau = (np.where(found[:, None], x, np.nan) for x in (e, tau))
     return Deflection(
         e.reshape(*batch, m), tau.reshape(*batch, arm.n),
@@ -278,7 +294,7 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     """
     if output not in ("joint", "tip"):
         raise InvalidValueError(f"output: expected 'joint' or 'tip', got {output!r:.40}.")
-    n, q = arm.n, as_exact(q, (arm.n,), "q")
+    n, q = check_arm(arm).n, as_exact(q, (arm.n,), "q")
     k, found = n + arm.m, static_deflection(arm, q)
     if found.status == DeflectionStatus.NOT_FOUND:
         raise InvalidValueError(f"q: there is no equilibrium to linearise about. {found.reason()}")

@@ -95,7 +95,7 @@ class FlexibleLink(Frozen, Value):
     invariants : Invariants
         The integrals of section 7.2.2.
     frequencies : ndarray, shape (m,)
-        Of its modes, rad/s.
+        Of its modes, rad/s: clamped at the root, or with a free joint for ``"pinned-hub"``.
     tip : Section
         Where what follows is fixed.
     nodes : ndarray, shape (N, 3)

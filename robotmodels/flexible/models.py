@@ -34,8 +34,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_vector, batch_rows, read_only
 from .._outcomes import Outcome
-from ..errors import InvalidValueError, SingularMassMatrixError
-from .robot import FlexibleRobot
+from ..errors import SingularMassMatrixError
+from .robot import FlexibleRobot, check_arm
 
 INVERSE, DIRECT = range(2)
 _NO_WRENCH = np.zeros((1, 6))
@@ -74,6 +74,18 @@ class Accelerations(tuple[Array, Array]):
     def reason(self, i: Any = ()) -> str:
         """The sentence of the status of sample i."""
         return SpinStatus(int(self.status[i])).sentence
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Accelerations):
+            return NotImplemented
+        pairs = zip((*self, self.status), (*other, other.status), strict=True)
+        return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(tuple(x.shape for x in self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (tuple(self), self.status)
@@ -232,11 +244,7 @@ def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) ->
 
 def checked_rows(arm: FlexibleRobot, **given: Any) -> tuple[tuple[int, ...], list[Array]]:
     """Batch axes and rows (N, k) of vectors; None is zero."""
-    if not isinstance(arm, FlexibleRobot):
-        raise InvalidValueError(
-            f"arm: expected a FlexibleRobot, got {type(arm).__name__}; make one of the model and "
-            "its flexible links."
-        )
+    check_arm(arm)
     lengths = {"e": arm.m, "e_v": arm.m, "wrench": 6}
     vectors = []
     for name, value in given.items():
@@ -330,8 +338,12 @@ def solved(
         if direct and not (rotor[joints] > 0.0).all():
             raise SingularMassMatrixError(
                 f"{arm.model.name!r}: flexible joint {int(joints[rotor[joints] <= 0.0][0]) + 1} "
-                "has no rotor inertia, so its motor has no acceleration. Give Ia with "
-                "model.with_drive(...)."
+                "has no rotor inertia, so its motor has no acceleration. "
+                + (
+                    "Give Ia with model.with_drive(DriveParameters(Ia=...))."
+                    if drive
+                    else "drive=False leaves out that of the model; take drive=True."
+                )
             )
         link = out[:, joints].copy()
         motor = (net + spring) / rotor[joints] if direct else given[:, joints]

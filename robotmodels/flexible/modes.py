@@ -78,6 +78,14 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
             "shapes: the first node moves, and a link is clamped there. Take modes with that node "
             "held, or subtract the rigid motion."
         )
+    least = np.linalg.eigvalsh(M)
+    if least[0] < -_MIXED * max(least[-1], 0.0):
+        raise InvalidValueError("M: expected a mass matrix, which has no negative eigenvalue.")
+    if free == 3 and not np.any(X[-1] - X[-2]):
+        raise InvalidValueError(
+            "nodes: the last two are the same place, which gives the tip no rotation. Leave one "
+            "out, or give rotations of the nodes."
+        )
     mass, stiffness = S.T @ M @ S, S.T @ K @ S
     for name, matrix in (("M", mass), ("K", stiffness)):
         own = np.sqrt(np.abs(np.diag(matrix)))
@@ -85,8 +93,9 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
             np.abs(matrix - np.diag(np.diag(matrix))) > _MIXED * np.outer(own, own)
         ).any():
             raise InvalidValueError(
-                f"shapes: the modes are not orthogonal with respect to {name}, or without {name}. "
-                "Take the eigenvectors of K and M, as craig_bampton returns them."
+                f"shapes: the modes are not orthogonal with respect to {name}, or {name} of one "
+                "is not positive (a shape that is zero, or a rigid motion). Take the eigenvectors "
+                "of K and M, as craig_bampton returns them."
             )
     parts = S.reshape(N, free, m)
     Phi = parts[:, :3]
@@ -162,8 +171,8 @@ def craig_bampton(
     Raises
     ------
     InvalidValueError, ShapeError
-        Matrices that are not symmetric; displacements that do not exist or that are named twice;
-        more modes than there are displacements inside.
+        Matrices that are not symmetric, or singular inside; displacements that do not exist or
+        that are named twice; more modes than there are displacements inside.
 
     References
     ----------
@@ -175,7 +184,7 @@ def craig_bampton(
     >>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
     array([0.445 , 1.247 , 1.8019])
     """
-    from scipy.linalg import eigh
+    from scipy.linalg import LinAlgError, eigh
 
     M = as_floats(M, "M")
     M, K = _symmetric(M, len(M) if M.ndim else 0, "M"), _symmetric(K, len(M), "K")
@@ -193,11 +202,17 @@ def craig_bampton(
         raise InvalidValueError(f"modes: expected 0 to {len(inner)}, got {modes!r:.40}.")
     T = np.zeros((c, len(k) + int(modes)))
     T[k, np.arange(len(k))] = 1.0
-    if len(inner):
-        inside = np.ix_(inner, inner)
-        T[inner, : len(k)] = -np.linalg.solve(K[inside], K[np.ix_(inner, k)])
-        T[inner, len(k) :] = eigh(K[inside], M[inside])[1][:, : int(modes)]
-    values, V = eigh(T.T @ K @ T, T.T @ M @ T)
+    try:
+        if len(inner):
+            inside = np.ix_(inner, inner)
+            T[inner, : len(k)] = -np.linalg.solve(K[inside], K[np.ix_(inner, k)])
+            T[inner, len(k) :] = eigh(K[inside], M[inside])[1][:, : int(modes)]
+        values, V = eigh(T.T @ K @ T, T.T @ M @ T)
+    except LinAlgError:
+        raise InvalidValueError(
+            "M, K: with the interface and the clamped displacements held, expected stiffness that "
+            "is not singular, and positive mass. Clamp the body, or add mass."
+        ) from None
     values = np.maximum(values, 0.0)
     return ReducedModel(np.eye(len(values)), np.diag(values), T @ V, np.sqrt(values))
 

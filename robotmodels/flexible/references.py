@@ -13,9 +13,10 @@ from ..geometry import DHTable
 from ..inertia import InertialParameters
 from ..model import RobotModel
 from .link import BeamData
-from .robot import FlexibleRobot
+from .robot import FlexibleRobot, check_arm
 
 _POINTS = 101
+_MOST = 100.0  # greatest load of `elastica`, of the same
 _LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solution is continued
 
 
@@ -62,7 +63,8 @@ def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) 
     Raises
     ------
     InvalidValueError
-        Length or stiffness that is not positive.
+        Length or stiffness that is not positive; ``force length^2 / EI`` or ``moment length / EI``
+        above 100.
 
     References
     ----------
@@ -79,6 +81,11 @@ def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) 
     L, stiff = as_number(length, "length", above=0.0), as_number(EI, "EI", above=0.0)
     F = as_number(force, "force") * L * L / stiff
     M = as_number(moment, "moment") * L / stiff
+    if not max(abs(F), abs(M)) <= _MOST:
+        raise InvalidValueError(
+            f"force, moment: expected force length^2 / EI and moment length / EI up to {_MOST:g}, "
+            f"got {F:.4g} and {M:.4g}: the beam is a hook within a small part of its length."
+        )
 
     def bent(root: float, share: float, s: Array | None = None) -> Array:
         """Slope, curvature and axis of a beam of length 1 from the curvature at its root."""
@@ -149,7 +156,7 @@ def lumped(arm: FlexibleRobot, segments: int) -> tuple[RobotModel, Array]:
     """
     if not isinstance(segments, int | np.integer) or segments < 1:
         raise InvalidValueError(f"segments: expected a number from 1, got {segments!r:.40}.")
-    if len(arm.joints) or not all(link.source for link in arm.links.values()):
+    if len(check_arm(arm).joints) or not all(link.source for link in arm.links.values()):
         raise InvalidValueError(
             "arm: lumped models are made of beams; links from modes and flexible joints have none."
         )

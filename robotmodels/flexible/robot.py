@@ -151,6 +151,16 @@ class FlexibleRobot(Value):
         )
 
 
+def check_arm(arm: Any) -> FlexibleRobot:
+    """The argument, if it is a flexible robot."""
+    if not isinstance(arm, FlexibleRobot):
+        raise InvalidValueError(
+            f"arm: expected a FlexibleRobot, got {type(arm).__name__}; make one of the model and "
+            "its flexible links."
+        )
+    return arm
+
+
 def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
     """Links by row in the order of rows."""
     if not isinstance(links, Mapping) or not all(

@@ -17,7 +17,7 @@ from ..errors import ShapeError, SingularMassMatrixError
 from ..simulation import Integrator
 from .linear import scales
 from .models import DIRECT, SpinStatus, ddm, jacobian, solved, states
-from .robot import FlexibleRobot, damping_matrix
+from .robot import FlexibleRobot, check_arm, damping_matrix
 
 _LAW = Callable[..., ArrayLike]
 _LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
@@ -166,7 +166,7 @@ def simulate(
     >>> motion.status, motion.energy_drift < 1e-8
     (<FlexibleMotionStatus.FINISHED: 0>, True)
     """
-    n, m, model = arm.n, arm.m, arm.model
+    n, m, model = check_arm(arm).n, arm.m, arm.model
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in (
         ("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))]  # fmt: skip
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")

@@ -8,15 +8,15 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_number
+from .._arrays import Array, Frozen, Value, as_floats, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
 from .linear import linearize, static_deflection, stiffness_matrix, tangent, tip_gain
 from .models import dgm, generalized_forces, idm, jacobian, mass_matrix
-from .robot import FlexibleRobot, damping_matrix
+from .robot import FlexibleRobot, check_arm, damping_matrix
 
 _METHODS = ("stable_inversion", "causal")
 _TIME_CONSTANTS = 14.0  # of the slowest unstable zero: default preview
@@ -84,8 +84,8 @@ class TipTracking(Frozen, Value):
     def _values(self) -> tuple[Any, ...]:
         return tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
-    def torque(self, t: float) -> Array:
-        """Torques (n,) at a time, constant outside the motion."""
+    def torque(self, t: ArrayLike) -> Array:
+        """Torques (..., n) at times (...), constant outside the motion."""
         return self._at(t)[0]
 
     def control(self, kp: float, kd: float) -> Any:
@@ -97,10 +97,11 @@ class TipTracking(Frozen, Value):
 
         return law
 
-    def _at(self, t: float) -> list[Array]:
+    def _at(self, t: ArrayLike) -> list[Array]:
         if self._spline is None:
             raise InvalidValueError(f"There are no torques. {self.reason()}")
-        return np.split(self._spline(np.clip(t, self.t[0], self.t[-1])), 3)
+        times = np.clip(as_floats(t, "t"), self.t[0], self.t[-1])
+        return np.split(self._spline(times), 3, axis=-1)
 
     def reason(self) -> str:
         """The sentence of the status."""
@@ -119,8 +120,9 @@ def tip_tracking(
 ) -> TipTracking:
     """Torques that move the tip as the rigid arm would be moved by a reference of its joints.
 
-    The output is ``y = q + J_q^+ J_e e``, corrected until the tip itself is on the path. Its zero
-    dynamics are solved as a boundary value problem, which needs a preview of the motion.
+    The output is ``y = q + J_q^+ J_e e``, corrected until the tip is on the path in the directions
+    in which the joints move it (one joint does not correct a shortened beam). Its zero dynamics are
+    solved as a boundary value problem, which needs a preview of the motion.
 
     Parameters
     ----------
@@ -164,12 +166,12 @@ def tip_tracking(
     """
     if method not in _METHODS:
         raise InvalidValueError(f"method: expected one of {_METHODS}, got {method!r:.40}.")
-    if len(arm.joints) or not arm.m:
+    if len(check_arm(arm).joints) or not arm.m:
         raise InvalidValueError(
             "arm: tip tracking is for flexible links with rigid joints. Take rest_to_rest or "
             "joint_tracking for flexible joints, and computed torque for rigid arms."
         )
-    at, motion = motion_of(reference), getattr(reference, "trajectory", reference)
+    at, motion = motion_of(reference, arm.n), getattr(reference, "trajectory", reference)
     given = getattr(motion, "duration", None) if duration is None else duration
     T = as_number(np.nan if given is None else given, "duration", above=0.0)
     n, m = arm.n, arm.m
