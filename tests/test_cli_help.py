@@ -113,9 +113,13 @@ def run(capsys):
 
 
 def test_every_command_has_examples_that_are_tried():
-    assert {*FILES, "demo", "compile"} == set(COMMANDS)
+    assert {*FILES, "demo", "compile", "follow", "workspace"} == set(COMMANDS)
     assert all(examples(command) for command in COMMANDS)
-    assert examples("demo") == [["demo"], ["demo", "--real", "--out", "tx40/"]]
+    assert examples("demo") == [
+        ["demo"],
+        ["demo", "--real", "--out", "tx40/"],
+        ["demo", "--chapter", "3"],
+    ]
 
 
 @pytest.mark.parametrize("command", FILES)

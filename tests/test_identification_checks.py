@@ -94,6 +94,7 @@ def test_flips_swaps_and_degrees_are_refused_by_name(good, change, words):
     assert all(some in str(error.value) for some in words)
 
 
+@pytest.mark.filterwarnings("ignore:q. joint")
 def test_a_joint_that_turns_on_and_on_is_no_motor(good):
     model, log = good
     q = np.array(log.q)

@@ -170,6 +170,7 @@ def test_batches_that_do_not_fit_are_named(model):
             function(model, q, v[:2])
 
 
+@pytest.mark.filterwarnings("ignore:q. joint")
 def test_large_angles_are_angles(model):
     """Turning many times changes nothing but the digits that the sum itself loses."""
     q = np.full(model.n, 0.5)

@@ -95,6 +95,7 @@ def test_a_mask_leaves_the_rest_free(panda):
     assert (motion.status == 0).all()
 
 
+@pytest.mark.filterwarnings("ignore:q. joint")
 def test_result_is_a_value(panda):
     motion = resolved_motion(panda, line_of(panda, PANDA, [0.0, 0.0, 0.05]), PANDA, samples=60)
     again = pickle.loads(pickle.dumps(motion))

@@ -20,6 +20,8 @@ _TWO_TURNS = 4.0 * np.pi
 def as_positions(model: RobotModel, q: ArrayLike) -> Array:
     """Check joint positions; angles that may be degrees warn, once for a robot.
 
+    The angles of the first hundred calls are looked at.
+
     Parameters
     ----------
     model : RobotModel
@@ -48,10 +50,10 @@ def as_positions(model: RobotModel, q: ArrayLike) -> Array:
     array([0.5])
     """
     q = as_vector(q, model.n, "q")
-    if model.twin.angles_warn:
-        # quickly for one configuration: its norm is at least as large as each angle
-        large = q.dot(q) if q.ndim == 1 else max(q.max(initial=0.0), -q.min(initial=0.0)) ** 2
-        if large > _TWO_TURNS**2:
+    twin = model.twin
+    if twin.angles_to_check:  # degrees are met at once: later calls do not pay for the check
+        twin.angles_to_check -= 1
+        if max(q.max(initial=0.0), -q.min(initial=0.0)) > _TWO_TURNS:
             _warn_of_degrees(model, q)
     return q
 
@@ -64,7 +66,7 @@ def _warn_of_degrees(model: RobotModel, q: Array) -> None:
     largest[kinds == PRISMATIC] = np.inf
     beyond = np.argwhere(np.abs(q) > largest)
     if len(beyond):
-        model.twin.angles_warn = False
+        model.twin.angles_to_check = 0
         warnings.warn(
             f"q: joint {beyond[0][-1] + 1} is at {q[tuple(beyond[0])]:.6g} rad, more than two "
             "turns. For degrees, pass np.deg2rad(q). This warning is given once.",

@@ -45,7 +45,7 @@ class PinocchioTwin:
     """
 
     __slots__ = (
-        "_frames", "_parts", "_scratch", "angles_warn", "base_is_massless", "in_table_order",
+        "_frames", "_parts", "_scratch", "angles_to_check", "base_is_massless", "in_table_order",
         "model", "names", "order", "serves_dynamics", "serves_poses", "torques_warn",
     )  # fmt: skip
 
@@ -76,7 +76,7 @@ class PinocchioTwin:
         d = parts.drive
         given, t = [parts.inertia.values, d.Ia, d.Fv, d.Fc, d.offset], parts.transmission
         given += [] if t is None else [t.Iam, t.Fvm, t.Fcm]
-        self.angles_warn = True  # one warning where angles look like degrees
+        self.angles_to_check = 100  # calls: one warning where angles look like degrees
         self.torques_warn = not any(np.any(values) for values in given)
         self.names = link_names(parts)
         self._parts = parts
