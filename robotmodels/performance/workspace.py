@@ -29,7 +29,7 @@ from .cells import SECTIONS, Space, grid_of, is_section, measure_of_cells, outli
 from .reach import reached_cells
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
-_RESOLUTION = {"counted": 400, "reached": 100, "oriented": 60, "space": 28}
+_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "space": 28}
 
 
 class WorkspaceStatus(Outcome):
