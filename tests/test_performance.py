@@ -585,3 +585,68 @@ def test_maps_and_means_are_values():
 
 def test_more_rows_than_joints_are_not_isotropic():
     assert pf.isotropy_index(TWO, [0.3, 1.1], [1, 1, 0, 0, 0, 1]) == 0.0
+
+
+def test_an_arm_without_joints():
+    fixed = rm.RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), tool=translation(1, 0, 0))
+    home = rm.dgm(fixed, np.zeros((2, 0)))
+    assert (pf.accessibility(fixed, home, "every_orientation").count <= 1).all()
+    assert pf.isotropy_index(fixed, np.zeros((2, 0)), POSITION).tolist() == [0.0, 0.0]
+    assert pf.global_index(fixed, measure="joints") == 0.0
+    with pytest.raises(InvalidValueError, match="nothing is reached"):
+        pf.global_index(fixed)
+
+
+def test_components_that_leave_a_family():
+    poses = [translation(0.1, 0, 0), translation(0.1, 1, 0)]
+    found = pf.accessibility(TWO, poses, mask=[1, 0, 0, 0, 0, 0])
+    assert (found.status == pf.AccessStatus.ACCESSIBLE).all()
+    found = pf.feasible_path(WENGER, poses, mask=[1, 0, 0, 0, 0, 0])
+    assert found.status is pf.PathStatus.NOT_DEFINED
+    tilted = rm.RobotModel.from_table(
+        DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1], alpha=[0.5, 0]),
+        tool=translation(0.5, 0, 0),
+    )
+    assert pf.accessibility(tilted, rm.dgm(tilted, [0.3, 0.7]), mask=PLANE).count == 2
+
+
+def test_every_orientation_about_one_axis():
+    scara = rm.load("cobra_s600")
+    T = rm.dgm(scara, [[0.3, 0.5, 0.05, 0.2]])
+    mask = [1, 1, 1, 0, 0, 1]
+    assert pf.accessibility(scara, T, "every_orientation", limits=False, mask=mask).count == 2
+    w = pf.workspace(scara, "primary", mask=mask, limits=False, resolution=10)
+    assert w.count.max() == 2
+
+
+def test_obstacles_are_kept_by_value():
+    bodies = [Sphere([1.2, 0, 0], 0.2)]
+    w = pf.workspace(TWO, "free", free=bodies, resolution=6)
+    again = pickle.loads(pickle.dumps(w))
+    bodies.clear()
+    assert again == w
+    assert len(w.free) == 1
+    assert w != pf.workspace(TWO, "free", free=Sphere([1.2, 0, 0], 0.3), resolution=6)
+
+
+def test_an_orientation_of_a_redundant_arm_is_not_counted():
+    arm = planar(1.0, 0.8, 0.5, 0.3)
+    w = pf.workspace(arm, "orientation", orientation=np.eye(3), limits=False, resolution=8)
+    assert w.status is pf.WorkspaceStatus.REACHED_ONLY
+    assert w.count.max() == 1
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: pf.cuspidality(WENGER, rng="x"),
+        lambda: pf.cuspidality(WENGER, rng=-1),
+        lambda: pf.workspace(TWO, resolution=6).area_of(1.5),
+        lambda: pf.workspace(TWO, section="space"),
+        lambda: pf.regions(TWO, over=pf.workspace(TWO, resolution=6), free=Sphere([1, 0, 0], 0.2)),
+        lambda: pf.regions(TWO, over=pf.workspace(TWO, resolution=6), limits=False),
+    ],
+)
+def test_arguments_that_would_be_ignored_are_refused(call):
+    with pytest.raises(InvalidValueError, match="expected"):
+        call()

@@ -343,3 +343,12 @@ def test_command_follow(capsys, tmp_path):
     T = rm.dgm(rm.load("rx90"), [0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
     file.write_text(" ".join(map(repr, map(float, T.ravel()))))
     assert main(["follow", "rx90", str(file)]) == 0
+
+
+def test_faces_in_space_are_triangles():
+    arm = rm.load("ur5e")
+    for kind in ("velocity", "force"):
+        faces = pf.polytope(arm.with_table(_limited(arm)), np.ones(6), kind, "position").faces
+        assert faces.shape[1] == 3
+        assert faces.dtype == np.int64
+        assert not faces.flags.writeable

@@ -106,7 +106,8 @@ def accessibility(
     free : callable or obstacles, optional
         Function of q (N, n) that returns bool (N,), or obstacles the links must not touch.
     mask : array_like, shape (6,), optional
-        Components of the pose that are asked, see `igm`.
+        Components of the pose that are asked, see `igm`. Of one component of the orientation
+        180 angles about its axis, from the orientation of zero joints, stand for every one.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def accessibility(
     bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
     components = None if mask is None else as_mask(mask)
     if level == "every_orientation":
-        status, count = _every_orientation(arm, rows, bounded, is_free)
+        status, count = _every_orientation(arm, rows, bounded, is_free, components)
     else:
         if level == "position":
             place = np.repeat((True, False), 3)
@@ -196,10 +197,14 @@ def postures_of(
         section is not None
         and mask is not None
         and not mask[3:].any()
-        and (mask[:3].all() or section.columns[0] < 0)
+        and (mask[:3].all() or (section.columns[0] < 0 and _spans(section.frame, mask[:3])))
     ):
-        # in a plane what is not asked is that of the plane
-        positions = np.where(mask[:3], poses[:, :3, 3], section.frame[:3, 3])
+        positions = poses[:, :3, 3]
+        if not mask[:3].all():
+            # in a plane what is not asked is that of the plane
+            plane, origin = section.frame[:3, :2], section.frame[:3, 3]
+            inverse = np.linalg.inv(plane[mask[:3]])
+            positions = origin + (positions - origin)[:, mask[:3]] @ inverse.T @ plane.T
         q, valid = section.postures(positions)
         return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
     known = known_arm(arm, mask is None)
@@ -217,6 +222,11 @@ def postures_of(
     return q, solved.valid.copy(), np.zeros(len(poses), np.bool_)
 
 
+def _spans(frame: Array, mask: NDArray[np.bool_]) -> bool:
+    """Whether two components of a position determine a point of the plane of a frame."""
+    return mask.sum() == 2 and abs(float(np.linalg.det(frame[:3, :2][mask]))) > 1e-9
+
+
 def with_free(valid: NDArray[np.bool_], q: Array, is_free: Free) -> NDArray[np.bool_]:
     """Rows that are valid and free. Shapes: valid (N, S), q (N, S, n)."""
     kept = valid.copy()
@@ -224,9 +234,11 @@ def with_free(valid: NDArray[np.bool_], q: Array, is_free: Free) -> NDArray[np.b
     return kept
 
 
-def orientations(arm: RobotModel) -> Array:
-    """Orientations (K, 3, 3) that stand for all: about the normal of an arm in a plane, or any."""
+def orientations(arm: RobotModel, mask: NDArray[np.bool_] | None = None) -> Array:
+    """Orientations (K, 3, 3) that stand for all: about the axis asked, the normal, or any."""
     normal = plane_normal(arm)
+    if mask is not None and mask[3:].sum() == 1:
+        normal = mask[3:].astype(float)
     if normal is not None:
         home = dgm(arm, np.zeros(arm.n))[:3, :3]
         angles = 2.0 * pi * np.arange(ANGLES) / ANGLES
@@ -248,30 +260,43 @@ def orientations(arm: RobotModel) -> Array:
 
 
 def _every_orientation(
-    arm: RobotModel, poses: Array, limits: bool, is_free: Free | None
+    arm: RobotModel,
+    poses: Array,
+    limits: bool,
+    is_free: Free | None,
+    mask: NDArray[np.bool_] | None,
 ) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
     """The worst status and the least count over the orientations."""
     place = np.repeat((True, False), 3)
+    place = place if mask is None else place & mask
     status, count = posture_counts(arm, poses, place, limits, is_free)
     rows = np.flatnonzero(status == AccessStatus.ACCESSIBLE)
-    worst, least = in_every_orientation(arm, poses[rows, :3, 3], limits, is_free)
+    worst, least = in_every_orientation(arm, poses[rows, :3, 3], limits, is_free, mask)
     status[rows], count[rows] = worst, least
     return status, count
 
 
 def in_every_orientation(
-    arm: RobotModel, positions: Array, limits: bool, is_free: Free | None
+    arm: RobotModel,
+    positions: Array,
+    limits: bool,
+    is_free: Free | None,
+    mask: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """Status of the first orientation that fails, and the least count, of positions (N, 3)."""
+    """Status of the first orientation that fails, and the least count, of positions (N, 3).
+
+    A mask without components of the orientation asks for all of them.
+    """
+    asked = mask if mask is not None and mask[3:].any() else None
     status = np.zeros(len(positions), np.int8)
     count = np.full(len(positions), np.iinfo(np.int64).max)
     rest = np.arange(len(positions))
-    for R in orientations(arm):
+    for R in orientations(arm, asked):
         if not rest.size:
             break
         T = np.tile(np.eye(4), (rest.size, 1, 1))
         T[:, :3, :3], T[:, :3, 3] = R, positions[rest]
-        found, number = posture_counts(arm, T, None, limits, is_free)
+        found, number = posture_counts(arm, T, asked, limits, is_free)
         count[rest] = np.minimum(count[rest], number)
         out = found == AccessStatus.OUT_OF_REACH
         status[rest] = np.where(out, AccessStatus.ORIENTATION_NOT_AVAILABLE, found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from math import pi, tau
 from typing import Any
 
@@ -60,6 +60,8 @@ def _same(a: Any, b: Any) -> bool:
         return len(a) == len(b) and all(map(_same, a, b))
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.shape == b.shape and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    if is_dataclass(a) and type(a) is type(b) and type(a).__eq__ is object.__eq__:
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))  # obstacles
     return bool(a == b) or (a != a and b != b)
 
 
@@ -206,6 +208,8 @@ def _axes(axis: Array) -> Array:
 
 def plane_normal(model: RobotModel) -> Array | None:
     """Normal of the plane in which all joints move the tool; None if there is none."""
+    if joint_chain(model).k == 0:
+        return None
     q = spread_configurations(model, 16, np.random.default_rng(3))
     columns = np.concatenate(np.moveaxis(jacobian(model, q)[:, :3], -1, 1), axis=0)
     _, s, vectors = np.linalg.svd(columns)
@@ -231,6 +235,18 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray
     if k <= 3 and position == k:
         return np.repeat((True, False), 3) & moved
     return moved if moved.sum() == k else np.ones(6, np.bool_)
+
+
+def leaves_a_family(model: RobotModel, mask: NDArray[np.bool_] | None = None) -> bool:
+    """Whether the rows asked (default all six) leave infinitely many postures."""
+    k = joint_chain(model).k
+    if k == 0:
+        return False
+    rows = np.ones(6, np.bool_) if mask is None else mask
+    weights = np.repeat((1.0 / characteristic_length(model), 1.0), 3)[rows]
+    J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
+    rank = np.linalg.matrix_rank(J[:, rows] * weights[:, None], tol=1e-9) if rows.any() else 0
+    return int(np.max(rank)) < k
 
 
 def joint_ranges(
@@ -287,6 +303,11 @@ def free_predicate(model: RobotModel, free: Any) -> Free | None:
         return asked
     bodies = checked_obstacles(free)
     return lambda q: clearance(model, q, bodies) > 0.0
+
+
+def kept_free(free: Any) -> Any:
+    """What a result keeps of ``free``: the function, or the obstacles as a tuple."""
+    return free if free is None or callable(free) else checked_obstacles(free)
 
 
 def checked_flag(value: Any, name: str) -> bool:

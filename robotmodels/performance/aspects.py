@@ -14,7 +14,8 @@ resolution : int, optional
 Raises
 ------
 InvalidValueError
-    A slide without limits, a resolution that is no number of cells or needs more than 1 GB.
+    A slide without limits that obstacles or a factor of the determinant depend on (the volume is
+    infinite if they do not), a resolution that is no number of cells or needs more than 1 GB.
 
 References
 ----------
@@ -40,6 +41,7 @@ from .arms import (
     checked_resolution,
     free_predicate,
     joint_ranges,
+    kept_free,
     turned_inside,
 )
 from .components import Group, connected, core_cells, labels_of
@@ -204,6 +206,7 @@ def _divided(
 ) -> Aspects:  # fmt: skip
     bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
     columns = tuple(int(c) for c in joint_chain(arm).columns)
+    free = kept_free(free)
     names = () if factors is None else factors.names
     if not columns or (signed and factors is None):
         return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)

@@ -73,6 +73,11 @@ def space_of(
     else:
         normal = plane_normal(model)
     if normal is not None:
+        if section == "space":
+            raise InvalidValueError(
+                f"section: expected 'auto' or 'plane' for {model.name}, whose workspace lies in a "
+                "plane, got 'space'."
+            )
         frame = np.eye(4)
         frame[:3, :3] = _axes(normal)
         e3 = frame[:3, 2]

@@ -16,6 +16,7 @@ from ..geometry import REVOLUTE
 from ..igm import igm
 from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
+from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from .arms import Result, SectionArm, section_arm, task_rows
 from .arrangement import cut, section_lines
@@ -133,7 +134,7 @@ def cuspidality(
     check_model(arm)
     if isinstance(poses, bool) or not isinstance(poses, (int, np.integer)) or poses < 1:
         raise InvalidValueError(f"poses: expected a number of poses of at least 1, got {poses!r}.")
-    rng = np.random.default_rng(0 if rng is None else rng)
+    rng = generator_of(0 if rng is None else rng)
     factors = sign_factors(arm)
     if factors is None:
         return _without(arm, CuspidalityStatus.NOT_DEFINED)
@@ -320,7 +321,8 @@ def _by_search(
     several = found.valid & ~found.double & ~found.free_joints.any(axis=-1)
     codes = np.full(found.valid.shape, -1)
     codes[several] = factors.codes(found.q[several])
-    if _signs_are_labels(factors, found.q[several], found.branch[several]):
+    apart = all(np.unique(c[c >= 0]).size == np.sum(c >= 0) for c in codes)
+    if apart and _signs_are_labels(factors, found.q[several], found.branch[several]):
         return _without(arm, CuspidalityStatus.NOT_CUSPIDAL)
     pairs = [
         (rows[s], rows[r])

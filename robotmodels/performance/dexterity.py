@@ -37,6 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -137,7 +138,7 @@ def isotropy_index(
     check_model(arm)
     q = as_vector(q, arm.n, "q")
     rows = _rows_of(arm, mask)
-    values = index_values(arm, q.reshape(-1, arm.n), "isotropy", rows, length)
+    values = index_values(arm, q.reshape(prod(q.shape[:-1]), arm.n), "isotropy", rows, length)
     return values.reshape(q.shape[:-1])
 
 
@@ -251,6 +252,8 @@ def index_values(
     """Index at configurations (N, n)."""
     from .kernels import gram_values
 
+    if arm.n == 0:
+        return np.zeros(len(q))  # nothing moves
     mixed = rows[:3].any() and rows[3:].any()
     metres = length_of(arm, None, length) if mixed or length is not None else 1.0
     weights = np.repeat((1.0 / metres if mixed else 1.0, 1.0), 3)[rows]

@@ -17,7 +17,14 @@ from ..igm.request import poses_of
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
 from .accessibility import postures_of
-from .arms import Result, checked_flag, checked_word, section_arm, task_rows
+from .arms import (
+    Result,
+    checked_flag,
+    checked_word,
+    leaves_a_family,
+    section_arm,
+    task_rows,
+)
 from .certificate import bound_of
 from .continuation import successors
 from .factors import sign_factors
@@ -32,7 +39,8 @@ class PathStatus(Outcome):
     FOLLOWED = 0, "The path is followed from at least one starting posture."
     BROKEN = 1, "The path is followed to its end from no starting posture."
     NOT_DEFINED = (
-        2, "The task leaves infinitely many postures: lock a joint, or ask for more components.",
+        2, "The task leaves infinitely many postures, or no joint moves the tool: lock a joint, or "
+        "ask for more components.",
     )  # fmt: skip
 
 
@@ -69,6 +77,8 @@ class FeasiblePath(Result):
 
     def reason(self) -> str:
         """The status as a sentence, with where the path breaks."""
+        if not len(self.q):
+            return "The path has no poses: there is nothing to follow."
         if self.status is not PathStatus.BROKEN:
             return self.status.sentence
         if not len(self.breaks):
@@ -155,7 +165,7 @@ def feasible_path(
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
     rows = task_rows(arm, mask)
     k = joint_chain(arm).k
-    if len(T) == 0 or k == 0 or (rows.sum() < k and section_arm(arm) is None):
+    if len(T) == 0 or k == 0 or leaves_a_family(arm, rows):
         return _nothing(len(T), arm.n, PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED)
     asked = None if mask is None else as_mask(mask)
     if mask is None and section_arm(arm) is not None:

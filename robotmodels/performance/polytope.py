@@ -39,8 +39,9 @@ class Polytope(Result):
     vertices : ndarray, shape (V, m)
         Extreme points, in the units of the task: m/s and rad/s, N and N m, m/s^2 and rad/s^2.
         Of an unbounded polytope those of the part that the joints feel.
-    faces : tuple of ndarray of int64
-        Numbers of the vertices of each face; in order around it for m = 3.
+    faces : ndarray of int64, shape (F, c), or tuple of ndarray of int64
+        Numbers of the vertices of each face: triangles for m = 3, edges for m = 2; a tuple where
+        faces have different numbers of vertices.
     radius : float
         Radius of the largest ball about the origin inside.
     status : PolytopeStatus
@@ -48,7 +49,7 @@ class Polytope(Result):
     """
 
     vertices: Array
-    faces: tuple[NDArray[np.int64], ...]
+    faces: NDArray[np.int64] | tuple[NDArray[np.int64], ...]
     radius: float
     status: PolytopeStatus
 
@@ -200,7 +201,9 @@ def _in_space(A: Array, of_strips: bool) -> Polytope:
     radius = run(np.ascontiguousarray(A), zero, vertices, corners, sizes, counts)
     ends = np.cumsum(sizes[: counts[1]])
     loops = [corners[b - n : b] for b, n in zip(ends.tolist(), sizes.tolist(), strict=False)]
-    return Polytope(vertices[: counts[0]].copy(), tuple(loops), radius, PolytopeStatus.BOUNDED)
+    # a fan of triangles for each face
+    fans = [np.stack((np.full(len(f) - 2, f[0]), f[1:-1], f[2:]), axis=1) for f in loops]
+    return _polytope(vertices[: counts[0]].copy(), np.concatenate(fans), radius)
 
 
 def _zonotope_of_corners(G: Array) -> Polytope:
@@ -285,9 +288,11 @@ def _strips(J: Array, tau: Array) -> Polytope:
 
 
 def _polytope(
-    vertices: Array, faces: tuple[NDArray[np.int64], ...], radius: float,
+    vertices: Array, faces: NDArray[np.int64] | tuple[NDArray[np.int64], ...], radius: float,
     status: PolytopeStatus = PolytopeStatus.BOUNDED,
 ) -> Polytope:  # fmt: skip
+    if len({len(face) for face in faces}) == 1:
+        return Polytope(read_only(vertices), read_only(np.array(faces), np.int64), radius, status)
     return Polytope(
         read_only(vertices), tuple(read_only(f, np.int64) for f in faces), radius, status
     )

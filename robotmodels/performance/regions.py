@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from .._outcomes import Outcome
+from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
@@ -148,6 +149,11 @@ def regions(
                       resolution=_RESOLUTION[max(first.size.size, 2)])  # fmt: skip
     else:
         w = _over(arm, over)
+        if free is not None or (w.limits and not checked_flag(limits, "limits")):
+            raise InvalidValueError(
+                "over: its limits and obstacles count; expected no `free` and no limits=False "
+                "beside it, make the workspace with them."
+            )
     if w.status is WorkspaceStatus.EMPTY:
         return _result(connectivity, w, [], RegionStatus.EMPTY)
     counted = section_arm(arm) is not None or w.kind == "orientation"

@@ -15,13 +15,21 @@ from ..igm.request import poses_of
 from ..kinematics import dgm
 from ..model import RobotModel, check_model
 from .accessibility import in_every_orientation, posture_counts
-from .arms import Result, checked_flag, checked_word, free_predicate, section_arm
+from .arms import (
+    Result,
+    checked_flag,
+    checked_word,
+    free_predicate,
+    kept_free,
+    leaves_a_family,
+    section_arm,
+)
 from .arrangement import boundary, measures
 from .cells import SECTIONS, Space, grid_of, is_section, measure_of_cells, outlines, space_of
 from .reach import reached_cells
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
-_RESOLUTION = {"counted": 400, "reached": 100, "oriented": 60, "space": 28}
+_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "space": 28}
 
 
 class WorkspaceStatus(Outcome):
@@ -33,7 +41,10 @@ class WorkspaceStatus(Outcome):
     )  # fmt: skip
     SAMPLED = 2, "Of every orientation samples were tried; the count is the least of them."
     EMPTY = 3, "No cell is reached."
-    NOT_DEFINED = 4, "The tool moves on a curve or on a surface in space: there is nothing to fill."
+    NOT_DEFINED = (
+        4,
+        "The tool is still, or moves on a curve or a surface in space: there is nothing to fill.",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -252,7 +263,7 @@ def workspace(
         one; those in the given orientation; those free of collisions with ``free``.
     section : {"auto", "plane", "space"}
         Half a plane through the first axis where that joint turns freely, the plane of a planar
-        arm, or space.
+        arm, which has no other, or space.
     limits : bool
         Whether the joint limits count.
     free : callable or obstacles, optional
@@ -295,6 +306,7 @@ def workspace(
     checked_word(kind, KINDS, "kind")
     checked_word(section, SECTIONS, "section")
     bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
+    free = kept_free(free)
     rows = None if mask is None else read_only(as_mask(mask), np.bool_)
     rotation = _rotation(kind, orientation, free)
     turned = free is None and kind != "orientation"
@@ -323,10 +335,12 @@ def workspace(
         T[:, :3, :3], T[:, :3, 3] = rotation, world
         asked = None if space.kind == "plane" else rows
         count = posture_counts(arm, T, asked, bounded, is_free)[1]
+        if leaves_a_family(arm, asked):
+            count, status = np.minimum(count, 1), WorkspaceStatus.REACHED_ONLY
     else:
         reached, _ = _positions(arm, space, points, size, shape, bounded, free)
         inner = np.flatnonzero(reached)
-        failed, least = in_every_orientation(arm, world[inner], bounded, is_free)
+        failed, least = in_every_orientation(arm, world[inner], bounded, is_free, rows)
         count = np.zeros(len(points), np.int64)
         count[inner] = np.where(failed == 0, least, 0)
         if kind == "secondary":
