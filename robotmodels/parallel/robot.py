@@ -220,7 +220,8 @@ class ParallelRobot(Value):
         q = "angle" if self.has_cranks else "length"
         ends = (self.lower.min(), self.upper.max())
         least = {0.0, -np.inf} if not self.has_cranks else {-np.inf}
-        words = [] if ends[0] in least else [f"from {ends[0]:.4g}"]
+        first = "" if np.isfinite(ends[1]) else "from "
+        words = [] if ends[0] in least else [f"{first}{ends[0]:.4g}"]
         words += [f"to {ends[1]:.4g}"] if np.isfinite(ends[1]) else []
         limits = " ".join([q, *words]) if words else "no limits"
         words = "with" if self.masses is not None else "without"
