@@ -109,7 +109,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
     --------
     >>> from robotmodels.robots import load
     >>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
-    ('ZZ1', 'MX1', 'MY1', 'ZZ2', 'MX2', 'MY2')
+    ('ZZ1', 'ZZ2', 'MX2', 'MY2')
     """
 
     reference: Any
