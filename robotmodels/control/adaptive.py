@@ -66,7 +66,7 @@ def slotine_li_regressor(
     >>> from robotmodels.geometry import DHTable
     >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
     >>> Y = slotine_li_regressor(one, [0.0], [3.0], [1.0], [2.0])
-    >>> dict(zip(parameter_names(one), Y[0], strict=True))["ZZ1"]
+    >>> dict(zip(parameter_names(one), Y[0].tolist(), strict=True))["ZZ1"]
     2.0
     """
     check_model(model)
@@ -109,7 +109,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
     --------
     >>> from robotmodels.robots import load
     >>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
-    ('ZZ1', 'MX1', 'MY1', 'ZZ2', 'MX2', 'MY2')
+    ('ZZ1', 'ZZ2', 'MX2', 'MY2')
     """
 
     reference: Any

@@ -89,10 +89,10 @@ def run(
 
     Examples
     --------
-    >>> from robotmodels.control import PDGravity, run
+    >>> from robotmodels.control import ComputedTorque, run
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
-    >>> law = PDGravity(np.full(6, 0.1), kp=300.0, kd=60.0, model=arm)
+    >>> law = ComputedTorque(np.full(6, 0.1), omega=20.0, model=arm)
     >>> run(arm, law, np.zeros(6), t=0.5, period=1e-3).status
     <ControlStatus.FOLLOWED: 0>
     """

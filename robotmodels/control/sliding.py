@@ -190,7 +190,7 @@ def first_order(
     Examples
     --------
     >>> first_order(SlidingMode(None, slope=1.0, gain=2.0), 1.0, 0.5, t=1.0, step=0.25)
-    array([1.   , 0.625, 0.25 , -0.125, 0.5  ])
+    array([ 1.   ,  0.625,  0.25 , -0.125,  0.5  ])
     """
     h, end = as_number(step, "step", above=0.0), as_number(t, "t", least=0.0)
     if end / h > _MOST_STEPS:

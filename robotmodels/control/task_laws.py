@@ -38,8 +38,10 @@ Examples
 >>> ComputedTorque(q + 0.1, omega=5.0, model=arm).error(0.0, q, rest).round(9)
 array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
 >>> law = Impedance(dgm(arm, q), M=2.0, B=40.0, K=800.0, model=arm)
->>> law.frequency[0], law.damping[0], law.command(0.0, q, rest, wrench=[5.0, 0, 0, 0, 0, 0]).shape
-(20.0, 0.5, (6,))
+>>> float(law.frequency[0]), float(law.damping[0])
+(20.0, 0.5)
+>>> law.command(0.0, q, rest, wrench=[5.0, 0, 0, 0, 0, 0]).shape
+(6,)
 """
 
 from __future__ import annotations
