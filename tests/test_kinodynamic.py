@@ -362,3 +362,12 @@ def test_progress_is_called():
     assert plan.status is PlanStatus.FOUND
     assert calls
     assert calls[-1][0] <= plan.evaluations
+
+
+def test_scaling_names_the_joint_that_is_not_held_and_refuses_a_motion_that_rests():
+    arm, q0 = rm.load("ur5e"), [0, -1.5, 1, 0, 0, 0]
+    why = time_scaled(tr.quintic(q0, np.ones(6), duration=1.0), arm, 5.0).reason()
+    assert "joint 2" in why
+    assert "margin of -" in why
+    with pytest.raises(InvalidValueError, match="does not move"):
+        time_scaled(tr.quintic(q0, q0, duration=1.0), arm, 150.0, MotionLimits(1.0))

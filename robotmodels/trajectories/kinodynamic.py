@@ -157,7 +157,7 @@ class Plan(Value):
         else:
             use = ", ".join(f"{x:.0%}" for x in self.torque_use)
             lines.append(f"greatest torques {use} of their limits")
-        spread = f", spread {self.spread:.2%}" if self.restarts.size else ""
+        spread = f", spread {self.spread:.2%}" if np.isfinite(self.spread) else ""
         lines.append(f"{self.evaluations} evaluations, {self.restarts.size} restarts{spread}>")
         return "\n  ".join(lines)
 
@@ -195,7 +195,8 @@ def kinodynamic(
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
     limits : MotionLimits
-        Of velocity, acceleration, jerk and position.
+        Of velocity, acceleration, jerk and position; those of the model's table count only if given
+        here, as by `MotionLimits.of_model`.
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     via : sequence of array_like, shape (n,), or Pose
