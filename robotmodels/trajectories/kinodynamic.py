@@ -30,6 +30,7 @@ from .path_limits import SLOWEST, PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import Trajectory
 
+_NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
 
 
@@ -283,7 +284,13 @@ def kinodynamic(
         at = knots_of(stations, count)
         optimal = timing is Timing.OPTIMAL
         task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-        tasks.append((task.evaluated(task.straight()).penalized, len(tasks), task))
+        straight = task.evaluated(task.straight())
+        if straight.duration < _NO_TIME:
+            raise InvalidValueError(
+                "limits, torque: nothing limits the straight motion, so its time would be zero; "
+                "give the robot inertia, or limits of velocity and acceleration of every joint."
+            )
+        tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
