@@ -362,3 +362,20 @@ def test_progress_is_called():
     assert plan.status is PlanStatus.FOUND
     assert calls
     assert calls[-1][0] <= plan.evaluations
+
+
+def test_scaling_names_the_joint_that_is_not_held_and_refuses_a_motion_that_rests():
+    arm, q0 = rm.load("ur5e"), [0, -1.5, 1, 0, 0, 0]
+    why = time_scaled(tr.quintic(q0, np.ones(6), duration=1.0), arm, 5.0).reason()
+    assert "joint 2" in why
+    assert "margin of -" in why
+    with pytest.raises(InvalidValueError, match="does not move"):
+        time_scaled(tr.quintic(q0, q0, duration=1.0), arm, 150.0, MotionLimits(1.0))
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning", "ignore:.*no masses")
+@pytest.mark.parametrize("timing", ["optimal", "profile"])
+def test_a_robot_without_inertia_has_no_quickest_motion(timing):
+    arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]))
+    with pytest.raises(InvalidValueError, match="inertia"):
+        kinodynamic(arm, [0, 0], [1, 1], FREE, torque=1.0, seconds=0.3, timing=timing)

@@ -35,6 +35,22 @@ def line(q0, q1):
     return tr.linear(q0, q1, duration=1.0)
 
 
+def test_torques_beyond_their_limits_between_points_are_named():
+    rng, arm = np.random.default_rng(4), rm.load("ur5e")
+    arm = arm.with_drive(rm.DriveParameters(*(np.full(6, x) for x in (0.2, 2.0, 0.0, 0.0))))
+    torque = np.array([150.0] * 3 + [28.0] * 3)
+    for _ in range(3):
+        path = tr.random_profile([0, -1.5, 1, 0, 0, 0], rng.normal(size=6), 3, "quintic", rng)
+        timed = time_optimal(path, None, arm, torque, both_ends=True)
+        greatest = used(arm, timed.trajectory, torque).max()
+        assert ("times its limit" in timed.reason()) == (greatest > 1.02)
+
+
+def test_a_velocity_of_zero_is_named():
+    timed = time_optimal(line([0.0, 0.0], [1.0, 1.0]), MotionLimits([0.0, 1.0], 1.0))
+    assert "velocity" in timed.reason()
+
+
 def spline(rng, n, points=5):
     return tr.cubic_spline(rng.uniform(-1, 1, (points, n)), np.arange(points), ends="not_a_knot")
 

@@ -30,6 +30,7 @@ from .path_limits import SLOWEST, PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import Trajectory
 
+_NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
 
 
@@ -157,7 +158,7 @@ class Plan(Value):
         else:
             use = ", ".join(f"{x:.0%}" for x in self.torque_use)
             lines.append(f"greatest torques {use} of their limits")
-        spread = f", spread {self.spread:.2%}" if self.restarts.size else ""
+        spread = f", spread {self.spread:.2%}" if np.isfinite(self.spread) else ""
         lines.append(f"{self.evaluations} evaluations, {self.restarts.size} restarts{spread}>")
         return "\n  ".join(lines)
 
@@ -195,7 +196,8 @@ def kinodynamic(
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
     limits : MotionLimits
-        Of velocity, acceleration, jerk and position.
+        Of velocity, acceleration, jerk and position; those of the model's table count only if given
+        here, as by `MotionLimits.of_model`.
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     via : sequence of array_like, shape (n,), or Pose
@@ -282,7 +284,13 @@ def kinodynamic(
         at = knots_of(stations, count)
         optimal = timing is Timing.OPTIMAL
         task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-        tasks.append((task.evaluated(task.straight()).penalized, len(tasks), task))
+        straight = task.evaluated(task.straight())
+        if straight.duration < _NO_TIME:
+            raise InvalidValueError(
+                "limits, torque: nothing limits the straight motion, so its time would be zero; "
+                "give the robot inertia, or limits of velocity and acceleration of every joint."
+            )
+        tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]

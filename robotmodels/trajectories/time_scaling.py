@@ -57,6 +57,8 @@ class ScaledTrajectory(Value):
         Least and greatest duration with which each sample keeps the limits, s: the window of the
         shortest ones if there are several, both infinite if there is none. The greatest is
         infinite where the robot is held still.
+    explanation : str
+        Details of the status.
 
     Examples
     --------
@@ -72,6 +74,7 @@ class ScaledTrajectory(Value):
     status: ScalingStatus
     fraction: Array
     windows: Array
+    explanation: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fraction", read_only(self.fraction))
@@ -83,8 +86,8 @@ class ScaledTrajectory(Value):
         return np.nan if self.trajectory is None else self.trajectory.duration
 
     def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence
+        """The status as a sentence, with the joint and the margin where it is not held."""
+        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         most = self.windows[:, 0].max(initial=0.0)
@@ -157,6 +160,8 @@ def time_scaled(
         bounds = checked_limits(limits, trajectory.n, *motion.extremes(0))
         assert bounds is not None
         least = end * trajectory.check(bounds).stretch
+    if not np.any(motion.extremes(1)):
+        raise InvalidValueError("trajectory: it does not move, so it has no least duration.")
     if not (np.isfinite(bound).any() or least > 0.0):
         raise InvalidValueError(
             "limits, torque: all are infinite or the motion is none, so any duration keeps them."
@@ -165,14 +170,29 @@ def time_scaled(
     parts = torque_parts(model, motion, fraction)
     windows = windows_of(parts, bound, least)
     if not _held(model, motion, bound):
-        return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows)
+        why = _heaviest(parts[2], bound, fraction)
+        return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows, why)
     T = _least_duration(model, motion, bound, least)
     if np.isinf(T):
         heavy = (np.abs(parts[2]) > bound).any()
         status = ScalingStatus.NOT_HELD_STILL if heavy else ScalingStatus.NO_WINDOW
-        return ScaledTrajectory(None, status, fraction, windows)
+        why = _heaviest(parts[2], bound, fraction) if heavy else ""
+        return ScaledTrajectory(None, status, fraction, windows, why)
     result = Trajectory(stretched(motion, T * _MARGIN), trajectory.scalar)
     return ScaledTrajectory(result, ScalingStatus.SCALED, fraction, windows)
+
+
+def _heaviest(held: Array, bound: Array, fraction: Array) -> str:
+    """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence."""
+    margin = bound - np.abs(held)
+    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
+    if margin[i, j] >= 0.0:
+        return ""
+    return (
+        f"Gravity exceeds the torques at the fraction {fraction[i]:.4g} of the motion: joint "
+        f"{j + 1} needs {abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}, a margin of "
+        f"{margin[i, j]:.4g} (N m or N)."
+    )
 
 
 def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:
