@@ -136,10 +136,10 @@ def animate_control(
 
     Examples
     --------
-    >>> from robotmodels.control import PDGravity, SpringWall, run
+    >>> from robotmodels.control import ComputedTorque, run
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
-    >>> law = PDGravity(np.full(6, 0.1), kp=300.0, kd=60.0, model=arm)
+    >>> law = ComputedTorque(np.full(6, 0.1), model=arm)
     >>> animate_control(run(arm, law, np.zeros(6), t=0.5)).motion.duration
     0.5
     """
