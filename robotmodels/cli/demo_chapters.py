@@ -53,7 +53,7 @@ def fastest_motion() -> Any:
 
     rx90 = load("rx90")
     path = quintic([0.3, 1.0, -1.8, 0.4, 0.8, -0.2], [1.2, 0.4, -1.0, 1.0, 0.2, 0.5], duration=1.0)
-    limits = MotionLimits(velocity=4.0, acceleration=40.0)
+    limits = MotionLimits(np.full(6, 4.0), np.full(6, 40.0))
     timed = tr.time_optimal(path, limits, model=rx90, torque=[250, 350, 150, 40, 20, 10])
     print(f"{timed.reason()} {timed.duration:.3f} s, to {timed.grid_gap:.1e} of it.")
     return plot_phase_plane(timed)
@@ -78,7 +78,7 @@ def four_points() -> Any:
     from .. import visual_servoing as vs
     from ..viz import plot_servo
 
-    square = vs.Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+    square = vs.Points(np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]]))
     start = se3.translation(0.1, -0.05, 0.9) @ se3.rotation("x", 0.4) @ se3.rotation("z", 0.8)
     task = vs.Task(square, se3.translation(0, 0, 0.5), gain=1.0)
     motion = vs.servo(task, start, vs.Camera(), duration=8.0, step=0.04)

@@ -331,12 +331,13 @@ class ExternalForceLoop(Law):
 def _inverse(M: Array) -> Array:
     """Inverse of the mass matrix of the believed model."""
     try:
-        return np.linalg.inv(M)
+        inverse: Array = np.linalg.inv(M)  # type: ignore[assignment]
     except np.linalg.LinAlgError:
         raise SingularMassMatrixError(
             "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
             "inertia."
         ) from None
+    return inverse
 
 
 def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Array:

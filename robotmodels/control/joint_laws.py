@@ -156,7 +156,7 @@ class DecentralizedPID(JointLaw):
         given = self.feedforward
         model = given if isinstance(given, RobotModel) else None
         self._prepare(("kp", "ki", "kd"), model, zero="ki")
-        if given is not None and model is None:
+        if given is not None and not isinstance(given, RobotModel):
             self._set(feedforward=as_exact(given, (self.n,), "feedforward"))
 
     @property
