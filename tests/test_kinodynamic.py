@@ -210,6 +210,7 @@ def test_a_profile_is_stretched_where_that_is_asked_for():
     assert by_descent.duration <= 1.05 * ORACLE["free"]["A"]
 
 
+@pytest.mark.nightly
 def test_six_joints_through_a_point_and_around_a_body():
     puma = rm.load("puma560")
     limits = MotionLimits(velocity=5.0)
