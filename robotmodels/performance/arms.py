@@ -66,10 +66,14 @@ def _same(a: Any, b: Any) -> bool:
 
 
 Free = Callable[[Array], NDArray[np.bool_]]
-_FULL_TURN = tau - 1e-9
 _CHUNK = 65536  # positions solved at a time
 _MOST_BYTES = 1e9
 _CELL_BYTES = 170
+
+
+def wrapped(x: Array, turning: NDArray[np.bool_]) -> Array:
+    """Differences of joint positions, angles in [-pi, pi)."""
+    return np.where(turning, (x + np.pi) % tau - np.pi, x)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import pi, tau
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .arms import wrapped
 
 _SPECKS = 1e-4  # of all cells: components without a core that belong to another
 
@@ -96,7 +96,7 @@ def labels_of(group: Group, q: Array, values: Array | None) -> NDArray[np.int64]
     cells = np.array(group.labels.shape)
     x = q[:, list(group.joints)]
     closed = np.array(group.closed)
-    x = np.where(closed, (x + pi) % tau - pi, x)
+    x = wrapped(x, closed)
     at = np.clip(np.floor((x - group.low) / group.side).astype(int), 0, cells - 1)
     labels = group.labels[tuple(at.T)].astype(np.int64)
     if values is None or not group.factors:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import tau
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +11,7 @@ from ..igm.loop import joint_chain
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel
 from ..se3.orientation import rotation_vectors_of
+from .arms import wrapped
 
 _SHORTEST = 2.0**-10  # part of the motion between two poses
 _CORRECTIONS = 6
@@ -51,8 +50,7 @@ def successors(
     signs = np.zeros(q_next.shape[:2])
     backward[k, r], signs[k, r] = back, sign_next
     # posture by posture: the prediction from either end must meet the other
-    gap = q_next[m] - q[m, s][:, None]
-    gap = np.where(turning, (gap + np.pi) % tau - np.pi, gap)
+    gap = wrapped(q_next[m] - q[m, s][:, None], turning)
     gap = np.where(valid_next[m][..., None], gap, np.inf)
     size = np.linalg.norm(ahead, axis=1)
     near = _AGREES * size + 1e-9
@@ -70,8 +68,7 @@ def successors(
         end, arrived = _followed(
             model, poses[at], following[at], q[at, row], rows, chain.columns, length
         )
-        gap = q_next[at] - end[:, None]
-        gap = np.where(turning, (gap + np.pi) % tau - np.pi, gap)
+        gap = wrapped(q_next[at] - end[:, None], turning)
         gap = np.where(valid_next[at][..., None], np.abs(gap), np.inf).max(axis=2)
         best, near = gap.argmin(axis=1), gap.min(axis=1, initial=np.inf)
         arrived &= near < _SAME

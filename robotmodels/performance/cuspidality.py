@@ -18,7 +18,7 @@ from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
-from .arms import Result, SectionArm, section_arm, task_rows
+from .arms import Result, SectionArm, section_arm, task_rows, wrapped
 from .arrangement import cut, section_lines
 from .aspects import aspects
 from .certificate import Bound, bound_of, certified
@@ -272,8 +272,7 @@ def _closed(arm: RobotModel, section: SectionArm, x: Array) -> Array | None:
     if not len(rows):
         return None
     turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
-    moved = rows - goal
-    moved = np.where(turning, (moved + np.pi) % tau - np.pi, moved)
+    moved = wrapped(rows - goal, turning)
     best = int(np.argmin(np.abs(moved).max(axis=1)))
     end = goal + moved[best]
     if np.abs(moved[best]).max() > 0.2 or _far(arm, q[0], end) < 1e-6:
@@ -287,8 +286,7 @@ def _closed(arm: RobotModel, section: SectionArm, x: Array) -> Array | None:
 def _far(arm: RobotModel, a: Array, b: Array) -> float:
     """Greatest difference of two postures, angles by the shorter way round."""
     turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
-    d = b - a
-    return float(np.abs(np.where(turning, (d + np.pi) % tau - np.pi, d)).max())
+    return float(np.abs(wrapped(b - a, turning)).max())
 
 
 def _all_apart(arm: RobotModel, section: SectionArm) -> bool:
@@ -334,8 +332,7 @@ def _by_search(
         return _without(arm, CuspidalityStatus.NONE_FOUND)
     turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
     start = np.array([a for a, _ in pairs])
-    step = np.array([b for _, b in pairs]) - start
-    step = np.where(turning, (step + np.pi) % tau - np.pi, step)
+    step = wrapped(np.array([b for _, b in pairs]) - start, turning)
     bound = bound_of(arm, factors.rows, _stroke(arm))
     tried = len(pairs)
     for via in range(1 + _VIAS):

@@ -24,6 +24,7 @@ from .arms import (
     leaves_a_family,
     section_arm,
     task_rows,
+    wrapped,
 )
 from .certificate import bound_of
 from .continuation import successors
@@ -226,8 +227,7 @@ def _chains(
         if through:
             for s in np.flatnonzero(alive & (to < 0)):
                 # the posture that goes on most smoothly
-                gap = q[k + 1] - q[k, at[s]]
-                gap = np.where(turning, (gap + np.pi) % tau - np.pi, gap)
+                gap = wrapped(q[k + 1] - q[k, at[s]], turning)
                 off = np.where(valid[k + 1], np.linalg.norm(gap - step[s], axis=1), np.inf)
                 r = int(off.argmin()) if off.size else -1
                 if r >= 0 and np.abs(gap[r]).max() < _THROUGH and np.isfinite(off[r]):
