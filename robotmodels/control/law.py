@@ -89,7 +89,7 @@ def as_gains(value: ArrayLike, name: str, n: int | None = None, zero: bool = Fal
 
 
 def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
-    """Refuse what is none of the words."""
+    """Refuse a choice that is not listed."""
     if value not in words:
         wanted = " or ".join(map(repr, words))
         raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")

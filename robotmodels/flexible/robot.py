@@ -130,7 +130,7 @@ class FlexibleRobot(Value):
 
     @property
     def arrays(self) -> Arm:
-        """What the compiled recursions take."""
+        """Arrays for the compiled recursions."""
         if self._arm is None:
             object.__setattr__(self, "_arm", _arrays_of(self))
         return self._arm  # type: ignore[return-value]

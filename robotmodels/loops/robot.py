@@ -194,7 +194,7 @@ class LoopedRobot(Value):
 
 
 def check_looped(robot: object) -> None:
-    """Refuse what is not a looped robot."""
+    """Raise unless the argument is a looped robot."""
     if not isinstance(robot, LoopedRobot):
         raise InvalidValueError(
             f"robot: expected a LoopedRobot, got {type(robot).__name__}; build one of a tree and "

@@ -206,7 +206,7 @@ def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
 
 
 def check_robot(robot: Any) -> None:
-    """Raise for what is no parallel robot."""
+    """Raise unless the argument is a parallel robot."""
     if not isinstance(robot, ParallelRobot | LoopedPlatform):
         raise InvalidValueError(
             "robot: expected a parallel robot, as made by parallel.gough and others, got "

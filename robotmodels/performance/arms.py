@@ -1,4 +1,4 @@
-"""What the analyses need to know of an arm: task, ranges of joints, section of three-joint arms."""
+"""Task, ranges of joints and section of an arm, shared by the analyses."""
 
 from __future__ import annotations
 
@@ -310,7 +310,7 @@ def free_predicate(model: RobotModel, free: Any) -> Free | None:
 
 
 def kept_free(free: Any) -> Any:
-    """What a result keeps of ``free``: the function, or the obstacles as a tuple."""
+    """Value of ``free`` that a result keeps: the function, or the obstacles as a tuple."""
     return free if free is None or callable(free) else checked_obstacles(free)
 
 

@@ -31,7 +31,7 @@ def successors(
     rows: NDArray[np.bool_],
     length: float,
 ) -> tuple[NDArray[np.int64], Array]:
-    """Number of the posture that goes on, -1 for none, and the way there.
+    """Number of the posture that continues the path, -1 for none, and the motion to it.
 
     Shapes: poses, following (M, 4, 4), q (M, S, n), q_next (M, R, n) -> (M, S), (M, S, n).
     """

@@ -55,7 +55,7 @@ class SectionStatus(Outcome):
 
 
 class CurveKind(Enum):
-    """What a curve of the section separates; the value is a word.
+    """Kinds of curves by the regions that they separate.
 
     Examples
     --------

@@ -72,7 +72,7 @@ def polytope(
     mask: ArrayLike | str | None = None,
     frame: str | int | None = None,
 ) -> Polytope:
-    """Polytope of what the limits of the joints allow the tool in a configuration.
+    """Polytope of velocities, forces or accelerations of the tool within the limits of the joints.
 
     Velocities are the images of the box of joint velocities, a zonotope; accelerations, at rest
     and without gravity, those of the box of torques; forces are all that torques in their box

@@ -33,7 +33,7 @@ _RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "space": 28}
 
 
 class WorkspaceStatus(Outcome):
-    """What the counts of a workspace mean."""
+    """Meaning of the counts of a workspace."""
 
     COUNTED = 0, "The postures of every cell were counted."
     REACHED_ONLY = (

@@ -62,7 +62,7 @@ class Knots(NamedTuple):
 
 
 class Evaluated(NamedTuple):
-    """What became of a candidate; its duration is infinite where it has no timing."""
+    """Result of a candidate; its duration is infinite where it has no timing."""
 
     cost: float
     duration: float

@@ -23,7 +23,7 @@ _INSIDE = np.linspace(0.0, 1.0, 6)  # where extremes are sought in each piece of
 
 
 class Motion(Protocol):
-    """What a `Trajectory` is made of: functions of time for n joints."""
+    """Functions of time for n joints, of which a `Trajectory` is made."""
 
     @property
     def n(self) -> int:

@@ -50,7 +50,7 @@ class Passes(NamedTuple):
 
 
 class PathLimits:
-    """What limits the motion of a robot along paths; the same for all paths that are tried."""
+    """Limits of the motion of a robot along paths, the same for all candidate paths."""
 
     __slots__ = (
         "acceleration", "drives", "ends", "friction", "limits", "loaded", "lower", "model", "n",

@@ -83,7 +83,7 @@ class Search:
         self.deadline = self.start + part * self.seconds
 
     def evaluated(self, task: Candidates, free: Array) -> Evaluated | None:
-        """What became of a candidate; None when the search is over."""
+        """Timing of a candidate; None when the search is over."""
         if time.monotonic() > self.deadline:
             return None
         found = task.evaluated(free)
