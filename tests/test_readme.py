@@ -33,8 +33,9 @@ def test_examples_print_what_they_say(tmp_path, monkeypatch):
 
 
 def of_package(dotted):
-    """Whether a name is found from the door, or in a room that the door opens."""
-    for start in (rm, rm.trajectories, rm.calibration, rm.identification):
+    """Whether a name is found from `rm`, or in one of its subpackages."""
+    rooms = "trajectories calibration identification performance control parallel"
+    for start in (rm, *(getattr(rm, room) for room in rooms.split())):
         value = start
         for part in dotted.split("."):
             value = getattr(value, part, None)
