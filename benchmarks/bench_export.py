@@ -1,71 +1,54 @@
-"""Speed and size of generated code beside Pinocchio and adam, in one run.
-
-    python -m benchmarks.bench_export [--out benchmarks/results] [--rounds 15]
-
-Operations are counted; the C code is compiled (``cc -O2``) and called in a loop in C, Pinocchio's
-``rnea`` from Python, from which the time of a call that does little is taken off. Contestants take
-turns. What is not installed (a compiler, adam) is named and left out.
-"""
+"""Generated code: operations, time of generation, speed of the compiled C beside `rnea`."""
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import importlib.util
 import shutil
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 import robotmodels as rm
-from benchmarks.kept import RESULTS, keep
-from benchmarks.machine import head, machine
-from benchmarks.measure import Contestant, in_turns
+from benchmarks.measure import Contestant, loop
+from benchmarks.works import OURS, Goal, Settings, Work, at_most
 from robotmodels import export
 
 ARMS = ("rx90", "puma560", "tx40", "panda")
 CALLS, FEW = 20_000, 2000
 
 
-def bound(n: int) -> tuple[int, int]:
-    """Operations of a general arm of n revolute joints (Khalil and Kleinfinger 1987)."""
-    return 92 * n - 127, 81 * n - 117
-
-
-def count_rows() -> list[str]:
-    """Operations and time of generation of the inverse dynamic model, without drives."""
-    rows = ["| arm | joints | base parameters | numbers | general arm | generated |"]
-    rows.append("|---|---|---|---|---|---|")
+def generation(settings: Settings) -> Iterator[Work]:
+    """The inverse dynamic model in base parameters, and the bound for a general arm."""
     for name in ARMS:
         model = rm.load(name)
-        start = time.process_time()
-        base = export.program(model, "idm", parameters="base", drive=False).count
-        spent = time.process_time() - start
-        numbers = export.program(model, "idm", drive=False).count
-        cells = (f"{c.multiplications} x, {c.additions} +" for c in (base, numbers))
-        most = "{} x, {} +".format(*bound(model.n))
-        rows.append(f"| {name} | {model.n} | {' | '.join(cells)} | {most} | {1e3 * spent:.0f} ms |")
-    return rows
+        most = f"{92 * model.n - 127} x, {81 * model.n - 117} + for a general arm"
+
+        def run(m: rm.RobotModel = model) -> export.Program:
+            return export.program(m, "idm", parameters="base", drive=False)
+
+        def said(p: export.Program, bound: str = most) -> str:
+            return f"{p.count.multiplications} x, {p.count.additions} +; {bound}"
+
+        ways = [Contestant(OURS, run, said=said)]
+        yield Work(
+            f"inverse dynamic model of {name}, generated", "ms", ways, [at_most(500.0, "ms")]
+        )
 
 
 def looped(program: export.Program, compiler: str, folder: Path) -> Callable[[], object]:
     """The compiled code, called in a loop in C with changing joint variables."""
     n = program.inputs[0].shape[0]
     call = f"{program.name}(y, y + {n}, y + {2 * n}, tau + {n} * (i % 100));"
-    loop = (
-        "void loop(const double *x, long count, double *tau)\n{\n"
-        "    for (long i = 0; i < count; i++) {\n"
-        f"        const double *y = x + {3 * n} * (i % 100);\n"
-        f"        {call}\n    }}\n}}\n"
-    )
     source, library = folder / f"{program.name}.c", folder / f"{program.name}.so"
-    source.write_text(program.code("c") + loop)
+    source.write_text(
+        program.code("c") + "void loop(const double *x, long count, double *tau)\n{\n"
+        "    for (long i = 0; i < count; i++) {\n"
+        f"        const double *y = x + {3 * n} * (i % 100);\n        {call}\n    }}\n}}\n"
+    )
     flags = ["-O2", "-std=c99", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, "-o", library, source, "-lm"], check=True)
     function = ctypes.CDLL(str(library)).loop
@@ -79,63 +62,36 @@ def looped(program: export.Program, compiler: str, folder: Path) -> Callable[[],
     return run
 
 
-def pinocchio_loops(model: rm.RobotModel) -> tuple[Callable[[], Any], Callable[[], Any]]:
-    """``rnea`` from Python, and a function that does little with the same arguments."""
-    robot, data = model.pin_model, model.pin_model.createData()
-    q, v, a = np.random.default_rng(0).normal(size=(3, model.n))
-
-    def rnea() -> None:
-        for _ in range(FEW):
-            pin.rnea(robot, data, q, v, a)
-
-    def little() -> None:
-        for _ in range(FEW):
-            pin.integrate(robot, q, v)
-
-    return rnea, little
-
-
-def time_rows(rounds: int) -> list[str]:
-    """Nanoseconds a call of the inverse dynamic model."""
-    rows = ["| arm | generated C | Pinocchio rnea | ratio |", "|---|---|---|---|"]
+def compiled(settings: Settings) -> Iterator[Work]:
+    """The C code in a loop in C; `rnea` from Python, less a call that does little."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
-        return ["No C compiler (cc, gcc) is on the path: the code was not timed."]
+        print("left out: the generated C, no compiler (cc, gcc) is on the path")
+        return
     with tempfile.TemporaryDirectory() as folder:
         for name in ARMS:
             model = rm.load(name)
-            rnea, little = pinocchio_loops(model)
+            robot, data = model.pin_model, model.pin_model.createData()
+            x = np.random.default_rng(0).normal(size=(3, FEW, model.n))
             program = export.program(model, "idm", drive=False)
-            contestants = [
-                Contestant("C", looped(program, compiler, Path(folder)), CALLS),
-                Contestant("rnea", rnea, FEW),
-                Contestant("little", little, FEW),
-            ]
-            found = in_turns(contestants, rounds).items()
-            spent = {key: timing.processor.times(1e9).median for key, timing in found}
-            alone = spent["rnea"] - spent["little"]
-            rows.append(
-                f"| {name} | {spent['C']:.0f} ns | {alone:.0f} ns ({spent['rnea']:.0f} with the "
-                f"call) | {spent['C'] / alone:.2f} |"
+            ways = [
+                Contestant(OURS, looped(program, compiler, Path(folder)), CALLS),
+                Contestant(
+                    "Pinocchio rnea, called from Python",
+                    loop(lambda *s, r=robot, d=data: pin.rnea(r, d, *s), *x), FEW,
+                ),
+                Contestant(
+                    "such a call that does little",
+                    loop(lambda q, v, r=robot: pin.integrate(r, q, v), *x[:2]), FEW, whole=False,
+                ),
+            ]  # fmt: skip
+            half = Goal(
+                "<= half of rnea without the call",
+                lambda t: (
+                    t[0].processor.median <= 0.5 * (t[1].processor.median - t[2].processor.median)
+                ),
             )
-    return rows
+            yield Work(f"inverse dynamics in C, {name}", "us", ways, [half])
 
 
-def main() -> None:
-    """Measure and keep the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--rounds", type=int, default=15)
-    arguments = parser.parse_args()
-    about = machine(("adam-robotics", "casadi"))
-    lines = head("Generated code: operations and time", about)
-    lines += [*count_rows(), "", *time_rows(arguments.rounds), ""]
-    if importlib.util.find_spec("adam") is None:
-        lines.append("adam-robotics is not installed: its graphs need CasADi or JAX to be run.")
-    text = "\n".join([*lines, ""])
-    print(text)
-    keep(arguments.out, "export", text, {"machine": about, "lines": lines})
-
-
-if __name__ == "__main__":
-    main()
+WORKS = {"generation": generation, "compiled": compiled}

@@ -1,28 +1,16 @@
-"""Speed of the recursions of flexible robots, and of simulated seconds.
-
-    python -m benchmarks.bench_flexible [--out benchmarks/results] [--rounds 15]
-
-Contestants of a row take turns. The direct model of a chain of N links is set beside a dense one:
-the mass matrix by columns and a linear system, which costs N^3. A simulated second of two links is
-set beside the same arm in 20 rigid segments each, by the rigid `simulate`.
-"""
+"""Recursions of flexible robots beside a dense direct model, and simulated seconds."""
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 
 import robotmodels as rm
-from benchmarks.kept import RESULTS, keep
-from benchmarks.machine import head, machine
-from benchmarks.measure import Contestant, in_turns
+from benchmarks.measure import Contestant
+from benchmarks.works import OURS, Settings, Work, at_most, same
 from robotmodels import flexible
 from robotmodels.flexible.models import generalized_forces
-
-LINKS, GOAL = (3, 6, 12, 30), 60.0  # number of links; us for six
-OURS = "robotmodels"
 
 
 def chain(n: int) -> flexible.FlexibleRobot:
@@ -34,71 +22,45 @@ def chain(n: int) -> flexible.FlexibleRobot:
     return flexible.FlexibleRobot(model, dict.fromkeys(range(1, n + 1), link))
 
 
-def direct(n: int) -> list[Contestant]:
-    """The direct model of a chain, alone and in a batch, and a dense one."""
-    arm, rng = chain(n), np.random.default_rng(n)
-    q, v, tau = rng.normal(size=(3, n))
-    e, ev = 0.01 * rng.normal(size=(2, arm.m))
-    many = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]
+def direct(settings: Settings) -> Iterator[Work]:
+    """The direct model of chains, alone and in a batch, and by a mass matrix and a system."""
+    for n in (3, 6, 12, 30):
+        arm, rng = chain(n), np.random.default_rng(n)
+        q, v, tau = rng.normal(size=(3, n))
+        e, ev = 0.01 * rng.normal(size=(2, arm.m))
 
-    def dense() -> np.ndarray:
-        M, rows = flexible.mass_matrix(arm, q, e), [x[None] for x in (q, e, v, ev)]
-        rest = np.hstack(generalized_forces(arm, *rows, 0.0 * rows[0], 0.0 * rows[1]))[0]
-        return np.linalg.solve(M, np.append(tau, np.zeros(arm.m)) - rest)
+        def dense(arm=arm, x=(q, e, v, ev), tau=tau) -> np.ndarray:
+            rows = [part[None] for part in x]
+            rest = np.hstack(generalized_forces(arm, *rows, 0.0 * rows[0], 0.0 * rows[1]))[0]
+            return np.linalg.solve(
+                flexible.mass_matrix(arm, *x[:2]), np.append(tau, np.zeros(arm.m)) - rest
+            )
 
-    found = np.concatenate(flexible.ddm(arm, q, e, v, ev, tau))
-    off = float(np.abs(found - dense()).max() / np.abs(found).max())
-    if off > 1e-8:
-        raise SystemExit(f"direct model of {n} links: the two differ by {off:.3g}.")
-    return [
-        Contestant(OURS, lambda: flexible.ddm(arm, q, e, v, ev, tau)),
-        Contestant(f"{OURS}, 100 at once", lambda: flexible.ddm(arm, *many), 100),
-        Contestant("mass matrix and linear system", dense),
-    ]
+        found = np.concatenate(flexible.ddm(arm, q, e, v, ev, tau))
+        ways = [
+            Contestant(OURS, lambda r=arm, x=(q, e, v, ev, tau): flexible.ddm(r, *x)),
+            Contestant(
+                "mass matrix and linear system", dense, said=same("ddm", found, dense(), 1e-8)
+            ),
+        ]
+        goals = [at_most(60.0, "us")] if n == 6 else []
+        yield Work(f"direct model, {n} links with two modes", "us", ways, goals)
+        many = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]
+        batch = [Contestant(OURS, lambda r=arm, x=many: flexible.ddm(r, *x), 100)]
+        yield Work(f"direct model, {n} links with two modes, batch", "us", batch)
 
 
-def second() -> list[Contestant]:
+def second(settings: Settings) -> Iterator[Work]:
     """A simulated second of two links that fall."""
     model = rm.RobotModel.from_table(
         rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), gravity=(0, -9.81, 0)
     )
     link = flexible.beam(0.5, EI=(np.inf, 10.0), density=0.2, hub=0.1, tip=0.1)
     arm = flexible.FlexibleRobot(model, {1: link, 2: link})
-    return [
-        Contestant(
-            f"{OURS}, relative tolerance {rtol:g}",
-            lambda rtol=rtol: flexible.simulate(arm, [0.0, 0.0], t=1.0, rtol=rtol),
-            rounds=3,
-        )
-        for rtol in (1e-6, 1e-9)
-    ]
+    for rtol in (1e-6, 1e-9):
+        run = lambda r=rtol: flexible.simulate(arm, [0.0, 0.0], t=1.0, rtol=r)  # noqa: E731
+        ways = [Contestant(OURS, run, rounds=3)]
+        yield Work(f"a simulated second of two links, tolerance {rtol:g}", "s", ways)
 
 
-def main() -> None:
-    """Measure, print and keep the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--rounds", type=int, default=15)
-    arguments = parser.parse_args()
-    about, lines, kept = machine({}), [], {}
-    work = {f"direct model, {n} links with two modes": direct(n) for n in LINKS}
-    for name, contestants in {**work, "a simulated second, two links": second()}.items():
-        found = in_turns(contestants, arguments.rounds)
-        times = {who: spent.processor.times(1e6).median for who, spent in found.items()}
-        kept[name] = times
-        goal = f"<= {GOAL:g} us" if " 6 links" in name else ""
-        lines.append(f"| {name} | {'; '.join(f'{w} {t:.1f}' for w, t in times.items())} | {goal} |")
-    slope = np.polyfit(LINKS, [kept[name][f"{OURS}, 100 at once"] for name in work], 1)[0]
-    text = "\n".join(
-        [
-            *head("Flexible robots: measured side by side", about),
-            f"Medians in us a call, one thread; {slope:.2f} us for each further link in a batch.",
-            "", "| work | us | goal |", "|---|---|---|", *lines,
-        ]
-    )  # fmt: skip
-    print(text)
-    keep(arguments.out, "flexible", text + "\n", {"machine": about, "rows": kept})
-
-
-if __name__ == "__main__":
-    main()
+WORKS = {"chains": direct, "falling": second}

@@ -1,283 +1,118 @@
-"""Identification beside FIGAROH on the same logs and columns, and logs that grow.
-
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_identification [--rounds 5] [--out ...]
-        [--figaroh-python PATH] [--quick]
-
-Both tools are given the same positions, velocities, accelerations and torques (filtered by ours)
-and the same columns: links, rotor inertias, viscous and dry friction, offsets; of the TX40 without
-the coupling of its wrist. Both solve ordinary least squares on all rows. `as fit does it`: ours
-from the raw positions with all that it does by default: checks, filter, decimation, weighted
-least squares, deviations for correlated residuals, validation at the rate of the log. Every
-contestant runs in a process of its own; figures are medians of the processor's time with the
-clock's beside it, after a first run that compiles; memory is the highest resident memory of the
-process, with what it was when the package had been imported and a short log identified.
-Long logs are memory maps in files; pages of the files that are resident count and are told apart.
-FIGAROH runs by the Python that the option names (`pip install figaroh` in an environment of its
-own); without it its entries are left out and that is said. `--quick`: one round, no 1e7.
-"""
+"""Base parameters, exciting trajectories, least squares from a log to parameters."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import subprocess
-import sys
-import tempfile
-import threading
-import time
-import warnings
-from pathlib import Path
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import robotmodels as rm
-from benchmarks.kept import RESULTS, keep
-from benchmarks.machine import head, machine
-from robotmodels.identification import choose_processing, fit
+from benchmarks.measure import Contestant, loop
+from benchmarks.works import OURS, Goal, Settings, Work, at_most
+from robotmodels import identification as idn
 from robotmodels.identification.signals import signals
-from robotmodels.logs import Log
 
 DT = 1e-3
 NOISE = 1e-5, 0.05  # rad, N m
-PIECE = 100_000
-Row = dict[str, Any]
-MODULE, ROOT = "benchmarks.bench_identification", Path(__file__).parents[1]
 
 
-def robot(name: str) -> rm.RobotModel:
-    """The robot whose columns both tools have."""
-    model = rm.load(name)
-    return model if model.transmission is None else model.with_transmission(None)
+def base_parameters(settings: Settings) -> Iterator[Work]:
+    """Base parameters of a UR10: by rules, and by the columns of the regressor."""
+    model = rm.load("erd:ur10")
+
+    def rank(base: rm.BaseParameters) -> str:
+        return f"rank {sum(not name.startswith('offset') for name in base.names)}"
+
+    run = partial(rm.base_parameters, model)
+    goals = [at_most(100.0, "ms")]
+    rules = [Contestant(OURS, run, said=rank)]
+    yield Work("base parameters of a UR10, by rules", "ms", rules, goals)
+    numbers = [Contestant(OURS, lambda: run("numeric"), said=rank)]
+    yield Work("base parameters of a UR10, by numbers", "ms", numbers, goals)
+    for count in (2_000,) if settings.quick else (10_000, 100_000):
+        motion = tuple(np.random.default_rng(0).uniform(-3.0, 3.0, (3, count, model.n)))
+        ways = [Contestant(OURS, lambda m=motion: run("numeric", motion=m), said=rank, rounds=3)]
+        if settings.figaroh is not None:
+            q, v, a = motion
+            job = settings.figaroh.robot_job(model.with_drive(None), q=q, v=v, a=a)
+            rounds = 1 if count > 10_000 else 3
+            task = settings.figaroh.task("base", job)
+            ways.append(Contestant("FIGAROH", task, rounds=rounds))
+        yield Work(f"base parameters of a UR10, from {count} samples", "ms", ways)
 
 
-def simulate(folder: Path, name: str, count: int) -> None:
-    """Positions and torques of a robot that moves, with noise, as memory maps."""
-    model = robot(name)
+def excitation(settings: Settings) -> Iterator[Work]:
+    """An exciting trajectory with the defaults, and the best random motion beside it."""
+    starts = 1 if settings.quick else 8
+    for name in ("rx90", "ur10e") if not settings.quick else ("rx90",):
+        model = rm.load(name)
+
+        def run(m: rm.RobotModel = model) -> Any:
+            return idn.exciting_trajectory(m, drive=("Ia", "Fv", "Fc"), starts=starts, rng=0)
+
+        def said(found: Any) -> str:
+            random = found.baseline_conditions
+            best = f", the best random motion {random[0]:.0f}" if random.size else ""
+            return f"condition number {found.condition:.1f}{best}"
+
+        good = Goal("condition number <= 100", lambda t: float(t[0].note.split()[2][:-1]) <= 100.0)
+        ways = [Contestant(OURS, run, said=said, rounds=1)]
+        yield Work(f"exciting trajectory, {name}", "s", ways, [at_most(60.0, "s"), good])
+
+
+def log_of(model: rm.RobotModel, count: int) -> idn.Log:
+    """Positions and torques of a robot that moves, with noise."""
     rng = np.random.default_rng(0)
     w = 2.0 * np.pi * 0.1 * np.arange(1, 6)
     A, B = 0.4 * rng.normal(size=(2, model.n, 5))
-    out = [
-        np.lib.format.open_memmap(folder / f"{k}.npy", "w+", np.float64, (count, model.n))
-        for k in ("q", "tau")
-    ]
-    for start in range(0, count, PIECE):
-        t = DT * np.arange(start, min(start + PIECE, count))
-        s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-        q, v = s @ A.T + c @ B.T, (c * w) @ A.T - (s * w) @ B.T
-        a = -(s * w**2) @ A.T - (c * w**2) @ B.T
-        rows = slice(start, start + len(t))
-        tau = rm.idm(model, q, v, a) + 3.0 * v + 2.0 * np.sign(v) + 0.5 * a
-        out[0][rows] = q + NOISE[0] * rng.normal(size=q.shape)
-        out[1][rows] = tau + NOISE[1] * rng.normal(size=q.shape)
+    t = DT * np.arange(count)
+    s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
+    q, v = s @ A.T + c @ B.T, (c * w) @ A.T - (s * w) @ B.T
+    a = -(s * w**2) @ A.T - (c * w**2) @ B.T
+    tau = rm.idm(model, q, v, a) + 3.0 * v + 2.0 * np.sign(v) + 0.5 * a
+    noise = rng.normal(size=(2, *q.shape))
+    return idn.Log(DT, q + NOISE[0] * noise[0], tau + NOISE[1] * noise[1])
 
 
-def memory() -> tuple[float, float]:
-    """Highest resident memory so far, and resident pages of files now, MB."""
-    status = Path("/proc/self/status").read_text().splitlines()
-    told = {line.split(":")[0]: line.split()[1] for line in status if line.endswith(" kB")}
-    return int(told["VmHWM"]) / 1024.0, int(told["RssFile"]) / 1024.0
+def least_squares(settings: Settings) -> Iterator[Work]:
+    """Identification of a simulated RX-90 from positions and torques."""
+    count, model = settings.number(100_000, 10_000), rm.load("rx90")
+    log = log_of(model, count)
 
+    def said(found: idn.IdentificationResult) -> str:
+        error = float(np.sqrt(np.mean(found.validation.in_sample.rmse**2)))
+        return f"rank {len(found.names)}, RMSE {error:.3f} N m of the raw torques"
 
-class AnonymousMemory:
-    """Growth of the memory that is no page of a file while something is done, MB.
+    fast = [Contestant(OURS, lambda: idn.fit(model, log), said=said)]
+    title = f"identification, {count} samples x 6 joints"
+    yield Work(f"{title}, decimated", "s", fast, [at_most(2.0, "s")])
+    found = signals(log, idn.choose_processing(log, decimation=1))
+    pm, data = model.pin_model, model.pin_model.createData()
 
-    Looked at every few milliseconds by a thread of its own: the system keeps no record of the most.
-    """
+    def one(*x: np.ndarray) -> np.ndarray:
+        return pin.computeJointTorqueRegressor(pm, data, *x)
 
-    PERIOD = 0.005
-
-    def __init__(self) -> None:
-        self.first = self.most = 0.0
-        self._over = threading.Event()
-        self._watch = threading.Thread(target=self._look)
-
-    @property
-    def grown(self) -> float:
-        """The most, above what there was in the beginning."""
-        return self.most - self.first
-
-    def __enter__(self) -> AnonymousMemory:
-        self.first = self.most = self._now()
-        self._watch.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._watch.join()
-
-    def _look(self) -> None:
-        while not self._over.wait(self.PERIOD):
-            self.most = max(self.most, self._now())
-
-    @staticmethod
-    def _now() -> float:
-        status = Path("/proc/self/status").read_text().splitlines()
-        line = next(line for line in status if line.startswith("RssAnon"))
-        return int(line.split()[1]) / 1024.0
-
-
-def child(name: str, way: str, folder: Path, rounds: int) -> None:
-    """One contestant of ours, in a process of its own."""
-    model = robot(name)
-    q, tau = (np.load(folder / f"{k}.npy", mmap_mode="r") for k in ("q", "tau"))
-    dt = float((folder / "dt").read_text())
-    v = a = None
-    if way == "same":
-        with np.load(folder / "job.npz") as job:
-            q, v, a, tau = (job[k] for k in ("q", "v", "a", "tau"))
-
-    def identify(log: Log) -> Any:
-        if way == "same":
-            chosen = choose_processing(log, decimation=1, dead_band=0.0, edges=0.0, filtered=False)
-            return fit(model, log, "ols", processing=chosen, checked=False)
-        return fit(model, log, processing={"decimation": 1 if way == "all rows" else None})
-
-    few = slice(0, min(len(q), 20_000))
-    identify(Log(dt, q[few], tau[few], *(None if x is None else x[few] for x in (v, a))))
-    before, spent, found = memory()[0], [], None
-    with AnonymousMemory() as anonymous:
-        for _ in range(rounds):
-            clock, processor = time.perf_counter(), time.process_time()
-            found = identify(Log(dt, q, tau, v, a))
-            spent.append((time.process_time() - processor, time.perf_counter() - clock))
-    assert found is not None
-    processor, clock = np.median(spent, axis=0).tolist()
-    errors = found.validation.in_sample
-    error = errors.filtered_rmse if way == "same" else errors.rmse
-    print(json.dumps({
-        "processor": processor, "clock": clock, "rank": len(found.names),
-        "rmse": float(np.sqrt(np.mean(error**2))), "memory": memory()[0], "files": memory()[1],
-        "before": before, "anonymous": anonymous.grown,
-    }))  # fmt: skip
-
-
-def run(command: list[str]) -> Row:
-    """What a contestant says."""
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, timeout=3600, cwd=ROOT
-    )
-    said = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    if done.returncode or not said:
-        return {"failed": (done.stderr.splitlines() or ["no answer"])[-1][:200]}
-    return json.loads(said[-1])
-
-
-def rows_of(
-    work: str, name: str, folder: Path, rounds: int, peer: str, ways: list[str]
-) -> list[Row]:
-    """All contestants on one log."""
-    out = []
-    for way in ways:
-        command = [sys.executable, "-W", "ignore", "-m", MODULE, "--child", name, way, str(folder)]
-        out.append({"work": work, "name": NAMES[way], **run([*command, "--rounds", str(rounds)])})
-        print(out[-1], flush=True)
-    if peer:
-        script = str(Path(__file__).parent / "identification_figaroh.py")
-        files = [str(folder / "job.npz"), str(folder / "robot.urdf")]
-        said = run([peer, "-W", "ignore", script, *files, str(min(rounds, 3))])
-        if "skipped" in said:
-            print(f"{said['skipped']}: its entries are left out.")
-        else:
-            out.append({"work": work, "name": "FIGAROH, all rows, OLS", **said})
-            print(out[-1], flush=True)
-    return out
-
-
-NAMES = {
-    "same": "robotmodels, all rows, OLS",
-    "fit": "robotmodels, as fit does it",
-    "all rows": "robotmodels, as fit does it without decimation",
-}
-
-
-def prepared(folder: Path, name: str, dt: float) -> None:
-    """The signals that both tools are given, and the robot as URDF."""
-    q, tau = (np.load(folder / f"{k}.npy") for k in ("q", "tau"))
-    log = Log(dt, q, tau)
-    found = signals(log, choose_processing(log, decimation=1))
-    np.savez(folder / "job.npz", q=found.q, v=found.v, a=found.a, tau=found.tau)
-    (folder / "dt").write_text(repr(dt))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # rotor inertias are no part of URDF, and not needed
-        (folder / "robot.urdf").write_text(rm.to_urdf(robot(name)), encoding="utf-8")
-
-
-def report(about: dict[str, str], rows: list[Row]) -> str:
-    """The results as Markdown."""
-    lines = [
-        *head("Identification: measured side by side", about),
-        "Processor's time and clock in s; `x`: ratio of the processor's time to the first of "
-        "the same log. Memory in MB: the highest of the process, what it was before the log, and "
-        "of the pages of files at the end (libraries and memory maps). RMSE over all joints, N m: "
-        "of the rows that were fitted, for `as fit does it` of the raw torques.", "",
-        "| log | contestant | s | clock | x | rank | RMSE | memory | before | files |",
-        "|---" * 10 + "|",
+    ways = [
+        Contestant(
+            OURS, lambda: idn.fit(model, log, processing={"decimation": 1}), said=said, rounds=3
+        ),
+        Contestant(
+            "Pinocchio, the regressor alone", loop(one, found.q, found.v, found.a), rounds=3,
+            whole=False,
+        ),
     ]  # fmt: skip
-    first: dict[str, float] = {}
-    for r in rows:
-        if "failed" in r:
-            lines.append(f"| {r['work']} | {r['name']} | failed: {r['failed']} |" + " |" * 7)
-            continue
-        ratio = r["processor"] / first.setdefault(r["work"], r["processor"])
-        files = f"{r['files']:.0f}" if "files" in r else ""
-        lines.append(
-            f"| {r['work']} | {r['name']} | {r['processor']:.2f} | {r['clock']:.2f} | {ratio:.2f} "
-            f"| {r['rank']} | {r['rmse']:.4f} | {r['memory']:.0f} | {r['before']:.0f} | {files} |"
+    if settings.figaroh is not None:
+        job = settings.figaroh.robot_job(
+            model.with_drive(None), q=found.q, v=found.v, a=found.a, tau=found.tau
         )
-    return "\n".join(lines) + "\n"
+        task = settings.figaroh.task("identify", job)
+        ways.append(Contestant("FIGAROH, ordinary, of our signals", task, rounds=1))
+    yield Work(f"{title}, every row", "s", ways)
 
 
-def main() -> None:
-    """Measure, print and keep the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--figaroh-python", default="")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--child", nargs=3, default=None, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.child is not None:
-        name, way, place = given.child
-        child(name, way, Path(place), given.rounds)
-        return
-    peer = given.figaroh_python
-    if not peer:
-        print("No Python with FIGAROH was named: its entries are left out.")
-    about = machine(interpreters={"figaroh": peer})
-    rounds = 1 if given.quick else given.rounds
-    about["rounds"] = f"{rounds}, of FIGAROH {min(rounds, 3)}"
-    rows: list[Row] = []
-
-    def keep_all() -> None:
-        keep(given.out, "identification", report(about, rows), {"machine": about, "rows": rows})
-
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        data = rm.datasets.load_tx40()
-        np.save(folder / "q.npy", data.log.q)
-        np.save(folder / "tau.npy", data.log.tau)
-        prepared(folder, "tx40", data.log.dt)
-        work = f"TX40, real, {len(data.log)} x 6"
-        rows += rows_of(work, "tx40", folder, rounds, peer, ["same", "fit", "all rows"])
-        keep_all()
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        simulate(folder, "rx90", 100_000)
-        prepared(folder, "rx90", DT)
-        ways = ["same", "fit", "all rows"]
-        rows += rows_of("RX-90, simulated, 1e5 x 6", "rx90", folder, rounds, peer, ways)
-        keep_all()
-    for count in (1_000_000,) if given.quick else (1_000_000, 10_000_000):
-        with tempfile.TemporaryDirectory() as place:
-            folder = Path(place)
-            simulate(folder, "rx90", count)
-            (folder / "dt").write_text(repr(DT))
-            work = f"RX-90, simulated, {count:.0e} x 6, a memory map".replace("+0", "")
-            rows += rows_of(work, "rx90", folder, 1, "", ["fit"])
-            keep_all()
-    print(report(about, rows))
-
-
-if __name__ == "__main__":
-    main()
+WORKS = {
+    "base_parameters": base_parameters, "excitation": excitation, "least_squares": least_squares,
+}  # fmt: skip

@@ -1,301 +1,182 @@
-"""Speed of the closed-form inverse models beside their peers, in one run.
-
-    python -m benchmarks.bench_igm [--out benchmarks/results] [--rounds 15] [--slow]
-
-Contestants of a row take turns, round after round, so that a drifting machine is fair to all of
-them; the figures are medians of the processor's time in microseconds a pose. Every peer is told
-the same arm (those with arms of their own solve poses of these) and has to give back random
-postures before it enters. Peers that are not installed are named and left out (`pip install eaik
-ssik ik-geo ur-analytic-ik roboticstoolbox-python`). `--slow` adds ssik's preparation of a general
-arm of one's own, which takes minutes.
-"""
+"""Inverse geometric models: closed forms, general arms, arm angles, calibrated arms, iteration."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import pinocchio as pin
 
 import robotmodels as rm
-from benchmarks import igm_arms, igm_peers
-from benchmarks.igm_peers import Peer, peers_of
-from benchmarks.kept import RESULTS, keep
-from benchmarks.machine import head, machine
-from benchmarks.measure import Contestant, in_turns, loop
-from robotmodels.igm.known import known_arm
+from benchmarks import igm_arms
+from benchmarks.measure import Contestant, loop
+from benchmarks.peers.igm import CLOSE, NOT_EVERY_POSTURE, Peer, peers_of
+from benchmarks.works import OURS, DisagreementError, Goal, Settings, Work, at_most, module
 
-Array = NDArray[np.float64]
-
-FEW, BATCH = 200, 100_000
-THOUSAND = 1000
-STRUCTURED = ("puma560", "rx90", "irb6640", "kr6_r900", "ur5", "ur5e")
-OURS = "robotmodels"
-KERNEL = "robotmodels, kernel"
+FEW, THOUSAND = 200, 1000
+STRUCTURED = ("puma560", "ur5e")
+TOLERANCE = 1e-6  # of the iteration, m and rad
 
 
-@dataclass(frozen=True)
-class Row:
-    """A line of the table: medians in microseconds a pose, and the goals that were set."""
-
-    work: str
-    microseconds: dict[str, float]
-    goal: str
-    met: bool | None
-
-
-def medians(contestants: list[Contestant], rounds: int) -> dict[str, float]:
-    """Median of the processor's time of each contestant, microseconds."""
-    found = in_turns(contestants, rounds)
-    return {name: 1e6 * timing.processor.median for name, timing in found.items()}
-
-
-def row(work: str, us: dict[str, float], goals: dict[str, float]) -> Row:
-    """A line with its goals, each for one contestant."""
-    print(f"{work}: " + "; ".join(f"{name} {value:.2f}" for name, value in us.items()), flush=True)
-    text = ", ".join(
-        f"<= {goal:g} us" + (" in the kernel" if name == KERNEL else "")
-        for name, goal in goals.items()
-    )
-    met = all(us[name] <= goal for name, goal in goals.items()) if goals else None
-    return Row(work, us, text, met)
-
-
-def reachable(model: rm.RobotModel, count: int, seed: int = 0) -> Array:
+def reachable(model: rm.RobotModel, count: int, seed: int = 0) -> np.ndarray:
     """Poses of random postures over whole turns."""
     rng = np.random.default_rng(seed)
-    low, high = -np.pi * np.ones(model.n), np.pi * np.ones(model.n)
-    slides = model.table.sigma[model.table.joint_rows] == 1
-    low[slides], high[slides] = -0.5, 0.5
-    return rm.dgm(model, rng.uniform(low, high, (count, model.n)))
+    return rm.dgm(model, rng.uniform(-np.pi, np.pi, (count, model.n)))
 
 
-def single_peer(peer: Peer, n: int) -> Contestant:
-    """A peer on poses of its own direct model."""
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (FEW, n))
-    return Contestant(peer.name, loop(peer.solve, np.array([peer.direct(x) for x in q])), FEW)
+def agreement(model: rm.RobotModel, T: np.ndarray, peer: Peer, found: Any) -> str:
+    """A note on a peer's postures; `DisagreementError` if one of ours or of theirs is missing."""
+    own = rm.igm(model, T)
+    lost = new = beside = total = 0
+    for k, answer in enumerate(found):
+        ours, theirs = own.q[k][own.valid[k]], peer.postures(answer)
+        reach = np.array([np.abs(peer.direct(q) - T[k]).max() <= CLOSE for q in theirs], bool)
+        beside += int((~reach).sum())
+        theirs = theirs[reach]
+        total += len(theirs)
+        turn = (ours[:, None] - theirs[None] + np.pi) % (2.0 * np.pi) - np.pi
+        away = np.abs(turn).max(axis=2)
+        if peer.name not in NOT_EVERY_POSTURE:
+            lost += int((away.min(axis=1, initial=np.inf) > CLOSE).sum())
+        new += int((away.min(axis=0, initial=np.inf) > CLOSE).sum())
+    if lost or new or not total:
+        raise DisagreementError(
+            f"{peer.name} on {len(T)} poses: {total} postures, {lost} of ours are not among them, "
+            f"{new} are not among ours."
+        )
+    note = f"{total} postures of {len(T)} poses, as ours"
+    return note + (f", and {beside} that miss the pose" if beside else "")
 
 
-# --- what stands beneath rm.igm -------------------------------------------------------------------
+def alone(model: rm.RobotModel, peer: Peer) -> Contestant:
+    """A peer on poses one by one: ours, or those of the robot that it ships."""
+    q = np.random.default_rng(5).uniform(-np.pi, np.pi, (FEW, model.n))
+    poses = np.array([peer.direct(x) for x in q])
+    whole = peer.name not in NOT_EVERY_POSTURE
+    if np.abs(poses - rm.dgm(model, q)).max() < 1e-10:
+        note = agreement(model, poses, peer, [peer.solve(T) for T in poses])
+    else:
+        note = "of the robot that it ships, which is not ours"
+    return Contestant(peer.name, loop(peer.solve, poses), FEW, lambda _: note, whole=whole)
 
 
-def kernel(model: rm.RobotModel, T: Array) -> Callable[[], object] | None:
-    """The compiled plan on the poses of one call: checked, ordered and labelled postures.
-
-    None for arms that Paul's method does not serve.
-    """
-    arm = known_arm(model)
-    if arm.kernel is None:
-        return None
-    N, S, n = len(T), arm.most, model.n
-    poses, references = np.ascontiguousarray(T), np.zeros((N, n))
-    q, residual = np.empty((N, S, n)), np.empty((N, S))
-    marks = np.empty((N, 2 + 2 * S), np.int64)
-    return lambda: arm.kernel(
-        arm.instructions, arm.numbers, poses, references, 0, q, residual, marks
-    )
-
-
-# --- rows ----------------------------------------------------------------------------------------
-
-
-def structured_rows(rounds: int) -> list[Row]:
-    """All eight postures of arms with a spherical wrist, and of UR arms."""
-    rows = []
+def postures(settings: Settings) -> Iterator[Work]:
+    """All postures of arms with closed forms."""
     for name in STRUCTURED:
-        model = rm.load(name)
-        T = reachable(model, BATCH)
-        few, thousand = T[:FEW], np.ascontiguousarray(T[:THOUSAND])
-        peers = peers_of(model, name)
-        contestants = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), few), FEW)]
-        alone = kernel(model, thousand)
-        if alone is not None:
-            contestants.append(Contestant(KERNEL, alone, THOUSAND))
-        contestants += [single_peer(peer, model.n) for peer in peers]
-        us = medians(contestants, rounds)
-        goals = {OURS: 12.0} | ({KERNEL: 3.0} if alone is not None else {})
-        rows.append(row(f"{name}: all postures, one pose", us, goals))
-        for poses in (thousand, T):
-            contestants = [Contestant(OURS, lambda m=model, x=poses: rm.igm(m, x), len(poses))]
-            contestants += [
-                Contestant(f"{p.name}, batch", lambda f=p.batch, x=poses: f(x), len(poses))
-                for p in peers
-                if p.batch is not None
-            ]
-            us = medians(contestants, rounds if len(poses) < BATCH else max(rounds // 3, 3))
-            rows.append(row(f"{name}: all postures, batch of {len(poses)}", us, {OURS: 2.5}))
-    return rows
+        model, count = rm.load(name), settings.number(100_000, 10_000)
+        T, peers = reachable(model, count), peers_of(model, name)
+        one = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:FEW]), FEW)]
+        one += [alone(model, peer) for peer in peers]
+        title = f"all postures, one pose, {name}"
+        yield Work(title, "us", one, [at_most(12.0, "us")])
+        batch = [Contestant(OURS, lambda m=model, x=T: rm.igm(m, x), count)]
+        for p in peers:
+            if p.batch is not None:
+                note = agreement(model, T[:FEW], p, p.batch(T[:FEW]))
+                run = p.batch
+                batch.append(
+                    Contestant(p.name, lambda f=run, x=T: f(x), count, lambda _, n=note: n)
+                )
+        title = f"all postures, batch of {count} poses, {name}"
+        yield Work(title, "us", batch, [at_most(2.5, "us")])
 
 
-def general_rows(rounds: int, slow: bool) -> list[Row]:
-    """Up to sixteen postures of arms without a closed form."""
-    rows = []
+def general(settings: Settings) -> Iterator[Work]:
+    """Arms without a closed form, a new one, arm angles, a calibrated arm."""
+    count = settings.number(THOUSAND, FEW)
     arms = {
         "crx10ia": rm.load("crx10ia"),
-        "xarm6": rm.load("xarm6"),
-        "Manocha and Canny's arm": igm_arms.manocha_canny(),
-        "a random 6R arm": igm_arms.random_arm(0),
+        "a random 6R": igm_arms.random_arm(0),
+        "a calibrated Puma": igm_arms.calibrated(
+            rm.load("puma560"), 1e-3, 2e-3, np.random.default_rng(0)
+        ),
     }
     for name, model in arms.items():
-        T = reachable(model, THOUSAND)
-        contestants = [
-            Contestant(f"{OURS}, batch of {THOUSAND}", lambda m=model, x=T: rm.igm(m, x), THOUSAND),
-            Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:FEW]), FEW),
-        ]
-        contestants += [single_peer(peer, model.n) for peer in peers_of(model, name)]
-        us = medians(contestants, max(rounds // 3, 3))
-        goals = {f"{OURS}, batch of {THOUSAND}": 450.0}
-        rows.append(row(f"{name}: up to 16 postures", us, goals))
+        T = reachable(model, count)
+        batch = [Contestant(OURS, lambda m=model, x=T: rm.igm(m, x), count)]
+        yield Work(f"up to 16 postures, batch, {name}", "us", batch, [at_most(450.0, "us")])
+        one = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:20]), 20)]
+        one += [alone(model, peer) for peer in peers_of(model, name)]
+        yield Work(f"up to 16 postures, one pose, {name}", "us", one)
     fresh = (igm_arms.random_arm(seed) for seed in range(1000, 2000))
 
     def new_robot() -> None:
         model = next(fresh)
-        rm.igm(model, igm_peers.model_pose(model))
+        rm.igm(model, rm.dgm(model, np.linspace(0.3, 1.1, model.n)))
 
-    contestants = [Contestant(OURS, new_robot, 1)]
-    if slow and igm_peers.module("ssik") is not None:
-        model = igm_arms.random_arm(999)
-
-        def theirs() -> None:
-            arm = igm_peers.ssik_arm(model)
-            arm.prepare()
-            arm.solve(igm_peers.model_pose(model), **igm_peers.SSIK)
-
-        contestants.append(Contestant("ssik, own robot", theirs, 1, rounds=1))
-    us = medians(contestants, max(rounds // 3, 3))
-    rows.append(row("a new general 6R arm: the first call, preparation included", us, {OURS: 2e6}))
-    return rows
+    work = "general 6R, a new robot: preparation and first pose"
+    yield Work(work, "s", [Contestant(OURS, new_robot)], [at_most(2.0, "s")])
+    arm, angles = rm.load("iiwa14"), np.linspace(-np.pi, np.pi, 16, endpoint=False)
+    T = reachable(arm, count)
+    many = Contestant(OURS, lambda: rm.igm(arm, T, arm_angle=angles), 16 * count)
+    work = "iiwa14: eight postures for one arm angle, batch"
+    yield Work(work, "us", [many], [at_most(5.0, "us")])
 
 
-def arm_angle_rows(rounds: int) -> list[Row]:
-    """S-R-S arms: the eight postures for each arm angle."""
-    model = rm.load("iiwa14")
-    T = reachable(model, THOUSAND)
-    angles = np.linspace(-np.pi, np.pi, 16, endpoint=False)
-    contestants = [
+def numeric(settings: Settings) -> Iterator[Work]:
+    """One posture by iteration to 1e-6 m and rad, its claims checked by the direct model."""
+    model, count = rm.load("puma560"), settings.number(2000, 200)
+    rng = np.random.default_rng(0)
+    poses = rm.dgm(model, rng.uniform(model.lower, model.upper, (count, model.n)))
+    few = poses[: count // 4]
+
+    def ours() -> tuple[np.ndarray, np.ndarray]:
+        found = rm.igm_numeric(model, poses)
+        return found.closest, found.valid[:, 0]
+
+    ways = [Contestant(OURS, ours, count, lambda answer: verdict(model, poses, answer))]
+    ways.append(
         Contestant(
-            f"{OURS}, {THOUSAND} poses x 16 angles",
-            lambda: rm.igm(model, T, arm_angle=angles), 16 * THOUSAND,
-        ),
-        Contestant(
-            f"{OURS}, one pose x 16 angles",
-            loop(lambda x: rm.igm(model, x, arm_angle=angles), T[:FEW]), 16 * FEW,
-        ),
-        Contestant(
-            f"{OURS}, one pose, one angle",
-            loop(lambda x: rm.igm(model, x, arm_angle=0.3), T[:FEW]), FEW,
-        ),
-    ]  # fmt: skip
-    peer = igm_peers.module("ssik")
-    if peer is not None:
-        arm = peer.Manipulator.from_prebuilt("iiwa14")
-        poses = T[:FEW]
-        found = np.median([len(arm.solve(x, **igm_peers.SSIK)) for x in poses[:20]])
-        contestants.append(
-            Contestant(
-                f"ssik, prebuilt, one pose, {found:.0f} postures",
-                loop(lambda x: arm.solve(x, **igm_peers.SSIK), poses),
-                FEW * max(round(found / 8), 1),
-            )
+            "Pinocchio CLIK, a loop", lambda: clik(model, few), len(few),
+            lambda answer: verdict(model, few, answer),
         )
-    us = medians(contestants, rounds)
-    goals = {f"{OURS}, {THOUSAND} poses x 16 angles": 5.0}
-    return [row("iiwa14: eight postures for one arm angle", us, goals)]
+    )  # fmt: skip
+    if module("roboticstoolbox-python") is not None:
+        from roboticstoolbox import models
 
-
-def other_rows(rounds: int) -> list[Row]:
-    """Calibrated neighbours of structured arms, and arms of five and three joints."""
-    rows = []
-    for name in ("puma560", "ur5e"):
-        model = igm_arms.calibrated(rm.load(name), 1e-3, 2e-3, np.random.default_rng(0))
-        T = reachable(model, THOUSAND)
-        contestants = _both(model, T)
-        contestants += [single_peer(peer, model.n) for peer in peers_of(model)]
-        us = medians(contestants, max(rounds // 3, 3))
-        rows.append(row(f"{name}, calibrated (1 mm, 2 mrad off)", us, {}))
-    arms = {
-        "xarm5": rm.load("xarm5"),
-        "the first five joints of the rx90": igm_arms.first_joints(rm.load("rx90"), 5),
-        "the first three joints of the puma560": igm_arms.first_joints(rm.load("puma560"), 3),
-        "the laboratory's TRR": rm.load("lab_trr"),
-    }
-    for name, model in arms.items():
-        T = reachable(model, THOUSAND)
-        contestants = _both(model, T)
-        peers = peers_of(model, name)
-        contestants += [single_peer(peer, model.n) for peer in peers]
-        us = medians(contestants, max(rounds // 3, 3))
-        rows.append(row(f"{name}: all postures", us, {}))
-    return rows
-
-
-def _both(model: rm.RobotModel, T: Array) -> list[Contestant]:
-    return [
-        Contestant(OURS, loop(lambda x: rm.igm(model, x), T[:FEW]), FEW),
-        Contestant(f"{OURS}, batch of {len(T)}", lambda: rm.igm(model, T), len(T)),
-    ]
-
-
-# --- report --------------------------------------------------------------------------------------
-
-
-def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
-    """The results as Markdown, with ratios to ours."""
-    lines = [
-        *head("Closed-form inverse models: measured side by side", about),
-        f"Medians of {rounds} rounds (fewer for the long rows) in us a pose, one thread; in "
-        "brackets the ratio to ours, the first of the row. Poses are those of random postures "
-        "over whole turns; EAIK's batches are asked of one thread; ssik is asked for every branch "
-        "once, without limits; `prebuilt` arms are ssik's own, with its native code. `kernel` is "
-        "the compiled plan alone, per pose of a call with 1000, without Python between.",
-        "",
-        "| work | ours | ours otherwise | others | goal | met |",
-        "|---|---|---|---|---|---|",
-    ]
-    for r in rows:
-        names = list(r.microseconds)
-        first = r.microseconds[names[0]]
-        own = [name for name in names[1:] if name.startswith(OURS)]
-        otherwise = "; ".join(f"{_short(name)} {r.microseconds[name]:.2f}" for name in own)
-        others = "; ".join(
-            f"{name} {r.microseconds[name]:.1f} ({r.microseconds[name] / first:.1f}x)"
-            for name in names
-            if not name.startswith(OURS)
-        )
-        met = "" if r.met is None else ("yes" if r.met else "no")
-        label = _short(names[0])
-        ours = f"{first:.2f}" + ("" if names[0] == OURS else f" ({label})")
-        lines.append(f"| {r.work} | {ours} | {otherwise} | {others} | {r.goal} | {met} |")
-    return "\n".join(lines) + "\n"
-
-
-def _short(name: str) -> str:
-    return name.removeprefix(OURS).removeprefix(", ") or "one by one"
-
-
-def main() -> None:
-    """Measure, print and keep the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--rounds", type=int, default=15)
-    parser.add_argument(
-        "--slow", action="store_true", help="minutes of ssik for a robot of one's own"
+        ets, q = models.DH.Puma560().ets(), rng.uniform(model.lower, model.upper, (FEW, model.n))
+        for tolerance in (1e-6, 5e-13):  # its default, and half the square of ours
+            run = loop(lambda T, e=ets, t=tolerance: e.ik_LM(T, tol=t), [ets.eval(x) for x in q])
+            whole = tolerance < 1e-6
+            ways.append(Contestant(f"RTB ik_LM, tol={tolerance:g}", run, FEW, whole=whole))
+    sound = Goal(
+        ">= 99.5 % reached, no false claim",
+        lambda t: float(t[0].note.split()[0]) >= 99.5 and float(t[0].note.split()[3]) == 0.0,
     )
-    arguments = parser.parse_args()
-    missing = igm_peers.absent()
-    if missing:
-        print(f"Not installed, so left out: {', '.join(missing)}.")
-    about = machine(igm_peers.PACKAGES)
-    rows = structured_rows(arguments.rounds)
-    rows += general_rows(arguments.rounds, arguments.slow)
-    rows += arm_angle_rows(arguments.rounds) + other_rows(arguments.rounds)
-    text = report(rows, about, arguments.rounds)
-    print(text)
-    keep(arguments.out, "igm", text, {"machine": about, "rows": [asdict(r) for r in rows]})
+    goals = [at_most(120.0, "us"), sound]
+    yield Work("numeric inverse, one solution, Puma 560, batch", "us", ways, goals)
 
 
-if __name__ == "__main__":
-    main()
+def verdict(model: rm.RobotModel, T: np.ndarray, answer: tuple[np.ndarray, np.ndarray]) -> str:
+    """Shares that were reached, and that were claimed and are not met."""
+    q, claims = answer
+    off = np.array([pin.log6(pin.SE3(a).actInv(pin.SE3(b))).vector for a, b in zip(
+        rm.dgm(model, q), T, strict=True)])  # fmt: skip
+    met = np.abs(off).max(axis=1) <= 1.1 * TOLERANCE
+    return (
+        f"{100 * (claims & met).mean():.2f} % reached, {100 * (claims & ~met).mean():.2f} % false"
+    )
+
+
+def clik(model: rm.RobotModel, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pinocchio's closed-loop inverse kinematics as in its examples, from mid-range."""
+    pm, data = model.pin_model, model.pin_model.createData()
+    tip = pm.getFrameId("tool", pin.FrameType.BODY)
+    found, claims = np.empty((len(poses), model.n)), np.zeros(len(poses), bool)
+    for i, T in enumerate(poses):
+        q = 0.5 * (model.lower + model.upper)
+        for _ in range(200):
+            pin.forwardKinematics(pm, data, q)
+            inverse = pin.updateFramePlacement(pm, data, tip).actInv(pin.SE3(T))
+            error = pin.log6(inverse).vector
+            if np.linalg.norm(error[:3]) < TOLERANCE and np.linalg.norm(error[3:]) < TOLERANCE:
+                claims[i] = True
+                break
+            J = -pin.Jlog6(inverse.inverse()) @ pin.computeFrameJacobian(pm, data, q, tip)
+            q = q - J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), error)
+        found[i] = q
+    return found, claims
+
+
+WORKS = {"postures": postures, "general": general, "numeric": numeric}

@@ -1,50 +1,21 @@
-"""Speed of robots with loops beside Pinocchio called from Python, in one run.
-
-    python -m benchmarks.bench_loops [--out benchmarks/results] [--rounds 15]
-
-Contestants of a row take turns. Pinocchio's direct model runs bare, with the settings of
-ours and with twenty proximal iterations; its closing is the Newton iteration that users write.
-toolbox-parallel-robots needs Pinocchio's CasADi bindings, which the wheel does not have.
-"""
+"""Robots with loops beside Pinocchio called from Python."""
 
 from __future__ import annotations
 
-import argparse
-import importlib.util
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 import robotmodels as rm
-from benchmarks.kept import RESULTS, keep
-from benchmarks.machine import head, machine
-from benchmarks.measure import Contestant, in_turns
+from benchmarks.measure import Contestant
+from benchmarks.works import OURS, Goal, Settings, Work, at_most
 from robotmodels import loops
 from robotmodels.loops.engine import engine_of
 
 Array = NDArray[np.float64]
-OURS, POSTURES, CALLS, FEW = "robotmodels", 10_000, 500, 100
-PEER = "toolbox_parallel_robots"
-
-
-@dataclass
-class Row:
-    """A line of the table: medians in microseconds, and the goal that was set."""
-
-    work: str
-    microseconds: dict[str, float]
-    goal: str
-
-
-def measure(work: str, contestants: list[Contestant], rounds: int, goal: str = "") -> Row:
-    """Time the contestants of a row, taking turns."""
-    found = {name: t.processor.times(1e6) for name, t in in_turns(contestants, rounds).items()}
-    median = {name: spread.median for name, spread in found.items()}
-    print(f"{work}: " + "; ".join(f"{name} {value:.2f} us" for name, value in median.items()))
-    return Row(work, median, goal)
+POSTURES, CALLS, FEW = 10_000, 500, 100
 
 
 def planar(rows: list[dict], frames: tuple[int, int], actuated: list[int]) -> loops.LoopedRobot:
@@ -74,8 +45,9 @@ def robots() -> dict[str, tuple[loops.LoopedRobot, Array]]:
     }
 
 
-def closing_row(robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
+def closing(settings: Settings) -> Iterator[Work]:
     """Postures of a four-bar at positions of its crank within a radian."""
+    robot, q = robots()["four-bar"]
     angles = q[0] + np.random.default_rng(0).uniform(-1.0, 1.0, (POSTURES, 1))
     engine, passive = engine_of(robot), robot.passive
     model, data, constraints = engine.model, engine.data, engine.models
@@ -94,57 +66,39 @@ def closing_row(robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
                 J = pin.getConstraintsJacobian(model, data, constraints, engine.datas)
                 x[passive] -= np.linalg.lstsq(-J[:, engine.back][:, passive], e, rcond=None)[0]
 
-    contestants = [
+    ways = [
         Contestant(OURS, lambda: loops.close(robot, angles, q), POSTURES),
         Contestant("Pinocchio, Newton in Python", by_hand, FEW, rounds=3),
     ]
-    return measure("close a four-bar", contestants, rounds, "1e4 postures <= 20 ms: 2 us each")
+    yield Work("closing a four-bar, batch", "us", ways, [at_most(2.0, "us")])
 
 
-def direct_row(name: str, robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
-    """The direct model, one sample a call and in a batch."""
-    v_a, tau = np.random.default_rng(0).normal(size=(2, len(robot.actuated)))
-    v = loops.velocity_map(robot, q) @ v_a
-    engine = engine_of(robot)
-    full = np.zeros(robot.n)
-    full[robot.actuated] = tau
-    given = (engine.model, engine.data, *(x[engine.order] for x in (q, v, full)))
-    finer = pin.ProximalSettings(1e-14, 1e-10, 20)
+def direct(settings: Settings) -> Iterator[Work]:
+    """The direct dynamic model, one sample a call and in a batch."""
+    for name, (robot, q) in robots().items():
+        v_a, tau = np.random.default_rng(0).normal(size=(2, len(robot.actuated)))
+        v = loops.velocity_map(robot, q) @ v_a
+        engine = engine_of(robot)
+        full = np.zeros(robot.n)
+        full[robot.actuated] = tau
+        given = (engine.model, engine.data, *(x[engine.order] for x in (q, v, full)))
 
-    def bare(settings: pin.ProximalSettings) -> None:
-        for _ in range(CALLS):
-            pin.constraintDynamics(*given, engine.models, engine.datas, settings)
+        def bare(e: object = engine, g: tuple = given) -> None:
+            for _ in range(CALLS):
+                pin.constraintDynamics(*g, e.models, e.datas, e.settings)  # type: ignore[attr-defined]
 
-    contestants = [
-        Contestant(OURS, lambda: [loops.ddm(robot, q, v, tau) for _ in range(CALLS)], CALLS),
-        Contestant("Pinocchio, same settings", lambda: bare(engine.settings), CALLS),
-        Contestant("Pinocchio, 20 iterations", lambda: bare(finer), CALLS),
-        Contestant(
-            f"{OURS}, batch",
-            lambda: loops.ddm(robot, np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau), CALLS,
-        ),
-    ]  # fmt: skip
-    return measure(f"direct model, {name}", contestants, rounds, "<= 1.3 of Pinocchio, bare")
+        def ours(r: loops.LoopedRobot = robot, x: tuple = (q, v, tau)) -> None:
+            for _ in range(CALLS):
+                loops.ddm(r, *x)
 
-
-def main() -> None:
-    """Measure, print and keep the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--rounds", type=int, default=15)
-    given = parser.parse_args()
-    about = machine(["pin"])
-    if importlib.util.find_spec(PEER) is None:
-        print(f"left out: {PEER}, which is not installed")
-    rows = [closing_row(*robots()["four-bar"], given.rounds)]
-    rows += [direct_row(name, *robot, given.rounds) for name, robot in robots().items()]
-    text = [*head("Kinematic loops: measured side by side", about), "| us each | goal | medians |"]
-    text.append("|---|---|---|")
-    for row in rows:
-        medians = "; ".join(f"{name} {value:.2f}" for name, value in row.microseconds.items())
-        text.append(f"| {row.work} | {row.goal} | {medians} |")
-    keep(given.out, "loops", "\n".join(text) + "\n", [asdict(row) for row in rows])
+        near = Goal(
+            "<= 1.3 x Pinocchio", lambda t: t[0].processor.median <= 1.3 * t[1].processor.median
+        )
+        ways = [Contestant(OURS, ours, CALLS), Contestant("Pinocchio, bare", bare, CALLS)]
+        yield Work(f"direct dynamic model, {name}, one call", "us", ways, [near])
+        many = np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau
+        batch = [Contestant(OURS, lambda r=robot, x=many: loops.ddm(r, *x), CALLS)]
+        yield Work(f"direct dynamic model, {name}, batch", "us", batch)
 
 
-if __name__ == "__main__":
-    main()
+WORKS = {"closing": closing, "direct": direct}

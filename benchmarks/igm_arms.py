@@ -71,19 +71,6 @@ def random_arm(seed: int) -> rm.RobotModel:
     return from_classical(list(zip(a.tolist(), d.tolist(), alpha.tolist(), strict=True)))
 
 
-def first_joints(model: rm.RobotModel, count: int) -> rm.RobotModel:
-    """The first joints of an arm, with a tool off the last axis."""
-    table = model.table
-    part = slice(0, count)
-    short = rm.DHTable(
-        antecedent=table.antecedent[part], sigma=table.sigma[part], alpha=table.alpha[part],
-        d=table.d[part], theta=table.theta[part], r=table.r[part],
-    )  # fmt: skip
-    tool = np.eye(4)
-    tool[:3, 3] = 0.3, 0.05, 0.1
-    return rm.RobotModel.from_table(short, tool=tool)
-
-
 def calibrated(
     model: rm.RobotModel, metres: float, radians: float, rng: np.random.Generator
 ) -> rm.RobotModel:

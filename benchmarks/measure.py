@@ -25,9 +25,9 @@ class Spent:
 class Contestant:
     """One way to do the work of a row.
 
-    ``run`` does it ``count`` times; what it returns is `Spent` where another process timed it.
-    ``said`` tells of an answer what is worth a note. ``rounds`` limits the rounds of what is slow;
-    with 1 there is no run before the first round either.
+    ``run`` does it ``count`` times; it returns `Spent` where another process timed it. ``said``
+    makes a note of an answer. ``rounds`` limits the rounds of slow ones; with 1 there is no run
+    before the first round either. ``whole`` is False for a part of the work.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Contestant:
     count: int = 1
     said: Callable[[Any], str] = lambda _: ""
     rounds: int | None = None
+    whole: bool = True
 
 
 @dataclass(frozen=True, slots=True)

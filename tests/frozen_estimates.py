@@ -274,7 +274,7 @@ METHODS = ("wls", "wls shrunk", "iv", "didim")
 
 
 class Study:
-    """Noisy logs of an RX-90 with known parameters: the study of `accuracy_identification`.
+    """Noisy logs of an RX-90 with known parameters.
 
     Motion, controller and friction at rest are numbers of the file, so that a search for exciting
     trajectories or controllers may change; noise has seeds.

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
-from benchmarks import igm_peers, machine, readme_tables
-from benchmarks.machine import BUSY
+from benchmarks import machine, readme_tables, works
+from benchmarks.__main__ import ROOMS, main
+from benchmarks.bench_igm import agreement
 from benchmarks.measure import Contestant, Spent, in_turns
-from benchmarks.side_by_side import agreement, report, works
-from benchmarks.side_by_side.works import Entry, Tool, Work, at_most
+from benchmarks.peers.igm import Peer
 
 pytestmark = pytest.mark.nightly
 
@@ -34,7 +34,9 @@ def run(*words, cwd=ROOT):
 
 WITHOUT_PEERS = """
 import sys
-for name in ("roboticstoolbox", "eaik", "ssik", "ik_geo", "ruckig", "figaroh", "pybotics"):
+from benchmarks import one_thread
+from benchmarks.works import PACKAGES
+for name in PACKAGES.values():
     sys.modules[name] = None  # the import fails
 import runpy
 sys.argv = ["benchmarks", "--quick", "--only", "pose", "jacobian", "--out", sys.argv[1]]
@@ -45,39 +47,47 @@ runpy.run_module("benchmarks", run_name="__main__")
 def test_one_command_runs_without_any_peer(tmp_path):
     done = run("-c", WITHOUT_PEERS, str(tmp_path))
     assert done.returncode == 0, done.stderr
-    left_out = [line for line in done.stdout.splitlines() if line.startswith("left out:")]
-    peers = {tool.value for tool in Tool} - {"robotmodels", "Pinocchio"}
-    assert {name for name in peers if any(name in line for line in left_out)} == peers
-    assert len(left_out) == len(peers)
     kept = json.loads((tmp_path / "peers.json").read_text())
-    assert [row["row"] for row in kept["rows"]] == ["pose", "jacobian"]
+    assert {*works.PACKAGES} <= {*kept["absent"]}
+    assert len(kept["absent"]) == len(works.PACKAGES) + 2
+    assert len(kept["rows"]) == 4
     for row in kept["rows"]:
-        assert [(e["tool"], e["mode"]) for e in row["entries"]] == [
-            ("robotmodels", "batch"), ("robotmodels", "one by one"), ("Pinocchio", "one by one"),
-        ]  # fmt: skip
-        assert list(row["ratios"]) == ["one by one"]  # nobody else is here with a batch
-        for e in row["entries"]:
-            assert 0.0 < e["least"] <= e["median"] <= e["most"]
-            assert e["rounds"] == 3
-        (goal,) = row["goals"]
-        assert goal["text"].startswith("<= 0.")
-        assert goal["met"] in (True, False)
+        assert row["ways"][0]["name"] == works.OURS
+        for w in row["ways"]:
+            assert 0.0 < w["least"] <= w["median"] <= w["most"]
+            assert w["rounds"] == 3
+        assert (row["ratio"] is None) is (len(row["ways"]) == 1)
+        assert all(goal["met"] in (True, False) for goal in row["goals"])
     facts = kept["machine"]
     assert {"cpu", "python", "numpy", "load"} <= set(facts)
     assert facts["run"].startswith("quick")
-    busy = float(facts["load"].split()[0]) > BUSY
-    assert ("warning" in facts) is busy
-    assert ("warning: others were at work" in done.stderr) is busy
-    text = (tmp_path / "peers.md").read_text()
-    assert text in done.stdout
-    assert len([line for line in text.splitlines() if line.startswith("| pose")]) == 4
+    assert (tmp_path / "peers.md").read_text() in done.stdout
 
 
-def test_a_row_that_is_not_known_is_refused():
-    done = run("-m", "benchmarks", "--only", "poses")
-    assert done.returncode == 2
-    assert "'poses'" in done.stderr
-    assert "inverse_dynamics" in done.stderr
+def test_unknown_works_and_busy_machines_are_refused(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--only", "pozes"])
+    with pytest.raises(SystemExit) as refused:
+        main()
+    assert refused.value.code == 2
+    told = capsys.readouterr().err
+    assert "'pozes'" in told
+    assert "inverse_dynamics" in told
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--only", "pose"])
+    monkeypatch.setattr(os, "getloadavg", lambda: (5.0, 0.0, 0.0), raising=False)
+    with pytest.raises(SystemExit, match=r"load 5\.0"):
+        main()
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_works_of_a_room_are_made(room):
+    """Of each function the first work, and what is ours in it."""
+    settings = works.Settings(rounds=1, budget=0.0, quick=True)
+    for make in works.works_of(room).values():
+        if make.__name__ in ("planned", "excitation", "maps"):
+            continue  # seconds each
+        work = next(make(settings))
+        assert work.contestants[0].name == works.OURS
+        work.contestants[0].run()
 
 
 # --- measuring -----------------------------------------------------------------------------------
@@ -116,32 +126,22 @@ def test_two_of_one_name_are_refused():
 
 @pytest.mark.parametrize(("limit", "met"), [(2.1, True), (1.9, False)])
 def test_goals_and_ratios(limit, met):
-    entries = [
-        Entry(Tool.OURS, "", lambda: Spent(2e-6, 2e-6), mode="batch"),
-        Entry(Tool.RTB, "", lambda: Spent(5e-6, 5e-6), mode="batch"),
-        Entry(Tool.EAIK, "", lambda: Spent(3e-6, 3e-6), mode="batch"),
-        Entry(Tool.SSIK, "a part", lambda: Spent(1e-6, 1e-6), mode="batch", whole=False),
+    ways = [
+        Contestant(works.OURS, lambda: Spent(2e-6, 2e-6)),
+        Contestant("RTB", lambda: Spent(5e-6, 5e-6)),
+        Contestant("EAIK", lambda: Spent(3e-6, 3e-6)),
+        Contestant("a part", lambda: Spent(1e-6, 1e-6), whole=False),
     ]
-    work = Work("some", "some work", "us", entries, [at_most(limit, "us", "batch")])
-    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
+    work = works.Work("some work", "us", ways, [works.at_most(limit, "us")])
+    row = work.measured(works.Settings(rounds=3))
     assert row["goals"] == [{"text": f"<= {limit:g} us", "met": met}]
-    assert [round(e["median"], 9) for e in row["entries"]] == [2.0, 5.0, 3.0, 1.0]
-    assert row["ratios"] == {"batch": pytest.approx(1.5)}
-    line = report.compact([row])[-1]
-    cells = [cell.strip() for cell in line.split("|")[1:-1]]
-    assert cells[:3] == ["some work", "us", "2.00 batch"]
-    told = f"<= {limit:g} us, {'met' if met else 'not met'}"
-    assert cells[-2:] == ["1.50 batch", told]
-    facts = {"cpu": "some", "python": "3", "load": "0.3 on 2 cores", "run": "full"}
-    lines = readme_tables.speed({"machine": facts, "rows": [row], "absent": []})
-    assert lines[-1].endswith(f"| 1.50 (batch) | {told} |")
-    assert "load 0.3 on 2 cores; run: full." in lines[0]
-    busy = readme_tables.speed(
-        {"machine": {**facts, "warning": "too busy"}, "rows": [row], "absent": ["x"]}
-    )
-    assert "load 0.3 on 2 cores, **too busy**; run: full." in busy[0]
-    assert busy[0].endswith("Left out: x.")
-    assert "Left out" not in lines[0]
+    assert [round(w["median"], 9) for w in row["ways"]] == [2.0, 5.0, 3.0, 1.0]
+    assert row["ratio"] == pytest.approx(1.5)
+    told = "RTB 5.00; EAIK 3.00; (a part 1.00)"
+    goal = f"<= {limit:g} us, {'met' if met else 'not met'}"
+    assert works.cells(row) == ["some work", "2.00 us", told, "1.50", goal]
+    facts = {"cpu": "some", "python": "3"}
+    assert f"| some work | 2.00 us | {told} | 1.50 | {goal} |" in works.markdown(facts, [row], [])
 
 
 @pytest.mark.parametrize(("others", "warned"), [(0.9, False), (1.1, True)])
@@ -150,45 +150,18 @@ def test_a_busy_machine_is_warned_of(others, warned, monkeypatch):
     assert bool(machine.too_busy()) is warned
 
 
-def test_only_like_is_set_in_ratio_with_like():
-    entries = [
-        Entry(Tool.OURS, "", lambda: Spent(2e-6, 2e-6), mode="batch"),
-        Entry(Tool.OURS, "", lambda: Spent(8e-6, 8e-6), mode="one by one"),
-        Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6), mode="kernel"),
-        Entry(Tool.RTB, "", lambda: Spent(4e-6, 4e-6), mode="one by one"),
-        Entry(Tool.EAIK, "", lambda: Spent(6e-6, 6e-6), mode="batch"),
-        Entry(Tool.FIGAROH, "", lambda: Spent(6e-6, 6e-6), mode="every row"),
-    ]
-    work = Work("some", "some work", "us", entries)
-    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
-    assert row["ratios"] == {"batch": pytest.approx(3.0), "one by one": pytest.approx(0.5)}
-    assert [e["ratio"] for e in row["entries"]] == [1.0, 1.0, 1.0, 0.5, pytest.approx(3.0), None]
-    facts = {"cpu": "some", "python": "3", "load": "none", "run": "full"}
-    line = readme_tables.speed({"machine": facts, "rows": [row], "absent": []})[-1]
-    assert "| 3.00 (batch); 0.50 (one by one) |" in line
-    assert "RTB 4.00 us (one by one); EAIK 6.00 us (batch)" in line
-    with pytest.raises(ValueError, match="one mode"):
-        Work("some", "some work", "us", [entries[0], entries[0]])
-
-
-def test_work_without_goal_is_neither_met_nor_missed():
-    work = Work("some", "some work", "us", [Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6))])
-    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
-    assert report.compact([row])[-1].endswith("|  |  |")
-
-
 # --- both sides computed the same ----------------------------------------------------------------
 
 
 def test_arrays_that_differ_end_the_run():
     ours = np.array([[1.0, 20.0], [3.0, 4.0]])
-    assert agreement.same("pose", ours, ours + 1e-12)(None) == "as ours to 5e-14 on 2"
-    with pytest.raises(agreement.DisagreementError, match=r"pose differs from ours by 5\.0e-06"):
-        agreement.same("pose", ours, ours + 1e-4)
-    with pytest.raises(agreement.DisagreementError, match="differs"):
-        agreement.same("pose", ours, ours * np.nan)
-    with pytest.raises(agreement.DisagreementError, match="shape"):
-        agreement.same("pose", ours, ours[:1])
+    assert works.same("pose", ours, ours + 1e-12)(None) == "equal to 5e-14"
+    with pytest.raises(works.DisagreementError, match=r"pose differs from ours by 5\.0e-06"):
+        works.same("pose", ours, ours + 1e-4)
+    with pytest.raises(works.DisagreementError, match="differs"):
+        works.same("pose", ours, ours * np.nan)
+    with pytest.raises(works.DisagreementError, match="shape"):
+        works.same("pose", ours, ours[:1])
 
 
 def test_postures_that_differ_end_the_run():
@@ -196,24 +169,20 @@ def test_postures_that_differ_end_the_run():
     T = rm.dgm(arm, np.random.default_rng(0).uniform(-2.0, 2.0, (5, 6)))
     all_of = [rm.igm(arm, x) for x in T]
     rows = [found.q[found.valid] for found in all_of]
-    peer = igm_peers.Peer("some", lambda x: x, lambda x: x, lambda q: rm.dgm(arm, q))
-    assert agreement.same_robot(arm, peer)
-    moved = igm_peers.Peer("some", peer.solve, peer.postures, lambda q: rm.dgm(arm, q) @ T[0])
-    assert not agreement.same_robot(arm, moved)
+    peer = Peer("some", lambda x: x, lambda x: x, lambda q: rm.dgm(arm, q))
     total = sum(map(len, rows))
-    told = agreement.same_postures("some", arm, T, peer, rows)
-    assert told.startswith(f"{total} postures of 5 poses, as ours to ")
+    assert agreement(arm, T, peer, rows) == f"{total} postures of 5 poses, as ours"
     turned = [q + 2.0 * np.pi for q in rows]
-    assert f"{total} postures" in agreement.same_postures("some", arm, T, peer, turned)
+    assert f"{total} postures" in agreement(arm, T, peer, turned)
     astray = [np.vstack([rows[0], np.zeros(6)]), *rows[1:]]
-    assert "1 that miss the pose" in agreement.same_postures("some", arm, T, peer, astray)
+    assert "1 that miss the pose" in agreement(arm, T, peer, astray)
     fewer = [rows[0][:-1], *rows[1:]]
-    with pytest.raises(agreement.DisagreementError, match="1 of ours are not among them"):
-        agreement.same_postures("some", arm, T, peer, fewer)
-    one_each = [q[:1] for q in rows]
-    assert "5 postures" in agreement.same_postures("some", arm, T, peer, one_each, every=False)
-    with pytest.raises(agreement.DisagreementError, match="0 postures"):
-        agreement.same_postures("some", arm, T, peer, [np.empty((0, 6))] * 5, every=False)
+    with pytest.raises(works.DisagreementError, match="1 of ours are not among them"):
+        agreement(arm, T, peer, fewer)
+    one = Peer("RTB ikine_a, 1 posture", peer.solve, peer.postures, peer.direct)
+    assert "5 postures" in agreement(arm, T, one, [q[:1] for q in rows])
+    with pytest.raises(works.DisagreementError, match="0 postures"):
+        agreement(arm, T, one, [np.empty((0, 6))] * 5)
 
 
 # --- tables of the pages ------------------------------------------------------------------------

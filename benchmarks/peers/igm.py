@@ -1,34 +1,24 @@
-"""The peers of the inverse benchmarks: the same arm told to each of them in its own language.
+"""Other programs that solve inverse geometric models: one arm in the terms of each.
 
-`peers_of(model)` gives those that are installed and know the family of the arm; the others are
-named by `absent()`. Each is checked when it is made: it has to give back random postures of the
-robot's own direct model, or it does not enter.
+`peers_of(model)` gives those that are installed and know the family of the arm. Each has to give
+back random postures of its own direct model, or it is left out.
 """
 
 from __future__ import annotations
 
-import importlib
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import robotmodels as rm
+from benchmarks.works import module
 from robotmodels.igm.loop import joint_chain
 
 Array = NDArray[np.float64]
 
-PACKAGES = {
-    "eaik": "eaik",
-    "ssik": "ssik",
-    "ik-geo": "ik_geo",
-    "ur-analytic-ik": "ur_analytic_ik_ext",
-    "roboticstoolbox-python": "roboticstoolbox",
-}
 CHECKS = 20
 CLOSE = 1e-6  # postures as near as this in every joint are the same [rad]
 PREBUILT = {
@@ -40,7 +30,6 @@ PREBUILT = {
     "xarm6": "xarm6",
     "iiwa14": "iiwa14",
 }
-UNIVERSAL = ("ur3e", "ur5", "ur5e", "ur10e", "ur16e")
 
 
 @dataclass(frozen=True)
@@ -59,21 +48,6 @@ class Peer:
     batch: Callable[[Array], list] | None = None
 
 
-def module(package: str) -> ModuleType | None:
-    """A peer's module, None where it is not installed."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return importlib.import_module(PACKAGES[package])
-    except ImportError:
-        return None
-
-
-def absent() -> list[str]:
-    """Peers that are not installed."""
-    return [package for package in PACKAGES if module(package) is None]
-
-
 def frames_at_zero(model: rm.RobotModel) -> Array:
     """Frames of the joints and of the tool in the world at q = 0, shape (n + 1, 4, 4)."""
     chain = joint_chain(model)
@@ -88,7 +62,7 @@ def frames_at_zero(model: rm.RobotModel) -> Array:
 def peers_of(model: rm.RobotModel, name: str = "") -> list[Peer]:
     """Peers that solve this arm; ``name`` is its name in the catalogue, if it is there."""
     found = []
-    for make in (eaik, ik_geo, ssik, ssik_prebuilt, ur_analytic, toolbox_puma):
+    for make in (eaik, ik_geo, ssik, ssik_prebuilt, toolbox_puma):
         for peer in make(model, name):
             wrong = mistakes(peer, model.n)
             if wrong:
@@ -144,7 +118,7 @@ def ik_geo(model: rm.RobotModel, _: str = "") -> Iterator[Peer]:
     chain = joint_chain(model)
     if peer is None or chain.k != 6 or (chain.sigma != 0).any():
         return
-    method = rm.igm(model, model_pose(model)).method
+    method = rm.igm(model, rm.dgm(model, np.linspace(0.3, 1.1, model.n))).method
     if "within" in method:
         return  # structured up to calibration errors, of which it knows nothing
     frames = frames_at_zero(model)
@@ -174,11 +148,6 @@ def ik_geo(model: rm.RobotModel, _: str = "") -> Iterator[Peer]:
     )
 
 
-def model_pose(model: rm.RobotModel) -> Array:
-    """A reachable pose away from singular ones."""
-    return rm.dgm(model, np.linspace(0.3, 1.1, model.n))
-
-
 def nearest_points(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     """Points of two lines that are nearest to each other."""
     s, t = np.linalg.lstsq(np.array([u, -v]).T, b - a, rcond=None)[0]
@@ -193,37 +162,18 @@ def _rows_of_ssik(n: int) -> Callable[[Any], Array]:
     return lambda found: np.array([s.q for s in found]).reshape(-1, n)
 
 
-def ssik(model: rm.RobotModel, _: str = "", general: bool = False) -> Iterator[Peer]:
-    """The arm told to ssik: its path for a robot of one's own.
-
-    General six-joint arms take it minutes to prepare, so they are asked for by ``general``.
-    """
+def ssik(model: rm.RobotModel, _: str = "") -> Iterator[Peer]:
+    """The arm told to ssik; general arms take it minutes to prepare and are left out."""
     peer = module("ssik")
     chain = joint_chain(model)
     if peer is None or chain.k != 6 or (chain.sigma != 0).any():
         return
-    if not general and not ssik_is_quick(model):
-        return
-    arm = ssik_arm(model)
-    yield Peer(
-        "ssik, own robot",
-        lambda T: arm.solve(T, **SSIK),
-        _rows_of_ssik(6),
-        lambda q: rm.dgm(model, q),
-    )
-
-
-def ssik_arm(model: rm.RobotModel):
-    """The arm as ssik's."""
-    chain = joint_chain(model)
     relative = np.array(chain.D)
     relative[0] = chain.base @ relative[0]
-    return module("ssik").Manipulator.from_transforms(relative)  # type: ignore[union-attr]
-
-
-def ssik_is_quick(model: rm.RobotModel) -> bool:
-    """Whether ssik serves the arm without minutes of preparation."""
-    return "general" not in ssik_arm(model).solver_name
+    arm = peer.Manipulator.from_transforms(relative)
+    if "general" not in arm.solver_name:
+        direct = lambda q: rm.dgm(model, q)  # noqa: E731
+        yield Peer("ssik, own robot", lambda T: arm.solve(T, **SSIK), _rows_of_ssik(6), direct)
 
 
 def ssik_prebuilt(model: rm.RobotModel, name: str = "") -> Iterator[Peer]:
@@ -235,20 +185,6 @@ def ssik_prebuilt(model: rm.RobotModel, name: str = "") -> Iterator[Peer]:
     if arm.dof != 6:
         return
     yield Peer("ssik, prebuilt", lambda T: arm.solve(T, **SSIK), _rows_of_ssik(6), arm.fk)
-
-
-def ur_analytic(model: rm.RobotModel, name: str = "") -> Iterator[Peer]:
-    """ur-analytic-ik: arms of Universal Robots by name."""
-    peer = module("ur-analytic-ik")
-    if peer is None or name not in UNIVERSAL:
-        return
-    arm = getattr(peer, name)
-    yield Peer(
-        "ur-analytic-ik",
-        arm.inverse_kinematics,
-        lambda found: np.array(found).reshape(-1, 6),
-        lambda q: np.array(arm.forward_kinematics(*q)),
-    )
 
 
 def toolbox_puma(model: rm.RobotModel, name: str = "") -> Iterator[Peer]:

@@ -1,11 +1,8 @@
-"""pybotics fitting the table of its own UR10 to simulated positions, for `bench_calibration.py`.
+"""pybotics in an interpreter of its own: ``["calibrate", COUNT]`` on as many positions.
 
-    PYTHON_WITH_PYBOTICS benchmarks/calibration_pybotics.py COUNT [COUNT ...]
-
-Needs pybotics and nothing of this project. Its residual is one number a pose, the distance between
-measured and predicted position; its derivatives are SciPy's differences. So it has 24 parameters
-of the table and 3 of the tool, of lower rank, and no orientation: less work than a calibration on
-poses. Prints one JSON object a line.
+Needs pybotics and nothing of this project: see `process.py`. It fits the table of its own UR10; its
+residual is one number a pose, the distance between measured and predicted position, and its
+derivatives are SciPy's differences: less work than a calibration on poses.
 """
 
 import json
@@ -15,17 +12,20 @@ import time
 import numpy as np
 
 try:
+    from importlib.metadata import version
+
     from pybotics.optimization import OptimizationHandler, optimize_accuracy
     from pybotics.predefined_models import ur10
     from pybotics.robot import Robot
     from scipy.optimize import least_squares
+
+    READY = {"ready": version("pybotics")}
 except ImportError as error:
-    print(json.dumps({"skipped": f"pybotics is not installed ({error})"}))
-    sys.exit(0)
+    READY = {"skipped": f"pybotics is not installed ({error})"}
 
 
-def fit(count):
-    """Fit as many positions as asked, with noise of 0.1 mm."""
+def calibrate(count):
+    """Fit positions with noise of 0.1 mm."""
     rng = np.random.default_rng(1)
     nominal, real = Robot.from_parameters(ur10()), Robot.from_parameters(ur10())
     scale = np.tile([2e-3, 1.0, 2e-3, 1.0], 6)  # alpha, a, theta, d of a row, rad and mm
@@ -41,20 +41,17 @@ def fit(count):
     start = handler.generate_optimization_vector()
     clock, processor = time.perf_counter(), time.process_time()
     found = least_squares(optimize_accuracy, start, args=(handler, q, p))
-    spent = time.process_time() - processor, time.perf_counter() - clock
-    length = np.maximum(np.linalg.norm(found.jac, axis=0), 1e-300)
-    return {
-        "name": f"{count}", "processor": spent[0], "clock": spent[1],
-        "parameters": [len(start)],
-        "rank": int(np.linalg.matrix_rank(found.jac / length, 1e-6)),
-        "position": 1e-3 * float(np.sqrt(np.mean(found.fun**2))),
-    }  # fmt: skip
+    spent = {"processor": time.process_time() - processor, "clock": time.perf_counter() - clock}
+    error = float(np.sqrt(np.mean(found.fun**2)))
+    return {**spent, "note": f"{len(start)} parameters, no angles, {error:.3f} mm"}
 
 
 def main():
-    """Fit every number of positions that was asked for."""
-    for count in sys.argv[1:]:
-        print(json.dumps(fit(int(count))), flush=True)
+    """Answer until the input ends."""
+    print(json.dumps(READY), flush=True)
+    if "ready" in READY:
+        for line in sys.stdin:
+            print(json.dumps(calibrate(int(json.loads(line)[1]))), flush=True)
 
 
 if __name__ == "__main__":

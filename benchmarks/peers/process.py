@@ -1,4 +1,4 @@
-"""A peer that lives in an interpreter of its own and takes its turns when it is told to.
+"""A program in an interpreter of its own that takes its turns on request.
 
 The script of a peer is started as ``PYTHON script JOB``, says one line of JSON, either
 ``{"ready": VERSION}`` or ``{"skipped": REASON}``, and then answers every line that names a task by
@@ -17,12 +17,8 @@ from typing import Any
 
 import numpy as np
 
+import robotmodels as rm
 from benchmarks.measure import Spent
-
-
-def kept_beside(job: str) -> str:
-    """Where a peer keeps an array that it is asked for, so that it is looked at."""
-    return f"{job}.answer.npy"
 
 
 class Foreign:
@@ -64,6 +60,11 @@ class Foreign:
         path = Path(self._folder.name) / f"job{self._jobs}.npz"
         np.savez(path, **content)
         return str(path)
+
+    def robot_job(self, model: rm.RobotModel, **content: Any) -> str:
+        """The same for a robot without drives, with columns of rotors and friction."""
+        zero = np.zeros(model.n)
+        return self.job(urdf=rm.to_urdf(model), Ia=zero, Fv=zero, Fc=zero, **content)
 
     def task(self, name: str, *words: str) -> Callable[[], Spent]:
         """Work for a contestant: the peer does it and says how long it took."""
