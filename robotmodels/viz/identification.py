@@ -127,8 +127,9 @@ def plot_identification_torques(
             ):
                 t, y = signals[label]
                 axes.plot(t[:, j], y[:, j], color=PALETTE[k], linewidth=width, label=label)
-            name = found.model.table.joint_names[j]
-            axes.set_title(f"{name}, {word}: {100.0 * errors.relative[j]:.3g} %", loc="left")
+            # the second column may be narrow: its joints are named beside it
+            name = f"{found.model.table.joint_names[j]}, " if word == "fitted" else ""
+            axes.set_title(f"{name}{word}: {100.0 * errors.relative[j]:.3g} %", loc="left")
         column[-1].set_xlabel("time (s)")
     for axes, unit in zip(grid[:, 0], units, strict=True):
         axes.set_ylabel(f"{'force' if unit == 'N' else 'torque'} ({unit})")
