@@ -6,7 +6,7 @@ from .combined_arms import combine_arms
 from .differential import differential_model
 from .fit import fit
 from .identifiable import IdentifiableParameters, Reason, identifiable_parameters
-from .inverse import CorrectedSolutions, corrected_igm
+from .inverse import corrected_igm
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -41,7 +41,6 @@ __all__ = [
     "CalibrationResult",
     "CameraPose",
     "Compliance",
-    "CorrectedSolutions",
     "Distance",
     "Errors",
     "FrameContact",

@@ -1,9 +1,9 @@
-"""Inverse kinematics of a calibrated robot: each nominal solution is refined by Newton steps."""
+"""Inverse model of a calibrated robot: solutions of its table, refined in the joint readings."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from math import pi
 from typing import Any
 
@@ -11,112 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_mask, as_vector, batch_rows, read_only
-from .._outcomes import Outcome
-from ..geometry import PRISMATIC
+from .._arrays import Array, as_mask, as_vector, batch_rows
+from ..geometry import REVOLUTE
 from ..igm import igm
-from ..igm.known import known_arm
 from ..igm.request import above_zero, locks_of
 from ..igm.solutions import IGMSolutions, posture_distance
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
-from ..model import RobotModel
-from .refinement import Candidates, Flags, Refinement
-from .robot import CalibratedRobot, as_calibrated, calibrated_pose
+from ..se3.orientation import rotation_vectors_of
+from .measurements.motions import inverse_left_jacobians
+from .robot import CalibratedRobot, as_calibrated, calibrated_pose, reading_jacobian
 
-SAMPLES = 32  # configurations at which calibrated and nominal poses are compared
-NEAR_SINGULAR = 3.0  # differences of these poses up to which a singular value may hide postures
-CALIBRATED_ONLY = "of the calibrated robot only"
-MERGE = 1e-6
-"""Postures closer than this are merged [rad, m], as in `igm`."""
+STEPS, HALVINGS = 20, 6
+LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
+SINGULAR = 1e-7  # singular value below which the pseudo-inverse replaces the inverse
+ROUNDED = 1e-14  # pose error that is rounding
+MERGE = 1e-6  # solutions closer than this are one [rad, m], as in `igm`
+_RANK_TOLERANCE = 1e-10  # singular values beside the largest that count as zero
 
-
-class CorrectionStatus(Outcome):
-    """Outcome of the refinement of a posture of the nominal robot; fits int8."""
-
-    ARRIVED = 0, "It converges to a posture of the calibrated robot."
-    MERGED = 1, "It converges to the same posture as another nominal one before it."
-    VANISHED = (
-        2,
-        "Newton refinement from it fails: the calibrated robot has no such posture.",
-    )
-    OUTSIDE_LIMITS = 3, "It converges to a posture outside the joint limits."
-    NO_READING = 4, "It converges to a posture that no readings of the joints lead to."
-    NO_POSTURE = 5, "The nominal robot has no more postures for the pose."
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CorrectedSolutions(Rebuilt):
-    """Readings that bring a calibrated robot to the poses of one call.
-
-    Parameters
-    ----------
-    solutions : IGMSolutions
-        ``q (..., S, n)`` are the readings of the joints; ``residual`` is that of the calibrated
-        robot at these readings.
-    actual : ndarray, shape (..., S, n)
-        Variables of the calibrated table there, rad or m; NaN where there is no solution.
-    nominal : ndarray, shape (..., C, n)
-        Postures of the nominal robot that were refined, rad or m; NaN where there are none.
-    correction : ndarray of int8, shape (..., C)
-        Codes of `CorrectionStatus`, one for each nominal posture.
-    row : ndarray of int, shape (..., C)
-        Which of the S rows a nominal posture became; -1 if none.
-    """
-
-    solutions: IGMSolutions
-    actual: Array
-    nominal: Array
-    correction: NDArray[np.int8]
-    row: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        kinds = {
-            "actual": np.float64,
-            "nominal": np.float64,
-            "correction": np.int8,
-            "row": np.int64,
-        }
-        for name, kind in kinds.items():
-            object.__setattr__(self, name, read_only(getattr(self, name), kind))
-
-    @property
-    def q(self) -> Array:
-        """Readings, shape (..., S, n), rad or m; NaN where there is no solution."""
-        return self.solutions.q
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """Whether a row is a solution, shape (..., S)."""
-        return self.solutions.valid
-
-    @property
-    def residual(self) -> Array:
-        """The larger of the pose errors in metres and in radians, shape (..., S)."""
-        return self.solutions.residual
-
-    @property
-    def within_limits(self) -> NDArray[np.bool_]:
-        """Whether the readings of a solution are inside the limits, shape (..., S)."""
-        return self.solutions.within_limits
-
-    @property
-    def status(self) -> NDArray[np.int8]:
-        """Codes of `IGMStatus`, one for each pose."""
-        return self.solutions.status
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of solutions of each pose."""
-        return self.solutions.count
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of one pose in a sentence; see `IGMSolutions.reason`."""
-        return self.solutions.reason(i)
-
-    def nearest(self, q: ArrayLike) -> Array:
-        """Readings of the solution nearest to a posture; see `IGMSolutions.nearest`."""
-        return self.solutions.nearest(q)
+Flags = NDArray[np.bool_]
 
 
 def corrected_igm(
@@ -128,15 +41,12 @@ def corrected_igm(
     limits: bool = False,
     lock: Mapping[int | str, float] | None = None,
     tolerance: float = 1e-12,
-    complete: bool = True,
-) -> CorrectedSolutions:
+) -> IGMSolutions:
     """Inverse geometric model of a calibrated robot: the readings of its joints.
 
-    The closed form of the nominal table (at the calibrated base and tool) gives its postures;
-    Newton's method refines each on the calibrated table and in the readings. Poses where that may
-    miss a posture (one vanished or was merged, the Jacobian is nearly singular, the nominal arm
-    has fewer postures than it can have, or no closed form) are solved by `igm` of the calibrated
-    table as well.
+    `igm` of the calibrated table gives the solutions; Newton's method refines each in the readings,
+    where gains, eccentricity, compliance of the joints and bending of the links act. At the edge of
+    its reach a robot that bends may have solutions that its rigid table does not lead to.
 
     Parameters
     ----------
@@ -156,14 +66,11 @@ def corrected_igm(
         Joints (column of q, from 0, or name) that keep a reading, rad or m.
     tolerance : float
         Largest pose error of a solution, metres and radians.
-    complete : bool
-        False skips the inverse geometric model of the calibrated table: faster, but postures that
-        only the calibrated robot has are not found.
 
     Returns
     -------
-    CorrectedSolutions
-        Readings, and the outcome for every nominal posture.
+    IGMSolutions
+        ``q (..., S, n)`` are readings, ``residual`` is that of the calibrated robot at them.
 
     Raises
     ------
@@ -172,9 +79,7 @@ def corrected_igm(
 
     Notes
     -----
-    For a redundant arm the free joints are those of the nominal model and keep the readings of
-    ``q_ref``. Postures at the choice of the calibrated table's own inverse model are added
-    (``free_joints``).
+    The free joints of a redundant arm keep the readings of ``q_ref``.
 
     References
     ----------
@@ -196,232 +101,248 @@ def corrected_igm(
     robot = as_calibrated(robot)
     model, n = robot.model, robot.model.n
     tolerance = above_zero(tolerance, "tolerance")
-    requested, locks = as_mask(mask), locks_of(model, lock)
+    requested, locks = as_mask(mask), dict(locks_of(model, lock))
     poses = se3.as_pose(T)
     reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref")
     flat = poses.reshape(*poses.shape[:-2], 16)
     batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     targets = np.ascontiguousarray(rows.reshape(-1, 4, 4))
-    N, locked = len(targets), [column for column, _ in locks]
-    newton = Refinement(robot, requested, mask_axes == "tool", locked, tolerance)
-    shift = _variable_offsets(robot)
     options: dict[str, Any] = {
+        "q_ref": None if q_ref is None else robot.joint_errors.actual(references),
         "mask": None if requested.all() else requested,
         "mask_axes": mask_axes,
+        "lock": locks or None,
         "position_tolerance": max(1e-9, tolerance),
         "orientation_tolerance": max(1e-9, tolerance),
     }
-    # the nominal solutions, in the variables of the calibrated table
-    starts = igm(
-        robot.structured,
-        targets,
-        None if q_ref is None else references + shift,
-        lock={c: value + shift[c] for c, value in locks} or None,
-        **options,
+    found = igm(model, targets, **options)
+    if robot.bent_rows and len(targets):
+        # at the edge of reach, bending decides whether there is a solution
+        found = igm(model, _unbent(robot, targets, found, references), **options)
+    newton = _Newton(robot, requested, mask_axes == "tool", list(locks))
+    reading, residual = newton.readings(targets, found, references, q_ref is not None, limits)
+    kept = found.valid & (residual <= tolerance)
+    kept &= ~_repeated(reading, kept, newton.turns)
+    return _arranged(
+        found, newton, (reading, residual, kept), references, q_ref is not None, limits, batch
     )
-    nominal = starts.q - shift
-    first = newton.refine(targets, starts, nominal, nominal, starts.code)
-    status = np.where(starts.count > 0, int(IGMStatus.NOT_CONVERGED), starts.status)
-    closest, missing = np.full((N, n), np.nan), np.full((N, 6), np.nan)
-    every = first
-    again = np.flatnonzero(_may_be_incomplete(starts, first, newton) & complete)
-    if again.size:
-        actual = robot.joint_errors.actual(references[again])
-        reference = None if q_ref is None else actual
-        extra = igm(model, targets[again], reference, lock=dict(locks) or None, **options)
-        # free joints have the variable, not the reading, of the reference
-        wanted = extra.q + (references[again] - actual)[:, None] * ~newton.locked
-        only = np.full(extra.valid.shape, len(starts.labels))
-        every = first.with_some(again, newton.refine(targets[again], extra, extra.q, wanted, only))
-        status[again] = extra.status
-        if extra.closest is not None and extra.missing is not None:
-            closest[again], missing[again] = extra.closest, extra.missing
-    aim = references if q_ref is not None else None
-    merged = _Merged(newton, targets, every, references, aim, limits)
-    return merged.solutions(batch, starts, nominal, (status, closest, missing))
 
 
-def _may_be_incomplete(starts: IGMSolutions, first: Candidates, newton: Refinement) -> Flags:
-    """Poses where the nominal solutions may not be all, or not lead to all."""
-    robot, present = newton.robot, starts.valid
-    plan = known_arm(robot.structured)
-    if plan.plan is None or starts.method != plan.method:
-        return np.ones(len(present), np.bool_)  # the greatest number of solutions is unknown
-    doubtful = ~newton.met(first)
-    doubtful |= (first.least < NEAR_SINGULAR * _pose_difference(robot)) | starts.double
-    if not newton.is_redundant:
-        doubtful |= starts.free_joints.any(axis=-1)
-    few = (present.sum(axis=1) < plan.most) | ~present.any(axis=1)
-    same = same_as(first, newton).any(axis=(1, 2))
-    return np.asarray(few | (present & doubtful).any(axis=1) | same)
+def _unbent(
+    robot: CalibratedRobot, targets: Array, found: IGMSolutions, references: Array
+) -> Array:
+    """Poses (N, 4, 4) of the rigid arm that its bending at the first solution takes to the targets.
+
+    At the references where there is no solution.
+    """
+    q = robot.joint_errors.actual(references)
+    if found.q.shape[1]:
+        q = np.where(found.valid[:, :1], found.q[:, 0], q)
+    reading = robot.joint_errors.reading(q)
+    reading = np.where(np.isfinite(reading), reading, references)
+    return dgm(robot.model, q) @ se3.inverse(calibrated_pose(robot, reading)) @ targets
 
 
-def _pose_difference(robot: CalibratedRobot) -> float:
-    """Largest difference of nominal and calibrated poses, in lengths of the arm and radians."""
-    readings = np.random.default_rng(0).uniform(-pi, pi, size=(SAMPLES, robot.model.n))
-    actual = robot.joint_errors.actual(readings)
-    a, b = (
-        dgm(robot.structured, actual + _variable_offsets(robot)),
-        calibrated_pose(robot, readings),
+def _repeated(q: Array, kept: Flags, turns: Flags) -> Flags:
+    """Solutions that are an earlier one of the same pose. Shapes: q (N, S, n), kept (N, S)."""
+    same = kept[:, :, None] & kept[:, None] & np.tri(kept.shape[1], k=-1, dtype=np.bool_)
+    for joint, turn in enumerate(turns):
+        distance = np.abs(q[:, :, None, joint] - q[:, None, :, joint])
+        same &= (np.minimum(distance, np.abs(2.0 * pi - distance)) if turn else distance) < MERGE
+    return np.asarray(same.any(axis=-1))
+
+
+def _arranged(
+    found: IGMSolutions,
+    newton: _Newton,
+    rows: tuple[Array, Array, Flags],
+    references: Array,
+    given: bool,
+    limits: bool,
+    batch: tuple[int, ...],
+) -> IGMSolutions:
+    """The kept rows in order: by their distance to the reference if one is given."""
+    model, (reading, residual, kept) = newton.robot.model, rows
+    inside = ((reading >= model.lower) & (reading <= model.upper)).all(axis=-1)
+    chosen = kept & (inside | (not limits))
+    periodic = newton.turns & (not limits)
+    key = np.broadcast_to(np.arange(float(kept.shape[1])), kept.shape)
+    if given:
+        key = posture_distance(reading, references[:, None], periodic)
+    order = np.argsort(np.where(chosen, key, np.inf), axis=1, kind="stable")
+    order = order[:, : int(chosen.sum(axis=1).max(initial=0))]
+    there = np.take_along_axis(chosen, order, axis=1)
+
+    def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
+        places = order if values.ndim == 2 else order[..., None]
+        out = np.take_along_axis(values, places, axis=1)
+        out[~there] = empty
+        return shaped(out)
+
+    def shaped(values: NDArray[Any]) -> NDArray[Any]:
+        return values.reshape((*batch, *values.shape[1:]))
+
+    solved = chosen.any(axis=1)
+    status = np.where(found.count > 0, int(IGMStatus.NOT_CONVERGED), found.status)
+    status = np.where(kept.any(axis=1), int(IGMStatus.OUTSIDE_LIMITS), status)
+    status = np.where(solved, found.status, status).astype(np.int8)
+    unsolved: dict[str, Array | None] = {"closest": found.closest, "missing": found.missing}
+    for name, values in unsolved.items():
+        if values is not None:
+            unsolved[name] = shaped(np.where(solved[:, None], np.nan, values))
+    return IGMSolutions(
+        q=packed(reading, np.nan),
+        valid=shaped(there),
+        residual=packed(residual, np.nan),
+        within_limits=packed(inside & chosen, False),
+        code=packed(found.code, -1),
+        labels=found.labels,
+        status=shaped(status),
+        double=packed(found.double, False),
+        free_joints=packed(found.free_joints, False),
+        family_joints=packed(found.family_joints, False),
+        method=f"{found.method}; of the calibrated table, refined in the readings",
+        periodic=periodic,
+        mask=newton.mask,
+        **unsolved,
     )
-    size = max(float(np.abs(b[:, :3, 3]).max()), 1e-9)
-    turn = np.abs(a[:, :3, :3] - b[:, :3, :3]).max()
-    return float(max(turn, np.abs(a[:, :3, 3] - b[:, :3, 3]).max() / size))
 
 
-def _variable_offsets(robot: CalibratedRobot) -> Array:
-    """Constant offsets of the joint variables, calibrated minus nominal, shape (n,)."""
-
-    def constants(model: RobotModel) -> Array:
-        table = model.table
-        return np.where(table.sigma == PRISMATIC, table.r, table.theta)[table.joint_rows]
-
-    return constants(robot.model) - constants(robot.structured)
-
-
-def same_as(found: Candidates, newton: Refinement) -> Flags:
-    """Whether a candidate converged to the same solution as an earlier one. Shapes: (N, C, C)."""
-    met = newton.met(found)
-    same = met[:, :, None] & met[:, None] & np.tri(met.shape[1], k=-1, dtype=np.bool_)
-    for joint, turn in enumerate(newton.turns):
-        distance = np.abs(found.q[:, :, None, joint] - found.q[:, None, :, joint])
-        same &= (np.minimum(distance, 2.0 * pi - distance) if turn else distance) < MERGE
-    return same
-
-
-class _Merged:
-    """Candidates of all poses without repetitions, in the order of the reference."""
+class _Newton:
+    """Newton refinement of readings for one robot and request (mask, axes, locked joints)."""
 
     def __init__(
-        self,
-        newton: Refinement,
-        targets: Array,
-        every: Candidates,
-        references: Array,
-        aim: Array | None,
-        limits: bool,
+        self, robot: CalibratedRobot, mask: Flags, in_tool_axes: bool, locked: list[int]
     ) -> None:
-        model, self.newton, self.every, self.limits = newton.robot.model, newton, every, limits
-        same = same_as(every, newton)
-        self.merged = np.asarray(same.any(axis=-1))
-        reading = np.where(every.readable[..., None], every.reading, 0.0)
-        reading = _turned(newton, every.q, reading, aim, limits)
-        self.residual, kept = every.residual, newton.met(every) & ~self.merged
-        if newton.bends:
-            # with gains, a whole turn of a joint is no whole turn of its reading: bending differs
-            held = every.free | newton.locked
-            reading, self.residual, _ = newton.newton(targets, reading, kept, held)
-            kept &= self.residual <= newton.tolerance
-        self.reading, self.kept = reading, kept
-        within = (reading >= model.lower) & (reading <= model.upper)
-        self.inside = np.asarray(within.all(axis=-1))
-        self.chosen = kept & (self.inside | (not limits))
-        self.into = np.broadcast_to(np.arange(same.shape[1]), kept.shape)
-        if same.size:
-            self.into = np.where(self.merged, same.argmax(axis=-1), self.into)
-        # the flags of a candidate hold for the one it is merged into
-        for values in (every.double, every.free, every.family):
-            for c in range(self.merged.shape[1]):
-                i = np.flatnonzero(self.merged[:, c])
-                values[i, self.into[i, c]] |= values[i, c]
-        distance = posture_distance(reading, references[:, None], newton.turns & (not limits))
-        key = np.broadcast_to(np.arange(float(kept.shape[1])), kept.shape)
-        key = np.where(self.chosen, key if aim is None else distance, np.inf)
-        self.order = np.argsort(key, axis=1, kind="stable")
+        model = robot.model
+        tool = model.twin.frame(None)
+        joints = model.chain.joint[tool.path - 1]
+        on_path = np.zeros(model.n, np.bool_)
+        on_path[joints[joints >= 0]] = True
+        lengths = np.linalg.norm(model.chain.position[tool.path[1:] - 1], axis=-1).sum()
+        self.length = float(lengths + np.linalg.norm(tool.position)) or 1.0
+        self.turns: Flags = np.asarray(model.table.sigma[model.table.joint_rows] == REVOLUTE)
+        self.unit = np.where(on_path, np.where(self.turns, 1.0, self.length), 0.0)
+        self.locked = np.isin(np.arange(model.n), locked)
+        self.robot, self.mask, self.in_tool_axes = robot, mask, in_tool_axes
+        self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
 
-    def solutions(
-        self,
-        batch: tuple[int, ...],
-        starts: IGMSolutions,
-        nominal: Array,
-        failed: tuple[NDArray[np.int8], Array, Array],
-    ) -> CorrectedSolutions:
-        """Packed solutions and the outcome of each start, nominal (N, C, n).
+    def readings(
+        self, targets: Array, found: IGMSolutions, references: Array, given: bool, limits: bool
+    ) -> tuple[Array, Array]:
+        """Readings (N, S, n) of solutions, and their pose errors (N, S), infinite without one."""
+        errors, held = self.robot.joint_errors, self.locked | found.free_joints & self.is_redundant
+        q = np.where(found.valid[..., None], found.q, 0.0)
+        reading = q if errors.is_zero or not q.size else errors.reading(q)
+        there = found.valid & np.isfinite(reading).all(axis=-1)
+        reading = np.where(there[..., None], reading, 0.0)
+        fixed = held & there[..., None]
+        off = np.where(fixed, references[:, None] - reading, 0.0)
+        off[..., self.turns] -= 2.0 * pi * np.round(off[..., self.turns] / (2.0 * pi))
+        reading, residual = self.refined(targets, reading + off, there, fixed)
+        aim = references[:, None] if given else None
+        turned = self._turned(reading, aim, limits)
+        moved = there & (turned != reading).any(axis=-1)
+        again, after = self.refined(targets, turned, moved, fixed)
+        return again, np.where(moved, after, residual)
 
-        ``failed``: status, closest and missing of poses without a solution.
+    def _turned(self, reading: Array, aim: Array | None, limits: bool) -> Array:
+        """Readings with whole turns added: in (-pi, pi], or with limits inside them if possible.
+
+        With limits nearest to the aim (N, 1, n), without one to mid-range.
         """
-        newton, every, chosen, limits = self.newton, self.every, self.chosen, self.limits
-        C, S = nominal.shape[1], int(chosen.sum(axis=1).max(initial=0))
-        rank, into = np.argsort(self.order, axis=1), self.into
-        row = np.where(np.take_along_axis(chosen, into, 1), np.take_along_axis(rank, into, 1), -1)
-        met = newton.met(every)[:, :C]
-        correction = np.full(met.shape, int(CorrectionStatus.NO_POSTURE), np.int8)
-        for code, where in (
-            (CorrectionStatus.VANISHED, starts.valid),
-            (CorrectionStatus.ARRIVED, met),
-            (CorrectionStatus.NO_READING, ~every.readable[:, :C]),
-            (CorrectionStatus.OUTSIDE_LIMITS, met & ~self.inside[:, :C] & limits),
-            (CorrectionStatus.MERGED, self.merged[:, :C]),
-        ):
-            correction[where & starts.valid] = int(code)
+        low, high = np.full(len(self.turns), -pi), np.full(len(self.turns), pi)
+        goal: Any = np.zeros(len(self.turns))
+        if limits:
+            low, high = self.robot.model.lower, self.robot.model.upper
+            both = np.isfinite(low) & np.isfinite(high)
+            goal = np.where(both, 0.5 * (low + high), 0.0) if aim is None else aim
+            goal = np.where(np.isfinite(goal), goal, 0.0)
+        step = np.round((goal - reading) / (2.0 * pi))
+        least = np.ceil((low - reading) / (2.0 * pi) - 1e-15)
+        most = np.floor((high - reading) / (2.0 * pi) + 1e-15)
+        step = np.where(least <= most, np.clip(step, least, most), 0.0) * self.turns
+        # a whole turn of the joint, not of its reading
+        errors, turned = self.robot.joint_errors, reading + 2.0 * pi * step
+        if errors.is_zero or not step.any():
+            return turned
+        known = errors.reading(errors.actual(reading) + 2.0 * pi * step)
+        return np.where(np.isfinite(known) & (step != 0).any(axis=-1, keepdims=True), known, turned)
 
-        def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
-            at = self.order[:, :S].reshape(len(values), S, *(1,) * (values.ndim - 2))
-            rows = np.take_along_axis(values, at, axis=1)
-            rows[~np.take_along_axis(chosen, self.order[:, :S], axis=1)] = empty
-            return rows.reshape(*batch, *rows.shape[1:])
+    def refined(
+        self, targets: Array, reading: Array, rows: Flags, held: Flags
+    ) -> tuple[Array, Array]:
+        """Readings and pose errors after Newton's method in some rows.
 
-        status, closest, missing = failed
-        solved = np.asarray(chosen.any(axis=1))
-        family = (every.free & chosen[..., None]).any(axis=(1, 2)) | newton.is_redundant
-        # the inverse model of the calibrated table may meet a pose less closely than requested
-        reached = np.isin(status, (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY))
-        status = np.where(reached, IGMStatus.NOT_CONVERGED, status)
-        status = np.where(self.kept.any(axis=1), IGMStatus.OUTSIDE_LIMITS, status)
-        reached = np.where(family, IGMStatus.REACHED_FAMILY, IGMStatus.REACHED)
-        solutions = IGMSolutions(
-            q=packed(self.reading, np.nan),
-            valid=packed(chosen, False),
-            residual=packed(self.residual, np.nan),
-            within_limits=packed(self.inside & chosen, False),
-            code=packed(every.code, -1),
-            labels=(*starts.labels, CALIBRATED_ONLY),
-            status=np.where(solved, reached, status).astype(np.int8).reshape(batch),
-            double=packed(every.double, False),
-            free_joints=packed(every.free, False),
-            family_joints=packed(every.family, False),
-            method=f"{starts.method}; refined on the calibrated table by Newton steps",
-            periodic=newton.turns & (not limits),
-            mask=newton.mask,
-            closest=np.where(solved[:, None], np.nan, closest).reshape(*batch, nominal.shape[-1]),
-            missing=np.where(solved[:, None], np.nan, missing).reshape(*batch, 6),
-        )
-        return CorrectedSolutions(
-            solutions,
-            packed(newton.errors.actual(self.reading), np.nan),
-            nominal.reshape(*batch, *nominal.shape[1:]),
-            correction.reshape(*batch, C),
-            row[:, :C].reshape(*batch, C),
-        )
+        Shapes: reading, held (N, S, n); rows (N, S) -> (N, S, n), (N, S).
+        """
+        pose, solution = np.nonzero(rows)
+        goals, fixed, q = targets[pose], held[pose, solution], reading[pose, solution]
+        size = self._sizes(goals, q)
+        going = np.flatnonzero(size > ROUNDED)
+        for _ in range(STEPS):
+            if not going.size:
+                break
+            step, better_rows = self._step(goals[going], q[going], fixed[going]), []
+            for _ in range(HALVINGS):
+                trial = q[going] + step
+                after = self._sizes(goals[going], trial)
+                better = after < size[going]
+                q[going[better]], size[going[better]] = trial[better], after[better]
+                better_rows.append(going[better])
+                going, step = going[~better], 0.5 * step[~better]
+                if not going.size:
+                    break
+            going = np.concatenate(better_rows)
+            going = going[size[going] > ROUNDED]
+        out, error = reading.copy(), np.full(rows.shape, np.inf)
+        out[pose, solution], error[pose, solution] = q, size
+        return out, error
+
+    def _in_axes(self, targets: Array, columns: Array) -> Array:
+        """Both halves of columns (M, 6, k) along the axes of the components."""
+        if not self.in_tool_axes:
+            return columns
+        turned = targets[:, :3, :3].swapaxes(1, 2)
+        return np.concatenate([turned @ columns[:, :3], turned @ columns[:, 3:]], axis=1)
+
+    def _sizes(self, targets: Array, reading: Array) -> Array:
+        """The larger of the missing translation (m) and rotation (rad), shape (M,)."""
+        errors = pose_errors(calibrated_pose(self.robot, reading), targets)
+        asked = self._in_axes(targets, errors[..., None])[..., 0] * self.mask
+        return np.asarray(np.linalg.norm(asked.reshape(-1, 2, 3), axis=-1).max(axis=-1))
+
+    def _step(self, targets: Array, reading: Array, held: Flags) -> Array:
+        """Newton steps of readings (M, n), the shortest."""
+        errors = pose_errors(calibrated_pose(self.robot, reading), targets)
+        slope = pose_error_slope(reading_jacobian(self.robot, reading), errors[:, 3:])
+        weight = np.repeat([1.0 / self.length, 1.0], 3)[:, None]
+        free = np.where(held, 0.0, self.unit)
+        A = (weight * self._in_axes(targets, slope))[:, self.mask] * free[:, None, :]
+        e = (weight * self._in_axes(targets, errors[..., None]))[:, self.mask]
+        step = (_inverses(A) @ e)[..., 0]
+        largest = np.abs(step).max(axis=-1, initial=0.0)
+        step *= np.minimum(1.0, LONGEST / np.maximum(largest, LONGEST))[:, None]
+        return step * free
 
 
-def _turned(newton: Refinement, q: Array, reading: Array, aim: Array | None, limits: bool) -> Array:
-    """Readings with whole turns of the joints added, in (-pi, pi], or with limits inside them.
+def _inverses(A: Array) -> Array:
+    """Inverses of regular square matrices, pseudo-inverses of all others, (M, m, n)."""
+    if A.shape[1] == A.shape[2]:
+        with suppress(np.linalg.LinAlgError):  # one of them is singular to the last digit
+            inverse = np.asarray(np.linalg.inv(A), np.float64)
+            rows = np.flatnonzero(~(np.linalg.norm(inverse, axis=(1, 2)) < 1.0 / SINGULAR))
+            inverse[rows] = np.linalg.pinv(A[rows], _RANK_TOLERANCE)
+            return inverse
+    return np.asarray(np.linalg.pinv(A, _RANK_TOLERANCE), np.float64)
 
-    Then nearest to the aim (N, n), or to mid-range without one.
-    """
-    turns, errors = newton.turns, newton.errors
-    low, high = np.full(len(turns), -pi), np.full(len(turns), pi)
-    middle = np.zeros(len(turns))
-    if limits:
-        low, high = newton.robot.model.lower, newton.robot.model.upper
-        both = np.isfinite(low) & np.isfinite(high)
-        middle[both] = 0.5 * (low[both] + high[both])
-    goal = aim[:, None] if limits and aim is not None else middle
-    count = np.zeros(q.shape)
-    turned = reading
-    for _ in range(4):
-        # the turn nearest to the goal; inside the limits if one is
-        step = np.round((goal - turned) / (2.0 * pi))
-        with np.errstate(invalid="ignore"):
-            least = np.ceil((low - turned) / (2.0 * pi) - 1e-15)
-            most = np.floor((high - turned) / (2.0 * pi) + 1e-15)
-        step = np.where(least <= most, np.clip(step, least, most), 0.0) * turns
-        if not step.any():
-            break
-        count += step
-        turned = reading + 2.0 * pi * count
-        if not errors.is_zero:
-            known = errors.reading(q + 2.0 * pi * count)
-            turned = np.where(np.isfinite(known), known, turned)
-    return turned
+
+def pose_errors(T: Array, wanted: Array) -> Array:
+    """Translation (m) and rotation vector (rad) from poses to the wanted ones, (N, 6), world."""
+    turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
+    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors_of(turn)], axis=1)
+
+
+def pose_error_slope(J: Array, phi: Array) -> Array:
+    """Minus the derivative of `pose_errors` at rotation errors phi (N, 3): (N, 6, n)."""
+    return np.concatenate([J[:, :3], inverse_left_jacobians(-phi) @ J[:, 3:]], axis=1)

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Rebuilt, as_mask, as_vector, read_only
 from ..errors import InvalidValueError
 from ..igm.request import above_zero
+from ..igm.solutions import IGMSolutions
 from ..kinematics import dgm
-from .inverse import CorrectedSolutions, corrected_igm
-from .refinement import pose_error_slope, pose_errors
+from .inverse import corrected_igm, pose_error_slope, pose_errors
 from .robot import CalibratedRobot, as_calibrated, calibrated_pose, reading_jacobian
 
 if TYPE_CHECKING:
@@ -71,14 +71,14 @@ class PoseOffsets(Rebuilt):
 
     Parameters
     ----------
-    solutions : CorrectedSolutions
+    solutions : IGMSolutions
         The readings at the true targets.
     command : ndarray, shape (..., S, 4, 4)
         The pose that the nominal robot has there, metres; NaN in rows without a solution. The
         controller must stay on the branch of the row.
     """
 
-    solutions: CorrectedSolutions
+    solutions: IGMSolutions
     command: Array
 
     def __post_init__(self) -> None:

@@ -160,9 +160,6 @@ class CalibratedRobot(Rebuilt):
         Their corrections (rad, m, or the unit of the parameter).
     model : RobotModel
         The table (with beta, gamma and b), base and tool with the constant corrections.
-    structured : RobotModel
-        The nominal table at the calibrated base and tool: it keeps the structure that gives a
-        closed form, and lacks only the corrections of the table.
     joint_errors : JointErrors
         Gains, couplings, eccentricity and compliance of the joints about their own axes.
     ends : tuple of CalibratedEnd
@@ -185,7 +182,6 @@ class CalibratedRobot(Rebuilt):
     parameters: GeometricParameters
     corrections: Array
     model: RobotModel
-    structured: RobotModel
     joint_errors: JointErrors
     ends: tuple[CalibratedEnd, ...]
 
@@ -256,7 +252,6 @@ class CalibratedRobot(Rebuilt):
         return replace(
             self,
             model=self.model.with_tool(end.pose, end.parent),
-            structured=self.structured.with_tool(end.pose, end.parent),
             ends=(*(e for e in self.ends if e.frame is not None), end._replace(frame=None)),
         )
 
@@ -326,7 +321,6 @@ def calibrated_model(parameters: GeometricParameters, corrections: ArrayLike) ->
         parameters=parameters,
         corrections=xi,
         model=model,
-        structured=nominal.with_base(base).with_tool(tool),
         joint_errors=joint_errors_of(parameters, xi),
         ends=tuple(ends),
     )
