@@ -2,8 +2,8 @@
 
 `inverse` documents the call, `call` checks it (`request`). `loop` writes the arm as a chain of
 joints, `chain` makes other chains of it; `families` chooses once which solver serves it: a plan of
-Paul's equations (`paul`, `closed_form`, `by_plan`), elimination for any six joints
-(`elimination`) or the nominal arm next to them (`nominal`), fewer joints or components
+Paul's equations (`paul`, `closed_form`, `by_plan`), elimination for other arms of six joints,
+calibrated ones among them (`elimination`), fewer joints or components
 (`reduced`, `position`), more of them (`redundant`, `relations`, `arm_angle`), numeric search for
 the rest (`search`). Candidates are refined and checked on the chain itself (`check`), self-motions
 are completed at the reference (`singular`), and the solutions are labelled (`branches`), sorted and

@@ -21,7 +21,6 @@ from .families import may_miss_solutions
 from .known import KnownArm, known_arm, solver_for
 from .loop import JointChain
 from .motion import lever
-from .nominal import NominalArm
 from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
 from .postures import Postures, no_postures
 from .redundant import Redundant
@@ -318,12 +317,7 @@ def _completed(request: Request, U: Array, psi: Array | None, references: Array)
         found = postures(solver, U, references, tolerances)
     whole = request.task.mask == WHOLE_POSE
     if solver is not None and whole and solver.chain.k <= 6 and not isinstance(solver, Redundant):
-        completed = complete(solver.chain, U, found, references, tolerances)
-        if not isinstance(solver, NominalArm):
-            return completed
-        # within the tolerances a nearly singular curve is a self-motion, at the reference already
-        rows = np.flatnonzero(found.free.any(axis=(1, 2)))
-        return completed.put(rows, replace(found, moving=found.free).take(rows))
+        return complete(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and (psi is None or not whole):
         moving = moving_joints(solver.chain, request.task, U, found)

@@ -15,7 +15,6 @@ from .closed_form import prepare_closed_form
 from .constraints import WHOLE, Components, constraints
 from .elimination import prepare_elimination
 from .loop import JointChain
-from .nominal import prepare_nominal
 from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
@@ -67,8 +66,8 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
 
 
 def _of_six_joints(chain: JointChain) -> Solver | None:
-    """Closed forms first, then the nominal arm, elimination and search."""
-    solver = prepare_closed_form(chain) or prepare_nominal(chain)
+    """Closed forms first, then elimination and search."""
+    solver = prepare_closed_form(chain)
     if solver is not None:
         return solver
     elimination = prepare_elimination(chain)
