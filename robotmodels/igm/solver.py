@@ -6,7 +6,7 @@ registers how poses are solved with it::
     @postures.register
     def _(solver: ClosedForm, U, references, tolerances): ...
 
-so that code which changes the chain (a locked joint, a mask, a calibrated arm) calls `postures`
+so that code which changes the chain (a locked joint, a mask) calls `postures`
 with the solver of the changed chain.
 """
 

@@ -128,7 +128,7 @@ def test_one_pose_is_solved_as_many_are(name):
 
 @pytest.mark.parametrize("name", ["rx90", "kr6_r900", "ur5e"])
 @pytest.mark.parametrize("share", [1.0, 0.1, 1e-3])
-def test_isolated_solutions_where_the_nominal_arm_has_infinitely_many(name, share):
+def test_isolated_solutions_beside_singular_wrists(name, share):
     model = changed(name, 3, share)
     q = configurations(model, 60, seed=5)
     q[:, 4] = np.repeat([0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2], 10)
