@@ -15,7 +15,7 @@ from ..minimal_parameters import BaseMethod, BaseParameters
 from ..minimal_parameters.numeric import TorqueColumns, residual_warning
 from ..minimal_parameters.rules import EARTH
 from ..regressors.columns import Columns
-from .closing import ClosingStatus, close, followed
+from .closing import ClosingStatus, attempt, close, without_turns
 from .constraints import checked, maps
 from .dynamics import closed
 from .robot import LoopedRobot, check_looped
@@ -177,8 +177,9 @@ def _motion(
     for _ in range(_NARROWER):
         by = rng.uniform(-spread, spread, (4 * count, len(actuated))) * units
         for some in (by[:_PROBES], by):  # a range in which at least half of the postures close
-            found = followed(robot, reference[actuated] + some, reference)
-            q = found.q[found.status == ClosingStatus.CLOSED]
+            start = np.tile(reference, (len(some), 1))
+            found, _, status = attempt(robot, reference[actuated] + some, start, True)
+            q = without_turns(robot, found[status == ClosingStatus.CLOSED], reference)
             if 2 * len(q) < len(some):
                 break
         else:
