@@ -23,7 +23,7 @@ from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
 from benchmarks.measure import Contestant, in_turns
 from robotmodels import loops
-from robotmodels.loops.engine import engine_of
+from robotmodels.loops.dynamics import engine_of
 
 Array = NDArray[np.float64]
 OURS, POSTURES, CALLS, FEW = "robotmodels", 10_000, 500, 100

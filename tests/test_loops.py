@@ -384,8 +384,7 @@ def test_the_direct_model_solves_the_dense_equations(robot, q_ref, rng):
 
 @every_robot
 def test_pinocchio_and_the_projection_on_free_motions_agree(robot, q_ref, rng):
-    from robotmodels.loops.dynamics import tree_torques
-    from robotmodels.loops.engine import engine_of, projected
+    from robotmodels.loops.dynamics import engine_of, projected, tree_torques
 
     q, v, _ = motion(robot, q_ref, rng)
     tau = rng.normal(size=(5, len(robot.actuated)))

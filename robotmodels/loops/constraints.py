@@ -43,6 +43,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import se3
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows, batch_shape
 from ..errors import LoopError
 from ..kinematics import dgm, jacobian, jacobian_rate
@@ -125,21 +126,12 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
         Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
     """
     (q,) = checked(robot, q=q)
-    J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
-    largest = np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
-    redundant = np.zeros(J.shape[:-1], dtype=np.bool_)
-    for k in range(J.shape[-2]):  # what a row has beyond those before it, which become orthonormal
-        row, before = J[..., k, :], J[..., :k, :]
-        for _ in range(2):
-            row = row - np.einsum(
-                "...k,...kj->...j", np.einsum("...kj,...j->...k", before, row), before
-            )
-        length = np.linalg.norm(row, axis=-1)
-        redundant[..., k] = ~(length > _INDEPENDENT * largest)
-        J[..., k, :] = np.where(
-            redundant[..., k, None], 0.0, row / np.where(length > 0.0, length, 1.0)[..., None]
-        )
-    return Mobility(np.asarray(robot.n - (~redundant).sum(axis=-1)), redundant, robot.rows)
+    J = robot.scaled(closure_rows(robot, q)[1])
+    least = _INDEPENDENT * np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
+    ranks = [np.linalg.matrix_rank(J[..., :k, :], least) for k in range(1, len(robot.rows) + 1)]
+    ranks = np.stack([np.zeros(q.shape[:-1], np.int64), *ranks], axis=-1)
+    redundant = np.diff(ranks, axis=-1) == 0
+    return Mobility(np.asarray(robot.n - ranks[..., -1]), redundant, robot.rows)
 
 
 def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
@@ -182,36 +174,26 @@ def closure_rows(robot: LoopedRobot, q: Array) -> tuple[Array, Array]:
 
 def row_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
     """Time derivative of the Jacobian of the closures (..., c, n) at q, v (..., n)."""
-    tree, rates = robot.tree, []
-    batch = batch_shape((q, v), ("q", "v"))
+    tree, rates = robot.tree, [np.empty((*batch_shape((q, v), ("q", "v")), 0, robot.n))]
     for closure in robot.closures:
-        first, second = closure.frames
-        point = dgm(tree, q, second)[..., None, :3, 3]
-        JA, JB = jacobian(tree, q, first), jacobian(tree, q, second)
-        # rows of the joints: twists relative to the first frame, at the origin of the second
-        twists = np.subtract(*(jacobian(tree, q, frame, "world") for frame in (second, first)))
-        change = np.subtract(
-            *(jacobian_rate(tree, q, v, frame, "world") for frame in (second, first))
-        )
-        V, W = twists[..., :3, :].swapaxes(-1, -2), twists[..., 3:, :].swapaxes(-1, -2)
-        dV, dW = change[..., :3, :].swapaxes(-1, -2), change[..., 3:, :].swapaxes(-1, -2)
-        turn, speed = (
-            np.einsum("...ij,...j->...i", J, v)[..., None, :]
-            for J in (JA[..., 3:, :], JB[..., :3, :])
-        )
-        linear = V + np.cross(W, point)
-        dlinear = dV + np.cross(dW, point) + np.cross(W, speed) - np.cross(turn, linear)
-        R = dgm(tree, q, first)[..., :3, :3]
-        parts = [(X @ R).swapaxes(-1, -2) for X in (dlinear, dW - np.cross(turn, W))]
+        ends = closure.frames[::-1]
+        B, A = (jacobian(tree, q, frame) @ v[..., None] for frame in ends)
+        # twists of the joints relative to the first frame, at the world's origin, then shifted
+        S = np.subtract(*(jacobian(tree, q, frame, "world") for frame in ends))
+        dS = np.subtract(*(jacobian_rate(tree, q, v, frame, "world") for frame in ends))
+        (V, W), (dV, dW) = np.split(S, 2, axis=-2), np.split(dS, 2, axis=-2)
+        T, turn = dgm(tree, q, closure.frames[0]), se3.skew(A[..., 3:, 0])
+        point = se3.skew(dgm(tree, q, closure.frames[1])[..., :3, 3])
+        linear = dV - point @ dW - se3.skew(B[..., :3, 0]) @ W - turn @ (V - point @ W)
+        parts = [T[..., :3, :3].swapaxes(-1, -2) @ x for x in (linear, dW - turn @ W)]
         rates.append(np.concatenate(parts, axis=-2)[..., : ROWS[closure.kind], :])
-    return np.concatenate([np.empty((*batch, 0, robot.n)), *rates], axis=-2)
+    return np.concatenate(rates, axis=-2)
 
 
 def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, Array]:
     """Velocity map and its rate along v, each (..., n, n_a); the rate is zero without v."""
     n, actuated, passive = robot.n, robot.actuated, robot.passive
-    weight = np.sqrt(robot.cuts.weight)[:, None]
-    J = weight * closure_rows(robot, q)[1] * robot.units
+    J = robot.scaled(closure_rows(robot, q)[1])
     U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
     determined = len(robot.rows) >= len(passive)
     least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
@@ -228,8 +210,7 @@ def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, A
     if v is None:
         return G * scales, np.zeros_like(G)
     rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
-    dJ = weight * row_rates(robot, q, v) * robot.units
-    rate[..., passive, :] = -inverse @ (dJ @ G)
+    rate[..., passive, :] = -inverse @ (robot.scaled(row_rates(robot, q, v)) @ G)
     return G * scales, rate * scales
 
 

@@ -15,7 +15,6 @@ from math import atan2, pi, sqrt
 import numpy as np
 from numba import types
 
-from ..kernels import Chain
 from ..kernels import _compile as nb
 from ..kernels import _vectors as vec
 from ..kernels._compile import Floats, Ints, compiled

@@ -14,7 +14,6 @@ from .._arrays import Array, Value, as_floats, read_only
 from ..errors import InvalidValueError, LoopError
 from ..geometry import FIXED, PRISMATIC, constant_factors
 from ..kernels import Chain
-from ..kinematics import dgm, jacobian
 from ..minimal_parameters.rules import reach
 from ..model import RobotModel
 
@@ -151,24 +150,31 @@ class LoopedRobot(Value):
     scratch: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.tree, RobotModel):
+        tree, given = self.tree, self.closures
+        if not isinstance(tree, RobotModel):
             raise InvalidValueError(
-                f"tree: expected the RobotModel of a spanning tree, got {type(self.tree).__name__}."
+                f"tree: expected the RobotModel of a spanning tree, got {type(tree).__name__}."
             )
-        closures = self.closures if isinstance(self.closures, Iterable) else (self.closures,)
-        actuated = _checked_actuated(self.tree, self.actuated)
-        parts: dict[str, Any] = {
-            "closures": _checked_closures(tuple(closures)),
-            "actuated": actuated,
-            "passive": read_only(np.setdiff1d(np.arange(self.tree.n), actuated), np.int64),
-            "scratch": threading.local(),
-        }
-        parts["rows"] = tuple(row for closure in parts["closures"] for row in closure.rows)
-        parts["cuts"] = cuts = _cuts(self.tree, parts["closures"])
+        closures = tuple(given) if isinstance(given, Iterable) else (given,)
+        for k, closure in enumerate(closures):
+            if not isinstance(closure, Closure):
+                raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
+        names = [closure.name for closure in closures]
+        if len(set(names)) < len(names):
+            raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
+        actuated, cuts = _actuated(tree, self.actuated), _cuts(tree, closures)
         slides = cuts.chain.sigma == PRISMATIC
-        parts["units"] = read_only(np.where(slides, cuts.length, 1.0))
-        for name, value in parts.items():
+        for name, value in {
+            "closures": closures,
+            "actuated": actuated,
+            "passive": read_only(np.setdiff1d(np.arange(tree.n), actuated), np.int64),
+            "units": read_only(np.where(slides, cuts.length, 1.0)),
+            "rows": tuple(row for closure in closures for row in closure.rows),
+            "cuts": cuts,
+            "scratch": threading.local(),
+        }.items():
             object.__setattr__(self, name, value)
+        _check_effect(self)
 
     @property
     def n(self) -> int:
@@ -179,6 +185,10 @@ class LoopedRobot(Value):
     def name(self) -> str:
         """Name of the tree."""
         return self.tree.name
+
+    def scaled(self, J: Array) -> Array:
+        """Rows (..., c, n) of the closures in sizes of the robot, rad and natural joint units."""
+        return np.sqrt(self.cuts.weight)[:, None] * J * self.units
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures[:4])
@@ -202,18 +212,7 @@ def check_looped(robot: object) -> None:
         )
 
 
-def _checked_closures(closures: tuple[Any, ...]) -> tuple[Closure, ...]:
-    """Closures, each with its own name."""
-    for k, closure in enumerate(closures):
-        if not isinstance(closure, Closure):
-            raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
-    names = [closure.name for closure in closures]
-    if len(set(names)) < len(names):
-        raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
-    return closures
-
-
-def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
+def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     """Columns of the actuated joints."""
     if actuated is None:
         return read_only(np.flatnonzero(tree.table.mu[tree.table.joint_rows]), np.int64)
@@ -231,40 +230,28 @@ def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
     """Arrays of closures, each of which some joint can violate."""
     moving, size = tree.table.joint_rows + 1, reach(tree)
     chain, body, pose = _moving_chain(tree)
-    sides = np.zeros((len(closures), tree.n), dtype=np.int64)
-    parents, ends, weight = [], [], []
-    for closure, side in zip(closures, sides, strict=True):
-        pair = [tree.twin.frame(frame) for frame in closure.frames]
-        side[:] = np.subtract(*(np.isin(moving, place.path).astype(int) for place in pair[::-1]))
-        named = f"closure {closure.name!r}: the frames {closure.frames[0]!r} and "
-        if not side.any():
-            raise LoopError(
-                f"{named}{closure.frames[1]!r} are on the same body; give frames of the two bodies "
-                "that the closure joins."
-            )
-        if not _acts(tree, closure, size):
-            raise LoopError(
-                f"{named}{closure.frames[1]!r} add no constraint: no joint moves them against each "
-                f"other in the rows {', '.join(closure.rows)}. Remove the closure, or correct its "
-                "frames."
-            )
-        for place in pair:
-            T = np.eye(4)
-            T[:3, :3], T[:3, 3] = place.rotation, place.position
-            parents.append(body[place.parent])
-            ends.append(pose[place.parent] @ T)
-        weight += [1.0 / size**2] * 3 + [1.0] * (ROWS[closure.kind] - 3)
+    places = [[tree.twin.frame(frame) for frame in closure.frames] for closure in closures]
+    ends = [pose[x.parent] @ _pose(x.rotation, x.position) for pair in places for x in pair]
+    parents = [body[x.parent] for pair in places for x in pair]
+    paths = [np.isin(moving, x.path).astype(int) for pair in places for x in pair]
+    weight = [[1.0 / size**2] * 3 + [1.0] * (ROWS[c.kind] - 3) for c in closures]
     return Cuts(
         chain=chain,
         first=read_only(parents[::2], np.int64),
         second=read_only(parents[1::2], np.int64),
         rows=read_only([ROWS[closure.kind] for closure in closures], np.int64),
-        rotation=read_only(np.array([T[:3, :3] for T in ends]).reshape(-1, 3, 3)),
-        position=read_only(np.array([T[:3, 3] for T in ends]).reshape(-1, 3)),
-        side=read_only(sides.ravel(), np.int64),
+        rotation=read_only(np.reshape([T[:3, :3] for T in ends], (-1, 3, 3))),
+        position=read_only(np.reshape([T[:3, 3] for T in ends], (-1, 3))),
+        side=read_only(np.ravel(np.subtract(paths[1::2], paths[::2])), np.int64),
         length=read_only([size]),
-        weight=read_only(weight),
+        weight=read_only(np.concatenate([[], *weight])),
     )
+
+
+def _pose(rotation: Array, position: Array) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, position
+    return T
 
 
 def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
@@ -287,13 +274,24 @@ def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
     return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
 
-def _acts(tree: RobotModel, closure: Closure, size: float) -> bool:
-    """Whether some joint moves the two frames against each other in the rows of the closure."""
-    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (3, tree.n)):
-        first, second = (dgm(tree, q, frame) for frame in closure.frames)
-        twist = np.subtract(*(jacobian(tree, q, frame, "world") for frame in closure.frames))
-        linear = twist[:3] + np.cross(twist[3:], second[:3, 3], axis=0)
-        rows = [first[:3, :3].T @ part for part in (linear / size, twist[3:])]
-        if np.abs(np.vstack(rows)[: ROWS[closure.kind]]).max(initial=0.0) > _NO_EFFECT:
-            return True
-    return False
+def _check_effect(robot: LoopedRobot) -> None:
+    """Raise for closures of one body, and for those that no joint can violate."""
+    from .kernels import closure_jacobians
+
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
+    e, J = np.empty((3, len(robot.rows))), np.empty((3, len(robot.rows), robot.n))
+    closure_jacobians(q, robot.cuts, e, J)
+    J = robot.scaled(J)
+    sides = robot.cuts.side.reshape(-1, robot.n)
+    for closure, side in zip(robot.closures, sides, strict=True):
+        acts = [k for k, row in enumerate(robot.rows) if row in closure.rows]
+        named = "closure {!r}: the frames {!r} and {!r}".format(closure.name, *closure.frames)
+        if not side.any():
+            raise LoopError(
+                f"{named} are on the same body; give frames of the two bodies that it joins."
+            )
+        if not np.abs(J[:, acts]).max(initial=0.0) > _NO_EFFECT:
+            raise LoopError(
+                f"{named} add no constraint: no joint moves them against each other in the rows "
+                f"{', '.join(closure.rows)}. Remove the closure, or correct its frames."
+            )

@@ -17,8 +17,7 @@ from ..simulation.integration import Integration
 from ..simulation.motion import Law, Loads, Motion
 from ..simulation.simulate import law_of, times_of
 from .constraints import closure_rows
-from .dynamics import closed
-from .engine import Engine, accelerations
+from .dynamics import Engine, accelerations, closed
 from .robot import LoopedRobot, check_looped
 
 _RATE = 10.0  # 1/s, decay of errors of the closures during the integration
@@ -178,8 +177,8 @@ class LoopMotion(Motion):
 
     def _passes(self, q: Array) -> bool:
         """Whether the least singular value of the closures changed its sign on the way to q."""
-        J = np.sqrt(self.robot.cuts.weight)[:, None] * closure_rows(self.robot, q)[1]
-        U, sizes, Vt = np.linalg.svd(J * self.robot.units, full_matrices=False)
+        J = self.robot.scaled(closure_rows(self.robot, q)[1])
+        U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
         last = int((sizes > 1e-12 * sizes.max(initial=0.0)).sum()) - 1
         before, self._weakest = self._weakest, (U[:, last], Vt[last]) if last >= 0 else None
         if before is None or self._weakest is None:
