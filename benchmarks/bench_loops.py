@@ -2,8 +2,8 @@
 
     python -m benchmarks.bench_loops [--out benchmarks/results] [--rounds 15]
 
-Contestants of a row take turns. Pinocchio's direct model runs bare, with the settings of
-ours and with twenty proximal iterations; its closing is the Newton iteration that users write.
+Contestants of a row take turns. Pinocchio's direct model runs bare, with the one point of
+a planar pin that ours takes, with two points on its axis, and with twenty proximal iterations; its closing is the Newton iteration that users write.
 toolbox-parallel-robots needs Pinocchio's CasADi bindings, which the wheel does not have.
 """
 
@@ -23,7 +23,7 @@ from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
 from benchmarks.measure import Contestant, in_turns
 from robotmodels import loops
-from robotmodels.loops.dynamics import engine_of
+from robotmodels.loops.dynamics import Engine, engine_of
 
 Array = NDArray[np.float64]
 OURS, POSTURES, CALLS, FEW = "robotmodels", 10_000, 500, 100
@@ -74,29 +74,49 @@ def robots() -> dict[str, tuple[loops.LoopedRobot, Array]]:
     }
 
 
+def by_hand(engine: Engine) -> tuple[pin.StdVec_RigidConstraintModel, ...]:
+    """A pin as users write it: two points on its axis; and its data."""
+    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    for z in (0.0, 1.0):
+        first, at = engine.models[0], pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
+        models.append(
+            pin.RigidConstraintModel(
+                pin.ContactType.CONTACT_3D, engine.model,
+                first.joint1_id, first.joint1_placement * at,
+                first.joint2_id, first.joint2_placement * at, pin.LOCAL,
+            )
+        )  # fmt: skip
+    for model in models:
+        datas.append(model.createData())
+    return models, datas
+
+
 def closing_row(robot: loops.LoopedRobot, q: Array, rounds: int) -> Row:
     """Postures of a four-bar at positions of its crank within a radian."""
     angles = q[0] + np.random.default_rng(0).uniform(-1.0, 1.0, (POSTURES, 1))
     engine, passive = engine_of(robot), robot.passive
     model, data, constraints = engine.model, engine.data, engine.models
+    order, back = (
+        (slice(None), slice(None)) if engine.order is None else (engine.order, engine.back)
+    )
 
-    def by_hand() -> None:
+    def newton() -> None:
         for angle in angles[:FEW, 0]:
             x = q.copy()
             x[0] = angle
             for _ in range(20):
-                pin.computeJointJacobians(model, data, x[engine.order])
+                pin.computeJointJacobians(model, data, x[order])
                 for constraint, found in zip(constraints, engine.datas, strict=True):
                     constraint.calc(model, data, found)
                 e = np.concatenate([found.c1Mc2.translation for found in engine.datas])
                 if np.abs(e).max() < 1e-12:
                     break
                 J = pin.getConstraintsJacobian(model, data, constraints, engine.datas)
-                x[passive] -= np.linalg.lstsq(-J[:, engine.back][:, passive], e, rcond=None)[0]
+                x[passive] -= np.linalg.lstsq(-J[:, back][:, passive], e, rcond=None)[0]
 
     contestants = [
         Contestant(OURS, lambda: loops.close(robot, angles, q), POSTURES),
-        Contestant("Pinocchio, Newton in Python", by_hand, FEW, rounds=3),
+        Contestant("Pinocchio, Newton in Python", newton, FEW, rounds=3),
     ]
     return measure("close a four-bar", contestants, rounds, "1e4 postures <= 20 ms: 2 us each")
 
@@ -108,17 +128,23 @@ def direct_row(name: str, robot: loops.LoopedRobot, q: Array, rounds: int) -> Ro
     engine = engine_of(robot)
     full = np.zeros(robot.n)
     full[robot.actuated] = tau
-    given = (engine.model, engine.data, *(x[engine.order] for x in (q, v, full)))
+    order = engine.order
+    samples = q[order], v[order], full[order]
     finer = pin.ProximalSettings(1e-14, 1e-10, 20)
+    points = by_hand(engine)
+    data = engine.model.createData()
+    pin.initConstraintDynamics(engine.model, data, *points)
 
-    def bare(settings: pin.ProximalSettings) -> None:
+    def bare(settings: pin.ProximalSettings, data: pin.Data, closures: tuple) -> None:
         for _ in range(CALLS):
-            pin.constraintDynamics(*given, engine.models, engine.datas, settings)
+            pin.constraintDynamics(engine.model, data, *samples, *closures, settings)
 
     contestants = [
         Contestant(OURS, lambda: [loops.ddm(robot, q, v, tau) for _ in range(CALLS)], CALLS),
-        Contestant("Pinocchio, same settings", lambda: bare(engine.settings), CALLS),
-        Contestant("Pinocchio, 20 iterations", lambda: bare(finer), CALLS),
+        Contestant("Pinocchio, one point",
+            lambda: bare(engine.settings, engine.data, (engine.models, engine.datas)), CALLS),
+        Contestant("Pinocchio, two points", lambda: bare(engine.settings, data, points), CALLS),
+        Contestant("Pinocchio, two points, 20 iterations", lambda: bare(finer, data, points), CALLS),
         Contestant(
             f"{OURS}, batch",
             lambda: loops.ddm(robot, np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau), CALLS,

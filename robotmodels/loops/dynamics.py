@@ -76,11 +76,11 @@ from .robot import LoopedRobot, check_looped
 _OPEN = 1e-3  # largest residual of closed loops, relative to the robot's size, or rad
 _MU, _ITERATIONS, _CHANGE = 1e-8, 5, 1e-5
 """Proximal parameter; most iterations; change of the multipliers at which they end."""
-_RESIDUAL = 1e-12  # largest acceleration between the frames of a closure, m/s^2 or rad/s^2
 _RANK = 1e-8  # least singular value of independent constraints, relative to the largest
 _DEFINITE = 1e-14  # least eigenvalue of the mass matrix of free motions, relative to the largest
 _REJECTED = 1e-6  # least part of closure accelerations that no joint acceleration gives
 _PARALLEL = 1e-10  # largest rate between parallel axes, 1
+_LEFT = 1e-12 / _MU  # largest change of the multipliers of closures that hold to 1e-12
 _FLOAT64, _solve = np.dtype(np.float64), pin.constraintDynamics
 
 
@@ -122,19 +122,23 @@ def ddm(
     ndarray, shape (..., n)
         Accelerations, rad/s^2 or m/s^2.
     """
-    try:  # one sample given as arrays, of a robot without drives, once its engine is made
-        run = robot.scratch.quick
+    try:  # one sample given as arrays, of a robot without drives whose engine is made: no calls
+        model, data, models, datas, settings, full, places, order, back = robot.scratch.quick
         if (
-            q.shape == v.shape == run.shape  # type: ignore[union-attr]
-            and tau.shape == run.actuated.shape  # type: ignore[union-attr]
+            q.shape == v.shape == full.shape  # type: ignore[union-attr]
+            and tau.shape == places.shape  # type: ignore[union-attr]
             and q.dtype is v.dtype is tau.dtype is _FLOAT64  # type: ignore[union-attr]
             and drive is True
             and wrench is None
         ):
-            run.full[run.actuated] = tau
-            a = run(q, v, run.full)
-            if a is not None:
-                return a
+            full[places] = tau
+            if order is not None:
+                q, v = q[order], v[order]  # type: ignore[index]
+            a = _solve(model, data, q, v, full, models, datas, settings)
+            if settings.relative_residual <= _LEFT and isfinite(sum(a.tolist())):
+                return a if order is None else a[back]
+            if order is not None:
+                q, v = q[back], v[back]
     except AttributeError:
         pass
     check_looped(robot)
@@ -215,11 +219,10 @@ class Engine:
         self.serves = twin.serves_dynamics and not (self.rotor - np.diag(np.diag(self.rotor))).any()
         if not self.serves:
             return
-        order = np.argsort(twin.order)  # joints of the table in Pinocchio's order
-        self.order, self.back = (None, None) if twin.in_table_order else (order, twin.order)
+        self.order = np.argsort(twin.order)  # joints of the table in Pinocchio's order
         self.model: Any = twin.model.copy() if self.rotor.any() else twin.model
         if self.rotor.any():
-            self.model.armature = np.diag(self.rotor)[order].copy()
+            self.model.armature = np.diag(self.rotor)[self.order].copy()
         models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
         turned = _tilts(robot)
@@ -243,20 +246,13 @@ class Engine:
         # the four-argument form: with three the data of another set of constraints are used
         pin.initConstraintDynamics(self.model, self.data, models, self.datas)
         self.settings = pin.ProximalSettings(_CHANGE, _MU, _ITERATIONS)
-        self.full, self.actuated, self.shape = np.zeros(tree.n), robot.actuated, (tree.n,)
 
-    def __call__(self, q: Array, v: Array, tau: Array) -> Array | None:
+    def accelerations(self, q: Array, v: Array, tau: Array) -> Array | None:
         """Accelerations under torques of all joints, each (n,); None if the closures fail."""
-        order, settings = self.order, self.settings
-        if order is not None:
-            q, v, tau = q[order], v[order], tau[order]
+        q, v, tau, settings = q[self.order], v[self.order], tau[self.order], self.settings
         a = _solve(self.model, self.data, q, v, tau, self.models, self.datas, settings)
-        left = _MU * settings.relative_residual
-        if not left <= _RESIDUAL and not left <= _RESIDUAL * np.linalg.norm(a):
-            return None
-        if not isfinite(sum(a.tolist())):
-            return None
-        return a if order is None else a[self.back]
+        left = settings.relative_residual <= _LEFT * (1.0 + np.linalg.norm(a))
+        return a[self.robot.tree.twin.order] if left and np.isfinite(a).all() else None
 
 
 def _tilts(robot: LoopedRobot) -> set[str]:
@@ -276,7 +272,10 @@ def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
         engine = Engine(robot, drive)
         setattr(robot.scratch, name, engine)
         if drive and engine.serves and robot.tree.drive_matrices is None:
-            robot.scratch.quick = engine
+            order, places = robot.tree.twin.order, robot.tree.twin.order[robot.actuated]
+            turned = (None, None) if robot.tree.twin.in_table_order else (engine.order, order)
+            parts = engine.model, engine.data, engine.models, engine.datas, engine.settings
+            robot.scratch.quick = (*parts, np.zeros(robot.n), places, *turned)
     return engine
 
 
@@ -316,7 +315,7 @@ def accelerations(engine: Engine, q: Array, v: Array, tau: Array) -> Array:
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
     out, left = np.empty_like(rows[0]), []
     for i, row in enumerate(zip(*rows, strict=True)):
-        a = engine(*row) if engine.serves else None
+        a = engine.accelerations(*row) if engine.serves else None
         if a is None:
             left.append(i)
         else:
