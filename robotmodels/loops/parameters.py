@@ -23,7 +23,7 @@ from .robot import LoopedRobot, check_looped
 _PIECE = 512  # samples at a time
 _ROWS_A_COLUMN = 4  # rows of random motion per parameter
 _NARROWER = 12  # halvings of the range of the actuated joints
-_CHECKED, _PROBES = 40, 16  # samples of the final check, and to find the range
+_CHECKED = 40  # samples of the final check
 
 
 def torque_regressor(
@@ -65,13 +65,11 @@ def torque_regressor(
     """
     batch, rows = batch_rows(tuple(checked(robot, q=q, v=v, a=a)), ("q", "v", "a"))
     G = maps(robot, closed(robot, rows[0]))[0].swapaxes(1, 2)
-    pieces = [
-        G[k : k + _PIECE]
-        @ regressors.torque_regressor(
-            robot.tree, *(x[k : k + _PIECE] for x in rows), drive=drive, columns=columns
-        )
-        for k in range(0, max(len(G), 1), _PIECE)
-    ]
+    pieces = []
+    for k in range(0, max(len(G), 1), _PIECE):
+        motion = (x[k : k + _PIECE] for x in rows)
+        W = regressors.torque_regressor(robot.tree, *motion, drive=drive, columns=columns)
+        pieces.append(G[k : k + _PIECE] @ W)
     W = np.concatenate(pieces)
     return W.reshape(*batch, *W.shape[1:])
 
@@ -130,61 +128,53 @@ def base_parameters(
     ('ZZ1', 'MX1', 'MY1')
     """
     check_looped(robot)
-    kinds = drive_kinds(drive)
-    reference = _reference(robot, q_ref)
+    kinds, reference = drive_kinds(drive), _reference(robot, q_ref)
     columns = TorqueColumns(robot.tree, kinds, None, tolerance)
     p, rng = len(columns.names), np.random.default_rng(0)
     count = max(_ROWS_A_COLUMN * p // max(len(robot.actuated), 1), 2)
     W = torque_regressor(robot, *_motion(robot, reference, count, rng), drive=kinds)
     # the rows of the looped robot take the place of those of its tree
-    rows = triangles_of([W * robot.units[robot.actuated][:, None]], p)
-    columns.__dict__["factor"] = rows
-    kept, matrix = columns.basis.kept, columns.basis.coefficients
+    columns.__dict__["factor"] = triangles_of([W * robot.units[robot.actuated][:, None]], p)
+    basis = columns.basis
     W = torque_regressor(robot, *_motion(robot, reference, _CHECKED, rng), drive=kinds)
     values = rng.normal(size=p)
-    torque = W @ values
-    wrong = np.abs(W[..., kept] @ (matrix @ values) - torque).max(initial=0.0)
-    error = float(wrong / (np.abs(torque).max(initial=0.0) or 1.0))
+    wrong = W[..., basis.kept] @ (basis.coefficients @ values) - W @ values
+    error = float(np.abs(wrong).max(initial=0.0) / (np.abs(W @ values).max(initial=0.0) or 1.0))
     notes = (f"With closed loops, in the assembly of q = {reference.round(6).tolist()}.",)
-    notes += (*columns.notes, *residual_warning(error, tolerance))
     return BaseParameters(
-        robot.tree, kinds, kept, matrix, BaseMethod.NUMERIC, columns.basis.gap, None, tolerance,
-        notes, columns.neglected(matrix), error, NOTHING,
+        robot.tree, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, None,
+        tolerance, (*notes, *columns.notes, *residual_warning(error, tolerance)),
+        columns.neglected(basis.coefficients), error, NOTHING,
     )  # fmt: skip
 
 
 def _reference(robot: LoopedRobot, q_ref: ArrayLike | None) -> Array:
     """A closed posture (n,): the given one, or the first that closes at random positions."""
     if q_ref is not None:
-        q = as_exact(q_ref, (robot.n,), "q_ref")
-        found = close(robot, q[..., robot.actuated], q)
+        q = as_exact(q_ref, (robot.n,), "q_ref")[None]
+        found = close(robot, q[:, robot.actuated], q)
     else:
         spread = np.pi * robot.units[robot.actuated]
-        tried = np.random.default_rng(0).uniform(-spread, spread, (200, len(spread)))
-        found = close(robot, np.vstack((0.0 * spread, tried)))
-    for k in np.flatnonzero(found.status.reshape(-1) == ClosingStatus.CLOSED)[:1]:
-        return found.q.reshape(-1, robot.n)[k]
-    reason = found.reason() if q_ref is not None else "No posture of 201 closes the loops."
-    raise LoopError(f"q_ref: {reason} Give a posture of all joints near a regular closed one.")
+        found = close(robot, np.random.default_rng(0).uniform(-spread, spread, (200, len(spread))))
+    for k in np.flatnonzero(found.status == ClosingStatus.CLOSED)[:1]:
+        return found.q[k]
+    raise LoopError(
+        f"q_ref: {found.reason(0)} Give a posture of all joints near a regular closed one."
+    )
 
 
 def _motion(
     robot: LoopedRobot, reference: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
     """Random motion in the assembly of a posture, of balanced gravity and inertia; each (N, n)."""
-    actuated = robot.actuated
-    units, spread = robot.units[actuated], np.pi
-    for _ in range(_NARROWER):
-        by = rng.uniform(-spread, spread, (4 * count, len(actuated))) * units
-        for some in (by[:_PROBES], by):  # a range in which at least half of the postures close
-            start = np.tile(reference, (len(some), 1))
-            found, _, status = attempt(robot, reference[actuated] + some, start, True)
-            q = without_turns(robot, found[status == ClosingStatus.CLOSED], reference)
-            if 2 * len(q) < len(some):
-                break
-        else:
+    actuated, units = robot.actuated, robot.units[robot.actuated]
+    start = np.tile(reference, (4 * count, 1))
+    for narrower in range(_NARROWER):  # a range in which at least half of the postures close
+        by = np.pi * 0.5**narrower * rng.uniform(-1.0, 1.0, (4 * count, len(actuated))) * units
+        found, _, status = attempt(robot, reference[actuated] + by, start, True)
+        q = without_turns(robot, found[status == ClosingStatus.CLOSED], reference)
+        if len(q) >= 2 * count:
             break
-        spread *= 0.5
     else:
         raise LoopError(
             f"{robot.name!r}: the loops hardly close around q = {reference.tolist()}; give another "
@@ -192,10 +182,7 @@ def _motion(
         )
     G = maps(robot, q)[0]  # without the half that is nearest to dead points
     best = np.argsort(np.abs(G / robot.units[:, None]).max(axis=(1, 2)))[:count]
-    q, G = q[best], G[best]
-    rate = np.sqrt(EARTH / robot.cuts.length[0])
-    v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated))) * units
-    v = rate * np.einsum("kij,kj->ki", G, v_a)
-    dG = maps(robot, q, v)[1]
-    a = rate**2 * np.einsum("kij,kj->ki", G, a_a) + rate * np.einsum("kij,kj->ki", dG, v_a)
-    return q, v, a
+    q, G, rate = q[best], G[best], np.sqrt(EARTH / robot.cuts.length[0])
+    v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated), 1)) * units[:, None]
+    v = rate * (G @ v_a)[..., 0]
+    return q, v, (rate**2 * (G @ a_a) + rate * maps(robot, q, v)[1] @ v_a)[..., 0]
