@@ -27,6 +27,9 @@ class ClosingStatus(Outcome):
     )  # fmt: skip
 
 
+_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ClosedPostures(Frozen, Value):
     """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
@@ -39,11 +42,6 @@ class ClosedPostures(Frozen, Value):
         Largest distance (m) or angle (rad) between the frames of a closure.
     status : ndarray of int8, shape (...)
         Codes of `ClosingStatus`; loops are open for ``CANNOT_CLOSE`` and ``NOT_CONVERGED``.
-
-    Examples
-    --------
-    >>> ClosedPostures(np.zeros(3), np.zeros(()), np.zeros((), np.int8)).reason()
-    'The loops are closed.'
     """
 
     q: Array
@@ -53,25 +51,19 @@ class ClosedPostures(Frozen, Value):
     def reason(self, index: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status of one posture, with the residual where its loops are open."""
         try:
-            code = self.status[index]
-        except (IndexError, TypeError):
-            code = self.status[None]
-        if np.ndim(code):
+            status = ClosingStatus(self.status[index].item())
+        except (IndexError, TypeError, ValueError):
             raise InvalidValueError(
                 f"index: expected the index of a posture of a batch of shape {self.status.shape}, "
                 f"got {index!r:.40}."
-            )
-        status = ClosingStatus(int(code))
-        left = f" Least residual: {self.residual[index]:.3g} m or rad."
+            ) from None
+        left = f" Least residual: {self.residual[index].item():.3g} m or rad."
         return status.sentence + (left if status in _OPEN else "")
 
     def __repr__(self) -> str:
         counts = [(int(np.sum(self.status == s)), s.name) for s in ClosingStatus]
         listed = ", ".join(f"{count} {name}" for count, name in counts if count)
         return f"<ClosedPostures, q {self.q.shape}: {listed or 'empty'}>"
-
-
-_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
 
 
 def close(
@@ -126,8 +118,8 @@ def close(
     guess = as_vector(guess, n if follow else len(passive), "q_guess")
     batch, (target, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))
     if not follow:
-        first, start = start, np.empty((len(start), n))
-        start[:, passive], start[:, robot.actuated] = first, target
+        of_passive, start = start, np.empty((len(start), n))
+        start[:, passive], start[:, robot.actuated] = of_passive, target
     q, residual, status = attempt(robot, target, start, follow)
     jumped = np.full(len(q), not follow)  # motions keep their turns
     rng = np.random.default_rng(0)

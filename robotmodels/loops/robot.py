@@ -50,21 +50,15 @@ class Closure:
     name : str
         Name of the closure, which messages and constraint rows use.
     frames : (int or str, int or str)
-        Numbers or names of the two frames; 0 is the base. They lie on different bodies.
+        Numbers or names of the two frames, on different bodies; 0 is the base.
     kind : {"revolute", "point", "full"}
-        ``"revolute"``: origins and z axes coincide, as in a cut revolute joint, rows
-        ``x y z rx ry``; ``"point"``: origins coincide, as in a spherical joint, rows ``x y z``;
-        ``"full"``: the frames coincide, as in a cut body, rows ``x y z rx ry rz``.
+        ``"revolute"``: origins and z axes coincide (rows ``x y z rx ry``); ``"point"``: origins
+        coincide, as in a spherical joint; ``"full"``: the frames coincide, as in a cut body.
 
     Raises
     ------
     InvalidValueError
         An empty name, another kind, or not two frames.
-
-    References
-    ----------
-    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
-    ICRA 1986, for frames of cut joints. Seed book section 1.2.1, for the tables.
 
     Examples
     --------
@@ -77,12 +71,11 @@ class Closure:
     kind: str = "revolute"
 
     def __post_init__(self) -> None:
+        pair, kinds = self.frames, ", ".join(map(repr, ROWS))
         if not isinstance(self.name, str) or not self.name:
             raise InvalidValueError(f"name: expected a text, not empty, got {self.name!r:.60}.")
         if not isinstance(self.kind, str) or self.kind not in ROWS:
-            kinds = ", ".join(map(repr, ROWS))
             raise InvalidValueError(f"kind: expected one of {kinds}, got {self.kind!r:.60}.")
-        pair = self.frames
         if isinstance(pair, str) or not isinstance(pair, Iterable) or len(tuple(pair)) != 2:
             raise InvalidValueError(
                 f"frames: expected two frames of the tree such as (4, 7), got {pair!r:.60}."
@@ -99,12 +92,10 @@ class Closure:
 class LoopedRobot(Value):
     """Robot with kinematic loops: spanning tree, closures and actuated joints. Read-only.
 
-    Joint variables ``q (..., n)`` are those of all n joints of the tree; n_a of them are actuated.
-
     Parameters
     ----------
     tree : RobotModel
-        Spanning tree, in which each loop is cut.
+        Spanning tree of n joints, in which each loop is cut.
     closures : sequence of Closure
         Closures of the cut loops.
     actuated : array_like of int, shape (n_a,), optional
@@ -128,7 +119,8 @@ class LoopedRobot(Value):
 
     References
     ----------
-    Seed book sections 1.2.1 and 2.2.
+    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
+    ICRA 1986. Seed book sections 1.2.1 and 2.2.
 
     Examples
     --------
@@ -163,12 +155,11 @@ class LoopedRobot(Value):
         if len(set(names)) < len(names):
             raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
         actuated, cuts = _actuated(tree, self.actuated), _cuts(tree, closures)
-        slides = cuts.chain.sigma == PRISMATIC
         for name, value in {
             "closures": closures,
             "actuated": actuated,
             "passive": read_only(np.setdiff1d(np.arange(tree.n), actuated), np.int64),
-            "units": read_only(np.where(slides, cuts.length, 1.0)),
+            "units": read_only(np.where(cuts.chain.sigma == PRISMATIC, cuts.length, 1.0)),
             "rows": tuple(row for closure in closures for row in closure.rows),
             "cuts": cuts,
             "scratch": threading.local(),
@@ -191,11 +182,11 @@ class LoopedRobot(Value):
         return np.sqrt(self.cuts.weight)[:, None] * J * self.units
 
     def __repr__(self) -> str:
-        listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures[:4])
+        listed = [f"{c.name} ({c.kind})" for c in self.closures[:4]] or ["none"]
         more = f" and {len(self.closures) - 4} more" if len(self.closures) > 4 else ""
         return (
             f"<LoopedRobot {self.name!r}: {self.n} joints, actuated {self.actuated.tolist()}, "
-            f"closures: {listed or 'none'}{more}>"
+            f"closures: {', '.join(listed)}{more}>"
         )
 
     @property
@@ -227,49 +218,41 @@ def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
 
 
 def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
-    """Arrays of closures, each of which some joint can violate."""
-    moving, size = tree.table.joint_rows + 1, reach(tree)
+    """Arrays of closures."""
+    size, moving = reach(tree), tree.table.joint_rows + 1
     chain, body, pose = _moving_chain(tree)
-    places = [[tree.twin.frame(frame) for frame in closure.frames] for closure in closures]
-    ends = [pose[x.parent] @ _pose(x.rotation, x.position) for pair in places for x in pair]
-    parents = [body[x.parent] for pair in places for x in pair]
-    paths = [np.isin(moving, x.path).astype(int) for pair in places for x in pair]
+    places = [tree.twin.frame(frame) for closure in closures for frame in closure.frames]
+    parents = [body[x.parent] for x in places]
+    R = [pose[x.parent][:3, :3] @ x.rotation for x in places]
+    p = [pose[x.parent][:3, :3] @ x.position + pose[x.parent][:3, 3] for x in places]
+    paths = [np.isin(moving, x.path).astype(int) for x in places]
     weight = [[1.0 / size**2] * 3 + [1.0] * (ROWS[c.kind] - 3) for c in closures]
     return Cuts(
         chain=chain,
         first=read_only(parents[::2], np.int64),
         second=read_only(parents[1::2], np.int64),
-        rows=read_only([ROWS[closure.kind] for closure in closures], np.int64),
-        rotation=read_only(np.reshape([T[:3, :3] for T in ends], (-1, 3, 3))),
-        position=read_only(np.reshape([T[:3, 3] for T in ends], (-1, 3))),
+        rows=read_only([ROWS[c.kind] for c in closures], np.int64),
+        rotation=read_only(np.reshape(R, (-1, 3, 3))),
+        position=read_only(np.reshape(p, (-1, 3))),
         side=read_only(np.ravel(np.subtract(paths[1::2], paths[::2])), np.int64),
         length=read_only([size]),
         weight=read_only(np.concatenate([[], *weight])),
     )
 
 
-def _pose(rotation: Array, position: Array) -> Array:
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation, position
-    return T
-
-
 def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
     """Chain of the moving joints alone; of each frame, R_0 first, its joint and its pose on it."""
-    body, pose = [0], [np.eye(4)]
-    antecedent, constants = [], []
-    for sigma, a, C in zip(
-        tree.table.sigma, tree.table.antecedent, constant_factors(tree.table), strict=True
-    ):
+    body, pose, antecedent, constants = [0], [np.eye(4)], [], []
+    table = tree.table
+    for sigma, a, C in zip(table.sigma, table.antecedent, constant_factors(table), strict=True):
         at = pose[a] @ C
         if sigma != FIXED:
             antecedent.append(body[a])
             constants.append(at)
         body.append(body[a] if sigma == FIXED else len(constants))
         pose.append(at if sigma == FIXED else np.eye(4))
-    T, joints = np.array(constants).reshape(-1, 4, 4), np.arange(tree.n)
-    sigma = tree.table.sigma[tree.table.joint_rows]
-    structure = [read_only(x, np.int64) for x in (antecedent, sigma, joints)]
+    T, sigma = np.array(constants).reshape(-1, 4, 4), table.sigma[table.joint_rows]
+    structure = [read_only(x, np.int64) for x in (antecedent, sigma, np.arange(tree.n))]
     places = [read_only(x) for x in (T[:, :3, :3], T[:, :3, 3], np.eye(3), np.zeros(3))]
     return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
@@ -281,16 +264,15 @@ def _check_effect(robot: LoopedRobot) -> None:
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
     e, J = np.empty((3, len(robot.rows))), np.empty((3, len(robot.rows), robot.n))
     closure_jacobians(q, robot.cuts, e, J)
-    J = robot.scaled(J)
+    acts = np.abs(robot.scaled(J)).max(axis=(0, 2), initial=0.0) > _NO_EFFECT
     sides = robot.cuts.side.reshape(-1, robot.n)
     for closure, side in zip(robot.closures, sides, strict=True):
-        acts = [k for k, row in enumerate(robot.rows) if row in closure.rows]
         named = "closure {!r}: the frames {!r} and {!r}".format(closure.name, *closure.frames)
         if not side.any():
             raise LoopError(
                 f"{named} are on the same body; give frames of the two bodies that it joins."
             )
-        if not np.abs(J[:, acts]).max(initial=0.0) > _NO_EFFECT:
+        if not acts[[robot.rows.index(row) for row in closure.rows]].any():
             raise LoopError(
                 f"{named} add no constraint: no joint moves them against each other in the rows "
                 f"{', '.join(closure.rows)}. Remove the closure, or correct its frames."
