@@ -11,17 +11,37 @@ Normal equations have unit diagonals, their rows weights that make metres dimens
 from __future__ import annotations
 
 from math import atan2, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
+from ..kernels import Chain
 from ..kernels import _compile as nb
 from ..kernels import _vectors as vec
 from ..kernels._compile import Floats, Ints, compiled
 from ..kernels._motion import carry_pose, link_pose
 from ..kernels._vectors import Matrix, Vector
 from ..kernels.mass import POSITIVE, solve_definite
-from .robot import Cuts
+
+
+class Cuts(NamedTuple):
+    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
+
+    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
+    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
+    """
+
+    chain: Chain
+    first: Ints
+    second: Ints
+    rows: Ints
+    rotation: Floats
+    position: Floats
+    side: Ints
+    length: Floats
+    weight: Floats
+
 
 CUTS = types.NamedTuple(
     (nb.CHAIN, nb.INTS, nb.INTS, nb.INTS, nb.STACK, nb.MATRIX, nb.INTS, nb.VECTOR, nb.VECTOR), Cuts

@@ -1,6 +1,47 @@
-"""Torque regressor and base parameters of looped robots."""
+"""Torque regressor and base parameters of looped robots.
+
+Parameters
+----------
+robot : LoopedRobot
+    The robot, n joints, n_a of them actuated.
+q, v, a : array_like, shape (..., n)
+    Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
+q_ref : array_like, shape (n,), optional
+    Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
+    Default: the first posture that closes at random positions of the actuated joints.
+drive, columns
+    As for `robotmodels.torque_regressor` of the tree, drives of passive joints included;
+    ``columns`` may be base parameters.
+tolerance : float
+    Largest relative torque of a parameter that is not kept.
+
+Raises
+------
+ShapeError, InvalidValueError, LoopError
+    As `idm`; columns that do not exist; no closed posture, or no regular ones near ``q_ref``.
+
+References
+----------
+W. Khalil and F. Bennis, "Symbolic calculation of the base inertial parameters of closed-loop
+robots", IJRR 14(2), 1995. Seed book sections 1.5.2.1, 1.5.3 and 1.6.2.
+
+Examples
+--------
+The inertia of a balanced parallelogram about its axes appears as one sum.
+
+>>> from robotmodels import RobotModel
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.loops import Closure
+>>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+>>> tree = RobotModel.from_table(table, gravity=[0, -9.81, 0])
+>>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
+>>> base_parameters(robot, [1.0, 1.0, -1.0], drive=False).names
+('ZZ1', 'MX1', 'MY1')
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,13 +58,46 @@ from ..minimal_parameters.rules import EARTH
 from ..regressors.columns import Columns
 from .closing import ClosingStatus, attempt, close, without_turns
 from .constraints import checked, maps
-from .dynamics import closed
+from .dynamics import _OPEN, closed
 from .robot import LoopedRobot, check_looped
 
 _PIECE = 512  # samples at a time
 _ROWS_A_COLUMN = 4  # rows of random motion per parameter
 _NARROWER = 12  # halvings of the range of the actuated joints
 _CHECKED = 40  # samples of the final check
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopedParameters(BaseParameters):
+    """Base parameters of a looped robot, in the assembly of a closed posture ``q_ref`` (n,)."""
+
+    robot: LoopedRobot = None  # type: ignore[assignment]
+    q_ref: Array = None  # type: ignore[assignment]
+
+    def motion(
+        self, guess: Array, q: Array, v: Array | None, a: Array | None
+    ) -> tuple[Array, Array, Array, Array]:
+        """Motion (N, n) of all joints from that of the actuated ones (N, n_a), and the map G."""
+        found = close(self.robot, q, guess)
+        for i in np.flatnonzero(found.residual > _OPEN * self.robot.cuts.length)[:1]:
+            raise LoopError(f"q: the loops are open in sample {i}. {found.reason(i)}")
+        v, a = (np.zeros(q.shape) if x is None else x for x in (v, a))
+        G = maps(self.robot, found.q)[0]
+        rate = np.einsum("kij,kj->ki", G, v)
+        dG = maps(self.robot, found.q, rate)[1]
+        return found.q, rate, (G @ a[..., None] + dG @ v[..., None])[..., 0], G
+
+    def torque_rows(self, q: Array, v: Array, a: Array, columns: Columns) -> Array:
+        """Rows (N, n, b) of the regressor at motions (N, n), zero for passive joints.
+
+        The motion of the actuated joints counts; that of the others is where iterations start.
+        """
+        robot, actuated = self.robot, self.robot.actuated
+        *motion, G = self.motion(q, q[:, actuated], v[:, actuated], a[:, actuated])
+        W = regressors.torque_regressor(robot.tree, *motion, drive=self.drive, columns=columns)
+        rows = np.zeros(W.shape)
+        rows[:, actuated] = G.swapaxes(1, 2) @ W
+        return rows
 
 
 def torque_regressor(
@@ -36,32 +110,10 @@ def torque_regressor(
 ) -> Array:
     """Matrix W of the inverse dynamic model: ``idm(robot, q, v, a) = W @ parameters``.
 
-    Parameters
-    ----------
-    robot : LoopedRobot
-        The robot, n joints, n_a of them actuated.
-    q, v, a : array_like, shape (..., n)
-        Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
-    drive, columns
-        As for `robotmodels.torque_regressor` of the tree; ``columns`` may be base parameters.
-
     Returns
     -------
     ndarray, shape (..., n_a, p)
         ``G^T`` times the regressor of the tree; columns as ``parameter_names(robot.tree, drive)``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, LoopError
-        As `idm`; columns that do not exist.
-
-    References
-    ----------
-    Seed book sections 1.5.2.1 and 1.6.2.
-
-    Examples
-    --------
-    See `base_parameters`.
     """
     batch, rows = batch_rows(tuple(checked(robot, q=q, v=v, a=a)), ("q", "v", "a"))
     G = maps(robot, closed(robot, rows[0]))[0].swapaxes(1, 2)
@@ -85,47 +137,10 @@ def base_parameters(
     Khalil's choice as for the tree: earlier frames before later ones, link parameters before
     ``Ia`` before ``Fv`` and ``Fc``. There are at most as many as base parameters of the tree.
 
-    Parameters
-    ----------
-    robot : LoopedRobot
-        The robot, n joints.
-    q_ref : array_like, shape (n,), optional
-        Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
-        Default: the first posture that closes at random positions of the actuated joints.
-    drive : bool or collection of DriveKind or str
-        As for `robotmodels.base_parameters`; drives of passive joints are included.
-    tolerance : float
-        Largest relative torque of a parameter that is not kept.
-
     Returns
     -------
     BaseParameters
         Of the tree's standard parameters; ``.reduce`` and ``columns=`` of `torque_regressor`.
-
-    Raises
-    ------
-    LoopError
-        No closed posture, or no regular ones near it.
-    ShapeError, InvalidValueError
-        A posture of the wrong length, or with NaN or infinity.
-
-    References
-    ----------
-    W. Khalil and F. Bennis, "Symbolic calculation of the base inertial parameters of closed-loop
-    robots", IJRR 14(2), 1995. Seed book section 1.5.3.
-
-    Examples
-    --------
-    The inertia of a balanced parallelogram about its axes appears as one sum.
-
-    >>> from robotmodels import RobotModel
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> tree = RobotModel.from_table(table, gravity=[0, -9.81, 0])
-    >>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
-    >>> base_parameters(robot, [1.0, 1.0, -1.0], drive=False).names
-    ('ZZ1', 'MX1', 'MY1')
     """
     check_looped(robot)
     kinds, reference = drive_kinds(drive), _reference(robot, q_ref)
@@ -141,10 +156,10 @@ def base_parameters(
     wrong = W[..., basis.kept] @ (basis.coefficients @ values) - W @ values
     error = float(np.abs(wrong).max(initial=0.0) / (np.abs(W @ values).max(initial=0.0) or 1.0))
     notes = (f"With closed loops, in the assembly of q = {reference.round(6).tolist()}.",)
-    return BaseParameters(
+    return LoopedParameters(
         robot.tree, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, None,
         tolerance, (*notes, *columns.notes, *residual_warning(error, tolerance)),
-        columns.neglected(basis.coefficients), error, NOTHING,
+        columns.neglected(basis.coefficients), error, NOTHING, robot, reference,
     )  # fmt: skip
 
 

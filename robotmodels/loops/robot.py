@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +21,6 @@ ROWS = {"point": 3, "revolute": 5, "full": 6}
 """Number of constraint rows of each kind of closure."""
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 _NO_EFFECT = 1e-10  # largest entry of the Jacobian of a closure without effect, dimensionless
-
-
-class Cuts(NamedTuple):
-    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
-
-    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
-    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
-    """
-
-    chain: Chain
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    rotation: Array
-    position: Array
-    side: NDArray[np.int64]
-    length: Array
-    weight: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +120,7 @@ class LoopedRobot(Value):
     passive: NDArray[np.int64] = field(init=False)
     units: Array = field(init=False)
     rows: tuple[str, ...] = field(init=False)
-    cuts: Cuts = field(init=False)
+    cuts: Any = field(init=False)
     scratch: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -217,8 +199,10 @@ def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     return read_only(given, np.int64)
 
 
-def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
+def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Any:
     """Arrays of closures."""
+    from .kernels import Cuts
+
     size, moving = reach(tree), tree.table.joint_rows + 1
     chain, body, pose = _moving_chain(tree)
     places = [tree.twin.frame(frame) for closure in closures for frame in closure.frames]

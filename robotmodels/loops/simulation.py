@@ -52,15 +52,13 @@ def simulate(
     q0, v0 : array_like, shape (n,)
         Positions (rad or m) of all joints, which close the loops, and velocities; default at rest.
     control : callable, or array_like of shape (n_a,) or (N, n_a), optional
-        Torques of the actuated joints, N m or N: a function of (t, q, v) with q and v of all
-        joints, constant ones, or rows for the N times ``t``. Default none.
-    t, wrench, drive, rtol, atol
+        Torques of the actuated joints, N m or N, as for `robotmodels.simulate`; a function gets
+        t and q, v of all joints.
+    t, wrench, drive, rtol, atol, max_evaluations
         As for `robotmodels.simulate`.
     smoothing : float, optional
         Velocity w, rad/s or m/s: ``tanh(v / w)`` instead of ``sign(v)`` in dry friction, which
         needs it here.
-    max_evaluations : int
-        Evaluations of the model after which the simulation ends with a status.
 
     Returns
     -------
