@@ -66,11 +66,6 @@ class Mobility(Frozen, Value):
         Constraint rows that follow from others, earlier ones first kept.
     rows : tuple of str
         Names of the c rows.
-
-    Examples
-    --------
-    >>> Mobility(np.array(1), np.array([False, True]), ("cut.x", "cut.z"))
-    <Mobility 1, redundant rows: cut.z>
     """
 
     count: NDArray[np.int64]
@@ -80,15 +75,11 @@ class Mobility(Frozen, Value):
     @property
     def redundant(self) -> tuple[str, ...]:
         """Names of the rows that are redundant in every posture; none of no postures."""
-        rows = self.is_redundant.reshape(-1, len(self.rows)) if self.is_redundant.size else None
-        everywhere = [] if rows is None else rows.all(axis=0)
-        return tuple(self.rows[k] for k in np.flatnonzero(everywhere))
+        flat = self.is_redundant.reshape(-1, len(self.rows)) if self.is_redundant.size else []
+        return tuple(self.rows[k] for k in np.flatnonzero(np.all(flat, axis=0) & (len(flat) > 0)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.count, dtype=dtype)
-
-    def __int__(self) -> int:
-        return int(self.count)
 
     def __index__(self) -> int:
         return int(self.count)
@@ -197,27 +188,30 @@ def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, A
     U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
     determined = len(robot.rows) >= len(passive)
     least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
-    for i in np.flatnonzero(np.ravel(least <= _DETERMINED))[:1]:
-        raise _undetermined(robot, i, q, "can move while the actuated ones stand still")
+    _check_determined(robot, least > _DETERMINED, "can move while the actuated ones stand still")
     inverse = (Vt.swapaxes(-1, -2) / sizes[..., None, :]) @ U.swapaxes(-1, -2)
     G = np.zeros((*q.shape[:-1], n, len(actuated)))
     G[..., actuated, range(len(actuated))] = 1.0
     G[..., passive, :] = -inverse @ J[..., actuated]
     left = np.abs(J @ G).max(axis=(-1, -2), initial=0.0)
-    for i in np.flatnonzero(np.ravel(left > _CONSISTENT))[:1]:
-        raise _undetermined(robot, i, q, "block the actuated ones, which depend on each other")
+    _check_determined(
+        robot, left <= _CONSISTENT, "block the actuated ones, which depend on each other"
+    )
     scales = robot.units[:, None] / robot.units[actuated]
     if v is None:
         return G * scales, np.zeros_like(G)
-    rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
-    rate[..., passive, :] = -inverse @ (robot.scaled(row_rates(robot, q, v)) @ G)
+    rates = -inverse @ (robot.scaled(row_rates(robot, q, v)) @ G)
+    rate = np.zeros((*rates.shape[:-2], n, len(actuated)))
+    rate[..., passive, :] = rates
     return G * scales, rate * scales
 
 
-def _undetermined(robot: LoopedRobot, i: int, q: Array, how: str) -> LoopError:
-    where = f" in sample {i}" if q.ndim > 1 else ""
-    return LoopError(
-        f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
-        f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops that "
-        "are open: see close), the closures (see mobility) and actuated=."
-    )
+def _check_determined(robot: LoopedRobot, is_determined: NDArray[np.bool_], how: str) -> None:
+    """Raise for the first sample (...) whose motion the actuated joints do not determine."""
+    for i in np.flatnonzero(~np.ravel(is_determined))[:1]:
+        where = f" in sample {i}" if np.ndim(is_determined) else ""
+        raise LoopError(
+            f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
+            f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops "
+            "that are open: see close), the closures (see mobility) and actuated=."
+        )

@@ -58,7 +58,7 @@ from ..minimal_parameters.rules import EARTH
 from ..regressors.columns import Columns
 from .closing import ClosingStatus, attempt, close, without_turns
 from .constraints import checked, maps
-from .dynamics import _OPEN, closed
+from .dynamics import closed
 from .robot import LoopedRobot, check_looped
 
 _PIECE = 512  # samples at a time
@@ -78,14 +78,8 @@ class LoopedParameters(BaseParameters):
         self, guess: Array, q: Array, v: Array | None, a: Array | None
     ) -> tuple[Array, Array, Array, Array]:
         """Motion (N, n) of all joints from that of the actuated ones (N, n_a), and the map G."""
-        found = close(self.robot, q, guess)
-        for i in np.flatnonzero(found.residual > _OPEN * self.robot.cuts.length)[:1]:
-            raise LoopError(f"q: the loops are open in sample {i}. {found.reason(i)}")
         v, a = (np.zeros(q.shape) if x is None else x for x in (v, a))
-        G = maps(self.robot, found.q)[0]
-        rate = np.einsum("kij,kj->ki", G, v)
-        dG = maps(self.robot, found.q, rate)[1]
-        return found.q, rate, (G @ a[..., None] + dG @ v[..., None])[..., 0], G
+        return lifted(self.robot, closed(self.robot, close(self.robot, q, guess).q), v, a)
 
     def torque_rows(self, q: Array, v: Array, a: Array, columns: Columns) -> Array:
         """Rows (N, n, b) of the regressor at motions (N, n), zero for passive joints.
@@ -98,6 +92,15 @@ class LoopedParameters(BaseParameters):
         rows = np.zeros(W.shape)
         rows[:, actuated] = G.swapaxes(1, 2) @ W
         return rows
+
+
+def lifted(
+    robot: LoopedRobot, q: Array, v_a: Array, a_a: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Motion (N, n) of all joints at closed postures, from that of the actuated ones; and G."""
+    G, v_a, a_a = maps(robot, q)[0], v_a[..., None], a_a[..., None]
+    v = (G @ v_a)[..., 0]
+    return q, v, (G @ a_a + maps(robot, q, v)[1] @ v_a)[..., 0], G
 
 
 def torque_regressor(
@@ -197,7 +200,6 @@ def _motion(
         )
     G = maps(robot, q)[0]  # without the half that is nearest to dead points
     best = np.argsort(np.abs(G / robot.units[:, None]).max(axis=(1, 2)))[:count]
-    q, G, rate = q[best], G[best], np.sqrt(EARTH / robot.cuts.length[0])
-    v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated), 1)) * units[:, None]
-    v = rate * (G @ v_a)[..., 0]
-    return q, v, (rate**2 * (G @ a_a) + rate * maps(robot, q, v)[1] @ v_a)[..., 0]
+    rate = np.sqrt(EARTH / robot.cuts.length[0])
+    v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated))) * units
+    return lifted(robot, q[best], rate * v_a, rate**2 * a_a)[:3]

@@ -9,13 +9,12 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
 from ..drive import check_all_or_none
-from ..dynamics import kinetic_energy, potential_energy
 from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
 from ..simulation import Integrator, Simulation
 from ..simulation.feedback import Feedback
 from ..simulation.integration import Integration
 from ..simulation.motion import Loads, Motion
-from ..simulation.simulate import law_of, times_of
+from ..simulation.simulate import followed, law_of, times_of
 from .constraints import closure_rows
 from .dynamics import Engine, accelerations, closed
 from .robot import LoopedRobot, check_looped
@@ -118,28 +117,12 @@ def simulate(
             f"v0: these velocities open the loops of {robot.name!r}; take "
             "v0 = velocity_map(robot, q0) @ v_actuated."
         )
-    tolerances = {
-        "rtol": as_number(rtol, "rtol", least=1e-13),
-        "atol": as_number(atol, "atol", above=0.0),
-        "max_step": np.inf,
-    }
+    steps = {"rtol": as_number(rtol, "rtol", least=1e-13), "max_step": np.inf}
+    steps["atol"] = as_number(atol, "atol", above=0.0)
     budget = int(min(as_number(max_evaluations, "max_evaluations", least=1.0), 2**62))
     inside = sorted({float(x) for x in (*knots, *tool_knots) if start < x < end})
-    run = _Integration(motion, times, None, Integrator.DOP853, tolerances, budget, None)
-    with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
-        run.follow(*moved, [(x, False) for x in (start, *inside, end)])
-    q, v, a, tau, taken, held, works, state = map(np.array, zip(*run.rows, strict=True))
-    kinetic, potential = kinetic_energy(tree, q, v, drive), potential_energy(tree, q)
-    return Simulation(
-        *(tree, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
-        *works.T.copy(),
-        drive=bool(drive),
-        events=(),
-        status=run.status,
-        evaluations=motion.evaluations,
-        steps=run.steps,
-        state=state,
-    )
+    run = _Integration(motion, times, None, Integrator.DOP853, steps, budget, None)
+    return followed(run, tree, *moved, [(x, False) for x in (start, *inside, end)], drive)
 
 
 class LoopMotion(Motion):
