@@ -26,13 +26,6 @@ LoopError
 SingularMassMatrixError
     Free motions without inertia.
 
-Notes
------
-The direct model is Pinocchio's, which has no revolute closure: it is two points on the axis, with
-redundant rows, which its proximal iterations tolerate. The residual ``J a + dJ/dt v`` of an
-iteration is the proximal parameter times the change of the multipliers; Pinocchio's own residual
-is another quantity. Where it fails, accelerations are projected on the free motions.
-
 References
 ----------
 W. Khalil and E. Dombre, *Modeling, Identification and Control of Robots*, chapter 10; seed book
@@ -48,13 +41,16 @@ A parallelogram in a horizontal plane, driven by one of its cranks.
 >>> from robotmodels.loops import Closure
 >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
 >>> bars = InertialParameters.from_com(np.ones(5), np.zeros((5, 3)), [np.eye(3)] * 5)
->>> tree = RobotModel.from_table(table, bars)
->>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
+>>> robot = LoopedRobot(RobotModel.from_table(table, bars), [Closure("cut", (4, 5))], actuated=[0])
 >>> q, v = [1.0, 1.0, -1.0], np.zeros(3)
 >>> a = ddm(robot, q, v, [2.0])
 >>> (a / a[0]).round(9), idm(robot, q, v, a).round(9), closure_forces(robot, q, v, [2.0]).shape
 (array([ 1.,  1., -1.]), array([2.]), (5,))
 """
+# Pinocchio has no revolute closure: it is two points on the axis, with redundant rows, which its
+# proximal iterations tolerate (one point where all axes are parallel). The residual J a + dJ/dt v
+# of an iteration is the proximal parameter times the change of the multipliers; Pinocchio's own
+# residual is another quantity. Where it fails, accelerations are projected on the free motions.
 
 from __future__ import annotations
 
@@ -145,7 +141,7 @@ def ddm(
     q, v = as_vector(q, robot.n, "q"), as_vector(v, robot.n, "v")
     tau = as_vector(tau, len(robot.actuated), "tau")
     full = tree_torques(robot, q, v, tau, wrench, drive)
-    return accelerations(engine_of(robot, drive), q, v, full)
+    return accelerations(robot, engine_of(robot, drive), q, v, full)
 
 
 def closure_forces(
@@ -213,16 +209,13 @@ class Engine:
     def __init__(self, robot: LoopedRobot, drive: bool = True, rate: float = 0.0) -> None:
         tree, twin = robot.tree, robot.tree.twin
         drives = tree.drive_matrices if drive else None
-        self.robot, self.rotor = robot, np.zeros((tree.n, tree.n))
-        if drives is not None:
-            self.rotor = drives.rotor
+        self.rotor = np.zeros((tree.n, tree.n)) if drives is None else drives.rotor
         self.serves = twin.serves_dynamics and not (self.rotor - np.diag(np.diag(self.rotor))).any()
         if not self.serves:
             return
-        self.order = np.argsort(twin.order)  # joints of the table in Pinocchio's order
-        self.model: Any = twin.model.copy() if self.rotor.any() else twin.model
-        if self.rotor.any():
-            self.model.armature = np.diag(self.rotor)[self.order].copy()
+        self.order, self.back = np.argsort(twin.order), twin.order  # the table's and Pinocchio's
+        self.model: Any = twin.model.copy()
+        self.model.armature = np.diag(self.rotor)[self.order].copy()
         models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
         turned = _tilts(robot)
@@ -252,7 +245,7 @@ class Engine:
         q, v, tau, settings = q[self.order], v[self.order], tau[self.order], self.settings
         a = _solve(self.model, self.data, q, v, tau, self.models, self.datas, settings)
         left = settings.relative_residual <= _LEFT * (1.0 + np.linalg.norm(a))
-        return a[self.robot.tree.twin.order] if left and np.isfinite(a).all() else None
+        return a[self.back] if left and np.isfinite(a).all() else None
 
 
 def _tilts(robot: LoopedRobot) -> set[str]:
@@ -266,16 +259,16 @@ def _tilts(robot: LoopedRobot) -> set[str]:
 
 def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
     """The engine of the calling thread."""
-    name = "driven" if drive else "free"
-    engine: Engine | None = getattr(robot.scratch, name, None)
-    if engine is None:
+    name, scratch = "driven" if drive else "free", robot.scratch
+    if not hasattr(scratch, name):
         engine = Engine(robot, drive)
-        setattr(robot.scratch, name, engine)
+        setattr(scratch, name, engine)
         if drive and engine.serves and robot.tree.drive_matrices is None:
-            order, places = robot.tree.twin.order, robot.tree.twin.order[robot.actuated]
-            turned = (None, None) if robot.tree.twin.in_table_order else (engine.order, order)
+            order, places = (engine.order, engine.back), engine.back[robot.actuated]
             parts = engine.model, engine.data, engine.models, engine.datas, engine.settings
-            robot.scratch.quick = (*parts, np.zeros(robot.n), places, *turned)
+            turned = (None, None) if robot.tree.twin.in_table_order else order
+            scratch.quick = (*parts, np.zeros(robot.n), places, *turned)
+    engine: Engine = getattr(scratch, name)
     return engine
 
 
@@ -310,7 +303,7 @@ def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, rotor: Array) 
     return out
 
 
-def accelerations(engine: Engine, q: Array, v: Array, tau: Array) -> Array:
+def accelerations(robot: LoopedRobot, engine: Engine, q: Array, v: Array, tau: Array) -> Array:
     """Accelerations (..., n) under torques of all joints, without those of drives."""
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
     out, left = np.empty_like(rows[0]), []
@@ -321,5 +314,5 @@ def accelerations(engine: Engine, q: Array, v: Array, tau: Array) -> Array:
         else:
             out[i] = a
     if left:
-        out[left] = projected(engine.robot, *(x[left] for x in rows), engine.rotor)
-    return out.reshape(*batch, out.shape[-1])
+        out[left] = projected(robot, *(x[left] for x in rows), engine.rotor)
+    return out.reshape(*batch, robot.n)

@@ -141,7 +141,7 @@ class LoopMotion(Motion):
         try:
             a = np.full(self.n, np.nan)
             if not self.passed:
-                a = accelerations(self.engine, q, v, load)
+                a = accelerations(self.robot, self.engine, q, v, load)
         except (LoopError, SingularMassMatrixError):
             pass
         self.singular = self.singular or bool(np.isnan(a).any())
