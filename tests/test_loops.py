@@ -364,6 +364,14 @@ def test_a_parallelogram_has_its_reduced_model(rng):
     assert np.allclose(loops.idm(robot, q, v, a)[:, 0], expected, rtol=1e-10, atol=1e-10)
 
 
+def test_velocities_that_no_acceleration_continues_are_refused(rng):
+    robot, q = FLEET[5]
+    for v in rng.normal(size=(2, robot.n)):  # the second call takes the quick way
+        with pytest.raises(LoopError, match="velocities violate"):
+            loops.ddm(robot, q, v, np.ones(1))
+    assert np.isfinite(loops.ddm(robot, q, 0.0 * q, np.ones(1))).all()
+
+
 def test_massless_links_and_singular_masses(rng):
     robot = five_bar(rng)
     q = FLEET[4][1]
@@ -451,6 +459,9 @@ def test_base_parameters_span_the_reduced_regressor(robot, q_ref, rng):
     assert np.allclose(own @ pi, loops.idm(robot, q, v, a), atol=1e-9)
     chosen = loops.torque_regressor(robot, q, v, a, drive=drive, columns=base)
     assert np.allclose(chosen, reduced)
+    rows = base.torque_rows(q, v, a, base.names)  # closes the loops from the actuated joints
+    assert np.allclose(rows[:, robot.actuated], reduced, atol=1e-9 * np.abs(W).max())
+    assert not rows[:, robot.passive].any()
     assert loops.torque_regressor(robot, q[0], v[0], a[0]).shape == own.shape[1:]
     assert loops.torque_regressor(robot, q[:0], v[:0], a[:0]).shape == (0, *own.shape[1:])
 
