@@ -81,9 +81,11 @@ def looped_equations(
 ) -> tuple[LoopedEquations, Log | None, tuple[str, ...]]:
     """Equations of a log of the actuated joints, the test log, and findings on both."""
     findings: tuple[str, ...] = ()
-    for given in (log, test) if checked else ():
-        if given is not None:
-            findings += accepted_log(given, None, "log", joints=False)[1]
+    if checked:
+        log, findings = accepted_log(log, None, "log", joints=False)
+    if checked and test is not None:
+        test, more = accepted_log(test, None, "test", joints=False)
+        findings += tuple(f"Of the held-out log: {sentence}" for sentence in more)
     if base is None:
         first = close(robot, log.q[0]) if log.n == len(robot.actuated) else None
         found = first is not None and first.status == ClosingStatus.CLOSED

@@ -128,13 +128,10 @@ def ddm(
             and wrench is None
         ):
             full[places] = tau
-            if order is not None:
-                q, v = q[order], v[order]  # type: ignore[index]
-            a = _solve(model, data, q, v, full, models, datas, settings)
+            x, y = (q, v) if order is None else (q[order], v[order])  # type: ignore[index]
+            a = _solve(model, data, x, y, full, models, datas, settings)
             if settings.relative_residual <= _LEFT and isfinite(sum(a.tolist())):
                 return a if order is None else a[back]
-            if order is not None:
-                q, v = q[back], v[back]
     except AttributeError:
         pass
     check_looped(robot)

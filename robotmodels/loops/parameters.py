@@ -144,6 +144,7 @@ def base_parameters(
     -------
     BaseParameters
         Of the tree's standard parameters; ``.reduce`` and ``columns=`` of `torque_regressor`.
+        Given to `robotmodels.identification.fit`, they name the assembly of the log.
     """
     check_looped(robot)
     kinds, reference = drive_kinds(drive), _reference(robot, q_ref)
