@@ -220,15 +220,16 @@ def closed_postures(
             q[i, actuated[a]] = target[i, a]
         for step in range(_STEPS):
             closure_rows(q, i, cuts, R, p, e, J)
-            cost = 0.0
+            cost, largest = 0.0, 0.0
             for k in range(c):
                 cost += cuts.weight[k] * e[k] * e[k]
+                largest = max(largest, abs(e[k]))
             if step == _STEPS // 2:
                 halfway = cost
             if step == _STEPS - 1 and cost > 0.5 * halfway and not moving:
                 code[i] = CANNOT_CLOSE  # the error hardly decreases
             if cost < before:
-                residual[i] = np.abs(e).max() if c else 0.0
+                residual[i] = largest
                 moved = moving and cost < _NEAR
                 if moved:
                     moving = move_along(q, i, target, actuated, cuts, e, J)

@@ -16,7 +16,7 @@ MUTATIONS = [
     Mutation("loops", "levers of joints from the first frame",
         "linear = axis\n", "subtract(pb,", "subtract(pa,", LOOPS + "open_postures_too"),
     Mutation("loops", "tilt about x with the other sign",
-        "x, y, turn, cosine = -z[1]", "-z[1]", "z[1]", LOOPS + "bennett"),
+        "x, y, turn, cosine = -z[1]", "-z[1]", "z[1]", CLOSING),
     Mutation("loops", "antiparallel axes count as closed",
         "return (pi, 0.0, 0.0) if cosine", "pi, 0.0, 0.0", "x, y, turn", LOOPS + "antiparallel"),
     Mutation("loops", "second frame of a closure turned as the first",
@@ -79,5 +79,5 @@ MUTATIONS = [
     Mutation("loops", "the second frame of a cut joint is the next one",
         "cuts = [(j + 1, joints + j - links", "+ 1)", "+ 0)", FILES + "symoro"),
     Mutation("loops", "masses of an MJCF file at the joint",
-        "<link name='body_{k}'><inertial>", "Y.lever", "0.0 * Y.lever", FILES + "centres"),
+        "<link name='body_{k}'><inertial>", "Y.lever", "0.0 * Y.lever", FILES + "root_bodies"),
 ]  # fmt: skip
