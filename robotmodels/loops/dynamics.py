@@ -75,7 +75,6 @@ _MU, _ITERATIONS, _CHANGE = 1e-8, 5, 1e-5
 _RANK = 1e-8  # least singular value of independent constraints, relative to the largest
 _DEFINITE = 1e-14  # least eigenvalue of the mass matrix of free motions, relative to the largest
 _REJECTED = 1e-6  # least part of closure accelerations that no joint acceleration gives
-_PARALLEL = 1e-10  # largest rate between parallel axes, 1
 _LEFT = 1e-12 / _MU  # largest change of the multipliers of closures that hold to 1e-12
 _FLOAT64, _solve = np.dtype(np.float64), pin.constraintDynamics
 
@@ -215,12 +214,13 @@ class Engine:
         self.model.armature = np.diag(self.rotor)[self.order].copy()
         models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
-        turned = _tilts(robot)
         for closure in robot.closures:
+            tilts = [robot.acts[robot.rows.index(row)] for row in closure.rows[3:5]]
             first, second = (twin.model.frames[twin.frame(f).pin_id] for f in closure.frames)
             whole = closure.kind == "full"
             kind = pin.ContactType.CONTACT_6D if whole else pin.ContactType.CONTACT_3D
-            for point in [pin.SE3.Identity(), along][: 2 if closure.name in turned else 1]:
+            two = any(tilts) and not whole  # one point closes a loop of parallel axes
+            for point in [pin.SE3.Identity(), along][: 2 if two else 1]:
                 constraint = pin.RigidConstraintModel(
                     kind, self.model, first.parentJoint, first.placement * point,
                     second.parentJoint, second.placement * point, pin.LOCAL,
@@ -243,15 +243,6 @@ class Engine:
         a = _solve(self.model, self.data, q, v, tau, self.models, self.datas, settings)
         left = settings.relative_residual <= _LEFT * (1.0 + np.linalg.norm(a))
         return a[self.back] if left and np.isfinite(a).all() else None
-
-
-def _tilts(robot: LoopedRobot) -> set[str]:
-    """Revolute closures whose axes can turn against each other: planar loops need one point."""
-    q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
-    moves = np.abs(closure_rows(robot, q)[1]).max(axis=(0, 2)) > _PARALLEL
-    moving = {row for row, moved in zip(robot.rows, moves, strict=True) if moved}
-    revolute = [closure for closure in robot.closures if closure.kind == "revolute"]
-    return {closure.name for closure in revolute if moving.intersection(closure.rows[3:])}
 
 
 def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:

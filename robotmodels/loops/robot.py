@@ -91,6 +91,8 @@ class LoopedRobot(Value):
         Natural unit of each joint: 1 rad, or the size of the robot in metres.
     rows : tuple of str
         Names of the c constraint rows, such as ``"cut.x"``.
+    acts : ndarray of bool, shape (c,)
+        Rows that some joint can violate.
 
     Raises
     ------
@@ -120,6 +122,7 @@ class LoopedRobot(Value):
     passive: NDArray[np.int64] = field(init=False)
     units: Array = field(init=False)
     rows: tuple[str, ...] = field(init=False)
+    acts: NDArray[np.bool_] = field(init=False)
     cuts: Any = field(init=False)
     scratch: Any = field(init=False)
 
@@ -147,7 +150,7 @@ class LoopedRobot(Value):
             "scratch": threading.local(),
         }.items():
             object.__setattr__(self, name, value)
-        _check_effect(self)
+        object.__setattr__(self, "acts", _acting_rows(self))
 
     @property
     def n(self) -> int:
@@ -241,8 +244,8 @@ def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
     return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
 
-def _check_effect(robot: LoopedRobot) -> None:
-    """Raise for closures of one body, and for those that no joint can violate."""
+def _acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
+    """Rows that some joint can violate (c,); raises for closures without any, and of one body."""
     from .kernels import closure_jacobians
 
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
@@ -261,3 +264,4 @@ def _check_effect(robot: LoopedRobot) -> None:
                 f"{named} add no constraint: no joint moves them against each other in the rows "
                 f"{', '.join(closure.rows)}. Remove the closure, or correct its frames."
             )
+    return acts
