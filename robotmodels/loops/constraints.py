@@ -47,7 +47,7 @@ from .. import se3
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows, batch_shape
 from ..errors import LoopError
 from ..kinematics import dgm, jacobian, jacobian_rate
-from .robot import ROWS, LoopedRobot, check_looped
+from .robot import ROWS, LoopedRobot, check_looped, scaled
 
 _INDEPENDENT = 1e-8  # least part of an independent row beyond those before it, of the longest row
 _DETERMINED = 1e-7  # least singular value of the passive columns, with lengths in robot sizes
@@ -117,7 +117,7 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
         Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
     """
     (q,) = checked(robot, q=q)
-    J = robot.scaled(closure_rows(robot, q)[1])
+    J = scaled(robot, closure_rows(robot, q)[1])
     least = _INDEPENDENT * np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
     ranks = [np.linalg.matrix_rank(J[..., :k, :], least) for k in range(1, len(robot.rows) + 1)]
     ranks = np.stack([np.zeros(q.shape[:-1], np.int64), *ranks], axis=-1)
@@ -184,7 +184,7 @@ def row_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
 def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, Array]:
     """Velocity map and its rate along v, each (..., n, n_a); the rate is zero without v."""
     n, actuated, passive = robot.n, robot.actuated, robot.passive
-    J = robot.scaled(closure_rows(robot, q)[1])
+    J = scaled(robot, closure_rows(robot, q)[1])
     U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
     determined = len(robot.rows) >= len(passive)
     least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
@@ -200,7 +200,7 @@ def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, A
     scales = robot.units[:, None] / robot.units[actuated]
     if v is None:
         return G * scales, np.zeros_like(G)
-    rates = -inverse @ (robot.scaled(row_rates(robot, q, v)) @ G)
+    rates = -inverse @ (scaled(robot, row_rates(robot, q, v)) @ G)
     rate = np.zeros((*rates.shape[:-2], n, len(actuated)))
     rate[..., passive, :] = rates
     return G * scales, rate * scales

@@ -67,7 +67,7 @@ from ..drive import check_all_or_none
 from ..dynamics.inverse import rigid_torques, wrench_torque
 from ..errors import LoopError, SingularMassMatrixError
 from .constraints import checked, closure_rows, maps, row_rates
-from .robot import LoopedRobot, check_looped
+from .robot import LoopedRobot, acting_rows, check_looped, scaled
 
 _OPEN = 1e-3  # largest residual of closed loops, relative to the robot's size, or rad
 _MU, _ITERATIONS, _CHANGE = 1e-8, 5, 1e-5
@@ -162,7 +162,7 @@ def closure_forces(
     q, v = checked(robot, q=q, v=v)
     given = tree_torques(robot, q, v, as_vector(tau, len(robot.actuated), "tau"), wrench, drive)
     bodies = dynamics.idm(robot.tree, q, v, a, drive=False) + a @ engine_of(robot, drive).rotor
-    inverse = np.linalg.pinv(robot.scaled(closure_rows(robot, q)[1]), rcond=1e-8)
+    inverse = np.linalg.pinv(scaled(robot, closure_rows(robot, q)[1]), rcond=1e-8)
     f = np.einsum("...jk,...j->...k", inverse, (bodies - given) * robot.units)
     return f * np.sqrt(robot.cuts.weight)
 
@@ -214,8 +214,9 @@ class Engine:
         self.model.armature = np.diag(self.rotor)[self.order].copy()
         models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
+        acts = acting_rows(robot)
         for closure in robot.closures:
-            tilts = [robot.acts[robot.rows.index(row)] for row in closure.rows[3:5]]
+            tilts = [acts[robot.rows.index(row)] for row in closure.rows[3:5]]
             first, second = (twin.model.frames[twin.frame(f).pin_id] for f in closure.frames)
             whole = closure.kind == "full"
             kind = pin.ContactType.CONTACT_6D if whole else pin.ContactType.CONTACT_3D
@@ -263,8 +264,8 @@ def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
 def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, rotor: Array) -> Array:
     """Accelerations by projection on the free motions, for any masses. Shapes: (N, n) -> (N, n)."""
     units = robot.units
-    J = robot.scaled(closure_rows(robot, q)[1])
-    bias = np.einsum("kij,kj->ki", robot.scaled(row_rates(robot, q, v)), v / units)
+    J = scaled(robot, closure_rows(robot, q)[1])
+    bias = np.einsum("kij,kj->ki", scaled(robot, row_rates(robot, q, v)), v / units)
     h = rigid_torques(robot.tree, q, v, np.zeros_like(q))
     M = (dynamics.mass_matrix(robot.tree, q, False) + rotor) * units * units[:, None]
     out = np.empty_like(q)

@@ -91,8 +91,6 @@ class LoopedRobot(Value):
         Natural unit of each joint: 1 rad, or the size of the robot in metres.
     rows : tuple of str
         Names of the c constraint rows, such as ``"cut.x"``.
-    acts : ndarray of bool, shape (c,)
-        Rows that some joint can violate.
 
     Raises
     ------
@@ -122,7 +120,6 @@ class LoopedRobot(Value):
     passive: NDArray[np.int64] = field(init=False)
     units: Array = field(init=False)
     rows: tuple[str, ...] = field(init=False)
-    acts: NDArray[np.bool_] = field(init=False)
     cuts: Any = field(init=False)
     scratch: Any = field(init=False)
 
@@ -150,7 +147,7 @@ class LoopedRobot(Value):
             "scratch": threading.local(),
         }.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "acts", _acting_rows(self))
+        acting_rows(self)
 
     @property
     def n(self) -> int:
@@ -161,10 +158,6 @@ class LoopedRobot(Value):
     def name(self) -> str:
         """Name of the tree."""
         return self.tree.name
-
-    def scaled(self, J: Array) -> Array:
-        """Rows (..., c, n) of the closures in sizes of the robot, rad and natural joint units."""
-        return np.sqrt(self.cuts.weight)[:, None] * J * self.units
 
     def __repr__(self) -> str:
         listed = [f"{c.name} ({c.kind})" for c in self.closures[:4]] or ["none"]
@@ -177,6 +170,11 @@ class LoopedRobot(Value):
     @property
     def _values(self) -> tuple[Any, ...]:
         return self.tree, self.closures, self.actuated
+
+
+def scaled(robot: LoopedRobot, J: Array) -> Array:
+    """Rows (..., c, n) of the closures in sizes of the robot, rad and natural joint units."""
+    return np.sqrt(robot.cuts.weight)[:, None] * J * robot.units
 
 
 def check_looped(robot: object) -> None:
@@ -244,14 +242,14 @@ def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
     return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
 
-def _acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
+def acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
     """Rows that some joint can violate (c,); raises for closures without any, and of one body."""
     from .kernels import closure_jacobians
 
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
     e, J = np.empty((3, len(robot.rows))), np.empty((3, len(robot.rows), robot.n))
     closure_jacobians(q, robot.cuts, e, J)
-    acts = np.abs(robot.scaled(J)).max(axis=(0, 2), initial=0.0) > _NO_EFFECT
+    acts = np.abs(scaled(robot, J)).max(axis=(0, 2), initial=0.0) > _NO_EFFECT
     sides = robot.cuts.side.reshape(-1, robot.n)
     for closure, side in zip(robot.closures, sides, strict=True):
         named = "closure {!r}: the frames {!r} and {!r}".format(closure.name, *closure.frames)

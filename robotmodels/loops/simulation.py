@@ -17,7 +17,7 @@ from ..simulation.motion import Loads, Motion
 from ..simulation.simulate import followed, law_of, times_of
 from .constraints import closure_rows
 from .dynamics import Engine, accelerations, closed
-from .robot import LoopedRobot, check_looped
+from .robot import LoopedRobot, check_looped, scaled
 
 _RATE = 10.0  # 1/s, decay of errors of the closures during the integration
 _SAME = 0.8  # least cosine between singular vectors of two evaluations that belong together
@@ -149,7 +149,7 @@ class LoopMotion(Motion):
 
     def _passes(self, q: Array) -> bool:
         """Whether the least singular value of the closures changed its sign on the way to q."""
-        J = self.robot.scaled(closure_rows(self.robot, q)[1])
+        J = scaled(self.robot, closure_rows(self.robot, q)[1])
         U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
         last = int((sizes > 1e-12 * sizes.max(initial=0.0)).sum()) - 1
         before, self.weakest = self.weakest, (U[:, last], Vt[last]) if last >= 0 else None
@@ -163,7 +163,7 @@ class LoopMotion(Motion):
         weight, units = np.sqrt(self.robot.cuts.weight), self.robot.units
         for _ in range(3):
             e, J = closure_rows(self.robot, q)
-            inverse = units[:, None] * np.linalg.pinv(self.robot.scaled(J), rcond=1e-8)
+            inverse = units[:, None] * np.linalg.pinv(scaled(self.robot, J), rcond=1e-8)
             q = q - inverse @ (weight * e)
         return q, v - inverse @ (weight * (J @ v))
 
