@@ -94,7 +94,8 @@ def looped_equations(
         raise InvalidValueError(
             "base: expected loops.base_parameters(robot, q_ref) of the same looped robot."
         )
-    log, held_out = (x if x is None else with_all_joints(base, x) for x in (log, test))
+    log = with_all_joints(base, log)
+    held_out = None if test is None else with_all_joints(base, test)
     if held_out is not None and abs(held_out.dt - log.dt) > 1e-6 * log.dt:
         raise InvalidValueError(
             f"test: expected the sampling period of the log ({log.dt:g} s), got {held_out.dt:g} s."

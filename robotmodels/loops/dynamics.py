@@ -303,5 +303,6 @@ def accelerations(robot: LoopedRobot, engine: Engine, q: Array, v: Array, tau: A
         else:
             out[i] = a
     if left:
-        out[left] = projected(robot, *(x[left] for x in rows), engine.rotor)
+        q, v, tau = (x[left] for x in rows)
+        out[left] = projected(robot, q, v, tau, engine.rotor)
     return out.reshape(*batch, robot.n)
