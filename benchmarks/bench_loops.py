@@ -2,8 +2,9 @@
 
     python -m benchmarks.bench_loops [--out benchmarks/results] [--rounds 15]
 
-Contestants of a row take turns. Pinocchio's direct model runs bare, with the one point of
-a planar pin that ours takes, with two points on its axis, and with twenty proximal iterations; its closing is the Newton iteration that users write.
+Contestants of a row take turns. Pinocchio's direct model runs bare: with one point for a planar
+pin, as ours has it, with two points on its axis, and with twenty proximal iterations. Its closing
+is the Newton iteration that users write.
 toolbox-parallel-robots needs Pinocchio's CasADi bindings, which the wheel does not have.
 """
 
@@ -144,13 +145,13 @@ def direct_row(name: str, robot: loops.LoopedRobot, q: Array, rounds: int) -> Ro
         Contestant("Pinocchio, one point",
             lambda: bare(engine.settings, engine.data, (engine.models, engine.datas)), CALLS),
         Contestant("Pinocchio, two points", lambda: bare(engine.settings, data, points), CALLS),
-        Contestant("Pinocchio, two points, 20 iterations", lambda: bare(finer, data, points), CALLS),
+        Contestant("Pinocchio, 20 iterations", lambda: bare(finer, data, points), CALLS),
         Contestant(
             f"{OURS}, batch",
             lambda: loops.ddm(robot, np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau), CALLS,
         ),
     ]  # fmt: skip
-    return measure(f"direct model, {name}", contestants, rounds, "<= 1.3 of Pinocchio, bare")
+    return measure(f"direct model, {name}", contestants, rounds, "<= 1.3 of two points")
 
 
 def main() -> None:
