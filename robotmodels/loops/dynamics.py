@@ -242,8 +242,9 @@ class Engine:
         """Accelerations under torques of all joints, each (n,); None if the closures fail."""
         q, v, tau, settings = q[self.order], v[self.order], tau[self.order], self.settings
         a = _solve(self.model, self.data, q, v, tau, self.models, self.datas, settings)
-        left = settings.relative_residual <= _LEFT * (1.0 + np.linalg.norm(a))
-        return a[self.back] if left and np.isfinite(a).all() else None
+        left = settings.relative_residual
+        holds = left <= _LEFT or left <= _LEFT * np.linalg.norm(a)
+        return a[self.back] if holds and isfinite(sum(a.tolist())) else None
 
 
 def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
