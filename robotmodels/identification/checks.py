@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from .joint_hypotheses import ADVICE, better_hypotheses
 
 
 def accepted_log(
-    log: Log, model: RobotModel, name: str, friction: Friction | None = None, joints: bool = True
+    log: Log, model: Any, name: str, friction: Friction | None = None, joints: bool = True
 ) -> tuple[Log, tuple[str, ...]]:
     """Check and clean a log, with sentences on the findings; raise if it is unusable."""
     findings = check_log(log, model)

@@ -100,7 +100,7 @@ class Equations(EquationSource):
         return map(self.block, self.pieces())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Equations, (self.base, self.names, self.log, self.processing, self.form)
+        return type(self), (self.base, self.names, self.log, self.processing, self.form)
 
 
 def equations(

@@ -18,11 +18,13 @@ from ..estimation.factor import TriangularFactors
 from ..friction import Friction
 from ..logs import Log
 from ..logs.log import check_is_log
+from ..loops import LoopedParameters, LoopedRobot
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
 from .checks import accepted_log, accepted_test
 from .equations import Equations, equations, parameters_of
 from .forms import EquationForm
+from .looped import looped_equations, looped_method
 from .method_names import method_of
 from .methods.base import Method
 from .methods.essential import essential
@@ -45,7 +47,7 @@ _ONE_EQUATION = (
 
 
 def fit(
-    model: RobotModel,
+    model: RobotModel | LoopedRobot,
     log: Log,
     method: Method | str = "wls",
     *,
@@ -63,10 +65,13 @@ def fit(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot; its own inertia is not used by least squares.
+    model : RobotModel or LoopedRobot
+        The robot; its own inertia is not used by least squares. For kinematic loops there are
+        methods "ols", "wls" and "irls" with torque equations; ``base`` names the assembly, by
+        default that of the first sample with passive joints near zero.
     log : Log
-        Positions and torques of its joints, from `read_log`.
+        Positions and torques of its joints, from `read_log`; of the actuated joints alone where
+        there are kinematic loops, which are closed at each sample.
     method : Method or str
         An object with its options such as ``Robust(loss="tukey")``, or a name: "ols", "wls",
         "irls", "robust", "tls", "ridge", "sequential", "recursive", "iv", "didim", "cloe".
@@ -125,19 +130,28 @@ def fit(
     >>> round(result.value("Fv1"), 3), result.standard_error("Fv1") < 1e-3
     (2.0, True)
     """
-    check_model(model)
     check_is_log(log)
     method = method_of(method)
     form = chosen(EquationForm, form, "form")
-    base = parameters_of(model, base, drive, friction)
-    given, findings = log, ()
-    if checked:
-        log, findings = accepted_log(log, model, "log", base.friction)
-    if test is not None:
-        test, more = accepted_test(given, test, model, checked)
-        findings = (*findings, *more)
-
-    system, factors = _equations(base, log, form, processing, executor, progress)
+    if isinstance(model, LoopedRobot):
+        others = {f"form={form.name.lower()!r}": form is not EquationForm.TORQUE}
+        others["friction="] = friction is not None
+        method = looped_method(model, method, others)
+        system, test, findings = looped_equations(
+            model, log, test, drive, base, processing, checked
+        )
+        model, log = system.model, system.log
+        factors = reduced(system, executor, progress)
+    else:
+        check_model(model)
+        base = parameters_of(model, base, drive, friction)
+        given, findings = log, ()
+        if checked:
+            log, findings = accepted_log(log, model, "log", base.friction)
+        if test is not None:
+            test, more = accepted_test(given, test, model, checked)
+            findings = (*findings, *more)
+        system, factors = _equations(base, log, form, processing, executor, progress)
     system, factors, gap, missing = _identifiable(system, factors)
     estimate = method.solve(system, factors)
     dropped, rule = (), ""
@@ -194,13 +208,23 @@ def _equations(
     fixed = isinstance(given, Processing)
     decimation = None if fixed else given["decimation"]
     system = made(decimation)
-    factors = reduce_equations(system, executor, progress)
+    factors = reduced(system, executor, progress)
     share = factors.rows / (LEAST_EQUATIONS * len(base))
     step = system.processing.decimation
     if not fixed and decimation is None and share < 1.0 < step:
         # with a margin, since the excluded samples depend on the cutoff
         system = made(max(1, int(_SPARE * share * step)))
-        factors = reduce_equations(system, executor)
+        factors = reduced(system, executor)
+    return system, factors
+
+
+def reduced(
+    system: Equations,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> TriangularFactors:
+    """Factors of equations, refused if there are none."""
+    factors = reduce_equations(system, executor, progress)
     if not factors.rows:
         bands = " ".join(f"{band:.3g}" for band in system.processing.dead_band)
         raise InvalidValueError(
@@ -208,7 +232,7 @@ def _equations(
             f"({bands} rad/s or m/s) or within 0.3 periods of the cutoff beside them. Give a "
             "smaller dead band or a higher cutoff (processing=), or a log in which the joints move."
         )
-    return system, factors
+    return factors
 
 
 def _identifiable(
@@ -234,7 +258,8 @@ def _validation(
         none = no_errors(log.n)
         return Validation(none, None if test is None else none), system.processing.dead_band
     ramp = friction_ramp(system.base, system.names, estimate.values, log, system.processing)
-    in_sample, nominal = prediction_errors(system, estimate.values, ramp, nominal=True)
+    known = not isinstance(system.base, LoopedParameters)  # of loops, the tree alone is known
+    in_sample, nominal = prediction_errors(system, estimate.values, ramp, nominal=known)
     held_out = None
     if test is not None:
         held_out, _ = prediction_errors(system.with_log(test), estimate.values, ramp)

@@ -9,6 +9,7 @@ from .._arrays import Array, as_exact, as_vector, batch_rows
 from ..friction import check_linear
 from ..friction.protocols import basis_at
 from ..logs import Log
+from ..loops import LoopedParameters
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor_chunks
 from .delay import representative_part
@@ -38,6 +39,9 @@ def parameter_torque(
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     batch, rows = batch_rows(arrays, ("q", "v", "a"))
     tau = np.empty((rows[0].shape[0], n))
+    if isinstance(base, LoopedParameters):
+        W = base.torque_rows(*rows, columns=names)
+        return (W @ b).reshape(*batch, n)
     if tau.size:
         chunks = torque_regressor_chunks(
             model, rows[0], rows[1], rows[2], base.drive, columns=names, friction=base.friction
@@ -57,8 +61,8 @@ def friction_ramp(
     The equations leave out the dead bands; widths up to eight of them are compared there.
     """
     band = processing.dead_band
-    if not band.any():
-        return band
+    if not band.any() or isinstance(base, LoopedParameters):
+        return np.zeros(band.shape)
     part = representative_part(log, processing.motion)
     squares = np.zeros((len(_RAMPS), log.n))
     for piece in pieces(part, processing):

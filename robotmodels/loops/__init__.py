@@ -8,6 +8,7 @@ from ..errors import LoopError
 from .closing import ClosedPostures, ClosingStatus, close
 from .constraints import Mobility, closure_jacobian, mobility, velocity_map, velocity_map_rate
 from .dynamics import closure_forces, ddm, idm
+from .parameters import LoopedParameters as LoopedParameters
 from .parameters import base_parameters, torque_regressor
 from .read import read_mjcf, read_par
 from .robot import Closure, LoopedRobot

@@ -27,6 +27,9 @@ class ClosingStatus(Outcome):
     )  # fmt: skip
 
 
+_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ClosedPostures(Frozen, Value):
     """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
@@ -39,11 +42,6 @@ class ClosedPostures(Frozen, Value):
         Largest distance (m) or angle (rad) between the frames of a closure.
     status : ndarray of int8, shape (...)
         Codes of `ClosingStatus`; loops are open for ``CANNOT_CLOSE`` and ``NOT_CONVERGED``.
-
-    Examples
-    --------
-    >>> ClosedPostures(np.zeros(3), np.zeros(()), np.zeros((), np.int8)).reason()
-    'The loops are closed.'
     """
 
     q: Array
@@ -53,25 +51,19 @@ class ClosedPostures(Frozen, Value):
     def reason(self, index: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status of one posture, with the residual where its loops are open."""
         try:
-            code = self.status[index]
-        except (IndexError, TypeError):
-            code = self.status[None]
-        if np.ndim(code):
+            status = ClosingStatus(self.status[index].item())
+        except (IndexError, TypeError, ValueError):
             raise InvalidValueError(
                 f"index: expected the index of a posture of a batch of shape {self.status.shape}, "
                 f"got {index!r:.40}."
-            )
-        status = ClosingStatus(int(code))
-        left = f" Least residual: {self.residual[index]:.3g} m or rad."
+            ) from None
+        left = f" Least residual: {self.residual[index].item():.3g} m or rad."
         return status.sentence + (left if status in _OPEN else "")
 
     def __repr__(self) -> str:
         counts = [(int(np.sum(self.status == s)), s.name) for s in ClosingStatus]
         listed = ", ".join(f"{count} {name}" for count, name in counts if count)
         return f"<ClosedPostures, q {self.q.shape}: {listed or 'empty'}>"
-
-
-_OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
 
 
 def close(
@@ -125,68 +117,44 @@ def close(
     follow = guess.shape[-1:] != passive.shape
     guess = as_vector(guess, n if follow else len(passive), "q_guess")
     batch, (target, start) = batch_rows((given, guess), ("q_actuated", "q_guess"))
-    q = start.copy()
     if not follow:
-        q = np.empty((len(start), n))
-        q[:, passive], q[:, robot.actuated] = start, target
-    residual, status = np.empty(len(q)), np.empty(len(q))
-    first = q.copy()
-    _close(robot, target, int(follow), q, residual, status)
-    # motions that ended on the way: once more from the guess, at the positions that are asked for
-    away = (q[:, robot.actuated] != target).any(axis=1) & np.isin(status, _OPEN)
-    away |= bool(follow) & (status == ClosingStatus.NOT_CONVERGED)
-    if away.any():
-        again, least, code = first[away], residual[away], status[away]
-        _close(robot, target[away], 0, again, least, code)
-        q[away], residual[away], status[away] = again, least, code
-    jumped = _start_again(robot, target, q, residual, status)
-    jumped |= away if follow else True
-    q[jumped] = _without_turns(robot, q[jumped], first[jumped])  # motions keep their turns
-    return ClosedPostures(
-        q.reshape(*batch, n), residual.reshape(batch), status.astype(np.int8).reshape(batch)
-    )
-
-
-def followed(robot: LoopedRobot, target: Array, start: Array) -> ClosedPostures:
-    """Postures on the way of the actuated joints from a closed one (n,); no other starts."""
-    q = np.tile(start, (len(target), 1))
-    residual, status = np.empty(len(q)), np.empty(len(q))
-    _close(robot, target, 2, q, residual, status)
-    return ClosedPostures(_without_turns(robot, q, start), residual, status.astype(np.int8))
-
-
-def _without_turns(robot: LoopedRobot, q: Array, start: Array) -> Array:
-    """The same postures (N, n), without the whole turns that iterations added to the start."""
-    table = robot.tree.table
-    turns = np.round((q - start) / (2.0 * np.pi)) * (table.sigma[table.joint_rows] != PRISMATIC)
-    turns[:, robot.actuated] = 0.0
-    return q - 2.0 * np.pi * turns
-
-
-def _close(
-    robot: LoopedRobot, target: Array, follow: int, q: Array, residual: Array, status: Array
-) -> None:
-    """Close the postures in the rows of q in place, see `kernels.closed_postures`."""
-    from .kernels import closed_postures
-
-    closed_postures(target, robot.cuts, robot.actuated, robot.passive, follow, q, residual, status)
-
-
-def _start_again(
-    robot: LoopedRobot, target: Array, q: Array, residual: Array, status: Array
-) -> NDArray[np.bool_]:
-    """Close rows that are still open from random starts; whether a row has another posture."""
+        of_passive, start = start, np.empty((len(start), n))
+        start[:, passive], start[:, robot.actuated] = of_passive, target
+    q, residual, status = attempt(robot, target, start, follow)
+    jumped = np.full(len(q), not follow)  # motions keep their turns
     rng = np.random.default_rng(0)
-    passive, jumped = robot.passive, np.zeros(len(q), np.bool_)
-    for _ in range(_STARTS):
+    for k in range(1 - follow, _STARTS + 1):
         rows = np.flatnonzero(np.isin(status, _OPEN))
         if not rows.size:
             break
-        again, least, code = q[rows], residual[rows], status[rows]
-        again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
-        _close(robot, target[rows], 0, again, least, code)
-        better = least < residual[rows]
+        again = start[rows]
+        if k:
+            again[:, passive] = rng.uniform(-np.pi, np.pi, len(passive)) * robot.units[passive]
+        again, least, code = attempt(robot, target[rows], again, False)
+        better = (least < residual[rows]) | (k == 0)  # a motion may have ended on its way
         kept = rows[better]
         q[kept], residual[kept], status[kept] = again[better], least[better], code[better]
         jumped[kept] = True
-    return jumped
+    q[jumped] = without_turns(robot, q[jumped], start[jumped])
+    return ClosedPostures(q.reshape(*batch, n), residual.reshape(batch), status.reshape(batch))
+
+
+def attempt(
+    robot: LoopedRobot, target: Array, start: Array, follow: bool
+) -> tuple[Array, Array, NDArray[np.int8]]:
+    """Close the postures in rows (N, n) once: those found, residuals and codes (N,).
+
+    With ``follow`` the actuated joints move to the target (N, n_a), else they start there.
+    """
+    from .kernels import closed_postures
+
+    q, residual, code = start.copy(), np.empty(len(start)), np.empty(len(start))
+    closed_postures(target, robot.cuts, robot.actuated, robot.passive, follow, q, residual, code)
+    return q, residual, code.astype(np.int8)
+
+
+def without_turns(robot: LoopedRobot, q: Array, start: Array) -> Array:
+    """The same postures (N, n), without whole turns that iterations added to the start."""
+    turns = np.round((q - start) / (2.0 * np.pi)) * (robot.cuts.chain.sigma != PRISMATIC)
+    turns[:, robot.actuated] = 0.0
+    return q - 2.0 * np.pi * turns

@@ -43,10 +43,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import se3
 from .._arrays import Array, Frozen, Value, as_vector, batch_rows, batch_shape
 from ..errors import LoopError
 from ..kinematics import dgm, jacobian, jacobian_rate
-from .robot import ROWS, LoopedRobot, check_looped
+from .robot import ROWS, LoopedRobot, check_looped, scaled
 
 _INDEPENDENT = 1e-8  # least part of an independent row beyond those before it, of the longest row
 _DETERMINED = 1e-7  # least singular value of the passive columns, with lengths in robot sizes
@@ -65,11 +66,6 @@ class Mobility(Frozen, Value):
         Constraint rows that follow from others, earlier ones first kept.
     rows : tuple of str
         Names of the c rows.
-
-    Examples
-    --------
-    >>> Mobility(np.array(1), np.array([False, True]), ("cut.x", "cut.z"))
-    <Mobility 1, redundant rows: cut.z>
     """
 
     count: NDArray[np.int64]
@@ -79,15 +75,11 @@ class Mobility(Frozen, Value):
     @property
     def redundant(self) -> tuple[str, ...]:
         """Names of the rows that are redundant in every posture; none of no postures."""
-        rows = self.is_redundant.reshape(-1, len(self.rows)) if self.is_redundant.size else None
-        everywhere = [] if rows is None else rows.all(axis=0)
-        return tuple(self.rows[k] for k in np.flatnonzero(everywhere))
+        flat = self.is_redundant.reshape(-1, len(self.rows)) if self.is_redundant.size else []
+        return tuple(self.rows[k] for k in np.flatnonzero(np.all(flat, axis=0) & (len(flat) > 0)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.count, dtype=dtype)
-
-    def __int__(self) -> int:
-        return int(self.count)
 
     def __index__(self) -> int:
         return int(self.count)
@@ -125,21 +117,12 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
         Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
     """
     (q,) = checked(robot, q=q)
-    J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
-    largest = np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
-    redundant = np.zeros(J.shape[:-1], dtype=np.bool_)
-    for k in range(J.shape[-2]):  # what a row has beyond those before it, which become orthonormal
-        row, before = J[..., k, :], J[..., :k, :]
-        for _ in range(2):
-            row = row - np.einsum(
-                "...k,...kj->...j", np.einsum("...kj,...j->...k", before, row), before
-            )
-        length = np.linalg.norm(row, axis=-1)
-        redundant[..., k] = ~(length > _INDEPENDENT * largest)
-        J[..., k, :] = np.where(
-            redundant[..., k, None], 0.0, row / np.where(length > 0.0, length, 1.0)[..., None]
-        )
-    return Mobility(np.asarray(robot.n - (~redundant).sum(axis=-1)), redundant, robot.rows)
+    J = scaled(robot, closure_rows(robot, q)[1])
+    least = _INDEPENDENT * np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
+    ranks = [np.linalg.matrix_rank(J[..., :k, :], least) for k in range(1, len(robot.rows) + 1)]
+    ranks = np.stack([np.zeros(q.shape[:-1], np.int64), *ranks], axis=-1)
+    redundant = np.diff(ranks, axis=-1) == 0
+    return Mobility(np.asarray(robot.n - ranks[..., -1]), redundant, robot.rows)
 
 
 def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
@@ -182,61 +165,53 @@ def closure_rows(robot: LoopedRobot, q: Array) -> tuple[Array, Array]:
 
 def row_rates(robot: LoopedRobot, q: Array, v: Array) -> Array:
     """Time derivative of the Jacobian of the closures (..., c, n) at q, v (..., n)."""
-    tree, rates = robot.tree, []
-    batch = batch_shape((q, v), ("q", "v"))
+    tree, rates = robot.tree, [np.empty((*batch_shape((q, v), ("q", "v")), 0, robot.n))]
     for closure in robot.closures:
-        first, second = closure.frames
-        point = dgm(tree, q, second)[..., None, :3, 3]
-        JA, JB = jacobian(tree, q, first), jacobian(tree, q, second)
-        # rows of the joints: twists relative to the first frame, at the origin of the second
-        twists = np.subtract(*(jacobian(tree, q, frame, "world") for frame in (second, first)))
-        change = np.subtract(
-            *(jacobian_rate(tree, q, v, frame, "world") for frame in (second, first))
-        )
-        V, W = twists[..., :3, :].swapaxes(-1, -2), twists[..., 3:, :].swapaxes(-1, -2)
-        dV, dW = change[..., :3, :].swapaxes(-1, -2), change[..., 3:, :].swapaxes(-1, -2)
-        turn, speed = (
-            np.einsum("...ij,...j->...i", J, v)[..., None, :]
-            for J in (JA[..., 3:, :], JB[..., :3, :])
-        )
-        linear = V + np.cross(W, point)
-        dlinear = dV + np.cross(dW, point) + np.cross(W, speed) - np.cross(turn, linear)
-        R = dgm(tree, q, first)[..., :3, :3]
-        parts = [(X @ R).swapaxes(-1, -2) for X in (dlinear, dW - np.cross(turn, W))]
+        ends = closure.frames[::-1]
+        B, A = (jacobian(tree, q, frame) @ v[..., None] for frame in ends)
+        # twists of the joints relative to the first frame, at the world's origin, then shifted
+        S = np.subtract(*(jacobian(tree, q, frame, "world") for frame in ends))
+        dS = np.subtract(*(jacobian_rate(tree, q, v, frame, "world") for frame in ends))
+        (V, W), (dV, dW) = np.split(S, 2, axis=-2), np.split(dS, 2, axis=-2)
+        T, turn = dgm(tree, q, closure.frames[0]), se3.skew(A[..., 3:, 0])
+        point = se3.skew(dgm(tree, q, closure.frames[1])[..., :3, 3])
+        linear = dV - point @ dW - se3.skew(B[..., :3, 0]) @ W - turn @ (V - point @ W)
+        parts = [T[..., :3, :3].swapaxes(-1, -2) @ x for x in (linear, dW - turn @ W)]
         rates.append(np.concatenate(parts, axis=-2)[..., : ROWS[closure.kind], :])
-    return np.concatenate([np.empty((*batch, 0, robot.n)), *rates], axis=-2)
+    return np.concatenate(rates, axis=-2)
 
 
 def maps(robot: LoopedRobot, q: Array, v: Array | None = None) -> tuple[Array, Array]:
     """Velocity map and its rate along v, each (..., n, n_a); the rate is zero without v."""
     n, actuated, passive = robot.n, robot.actuated, robot.passive
-    weight = np.sqrt(robot.cuts.weight)[:, None]
-    J = weight * closure_rows(robot, q)[1] * robot.units
+    J = scaled(robot, closure_rows(robot, q)[1])
     U, sizes, Vt = np.linalg.svd(J[..., passive], full_matrices=False)
     determined = len(robot.rows) >= len(passive)
     least = sizes.min(axis=-1, initial=np.inf) if determined else np.zeros(q.shape[:-1])
-    for i in np.flatnonzero(np.ravel(least <= _DETERMINED))[:1]:
-        raise _undetermined(robot, i, q, "can move while the actuated ones stand still")
+    _check_determined(robot, least > _DETERMINED, "can move while the actuated ones stand still")
     inverse = (Vt.swapaxes(-1, -2) / sizes[..., None, :]) @ U.swapaxes(-1, -2)
     G = np.zeros((*q.shape[:-1], n, len(actuated)))
     G[..., actuated, range(len(actuated))] = 1.0
     G[..., passive, :] = -inverse @ J[..., actuated]
     left = np.abs(J @ G).max(axis=(-1, -2), initial=0.0)
-    for i in np.flatnonzero(np.ravel(left > _CONSISTENT))[:1]:
-        raise _undetermined(robot, i, q, "block the actuated ones, which depend on each other")
+    _check_determined(
+        robot, left <= _CONSISTENT, "block the actuated ones, which depend on each other"
+    )
     scales = robot.units[:, None] / robot.units[actuated]
     if v is None:
         return G * scales, np.zeros_like(G)
-    rate = np.zeros((*batch_shape((q, v), ("q", "v")), n, len(actuated)))
-    dJ = weight * row_rates(robot, q, v) * robot.units
-    rate[..., passive, :] = -inverse @ (dJ @ G)
+    rates = -inverse @ (scaled(robot, row_rates(robot, q, v)) @ G)
+    rate = np.zeros((*rates.shape[:-2], n, len(actuated)))
+    rate[..., passive, :] = rates
     return G * scales, rate * scales
 
 
-def _undetermined(robot: LoopedRobot, i: int, q: Array, how: str) -> LoopError:
-    where = f" in sample {i}" if q.ndim > 1 else ""
-    return LoopError(
-        f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
-        f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops that "
-        "are open: see close), the closures (see mobility) and actuated=."
-    )
+def _check_determined(robot: LoopedRobot, is_determined: NDArray[np.bool_], how: str) -> None:
+    """Raise for the first sample (...) whose motion the actuated joints do not determine."""
+    for i in np.flatnonzero(~np.ravel(is_determined))[:1]:
+        where = f" in sample {i}" if np.ndim(is_determined) else ""
+        raise LoopError(
+            f"the actuated joints {robot.actuated.tolist()} of {robot.name!r} do not determine the "
+            f"others{where}: the passive joints {how}. Check the posture (a dead point, or loops "
+            "that are open: see close), the closures (see mobility) and actuated=."
+        )

@@ -41,29 +41,42 @@ A parallelogram in a horizontal plane, driven by one of its cranks.
 >>> from robotmodels.loops import Closure
 >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
 >>> bars = InertialParameters.from_com(np.ones(5), np.zeros((5, 3)), [np.eye(3)] * 5)
->>> tree = RobotModel.from_table(table, bars)
->>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
+>>> robot = LoopedRobot(RobotModel.from_table(table, bars), [Closure("cut", (4, 5))], actuated=[0])
 >>> q, v = [1.0, 1.0, -1.0], np.zeros(3)
 >>> a = ddm(robot, q, v, [2.0])
 >>> (a / a[0]).round(9), idm(robot, q, v, a).round(9), closure_forces(robot, q, v, [2.0]).shape
 (array([ 1.,  1., -1.]), array([2.]), (5,))
 """
+# Pinocchio has no revolute closure: it is two points on the axis, with redundant rows, which its
+# proximal iterations tolerate (one point where all axes are parallel). The residual J a + dJ/dt v
+# of an iteration is the proximal parameter times the change of the multipliers; Pinocchio's own
+# residual is another quantity. Where it fails, accelerations are projected on the free motions.
 
 from __future__ import annotations
 
+from math import isfinite
+from typing import Any
+
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .. import dynamics
-from .._arrays import Array, as_vector
+from .._arrays import Array, as_vector, batch_rows
 from ..drive import check_all_or_none
-from ..dynamics.inverse import wrench_torque
-from ..errors import LoopError
-from .constraints import checked, closure_rows, maps
-from .engine import accelerations, engine_of
-from .robot import LoopedRobot, check_looped
+from ..dynamics.inverse import rigid_torques, wrench_torque
+from ..errors import LoopError, SingularMassMatrixError
+from .constraints import checked, closure_rows, maps, row_rates
+from .robot import LoopedRobot, acting_rows, check_looped, scaled
 
 _OPEN = 1e-3  # largest residual of closed loops, relative to the robot's size, or rad
+_MU, _ITERATIONS, _CHANGE = 1e-8, 5, 1e-5
+"""Proximal parameter; most iterations; change of the multipliers at which they end."""
+_RANK = 1e-8  # least singular value of independent constraints, relative to the largest
+_DEFINITE = 1e-14  # least eigenvalue of the mass matrix of free motions, relative to the largest
+_REJECTED = 1e-6  # least part of closure accelerations that no joint acceleration gives
+_LEFT = 1e-12 / _MU  # largest change of the multipliers of closures that hold to 1e-12
+_FLOAT64, _solve = np.dtype(np.float64), pin.constraintDynamics
 
 
 def idm(
@@ -104,16 +117,27 @@ def ddm(
     ndarray, shape (..., n)
         Accelerations, rad/s^2 or m/s^2.
     """
-    quick = getattr(getattr(robot, "scratch", None), "quick", None)
-    if quick is not None and drive is True and wrench is None:
-        a = quick(q, v, tau)
-        if a is not None:
-            return a
+    try:  # one sample given as arrays, of a robot without drives whose engine is made: no calls
+        model, data, models, datas, settings, full, places, order, back = robot.scratch.quick
+        if (
+            q.shape == v.shape == full.shape  # type: ignore[union-attr]
+            and tau.shape == places.shape  # type: ignore[union-attr]
+            and q.dtype is v.dtype is tau.dtype is _FLOAT64  # type: ignore[union-attr]
+            and drive is True
+            and wrench is None
+        ):
+            full[places] = tau
+            x, y = (q, v) if order is None else (q[order], v[order])  # type: ignore[index]
+            a = _solve(model, data, x, y, full, models, datas, settings)
+            if settings.relative_residual <= _LEFT and isfinite(sum(a.tolist())):
+                return a if order is None else a[back]
+    except AttributeError:
+        pass
     check_looped(robot)
     q, v = as_vector(q, robot.n, "q"), as_vector(v, robot.n, "v")
     tau = as_vector(tau, len(robot.actuated), "tau")
     full = tree_torques(robot, q, v, tau, wrench, drive)
-    return accelerations(engine_of(robot, drive), q, v, full)
+    return accelerations(robot, engine_of(robot, drive), q, v, full)
 
 
 def closure_forces(
@@ -137,20 +161,17 @@ def closure_forces(
     a = ddm(robot, q, v, tau, wrench, drive)
     q, v = checked(robot, q=q, v=v)
     given = tree_torques(robot, q, v, as_vector(tau, len(robot.actuated), "tau"), wrench, drive)
-    drives = robot.tree.drive_matrices if drive else None
-    rotors = 0.0 if drives is None else a @ drives.rotor
-    J = np.sqrt(robot.cuts.weight)[:, None] * closure_rows(robot, q)[1] * robot.units
-    missing = (dynamics.idm(robot.tree, q, v, a, drive=False) + rotors - given) * robot.units
-    inverse = np.linalg.pinv(J, rcond=1e-8)
-    return np.einsum("...jk,...j->...k", inverse, missing) * np.sqrt(robot.cuts.weight)
+    bodies = dynamics.idm(robot.tree, q, v, a, drive=False) + a @ engine_of(robot, drive).rotor
+    inverse = np.linalg.pinv(scaled(robot, closure_rows(robot, q)[1]), rcond=1e-8)
+    f = np.einsum("...jk,...j->...k", inverse, (bodies - given) * robot.units)
+    return f * np.sqrt(robot.cuts.weight)
 
 
 def tree_torques(
     robot: LoopedRobot, q: Array, v: Array, tau: Array, wrench: ArrayLike | None, drive: bool
 ) -> Array:
     """Torques on the bodies of all joints (..., n): actuators less friction, offsets and wrench."""
-    if not (drive is True or drive is False):
-        check_all_or_none(drive)
+    check_all_or_none(drive)
     full = np.zeros((*tau.shape[:-1], robot.n))
     full[..., robot.actuated] = tau
     if drive and (drives := robot.tree.drive_matrices) is not None:
@@ -173,3 +194,116 @@ def closed(robot: LoopedRobot, q: Array) -> Array:
             "close(robot, q_actuated, q_guess).q."
         )
     return q
+
+
+class Engine:
+    """Pinocchio's closures of one robot, with the scratch data of one thread.
+
+    With a ``rate`` (1/s), errors of the closures decay at that rate.
+    """
+
+    def __init__(self, robot: LoopedRobot, drive: bool = True, rate: float = 0.0) -> None:
+        tree, twin = robot.tree, robot.tree.twin
+        drives = tree.drive_matrices if drive else None
+        self.rotor = np.zeros((tree.n, tree.n)) if drives is None else drives.rotor
+        self.serves = twin.serves_dynamics and not (self.rotor - np.diag(np.diag(self.rotor))).any()
+        if not self.serves:
+            return
+        self.order, self.back = np.argsort(twin.order), twin.order  # the table's and Pinocchio's
+        self.model: Any = twin.model.copy()
+        self.model.armature = np.diag(self.rotor)[self.order].copy()
+        models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
+        acts = acting_rows(robot)
+        for closure in robot.closures:
+            tilts = [acts[robot.rows.index(row)] for row in closure.rows[3:5]]
+            first, second = (twin.model.frames[twin.frame(f).pin_id] for f in closure.frames)
+            whole = closure.kind == "full"
+            kind = pin.ContactType.CONTACT_6D if whole else pin.ContactType.CONTACT_3D
+            two = any(tilts) and not whole  # one point closes a loop of parallel axes
+            for point in [pin.SE3.Identity(), along][: 2 if two else 1]:
+                constraint = pin.RigidConstraintModel(
+                    kind, self.model, first.parentJoint, first.placement * point,
+                    second.parentJoint, second.placement * point, pin.LOCAL,
+                )  # fmt: skip
+                if rate:
+                    constraint.setBaumgarteCorrectorParameters(
+                        pin.BaumgarteCorrectorParameters(rate**2, 2.0 * rate)
+                    )
+                models.append(constraint)
+        self.models, self.data = models, self.model.createData()
+        for constraint in models:
+            self.datas.append(constraint.createData())
+        # the four-argument form: with three the data of another set of constraints are used
+        pin.initConstraintDynamics(self.model, self.data, models, self.datas)
+        self.settings = pin.ProximalSettings(_CHANGE, _MU, _ITERATIONS)
+
+    def accelerations(self, q: Array, v: Array, tau: Array) -> Array | None:
+        """Accelerations under torques of all joints, each (n,); None if the closures fail."""
+        q, v, tau, settings = q[self.order], v[self.order], tau[self.order], self.settings
+        a = _solve(self.model, self.data, q, v, tau, self.models, self.datas, settings)
+        left = settings.relative_residual
+        holds = left <= _LEFT or left <= _LEFT * np.linalg.norm(a)
+        return a[self.back] if holds and isfinite(sum(a.tolist())) else None
+
+
+def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
+    """The engine of the calling thread."""
+    name, scratch = "driven" if drive else "free", robot.scratch
+    if not hasattr(scratch, name):
+        engine = Engine(robot, drive)
+        setattr(scratch, name, engine)
+        if drive and engine.serves and robot.tree.drive_matrices is None:
+            order, places = (engine.order, engine.back), engine.back[robot.actuated]
+            parts = engine.model, engine.data, engine.models, engine.datas, engine.settings
+            turned = (None, None) if robot.tree.twin.in_table_order else order
+            scratch.quick = (*parts, np.zeros(robot.n), places, *turned)
+    engine: Engine = getattr(scratch, name)
+    return engine
+
+
+def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, rotor: Array) -> Array:
+    """Accelerations by projection on the free motions, for any masses. Shapes: (N, n) -> (N, n)."""
+    units = robot.units
+    J = scaled(robot, closure_rows(robot, q)[1])
+    bias = np.einsum("kij,kj->ki", scaled(robot, row_rates(robot, q, v)), v / units)
+    h = rigid_torques(robot.tree, q, v, np.zeros_like(q))
+    M = (dynamics.mass_matrix(robot.tree, q, False) + rotor) * units * units[:, None]
+    out = np.empty_like(q)
+    for i in range(len(q)):
+        U, sizes, Vt = np.linalg.svd(J[i])
+        rank = int((sizes > _RANK * sizes.max(initial=0.0)).sum())
+        part = U.T @ bias[i]
+        if np.abs(part[rank:]).max(initial=0.0) > _REJECTED * (1.0 + np.abs(part).max(initial=0.0)):
+            raise LoopError(
+                f"no accelerations keep the loops of {robot.name!r} closed in sample {i}: its "
+                "velocities violate them (take v = velocity_map(robot, q) @ v_a), or the posture "
+                "is singular."
+            )
+        start, Z = -Vt[:rank].T @ (part[:rank] / sizes[:rank]), Vt[rank:].T
+        S = Z.T @ M[i] @ Z
+        eigenvalues = np.abs(np.linalg.eigvalsh(S))
+        if S.size and not eigenvalues.min() > _DEFINITE * eigenvalues.max():
+            raise SingularMassMatrixError(
+                f"the mass matrix of the free motions of {robot.name!r} is singular in sample {i}. "
+                "Give inertial parameters to its tree: LoopedRobot(tree.with_inertia(...), ...)."
+            )
+        free = np.linalg.solve(S, Z.T @ ((tau[i] - h[i]) * units - M[i] @ start))
+        out[i] = (start + Z @ free) * units
+    return out
+
+
+def accelerations(robot: LoopedRobot, engine: Engine, q: Array, v: Array, tau: Array) -> Array:
+    """Accelerations (..., n) under torques of all joints, without those of drives."""
+    batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
+    out, left = np.empty_like(rows[0]), []
+    for i, row in enumerate(zip(*rows, strict=True)):
+        a = engine.accelerations(*row) if engine.serves else None
+        if a is None:
+            left.append(i)
+        else:
+            out[i] = a
+    if left:
+        q, v, tau = (x[left] for x in rows)
+        out[left] = projected(robot, q, v, tau, engine.rotor)
+    return out.reshape(*batch, robot.n)

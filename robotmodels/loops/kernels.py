@@ -5,50 +5,47 @@ first to the second (of the z axes alone where there are five rows). With z and 
 origin of a joint that carries one of the two frames, p the origin of the second frame and R the
 axes of the first, its column of the Jacobian is ``+-R^T [z x (p - o); z]``.
 
-The chain has the moving joints alone, with identity as its base. Inside the iterations, rows and
-columns are made dimensionless by the size of the robot.
+Normal equations have unit diagonals, their rows weights that make metres dimensionless.
 """
 
 from __future__ import annotations
 
 from math import atan2, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
 from ..kernels import Chain
-from ..kernels._compile import (
-    CHAIN,
-    INT,
-    INTS,
-    MATRIX,
-    NOTHING,
-    OUT1,
-    OUT2,
-    OUT3,
-    STACK,
-    VECTOR,
-    Floats,
-    Ints,
-    compiled,
-)
+from ..kernels import _compile as nb
+from ..kernels import _vectors as vec
+from ..kernels._compile import Floats, Ints, compiled
 from ..kernels._motion import carry_pose, link_pose
-from ..kernels._vectors import (
-    Matrix,
-    Vector,
-    add,
-    cross,
-    matrix,
-    product,
-    scale,
-    subtract,
-    times,
-    transpose_times,
-    vector,
-)
-from .robot import Cuts
+from ..kernels._vectors import Matrix, Vector
+from ..kernels.mass import POSITIVE, solve_definite
 
-CUTS = types.NamedTuple((CHAIN, INTS, INTS, INTS, STACK, MATRIX, INTS, VECTOR, VECTOR), Cuts)
+
+class Cuts(NamedTuple):
+    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
+
+    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
+    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
+    """
+
+    chain: Chain
+    first: Ints
+    second: Ints
+    rows: Ints
+    rotation: Floats
+    position: Floats
+    side: Ints
+    length: Floats
+    weight: Floats
+
+
+CUTS = types.NamedTuple(
+    (nb.CHAIN, nb.INTS, nb.INTS, nb.INTS, nb.STACK, nb.MATRIX, nb.INTS, nb.VECTOR, nb.VECTOR), Cuts
+)
 CLOSED, CANNOT_CLOSE, NOT_CONVERGED, SINGULAR_THERE = 0, 1, 2, 3
 _CLOSED = 1e-13  # largest residual of closed loops, relative to the robot's size, or rad
 _STATIONARY = 1e-6  # largest slope of the error at a minimum, relative to the error
@@ -59,47 +56,41 @@ _NEAR, _STRIDE = 0.01, 1.0  # squared error up to which actuated joints move on;
 
 
 @compiled(inlined=True)
-def joint_poses(q: Floats, i: int, chain: Chain, R: Floats, p: Floats) -> None:
-    """Poses of all joint frames of sample i, in rows from 1; row 0 is the base."""
-    for j in range(q.shape[1]):
-        Rj, Pj = link_pose(chain, j, q, i)
-        carry_pose(chain, j, Rj, Pj, R, p)
-
-
-@compiled(inlined=True)
 def frame_pose(cuts: Cuts, k: int, parent: int, R: Floats, p: Floats) -> tuple[Matrix, Vector]:
     """Pose of frame k of the closures."""
-    Rb = matrix(R, parent)
-    at = add(vector(p, parent), times(Rb, vector(cuts.position, k)))
-    return product(Rb, matrix(cuts.rotation, k)), at
+    Rb = vec.matrix(R, parent)
+    at = vec.add(vec.vector(p, parent), vec.times(Rb, vec.vector(cuts.position, k)))
+    return vec.product(Rb, vec.matrix(cuts.rotation, k)), at
 
 
 @compiled(inlined=True)
 def rotation_error(rows: int, Ra: Matrix, Rb: Matrix) -> Vector:
     """Rotation vector from a to b, or with five rows that between their z axes; axes of a."""
-    z = transpose_times(Ra, (Rb[2], Rb[5], Rb[8]))
+    z = vec.transpose_times(Ra, (Rb[2], Rb[5], Rb[8]))
     x, y, turn, cosine = -z[1], z[0], 0.0, z[2]
     if rows == 6:
-        first = transpose_times(Ra, (Rb[0], Rb[3], Rb[6]))
-        second = transpose_times(Ra, (Rb[1], Rb[4], Rb[7]))
+        first = vec.transpose_times(Ra, (Rb[0], Rb[3], Rb[6]))
+        second = vec.transpose_times(Ra, (Rb[1], Rb[4], Rb[7]))
         x, y, turn = 0.5 * (second[2] - z[1]), 0.5 * (z[0] - first[2]), 0.5 * (first[1] - second[0])
         cosine = 0.5 * (first[0] + second[1] + z[2] - 1.0)
     sine = sqrt(x * x + y * y + turn * turn)
     if sine < 1e-9:
         return (pi, 0.0, 0.0) if cosine < 0.0 else (x, y, turn)
-    return scale(atan2(sine, cosine) / sine, (x, y, turn))
+    return vec.scale(atan2(sine, cosine) / sine, (x, y, turn))
 
 
 @compiled(inlined=True)
-def closure_rows(cuts: Cuts, R: Floats, p: Floats, e: Floats, J: Floats) -> None:
-    """Residuals and Jacobian of all closures at given poses. Shapes: e (c,), J (c, n)."""
-    n = J.shape[1]
-    at = 0
+def closure_rows(q: Floats, i: int, cuts: Cuts, R: Floats, p: Floats, e: Floats, J: Floats) -> None:
+    """Residuals e (c,) and Jacobian J (c, n) of all closures in sample i; R, p are scratch."""
+    n, at = J.shape[1], 0
+    for j in range(n):
+        Rj, Pj = link_pose(cuts.chain, j, q, i)
+        carry_pose(cuts.chain, j, Rj, Pj, R, p)
     for k in range(cuts.rows.shape[0]):
         rows = cuts.rows[k]
         Ra, pa = frame_pose(cuts, 2 * k, cuts.first[k], R, p)
         Rb, pb = frame_pose(cuts, 2 * k + 1, cuts.second[k], R, p)
-        d = transpose_times(Ra, subtract(pb, pa))
+        d = vec.transpose_times(Ra, vec.subtract(pb, pa))
         for x in range(3):
             e[at + x] = d[x]
         if rows > 3:
@@ -113,9 +104,9 @@ def closure_rows(cuts: Cuts, R: Floats, p: Floats, e: Floats, J: Floats) -> None
                 axis = (R[j + 1, 0, 2], R[j + 1, 1, 2], R[j + 1, 2, 2])
                 linear = axis
                 if cuts.chain.sigma[j] == 0:
-                    linear = cross(axis, subtract(pb, vector(p, j + 1)))
-                    angular = scale(side, transpose_times(Ra, axis))
-                linear = scale(side, transpose_times(Ra, linear))
+                    linear = vec.cross(axis, vec.subtract(pb, vec.vector(p, j + 1)))
+                    angular = vec.scale(side, vec.transpose_times(Ra, axis))
+                linear = vec.scale(side, vec.transpose_times(Ra, linear))
             for x in range(3):
                 J[at + x, j] = linear[x]
             for x in range(3, rows):
@@ -123,13 +114,12 @@ def closure_rows(cuts: Cuts, R: Floats, p: Floats, e: Floats, J: Floats) -> None
         at += rows
 
 
-@compiled(NOTHING(MATRIX, CUTS, OUT2, OUT3))
+@compiled(nb.NOTHING(nb.MATRIX, CUTS, nb.OUT2, nb.OUT3))
 def closure_jacobians(q: Floats, cuts: Cuts, e: Floats, J: Floats) -> None:
     """Residuals e (N, c) of the closures and their Jacobians J (N, c, n) at q (N, n)."""
     R, p = base_poses(q.shape[1])
     for i in range(q.shape[0]):
-        joint_poses(q, i, cuts.chain, R, p)
-        closure_rows(cuts, R, p, e[i], J[i])
+        closure_rows(q, i, cuts, R, p, e[i], J[i])
 
 
 @compiled()
@@ -161,37 +151,25 @@ def normal_equations(
                 D[a] = sqrt(total) if total > 0.0 else 1.0
                 g[a] = slope / D[a]
                 steepest = max(steepest, abs(g[a]))
-            N[a, b] = total / (D[a] * D[b])
+            N[a, b] = N[b, a] = total / (D[a] * D[b])
     return steepest
 
 
-@compiled()
-def damped_step(N: Floats, g: Floats, damping: float, L: Floats, x: Floats) -> float:
+@compiled(inlined=True)
+def damped_step(
+    N: Floats, g: Floats, damping: float, L: Floats, x: Floats, diagonal: Floats
+) -> float:
     """Solve ``(N + damping 1) x = -g`` by Cholesky; its least pivot, 0 without a solution."""
-    m = g.shape[0]
     least = 1.0
-    for a in range(m):
-        for b in range(a + 1):
-            total = N[a, b] + (damping if a == b else 0.0)
-            for k in range(b):
-                total -= L[a, k] * L[b, k]
-            if a > b:
-                L[a, b] = total / L[b, b]
-                continue
-            least = min(least, total)
-            if not total > 1e-15:
-                return 0.0
-            L[a, a] = sqrt(total)
-    for a in range(m):
-        total = -g[a]
-        for k in range(a):
-            total -= L[a, k] * x[k]
-        x[a] = total / L[a, a]
-    for a in range(m - 1, -1, -1):
-        total = x[a]
-        for k in range(a + 1, m):
-            total -= L[k, a] * x[k]
-        x[a] = total / L[a, a]
+    for a in range(g.shape[0]):
+        x[0, a] = -g[a]
+        for b in range(g.shape[0]):
+            L[0, a, b] = N[a, b]
+        L[0, a, a] += damping
+    if solve_definite(L, x, 0, diagonal) != POSITIVE:
+        return 0.0
+    for a in range(g.shape[0]):
+        least = min(least, L[0, a, a] * L[0, a, a])
     return least
 
 
@@ -214,7 +192,7 @@ def move_along(
     return share < 1.0
 
 
-@compiled(NOTHING(MATRIX, CUTS, INTS, INTS, INT, OUT2, OUT1, OUT1))
+@compiled(nb.NOTHING(nb.MATRIX, CUTS, nb.INTS, nb.INTS, nb.INT, nb.OUT2, nb.OUT1, nb.OUT1))
 def closed_postures(
     target: Floats,
     cuts: Cuts,
@@ -227,70 +205,58 @@ def closed_postures(
 ) -> None:
     """Close the loops by the passive joints, from the posture in each row; residuals and codes.
 
-    Shapes: target (N, n_a), q (N, n) -> q, residual, code (N,). ``follow``: 0 with the actuated
-    joints at the target from the start, 1 moving from the row to there, 2 without a second start.
+    Shapes: target (N, n_a), q (N, n) -> q, residual, code (N,). With ``follow`` the actuated joints
+    move from the row to the target, else they are there from the start.
     """
     m, c = passive.shape[0], cuts.weight.shape[0]
     R, p = base_poses(q.shape[1])
     e, J = np.empty(c), np.empty((c, q.shape[1]))
-    N, L = np.empty((m, m)), np.empty((m, m))
-    g, D, x, start, guess = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    N, L, x = np.empty((m, m)), np.empty((1, m, m)), np.empty((1, m))
+    g, D, start, diagonal = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     for i in range(q.shape[0]):
-        for a in range(m):
-            guess[a] = q[i, passive[a]]
-        moving = follow > 0
-        jump = not moving
-        before, damping, least, halfway = np.inf, 0.0, 0.0, np.inf
+        moving, before, damping, halfway = follow > 0, np.inf, 0.0, np.inf
         code[i] = NOT_CONVERGED
+        for a in range(0 if moving else actuated.shape[0]):
+            q[i, actuated[a]] = target[i, a]
         for step in range(_STEPS):
-            if jump:  # start at the target
-                for a in range(actuated.shape[0]):
-                    q[i, actuated[a]] = target[i, a]
-                for a in range(m):
-                    q[i, passive[a]] = guess[a]
-                jump, moving, before, damping = False, False, np.inf, 0.0
-            joint_poses(q, i, cuts.chain, R, p)
-            closure_rows(cuts, R, p, e, J)
-            cost = 0.0
+            closure_rows(q, i, cuts, R, p, e, J)
+            cost, largest = 0.0, 0.0
             for k in range(c):
                 cost += cuts.weight[k] * e[k] * e[k]
+                largest = max(largest, abs(e[k]))
             if step == _STEPS // 2:
                 halfway = cost
             if step == _STEPS - 1 and cost > 0.5 * halfway and not moving:
                 code[i] = CANNOT_CLOSE  # the error hardly decreases
             if cost < before:
-                residual[i] = 0.0
-                for k in range(c):
-                    residual[i] = max(residual[i], abs(e[k]))
+                residual[i] = largest
                 moved = moving and cost < _NEAR
                 if moved:
                     moving = move_along(q, i, target, actuated, cuts, e, J)
                 steepest = normal_equations(cuts.weight, passive, e, J, N, g, D)
-                damping *= 0.1 if cost < 0.3 * before else 0.6
-                damping = damping if damping > 1e-6 else 0.0
-                least = damped_step(N, g, damping, L, x)
-                if cost <= _CLOSED * _CLOSED and not moved:
-                    code[i] = CLOSED if least > _FLAT else SINGULAR_THERE
-                    for a in range(m):  # the last digits
-                        q[i, passive[a]] += x[a] / D[a] if least > _FLAT else 0.0
-                    break
-                stuck = steepest <= _STATIONARY * sqrt(cost) and cost > _APART and not moved
                 for a in range(m):
                     start[a] = q[i, passive[a]]
+                if cost <= _CLOSED * _CLOSED and not moved:
+                    flat = damped_step(N, g, 0.0, L, x, diagonal) <= _FLAT
+                    code[i] = SINGULAR_THERE if flat else CLOSED
+                    for a in range(m):  # the last digits
+                        q[i, passive[a]] += 0.0 if flat else x[0, a] / D[a]
+                    break
+                stuck = steepest <= _STATIONARY * sqrt(cost) and cost > _APART and not moved
+                damping *= 0.1 if cost < 0.3 * before else 0.6
+                damping = damping if damping > 1e-6 else 0.0
                 before = np.inf if moved else cost
             else:
                 stuck = damping > _HEAVIEST
                 damping = max(damping * 4.0, 1e-3)
-                least = 0.0
-            if stuck and (follow == 2 or not moving):
+            if stuck:
                 code[i] = CANNOT_CLOSE
                 break
-            jump = stuck
-            if not least > _FLAT:
+            if damped_step(N, g, damping, L, x, diagonal) <= _FLAT:
                 damping = max(damping, 1e-6)
-                damped_step(N, g, damping, L, x)
+                damped_step(N, g, damping, L, x, diagonal)
             for a in range(m):
-                q[i, passive[a]] = start[a] + x[a] / D[a]
+                q[i, passive[a]] = start[a] + x[0, a] / D[a]
         if code[i] == CANNOT_CLOSE or code[i] == NOT_CONVERGED:  # back to the least error
             for a in range(m):
                 q[i, passive[a]] = start[a]

@@ -1,6 +1,47 @@
-"""Torque regressor and base parameters of looped robots."""
+"""Torque regressor and base parameters of looped robots.
+
+Parameters
+----------
+robot : LoopedRobot
+    The robot, n joints, n_a of them actuated.
+q, v, a : array_like, shape (..., n)
+    Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
+q_ref : array_like, shape (n,), optional
+    Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
+    Default: the first posture that closes at random positions of the actuated joints.
+drive, columns
+    As for `robotmodels.torque_regressor` of the tree, drives of passive joints included;
+    ``columns`` may be base parameters.
+tolerance : float
+    Largest relative torque of a parameter that is not kept.
+
+Raises
+------
+ShapeError, InvalidValueError, LoopError
+    As `idm`; columns that do not exist; no closed posture, or no regular ones near ``q_ref``.
+
+References
+----------
+W. Khalil and F. Bennis, "Symbolic calculation of the base inertial parameters of closed-loop
+robots", IJRR 14(2), 1995. Seed book sections 1.5.2.1, 1.5.3 and 1.6.2.
+
+Examples
+--------
+The inertia of a balanced parallelogram about its axes appears as one sum.
+
+>>> from robotmodels import RobotModel
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.loops import Closure
+>>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
+>>> tree = RobotModel.from_table(table, gravity=[0, -9.81, 0])
+>>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
+>>> base_parameters(robot, [1.0, 1.0, -1.0], drive=False).names
+('ZZ1', 'MX1', 'MY1')
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +56,7 @@ from ..minimal_parameters import BaseMethod, BaseParameters
 from ..minimal_parameters.numeric import TorqueColumns, residual_warning
 from ..minimal_parameters.rules import EARTH
 from ..regressors.columns import Columns
-from .closing import ClosingStatus, close, followed
+from .closing import ClosingStatus, attempt, close, without_turns
 from .constraints import checked, maps
 from .dynamics import closed
 from .robot import LoopedRobot, check_looped
@@ -23,7 +64,43 @@ from .robot import LoopedRobot, check_looped
 _PIECE = 512  # samples at a time
 _ROWS_A_COLUMN = 4  # rows of random motion per parameter
 _NARROWER = 12  # halvings of the range of the actuated joints
-_CHECKED, _PROBES = 40, 16  # samples of the final check, and to find the range
+_CHECKED = 40  # samples of the final check
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopedParameters(BaseParameters):
+    """Base parameters of a looped robot, in the assembly of a closed posture ``q_ref`` (n,)."""
+
+    robot: LoopedRobot = None  # type: ignore[assignment]
+    q_ref: Array = None  # type: ignore[assignment]
+
+    def motion(
+        self, guess: Array, q: Array, v: Array | None, a: Array | None
+    ) -> tuple[Array, Array, Array, Array]:
+        """Motion (N, n) of all joints from that of the actuated ones (N, n_a), and the map G."""
+        v, a = (np.zeros(q.shape) if x is None else x for x in (v, a))
+        return lifted(self.robot, closed(self.robot, close(self.robot, q, guess).q), v, a)
+
+    def torque_rows(self, q: Array, v: Array, a: Array, columns: Columns) -> Array:
+        """Rows (N, n, b) of the regressor at motions (N, n), zero for passive joints.
+
+        The motion of the actuated joints counts; that of the others is where iterations start.
+        """
+        robot, actuated = self.robot, self.robot.actuated
+        *motion, G = self.motion(q, q[:, actuated], v[:, actuated], a[:, actuated])
+        W = regressors.torque_regressor(robot.tree, *motion, drive=self.drive, columns=columns)
+        rows = np.zeros(W.shape)
+        rows[:, actuated] = G.swapaxes(1, 2) @ W
+        return rows
+
+
+def lifted(
+    robot: LoopedRobot, q: Array, v_a: Array, a_a: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Motion (N, n) of all joints at closed postures, from that of the actuated ones; and G."""
+    G, v_a, a_a = maps(robot, q)[0], v_a[..., None], a_a[..., None]
+    v = (G @ v_a)[..., 0]
+    return q, v, (G @ a_a + maps(robot, q, v)[1] @ v_a)[..., 0], G
 
 
 def torque_regressor(
@@ -36,42 +113,18 @@ def torque_regressor(
 ) -> Array:
     """Matrix W of the inverse dynamic model: ``idm(robot, q, v, a) = W @ parameters``.
 
-    Parameters
-    ----------
-    robot : LoopedRobot
-        The robot, n joints, n_a of them actuated.
-    q, v, a : array_like, shape (..., n)
-        Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
-    drive, columns
-        As for `robotmodels.torque_regressor` of the tree; ``columns`` may be base parameters.
-
     Returns
     -------
     ndarray, shape (..., n_a, p)
         ``G^T`` times the regressor of the tree; columns as ``parameter_names(robot.tree, drive)``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, LoopError
-        As `idm`; columns that do not exist.
-
-    References
-    ----------
-    Seed book sections 1.5.2.1 and 1.6.2.
-
-    Examples
-    --------
-    See `base_parameters`.
     """
     batch, rows = batch_rows(tuple(checked(robot, q=q, v=v, a=a)), ("q", "v", "a"))
     G = maps(robot, closed(robot, rows[0]))[0].swapaxes(1, 2)
-    pieces = [
-        G[k : k + _PIECE]
-        @ regressors.torque_regressor(
-            robot.tree, *(x[k : k + _PIECE] for x in rows), drive=drive, columns=columns
-        )
-        for k in range(0, max(len(G), 1), _PIECE)
-    ]
+    pieces = []
+    for k in range(0, max(len(G), 1), _PIECE):
+        motion = (x[k : k + _PIECE] for x in rows)
+        W = regressors.torque_regressor(robot.tree, *motion, drive=drive, columns=columns)
+        pieces.append(G[k : k + _PIECE] @ W)
     W = np.concatenate(pieces)
     return W.reshape(*batch, *W.shape[1:])
 
@@ -87,103 +140,60 @@ def base_parameters(
     Khalil's choice as for the tree: earlier frames before later ones, link parameters before
     ``Ia`` before ``Fv`` and ``Fc``. There are at most as many as base parameters of the tree.
 
-    Parameters
-    ----------
-    robot : LoopedRobot
-        The robot, n joints.
-    q_ref : array_like, shape (n,), optional
-        Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
-        Default: the first posture that closes at random positions of the actuated joints.
-    drive : bool or collection of DriveKind or str
-        As for `robotmodels.base_parameters`; drives of passive joints are included.
-    tolerance : float
-        Largest relative torque of a parameter that is not kept.
-
     Returns
     -------
     BaseParameters
         Of the tree's standard parameters; ``.reduce`` and ``columns=`` of `torque_regressor`.
-
-    Raises
-    ------
-    LoopError
-        No closed posture, or no regular ones near it.
-    ShapeError, InvalidValueError
-        A posture of the wrong length, or with NaN or infinity.
-
-    References
-    ----------
-    W. Khalil and F. Bennis, "Symbolic calculation of the base inertial parameters of closed-loop
-    robots", IJRR 14(2), 1995. Seed book section 1.5.3.
-
-    Examples
-    --------
-    The inertia of a balanced parallelogram about its axes appears as one sum.
-
-    >>> from robotmodels import RobotModel
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure
-    >>> table = DHTable(antecedent=[0, 0, 1, 3, 2], sigma=[0, 0, 0, 2, 2], d=[0, 1, 0.5, 1, 0.5])
-    >>> tree = RobotModel.from_table(table, gravity=[0, -9.81, 0])
-    >>> robot = LoopedRobot(tree, [Closure("cut", (4, 5))], actuated=[0])
-    >>> base_parameters(robot, [1.0, 1.0, -1.0], drive=False).names
-    ('ZZ1', 'MX1', 'MY1')
+        Given to `robotmodels.identification.fit`, they name the assembly of the log.
     """
     check_looped(robot)
-    kinds = drive_kinds(drive)
-    reference = _reference(robot, q_ref)
+    kinds, reference = drive_kinds(drive), _reference(robot, q_ref)
     columns = TorqueColumns(robot.tree, kinds, None, tolerance)
     p, rng = len(columns.names), np.random.default_rng(0)
     count = max(_ROWS_A_COLUMN * p // max(len(robot.actuated), 1), 2)
     W = torque_regressor(robot, *_motion(robot, reference, count, rng), drive=kinds)
     # the rows of the looped robot take the place of those of its tree
-    rows = triangles_of([W * robot.units[robot.actuated][:, None]], p)
-    columns.__dict__["factor"] = rows
-    kept, matrix = columns.basis.kept, columns.basis.coefficients
+    columns.__dict__["factor"] = triangles_of([W * robot.units[robot.actuated][:, None]], p)
+    basis = columns.basis
     W = torque_regressor(robot, *_motion(robot, reference, _CHECKED, rng), drive=kinds)
     values = rng.normal(size=p)
-    torque = W @ values
-    wrong = np.abs(W[..., kept] @ (matrix @ values) - torque).max(initial=0.0)
-    error = float(wrong / (np.abs(torque).max(initial=0.0) or 1.0))
+    wrong = W[..., basis.kept] @ (basis.coefficients @ values) - W @ values
+    error = float(np.abs(wrong).max(initial=0.0) / (np.abs(W @ values).max(initial=0.0) or 1.0))
     notes = (f"With closed loops, in the assembly of q = {reference.round(6).tolist()}.",)
-    notes += (*columns.notes, *residual_warning(error, tolerance))
-    return BaseParameters(
-        robot.tree, kinds, kept, matrix, BaseMethod.NUMERIC, columns.basis.gap, None, tolerance,
-        notes, columns.neglected(matrix), error, NOTHING,
+    return LoopedParameters(
+        robot.tree, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, None,
+        tolerance, (*notes, *columns.notes, *residual_warning(error, tolerance)),
+        columns.neglected(basis.coefficients), error, NOTHING, robot, reference,
     )  # fmt: skip
 
 
 def _reference(robot: LoopedRobot, q_ref: ArrayLike | None) -> Array:
     """A closed posture (n,): the given one, or the first that closes at random positions."""
     if q_ref is not None:
-        q = as_exact(q_ref, (robot.n,), "q_ref")
-        found = close(robot, q[..., robot.actuated], q)
+        q = as_exact(q_ref, (robot.n,), "q_ref")[None]
+        found = close(robot, q[:, robot.actuated], q)
     else:
         spread = np.pi * robot.units[robot.actuated]
-        tried = np.random.default_rng(0).uniform(-spread, spread, (200, len(spread)))
-        found = close(robot, np.vstack((0.0 * spread, tried)))
-    for k in np.flatnonzero(found.status.reshape(-1) == ClosingStatus.CLOSED)[:1]:
-        return found.q.reshape(-1, robot.n)[k]
-    reason = found.reason() if q_ref is not None else "No posture of 201 closes the loops."
-    raise LoopError(f"q_ref: {reason} Give a posture of all joints near a regular closed one.")
+        found = close(robot, np.random.default_rng(0).uniform(-spread, spread, (200, len(spread))))
+    for k in np.flatnonzero(found.status == ClosingStatus.CLOSED)[:1]:
+        return found.q[k]
+    raise LoopError(
+        f"q_ref: {found.reason(0)} Give a posture of all joints near a regular closed one."
+    )
 
 
 def _motion(
     robot: LoopedRobot, reference: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
     """Random motion in the assembly of a posture, of balanced gravity and inertia; each (N, n)."""
-    actuated = robot.actuated
-    units, spread = robot.units[actuated], np.pi
-    for _ in range(_NARROWER):
-        by = rng.uniform(-spread, spread, (4 * count, len(actuated))) * units
-        for some in (by[:_PROBES], by):  # a range in which at least half of the postures close
-            found = followed(robot, reference[actuated] + some, reference)
-            q = found.q[found.status == ClosingStatus.CLOSED]
-            if 2 * len(q) < len(some):
-                break
-        else:
+    actuated, units = robot.actuated, robot.units[robot.actuated]
+    start = np.tile(reference, (4 * count, 1))
+    for narrower in range(_NARROWER):  # a range in which at least half of the postures close
+        by = np.pi * 0.5**narrower * rng.uniform(-1.0, 1.0, (4 * count, len(actuated))) * units
+        found, _, status = attempt(robot, reference[actuated] + by, start, True)
+        q = without_turns(robot, found[status == ClosingStatus.CLOSED], reference)
+        if len(q) >= 2 * count:
             break
-        spread *= 0.5
     else:
         raise LoopError(
             f"{robot.name!r}: the loops hardly close around q = {reference.tolist()}; give another "
@@ -191,10 +201,6 @@ def _motion(
         )
     G = maps(robot, q)[0]  # without the half that is nearest to dead points
     best = np.argsort(np.abs(G / robot.units[:, None]).max(axis=(1, 2)))[:count]
-    q, G = q[best], G[best]
     rate = np.sqrt(EARTH / robot.cuts.length[0])
     v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated))) * units
-    v = rate * np.einsum("kij,kj->ki", G, v_a)
-    dG = maps(robot, q, v)[1]
-    a = rate**2 * np.einsum("kij,kj->ki", G, a_a) + rate * np.einsum("kij,kj->ki", dG, v_a)
-    return q, v, a
+    return lifted(robot, q[best], rate * v_a, rate**2 * a_a)[:3]

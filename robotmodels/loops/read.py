@@ -1,4 +1,44 @@
-"""Looped robots from files: SYMORO's ``.par`` and MuJoCo's MJCF."""
+"""Looped robots from files: SYMORO's ``.par`` and MuJoCo's MJCF.
+
+Parameters
+----------
+path : str or Path
+    The file.
+values, gravity
+    As for `robotmodels.read_par`.
+
+Returns
+-------
+LoopedRobot
+    Spanning tree, closures and actuated joints.
+
+Raises
+------
+ParFileError, TableError, InvalidValueError
+    As for `robotmodels.read_par`; a file without loops.
+LoopError
+    An MJCF file that cannot be read; other joints or equalities than those supported, by name.
+
+References
+----------
+W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robots", Robotica 15,
+1997. Seed book section 1.2.1.
+
+Examples
+--------
+>>> text = '''<mujoco model="bars"><worldbody>
+... <body name="crank"><joint name="j1" axis="0 0 1"/><inertial pos="0 0 0" mass="1"
+...   diaginertia="1 1 1"/><body name="rod" pos="0.5 0 0"><joint name="j2" axis="0 0 1"/>
+...   <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+... <body name="rocker" pos="1 0 0"><joint name="j3" axis="0 0 1"/><inertial pos="0 0 0"
+...   mass="1" diaginertia="1 1 1"/></body></worldbody>
+... <equality><connect body1="rod" body2="rocker" anchor="1 0 0"/></equality>
+... <actuator><motor joint="j1"/></actuator></mujoco>'''
+>>> with TemporaryDirectory() as folder:
+...     _ = (Path(folder) / "bars.xml").write_text(text)
+...     read_mjcf(Path(folder) / "bars.xml")
+<LoopedRobot 'bars': 3 joints, actuated [0], closures: connect_1 (point)>
+"""
 
 from __future__ import annotations
 
@@ -19,9 +59,8 @@ from ..errors import LoopError, ParFileError
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..symoro.read import read_tree
+from ..urdf.write import origin_element
 from .robot import Closure, LoopedRobot
-
-_UPPER = np.triu_indices(3)
 
 
 def read_par(
@@ -34,46 +73,6 @@ def read_par(
     Joints NL + 1 to NJ are cut: the closure ``cut_j`` joins frame j to its second frame, which is
     one of the last NJ - NL fixed frames. A cut revolute joint is no joint of the tree; a cut
     prismatic one stays, without mass. Joints with mu = 1 are actuated.
-
-    Parameters
-    ----------
-    path, values, gravity
-        As for `robotmodels.read_par`.
-
-    Returns
-    -------
-    LoopedRobot
-        Spanning tree, closures and actuated joints.
-
-    Raises
-    ------
-    ParFileError, TableError, InvalidValueError
-        As for `robotmodels.read_par`; a file without loops.
-
-    References
-    ----------
-    W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robots", Robotica
-    15, 1997. Seed book section 1.2.1.
-
-    Examples
-    --------
-    >>> text = '''NL = 3
-    ... NJ = 4
-    ... NF = 5
-    ... Type = 2
-    ... ant = {0, 0, 1, 3, 2}
-    ... sigma = {0, 0, 0, 0, 2}
-    ... mu = {1, 0, 0, 0, 0}
-    ... d = {0, 1, 0.5, 1, 0.5}
-    ... alpha = {0, 0, 0, 0, 0}
-    ... r = {0, 0, 0, 0, 0}
-    ... theta = {t1, t2, t3, t4, 0}
-    ... '''
-    >>> with TemporaryDirectory() as folder:
-    ...     file = Path(folder) / "parallelogram.par"
-    ...     _ = file.write_text(text)
-    ...     read_par(file)
-    <LoopedRobot 'parallelogram': 3 joints, actuated [0], closures: cut_4 (revolute)>
     """
     tree, cuts = read_tree(path, values, gravity, loops=True)
     if not cuts:
@@ -81,49 +80,16 @@ def read_par(
             f"{Path(path).name}: NJ = NL, so that no loop is cut; read it with rm.read_par."
         )
     kinds = ["full" if tree.table.sigma[j - 1] == PRISMATIC else "revolute" for j, _ in cuts]
-    return LoopedRobot(
-        tree,
-        [Closure(f"cut_{pair[0]}", pair, kind) for pair, kind in zip(cuts, kinds, strict=True)],
-    )
+    pairs = zip(cuts, kinds, strict=True)
+    return LoopedRobot(tree, [Closure(f"cut_{pair[0]}", pair, kind) for pair, kind in pairs])
 
 
 def read_mjcf(path: str | Path) -> LoopedRobot:
     """Read an MJCF file with hinge and slide joints and ``<connect>`` or ``<weld>`` closures.
 
-    Pinocchio reads bodies and joints. Joints of actuators are actuated, in the order of the tree;
-    armature, damping and friction loss are Ia, Fv and Fc.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    LoopedRobot
-        The tree (in joint variables of the file), a closure ``connect_k`` (point) or ``weld_k``
-        (full) for each equality, actuated joints.
-
-    Raises
-    ------
-    LoopError
-        A file that cannot be read; other joints or equalities, which are named.
-
-    Examples
-    --------
-    >>> text = '''<mujoco model="bars"><worldbody>
-    ... <body name="crank"><joint name="j1" axis="0 0 1"/><inertial pos="0 0 0" mass="1"
-    ...   diaginertia="1 1 1"/><body name="rod" pos="0.5 0 0"><joint name="j2" axis="0 0 1"/>
-    ...   <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
-    ... <body name="rocker" pos="1 0 0"><joint name="j3" axis="0 0 1"/><inertial pos="0 0 0"
-    ...   mass="1" diaginertia="1 1 1"/></body></worldbody>
-    ... <equality><connect body1="rod" body2="rocker" anchor="1 0 0"/></equality>
-    ... <actuator><motor joint="j1"/></actuator></mujoco>'''
-    >>> with TemporaryDirectory() as folder:
-    ...     file = Path(folder) / "bars.xml"
-    ...     _ = file.write_text(text)
-    ...     read_mjcf(file)
-    <LoopedRobot 'bars': 3 joints, actuated [0], closures: connect_1 (point)>
+    Pinocchio reads bodies and joints. Each equality is a closure, ``connect_k`` (point) or
+    ``weld_k`` (full). Joints of actuators are actuated, in the order of the tree; armature,
+    damping and friction loss are Ia, Fv and Fc.
     """
     path = Path(path)
     try:
@@ -138,78 +104,68 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
             group.remove(equality)
     equalities = root.findall("equality/*")
     for k, equality in enumerate(equalities, start=1):
-        if equality.tag not in ("connect", "weld") or equality.get("body1") is None:
-            raise LoopError(
-                f"{path.name}: the equality {ET.tostring(equality, encoding='unicode').strip()} "
-                "is not supported; closures are <connect> and <weld> of body1 and body2."
-            )
-        _check_numbers(equality, path.name)
+        _check_equality(equality, path.name)
         equality.set("name", f"{equality.tag}_{k:06d}")  # Pinocchio sorts by kind and by name
+    bodies = world.findall("body")
+    if len(bodies) != 1:  # of several root bodies, Pinocchio leaves out all but one
+        together = ET.SubElement(world, "body", name="robotmodels_roots")
+        for body in bodies:
+            world.remove(body)
+            together.append(body)
     with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        ET.ElementTree(root).write(copy)
         try:
-            model, constraints = pin.buildModelAndLegacyConstraintsFromMJCF(
-                str(_with_one_root(root, world, Path(folder) / path.name))
-            )
+            model, constraints = pin.buildModelAndLegacyConstraintsFromMJCF(str(copy))
         except (ValueError, RuntimeError) as error:
             raise LoopError(f"{path.name}: Pinocchio cannot read it: {error}") from None
-    text = _urdf(model, root.get("model") or path.stem, path.name)
-    tree = RobotModel.from_urdf(text, gravity=model.gravity.linear)
-    order = [model.idx_vs[model.getJointId(name)] for name in tree.table.joint_names]
-    lower, upper = model.lowerPositionLimit[order], model.upperPositionLimit[order]
-    none = np.full(len(order), np.inf)
-    limits = {"lower": lower, "upper": upper, "velocity": none, "effort": none}
-    tree = tree.with_table(tree.table.replace(**limits))
-    Ia, Fv, Fc = (getattr(model, key)[order] for key in ("armature", "damping", "friction"))
-    closures = []
     if len(constraints) != len(equalities):
         raise LoopError(
             f"{path.name}: Pinocchio reads {len(constraints)} of {len(equalities)} equalities; "
             "check the names of their bodies."
         )
+    text = _urdf(model, root.get("model") or path.stem, path.name)
+    tree = RobotModel.from_urdf(text, gravity=model.gravity.linear)
+    names = tree.table.joint_names
+    order = [model.idx_vs[model.getJointId(name)] for name in names]
+    lower, upper = model.lowerPositionLimit[order], model.upperPositionLimit[order]
+    none = np.full(len(order), np.inf)
+    table = tree.table.replace(lower=lower, upper=upper, velocity=none, effort=none)
+    Ia, Fv, Fc = (getattr(model, key)[order] for key in ("armature", "damping", "friction"))
+    tree = tree.with_table(table).with_drive(DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc))
+    closures = []
     places = sorted(range(len(equalities)), key=lambda k: str(equalities[k].get("name")))
-    found = dict(zip(places, constraints, strict=True))
-    for k, equality in enumerate(equalities):
-        constraint, name, frames = found[k], f"{equality.tag}_{k + 1}", []
-        for side in ("1", "2"):
+    for k, constraint in sorted(zip(places, constraints, strict=True), key=lambda pair: pair[0]):
+        kind, name = equalities[k].tag, f"{equalities[k].tag}_{k + 1}"
+        for side in "12":
             body = getattr(constraint, f"joint{side}_id")
             place = getattr(constraint, f"joint{side}_placement").homogeneous
-            frames.append(f"{name}_{side}")
-            tree = tree.with_frames({frames[-1]: place}, f"body_{body}" if body else 0)
-        kind = "point" if equality.tag == "connect" else "full"
-        closures.append(Closure(name, (frames[0], frames[1]), kind))
+            tree = tree.with_frames({f"{name}_{side}": place}, f"body_{body}" if body else 0)
+        frames = f"{name}_1", f"{name}_2"
+        closures.append(Closure(name, frames, "point" if kind == "connect" else "full"))
     driven = {element.get("joint") for element in root.findall("actuator/*")}
-    actuated = [j for j, name in enumerate(tree.table.joint_names) if name in driven]
-    tree = tree.with_drive(DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc))
+    actuated = [j for j, name in enumerate(names) if name in driven]
     return LoopedRobot(tree, closures, actuated)  # type: ignore[arg-type]
 
 
-def _check_numbers(equality: ET.Element, label: str) -> None:
-    """Raise for anchors and poses that are not numbers, which Pinocchio reads as any number."""
-    for key, count in (("anchor", 3), ("relpose", 7)):
-        text = equality.get(key)
-        if text is None and not (key == "anchor" and equality.tag == "connect"):
-            continue
+def _check_equality(equality: ET.Element, label: str) -> None:
+    """Raise for other equalities, and anchors that Pinocchio would read as any number."""
+    shown = ET.tostring(equality, encoding="unicode").strip()
+    if equality.tag not in ("connect", "weld") or equality.get("body1") is None:
+        raise LoopError(
+            f"{label}: the equality {shown} is not supported; closures are <connect> and <weld> of "
+            "body1 and body2."
+        )
+    for key, count, text in (("anchor", 3, "0 0 0"), ("relpose", 7, "0 0 0 1 0 0 0")):
+        text = equality.get(key, "" if (key, equality.tag) == ("anchor", "connect") else text)
         try:
-            values = [float(word) for word in (text or "").split()]
+            fits = np.isfinite(np.array(text.split(), np.float64)).sum() == count
         except ValueError:
-            values = []
-        if len(values) != count or not np.isfinite(values).all():
+            fits = False
+        if not fits:
             raise LoopError(
-                f"{label}: expected {key} with {count} numbers, got {text!r} in "
-                f"{ET.tostring(equality, encoding='unicode').strip()}."
+                f"{label}: expected {key} with {count} numbers, got {text!r} in {shown}."
             )
-
-
-def _with_one_root(root: ET.Element, world: ET.Element, path: Path) -> Path:
-    """A file with one body that carries all root bodies: Pinocchio leaves out all but one."""
-    bodies = world.findall("body")
-    if len(bodies) != 1:
-        together = ET.SubElement(world, "body", name="robotmodels_roots")
-        for body in bodies:
-            world.remove(body)
-            together.append(body)
-    ET.ElementTree(root).write(path)
-    return path
 
 
 def _urdf(model: Any, name: str, label: str) -> str:
@@ -218,7 +174,7 @@ def _urdf(model: Any, name: str, label: str) -> str:
     data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
     for k in range(1, model.njoints):
-        kind = model.joints[k].shortname()
+        kind, Y = model.joints[k].shortname(), model.inertias[k]
         sort = {"R": "revolute", "P": "prismatic"}.get(kind.removeprefix("JointModel")[0])
         if sort is None or model.joints[k].nq != 1:
             raise LoopError(
@@ -227,24 +183,22 @@ def _urdf(model: Any, name: str, label: str) -> str:
             )
         twist = pin.getJointJacobian(model, data, k, pin.LOCAL)[:, model.idx_vs[k]]
         axis = twist[3:] if sort == "revolute" else twist[:3]
-        place, Y = model.jointPlacements[k], model.inertias[k]
-        origin = _origin(place.translation, pin.rpy.matrixToRpy(place.rotation))
-        tensor = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), Y.inertia[_UPPER], strict=True)
-        entries = " ".join(f"{key}='{float(value)!r}'" for key, value in tensor)
+        tensor = [
+            f"i{'xyz'[a]}{'xyz'[b]}='{float(Y.inertia[a, b])!r}'"
+            for a in range(3)
+            for b in range(a, 3)
+        ]
         lines.append(
-            f"<link name='body_{k}'><inertial>{_origin(Y.lever, np.zeros(3))}"
-            f"<mass value='{float(Y.mass)!r}'/><inertia {entries}/></inertial></link>"
-            f"<joint name={quoteattr(model.names[k])} type='{sort}'>{origin}"
+            f"<link name='body_{k}'><inertial><origin xyz='{_words(Y.lever)}'/>"
+            f"<mass value='{float(Y.mass)!r}'/><inertia {' '.join(tensor)}/></inertial></link>"
+            f"<joint name={quoteattr(model.names[k])} type='{sort}'>"
+            f"{origin_element(model.jointPlacements[k].homogeneous)}"
             f"<parent link='body_{model.parents[k]}'/><child link='body_{k}'/>"
-            f"<axis xyz='{_numbers(axis)}'/>"
+            f"<axis xyz='{_words(axis)}'/>"
             "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
         )
     return "\n".join([*lines, "</robot>"])
 
 
-def _origin(xyz: Array, rpy: Array) -> str:
-    return f"<origin xyz='{_numbers(xyz)}' rpy='{_numbers(rpy)}'/>"
-
-
-def _numbers(values: Array) -> str:
+def _words(values: Array) -> str:
     return " ".join(repr(float(value)) for value in values)

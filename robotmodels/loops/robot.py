@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from .._arrays import Array, Value, as_floats, read_only
 from ..errors import InvalidValueError, LoopError
 from ..geometry import FIXED, PRISMATIC, constant_factors
 from ..kernels import Chain
-from ..kinematics import dgm, jacobian
 from ..minimal_parameters.rules import reach
 from ..model import RobotModel
 
@@ -22,24 +21,6 @@ ROWS = {"point": 3, "revolute": 5, "full": 6}
 """Number of constraint rows of each kind of closure."""
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 _NO_EFFECT = 1e-10  # largest entry of the Jacobian of a closure without effect, dimensionless
-
-
-class Cuts(NamedTuple):
-    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
-
-    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
-    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
-    """
-
-    chain: Chain
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    rotation: Array
-    position: Array
-    side: NDArray[np.int64]
-    length: Array
-    weight: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +32,15 @@ class Closure:
     name : str
         Name of the closure, which messages and constraint rows use.
     frames : (int or str, int or str)
-        Numbers or names of the two frames; 0 is the base. They lie on different bodies.
+        Numbers or names of the two frames, on different bodies; 0 is the base.
     kind : {"revolute", "point", "full"}
-        ``"revolute"``: origins and z axes coincide, as in a cut revolute joint, rows
-        ``x y z rx ry``; ``"point"``: origins coincide, as in a spherical joint, rows ``x y z``;
-        ``"full"``: the frames coincide, as in a cut body, rows ``x y z rx ry rz``.
+        ``"revolute"``: origins and z axes coincide (rows ``x y z rx ry``); ``"point"``: origins
+        coincide, as in a spherical joint; ``"full"``: the frames coincide, as in a cut body.
 
     Raises
     ------
     InvalidValueError
         An empty name, another kind, or not two frames.
-
-    References
-    ----------
-    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
-    ICRA 1986, for frames of cut joints. Seed book section 1.2.1, for the tables.
 
     Examples
     --------
@@ -78,12 +53,11 @@ class Closure:
     kind: str = "revolute"
 
     def __post_init__(self) -> None:
+        pair, kinds = self.frames, ", ".join(map(repr, ROWS))
         if not isinstance(self.name, str) or not self.name:
             raise InvalidValueError(f"name: expected a text, not empty, got {self.name!r:.60}.")
         if not isinstance(self.kind, str) or self.kind not in ROWS:
-            kinds = ", ".join(map(repr, ROWS))
             raise InvalidValueError(f"kind: expected one of {kinds}, got {self.kind!r:.60}.")
-        pair = self.frames
         if isinstance(pair, str) or not isinstance(pair, Iterable) or len(tuple(pair)) != 2:
             raise InvalidValueError(
                 f"frames: expected two frames of the tree such as (4, 7), got {pair!r:.60}."
@@ -100,12 +74,10 @@ class Closure:
 class LoopedRobot(Value):
     """Robot with kinematic loops: spanning tree, closures and actuated joints. Read-only.
 
-    Joint variables ``q (..., n)`` are those of all n joints of the tree; n_a of them are actuated.
-
     Parameters
     ----------
     tree : RobotModel
-        Spanning tree, in which each loop is cut.
+        Spanning tree of n joints, in which each loop is cut.
     closures : sequence of Closure
         Closures of the cut loops.
     actuated : array_like of int, shape (n_a,), optional
@@ -129,7 +101,8 @@ class LoopedRobot(Value):
 
     References
     ----------
-    Seed book sections 1.2.1 and 2.2.
+    W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
+    ICRA 1986. Seed book sections 1.2.1 and 2.2.
 
     Examples
     --------
@@ -147,28 +120,34 @@ class LoopedRobot(Value):
     passive: NDArray[np.int64] = field(init=False)
     units: Array = field(init=False)
     rows: tuple[str, ...] = field(init=False)
-    cuts: Cuts = field(init=False)
+    cuts: Any = field(init=False)
     scratch: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.tree, RobotModel):
+        tree, given = self.tree, self.closures
+        if not isinstance(tree, RobotModel):
             raise InvalidValueError(
-                f"tree: expected the RobotModel of a spanning tree, got {type(self.tree).__name__}."
+                f"tree: expected the RobotModel of a spanning tree, got {type(tree).__name__}."
             )
-        closures = self.closures if isinstance(self.closures, Iterable) else (self.closures,)
-        actuated = _checked_actuated(self.tree, self.actuated)
-        parts: dict[str, Any] = {
-            "closures": _checked_closures(tuple(closures)),
+        closures = tuple(given) if isinstance(given, Iterable) else (given,)
+        for k, closure in enumerate(closures):
+            if not isinstance(closure, Closure):
+                raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
+        names = [closure.name for closure in closures]
+        if len(set(names)) < len(names):
+            raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
+        actuated, cuts = _actuated(tree, self.actuated), _cuts(tree, closures)
+        for name, value in {
+            "closures": closures,
             "actuated": actuated,
-            "passive": read_only(np.setdiff1d(np.arange(self.tree.n), actuated), np.int64),
+            "passive": read_only(np.setdiff1d(np.arange(tree.n), actuated), np.int64),
+            "units": read_only(np.where(cuts.chain.sigma == PRISMATIC, cuts.length, 1.0)),
+            "rows": tuple(row for closure in closures for row in closure.rows),
+            "cuts": cuts,
             "scratch": threading.local(),
-        }
-        parts["rows"] = tuple(row for closure in parts["closures"] for row in closure.rows)
-        parts["cuts"] = cuts = _cuts(self.tree, parts["closures"])
-        slides = cuts.chain.sigma == PRISMATIC
-        parts["units"] = read_only(np.where(slides, cuts.length, 1.0))
-        for name, value in parts.items():
+        }.items():
             object.__setattr__(self, name, value)
+        acting_rows(self)
 
     @property
     def n(self) -> int:
@@ -181,16 +160,21 @@ class LoopedRobot(Value):
         return self.tree.name
 
     def __repr__(self) -> str:
-        listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures[:4])
+        listed = [f"{c.name} ({c.kind})" for c in self.closures[:4]] or ["none"]
         more = f" and {len(self.closures) - 4} more" if len(self.closures) > 4 else ""
         return (
             f"<LoopedRobot {self.name!r}: {self.n} joints, actuated {self.actuated.tolist()}, "
-            f"closures: {listed or 'none'}{more}>"
+            f"closures: {', '.join(listed)}{more}>"
         )
 
     @property
     def _values(self) -> tuple[Any, ...]:
         return self.tree, self.closures, self.actuated
+
+
+def scaled(robot: LoopedRobot, J: Array) -> Array:
+    """Rows (..., c, n) of the closures in sizes of the robot, rad and natural joint units."""
+    return np.sqrt(robot.cuts.weight)[:, None] * J * robot.units
 
 
 def check_looped(robot: object) -> None:
@@ -202,18 +186,7 @@ def check_looped(robot: object) -> None:
         )
 
 
-def _checked_closures(closures: tuple[Any, ...]) -> tuple[Closure, ...]:
-    """Closures, each with its own name."""
-    for k, closure in enumerate(closures):
-        if not isinstance(closure, Closure):
-            raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
-    names = [closure.name for closure in closures]
-    if len(set(names)) < len(names):
-        raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
-    return closures
-
-
-def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
+def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     """Columns of the actuated joints."""
     if actuated is None:
         return read_only(np.flatnonzero(tree.table.mu[tree.table.joint_rows]), np.int64)
@@ -227,73 +200,66 @@ def _checked_actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     return read_only(given, np.int64)
 
 
-def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Cuts:
-    """Arrays of closures, each of which some joint can violate."""
-    moving, size = tree.table.joint_rows + 1, reach(tree)
+def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Any:
+    """Arrays of closures."""
+    from .kernels import Cuts
+
+    size, moving = reach(tree), tree.table.joint_rows + 1
     chain, body, pose = _moving_chain(tree)
-    sides = np.zeros((len(closures), tree.n), dtype=np.int64)
-    parents, ends, weight = [], [], []
-    for closure, side in zip(closures, sides, strict=True):
-        pair = [tree.twin.frame(frame) for frame in closure.frames]
-        side[:] = np.subtract(*(np.isin(moving, place.path).astype(int) for place in pair[::-1]))
-        named = f"closure {closure.name!r}: the frames {closure.frames[0]!r} and "
-        if not side.any():
-            raise LoopError(
-                f"{named}{closure.frames[1]!r} are on the same body; give frames of the two bodies "
-                "that the closure joins."
-            )
-        if not _acts(tree, closure, size):
-            raise LoopError(
-                f"{named}{closure.frames[1]!r} add no constraint: no joint moves them against each "
-                f"other in the rows {', '.join(closure.rows)}. Remove the closure, or correct its "
-                "frames."
-            )
-        for place in pair:
-            T = np.eye(4)
-            T[:3, :3], T[:3, 3] = place.rotation, place.position
-            parents.append(body[place.parent])
-            ends.append(pose[place.parent] @ T)
-        weight += [1.0 / size**2] * 3 + [1.0] * (ROWS[closure.kind] - 3)
+    places = [tree.twin.frame(frame) for closure in closures for frame in closure.frames]
+    parents = [body[x.parent] for x in places]
+    R = [pose[x.parent][:3, :3] @ x.rotation for x in places]
+    p = [pose[x.parent][:3, :3] @ x.position + pose[x.parent][:3, 3] for x in places]
+    paths = [np.isin(moving, x.path).astype(int) for x in places]
+    weight = [[1.0 / size**2] * 3 + [1.0] * (ROWS[c.kind] - 3) for c in closures]
     return Cuts(
         chain=chain,
         first=read_only(parents[::2], np.int64),
         second=read_only(parents[1::2], np.int64),
-        rows=read_only([ROWS[closure.kind] for closure in closures], np.int64),
-        rotation=read_only(np.array([T[:3, :3] for T in ends]).reshape(-1, 3, 3)),
-        position=read_only(np.array([T[:3, 3] for T in ends]).reshape(-1, 3)),
-        side=read_only(sides.ravel(), np.int64),
+        rows=read_only([ROWS[c.kind] for c in closures], np.int64),
+        rotation=read_only(np.reshape(R, (-1, 3, 3))),
+        position=read_only(np.reshape(p, (-1, 3))),
+        side=read_only(np.ravel(np.subtract(paths[1::2], paths[::2])), np.int64),
         length=read_only([size]),
-        weight=read_only(weight),
+        weight=read_only(np.concatenate([[], *weight])),
     )
 
 
 def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
     """Chain of the moving joints alone; of each frame, R_0 first, its joint and its pose on it."""
-    body, pose = [0], [np.eye(4)]
-    antecedent, constants = [], []
-    for sigma, a, C in zip(
-        tree.table.sigma, tree.table.antecedent, constant_factors(tree.table), strict=True
-    ):
+    body, pose, antecedent, constants = [0], [np.eye(4)], [], []
+    table = tree.table
+    for sigma, a, C in zip(table.sigma, table.antecedent, constant_factors(table), strict=True):
         at = pose[a] @ C
         if sigma != FIXED:
             antecedent.append(body[a])
             constants.append(at)
         body.append(body[a] if sigma == FIXED else len(constants))
         pose.append(at if sigma == FIXED else np.eye(4))
-    T, joints = np.array(constants).reshape(-1, 4, 4), np.arange(tree.n)
-    sigma = tree.table.sigma[tree.table.joint_rows]
-    structure = [read_only(x, np.int64) for x in (antecedent, sigma, joints)]
+    T, sigma = np.array(constants).reshape(-1, 4, 4), table.sigma[table.joint_rows]
+    structure = [read_only(x, np.int64) for x in (antecedent, sigma, np.arange(tree.n))]
     places = [read_only(x) for x in (T[:, :3, :3], T[:, :3, 3], np.eye(3), np.zeros(3))]
     return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
 
-def _acts(tree: RobotModel, closure: Closure, size: float) -> bool:
-    """Whether some joint moves the two frames against each other in the rows of the closure."""
-    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (3, tree.n)):
-        first, second = (dgm(tree, q, frame) for frame in closure.frames)
-        twist = np.subtract(*(jacobian(tree, q, frame, "world") for frame in closure.frames))
-        linear = twist[:3] + np.cross(twist[3:], second[:3, 3], axis=0)
-        rows = [first[:3, :3].T @ part for part in (linear / size, twist[3:])]
-        if np.abs(np.vstack(rows)[: ROWS[closure.kind]]).max(initial=0.0) > _NO_EFFECT:
-            return True
-    return False
+def acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
+    """Rows that some joint can violate (c,); raises for closures without any, and of one body."""
+    from .kernels import closure_jacobians
+
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (3, robot.n))
+    e, J = np.empty((3, len(robot.rows))), np.empty((3, len(robot.rows), robot.n))
+    closure_jacobians(q, robot.cuts, e, J)
+    acts = np.abs(scaled(robot, J)).max(axis=(0, 2), initial=0.0) > _NO_EFFECT
+    sides = robot.cuts.side.reshape(-1, robot.n)
+    for closure, side in zip(robot.closures, sides, strict=True):
+        named = "closure {!r}: the frames {!r} and {!r}".format(closure.name, *closure.frames)
+        if not side.any():
+            raise LoopError(
+                f"{named} are on the same body; give frames of the two bodies that it joins."
+            )
+        if not acts[[robot.rows.index(row) for row in closure.rows]].any():
+            raise LoopError(
+                f"{named} add no constraint: no joint moves them against each other in the rows "
+                f"{', '.join(closure.rows)}. Remove the closure, or correct its frames."
+            )
+    return acts

@@ -9,17 +9,15 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
 from ..drive import check_all_or_none
-from ..dynamics import kinetic_energy, potential_energy
 from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
 from ..simulation import Integrator, Simulation
 from ..simulation.feedback import Feedback
 from ..simulation.integration import Integration
-from ..simulation.motion import Law, Loads, Motion
-from ..simulation.simulate import law_of, times_of
+from ..simulation.motion import Loads, Motion
+from ..simulation.simulate import followed, law_of, times_of
 from .constraints import closure_rows
-from .dynamics import closed
-from .engine import Engine, accelerations
-from .robot import LoopedRobot, check_looped
+from .dynamics import Engine, accelerations, closed
+from .robot import LoopedRobot, check_looped, scaled
 
 _RATE = 10.0  # 1/s, decay of errors of the closures during the integration
 _SAME = 0.8  # least cosine between singular vectors of two evaluations that belong together
@@ -53,15 +51,13 @@ def simulate(
     q0, v0 : array_like, shape (n,)
         Positions (rad or m) of all joints, which close the loops, and velocities; default at rest.
     control : callable, or array_like of shape (n_a,) or (N, n_a), optional
-        Torques of the actuated joints, N m or N: a function of (t, q, v) with q and v of all
-        joints, constant ones, or rows for the N times ``t``. Default none.
-    t, wrench, drive, rtol, atol
+        Torques of the actuated joints, N m or N, as for `robotmodels.simulate`; a function gets
+        t and q, v of all joints.
+    t, wrench, drive, rtol, atol, max_evaluations
         As for `robotmodels.simulate`.
     smoothing : float, optional
         Velocity w, rad/s or m/s: ``tanh(v / w)`` instead of ``sign(v)`` in dry friction, which
         needs it here.
-    max_evaluations : int
-        Evaluations of the model after which the simulation ends with a status.
 
     Returns
     -------
@@ -94,97 +90,72 @@ def simulate(
     """
     check_looped(robot)
     check_all_or_none(drive)
-    n, tree = robot.n, robot.tree
+    n, tree, drives = robot.n, robot.tree, robot.tree.drive_matrices if drive else None
     q = closed(robot, as_exact(q0, (n,), "q0")).copy()
     v = np.zeros(n) if v0 is None else as_exact(v0, (n,), "v0").copy()
     start, end, times = times_of(t)
     law, knots = law_of(control, len(robot.actuated), times, "control")
     tool, tool_knots = law_of(wrench, 6, times, "wrench")
     width = None if smoothing is None else np.full(n, as_number(smoothing, "smoothing", above=0.0))
-    drives = tree.drive_matrices if drive else None
     if width is None and drives is not None and (drives.coulomb.any() or drives.coupling.size):
         raise InvalidValueError(
             "smoothing: the dry friction of looped robots needs a velocity, such as "
             "smoothing=1e-3; or leave out the drives: drive=False."
         )
-    motion = LoopMotion(robot, law, tool, drive, width)
+
+    def torques(t: float, q: Array, v: Array, x: Array) -> Array:
+        tau = np.zeros(n)
+        if law is not None:
+            tau[robot.actuated] = law(t, q, v)
+        return tau
+
+    motion = LoopMotion(tree, Feedback(torques), tool, drive, None, width)
+    motion.robot, motion.engine = robot, Engine(robot, drive, _RATE)
     moved = motion.projected(q, v)
     if np.abs(moved[1] - v).max(initial=0.0) > _MOVING * np.abs(v).max(initial=0.0):
         raise LoopError(
             f"v0: these velocities open the loops of {robot.name!r}; take "
             "v0 = velocity_map(robot, q0) @ v_actuated."
         )
-    tolerances = {
-        "rtol": as_number(rtol, "rtol", least=1e-13),
-        "atol": as_number(atol, "atol", above=0.0),
-        "max_step": np.inf,
-    }
+    steps = {"rtol": as_number(rtol, "rtol", least=1e-13), "max_step": np.inf}
+    steps["atol"] = as_number(atol, "atol", above=0.0)
     budget = int(min(as_number(max_evaluations, "max_evaluations", least=1.0), 2**62))
-    cuts = sorted({start, end, *(x for x in (*knots, *tool_knots) if start < x < end)})
-    run = _Integration(motion, times, None, Integrator.DOP853, tolerances, budget, None)
-    with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
-        run.follow(
-            *moved, [(float(x), False) for x in cuts] if len(cuts) > 1 else [(start, False)] * 2
-        )
-    rows = zip(*run.rows, strict=True)
-    q, v, a, tau, taken, held, works, state = (np.array(x) for x in rows)
-    kinetic, potential = kinetic_energy(tree, q, v, drive), potential_energy(tree, q)
-    return Simulation(
-        *(tree, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
-        *works.T.copy(),
-        drive=bool(drive),
-        events=(),
-        status=run.status,
-        evaluations=motion.evaluations,
-        steps=run.steps,
-        state=state,
-    )
+    inside = sorted({float(x) for x in (*knots, *tool_knots) if start < x < end})
+    run = _Integration(motion, times, None, Integrator.DOP853, steps, budget, None)
+    return followed(run, tree, *moved, [(x, False) for x in (start, *inside, end)], drive)
 
 
 class LoopMotion(Motion):
     """Equations of motion of a looped robot on plain arrays, for an integrator."""
 
-    def __init__(
-        self,
-        robot: LoopedRobot,
-        control: Law | None,
-        wrench: Law | None,
-        drive: bool,
-        width: Array | None,
-    ) -> None:
-        def torques(t: float, q: Array, v: Array, x: Array) -> Array:
-            tau = np.zeros(robot.n)
-            if control is not None:
-                tau[robot.actuated] = control(t, q, v)
-            return tau
-
-        super().__init__(robot.tree, Feedback(torques), wrench, drive, None, width)
-        self.robot, self.engine = robot, Engine(robot, drive, _RATE)
-        self._weakest: tuple[Array, Array] | None = None
-        self._passed = False
+    robot: LoopedRobot
+    engine: Engine
+    weakest: tuple[Array, Array] | None = None
+    passed = False
 
     def at(self, t: float, q: Array, v: Array, x: Array) -> Loads:
         """Accelerations and torques at one time; NaN accelerations where there are none."""
         self.evaluations += 1
         load, tau, friction, tool = self.load(t, q, v, x)
-        self._passed = self._passed or self._passes(q)
+        self.passed = self.passed or self._passes(q)
         try:
-            if self._passed:
-                raise LoopError("the motion passed a singular posture of the closures")
-            a = accelerations(self.engine, q, v, load)
+            a = np.full(self.n, np.nan)
+            if not self.passed:
+                a = accelerations(self.robot, self.engine, q, v, load)
         except (LoopError, SingularMassMatrixError):
-            self.singular, a = True, np.full(self.n, np.nan)
+            pass
+        self.singular = self.singular or bool(np.isnan(a).any())
         return Loads(a, tau, friction, tool, self._zero[0])
 
     def _passes(self, q: Array) -> bool:
         """Whether the least singular value of the closures changed its sign on the way to q."""
-        J = np.sqrt(self.robot.cuts.weight)[:, None] * closure_rows(self.robot, q)[1]
-        U, sizes, Vt = np.linalg.svd(J * self.robot.units, full_matrices=False)
+        J = scaled(self.robot, closure_rows(self.robot, q)[1])
+        U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
         last = int((sizes > 1e-12 * sizes.max(initial=0.0)).sum()) - 1
-        before, self._weakest = self._weakest, (U[:, last], Vt[last]) if last >= 0 else None
-        if before is None or self._weakest is None:
+        before, self.weakest = self.weakest, (U[:, last], Vt[last]) if last >= 0 else None
+        if before is None or self.weakest is None:
             return False
-        turned = [float(a @ b) for a, b in zip(before, self._weakest, strict=True)]
+        turned = [float(a @ b) for a, b in zip(before, self.weakest, strict=True)]
         return min(map(abs, turned)) > _SAME and turned[0] * turned[1] < 0.0
 
     def projected(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -192,9 +163,9 @@ class LoopMotion(Motion):
         weight, units = np.sqrt(self.robot.cuts.weight), self.robot.units
         for _ in range(3):
             e, J = closure_rows(self.robot, q)
-            inverse = np.linalg.pinv(weight[:, None] * J * units, rcond=1e-8)
-            q = q - units * (inverse @ (weight * e))
-        return q, v - units * (inverse @ (weight * (J @ v)))
+            inverse = units[:, None] * np.linalg.pinv(scaled(self.robot, J), rcond=1e-8)
+            q = q - inverse @ (weight * e)
+        return q, v - inverse @ (weight * (J @ v))
 
 
 class _Integration(Integration):
@@ -204,6 +175,5 @@ class _Integration(Integration):
 
     def _sample(self, t: float, y: Array) -> None:
         n = self.motion.n
-        super()._sample(
-            t, np.concatenate((*self.motion.projected(y[:n], y[n : 2 * n]), y[2 * n :]))
-        )
+        moved = self.motion.projected(y[:n], y[n : 2 * n])
+        super()._sample(t, np.concatenate((*moved, y[2 * n :])))

@@ -175,6 +175,18 @@ def simulate(
     _check_start(model, q, v, drive)
     report = _log_progress if progress is True else progress or None
     run = Integration(motion, times, limits, integrator, tolerances, budget, report)
+    return followed(run, model, q, v, cuts, drive)
+
+
+def followed(
+    run: Integration,
+    model: RobotModel,
+    q: Array,
+    v: Array,
+    cuts: list[tuple[float, bool]],
+    drive: bool,
+) -> Simulation:
+    """The motion of an integration from a state (n,), with its energies."""
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
     q, v, a, tau, taken, sticks, works, state = (np.array(x) for x in zip(*run.rows, strict=True))
@@ -185,7 +197,7 @@ def simulate(
         drive=bool(drive),
         events=tuple(run.events),
         status=run.status,
-        evaluations=motion.evaluations,
+        evaluations=run.motion.evaluations,
         steps=run.steps,
         state=state,
     )
