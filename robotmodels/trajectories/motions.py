@@ -14,12 +14,10 @@ from ..errors import InvalidValueError, ShapeError
 from .piecewise import PiecewisePolynomial
 
 _STENCIL = 7
-_SPACING = (
-    5e-3  # of the duration: balances truncation and rounding of a first and second derivative
-)
+_SPACING = 5e-3  # of the duration: balances truncation and rounding of two derivatives
 _SAMPLES = 4001
-_JUMP = 1e-9  # of the largest value: smaller jumps are put down to rounding
-_INSIDE = np.linspace(0.0, 1.0, 6)  # where extremes are sought in each piece of a law
+_JUMP = 1e-6  # of the largest value: smaller jumps are put down to rounding
+_INSIDE = np.linspace(0.0, 1.0 - 1e-7, 6)  # of a piece of a law: where extremes are sought
 
 
 class Motion(Protocol):
@@ -138,22 +136,15 @@ class TimedMotion(Value):
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value at samples of each piece; infinite where the one below jumps."""
-        lengths, c = self.law.lengths[0], self.law.coefficients[..., 0]
-        live = lengths > 0.0
-        lengths, c = lengths[live], c[live]
-        powers = np.arange(c.shape[1])
-        rows = []
-        for k in range(order + 1):
-            rates = np.array([np.prod(powers[p] - np.arange(k)) for p in powers])
-            x = np.where(powers >= k, _INSIDE[:, None] ** np.maximum(powers - k, 0), 0.0)
-            rows.append((c @ (x * rates).T / lengths[:, None] ** k).reshape(-1))
-        values = self._chained(rows, tuple(range(order + 1)))
-        low, high = values[order].min(axis=0), values[order].max(axis=0)
-        if order:
-            below = values[order - 1].reshape(lengths.size, _INSIDE.size, self.n)
-            jump = below[1:, 0] - below[:-1, -1]
-            jump = np.concatenate((np.zeros((1, self.n)), jump))
-            size = _JUMP * np.abs(below).max()
+        live = self.law.lengths[0] > 0.0
+        begin, lengths = self.law.breaks[0, :-1][live], self.law.lengths[0, live]
+        t = (begin[:, None] + lengths[:, None] * _INSIDE).reshape(-1)
+        *below, values = self.derivatives(t, (order - 1, order) if order else (0,))
+        low, high = values.min(axis=0), values.max(axis=0)
+        for x in below:
+            ends = x.reshape(lengths.size, _INSIDE.size, self.n)[:, [0, -1]]
+            jump = np.append(ends[1:, 0] - ends[:-1, 1], np.zeros((1, self.n)), axis=0)
+            size = _JUMP * np.abs(x).max()
             low = np.where(jump.min(axis=0) < -size, -np.inf, low)
             high = np.where(jump.max(axis=0) > size, np.inf, high)
         return low, high
@@ -162,16 +153,8 @@ class TimedMotion(Value):
         """Derivatives by time from those of s (k + 1 rows (N,)) and of the path."""
         end = float(self.path.duration)
         q = self.path.derivatives(np.clip(s[0], 0.0, end), tuple(range(max(orders) + 1)))
-        rates = [rate[:, None] for rate in s]
-        found = []
-        for order in orders:
-            if order == 0:
-                found.append(q[0])
-            elif order == 1:
-                found.append(q[1] * rates[1])
-            elif order == 2:
-                found.append(q[2] * rates[1] ** 2 + q[1] * rates[2])
-            else:
-                bend = 3.0 * q[2] * rates[1] * rates[2]
-                found.append(q[3] * rates[1] ** 3 + bend + q[1] * rates[3])
-        return found
+        r = [rate[:, None] for rate in s]
+        found = {0: lambda: q[0], 1: lambda: q[1] * r[1]}
+        found[2] = lambda: q[2] * r[1] ** 2 + q[1] * r[2]
+        found[3] = lambda: q[3] * r[1] ** 3 + 3.0 * q[2] * r[1] * r[2] + q[1] * r[3]
+        return [found[order]() for order in orders]

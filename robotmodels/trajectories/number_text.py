@@ -1,12 +1,8 @@
-"""Numbers as messages and reprs show them.
-
-Bounds are rounded to the side on which they are accepted when they are passed back.
-"""
+"""Numbers as messages and reprs show them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 import numpy as np
 
@@ -14,15 +10,10 @@ from .._arrays import Array
 
 
 def least_shown(value: float, digits: int = 12) -> str:
-    """A least value in few digits, not below it."""
-    up = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(float(value))
-    return f"{float(up):.{digits}g}"
-
-
-def most_shown(value: float, digits: int = 12) -> str:
-    """Upper bound as text, rounded down."""
-    down = Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(float(value))
-    return f"{float(down):.{digits}g}"
+    """A least value in few digits, rounded up: it is accepted when it is passed back."""
+    text = f"{value:.{digits}g}"
+    up = value + abs(value) * 10.0 ** (1 - digits)
+    return text if float(text) >= value else f"{up:.{digits}g}"
 
 
 def counted(number: int, one: str) -> str:
@@ -45,6 +36,4 @@ def greatest_shown(rows: Iterable[tuple[str, Array]]) -> str:
 def seconds_shown(t: Array) -> str:
     """The times of samples. Shapes: t (N,)."""
     times = f" from {t[0]:.4g} s to {t[-1]:.4g} s" if t.size > 1 else ""
-    if t.size == 1:
-        times = f" at {t[0]:.4g} s"
-    return counted(t.size, "sample") + times
+    return counted(t.size, "sample") + (f" at {t[0]:.4g} s" if t.size == 1 else times)

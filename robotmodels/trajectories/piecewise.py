@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -27,19 +27,21 @@ class PiecewisePolynomial(Value):
 
     def __post_init__(self) -> None:
         breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
+        lengths = read_only(np.diff(breaks) if self.lengths is None else self.lengths)
         *batch, K, _, n = coefficients.shape
         c = breaks.shape[-2] if breaks.ndim > 1 else 0
-        if c not in (1, n) or breaks.shape != (*batch, c, K + 1) or K == 0:
+        wanted = ((*batch, c, K + 1), (*batch, c, K))
+        if c not in (1, n) or (breaks.shape, lengths.shape) != wanted or K == 0:
             raise ShapeError(
-                f"breaks: expected shape {(*batch, 1, K + 1)} for coefficients of shape "
-                f"{coefficients.shape}, got {breaks.shape}."
+                f"breaks, lengths: expected shapes {(*batch, 1, K + 1)} and {(*batch, 1, K)} for "
+                f"coefficients {coefficients.shape}, got {breaks.shape} and {lengths.shape}."
             )
-        object.__setattr__(self, "breaks", breaks)
-        object.__setattr__(self, "coefficients", coefficients)
-        lengths = read_only(np.diff(breaks) if self.lengths is None else self.lengths)
-        if lengths.shape != (*batch, c, K):
-            raise ShapeError(f"lengths: expected shape {(*batch, c, K)}, got {lengths.shape}.")
-        object.__setattr__(self, "lengths", lengths)
+        for name, value in (
+            ("breaks", breaks),
+            ("coefficients", coefficients),
+            ("lengths", lengths),
+        ):
+            object.__setattr__(self, name, value)
 
     @property
     def n(self) -> int:
@@ -106,9 +108,6 @@ class PiecewisePolynomial(Value):
             started = started | live[..., k, :]
         return down < -_ROUNDING * scale, up > _ROUNDING * scale
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
 
 def _derived(c: Array, order: int) -> Array:
     """Coefficients of a derivative with respect to x; the powers are the last axis but one."""
@@ -126,16 +125,6 @@ def _in_time(c: Array, step: Array, order: int) -> Array:
     return c
 
 
-def _horner(c: Array, x: Array) -> Any:
-    """Value of a polynomial whose powers are the first axis of ``c``."""
-    y = c[-1] + 0.0 * x if len(c) == 1 else c[-1] * x
-    for i in range(len(c) - 2, -1, -1):
-        y += c[i]
-        if i:
-            y *= x
-    return y
-
-
 def _range_on_unit_interval(c: Array) -> tuple[Array, Array]:
     """Least and greatest value on [0, 1] of polynomials (..., d + 1, n), shapes (..., n)."""
     ends = np.stack((c[..., 0, :], c.sum(axis=-2)))
@@ -143,7 +132,9 @@ def _range_on_unit_interval(c: Array) -> tuple[Array, Array]:
     if c.shape[-2] < 3:
         return low, high
     x = _real_roots(np.moveaxis(_derived(c, 1), -2, -1))  # (..., n, d - 1)
-    y = _horner(np.moveaxis(c, -2, 0)[..., None], x)
+    y = np.zeros(x.shape)
+    for part in np.moveaxis(c, -2, 0)[::-1, ..., None]:
+        y = y * x + part
     return np.minimum(low, y.min(axis=-1)), np.maximum(high, y.max(axis=-1))
 
 
