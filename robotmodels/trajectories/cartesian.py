@@ -52,7 +52,7 @@ from .limits import MotionLimits
 from .number_text import least_shown
 from .paths import BlendedPoses, FixedAxisPath, arc, line, rotation_about
 from .piecewise import PiecewisePolynomial
-from .point_to_point import Synchronisation, along_line, assembled, stretched
+from .point_to_point import along_line, assembled
 from .pose_trajectory import PoseTrajectory
 from .trajectory import Trajectory
 
@@ -269,8 +269,7 @@ def _timed(
         pieces = circle_law(law, _of_circle(path, bounds))
         least = pieces.durations.sum(axis=-1)
         refuse_short(T, least, np.ones((1, 1)))
-        pieces = stretched(pieces, T, least, Synchronisation.COORDINATED, 1)
-        moves = assembled(pieces, 1, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
+        moves = assembled(pieces, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
     else:
         moves = along_line(law, np.zeros(1), goal, duration, of_s)
     return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))

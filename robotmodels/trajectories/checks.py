@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .laws import LineLimits
-from .limits import MotionLimits
+from .limits import MotionLimits, ranges_of
 from .number_text import least_shown
 
 ROUNDING = 1e-12
@@ -62,14 +62,12 @@ def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] 
         zero = (u != 0.0) & (bound == 0.0)
         if needed and zero.any():
             j = int(np.argwhere(zero)[0][-1])
+            what, other = f"joint {j + 1}", "leave the joint where it is"
             if names:
-                raise InvalidValueError(
-                    f"limits: the {name} of {names[j]} is limited to 0, but the path asks for "
-                    f"{names[j]}; any other limit will do, or poses without {names[j]}."
-                )
+                what, other = names[j], f"take poses without {names[j]}"
             raise InvalidValueError(
-                f"limits: a limit of {name} of joint {j + 1} is 0, but it has to move; any "
-                "other limit will do, or leave the joint where it is."
+                f"limits: the limit of {name} of {what} is 0, but it has to move; any other limit "
+                f"will do, or {other}."
             )
         with np.errstate(over="ignore"):
             bound = np.where(u != 0.0, bound / size, np.inf)
@@ -138,18 +136,28 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
 
 
-def refuse_extremes(states: dict[str, Array], limits: MotionLimits | None) -> None:
-    """Refuse states, durations and limits whose powers overflow or underflow."""
-    bounds = {} if limits is None else {
-        f"limits: {name}": np.abs(getattr(limits, name))
-        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk",
-                     "jerk_lower")
-    }  # fmt: skip
-    for name, given in (*((k, np.abs(v)) for k, v in states.items()), *bounds.items()):
-        small = (given > 0.0) & (given < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
-        wrong = np.isfinite(given) & ((given > _EXTREME) | small)
+def checked_request(
+    states: dict[str, Array], batch: tuple[int, ...], duration: Any, limits: MotionLimits | None
+) -> tuple[Array | None, MotionLimits | None]:
+    """Durations (R,) and limits of a motion between states (R, n); at least one of the two.
+
+    States, durations and limits whose powers overflow or underflow are refused.
+    """
+    T = given_durations(duration, batch)
+    if T is None and limits is None:
+        raise InvalidValueError("Give duration, limits or both.")
+    bounds = checked_limits(limits, states["q0"].shape[1], states["q0"], states["q1"])
+    given = states if T is None else states | {"duration": T}
+    if bounds is not None:
+        for name, least, most in ranges_of(bounds)[1:]:
+            given = given | {f"limits: {name}": most, f"limits: {name}_lower": least}
+    for name, values in given.items():
+        size = np.abs(values)
+        small = (size > 0.0) & (size < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
+        wrong = np.isfinite(size) & ((size > _EXTREME) | small)
         if wrong.any():
             raise InvalidValueError(
                 f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0), got "
-                f"{given[wrong][0]:.3g}; check the units."
+                f"{size[wrong][0]:.3g}; check the units."
             )
+    return T, bounds

@@ -53,14 +53,7 @@ from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
 from .between_states import motion_between
-from .checks import (
-    checked_limits,
-    given_durations,
-    joint_vectors,
-    limits_along,
-    refuse_extremes,
-    refuse_short,
-)
+from .checks import checked_request, joint_vectors, limits_along, refuse_short
 from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
@@ -181,10 +174,7 @@ def cubic(
     2.00...
     """
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
-    states |= {"a0": np.zeros_like(states["q0"]), "a1": np.zeros_like(states["q0"])}
-    if not (states["v0"].any() or states["v1"].any()):
-        return _from_rest(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
-    return motion_between(3, states, batch, scalar, duration, limits)
+    return _polynomial(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
 
 
 def quintic(
@@ -208,22 +198,17 @@ def quintic(
     1.0745...
     """
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
-    if not any(states[name].any() for name in ("v0", "v1", "a0", "a1")):
-        return _from_rest(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
-    return motion_between(5, states, batch, scalar, duration, limits)
+    return _polynomial(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
 
 
-def _from_rest(
-    law: TimeLaw,
-    states: dict[str, Array],
-    batch: tuple[int, ...],
-    scalar: bool,
-    duration: ArrayLike | None,
-    limits: MotionLimits | None,
-) -> Trajectory:
-    shape = (*batch, states["q0"].shape[-1])
-    q0, q1 = states["q0"].reshape(shape), states["q1"].reshape(shape)
-    return Trajectory(along_line(law, q0, q1, duration, limits).motion, scalar)
+def _polynomial(
+    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
+    duration: ArrayLike | None, limits: MotionLimits | None,
+) -> Trajectory:  # fmt: skip
+    """From rest to rest the law of its name, else polynomials of its order."""
+    if not any(states[name].any() for name in states if name not in ("q0", "q1")):
+        return law_motion(law, states, batch, scalar, duration, limits)
+    return motion_between(3 if law is TimeLaw.CUBIC else 5, states, batch, scalar, duration, limits)
 
 
 def along_line(
@@ -242,37 +227,39 @@ def along_line(
     1.00...
     """
     law = chosen(TimeLaw, law, "law")
-    synchronisation = chosen(Synchronisation, synchronisation, "synchronisation")
-    given, batch, scalar = joint_vectors(q0=q0, q1=q1)
-    start, end = given["q0"], given["q1"]
-    R, n = start.shape
-    T = given_durations(duration, batch)
-    if T is None and limits is None:
-        raise InvalidValueError("Give duration, limits or both.")
-    bounds = checked_limits(limits, n, start, end)
-    together = bounds is None or synchronisation is Synchronisation.COORDINATED
+    how = chosen(Synchronisation, synchronisation, "synchronisation")
+    return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)
+
+
+def law_motion(
+    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
+    duration: ArrayLike | None, limits: MotionLimits | None,
+    how: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:  # fmt: skip
+    """Motion from rest to rest between checked positions q0, q1 (R, n)."""
+    start, end = states["q0"], states["q1"]
+    n = start.shape[1]
+    T, bounds = checked_request(states, batch, duration, limits)
+    together = bounds is None or how is Synchronisation.COORDINATED
     # one law for all joints of a motion, or one law each
-    refuse_extremes({"q0": start, "q1": end} | ({} if T is None else {"duration": T}), bounds)
     difference = np.where(np.abs(end - start) < 1e-50, 0.0, end - start)
     way = difference[:, None, :] if together else difference[:, :, None]
-    laws = 1 if together else n  # of each motion
-    length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
+    length = np.abs(way).max(axis=-1, initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
+        direction = np.where(way != 0.0, way / length[..., None], 0.0)
     if bounds is None:
         assert T is not None
-        pieces = law_of_duration(law, length, np.repeat(T, laws))
-        least = np.zeros(R)
-    else:
-        along = limits_along(bounds, direction)
-        pieces = law_of_limits(law, length, along)
-        totals = pieces.durations.sum(axis=-1).reshape(R, laws)
-        least = totals.max(axis=-1, initial=0.0)
-        if T is None and synchronisation is Synchronisation.INDEPENDENT:
-            _refuse_waiting(law, along, totals)
-    refuse_short(T, least, length.reshape(R, laws))
-    pieces = stretched(pieces, T, least, synchronisation, laws)
-    return assembled(pieces, laws, start, direction, batch, scalar, T)
+        refuse_short(T, np.zeros(len(start)), length)
+        pieces = law_of_duration(law, length.reshape(-1), np.repeat(T, 1 if together else n))
+        return assembled(pieces, start, direction, batch, scalar, T)
+    along = limits_along(bounds, direction)
+    pieces = law_of_limits(law, length.reshape(-1), along)
+    totals = pieces.durations.sum(axis=-1).reshape(length.shape)
+    waits = T is None and how is Synchronisation.INDEPENDENT
+    if waits:
+        _refuse_waiting(law, along, totals)
+    refuse_short(T, totals.max(axis=-1, initial=0.0), length)
+    return assembled(pieces, start, direction, batch, scalar, T, waits)
 
 
 def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
@@ -296,51 +283,39 @@ def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
         )
 
 
-def stretched(
-    pieces: Pieces, T: Array | None, least: Array, how: Synchronisation, laws: int
-) -> Pieces:
-    """Stretch the laws of each motion to its duration, and let those that arrive early wait."""
-    total = pieces.durations.sum(axis=-1)
-    goal = np.repeat(least if T is None else T, laws)
-    if T is None and how is Synchronisation.INDEPENDENT:
-        wait = goal - total
-    else:
-        wait = np.where(total > 0.0, 0.0, goal)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            factor = np.where(total > 0.0, goal / total, 1.0)
-        pieces = Pieces(pieces.durations * factor[:, None], pieces.coefficients)
-    if not (wait > 0.0).any():
-        return pieces
-    rest = np.zeros_like(pieces.coefficients[:, :1])
-    rest[:, 0, 0] = pieces.coefficients[:, -1].sum(axis=-1)
-    return Pieces(
-        np.concatenate((pieces.durations, wait[:, None]), axis=1),
-        np.concatenate((pieces.coefficients, rest), axis=1),
-    )
-
-
 def assembled(
-    pieces: Pieces, columns: int, start: Array, direction: Array, batch: tuple[int, ...],
-    scalar: bool, T: Array | None,
+    pieces: Pieces, start: Array, direction: Array, batch: tuple[int, ...], scalar: bool,
+    T: Array | None = None, waits: bool = False,
 ) -> Trajectory:  # fmt: skip
-    """Trajectory from motion laws along given directions.
+    """Trajectory of laws along given directions, stretched to the durations T (R,).
 
-    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1), T (R,).
+    Without them to the longest of each motion, or each law ``waits`` at its end.
+    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1).
     """
-    R, n = start.shape
-    K, powers = pieces.coefficients.shape[1:]
+    (R, n), columns = start.shape, direction.shape[1]
+    h, c = pieces.durations, pieces.coefficients
+    total = h.sum(axis=-1)
+    ends = total.reshape(R, columns).max(axis=-1, initial=0.0) if T is None else T
+    goal = np.repeat(ends, columns)
+    stretches = (total > 0.0) & (not waits)
+    h = h * np.where(stretches, goal / np.where(stretches, total, 1.0), 1.0)[:, None]
+    rest = np.where(stretches, 0.0, goal - total)
+    if (rest > 0.0).any():
+        last = np.zeros_like(c[:, :1])
+        last[:, 0, 0] = c[:, -1].sum(axis=-1)
+        h, c = np.append(h, rest[:, None], axis=1), np.append(c, last, axis=1)
+    K, powers = c.shape[1:]
     breaks = np.zeros((R, columns, K + 1))
-    breaks[..., 1:] = np.cumsum(pieces.durations, axis=-1).reshape(R, columns, K)
+    breaks[..., 1:] = np.cumsum(h, axis=-1).reshape(R, columns, K)
     if T is not None:
         # times of all laws end together to the last digit
         breaks = np.minimum(breaks, T[:, None, None])
         breaks[..., -1] = T[:, None]
-    c = pieces.coefficients.reshape(R, columns, K, powers)
-    c = np.moveaxis(c, 1, -1) * direction.reshape(R, 1, 1, n)
+    c = np.moveaxis(c.reshape(R, columns, K, powers), 1, -1) * direction.reshape(R, 1, 1, n)
     c[:, :, 0] += start[:, None, :]
     motion = PiecewisePolynomial(
         breaks.reshape(*batch, columns, K + 1),
         c.reshape(*batch, K, powers, n),
-        pieces.durations.reshape(*batch, columns, K),
+        h.reshape(*batch, columns, K),
     )
     return Trajectory(motion, scalar)
