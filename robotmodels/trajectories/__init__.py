@@ -8,6 +8,7 @@ from .blends import blended_lines
 from .candidates import Cost
 from .cartesian import (
     blended_poses,
+    cartesian_trajectory,
     circle,
     circular_arc,
     straight_line,
@@ -24,6 +25,7 @@ from .point_to_point import (
     along_line,
     bang_bang,
     cubic,
+    joint_trajectory,
     linear,
     quintic,
     smoothed_trapezoidal,
@@ -32,7 +34,6 @@ from .point_to_point import (
 from .pose_trajectory import PoseSamples, PoseTrajectory
 from .random_profiles import ProfileLaw, random_profile
 from .resolved_motion import ResolvedMotion, resolved_motion
-from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_optimal import TimedPath, TimingStatus, time_optimal
 from .time_scaling import ScaledTrajectory, ScalingStatus, time_scaled

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, given_durations, refuse_jointless
+from .checks import ROUNDING, checked_limits, refuse_jointless, slowed
 from .limits import MotionLimits
 from .number_text import least_shown
 from .piecewise import PiecewisePolynomial
@@ -110,17 +110,7 @@ def blended_lines(
                 f"The blends at the ends of line {k + 1} overlap: it needs at least "
                 f"{least_shown(0.5 * (tb[k] + tb[k + 1]), 9)} s, and has {T[k]:.9g} s."
             )
-    least = float(T.sum() + 0.5 * (tb[0] + tb[-1]))
-    wanted = given_durations(duration, ())
-    if wanted is not None and least > 0.0:
-        if bounds is not None and wanted[0] < least * (1.0 - ROUNDING):
-            raise InvalidValueError(
-                f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
-                f"{least_shown(least)} s."
-            )
-        if wanted[0] == 0.0:
-            raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
-        T, tb = T * (wanted[0] / least), tb * (wanted[0] / least)
+    T, tb = slowed(T, tb, duration, bounds is not None)
     trajectory = Trajectory(_joined(q, step, T, tb, smooth), scalar)
     if bounds is not None and not (report := trajectory.check(bounds, 1e-9)).kept:
         raise InvalidValueError(
@@ -146,6 +136,11 @@ def schedule(T: Array, blends: Callable[[Array], Array]) -> tuple[Array, Array]:
         need = 0.5 * (tb[:-1] + tb[1:])
         T = T * float(np.sqrt(max(1.0, (need / np.where(T > 0.0, T, 1.0)).max())))
     return T * (1.0 + 1e-13), blends(T)
+
+
+def rates_of(step: Array, T: Array) -> Array:
+    """Velocities (m - 1, n) of lines, zero where they take no time."""
+    return np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
 
 
 def _full_speed(step: Array, limits: MotionLimits) -> Array:
@@ -175,8 +170,7 @@ def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> 
             "limits: the acceleration of a parabolic blend jumps, which keeps no limit of jerk; "
             "pass limits.without_jerk(), or smooth=True."
         )
-    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
-    change = np.diff(v, axis=0, prepend=0.0, append=0.0)
+    change = np.diff(rates_of(step, T), axis=0, prepend=0.0, append=0.0)
     A = np.where(change > 0.0, limits.acceleration, -limits.acceleration_lower)
     by_j = np.sqrt(6.0 * np.abs(change) / J) if smooth else np.zeros_like(change)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -190,7 +184,7 @@ def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> 
 def _joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> PiecewisePolynomial:
     """Blend, line, blend, and so on to the last blend."""
     m, n = q.shape
-    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
+    v = rates_of(step, T)
     before, after = np.vstack((np.zeros(n), v)), np.vstack((v, np.zeros(n)))
     c = np.zeros((2 * m - 1, 5 if smooth else 3, n))
     h = np.zeros(2 * m - 1)

@@ -136,6 +136,19 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
 
 
+def slowed(T: Array, blends: Array, duration: ArrayLike | None, kept: bool) -> tuple[Array, Array]:
+    """Times (m - 1,) of lines and (m,) of their blends, evenly stretched to a whole duration.
+
+    ``kept``: whether limits make the given times the least ones.
+    """
+    least = float(T.sum() + 0.5 * (blends[0] + blends[-1]))
+    wanted = given_durations(duration, ())
+    if wanted is None or least == 0.0:
+        return T, blends
+    refuse_short(wanted, np.array([least if kept else 0.0]), np.ones((1, 1)))
+    return T * (wanted[0] / least), blends * (wanted[0] / least)
+
+
 def checked_request(
     states: dict[str, Array], batch: tuple[int, ...], duration: Any, limits: MotionLimits | None
 ) -> tuple[Array | None, MotionLimits | None]:

@@ -49,15 +49,16 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
+from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
+from ..kinematics.singular.task import whole_number
 from .between_states import motion_between
 from .checks import checked_request, joint_vectors, limits_along, refuse_short
 from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
-from .trajectory import Trajectory
+from .trajectory import Samples, Trajectory
 
 
 class Synchronisation(Enum):
@@ -209,6 +210,62 @@ def _polynomial(
     if not any(states[name].any() for name in states if name not in ("q0", "q1")):
         return law_motion(law, states, batch, scalar, duration, limits)
     return motion_between(3 if law is TimeLaw.CUBIC else 5, states, batch, scalar, duration, limits)
+
+
+def joint_trajectory(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    N: int | ArrayLike,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+) -> Samples:
+    """Positions, velocities and accelerations between two postures, fifth-order polynomials.
+
+    Also called ``jtraj``. For limits, other laws and continuous time see `quintic` and the other
+    generators of a `Trajectory`.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape (..., n)
+        First and last postures, rad or m.
+    N : int or array_like, shape (N,)
+        How many samples, equally spaced over one second; or their times, s, ascending. The motion
+        lasts from the first time to the last.
+    v0, v1 : array_like, shape () or (..., n)
+        Velocities at the ends, rad/s or m/s.
+
+    Returns
+    -------
+    Samples
+        ``t (N,)`` and ``q, v, a, jerk (..., N, n)``; the object itself passes as the array of its
+        positions.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors of different lengths, NaN, times that do not ascend.
+
+    References
+    ----------
+    Seed book section 4.2.1.
+
+    Examples
+    --------
+    >>> path = joint_trajectory([0.0, 1.0], [1.0, -1.0], 5)
+    >>> path.q[2], path.q.shape
+    (array([0.5, 0. ]), (5, 2))
+    >>> joint_trajectory([0.0], [1.0], [0.0, 1.0, 2.0]).v.ravel()
+    array([0.    , 0.9375, 0.    ])
+    """
+    if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
+        t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))
+    else:
+        t = as_floats(N, "N")  # type: ignore[arg-type]
+        if t.ndim != 1 or (t[1:] < t[:-1]).any():
+            raise InvalidValueError("N: expected a number of samples or times that ascend.")
+    times = t - t[0] if t.size else t
+    samples = quintic(q0, q1, float(times.max(initial=0.0)) or 1.0, v0=v0, v1=v1).at(times)
+    return Samples(t, samples.q, samples.v, samples.a, samples.jerk)
 
 
 def along_line(

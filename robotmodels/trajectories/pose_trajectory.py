@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, read_only
+from .._arrays import Array, Frozen, Rebuilt, as_floats
 from ..errors import ShapeError
 from .number_text import seconds_shown
 from .paths import PosePath
@@ -16,7 +16,7 @@ from .trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseSamples:
+class PoseSamples(Frozen):
     """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
 
     Parameters
@@ -35,10 +35,6 @@ class PoseSamples:
     twist: Array
     acceleration: Array
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
-
     def __len__(self) -> int:
         return self.t.size
 
@@ -48,12 +44,9 @@ class PoseSamples:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.T, dtype=dtype, copy=copy)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseTrajectory:
+class PoseTrajectory(Rebuilt):
     """Motion of the tool: a path in space and a law of time on it.
 
     Parameters
@@ -118,9 +111,6 @@ class PoseTrajectory:
             f"<PoseTrajectory: {self.duration:.6g} s, a way of {metres:.4g} m"
             f"\n  {_speeds(seen.twist)}>"
         )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.path, self.law)
 
 
 def _speeds(twist: Array) -> str:

@@ -44,6 +44,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
+from .between_states import between_states
 from .checks import ROUNDING, checked_limits, refuse_jointless
 from .limits import MotionLimits
 from .number_text import least_shown
@@ -99,22 +100,14 @@ def cubic_spline(
                 f"points: a periodic spline ends where it began; joint {j + 1} ends {gap[j]:.3g} "
                 "beside its start. Give the first point again as the last."
             )
-        q = q.copy()
-        q[-1] = q[0]
+        q = knots.points = np.vstack((q[:-1], q[:1]))
     condition: Any = {
         SplineEnds.CLAMPED: ((1, knots.rates["v0"]), (1, knots.rates["v1"])),
         SplineEnds.NATURAL: "natural",
         SplineEnds.NOT_A_KNOT: "not-a-knot",
         SplineEnds.PERIODIC: "periodic",
     }[ends]
-    spline = CubicSpline(knots.times, q, bc_type=condition)
-    # highest power of the time first
-    c = np.moveaxis(np.asarray(spline.c)[::-1], 0, 1)
-    c = c * np.diff(knots.times)[:, None, None] ** np.arange(4.0)[:, None]
-    trajectory = knots.finished(c, knots.times)
-    if ends is SplineEnds.PERIODIC:
-        return Trajectory(trajectory.motion, trajectory.scalar)
-    return trajectory
+    return knots.finished(3, v=CubicSpline(knots.times, q, bc_type=condition)(knots.times, 1))
 
 
 def quintic_spline(
@@ -145,14 +138,7 @@ def quintic_spline(
     spline = make_interp_spline(knots.times, knots.points, k=5, bc_type=ends)
     v, a = spline(knots.times, 1), spline(knots.times, 2)
     v[[0, -1]], a[[0, -1]] = (rates["v0"], rates["v1"]), (rates["a0"], rates["a1"])
-    h = np.diff(knots.times)[:, None]
-    # between two states: points are met and the acceleration goes on however uneven the times are
-    q, d = knots.points[:-1], np.diff(knots.points, axis=0)
-    V0, V1, A0, A1 = h * v[:-1], h * v[1:], h * h * a[:-1], h * h * a[1:]
-    cubed = 10.0 * d - 6.0 * V0 - 4.0 * V1 - 1.5 * A0 + 0.5 * A1
-    fourth = -15.0 * d + 8.0 * V0 + 7.0 * V1 + 1.5 * A0 - A1
-    fifth = 6.0 * d - 3.0 * (V0 + V1) - 0.5 * (A0 - A1)
-    return knots.finished(np.stack((q, V0, 0.5 * A0, cubed, fourth, fifth), axis=1), knots.times)
+    return knots.finished(5, v=v, a=a)
 
 
 class _Knots:
@@ -183,26 +169,30 @@ class _Knots:
         self.chosen = times is None
         self.times = _chosen_times(self) if times is None else _given_times(times, len(q))
 
-    def finished(self, c: Array, x: Array) -> Trajectory:
-        """The trajectory of coefficients (K, d + 1, n) of normalised time, and its limits."""
-        h = np.diff(x)
-        motion = PiecewisePolynomial(x[None], c)
-        trajectory = Trajectory(motion, self.scalar)
+    def finished(self, order: int, **rates: Array) -> Trajectory:
+        """Polynomials between the states at the knots, each (m, n), and the check of the limits.
+
+        Points are met and the derivatives go on however uneven the times are.
+        """
+        states = {"q": self.points} | rates
+        ends = {name + "0": x[:-1] for name, x in states.items()}
+        ends |= {name + "1": x[1:] for name, x in states.items()}
+        h = np.diff(self.times)
+        c = np.swapaxes(between_states(order, ends, h[:, None]), 0, 1)
+        trajectory = Trajectory(PiecewisePolynomial(self.times[None], c), self.scalar)
         if self.limits is None:
             return trajectory
         report = trajectory.check(self.limits, ROUNDING)
         if self.chosen:
             factor = report.stretch * (1.0 + 1e-14)
-            motion = PiecewisePolynomial(x[None] * factor, c, h[None] * factor)
+            motion = PiecewisePolynomial(self.times[None] * factor, c, h[None] * factor)
             trajectory = Trajectory(motion, self.scalar)
             report = trajectory.check(self.limits, ROUNDING)
         if not report.kept:
             sentences = "; ".join(report.violations())
-            advice = (
-                f"The least factor on the times is {least_shown(report.stretch)}."
-                if report.stretch > 1.0 and not self.moving
-                else "Choose other points or times."
-            )
+            advice = "Choose other points or times."
+            if report.stretch > 1.0 and not self.moving:
+                advice = f"The least factor on the times is {least_shown(report.stretch)}."
             raise InvalidValueError(f"The limits are not kept: {sentences}. {advice}")
         return trajectory
 
