@@ -8,15 +8,14 @@ robot, meet a singular position or ask for joint velocities that no motor has; w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_mask, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats, as_mask
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
@@ -27,7 +26,7 @@ from .pose_trajectory import PoseTrajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath:
+class JointPath(Frozen):
     """Postures that follow poses, and what happens on the way.
 
     Parameters
@@ -67,13 +66,6 @@ class JointPath:
     branch: NDArray[np.str_]
     events: tuple[PathEvent, ...]
 
-    def __post_init__(self) -> None:
-        kinds = {"status": np.int8, "branch": str}
-        for field in fields(self):
-            if field.name != "events":
-                value = read_only(getattr(self, field.name), kinds.get(field.name, float))
-                object.__setattr__(self, field.name, value)
-
     @property
     def complete(self) -> bool:
         """Whether every pose is reached, inside the joint limits and without a jump."""
@@ -91,9 +83,6 @@ class JointPath:
         state = "complete" if self.complete else "not complete"
         lines = [f"<JointPath: {len(self.q)} poses, {state}>", *(str(e) for e in self.events)]
         return "\n  ".join(lines)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
 def joint_path(
@@ -193,24 +182,17 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = float(as_floats(singular_below, "singular_below"))
+    given = (mask, mask_axes)
     tolerances = {
         "position_tolerance": position_tolerance,
         "orientation_tolerance": orientation_tolerance,
     }
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
-        return igm(model, targets, near, mask, mask_axes, **tolerances)  # type: ignore[arg-type]
+        return igm(model, targets, near, *given, **tolerances)  # type: ignore[arg-type]
 
     def go_on(i: int, near: Array) -> IGMSolutions:
-        return igm_numeric(
-            model,
-            T[i],
-            near,
-            mask,
-            mask_axes,
-            restarts=0,
-            **tolerances,  # type: ignore[arg-type]
-        )
+        return igm_numeric(model, T[i], near, *given, restarts=0, **tolerances)  # type: ignore[arg-type]
 
     columns = joint_chain(model).columns
     found = None
@@ -218,7 +200,7 @@ def joint_path(
         # without a reference postures come in the order of their branches
         found = solve(T, None)
     if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
-        rows = follow(model, T, found, near, lambda i, near: solve(T[i], near))
+        rows = follow(model, found, near, lambda i, near: solve(T[i], near))
     else:
         rows = follow_singly(model, len(T), near, lambda i, near: solve(T[i], near), go_on)
     # joints that do not move the tool stand still: at the start, else near zero
@@ -227,32 +209,27 @@ def joint_path(
     rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
-    if twists is not None and task.square:
-        v = task.rates(twists)
-    else:
-        v = _differences(times, q, rows.reached)
-    events = list(path_events(model, times, q, v, rows, task, singular_below, start))
+    square = twists is not None and task.square
+    v = task.rates(twists) if square else _differences(times, q, rows.reached)
+    events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
-        known = partial(_reached, motion, lambda pose: solve(pose, near))
-        events = [_located(event, times, known) for event in events]
+        events = [
+            _located(event, times, lambda t: bool(solve(motion.pose(t), near).count > 0))
+            for event in events
+        ]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 
 
 def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
     """Velocities from the neighbours of each pose on either side that are reached."""
-    v = np.full(q.shape, np.nan)
     if np.isnan(times).any() or len(q) < 2:
-        return v
+        return np.full(q.shape, np.nan)
     with np.errstate(invalid="ignore"):
         slope = np.diff(q, axis=0) / np.diff(times)[:, None]
-    left = np.vstack((np.full((1, q.shape[1]), np.nan), slope))
-    right = np.vstack((slope, np.full((1, q.shape[1]), np.nan)))
+    none = np.full((1, q.shape[1]), np.nan)
+    left, right = np.vstack((none, slope)), np.vstack((slope, none))
     both = np.where(np.isnan(left), right, np.where(np.isnan(right), left, 0.5 * (left + right)))
     return np.where(reached[:, None], both, np.nan)
-
-
-def _reached(motion: PoseTrajectory, solve: Callable[[Array], IGMSolutions], time: float) -> bool:
-    return bool(solve(motion.pose(time)).count > 0)
 
 
 def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -> PathEvent:
@@ -260,15 +237,14 @@ def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -
     if event.kind is not PathEventKind.OUT_OF_REACH:
         return event
 
-    def edge(inside: float, outside: float) -> float:
+    def edge(inside: int, outside: float) -> float:
+        if not 0 <= inside < len(times):
+            return outside
+        good = times[inside]
         for _ in range(30):
-            middle = 0.5 * (inside + outside)
-            if reached(middle):
-                inside = middle
-            else:
-                outside = middle
+            middle = 0.5 * (good + outside)
+            good, outside = (middle, outside) if reached(middle) else (good, middle)
         return outside
 
-    start = edge(times[event.first - 1], event.start) if event.first > 0 else event.start
-    stop = edge(times[event.last + 1], event.stop) if event.last + 1 < len(times) else event.stop
+    start, stop = edge(event.first - 1, event.start), edge(event.last + 1, event.stop)
     return replace(event, start=start, stop=stop)
