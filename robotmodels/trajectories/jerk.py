@@ -25,7 +25,11 @@ from .trajectory import Trajectory
 
 _PHASES = 9  # two that bring a start back inside the limits, and seven
 _STATES = ("q0", "q1", "v0", "v1", "a0", "a1")
-_BOUNDS = ("max_velocity", "min_velocity", "max_acceleration", "min_acceleration", "max_jerk")
+_GIVEN = (
+    *("current_position", "current_velocity", "current_acceleration"),
+    *("target_position", "target_velocity", "target_acceleration"),
+    *("max_velocity", "min_velocity", "max_acceleration", "min_acceleration", "max_jerk"),
+)  # as ruckig calls them
 
 
 def jerk_limited(
@@ -194,11 +198,12 @@ def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchro
     common, longest = T, 0.0
     for _ in range(50):
         times = np.zeros(k) if common is None else common / unit
-        found = [_profile(*of) for of in zip(start, goal, bounds, times.tolist(), strict=True)]
+        rows = (start.tolist(), goal.tolist(), bounds.tolist(), times.tolist())
+        found = [_solved(*of) for of in zip(*rows, strict=True)]
         failed = [one for one in found if isinstance(one, str)]
         if failed:
             break
-        longest = float(max(duration * u for (duration, *_), u in zip(found, unit, strict=True)))
+        longest = float(max(one.duration * u for one, u in zip(found, unit, strict=True)))
         if waits or k == 1 or (common is not None and longest <= common * (1.0 + ROUNDING)):
             break
         # one joint cannot take the time of the others: all take the next that it can
@@ -217,7 +222,7 @@ def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchro
             f"with which they are is {least_shown(longest)} s."
         )
     h, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
-    given, jerk = (np.array([one[i] for one in found]) for i in (1, 2))
+    given, jerk = (np.array(rows) for rows in zip(*map(_phases, found), strict=True))
     # where ruckig is asked for a time it meets positions to 1e-8 only
     polished_phases(given, jerk, start, goal, h, phases)
     h, phases = h * unit[:, None], phases * s[:, None, None]
@@ -235,30 +240,29 @@ def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchro
     return breaks, c, lengths
 
 
-def _profile(start: Array, goal: Array, bounds: Array, least: float) -> Any:
-    """Duration, times and jerks of the phases of one joint; or what ruckig says."""
+def _solved(start: list[float], goal: list[float], bounds: list[float], least: float) -> Any:
+    """Motion of one joint, not shorter than the least duration; or what ruckig says."""
     import ruckig
 
-    given = ruckig.InputParameter(1)
-    for side, values in (("current", start), ("target", goal)):
-        for quantity, value in zip(("position", "velocity", "acceleration"), values, strict=True):
-            setattr(given, f"{side}_{quantity}", [float(value)])
-    for bound, value in zip(_BOUNDS, bounds, strict=True):
-        setattr(given, bound, [float(value)])
+    given, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    for name, value in zip(_GIVEN, (*start, *goal, *bounds), strict=True):
+        setattr(given, name, [value])
     if least > 0.0:
         given.minimum_duration = least
-    found = ruckig.Trajectory(1)
     try:
         code = ruckig.Ruckig(1).calculate(given, found).name
     except (ruckig.RuckigError, ValueError) as error:  # or a number for which it has no name
         code = str(error).strip().partition("\n")[0]
-    if code not in ("Working", "Finished"):
-        return code
+    return found if code in ("Working", "Finished") else code
+
+
+def _phases(found: Any) -> tuple[list[float], list[float]]:
+    """Times and jerks of the phases of the motion of one joint."""
     profile = found.profiles[0][0]
     brake = profile.brake
     # phases of a brake that is not used hold what was there before
     used = np.cumsum(brake.t) <= brake.duration * (1.0 + 1e-12)
-    return found.duration, [*np.where(used, brake.t, 0.0), *profile.t], [*brake.j, *profile.j]
+    return [*np.where(used, brake.t, 0.0), *profile.t], [*brake.j, *profile.j]
 
 
 def _units(state: dict[str, Array], box: _Box) -> tuple[Array, Array]:

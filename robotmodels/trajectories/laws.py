@@ -221,9 +221,13 @@ def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> 
     up, down = 1.0 / J, 1.0 / K
     with np.errstate(divide="ignore", invalid="ignore"):
         # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
-        of_one = ramp(np.ones_like(L), np.full_like(L, np.inf), up, down).distance
-        full = np.minimum(np.sqrt(2.0 * L / (1 / A + 1 / B)), np.cbrt(0.5 * L / of_one) ** 2)
-    V = _cruise(L, V, full, lambda v: (ramp(v, A, up, down), ramp(v, B, up, down)))
+        full = np.sqrt(2.0 * L / (1.0 / A + 1.0 / B))
+        if not (up + down).any():
+            V = np.where(L > 0.0, np.minimum(V, full), 0.0)
+        else:
+            of_one = ramp(np.ones_like(L), np.full_like(L, np.inf), up, down).distance
+            full = np.minimum(full, np.cbrt(0.5 * L / of_one) ** 2)
+            V = _cruise(L, V, full, lambda v: (ramp(v, A, up, down), ramp(v, B, up, down)))
     first, last = ramp(V, A, up, down), ramp(V, B, up, down)
     ramps = first.distance + last.distance
     with np.errstate(divide="ignore", invalid="ignore"):
