@@ -12,6 +12,7 @@ from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..friction import Friction
+from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from .checks import checked_limits
 from .limits import MotionLimits
@@ -20,7 +21,7 @@ from .path_limits import SLOWEST, Passes, PathLimits, Rows
 from .piecewise import PiecewisePolynomial
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
-from .regular_paths import checked_points, path_of, toward_ends
+from .regular_paths import path_of, toward_ends
 from .trajectory import Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
@@ -182,7 +183,7 @@ def time_optimal(
     >>> round(timed.duration, 6)  # D / v + v / a
     1.5
     """
-    points = checked_points(points)
+    points = whole_number(points, "points", 2)
     rates = tuple(as_number(r, k, least=0.0) for r, k in
                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
     motion, scalar = path_of(path, model, points)
