@@ -158,23 +158,26 @@ class PathLimits:
 
     def passes(
         self, s: Array, q: Array, rate: Array, bend: Array, ends: tuple[float, float] = (0.0, 0.0),
-        rows: Rows | None = None, sweeps: int = _SWEEPS,
+        rows: Rows | None = None, sweeps: int = _SWEEPS, tight: Array | float = 0.0,
     ) -> Passes:  # fmt: skip
-        """Quickest rates at points s (N + 1,) of a path whose derivatives are given there."""
+        """Quickest rates at points s (N + 1,) of a path whose derivatives are given there.
+
+        ``tight`` (2, N, K): by how much the lower and upper limits are narrower on each interval.
+        """
         rows = self.rows(q, rate, bend) if rows is None else rows
-        steps, given = np.diff(s), np.square(ends)
         if ends[1] == 0.0:  # at rest dry friction does not help to brake
             held = rows.held[-1, self.loaded]
             rows.c[-1, self.acceleration.size :] = held / self.scale[self.acceleration.size :]
-        now = self._swept(steps, rows, given)
+        steps, given, narrow = np.diff(s), np.square(ends), np.zeros((2, len(s) - 1, 1)) + tight
+        bounds = (self.lower + narrow[0], self.upper - narrow[1])
+        now = self._swept(steps, rows, given, bounds)
         if not self.viscous or now.failed >= 0:
             return now
         x, best = now.found[:, 0], None
         for _ in range(sweeps):
-            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given)
+            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given, bounds)
             if now.failed >= 0:
-                x = 0.25 * x
-                now = last
+                x, now = 0.25 * x, last
                 continue
             if best is not None and abs(now.duration - last.duration) <= _SETTLED * now.duration:
                 return now
@@ -202,12 +205,14 @@ class PathLimits:
         c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
         return rows._replace(b=b, c=c)
 
-    def _swept(self, steps: Array, rows: Rows, given: Array) -> Passes:
+    def _swept(
+        self, steps: Array, rows: Rows, given: Array, bounds: tuple[Array, Array]
+    ) -> Passes:  # fmt: skip
         from .kernels import path_rates
 
         found = np.empty((len(steps) + 1, 6))
         failed = path_rates(
-            steps, rows.a, rows.b, rows.c, self.lower, self.upper, self.ends, rows.top, given, found
+            steps, rows.a, rows.b, rows.c, *bounds, self.ends, rows.top, given, found
         )
         if failed >= 0:
             return Passes(found, failed, np.inf, rows)

@@ -16,7 +16,7 @@ from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from .checks import checked_limits
 from .limits import MotionLimits
-from .motions import TimedMotion
+from .motions import Motion, TimedMotion
 from .path_limits import SLOWEST, Passes, PathLimits, Rows
 from .piecewise import PiecewisePolynomial
 from .pose_trajectory import PoseTrajectory
@@ -25,7 +25,10 @@ from .regular_paths import path_of, toward_ends
 from .trajectory import Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
-_INSIDE = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of an interval
+_INSIDE = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of the time of an interval
+_BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
+_HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
+_ROUNDS = 8
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
 
@@ -130,9 +133,10 @@ def time_optimal(
     Also called TOPP, TOPP-RA. The path keeps its shape and loses its own timing. On a grid of its
     parameter, the rates from which the end is reached are computed backward, and the greatest of
     them forward (reachability analysis). Accelerations are limited at both ends of every interval
-    of the grid, torques at its start, with ``both_ends`` at both. Between points torques may be
+    of the grid, torques at its start, as is usual (collocation). Between points torques may then be
     exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where five
-    times in each interval show more than 2 %; take more points then.
+    times in each interval show more than 2 %. With ``both_ends`` torques are limited at both ends
+    and, by narrower limits where that is needed, between them to 1.001 of their limits.
 
     Parameters
     ----------
@@ -157,7 +161,7 @@ def time_optimal(
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
     both_ends : bool
-        Whether torques are limited at both ends of each interval.
+        Whether torques are limited at both ends of each interval, and inside.
 
     Returns
     -------
@@ -221,7 +225,8 @@ def time_optimal(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
-    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    law, slowed, tight = law_of(s, x), np.zeros(x.shape, np.bool_), np.zeros((2, points, 1))
+    use = _uses(problem, motion, law)
     if np.isfinite(problem.rates).any():
         slower = rate_limited(problem, s, q, rate, rows, x)
         if slower is None:
@@ -231,46 +236,65 @@ def time_optimal(
             )
         slowed = slower[0] < x * (1.0 - 1e-3)
         x, law = slower
-    trajectory = Trajectory(TimedMotion(motion, law), scalar)
-    beyond = _between(problem, trajectory, law)
+        use = _uses(problem, motion, law)
+    elif both_ends:
+        for _ in range(_ROUNDS):
+            over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
+            if not over.max(initial=0.0) > _HELD:
+                break
+            # where torques inside an interval exceed their limits, those at its ends are narrower
+            wide = np.zeros((2, points, problem.scale.size))
+            wide[..., problem.acceleration.size :] = 1.1 * np.maximum(over[..., problem.loaded], 0)
+            tight = tight + wide
+            then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
+            if then.failed >= 0 or np.isinf(then.duration):
+                break
+            passes, law = then, law_of(s, then.found[:, 0])
+            x, use = passes.found[:, 0], _uses(problem, motion, law)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
     if velocity.any():
         with np.errstate(divide="ignore"):
             spare = np.where(rate > 0.0, problem.limits.velocity, -problem.limits.velocity_lower)
             code[velocity] += (spare / np.abs(rate)).argmin(axis=1)[velocity]
-    return TimedPath(
-        trajectory,
-        TimingStatus.OPTIMAL,
-        s,
-        np.sqrt(np.maximum(x, 0.0)),
-        np.sqrt(np.maximum(passes.found[:, 4], 0.0)),
-        np.where(slowed, "rate", problem.names[code]),
-        gap,
-        beyond,
-    )
+    most = np.sqrt(np.maximum(passes.found[:, 4], 0.0))
+    active = np.where(slowed, "rate", problem.names[code])
+    trajectory = Trajectory(TimedMotion(motion, law), scalar)
+    x = np.sqrt(np.maximum(x, 0.0))
+    why = _beyond(use, s, both_ends)
+    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, x, most, active, gap, why)
 
 
-def _between(problem: PathLimits, motion: Trajectory, law: PiecewisePolynomial) -> str:
-    """Where torques inside of intervals exceed their limits, as a sentence, or nothing."""
+def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial) -> Array:
+    """Torques (N, P, n) at places inside the intervals, over their limits."""
+    N = law.lengths.size
     if problem.model is None or not problem.loaded.size:
-        return ""
-    begin, end = law.breaks[0, :-1], law.breaks[0, 1:]
-    times = (begin[:, None] + (end - begin)[:, None] * _INSIDE).ravel()
-    q, v, a = motion.motion.derivatives(times, (0, 1, 2))
+        return np.zeros((N, 1, problem.n))
+    timed, places = TimedMotion(motion, law), np.tile(_INSIDE, (N, 1))
+    if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
+        (v,) = timed.derivatives(law.breaks[0], (1,))
+        turns = v[1:] * v[:-1] < 0.0
+        at = np.where(turns, v[:-1] / np.where(turns, v[:-1] - v[1:], 1.0), 0.0).max(axis=1)
+        places = np.hstack((places, np.clip(at[:, None] + _BESIDE, 0.0, 1.0 - 1e-9)))
+    times = (law.breaks[0, :-1, None] + law.lengths[0][:, None] * places).reshape(-1)
+    q, v, a = timed.derivatives(times, (0, 1, 2))
     tau = rigid_torques(problem.model, q, v, a) + problem.drag(q, v)
     if problem.drives is not None:
         tau = tau + a @ problem.drives.rotor + problem.drives.offset
     with np.errstate(divide="ignore", invalid="ignore"):
-        use = np.nan_to_num(np.abs(tau) / problem.torque, nan=0.0)
-    if not use.size or use.max() <= _BETWEEN:
+        return np.nan_to_num(tau / problem.torque, nan=0.0).reshape(N, -1, problem.n)
+
+
+def _beyond(use: Array, s: Array, both_ends: bool) -> str:
+    """Where torques inside of intervals exceed their limits, as a sentence, or nothing."""
+    size = np.abs(use).max(axis=1, initial=0.0)
+    if not size.max(initial=0.0) > _BETWEEN:
         return ""
-    i, j = np.unravel_index(int(use.argmax()), use.shape)
-    (place,) = law.derivatives(times[i : i + 1], (0,))
+    i, j = np.unravel_index(int(size.argmax()), size.shape)
     return (
         f"The motion is the quickest on this grid, but between its points the torque of joint "
-        f"{j + 1} reaches {use.max():.3g} times its limit at s = {place.item():.6g}. Take "
-        "more points."
+        f"{j + 1} reaches {size[i, j]:.3g} times its limit at s = {s[i]:.6g} to {s[i + 1]:.6g}. "
+        f"Take more points{'' if both_ends else ', or both_ends=True'}."
     )
 
 
