@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import product
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays import Array, Frozen, Value, as_exact, as_number, read_only
 from .._choices import chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
@@ -83,7 +83,7 @@ class Pose(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(Value):
+class Plan(Frozen, Value):
     """The best motion that the planner found.
 
     Parameters
@@ -124,11 +124,6 @@ class Plan(Value):
     restarts: Array
     via_times: Array
     explanation: str = ""
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                object.__setattr__(self, field.name, read_only(value))
 
     @property
     def duration(self) -> float:
@@ -264,33 +259,30 @@ def kinodynamic(
         name = _name(missing[0], len(given))
         why = f"No posture reaches the pose {name} within the limits of position."
         return _without(PlanStatus.NONE_FOUND, why)
-    for status, test in (
-        (PlanStatus.ENDS_NOT_HELD, _held), (PlanStatus.ENDS_IN_COLLISION, _clear),
-    ):  # fmt: skip
-        for k in range(len(given)):
-            if 0 < k < len(given) - 1 and test is _held:
-                continue
-            good, why = test(problem, postures[k], bodies, wanted, _name(k, len(given)))
-            postures[k] = postures[k][good]
-            if not good.any():
-                end = k in (0, len(given) - 1)
-                return _without(status if end else PlanStatus.NONE_FOUND, why)
+    for k, q in enumerate(postures):
+        end, name = k in (0, len(given) - 1), _name(k, len(given))
+        held, why = _held(problem, q, name) if end else (np.ones(len(q), np.bool_), "")
+        if not held.any():
+            return _without(PlanStatus.ENDS_NOT_HELD, why)
+        clear, why = _clear(model, q, bodies, wanted, name)
+        if not (held & clear).any():
+            return _without(PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND, why)
+        postures[k] = q[held & clear]
     generator = generator_of(rng)
     tasks = []
     for choice in product(*postures):
         stations = np.array(choice)
-        if not np.any(np.diff(stations, axis=0), axis=1).all():
-            continue
-        at = knots_of(stations, count)
-        optimal = timing is Timing.OPTIMAL
-        task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-        straight = task.evaluated(task.straight())
-        if straight.duration < _NO_TIME:
-            raise InvalidValueError(
-                "limits, torque: nothing limits the straight motion, so its time would be zero; "
-                "give the robot inertia, or limits of velocity and acceleration of every joint."
-            )
-        tasks.append((straight.penalized, len(tasks), task))
+        if np.any(np.diff(stations, axis=0), axis=1).all():
+            at, optimal = knots_of(stations, count), timing is Timing.OPTIMAL
+            task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
+            straight = task.evaluated(task.straight())
+            if straight.duration < _NO_TIME:
+                raise InvalidValueError(
+                    "limits, torque: nothing limits the straight motion, so its time would be "
+                    "zero; give the robot inertia, or limits of velocity and acceleration of "
+                    "every joint."
+                )
+            tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
@@ -356,28 +348,26 @@ def _postures(
     return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
 
 
-def _held(
-    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[NDArray[np.bool_], str]:
+def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) the torques hold, and a sentence about the first."""
     rest = np.zeros(q.shape)
     load = np.abs(problem.rows(q, rest, rest).held)
     stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
     margin = problem.torque * (1.0 + 1e-9) + stuck - load
     j = int(margin[0].argmin())
-    return np.atleast_1d((margin >= 0.0).all(axis=1)), (
+    return (margin >= 0.0).all(axis=1), (
         f"The torques do not hold the robot at {name}: joint {j + 1} needs {load[0, j]:.6g} and "
         f"has {problem.torque[j]:.6g}, a margin of {margin[0, j]:.4g} (N m or N)."
     )
 
 
 def _clear(
-    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
+    model: RobotModel, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
 ) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) keep the clearance, and a sentence about the first."""
-    if not bodies or problem.model is None:
+    if not bodies:
         return np.ones(len(q), np.bool_), ""
-    distance = clearance_of(problem.model, q, bodies)
-    return np.atleast_1d(distance >= wanted), (
+    distance = np.atleast_1d(clearance_of(model, q, bodies))
+    return distance >= wanted, (
         f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_number, read_only
+from .._arrays import Array, Frozen, Value, as_number
 from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
@@ -42,7 +42,7 @@ class TimingStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TimedPath(Value):
+class TimedPath(Frozen, Value):
     """The quickest motion along a path, and what limits it.
 
     Parameters
@@ -85,11 +85,6 @@ class TimedPath(Value):
     active: NDArray[np.str_]
     grid_gap: float = np.inf
     explanation: str = field(default="")
-
-    def __post_init__(self) -> None:
-        for name in ("parameter", "rate", "maximum_rate"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-        object.__setattr__(self, "active", read_only(self.active, str))
 
     def __hash__(self) -> int:
         return hash((self.status, self.duration, self.explanation))

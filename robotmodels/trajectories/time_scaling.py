@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, read_only
+from .._arrays import Array, Frozen, Value
 from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
@@ -42,7 +42,7 @@ class ScalingStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ScaledTrajectory(Value):
+class ScaledTrajectory(Frozen, Value):
     """A motion with the least duration that its profile allows.
 
     Parameters
@@ -75,10 +75,6 @@ class ScaledTrajectory(Value):
     fraction: Array
     windows: Array
     explanation: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "fraction", read_only(self.fraction))
-        object.__setattr__(self, "windows", read_only(self.windows))
 
     @property
     def duration(self) -> float:
