@@ -32,16 +32,6 @@ class Cost:
         Weight of the duration, 1/s.
     torque : float
         Weight of the squared torques, each in units of its limit, 1/s.
-
-    Raises
-    ------
-    InvalidValueError
-        A negative weight, or both zero.
-
-    Examples
-    --------
-    >>> Cost(torque=0.5)
-    Cost(time=1.0, torque=0.5)
     """
 
     time: float = 1.0

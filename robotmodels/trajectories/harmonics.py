@@ -38,16 +38,6 @@ class FourierSeries(Rebuilt):
         Middle of the motion, rad or m.
     periods : float
         How many the motion lasts.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Amplitudes that do not fit each other, a period that is not positive.
-
-    Examples
-    --------
-    >>> FourierSeries(2.0, [[1.0]], [[0.0]], [0.0]).duration
-    array(2.)
     """
 
     period: float

@@ -46,16 +46,6 @@ class JointPath(Frozen):
         Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
         What happens, in the order of the path.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.trajectories import cartesian_trajectory
-    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
-    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 50), q)
-    >>> path.complete, path.q[-1].round(6)
-    (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
 
     t: Array

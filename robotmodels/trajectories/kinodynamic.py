@@ -1,4 +1,9 @@
-"""Kinodynamic planning: the best motion between configurations or poses under limits of torque."""
+"""Kinodynamic planning: the best motion between configurations or poses under limits of torque.
+
+References
+----------
+Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
+"""
 
 from __future__ import annotations
 
@@ -35,13 +40,7 @@ _QUICKEST = Cost()
 
 
 class Timing(Enum):
-    """How a candidate of the planner is timed; the value says how.
-
-    Examples
-    --------
-    >>> Timing.PROFILE.value
-    'its own profile over time, evenly stretched to the least duration'
-    """
+    """How a candidate of the planner is timed; the value says how."""
 
     OPTIMAL = "the quickest motion along its path"
     PROFILE = "its own profile over time, evenly stretched to the least duration"
@@ -64,16 +63,6 @@ class Pose(Value):
     ----------
     T : array_like, shape (4, 4)
         World pose of the tool, m.
-
-    Raises
-    ------
-    ShapeError, NotARotationError
-        An array that is no pose.
-
-    Examples
-    --------
-    >>> Pose(np.eye(4)).T.shape
-    (4, 4)
     """
 
     T: Array
@@ -105,15 +94,6 @@ class Plan(Frozen, Value):
         Times at which the via points are met, s.
     explanation : str
         Details of the status.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import MotionLimits, kinodynamic
-    >>> plan = kinodynamic(load("ur5e"), np.zeros(6), np.full(6, 0.2), MotionLimits(),
-    ...                    torque=[1, 1, 1, 1, 1, 1])
-    >>> plan.status.name, plan.trajectory
-    ('ENDS_NOT_HELD', None)
     """
 
     trajectory: Trajectory | None
@@ -228,10 +208,6 @@ def kinodynamic(
     ShapeError, InvalidValueError
         Vectors of the wrong length, ends outside of the limits of position, ends or via points
         that coincide, NaN, limits that are all infinite.
-
-    References
-    ----------
-    Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
 
     Examples
     --------

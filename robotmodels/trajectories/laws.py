@@ -4,7 +4,9 @@ Seed book sections 4.2.1 (fifth-order polynomial), 4.2.2 (trapezoidal velocity) 
 trapezoidal velocity). A law moves ``s`` from 0 to a distance; whatever follows it, joints on a
 straight line or a pose on a path, keeps its shape. Everything here works on rows, one per motion.
 
-Source: Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
+References
+----------
+Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
 """
 
 from __future__ import annotations
@@ -25,13 +27,7 @@ _PHASE = 1.0 / 3.0
 
 
 class TimeLaw(Enum):
-    """How the motion is distributed over its time; the value describes the law.
-
-    Examples
-    --------
-    >>> TimeLaw.QUINTIC.value
-    'fifth-order polynomial: starts and stops with zero acceleration'
-    """
+    """How the motion is distributed over its time; the value describes the law."""
 
     LINEAR = "constant velocity: starts and stops with a jump of velocity"
     CUBIC = "third-order polynomial: starts and stops with a jump of acceleration"

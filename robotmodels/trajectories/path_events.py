@@ -1,4 +1,9 @@
-"""Events along poses, and the Jacobians of the task that show them."""
+"""Events along poses, and the Jacobians of the task that show them.
+
+References
+----------
+Seed book section 4.3.
+"""
 
 from __future__ import annotations
 
@@ -26,13 +31,7 @@ _FAR = 0.5 * np.pi
 
 
 class PathEventKind(Enum):
-    """What may happen on the way; the value is the sentence a person reads.
-
-    Examples
-    --------
-    >>> PathEventKind.SINGULAR.value
-    'The path meets a singular position.'
-    """
+    """What may happen on the way; the value is the sentence a person reads."""
 
     OUT_OF_REACH = "The path leaves the reach of the robot."
     OUTSIDE_LIMITS = "The posture is outside the joint limits."

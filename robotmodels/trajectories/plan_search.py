@@ -1,4 +1,9 @@
-"""Search of the kinodynamic planner: annealing, local improvement, and the check of the motion."""
+"""Search of the kinodynamic planner: annealing, local improvement, and the check of the motion.
+
+References
+----------
+Seed book section 4.4.1 and the appendix of chapter 4.
+"""
 
 from __future__ import annotations
 
@@ -35,13 +40,7 @@ _NARROW = 0.1  # of the first steps: the last ones
 
 
 class PlanMethod(Enum):
-    """How the planner searches; the value says how.
-
-    Examples
-    --------
-    >>> PlanMethod.DESCENT.value
-    'local improvement of the straight path and of random ones'
-    """
+    """How the planner searches; the value says how."""
 
     ANNEAL = "simulated annealing of the nodes, then local improvement"
     DESCENT = "local improvement of the straight path and of random ones"

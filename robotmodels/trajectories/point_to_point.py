@@ -62,13 +62,7 @@ from .trajectory import Samples, Trajectory
 
 
 class Synchronisation(Enum):
-    """How joints that move together are kept in step; the value says what is common to them.
-
-    Examples
-    --------
-    >>> Synchronisation.SAME_TIME.value
-    'start and end: each joint has its own quickest law, slowed down to the slowest joint'
-    """
+    """How joints that move together are kept in step; the value says what is common to them."""
 
     COORDINATED = "one law: the ratio of the joints' motions is kept along the whole path"
     SAME_TIME = (

@@ -1,4 +1,9 @@
-"""Random profiles of motion: the candidates of a search for the best motion."""
+"""Random profiles of motion: the candidates of a search for the best motion.
+
+References
+----------
+Seed book sections 4.4.2.2 and 4.4.3.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +25,7 @@ _LEAST_RAMP = 0.1  # of the time between two points
 
 
 class ProfileLaw(Enum):
-    """Laws of random profiles; the value describes the law.
-
-    Examples
-    --------
-    >>> ProfileLaw.SPLINE.value
-    'cubic spline through the nodes, at rest at the ends'
-    """
+    """Laws of random profiles; the value describes the law."""
 
     SPLINE = "cubic spline through the nodes, at rest at the ends"
     TRAPEZOID = "constant velocities between the nodes, constant accelerations near them"
@@ -66,10 +65,6 @@ def random_profile(
     ------
     ShapeError, InvalidValueError
         Vectors that do not fit, ends that are the same, a number of nodes below zero.
-
-    References
-    ----------
-    Seed book sections 4.4.2.2 and 4.4.3.
 
     Examples
     --------

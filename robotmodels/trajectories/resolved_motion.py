@@ -48,11 +48,6 @@ class ResolvedMotion(Rebuilt):
         Codes of `IKMStatus`.
     position_error, orientation_error : ndarray, shape (N,)
         How far the tool is behind in what was asked for, m and rad.
-
-    Examples
-    --------
-    >>> ResolvedMotion.__slots__[:3]
-    ('t', 'q', 'v')
     """
 
     t: Array

@@ -53,13 +53,7 @@ from .trajectory import Trajectory
 
 
 class SplineEnds(Enum):
-    """What is asked of a cubic spline at its ends.
-
-    Examples
-    --------
-    >>> SplineEnds.NATURAL.value
-    'no acceleration at the ends'
-    """
+    """What is asked of a cubic spline at its ends."""
 
     CLAMPED = "given velocities at the ends"
     NATURAL = "no acceleration at the ends"

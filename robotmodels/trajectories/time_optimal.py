@@ -68,13 +68,6 @@ class TimedPath(Frozen, Value):
         estimates the relative error of the duration; infinite without one.
     explanation : str
         Details of the status; where torques exceed their limits between the points of the grid.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
-    >>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0), points=10)
-    >>> timed.status.name, str(timed.active[0]), str(timed.active[5])
-    ('OPTIMAL', 'acceleration of joint 1', 'velocity of joint 1')
     """
 
     trajectory: Trajectory | None

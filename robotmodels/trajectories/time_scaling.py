@@ -59,15 +59,6 @@ class ScaledTrajectory(Frozen, Value):
         infinite where the robot is held still.
     explanation : str
         Details of the status.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import MotionLimits, quintic, time_scaled
-    >>> move = quintic(np.zeros(6), np.full(6, 0.1), duration=1.0)
-    >>> scaled = time_scaled(move, load("ur5e"), None, MotionLimits(velocity=0.5))
-    >>> scaled.status.name, round(scaled.duration, 6)
-    ('SCALED', 0.375)
     """
 
     trajectory: Trajectory | None

@@ -26,12 +26,6 @@ class Samples(Rebuilt):
         Times, s.
     q, v, a, jerk : ndarray, shape (..., N, n)
         Positions and their first three derivatives, rad or m, and per s.
-
-    Examples
-    --------
-    >>> joint_samples = Samples([0.0, 1.0], [[0.0], [1.0]], *np.zeros((3, 2, 1)))
-    >>> np.asarray(joint_samples).shape
-    (2, 1)
     """
 
     t: Array
