@@ -37,7 +37,7 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.follow import _following
 from robotmodels.trajectories.path_events import _inverted
-from robotmodels.trajectories.paths import rotation_about
+from robotmodels.trajectories.pose_trajectory import rotation_about
 
 
 def central(f, t, h=1e-5):

@@ -5,14 +5,8 @@ arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_tr
 """
 
 from .blends import blended_lines
-from .candidates import Cost
-from .cartesian import (
-    blended_poses,
-    cartesian_trajectory,
-    circle,
-    circular_arc,
-    straight_line,
-)
+from .candidates import Cost, ProfileLaw, random_profile
+from .cartesian import blended_poses, cartesian_trajectory, circle, circular_arc, straight_line
 from .harmonics import FourierSeries, fourier, fourier_basis
 from .jerk import jerk_limited
 from .joint_path import JointPath, joint_path
@@ -32,7 +26,6 @@ from .point_to_point import (
     trapezoidal,
 )
 from .pose_trajectory import PoseSamples, PoseTrajectory
-from .random_profiles import ProfileLaw, random_profile
 from .resolved_motion import ResolvedMotion, resolved_motion
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_optimal import TimedPath, TimingStatus, time_optimal

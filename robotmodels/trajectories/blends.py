@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, refuse_jointless, slowed
+from .checks import ROUNDING, checked_limits, least_shown, refuse_jointless, slowed
 from .limits import MotionLimits
-from .number_text import least_shown
-from .piecewise import PiecewisePolynomial
+from .motions import PiecewisePolynomial
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5
@@ -35,24 +34,23 @@ def blended_lines(
     """Lines through points with blends: trapezoids of velocity that do not stop at the points.
 
     Also called linear segments with parabolic blends, ``mstraj``. All joints change velocity
-    together, so that the motion is straight between blends. It passes an inner point at a
-    distance of ``blend time * change of velocity / 8`` (3/32 of it with smooth blends).
+    together, so that the motion is straight between blends. It passes an inner point at a distance
+    of ``blend time * change of velocity / 8`` (3/32 of it with smooth blends).
 
     Parameters
     ----------
     points : array_like, shape (m,) or (m, n)
         Positions, rad or m, at least two.
     duration : float, optional
-        Seconds; default what the limits or the times make it. Longer than the least, it slows the
-        whole motion down evenly.
+        Seconds; longer than the least, it slows the whole motion down evenly.
     limits : MotionLimits, optional
         Velocity and acceleration, with smooth blends also jerk. Each line is as quick as it may
         be; where the blends of a line would overlap, it is slowed down.
     segment_times : array_like, shape () or (m - 1,), optional
         Seconds from corner to corner instead.
     blend_times : array_like, shape () or (m,), optional
-        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
-        The motion starts and ends half a blend before and after the time of its end points.
+        Seconds of each blend, with ``segment_times``; default the least that the limits allow. The
+        motion starts and ends half a blend before and after the time of its end points.
     smooth : bool
         Whether the blends keep the acceleration continuous.
 
@@ -64,8 +62,8 @@ def blended_lines(
     Raises
     ------
     ShapeError, InvalidValueError
-        Fewer than two points; neither limits nor times; blends that overlap; a duration that is
-        too short, with the least one; limits that are missing, zero, or not kept.
+        Fewer than two points; neither limits nor times; blends that overlap; a duration below the
+        least, which is in the message; limits that are missing, zero, or not kept.
 
     References
     ----------

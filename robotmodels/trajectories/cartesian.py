@@ -50,10 +50,17 @@ from .checks import given_durations, limits_along, refuse_short, slowed
 from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits, ranges_of
-from .paths import BlendedPoses, FixedAxisPath, arc, axis_and_angle, line, rotation_about
-from .piecewise import PiecewisePolynomial
+from .motions import PiecewisePolynomial
 from .point_to_point import along_line, assembled
-from .pose_trajectory import PoseTrajectory
+from .pose_trajectory import (
+    BlendedPoses,
+    FixedAxisPath,
+    PoseTrajectory,
+    arc,
+    axis_and_angle,
+    line,
+    rotation_about,
+)
 from .trajectory import Trajectory
 
 _MOVES = ("translation", "rotation")
@@ -72,8 +79,8 @@ def cartesian_trajectory(
     """Poses on the straight line between two poses, at equal steps of time.
 
     Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
-    orientation turns about one fixed axis by the shorter way (slerp), both by the same time law:
-    by default a trapezoid of velocity whose ramps take a third of the time each.
+    orientation turns about one fixed axis by the shorter way (slerp), both by the same law, by
+    default a trapezoid of velocity whose ramps take a third of the time each.
 
     Parameters
     ----------
@@ -82,22 +89,12 @@ def cartesian_trajectory(
     N : int
         Number of poses, both ends included; a single one is ``T0``.
     law : TimeLaw or str
-        How the motion is distributed over the time; a member or its name.
+        A member or its name; not `TimeLaw.JERK_LIMITED`, whose shape depends on limits.
 
     Returns
     -------
     ndarray, shape (..., N, 4, 4)
         Poses. The first and the last are those given.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        What are no poses; ``N`` that is not a whole number from 0; `TimeLaw.JERK_LIMITED`, whose
-        shape depends on limits (see `straight_line`).
-
-    References
-    ----------
-    Seed book section 4.3; the exercise, section 4.3 (``ctraj``).
 
     Examples
     --------
@@ -247,10 +244,7 @@ def circle(
 
 
 def blended_poses(
-    poses: Any,
-    limits: MotionLimits,
-    duration: float | None = None,
-    smooth: bool = False,
+    poses: Any, limits: MotionLimits, duration: float | None = None, smooth: bool = False
 ) -> PoseTrajectory:
     """Straight lines through poses, joined by blends that do not meet the inner poses.
 

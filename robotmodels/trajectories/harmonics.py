@@ -23,15 +23,15 @@ _TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourierSeries(Rebuilt):
-    """Finite Fourier series of n joints.
+    """Finite Fourier series of n joints, with period ``2 pi / w``.
 
-    ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``, so that ``a`` and ``b`` are the
+    ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``: ``a`` and ``b`` are the
     amplitudes of the velocity.
 
     Parameters
     ----------
     period : float
-        Seconds, ``w = 2 pi / period``.
+        Seconds.
     a, b : array_like, shape (H, n)
         Amplitudes of the velocity, rad/s or m/s.
     mean : array_like, shape (n,)
@@ -121,25 +121,20 @@ class FourierSeries(Rebuilt):
 
 
 def fourier(
-    a: ArrayLike,
-    b: ArrayLike,
-    mean: ArrayLike = 0.0,
-    period: float = 10.0,
-    periods: float = 1.0,
+    a: ArrayLike, b: ArrayLike, mean: ArrayLike = 0.0, period: float = 10.0, periods: float = 1.0
 ) -> Trajectory:
-    """Periodic motion, a finite Fourier series with analytic derivatives.
+    """Periodic motion, a finite Fourier series with analytic derivatives, defined at every time.
 
     Parameters
     ----------
     a, b : array_like, shape (H,) or (H, n)
-        Amplitudes of the sine and cosine terms, such that the velocity is
-        ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
+        Amplitudes of the velocity ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
     mean : array_like, shape () or (n,)
         Middle of the motion, rad or m.
     period : float
         Seconds; ``w = 2 pi / period``.
     periods : float
-        How many the motion lasts. It is defined at every time.
+        How many the motion lasts.
 
     Returns
     -------
@@ -173,7 +168,7 @@ def fourier(
 
 
 def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -> Array:
-    """The functions of which a Fourier motion is a sum: its gradient by its own parameters.
+    """Basis of Fourier motions: the derivative of an order as a matrix of its own parameters.
 
     Parameters
     ----------
@@ -189,12 +184,7 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
     Returns
     -------
     ndarray, shape (N, 2 H + 1)
-        ``basis @ [mean, a_1 .. a_H, b_1 .. b_H]`` is the derivative of that order of the motion.
-
-    Raises
-    ------
-    InvalidValueError
-        NaN, numbers that are not positive.
+        ``basis @ [mean, a_1 .. a_H, b_1 .. b_H]`` is the derivative.
 
     Examples
     --------

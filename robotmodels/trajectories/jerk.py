@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .checks import ROUNDING, checked_request, joint_vectors, limits_along
+from .checks import ROUNDING, checked_request, joint_vectors, least_shown, limits_along
 from .laws import TimeLaw
 from .limits import MotionLimits
-from .number_text import least_shown
-from .piecewise import PiecewisePolynomial
+from .motions import PiecewisePolynomial
 from .point_to_point import Synchronisation, law_motion
 from .trajectory import Trajectory
 
@@ -45,9 +44,9 @@ def jerk_limited(
 ) -> Trajectory:
     """The quickest motion under limits of velocity, acceleration and jerk, between any states.
 
-    Also called double S, seven-phase profile, online trajectory generation. Coordinated joints
-    stay on the straight line between the postures, which states at the ends must lie along;
-    joints that share the time only may start and end in any state.
+    Also called double S, seven-phase profile, online trajectory generation. Coordinated joints stay
+    on the straight line between the postures, which states at the ends must lie along; joints that
+    share the time only may start and end in any state.
 
     Parameters
     ----------
@@ -56,9 +55,9 @@ def jerk_limited(
     duration : array_like, shape () or (...), optional
         Seconds; default the least.
     limits : MotionLimits
-        Of velocity, acceleration and jerk, which may be asymmetric; all but that of jerk may be
-        infinite. Where a state at an end moves, ruckig keeps the smaller limit of jerk both ways:
-        only from rest to rest is the motion then the quickest.
+        May be asymmetric; all but that of jerk may be infinite. Where a state at an end moves,
+        ruckig keeps the smaller limit of jerk both ways: only from rest to rest is the motion the
+        quickest.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation or str
@@ -72,9 +71,8 @@ def jerk_limited(
     Raises
     ------
     ShapeError, InvalidValueError
-        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or
-        not along the line of coordinated joints; a duration that cannot be had, with the least
-        that can; a limit of zero for a joint that has to move.
+        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or not
+        along the line; a duration that cannot be had, with the least that can; a limit of zero.
 
     References
     ----------
@@ -84,8 +82,6 @@ def jerk_limited(
     Examples
     --------
     >>> limits = MotionLimits(velocity=1.0, acceleration=1.0, jerk=2.0)
-    >>> jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits).duration
-    3.50...
     >>> move = jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits, v0=[0.0, 0.5],
     ...                     synchronisation=Synchronisation.SAME_TIME)
     >>> move.duration, move.v(0.0)

@@ -93,9 +93,9 @@ def joint_path(
     Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
     nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
     with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
-    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if
-    it has one; others go on by the least steps from the last posture, and are solved for all
-    postures only where that fails.
+    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if it
+    has one; others go on by the least steps from the last posture, and are solved for all postures
+    only where that fails.
 
     Parameters
     ----------
@@ -105,19 +105,16 @@ def joint_path(
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
         Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
-        value (without it 0, or the nearest value inside their limits). A
-        first posture that is more than 0.1 away from it is reported as a jump.
+        value (without it 0, or the nearest value inside their limits). A first posture that is more
+        than 0.1 away from it is reported as a jump.
     q_near : array_like, shape (n,), optional
-        A guess instead of ``q_start``: the path begins with the solution of the first pose that is
-        nearest to it, however far that is.
+        A guess instead: the path begins with the solution of the first pose that is nearest to it.
     t : array_like, shape (N,), optional
         Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
         Into how many poses a `PoseTrajectory` is divided.
-    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
-        Ones for the components ``x y z rx ry rz`` that are asked for, as in `igm`.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
+    mask, mask_axes
+        Components ``x y z rx ry rz`` that are asked for, and their axes, as in `igm`.
     position_tolerance, orientation_tolerance : float
         When a pose counts as met, m and rad.
     singular_below : float
@@ -139,16 +136,13 @@ def joint_path(
 
     Examples
     --------
-    The exercise's path from A to B: positions are reached all the way.
-
+    >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
     >>> from robotmodels.trajectories import cartesian_trajectory
-    >>> A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
-    >>> B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
-    >>> path = joint_path(load("lab_trr"), cartesian_trajectory(A, B, 50), [-0.3, -0.8, -0.8],
-    ...                   mask=[1, 1, 1, 0, 0, 0], position_tolerance=1e-6)
-    >>> path.complete, path.q[0].round(2)
-    (True, array([-0.3 , -0.79, -0.79]))
+    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
+    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 50), q)
+    >>> path.complete, path.q[-1].round(6)
+    (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")

@@ -31,7 +31,7 @@ from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, knots_of
 from .checks import checked_limits
 from .limits import MotionLimits
-from .path_limits import SLOWEST, PathLimits
+from .path_limits import SLOWEST, PathLimits, not_held
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import Trajectory
 
@@ -327,14 +327,12 @@ def _postures(
 def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) the torques hold, and a sentence about the first."""
     rest = np.zeros(q.shape)
-    load = np.abs(problem.rows(q, rest, rest).held)
+    load = problem.rows(q, rest, rest).held
     stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-    margin = problem.torque * (1.0 + 1e-9) + stuck - load
-    j = int(margin[0].argmin())
-    return (margin >= 0.0).all(axis=1), (
-        f"The torques do not hold the robot at {name}: joint {j + 1} needs {load[0, j]:.6g} and "
-        f"has {problem.torque[j]:.6g}, a margin of {margin[0, j]:.4g} (N m or N)."
-    )
+    why = [
+        not_held(load[k : k + 1], problem.torque, [name], stuck[k : k + 1]) for k in range(len(q))
+    ]
+    return np.array([not text for text in why]), why[0]
 
 
 def _clear(

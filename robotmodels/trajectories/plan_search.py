@@ -19,11 +19,10 @@ import numpy as np
 from .._arrays import Array
 from ..dynamics import idm
 from ..model import RobotModel
-from .candidates import Candidates, Evaluated, spread
+from .candidates import Candidates, Evaluated, half_width, spread
 from .descent import descended
 from .limits import MotionLimits, ranges_of
 from .motions import TimedMotion
-from .random_profiles import half_width
 from .time_optimal import law_of, time_optimal
 from .time_scaling import at_rest, stretched, time_scaled
 from .trajectory import Trajectory

@@ -53,11 +53,11 @@ from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
 from ..kinematics.singular.task import whole_number
-from .between_states import motion_between
 from .checks import checked_request, joint_vectors, limits_along, refuse_short
-from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
+from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
-from .piecewise import PiecewisePolynomial
+from .motions import PiecewisePolynomial
+from .splines import motion_between
 from .trajectory import Samples, Trajectory
 
 
@@ -207,49 +207,31 @@ def _polynomial(
 
 
 def joint_trajectory(
-    q0: ArrayLike,
-    q1: ArrayLike,
-    N: int | ArrayLike,
-    v0: ArrayLike = 0.0,
-    v1: ArrayLike = 0.0,
+    q0: ArrayLike, q1: ArrayLike, N: int | ArrayLike, v0: ArrayLike = 0.0, v1: ArrayLike = 0.0
 ) -> Samples:
     """Positions, velocities and accelerations between two postures, fifth-order polynomials.
 
-    Also called ``jtraj``. For limits, other laws and continuous time see `quintic` and the other
-    generators of a `Trajectory`.
+    Also called ``jtraj``. For limits, other laws and continuous time see `quintic`.
 
     Parameters
     ----------
     q0, q1 : array_like, shape (..., n)
         First and last postures, rad or m.
     N : int or array_like, shape (N,)
-        How many samples, equally spaced over one second; or their times, s, ascending. The motion
-        lasts from the first time to the last.
+        How many samples, equally spaced over one second; or their times, s, ascending.
     v0, v1 : array_like, shape () or (..., n)
         Velocities at the ends, rad/s or m/s.
 
     Returns
     -------
     Samples
-        ``t (N,)`` and ``q, v, a, jerk (..., N, n)``; the object itself passes as the array of its
-        positions.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors of different lengths, NaN, times that do not ascend.
-
-    References
-    ----------
-    Seed book section 4.2.1.
+        ``t (N,)`` and ``q, v, a, jerk (..., N, n)``; as an array its positions.
 
     Examples
     --------
     >>> path = joint_trajectory([0.0, 1.0], [1.0, -1.0], 5)
     >>> path.q[2], path.q.shape
     (array([0.5, 0. ]), (5, 2))
-    >>> joint_trajectory([0.0], [1.0], [0.0, 1.0, 2.0]).v.ravel()
-    array([0.    , 0.9375, 0.    ])
     """
     if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
         t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))
@@ -306,32 +288,18 @@ def law_motion(
     along = limits_along(bounds, direction)
     pieces = law_of_limits(law, length.reshape(-1), along)
     totals = pieces.durations.sum(axis=-1).reshape(length.shape)
-    waits = T is None and how is Synchronisation.INDEPENDENT
-    if waits:
-        _refuse_waiting(law, along, totals)
     refuse_short(T, totals.max(axis=-1, initial=0.0), length)
-    return assembled(pieces, start, direction, batch, scalar, T, waits)
-
-
-def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
-    """Jumps at the end of a law, totals (R, n), are inside the motion where a joint waits."""
-    if law is TimeLaw.LINEAR:
-        jump, kind = "velocity", "acceleration or jerk"
-        bound = np.minimum(limits.deceleration, np.minimum(limits.jerk, limits.jerk_down))
-        others = "take SAME_TIME, or a law that ends at rest"
-    elif law is TimeLaw.CUBIC:
-        jump, kind, bound = "acceleration", "jerk", limits.jerk
-        others = "pass limits.without_jerk(), or take SAME_TIME or QUINTIC"
-    else:  # those of jerk are refused for BANG_BANG and TRAPEZOIDAL anywhere
-        return
-    early = (totals > 0.0) & (totals < totals.max(axis=-1, keepdims=True, initial=0.0))
-    wrong = early & np.isfinite(bound.reshape(totals.shape))
-    if wrong.any():
-        j = int(np.argwhere(wrong)[0][-1])
-        raise InvalidValueError(
-            f"limits: joint {j + 1} arrives early and waits, and the {jump} of {law.name} jumps at "
-            f"its end, which keeps no limit of {kind}; {others}."
-        )
+    waits = T is None and how is Synchronisation.INDEPENDENT
+    moves = assembled(pieces, start, direction, batch, scalar, T, waits)
+    if waits and law in (TimeLaw.LINEAR, TimeLaw.CUBIC):  # jumps at an end are inside the motion
+        report = moves.check(bounds)
+        if not report.kept:
+            raise InvalidValueError(
+                f"limits: {law.name} ends with a jump, and where a joint arrives early and waits, "
+                f"limits are not kept: {'; '.join(report.violations())}. Take SAME_TIME, or a law "
+                "that ends at rest."
+            )
+    return moves
 
 
 def assembled(

@@ -12,8 +12,8 @@ from typing import Any, cast
 import numpy as np
 
 from .._arrays import Array
+from .motions import PiecewisePolynomial
 from .path_limits import PathLimits, Rows
-from .piecewise import PiecewisePolynomial
 from .splines import cubic_spline
 
 _FIRST, _LEAST = 0.3, 1e-4  # of x: bounds of a step

@@ -25,8 +25,7 @@ from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
-from .checks import ROUNDING
-from .number_text import counted, greatest_shown, least_shown, seconds_shown
+from .checks import ROUNDING, counted, greatest_shown, least_shown, seconds_shown
 from .pose_trajectory import PoseTrajectory
 
 _MOVE, _TURN = slice(0, 3), slice(3, 6)
@@ -130,8 +129,8 @@ def resolved_motion(
     Raises
     ------
     ShapeError, InvalidValueError
-        A posture of the wrong length; fewer than two samples; a feedback that is negative or
-        faster than the steps; limits with a shorter step; what is no `PoseTrajectory`.
+        A posture of the wrong length; fewer than two samples; a feedback that is negative or faster
+        than the steps; limits with a shorter step; what is no `PoseTrajectory`.
 
     References
     ----------
@@ -142,11 +141,9 @@ def resolved_motion(
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.trajectories import straight_line
-    >>> arm = load("panda")
-    >>> q = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    >>> arm, q = load("panda"), np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
     >>> start = dgm(arm, q)
-    >>> goal = start.copy()
-    >>> goal[:3, 3] += [0.1, 0.2, -0.1]
+    >>> goal = start + np.eye(4, k=3) * 0.1  # 0.1 m along x
     >>> motion = resolved_motion(arm, straight_line(start, goal, duration=2.0), q)
     >>> bool(motion.position_error.max() < 1e-5)
     True

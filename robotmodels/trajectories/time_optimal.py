@@ -16,12 +16,10 @@ from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from .checks import checked_limits
 from .limits import MotionLimits
-from .motions import Motion, TimedMotion
-from .path_limits import SLOWEST, Passes, PathLimits, Rows
-from .piecewise import PiecewisePolynomial
+from .motions import Motion, PiecewisePolynomial, TimedMotion
+from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
-from .regular_paths import path_of, toward_ends
 from .trajectory import Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
@@ -122,9 +120,10 @@ def time_optimal(
     parameter, the rates from which the end is reached are computed backward, and the greatest of
     them forward (reachability analysis). Accelerations are limited at both ends of every interval
     of the grid, torques at its start, as is usual (collocation). Between points torques may then be
-    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where five
-    times in each interval show more than 2 %. With ``both_ends`` torques are limited at both ends
-    and, by narrower limits where that is needed, between them to 1.001 of their limits.
+    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where it is more
+    than 2 %. With ``both_ends`` torques are limited at both ends and, by narrower limits where that
+    is needed, between them to 1.001 of their limits, but for moments where dry friction changes its
+    sign.
 
     Parameters
     ----------
@@ -136,8 +135,7 @@ def time_optimal(
     model : RobotModel, optional
         The robot, n joints, for limits of torque.
     torque : array_like, shape () or (n,), optional
-        Greatest torques of both signs, N m or N; default those of the model's table. Infinity is
-        no limit.
+        Greatest torques of both signs, N m or N; default those of the model's table.
     torque_rate : array_like, shape () or (n,), optional
         Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
         is then a local optimum, found from the one without them, and keeps them within 1 %.
@@ -159,8 +157,8 @@ def time_optimal(
     Raises
     ------
     ShapeError, InvalidValueError
-        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates,
-        no finite limit, a path outside the limits of position.
+        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates, no
+        finite limit, a path outside the limits of position.
 
     References
     ----------
@@ -172,8 +170,8 @@ def time_optimal(
     >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
     >>> line = linear([0.0, 0.0], [1.0, 0.5], duration=1.0)
     >>> timed = time_optimal(line, MotionLimits(velocity=1.0, acceleration=2.0))
-    >>> round(timed.duration, 6)  # D / v + v / a
-    1.5
+    >>> round(timed.duration, 6), str(timed.active[100])  # D / v + v / a
+    (1.5, 'velocity of joint 1')
     """
     points = whole_number(points, "points", 2)
     rates = tuple(as_number(r, k, least=0.0) for r, k in
@@ -194,18 +192,22 @@ def time_optimal(
         rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
     ends = (rates[0], rates[1])
     rows = problem.rows(q, rate, bend)
-    at_rest = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
-    found = not_held(problem, rows.held, s, q, at_rest)
+    places = [f"s = {value:.6g}" for value in s.tolist()]
+    rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
+    stuck = np.abs(problem.drag(q[rests], np.full((len(rests), n), SLOWEST)))
+    found = not_held(rows.held[rests], problem.torque, [places[k] for k in rests], stuck)
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
-        found = not_held(problem, rows.held, s, q)
+        found = not_held(rows.held, problem.torque, places)
         if found:
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = problem.passes(s[half], q[half], rate[half], bend[half], ends, _part(rows, half))
+    coarse = problem.passes(
+        s[half], q[half], rate[half], bend[half], ends, Rows(*(part[half] for part in rows))
+    )
     gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
     if not x.max() < 1e200:
@@ -299,31 +301,6 @@ def law_of(s: Array, x: Array) -> PiecewisePolynomial:
 def _without(status: TimingStatus, why: str) -> TimedPath:
     none = np.empty(0)
     return TimedPath(None, status, none, none, none, np.empty(0, str), np.inf, why)
-
-
-def _part(rows: Rows, at: NDArray[np.intp]) -> Rows:
-    """Rows of some points of the grid."""
-    return Rows(*(part[at] for part in rows))
-
-
-def not_held(
-    problem: PathLimits, held: Array, s: Array, q: Array, at_rest: list[int] | None = None
-) -> str:  # fmt: skip
-    """Where gravity exceeds the torques most, as a sentence; at points at rest friction helps."""
-    margin = problem.torque * (1.0 + 1e-9) - np.abs(held)
-    help_ = ""
-    if at_rest is not None:
-        s, q, held, margin = s[at_rest], q[at_rest], held[at_rest], margin[at_rest]
-        stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-        margin, help_ = margin + stuck, " and dry friction" if stuck.any() else ""
-    if (margin >= 0.0).all():
-        return ""
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    return (
-        f"Gravity exceeds the torques at s = {s[i]:.6g}: joint {j + 1} needs "
-        f"{abs(held[i, j]):.6g} to be held still and has {problem.torque[j]:.6g}{help_}, a margin "
-        f"of {margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def _where(passes: Passes, s: Array, ends: tuple[float, float]) -> str:

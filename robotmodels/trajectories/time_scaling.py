@@ -19,9 +19,8 @@ from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .checks import checked_limits
 from .limits import MotionLimits
-from .motions import Motion, TimedMotion
-from .path_limits import checked_torque
-from .piecewise import PiecewisePolynomial
+from .motions import Motion, PiecewisePolynomial, TimedMotion
+from .path_limits import checked_torque, not_held
 from .trajectory import Trajectory
 
 _SAMPLES, _FINE = 501, 4001
@@ -156,30 +155,14 @@ def time_scaled(
     fraction = np.linspace(0.0, 1.0, _SAMPLES)
     parts = torque_parts(model, motion, fraction)
     windows = windows_of(parts, bound, least)
-    if not _held(model, motion, bound):
-        why = _heaviest(parts[2], bound, fraction)
-        return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows, why)
-    T = _least_duration(model, motion, bound, least)
+    T = _least_duration(model, motion, bound, least) if _held(model, motion, bound) else np.inf
     if np.isinf(T):
-        heavy = (np.abs(parts[2]) > bound).any()
-        status = ScalingStatus.NOT_HELD_STILL if heavy else ScalingStatus.NO_WINDOW
-        why = _heaviest(parts[2], bound, fraction) if heavy else ""
+        places = [f"the fraction {x:.4g} of the motion" for x in fraction.tolist()]
+        why = not_held(parts[2], bound, places)
+        status = ScalingStatus.NOT_HELD_STILL if why else ScalingStatus.NO_WINDOW
         return ScaledTrajectory(None, status, fraction, windows, why)
     result = Trajectory(stretched(motion, T * _MARGIN), trajectory.scalar)
     return ScaledTrajectory(result, ScalingStatus.SCALED, fraction, windows)
-
-
-def _heaviest(held: Array, bound: Array, fraction: Array) -> str:
-    """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence."""
-    margin = bound - np.abs(held)
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    if margin[i, j] >= 0.0:
-        return ""
-    return (
-        f"Gravity exceeds the torques at the fraction {fraction[i]:.4g} of the motion: joint "
-        f"{j + 1} needs {abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}, a margin of "
-        f"{margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
+from .checks import counted, greatest_shown, seconds_shown
 from .limits import RATES, LimitsReport, MotionLimits
 from .motions import FunctionMotion, Motion
-from .number_text import counted, greatest_shown, seconds_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
