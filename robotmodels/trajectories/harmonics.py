@@ -210,8 +210,8 @@ def _waves(t: Array, period: float, H: int) -> tuple[Array, Array]:
     """Cosines and sines (N, H) of the harmonics; the time is brought into one period first."""
     angle = 2.0 * np.pi * np.remainder(t / period, 1.0)
     c, s = np.empty((H, t.size)), np.empty((H, t.size))
-    c[:1], s[:1] = np.cos(angle), np.sin(angle)
+    c[:1], s[:1] = c1, s1 = np.cos(angle), np.sin(angle)
     for k in range(1, H):
-        c[k] = c[k - 1] * c[0] - s[k - 1] * s[0]
-        s[k] = s[k - 1] * c[0] + c[k - 1] * s[0]
+        c[k] = c[k - 1] * c1 - s[k - 1] * s1
+        s[k] = s[k - 1] * c1 + c[k - 1] * s1
     return c.T, s.T

@@ -164,8 +164,8 @@ def _of_joints(
             "synchronisation=Synchronisation.SAME_TIME."
         )
     moves = np.any([state["q1"] != state["q0"], *(state[k] != 0.0 for k in _STATES[2:])], axis=0)
-    jerk = np.minimum(limits.jerk, -limits.jerk_lower)
-    box = _Box(*(getattr(limits, name)[moves] for name in _Box._fields[:4]), jerk[moves])
+    rows = [getattr(limits, name)[moves] for name in _Box._fields[:4]]
+    box = _Box(*rows, np.minimum(limits.jerk, -limits.jerk_lower)[moves])
     breaks, c = np.zeros((n, _PHASES + 2)), np.zeros((_PHASES + 1, 4, n))
     lengths = np.zeros((n, _PHASES + 1))
     active = {name: value[moves] for name, value in state.items()}

@@ -193,12 +193,15 @@ def joint_path(
     rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
-    square = twists is not None and task.square
-    v = task.rates(twists) if square else _differences(times, q, rows.reached)
+    if twists is not None and task.square:
+        v = task.rates(twists)
+    else:
+        v = _differences(times, q, rows.reached)
     events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
+        pose = motion.pose
         events = [
-            _located(event, times, lambda t: bool(solve(motion.pose(t), near).count > 0))
+            _located(event, times, lambda t: bool(solve(pose(t), near).count > 0))
             for event in events
         ]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))

@@ -171,7 +171,7 @@ def path_events(
         over = np.maximum(q - model.upper, model.lower - q)
         share = np.abs(v) / model.table.velocity
         outside, fast = over > 1e-9, share > 1.0 + 1e-9
-    for i, j in _runs(outside.any(axis=-1)):
+    for i, j in _runs(np.any(outside, axis=-1)):
         add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     step, jump, gaps = _jumps(q, reached, task)
     adjacent = reached[1:] & reached[:-1]
@@ -205,7 +205,7 @@ def path_events(
         if named or flips[i]:
             text = f"From {before} to {after}." if named else ""
             add(PathEventKind.CHANGES_POSTURE, i, i + 1, text)
-    for i, j in _runs(fast.any(axis=-1)):
+    for i, j in _runs(np.any(fast, axis=-1)):
         text = _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity.")
         add(PathEventKind.TOO_FAST, i, j, text)
     return sorted(events, key=lambda event: (event.first, event.last))
@@ -250,7 +250,7 @@ def _jumps(
     return step, jump, gaps
 
 
-def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(where: Any) -> list[tuple[int, int]]:
     """First and last number of every run of true values."""
     edges = np.diff(np.concatenate(((False,), where, (False,))).astype(np.int8))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

@@ -323,7 +323,8 @@ def _jumps(motion: Motion, t: Array, q: Array, most: float) -> bool:
     change = np.abs(np.diff(q, 3, axis=0)).max(axis=1, initial=0.0) / t[1]
     worst = np.argsort(change)[-20:]
     return any(
-        change[k] > _BEND * most and _is_sharp(motion, t[k], t[k + 3], change[k], None)
+        change[k] > _BEND * most
+        and _is_sharp(motion, float(t[k]), float(t[k + 3]), float(change[k]), None)
         for k in worst.tolist()
     )
 

@@ -234,7 +234,7 @@ def joint_trajectory(
     (array([0.5, 0. ]), (5, 2))
     """
     if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
-        t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))
+        t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))  # type: ignore[arg-type]
     else:
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():

@@ -23,10 +23,10 @@ from .rate_limits import rate_limited
 from .trajectory import Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
-_INSIDE = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of the time of an interval
+_INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
-_ROUNDS = 8
+_ROUNDS = 12
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
 
