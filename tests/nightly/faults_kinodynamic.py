@@ -33,7 +33,7 @@ MUTATIONS = [
     Mutation(ROOM, "half of gravity is held", "def not_held(",
              "- np.abs(held)", "- 0.5 * np.abs(held)", PATH + "gravity_beyond"),
     Mutation(ROOM, "narrower limits of intervals have no effect", "bounds = (self.lower + narrow",
-             "self.upper - narrow[1]", "self.upper + 0.0 * narrow[1]", PATH + "held_between_the_points"),
+             "self.upper - narrow[1]", "self.upper + 0.0 * narrow[1]", PATH + "held_between"),
     Mutation(ROOM, "rates of torques without the change of the middle", "at_ends = ends @",
              "change @ middle", "0.0 * change @ middle", PATH + "rates_of_the_torques"),
     Mutation(ROOM, "the gap is a tenth", "gap = abs(coarse",
