@@ -82,11 +82,6 @@ class Candidates:
     parameter that is the time divided by the duration.
     """
 
-    __slots__ = (
-        "basis", "bodies", "clearance", "cost", "fixed", "free", "grid", "knots", "limits",
-        "margin", "optimal", "stations",
-    )  # fmt: skip
-
     def __init__(
         self, limits: PathLimits, stations: Array, at: Knots,
         bodies: tuple[Obstacle, ...], clearance: float, cost: Cost, optimal: bool,

@@ -163,13 +163,6 @@ def circular_arc(
     Also called MOVEC. ``through (3,)`` is the position on the arc between the poses, m. The
     orientation takes the shorter rotation from the first to the last. Points that are on a line to
     within 1e-9 of their longest side, or to within their rounding, are an error.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> half = circular_arc(translation(1, 0, 0), [0, 1, 0], translation(-1, 0, 0), duration=2.0)
-    >>> half.pose(1.0)[:3, 3].round(12)
-    array([0., 1., 0.])
     """
     first, last = se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1")
     p, m, e = first[:3, 3], as_exact(through, (3,), "through"), last[:3, 3]
@@ -212,13 +205,6 @@ def circle(
     The axis goes through ``centre (3,)``, m, in the direction of ``axis (3,)``; the tool turns
     about it to the right by ``angle``, rad. With ``turning`` the orientation turns with it, instead
     of being kept. A pose on the axis is an error.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> round_trip = circle(translation(1, 0, 0), [0, 0, 0], [0, 0, 1], duration=4.0)
-    >>> round_trip.pose(2.0)[:3, 3].round(12)
-    array([-1.,  0.,  0.])
     """
     first = se3.as_single_pose(T0, "T0")
     point, direction = as_exact(centre, (3,), "centre"), as_exact(axis, (3,), "axis")
@@ -252,14 +238,6 @@ def blended_poses(
     position at a distance of ``blend time * change of velocity / 8`` (3/32 of it with ``smooth``
     blends, whose acceleration is continuous). A longer ``duration`` slows the whole motion down
     evenly; limits of jerk are refused.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> corners = [translation(0, 0, 0), translation(1, 0, 0), translation(1, 1, 0)]
-    >>> path = blended_poses(corners, MotionLimits(velocity=1.0, acceleration=4.0))
-    >>> path.duration, path.pose(path.duration)[:3, 3]
-    (2.25..., array([1., 1., 0.]))
     """
     T = se3.as_pose(poses, "poses")
     if T.ndim != 3 or len(T) < 2:

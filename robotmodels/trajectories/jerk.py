@@ -165,7 +165,7 @@ def _of_joints(
         )
     moves = np.any([state["q1"] != state["q0"], *(state[k] != 0.0 for k in _STATES[2:])], axis=0)
     rows = [getattr(limits, name)[moves] for name in _Box._fields[:4]]
-    box = _Box(*rows, np.minimum(limits.jerk, -limits.jerk_lower)[moves])
+    box = _Box._make((*rows, np.minimum(limits.jerk, -limits.jerk_lower)[moves]))
     breaks, c = np.zeros((n, _PHASES + 2)), np.zeros((_PHASES + 1, 4, n))
     lengths = np.zeros((n, _PHASES + 1))
     active = {name: value[moves] for name, value in state.items()}

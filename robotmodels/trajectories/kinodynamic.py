@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Frozen, Value, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_exact, as_number, read_only
 from .._choices import chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
@@ -33,7 +33,7 @@ from .checks import checked_limits
 from .limits import MotionLimits
 from .path_limits import SLOWEST, PathLimits, not_held
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
-from .trajectory import Trajectory
+from .trajectory import TimingResult, Trajectory
 
 _NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
@@ -72,7 +72,7 @@ class Pose(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(Frozen, Value):
+class Plan(TimingResult):
     """The best motion that the planner found.
 
     Parameters
@@ -106,11 +106,6 @@ class Plan(Frozen, Value):
     explanation: str = ""
 
     @property
-    def duration(self) -> float:
-        """Seconds; NaN without a motion."""
-        return np.nan if self.trajectory is None else self.trajectory.duration
-
-    @property
     def evaluations(self) -> int:
         """Number of candidates that were timed."""
         return len(self.history)
@@ -121,10 +116,6 @@ class Plan(Frozen, Value):
         if not np.isfinite(self.restarts).all() or not self.restarts.size:
             return np.inf
         return float(np.ptp(self.restarts) / self.restarts.min())
-
-    def reason(self) -> str:
-        """The status as a sentence, with the end and the joint."""
-        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         lines = [f"<Plan: {self.status.name}, {self.duration:.6g} s, cost {self.cost:.6g}"]
@@ -330,7 +321,8 @@ def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], 
     load = problem.rows(q, rest, rest).held
     stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
     why = [
-        not_held(load[k : k + 1], problem.torque, [name], stuck[k : k + 1]) for k in range(len(q))
+        not_held(load[k : k + 1], problem.torque, lambda _: name, stuck[k : k + 1])
+        for k in range(len(q))
     ]
     return np.array([not text for text in why]), why[0]
 

@@ -8,6 +8,7 @@ tangent at the rates of the solution before, until these do not change any more.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -63,11 +64,6 @@ class Passes(NamedTuple):
 
 class PathLimits:
     """Limits of the motion of a robot along paths, the same for all candidate paths."""
-
-    __slots__ = (
-        "acceleration", "drives", "ends", "friction", "limits", "loaded", "lower", "model", "n",
-        "names", "rates", "scale", "torque", "upper", "viscous",
-    )  # fmt: skip
 
     def __init__(
         self, n: int, model: RobotModel | None, limits: MotionLimits | None,
@@ -234,7 +230,9 @@ class PathLimits:
         return Passes(found, -1, duration, rows)
 
 
-def not_held(held: Array, bound: Array, places: list[str], stuck: Array | float = 0.0) -> str:
+def not_held(
+    held: Array, bound: Array, place: Callable[[int], str], stuck: Array | float = 0.0
+) -> str:
     """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence; or nothing.
 
     ``stuck``: torques of dry friction that help.
@@ -244,9 +242,9 @@ def not_held(held: Array, bound: Array, places: list[str], stuck: Array | float 
         return ""
     i, j = np.unravel_index(int(margin.argmin()), margin.shape)
     return (
-        f"Gravity exceeds the torques at {places[i]}: joint {j + 1} needs {abs(held[i, j]):.6g} to "
-        f"be held still and has {bound[j]:.6g}{' and dry friction' if np.any(stuck) else ''}, a "
-        f"margin of {margin[i, j]:.4g} (N m or N)."
+        f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
+        f"{abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}"
+        f"{' and dry friction' if np.any(stuck) else ''}, margin of {margin[i, j]:.4g} (N m or N)."
     )
 
 

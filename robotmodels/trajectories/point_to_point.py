@@ -78,13 +78,7 @@ def linear(
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there.
-
-    Examples
-    --------
-    >>> linear([0.0, 0.0], [1.0, 4.0], limits=MotionLimits(velocity=2.0)).duration
-    2.00...
-    """
+    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there."""
     return along_line(TimeLaw.LINEAR, q0, q1, duration, limits, synchronisation)
 
 
@@ -99,11 +93,6 @@ def bang_bang(
 
     With asymmetric limits the two parts share the time so that both accelerations are used in
     full; without limits they are equal.
-
-    Examples
-    --------
-    >>> bang_bang(0.0, 1.0, limits=MotionLimits(acceleration=4.0)).duration
-    1.00...
     """
     return along_line(TimeLaw.BANG_BANG, q0, q1, duration, limits, synchronisation)
 
@@ -141,12 +130,6 @@ def smoothed_trapezoidal(
 
     The acceleration is continuous, also at the ends. A ramp to the velocity V takes
     ``1.5 V / acceleration``, or longer where a limit of jerk needs it.
-
-    Examples
-    --------
-    >>> limits = MotionLimits(velocity=1.0, acceleration=1.5)
-    >>> smoothed_trapezoidal(0.0, 3.0, limits=limits).duration
-    4.00...
     """
     return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
 
@@ -159,15 +142,7 @@ def cubic(
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
 ) -> Trajectory:
-    """Third-order polynomials with given velocities at the ends.
-
-    Examples
-    --------
-    >>> cubic([0.0, 1.0], [1.0, 0.0], duration=1.0).v(0.5)
-    array([ 1.5, -1.5])
-    >>> cubic(0.0, 1.0, limits=MotionLimits(velocity=0.75)).duration
-    2.00...
-    """
+    """Third-order polynomials with given velocities at the ends."""
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
     return _polynomial(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
 
@@ -252,13 +227,7 @@ def along_line(
     limits: MotionLimits | None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Motion from rest to rest by any law, for programs that choose it.
-
-    Examples
-    --------
-    >>> along_line(TimeLaw.CUBIC, 0.0, 1.0, None, MotionLimits(velocity=1.5)).duration
-    1.00...
-    """
+    """Motion from rest to rest by any law, for programs that choose it."""
     law = chosen(TimeLaw, law, "law")
     how = chosen(Synchronisation, synchronisation, "synchronisation")
     return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)

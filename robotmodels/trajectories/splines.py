@@ -126,12 +126,6 @@ def quintic_spline(
 
     The continuity of these two loses digits where intervals of time differ by more than a factor
     of 1000.
-
-    Examples
-    --------
-    >>> path = quintic_spline([0.0, 1.0, 0.5], times=[0.0, 1.0, 2.0])
-    >>> path.q([0.0, 1.0, 2.0]).round(12), path.a([0.0, 2.0]).round(9) + 0.0
-    (array([0. , 1. , 0.5]), array([0., 0.]))
     """
     from scipy.interpolate import make_interp_spline
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_number
+from .._arrays import Array, as_number
 from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
@@ -20,7 +20,7 @@ from .motions import Motion, PiecewisePolynomial, TimedMotion
 from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
-from .trajectory import Trajectory
+from .trajectory import TimingResult, Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
 _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
@@ -40,7 +40,7 @@ class TimingStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TimedPath(Frozen, Value):
+class TimedPath(TimingResult):
     """The quickest motion along a path, and what limits it.
 
     Parameters
@@ -79,15 +79,6 @@ class TimedPath(Frozen, Value):
 
     def __hash__(self) -> int:
         return hash((self.status, self.duration, self.explanation))
-
-    @property
-    def duration(self) -> float:
-        """Seconds; NaN without a motion."""
-        return np.nan if self.trajectory is None else self.trajectory.duration
-
-    def reason(self) -> str:
-        """The status as a sentence, with the place and the joint."""
-        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         lines = [f"<TimedPath: {self.status.name}"]
@@ -192,15 +183,14 @@ def time_optimal(
         rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
     ends = (rates[0], rates[1])
     rows = problem.rows(q, rate, bend)
-    places = [f"s = {value:.6g}" for value in s.tolist()]
     rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
     stuck = np.abs(problem.drag(q[rests], np.full((len(rests), n), SLOWEST)))
-    found = not_held(rows.held[rests], problem.torque, [places[k] for k in rests], stuck)
+    found = not_held(rows.held[rests], problem.torque, lambda i: f"s = {s[rests[i]]:.6g}", stuck)
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
-        found = not_held(rows.held, problem.torque, places)
+        found = not_held(rows.held, problem.torque, lambda i: f"s = {s[i]:.6g}")
         if found:
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, Value, as_floats, as_number, read_only
+from .._arrays import Array, Frozen, Rebuilt, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from .checks import counted, greatest_shown, seconds_shown
 from .limits import RATES, LimitsReport, MotionLimits
@@ -223,6 +223,25 @@ class Trajectory(Value):
             f"<Trajectory: {counted(self.n, 'joint')}, {T or 0} s{', periodic' * self.repeats}"
             f"{_motions(self.motion.batch)}\n  {greatest_shown(zip(RATES, peaks, strict=True))}>"
         )
+
+
+class TimingResult(Frozen, Value):
+    """Base of what the search of a motion under limits gives."""
+
+    __slots__ = ()
+
+    trajectory: Trajectory | None
+    status: Any
+    explanation: str
+
+    @property
+    def duration(self) -> float:
+        """Seconds; NaN without a motion."""
+        return np.nan if self.trajectory is None else self.trajectory.duration
+
+    def reason(self) -> str:
+        """The status as a sentence, with the place and the joint."""
+        return self.explanation or self.status.sentence
 
 
 def _motions(batch: tuple[int, ...]) -> str:

@@ -35,7 +35,7 @@ MUTATIONS = [
     Mutation(ROOM, "narrower limits of intervals have no effect", "bounds = (self.lower + narrow",
              "self.upper - narrow[1]", "self.upper + 0.0 * narrow[1]", PATH + "held_between"),
     Mutation(ROOM, "rates of torques without the change of the middle", "at_ends = ends @",
-             "change @ middle", "0.0 * change @ middle", PATH + "rates_of_the_torques"),
+             "change @ middle", "0.0 * change @ middle", PATH + "rates_of_torques"),
     Mutation(ROOM, "the gap is a tenth", "gap = abs(coarse",
              "abs(", "0.1 * abs(", PATH + "gap_falls"),
     Mutation(ROOM, "the law of time accelerates twice", "def law_of(s: Array",
