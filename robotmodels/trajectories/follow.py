@@ -56,16 +56,17 @@ def follow(
         s = _nearest(postures[0], valid[0], start, revolute)
     else:
         s = _best_start(postures, valid, found.within_limits[index], following, revolute)
-    after, loose = following.tolist(), np.any(found.free_joints[index], axis=-1).tolist()
-    picks: list[int] = []
+    loose, picks = np.any(found.free_joints[index], axis=-1), []
     settled: dict[int, tuple[Array, str]] = {}  # their free joints depend on the posture before
-    for k in range(index.size):
+    if not loose.any() and (following == np.arange(following.shape[-1])).all():
+        picks = [s] * index.size
+    for k in range(len(picks), index.size):
         if k - 1 in settled:
             s = _nearest(postures[k], valid[k], settled[k - 1][0], revolute)
         elif k:
-            s = after[k - 1][s]
+            s = int(following[k - 1, s])
         picks.append(s)
-        if loose[k][s]:
+        if loose[k, s]:
             settled[k] = postures[k, s], str(names[code[k, s]])
             before = settled.get(k - 1, (postures[k - 1, picks[k - 1]],))[0] if k else start
             if before is not None:

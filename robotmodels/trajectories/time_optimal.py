@@ -206,7 +206,8 @@ def time_optimal(
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
     law, slowed, tight = law_of(s, x), np.zeros(x.shape, np.bool_), np.zeros((2, points, 1))
-    use = _uses(problem, motion, law)
+    inside = _INSIDE if both_ends else _INSIDE[::2]
+    use = _uses(problem, motion, law, inside)
     if np.isfinite(problem.rates).any():
         slower = rate_limited(problem, s, q, rate, rows, x)
         if slower is None:
@@ -216,7 +217,7 @@ def time_optimal(
             )
         slowed = slower[0] < x * (1.0 - 1e-3)
         x, law = slower
-        use = _uses(problem, motion, law)
+        use = _uses(problem, motion, law, inside)
     elif both_ends:
         for _ in range(_ROUNDS):
             over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
@@ -230,7 +231,7 @@ def time_optimal(
             if then.failed >= 0 or np.isinf(then.duration):
                 break
             passes, law = then, law_of(s, then.found[:, 0])
-            x, use = passes.found[:, 0], _uses(problem, motion, law)
+            x, use = passes.found[:, 0], _uses(problem, motion, law, inside)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
     if velocity.any():
@@ -245,12 +246,12 @@ def time_optimal(
     return TimedPath(trajectory, TimingStatus.OPTIMAL, s, x, most, active, gap, why)
 
 
-def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial) -> Array:
+def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside: Array) -> Array:
     """Torques (N, P, n) at places inside the intervals, over their limits."""
     N = law.lengths.size
     if problem.model is None or not problem.loaded.size:
         return np.zeros((N, 1, problem.n))
-    timed, places = TimedMotion(motion, law), np.tile(_INSIDE, (N, 1))
+    timed, places = TimedMotion(motion, law), np.tile(inside, (N, 1))
     if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
         (v,) = timed.derivatives(law.breaks[0], (1,))
         turns = v[1:] * v[:-1] < 0.0
