@@ -43,10 +43,9 @@ from .. import se3
 from .._arrays import Array, as_exact, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.singular.task import whole_number
 from ..se3.orientation import rotation_vectors_of
 from .blends import PARABOLA, QUARTIC, rates_of, schedule
-from .checks import given_durations, limits_along, refuse_short, slowed
+from .checks import given_durations, limits_along, refuse_short, sample_count, slowed
 from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits, ranges_of
@@ -104,7 +103,7 @@ def cartesian_trajectory(
     ((50, 4, 4), True)
     """
     first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
-    law, N = chosen(TimeLaw, law, "law"), whole_number(N, "N", 0)
+    law, N = chosen(TimeLaw, law, "law"), sample_count(N)
     try:
         batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
     except ValueError:

@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics.singular.task import whole_number
 from .laws import LineLimits
 from .limits import MotionLimits, ranges_of
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
 
+_MOST = 10**9  # samples; more would be a mistake
 _EXTREME = 1e50
 """Largest size of states, durations and limits: cubes of their ratios are floats."""
 
@@ -36,6 +38,14 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
     refuse_jointless(n, " and ".join(tuple(given)[:2]))
     rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
     return rows, shape[:-1], scalar
+
+
+def sample_count(N: Any) -> int:
+    """A number of samples, not more than can be held."""
+    count = whole_number(N, "N", 0)
+    if count > _MOST:
+        raise InvalidValueError(f"N: expected at most {_MOST} samples, got more.")
+    return count
 
 
 def refuse_jointless(n: int, name: str) -> None:

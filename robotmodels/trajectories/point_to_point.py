@@ -52,8 +52,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
-from ..kinematics.singular.task import whole_number
-from .checks import checked_request, joint_vectors, limits_along, refuse_short
+from .checks import checked_request, joint_vectors, limits_along, refuse_short, sample_count
 from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .motions import PiecewisePolynomial
@@ -209,7 +208,7 @@ def joint_trajectory(
     (array([0.5, 0. ]), (5, 2))
     """
     if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
-        t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))  # type: ignore[arg-type]
+        t = np.linspace(0.0, 1.0, sample_count(N))
     else:
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
