@@ -204,11 +204,11 @@ def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
         share = used(model, timed.trajectory, torque, samples=4001)
         assert 0.99 < share.max() < 1.02
         assert (timed.active != "").mean() >= 0.95
-    alone = time_optimal(path, FREE, dry, torque, points=400).trajectory
-    at = alone.at(alone.motion.law.breaks[0][1:-1])  # at the points of the grid itself
-    share = (np.abs(rm.idm(dry, at.q, at.v, at.a)) / torque).max(axis=1)
-    assert share.max() <= 1.0 + 1e-9
-    assert np.median(share) >= 1.0 - 1e-6
+        alone = time_optimal(path, FREE, model, torque, points=400).trajectory
+        at = alone.at(alone.motion.law.breaks[0][1:-1])  # at the points of the grid itself
+        share = (np.abs(rm.idm(model, at.q, at.v, at.a)) / torque).max(axis=1)
+        assert share.max() <= 1.0 + 1e-4
+        assert np.median(share) >= 1.0 - 1e-4
     without = time_optimal(path, FREE, dry, torque, friction=False).duration
     assert without == pytest.approx(time_optimal(path, FREE, plain, torque).duration, rel=1e-12)
     own = CoulombFriction([10.0, 4.0]) + ViscousFriction([8.0, 5.0])
