@@ -1,5 +1,6 @@
 """Time-optimal motion along a path: other programs, closed forms, identities, refused input."""
 
+import dataclasses
 import json
 import pickle
 from pathlib import Path
@@ -41,9 +42,24 @@ def test_torques_beyond_their_limits_between_points_are_named():
     torque = np.array([150.0] * 3 + [28.0] * 3)
     for _ in range(3):
         path = tr.random_profile([0, -1.5, 1, 0, 0, 0], rng.normal(size=6), 3, "quintic", rng)
-        timed = time_optimal(path, None, arm, torque, both_ends=True)
+        timed = time_optimal(path, None, arm, torque, points=50)
         greatest = used(arm, timed.trajectory, torque).max()
         assert ("times its limit" in timed.reason()) == (greatest > 1.02)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_torques_are_held_between_the_points_with_limits_at_both_ends(seed):
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=4, tree=seed % 2 == 1, drive=True)
+    model = model.with_drive(dataclasses.replace(model.drive, Fc=np.zeros(model.n)))
+    path = spline(rng, model.n)
+    q = path.q(np.linspace(0, path.duration, 201))
+    torque = 3.0 + 2.0 * np.abs(rm.gravity_torque(model, q) + model.drive.offset).max(axis=0)
+    for points in (60, 200):
+        timed = time_optimal(path, FREE, model, torque, points=points, both_ends=True)
+        assert used(model, timed.trajectory, torque).max() <= 1.001
+        alone = time_optimal(path, FREE, model, torque, points=points)
+        assert timed.duration <= 1.05 * alone.duration
 
 
 def test_a_velocity_of_zero_is_named():
@@ -188,6 +204,11 @@ def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
         share = used(model, timed.trajectory, torque, samples=4001)
         assert 0.99 < share.max() < 1.02
         assert (timed.active != "").mean() >= 0.95
+        alone = time_optimal(path, FREE, model, torque, points=400).trajectory
+        at = alone.at(alone.motion.law.breaks[0][1:-1])  # at the points of the grid itself
+        share = (np.abs(rm.idm(model, at.q, at.v, at.a)) / torque).max(axis=1)
+        assert share.max() <= 1.0 + 1e-4
+        assert np.median(share) >= 1.0 - 1e-4
     without = time_optimal(path, FREE, dry, torque, friction=False).duration
     assert without == pytest.approx(time_optimal(path, FREE, plain, torque).duration, rel=1e-12)
     own = CoulombFriction([10.0, 4.0]) + ViscousFriction([8.0, 5.0])

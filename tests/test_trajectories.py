@@ -36,9 +36,9 @@ from robotmodels.trajectories import (
     straight_line,
     trapezoidal,
 )
-from robotmodels.trajectories.between_states import excess, least_duration
-from robotmodels.trajectories.number_text import least_shown
-from robotmodels.trajectories.piecewise import PiecewisePolynomial
+from robotmodels.trajectories.checks import least_shown
+from robotmodels.trajectories.motions import PiecewisePolynomial
+from robotmodels.trajectories.splines import excess, least_duration
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion
@@ -195,10 +195,7 @@ def jerk_limited_ramp(V, A, J, K):
 
 @pytest.mark.parametrize(
     ("law", "ramp"),
-    [
-        (TimeLaw.SMOOTHED_TRAPEZOIDAL, smoothed_ramp),
-        (TimeLaw.JERK_LIMITED, jerk_limited_ramp),
-    ],
+    [(TimeLaw.SMOOTHED_TRAPEZOIDAL, smoothed_ramp), (TimeLaw.JERK_LIMITED, jerk_limited_ramp)],
 )
 @pytest.mark.nightly
 def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):

@@ -37,7 +37,7 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.follow import _following
 from robotmodels.trajectories.path_events import _inverted
-from robotmodels.trajectories.paths import rotation_about
+from robotmodels.trajectories.pose_trajectory import rotation_about
 
 
 def central(f, t, h=1e-5):
@@ -287,7 +287,7 @@ def test_fourier_series_and_its_derivatives(rng):
     assert np.array_equal(pickle.loads(pickle.dumps(move)).q(t), move.q(t))
     with pytest.raises(ShapeError):
         fourier(a, b[:4], mean)
-    with pytest.raises(InvalidValueError, match="positive"):
+    with pytest.raises(InvalidValueError, match="above 0"):
         fourier(a, b, mean, period=0.0)
 
 

@@ -5,13 +5,8 @@ arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_tr
 """
 
 from .blends import blended_lines
-from .candidates import Cost
-from .cartesian import (
-    blended_poses,
-    circle,
-    circular_arc,
-    straight_line,
-)
+from .candidates import Cost, ProfileLaw, random_profile
+from .cartesian import blended_poses, cartesian_trajectory, circle, circular_arc, straight_line
 from .harmonics import FourierSeries, fourier, fourier_basis
 from .jerk import jerk_limited
 from .joint_path import JointPath, joint_path
@@ -24,15 +19,14 @@ from .point_to_point import (
     along_line,
     bang_bang,
     cubic,
+    joint_trajectory,
     linear,
     quintic,
     smoothed_trapezoidal,
     trapezoidal,
 )
 from .pose_trajectory import PoseSamples, PoseTrajectory
-from .random_profiles import ProfileLaw, random_profile
 from .resolved_motion import ResolvedMotion, resolved_motion
-from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_optimal import TimedPath, TimingStatus, time_optimal
 from .time_scaling import ScaledTrajectory, ScalingStatus, time_scaled

@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, given_durations, refuse_jointless
+from .checks import ROUNDING, checked_limits, least_shown, refuse_jointless, slowed
 from .limits import MotionLimits
-from .number_text import least_shown
-from .piecewise import PiecewisePolynomial
+from .motions import PiecewisePolynomial
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5
@@ -35,24 +34,23 @@ def blended_lines(
     """Lines through points with blends: trapezoids of velocity that do not stop at the points.
 
     Also called linear segments with parabolic blends, ``mstraj``. All joints change velocity
-    together, so that the motion is straight between blends. It passes an inner point at a
-    distance of ``blend time * change of velocity / 8`` (3/32 of it with smooth blends).
+    together, so that the motion is straight between blends. It passes an inner point at a distance
+    of ``blend time * change of velocity / 8`` (3/32 of it with smooth blends).
 
     Parameters
     ----------
     points : array_like, shape (m,) or (m, n)
         Positions, rad or m, at least two.
     duration : float, optional
-        Seconds; default what the limits or the times make it. Longer than the least, it slows the
-        whole motion down evenly.
+        Seconds; longer than the least, it slows the whole motion down evenly.
     limits : MotionLimits, optional
         Velocity and acceleration, with smooth blends also jerk. Each line is as quick as it may
         be; where the blends of a line would overlap, it is slowed down.
     segment_times : array_like, shape () or (m - 1,), optional
         Seconds from corner to corner instead.
     blend_times : array_like, shape () or (m,), optional
-        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
-        The motion starts and ends half a blend before and after the time of its end points.
+        Seconds of each blend, with ``segment_times``; default the least that the limits allow. The
+        motion starts and ends half a blend before and after the time of its end points.
     smooth : bool
         Whether the blends keep the acceleration continuous.
 
@@ -64,8 +62,8 @@ def blended_lines(
     Raises
     ------
     ShapeError, InvalidValueError
-        Fewer than two points; neither limits nor times; blends that overlap; a duration that is
-        too short, with the least one; limits that are missing, zero, or not kept.
+        Fewer than two points; neither limits nor times; blends that overlap; a duration below the
+        least, which is in the message; limits that are missing, zero, or not kept.
 
     References
     ----------
@@ -110,17 +108,7 @@ def blended_lines(
                 f"The blends at the ends of line {k + 1} overlap: it needs at least "
                 f"{least_shown(0.5 * (tb[k] + tb[k + 1]), 9)} s, and has {T[k]:.9g} s."
             )
-    least = float(T.sum() + 0.5 * (tb[0] + tb[-1]))
-    wanted = given_durations(duration, ())
-    if wanted is not None and least > 0.0:
-        if bounds is not None and wanted[0] < least * (1.0 - ROUNDING):
-            raise InvalidValueError(
-                f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
-                f"{least_shown(least)} s."
-            )
-        if wanted[0] == 0.0:
-            raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
-        T, tb = T * (wanted[0] / least), tb * (wanted[0] / least)
+    T, tb = slowed(T, tb, duration, bounds is not None)
     trajectory = Trajectory(_joined(q, step, T, tb, smooth), scalar)
     if bounds is not None and not (report := trajectory.check(bounds, 1e-9)).kept:
         raise InvalidValueError(
@@ -146,6 +134,11 @@ def schedule(T: Array, blends: Callable[[Array], Array]) -> tuple[Array, Array]:
         need = 0.5 * (tb[:-1] + tb[1:])
         T = T * float(np.sqrt(max(1.0, (need / np.where(T > 0.0, T, 1.0)).max())))
     return T * (1.0 + 1e-13), blends(T)
+
+
+def rates_of(step: Array, T: Array) -> Array:
+    """Velocities (m - 1, n) of lines, zero where they take no time."""
+    return np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
 
 
 def _full_speed(step: Array, limits: MotionLimits) -> Array:
@@ -175,8 +168,7 @@ def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> 
             "limits: the acceleration of a parabolic blend jumps, which keeps no limit of jerk; "
             "pass limits.without_jerk(), or smooth=True."
         )
-    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
-    change = np.diff(v, axis=0, prepend=0.0, append=0.0)
+    change = np.diff(rates_of(step, T), axis=0, prepend=0.0, append=0.0)
     A = np.where(change > 0.0, limits.acceleration, -limits.acceleration_lower)
     by_j = np.sqrt(6.0 * np.abs(change) / J) if smooth else np.zeros_like(change)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -190,7 +182,7 @@ def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> 
 def _joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> PiecewisePolynomial:
     """Blend, line, blend, and so on to the last blend."""
     m, n = q.shape
-    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
+    v = rates_of(step, T)
     before, after = np.vstack((np.zeros(n), v)), np.vstack((v, np.zeros(n)))
     c = np.zeros((2 * m - 1, 5 if smooth else 3, n))
     h = np.zeros(2 * m - 1)

@@ -44,16 +44,22 @@ from .._arrays import Array, as_exact, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
-from .blends import PARABOLA, QUARTIC, schedule
-from .checks import ROUNDING, given_durations, limits_along, refuse_short
+from .blends import PARABOLA, QUARTIC, rates_of, schedule
+from .checks import given_durations, limits_along, refuse_short, sample_count, slowed
 from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
-from .limits import MotionLimits
-from .number_text import least_shown
-from .paths import BlendedPoses, FixedAxisPath, arc, line, rotation_about
-from .piecewise import PiecewisePolynomial
-from .point_to_point import Synchronisation, along_line, assembled, stretched
-from .pose_trajectory import PoseTrajectory
+from .limits import MotionLimits, ranges_of
+from .motions import PiecewisePolynomial
+from .point_to_point import along_line, assembled
+from .pose_trajectory import (
+    BlendedPoses,
+    FixedAxisPath,
+    PoseTrajectory,
+    arc,
+    axis_and_angle,
+    line,
+    rotation_about,
+)
 from .trajectory import Trajectory
 
 _MOVES = ("translation", "rotation")
@@ -64,6 +70,59 @@ _NO_TURN = 1e-15
 _FLAT = 1e-9
 """Height of three points beside their longest side below which they are on a line. Down to it an
 arc passes them within some 1e-15 of their coordinates, however far away its centre is."""
+
+
+def cartesian_trajectory(
+    T0: Any, T1: Any, N: int, law: TimeLaw | str = TimeLaw.TRAPEZOIDAL
+) -> Array:
+    """Poses on the straight line between two poses, at equal steps of time.
+
+    Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
+    orientation turns about one fixed axis by the shorter way (slerp), both by the same law, by
+    default a trapezoid of velocity whose ramps take a third of the time each.
+
+    Parameters
+    ----------
+    T0, T1 : array_like, shape (..., 4, 4)
+        First and last poses, m; leading axes broadcast.
+    N : int
+        Number of poses, both ends included; a single one is ``T0``.
+    law : TimeLaw or str
+        A member or its name; not `TimeLaw.JERK_LIMITED`, whose shape depends on limits.
+
+    Returns
+    -------
+    ndarray, shape (..., N, 4, 4)
+        Poses. The first and the last are those given.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> T = cartesian_trajectory(np.eye(4), translation(0.3, 0, 0) @ rotation("z", 1.0), 50)
+    >>> T.shape, bool((T[0] == np.eye(4)).all())
+    ((50, 4, 4), True)
+    """
+    first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
+    law, N = chosen(TimeLaw, law, "law"), sample_count(N)
+    try:
+        batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
+    except ValueError:
+        raise ShapeError(
+            f"The leading (batch) axes do not broadcast: T0 {first.shape}, T1 {last.shape}."
+        ) from None
+    first, last = (np.broadcast_to(T, (*batch, 4, 4))[..., None, :, :] for T in (first, last))
+    s = along_line(law, 0.0, 1.0, 1.0, None).q(np.linspace(0.0, 1.0, N))  # part of the way
+    R0 = first[..., :3, :3]
+    # the turn seen in the world's axes
+    axis, angle = axis_and_angle(rotation_vectors_of(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
+    T = np.zeros((*batch, N, 4, 4))
+    T[..., :3, :3] = rotation_about(axis, angle * s) @ R0
+    T[..., :3, 3] = first[..., :3, 3] + s[:, None] * (last[..., :3, 3] - first[..., :3, 3])
+    T[..., 3, 3] = 1.0
+    if N:
+        T[..., -1:, :, :] = last
+        T[..., :1, :, :] = first
+    return T
 
 
 def straight_line(
@@ -103,13 +162,6 @@ def circular_arc(
     Also called MOVEC. ``through (3,)`` is the position on the arc between the poses, m. The
     orientation takes the shorter rotation from the first to the last. Points that are on a line to
     within 1e-9 of their longest side, or to within their rounding, are an error.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> half = circular_arc(translation(1, 0, 0), [0, 1, 0], translation(-1, 0, 0), duration=2.0)
-    >>> half.pose(1.0)[:3, 3].round(12)
-    array([0., 1., 0.])
     """
     first, last = se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1")
     p, m, e = first[:3, 3], as_exact(through, (3,), "through"), last[:3, 3]
@@ -152,13 +204,6 @@ def circle(
     The axis goes through ``centre (3,)``, m, in the direction of ``axis (3,)``; the tool turns
     about it to the right by ``angle``, rad. With ``turning`` the orientation turns with it, instead
     of being kept. A pose on the axis is an error.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> round_trip = circle(translation(1, 0, 0), [0, 0, 0], [0, 0, 1], duration=4.0)
-    >>> round_trip.pose(2.0)[:3, 3].round(12)
-    array([-1.,  0.,  0.])
     """
     first = se3.as_single_pose(T0, "T0")
     point, direction = as_exact(centre, (3,), "centre"), as_exact(axis, (3,), "axis")
@@ -184,10 +229,7 @@ def circle(
 
 
 def blended_poses(
-    poses: Any,
-    limits: MotionLimits,
-    duration: float | None = None,
-    smooth: bool = False,
+    poses: Any, limits: MotionLimits, duration: float | None = None, smooth: bool = False
 ) -> PoseTrajectory:
     """Straight lines through poses, joined by blends that do not meet the inner poses.
 
@@ -195,14 +237,6 @@ def blended_poses(
     position at a distance of ``blend time * change of velocity / 8`` (3/32 of it with ``smooth``
     blends, whose acceleration is continuous). A longer ``duration`` slows the whole motion down
     evenly; limits of jerk are refused.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> corners = [translation(0, 0, 0), translation(1, 0, 0), translation(1, 1, 0)]
-    >>> path = blended_poses(corners, MotionLimits(velocity=1.0, acceleration=4.0))
-    >>> path.duration, path.pose(path.duration)[:3, 3]
-    (2.25..., array([1., 1., 0.]))
     """
     T = se3.as_pose(poses, "poses")
     if T.ndim != 3 or len(T) < 2:
@@ -226,16 +260,8 @@ def blended_poses(
     with np.errstate(divide="ignore", invalid="ignore"):
         least_T = np.where(size > 0.0, size / bounds.velocity[:, None], 0.0).max(axis=0)
     times, tb = schedule(least_T, lambda t: _pose_blends(step, t, bounds, smooth))
-    total = float(times.sum() + 0.5 * (tb[0] + tb[-1]))
-    wanted = given_durations(duration, ())
-    if wanted is not None and total > 0.0:
-        if wanted[0] < total * (1.0 - ROUNDING):
-            raise InvalidValueError(
-                f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
-                f"{least_shown(total)} s."
-            )
-        times, tb = times * (wanted[0] / total), tb * (wanted[0] / total)
-    twists = np.where(times[:, None] > 0.0, step / np.where(times > 0.0, times, 1.0)[:, None], 0.0)
+    times, tb = slowed(times, tb, duration, True)
+    twists = rates_of(step, times)
     corners = 0.5 * tb[0] + np.concatenate(((0.0,), np.cumsum(times)))
     path = BlendedPoses(T, twists, corners, tb, smooth)
     end = path.end
@@ -247,41 +273,29 @@ def blended_poses(
 def _timed(
     path: FixedAxisPath, duration: float | None, limits: MotionLimits | None, law: TimeLaw | str
 ) -> PoseTrajectory:
-    law = chosen(TimeLaw, law, "law")
-    bounds = _of_space(limits)
+    """Motion along a path from rest to rest by a law."""
+    law, bounds = chosen(TimeLaw, law, "law"), _of_space(limits)
     turn = abs(path.turn)
     size = np.array([path.length, turn if turn > _NO_TURN else 0.0])
     of_s = None
     if bounds is not None:
         V, A, B, J, K, _ = limits_along(bounds, size[None, None, :], _MOVES)
-        of_s = MotionLimits(
-            velocity=V, acceleration=A, jerk=J,
-            velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K,
-        )  # fmt: skip
+        of_s = MotionLimits(V, A, J, velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K)
     goal = np.ones(1) if size.any() else np.zeros(1)
-    if (
-        bounds is not None
-        and path.radius > 0.0
-        and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any()
+    curved = bounds is not None and path.radius > 0.0
+    if bounds is None or not (
+        curved and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any()
     ):
-        along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
-        T = given_durations(duration, ())
-        pieces = circle_law(law, _of_circle(path, bounds))
-        least = pieces.durations.sum(axis=-1)
-        refuse_short(T, least, np.ones((1, 1)))
-        pieces = stretched(pieces, T, least, Synchronisation.COORDINATED, 1)
-        moves = assembled(pieces, 1, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
-    else:
         moves = along_line(law, np.zeros(1), goal, duration, of_s)
-    return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
-
-
-def _of_circle(path: FixedAxisPath, limits: MotionLimits) -> CircleLimits:
-    V, A, J = (
-        (float(bound[0]), float(bound[1]))
-        for bound in (limits.velocity, limits.acceleration, limits.jerk)
+        return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
+    along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
+    T, pairs = given_durations(duration, ()), (bounds.velocity, bounds.acceleration, bounds.jerk)
+    V, A, J = ((float(move), float(spin)) for move, spin in pairs)
+    pieces = circle_law(law, CircleLimits(path.length, path.radius, turn, V, A, J))
+    refuse_short(T, pieces.durations.sum(axis=-1), np.ones((1, 1)))
+    return PoseTrajectory(
+        path, assembled(pieces, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
     )
-    return CircleLimits(path.length, path.radius, abs(path.turn), V, A, J)
 
 
 def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
@@ -300,11 +314,7 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
             "a path in space."
         )
     bounds = limits.for_joints(2)
-    if (
-        (bounds.velocity_lower != -bounds.velocity).any()
-        or (bounds.acceleration_lower != -bounds.acceleration).any()
-        or (bounds.jerk_lower != -bounds.jerk).any()
-    ):
+    if any((least != -most).any() for _, least, most in ranges_of(bounds)[1:]):
         raise InvalidValueError("limits: those of a path in space are lengths, alike both ways.")
     if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
         raise InvalidValueError("limits: a path in space has no limits of position.")
@@ -313,9 +323,8 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
 
 def _pose_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> Array:
     """Least times of the blends of poses, shape (m,)."""
-    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
-    before = np.vstack((np.zeros(6), v))
-    after = np.vstack((v, np.zeros(6)))
+    v, none = rates_of(step, T), np.zeros((1, 6))
+    before, after = np.vstack((none, v)), np.vstack((v, none))
     peak = QUARTIC if smooth else PARABOLA
     change = after - before
     # the two rotations do not commute: what is left of the product of their rates is not faded.

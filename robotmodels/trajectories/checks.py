@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,14 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics.singular.task import whole_number
 from .laws import LineLimits
-from .limits import MotionLimits
-from .number_text import least_shown
+from .limits import MotionLimits, ranges_of
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
 
+_MOST = 10**9  # samples; more would be a mistake
 _EXTREME = 1e50
 """Largest size of states, durations and limits: cubes of their ratios are floats."""
 
@@ -36,6 +38,14 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
     refuse_jointless(n, " and ".join(tuple(given)[:2]))
     rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
     return rows, shape[:-1], scalar
+
+
+def sample_count(N: Any) -> int:
+    """A number of samples, not more than can be held."""
+    count = whole_number(N, "N", 0)
+    if count > _MOST:
+        raise InvalidValueError(f"N: expected at most {_MOST} samples, got more.")
+    return count
 
 
 def refuse_jointless(n: int, name: str) -> None:
@@ -62,14 +72,12 @@ def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] 
         zero = (u != 0.0) & (bound == 0.0)
         if needed and zero.any():
             j = int(np.argwhere(zero)[0][-1])
+            what, other = f"joint {j + 1}", "leave the joint where it is"
             if names:
-                raise InvalidValueError(
-                    f"limits: the {name} of {names[j]} is limited to 0, but the path asks for "
-                    f"{names[j]}; any other limit will do, or poses without {names[j]}."
-                )
+                what, other = names[j], f"take poses without {names[j]}"
             raise InvalidValueError(
-                f"limits: a limit of {name} of joint {j + 1} is 0, but it has to move; any "
-                "other limit will do, or leave the joint where it is."
+                f"limits: the limit of {name} of {what} is 0, but it has to move; any other limit "
+                f"will do, or {other}."
             )
         with np.errstate(over="ignore"):
             bound = np.where(u != 0.0, bound / size, np.inf)
@@ -138,18 +146,71 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
 
 
-def refuse_extremes(states: dict[str, Array], limits: MotionLimits | None) -> None:
-    """Refuse states, durations and limits whose powers overflow or underflow."""
-    bounds = {} if limits is None else {
-        f"limits: {name}": np.abs(getattr(limits, name))
-        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk",
-                     "jerk_lower")
-    }  # fmt: skip
-    for name, given in (*((k, np.abs(v)) for k, v in states.items()), *bounds.items()):
-        small = (given > 0.0) & (given < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
-        wrong = np.isfinite(given) & ((given > _EXTREME) | small)
+def slowed(T: Array, blends: Array, duration: ArrayLike | None, kept: bool) -> tuple[Array, Array]:
+    """Times (m - 1,) of lines and (m,) of their blends, evenly stretched to a whole duration.
+
+    ``kept``: whether limits make the given times the least ones.
+    """
+    least = float(T.sum() + 0.5 * (blends[0] + blends[-1]))
+    wanted = given_durations(duration, ())
+    if wanted is None or least == 0.0:
+        return T, blends
+    refuse_short(wanted, np.array([least if kept else 0.0]), np.ones((1, 1)))
+    return T * (wanted[0] / least), blends * (wanted[0] / least)
+
+
+def checked_request(
+    states: dict[str, Array], batch: tuple[int, ...], duration: Any, limits: MotionLimits | None
+) -> tuple[Array | None, MotionLimits | None]:
+    """Durations (R,) and limits of a motion between states (R, n); at least one of the two.
+
+    States, durations and limits whose powers overflow or underflow are refused.
+    """
+    T = given_durations(duration, batch)
+    if T is None and limits is None:
+        raise InvalidValueError("Give duration, limits or both.")
+    bounds = checked_limits(limits, states["q0"].shape[1], states["q0"], states["q1"])
+    given = states if T is None else states | {"duration": T}
+    if bounds is not None:
+        for name, least, most in ranges_of(bounds)[1:]:
+            given = given | {f"limits: {name}": most, f"limits: {name}_lower": least}
+    for name, values in given.items():
+        size = np.abs(values)
+        small = (size > 0.0) & (size < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
+        wrong = np.isfinite(size) & ((size > _EXTREME) | small)
         if wrong.any():
             raise InvalidValueError(
                 f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0), got "
-                f"{given[wrong][0]:.3g}; check the units."
+                f"{size[wrong][0]:.3g}; check the units."
             )
+    return T, bounds
+
+
+def least_shown(value: float, digits: int = 12) -> str:
+    """A least value in few digits, rounded up: it is accepted when it is passed back."""
+    text = f"{value:.{digits}g}"
+    up = value + abs(value) * 10.0 ** (1 - digits)
+    return text if float(text) >= value else f"{up:.{digits}g}"
+
+
+def counted(number: int, one: str) -> str:
+    """Number with its noun."""
+    return f"{number} {one}" if number == 1 else f"{number} {one}s"
+
+
+def greatest_shown(rows: Iterable[tuple[str, Array]]) -> str:
+    """The greatest sizes of quantities of joints, and which joint has them."""
+    texts = []
+    for name, values in rows:
+        size = np.abs(np.where(np.isnan(values), 0.0, values)).reshape(-1, values.shape[-1])
+        if size.size:
+            size = size.max(axis=0)
+            joint = f" (joint {int(size.argmax()) + 1})" if size.size > 1 and size.any() else ""
+            texts.append(f"{name} {size.max():.4g}{joint}")
+    return "greatest " + ", ".join(texts) if texts else "no values"
+
+
+def seconds_shown(t: Array) -> str:
+    """The times of samples. Shapes: t (N,)."""
+    times = f" from {t[0]:.4g} s to {t[-1]:.4g} s" if t.size > 1 else ""
+    return counted(t.size, "sample") + (f" at {t[0]:.4g} s" if t.size == 1 else times)

@@ -16,7 +16,6 @@ from ..model import RobotModel
 
 _STEP = 0.5
 """A posture found by steps from the last is taken when it is as near as this, rad or m."""
-
 _NEAR = 0.05
 """A posture with the same number that is as near as this goes on from the last, rad or m."""
 
@@ -32,89 +31,58 @@ class Followed(NamedTuple):
     reason: Callable[[int], str]
 
 
+def revolute_joints(model: RobotModel) -> NDArray[np.bool_]:
+    """Which joints turn (n,)."""
+    return model.table.sigma[model.table.joint_rows] == REVOLUTE
+
+
 def follow(
     model: RobotModel,
-    T: Array,
     found: IGMSolutions,
     start: Array | None,
     solve: Callable[[int, Array], IGMSolutions],
 ) -> Followed:
-    """Choose the posture of every pose that continues the one before.
-
-    Shapes: T (N, 4, 4), start (n,).
-    """
-    N, n = len(T), model.n
-    names = np.array((*found.labels, ""))
-    q, branch = np.full((N, n), np.nan), np.zeros(N, names.dtype)
-    status, missing = np.array(found.status), _missing(found)
-    index = np.flatnonzero(found.valid.any(axis=-1)) if N else np.zeros(0, np.int64)
-    reached = np.zeros(N, np.bool_)
-    reached[index] = True
+    """Choose the posture of every pose that continues the one before. Shapes: start (n,)."""
+    names, revolute = np.array((*found.labels, "")), revolute_joints(model)
+    reached = np.atleast_1d(found.valid.any(axis=-1))
+    q, branch = np.full((reached.size, model.n), np.nan), np.zeros(reached.size, names.dtype)
+    rows = Followed(q, reached, np.array(found.status), branch, _missing(found), found.reason)
+    index = np.flatnonzero(reached)
     if index.size == 0:
-        return Followed(q, reached, status, branch, missing, found.reason)
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    postures, valid = found.q[index], found.valid[index]
+        return rows
+    postures, valid, code = found.q[index], found.valid[index], found.code[index]
     following = _following(postures, valid, revolute)
     if start is not None:
-        distance = posture_distance(postures[0], start, revolute)
-        s = int(np.where(valid[0], distance, np.inf).argmin())
+        s = _nearest(postures[0], valid[0], start, revolute)
     else:
         s = _best_start(postures, valid, found.within_limits[index], following, revolute)
-    loose: NDArray[np.bool_] = np.any(found.free_joints[index], axis=-1)
-    picks, settled = [s] * len(index), {}
-    if loose.any():
-        picks, settled = _settled(
-            postures, valid, names[found.code[index]], loose, following, s, revolute, start,
-            lambda k, near: solve(int(index[k]), near),
-        )  # fmt: skip
-    elif (following != np.arange(following.shape[-1])).any():
-        after = following.tolist()
-        for k in range(1, len(index)):
-            picks[k] = after[k - 1][picks[k - 1]]
-    q[index] = postures[np.arange(len(index)), picks]
-    branch[index] = names[found.code[index, picks]]
+    loose, picks = np.any(found.free_joints[index], axis=-1), []
+    settled: dict[int, tuple[Array, str]] = {}  # their free joints depend on the posture before
+    if not loose.any() and (following == np.arange(following.shape[-1])).all():
+        picks = [s] * index.size
+    for k in range(len(picks), index.size):
+        if k - 1 in settled:
+            s = _nearest(postures[k], valid[k], settled[k - 1][0], revolute)
+        elif k:
+            s = int(following[k - 1, s])
+        picks.append(s)
+        if loose[k, s]:
+            settled[k] = postures[k, s], str(names[code[k, s]])
+            before = settled.get(k - 1, (postures[k - 1, picks[k - 1]],))[0] if k else start
+            if before is not None:
+                one = solve(int(index[k]), before)
+                best = _nearest(one.q, one.valid, before, revolute)
+                settled[k] = one.q[best], str(one.branch[best])
+    q[index] = postures[np.arange(index.size), picks]
+    branch[index] = names[code[np.arange(index.size), picks]]
     for k, (posture, label) in settled.items():
         q[index[k]], branch[index[k]] = posture, label
-    return Followed(q, reached, status, branch, missing, found.reason)
+    return rows
 
 
-def _settled(
-    postures: Array,
-    valid: NDArray[np.bool_],
-    branch: NDArray[np.str_],
-    loose: NDArray[np.bool_],
-    following: NDArray[np.int64],
-    s: int,
-    revolute: NDArray[np.bool_],
-    start: Array | None,
-    solve: Callable[[int, Array], IGMSolutions],
-) -> tuple[list[int], dict[int, tuple[Array, str]]]:
-    """Numbers of the postures taken, and those that were solved again, with their labels.
-
-    Postures with free joints depend on the reference, which is the posture before.
-    """
-    after, again = following.tolist(), False
-    picks = [s] * len(postures)
-    settled: dict[int, tuple[Array, str]] = {}
-    before = start
-    for k in range(len(postures)):
-        if again and before is not None:
-            distance = posture_distance(postures[k], before, revolute)
-            s = int(np.where(valid[k], distance, np.inf).argmin())
-        elif k:
-            s = after[k - 1][s]
-        picks[k] = s
-        again = bool(loose[k, s])
-        if again:
-            reference = before if k == 0 or k - 1 in settled else postures[k - 1, picks[k - 1]]
-            if reference is not None:
-                one = solve(k, reference)
-                distance = posture_distance(one.q, reference, revolute)
-                best = int(np.where(one.valid, distance, np.inf).argmin())
-                settled[k] = one.q[best], str(one.branch[best])
-            before = settled[k][0] if k in settled else postures[k, s]
-            settled.setdefault(k, (before, str(branch[k, s])))
-    return picks, settled
+def _nearest(q: Array, valid: NDArray[np.bool_], near: Array, revolute: NDArray[np.bool_]) -> int:
+    """Number of the posture (S, n) that is nearest to another one (n,)."""
+    return int(np.where(valid, posture_distance(q, near, revolute), np.inf).argmin())
 
 
 def follow_singly(
@@ -125,7 +93,7 @@ def follow_singly(
     go_on: Callable[[int, Array], IGMSolutions],
 ) -> Followed:
     """Solve pose by pose, each from the posture before: for arms with a choice of postures."""
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    revolute = revolute_joints(model)
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
     status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
     missing = np.full((N, 6), np.nan)
@@ -141,15 +109,11 @@ def follow_singly(
                 continue
         one = solve(k, before)
         status[k], reasons[k], missing[k] = one.status, one.reason(), _missing(one)
-        if not one.valid.any():
-            continue
-        s = 0
-        if before is not None:
-            distance = posture_distance(one.q, before, revolute)
-            s = int(np.where(one.valid, distance, np.inf).argmin())
-        before = q[k] = one.q[s]
-        reached[k], labels[k] = True, str(one.branch[s])
-        steps = not one.method.endswith("arm angle")
+        if one.valid.any():
+            s = 0 if before is None else _nearest(one.q, one.valid, before, revolute)
+            before = q[k] = one.q[s]
+            reached[k], labels[k] = True, str(one.branch[s])
+            steps = not one.method.endswith("arm angle")
     branch = np.array(labels, dtype=np.str_)
     return Followed(q, reached, status, branch, missing, reasons.__getitem__)
 
@@ -169,9 +133,7 @@ def continuous(
 
     Shapes: q (N, n), reached (N,), start (n,) -> (N, n).
     """
-    turn = 2.0 * np.pi
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    out = q.copy()
+    turn, revolute, out = 2.0 * np.pi, revolute_joints(model), q.copy()
     if not reached.any():
         return out
     rows = q[reached]
@@ -179,10 +141,9 @@ def continuous(
     if start is not None:
         shift = np.round((start - rows[0]) / turn)
     else:
-        low, high = rows.min(axis=0), rows.max(axis=0)
         with np.errstate(invalid="ignore"):
-            up = np.ceil((model.lower - low) / turn - 1e-12)
-            down = np.floor((model.upper - high) / turn + 1e-12)
+            up = np.ceil((model.lower - rows.min(axis=0)) / turn - 1e-12)
+            down = np.floor((model.upper - rows.max(axis=0)) / turn + 1e-12)
         shift = np.where(up > 0.0, up, np.where(down < 0.0, down, 0.0))
         # only where the whole of the path then fits
         shift = np.where(np.isfinite(shift) & (up <= down), shift, 0.0)
@@ -196,11 +157,9 @@ def _following(
     """For every posture the one of the next pose that goes on from it, shape (M - 1, S)."""
     from ..kernels.posture_chains import following_postures
 
-    M, S = valid.shape
-    following = np.empty((max(M - 1, 0), S), np.int64)
-    following_postures(
-        np.ascontiguousarray(postures), np.ascontiguousarray(valid), revolute, _NEAR, following
-    )
+    postures, valid = np.ascontiguousarray(postures), np.ascontiguousarray(valid)
+    following = np.empty((max(len(valid) - 1, 0), valid.shape[1]), np.int64)
+    following_postures(postures, valid, revolute, _NEAR, following)
     return following
 
 
@@ -222,10 +181,5 @@ def _best_start(
     ordinary = np.median(steps, axis=0) if M > 1 else np.zeros(S)
     jumps = (steps > np.maximum(0.3, 8.0 * ordinary)).sum(axis=0)
     outside = (~np.take_along_axis(inside, chains, axis=1)).sum(axis=0)
-    ranks = [
-        (int(jumps[s]), int(outside[s]), float(steps[:, s].sum()))
-        if valid[0, s]
-        else (M + 1, 0, 0.0)
-        for s in range(S)
-    ]
-    return min(range(S), key=ranks.__getitem__)
+    ranks = np.lexsort((steps.sum(axis=0), outside, jumps, ~valid[0]))
+    return int(ranks[0])

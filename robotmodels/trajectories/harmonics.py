@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, read_only
+from .._arrays import Array, Rebuilt, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from .trajectory import Trajectory
 
@@ -23,32 +22,22 @@ _TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FourierSeries:
-    """Finite Fourier series of n joints.
+class FourierSeries(Rebuilt):
+    """Finite Fourier series of n joints, with period ``2 pi / w``.
 
-    ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``, so that ``a`` and ``b`` are the
+    ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``: ``a`` and ``b`` are the
     amplitudes of the velocity.
 
     Parameters
     ----------
     period : float
-        Seconds, ``w = 2 pi / period``.
+        Seconds.
     a, b : array_like, shape (H, n)
         Amplitudes of the velocity, rad/s or m/s.
     mean : array_like, shape (n,)
         Middle of the motion, rad or m.
     periods : float
         How many the motion lasts.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Amplitudes that do not fit each other, a period that is not positive.
-
-    Examples
-    --------
-    >>> FourierSeries(2.0, [[1.0]], [[0.0]], [0.0]).duration
-    array(2.)
     """
 
     period: float
@@ -66,10 +55,7 @@ class FourierSeries:
                 f"{a.shape}, {b.shape} and {mean.shape}."
             )
         for name in ("period", "periods"):
-            value = float(as_floats(getattr(self, name), name))
-            if value <= 0.0:
-                raise InvalidValueError(f"{name}: expected a positive number, got {value:g}.")
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
         for name, value in (("a", a), ("b", b), ("mean", mean)):
             object.__setattr__(self, name, read_only(value))
 
@@ -133,30 +119,22 @@ class FourierSeries:
             low[j], high[j] = value[:, j].min() - slack, value[:, j].max() + slack
         return low, high
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
 
 def fourier(
-    a: ArrayLike,
-    b: ArrayLike,
-    mean: ArrayLike = 0.0,
-    period: float = 10.0,
-    periods: float = 1.0,
+    a: ArrayLike, b: ArrayLike, mean: ArrayLike = 0.0, period: float = 10.0, periods: float = 1.0
 ) -> Trajectory:
-    """Periodic motion, a finite Fourier series with analytic derivatives.
+    """Periodic motion, a finite Fourier series with analytic derivatives, defined at every time.
 
     Parameters
     ----------
     a, b : array_like, shape (H,) or (H, n)
-        Amplitudes of the sine and cosine terms, such that the velocity is
-        ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
+        Amplitudes of the velocity ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
     mean : array_like, shape () or (n,)
         Middle of the motion, rad or m.
     period : float
         Seconds; ``w = 2 pi / period``.
     periods : float
-        How many the motion lasts. It is defined at every time.
+        How many the motion lasts.
 
     Returns
     -------
@@ -190,7 +168,7 @@ def fourier(
 
 
 def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -> Array:
-    """The functions of which a Fourier motion is a sum: its gradient by its own parameters.
+    """Basis of Fourier motions: the derivative of an order as a matrix of its own parameters.
 
     Parameters
     ----------
@@ -206,12 +184,7 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
     Returns
     -------
     ndarray, shape (N, 2 H + 1)
-        ``basis @ [mean, a_1 .. a_H, b_1 .. b_H]`` is the derivative of that order of the motion.
-
-    Raises
-    ------
-    InvalidValueError
-        NaN, numbers that are not positive.
+        ``basis @ [mean, a_1 .. a_H, b_1 .. b_H]`` is the derivative.
 
     Examples
     --------
@@ -227,27 +200,18 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
         )
     if int(order) != order or order < 0:
         raise InvalidValueError(f"order: expected a whole number from 0, got {order!r}.")
-    return _basis(*_waves(t, period, int(harmonics)), period, int(order))
+    H = int(harmonics)
+    one = np.eye(2 * H + 1)  # a series for each parameter
+    series = FourierSeries(period, one[1 : H + 1], one[H + 1 :], one[0])
+    return series.derivatives(t, (int(order),))[0]
 
 
 def _waves(t: Array, period: float, H: int) -> tuple[Array, Array]:
     """Cosines and sines (N, H) of the harmonics; the time is brought into one period first."""
     angle = 2.0 * np.pi * np.remainder(t / period, 1.0)
-    c1, s1 = np.cos(angle), np.sin(angle)
     c, s = np.empty((H, t.size)), np.empty((H, t.size))
-    for k in range(H):
-        if k == 0:
-            c[0], s[0] = c1, s1
-        else:
-            c[k] = c[k - 1] * c1 - s[k - 1] * s1
-            s[k] = s[k - 1] * c1 + c[k - 1] * s1
+    c[:1], s[:1] = c1, s1 = np.cos(angle), np.sin(angle)
+    for k in range(1, H):
+        c[k] = c[k - 1] * c1 - s[k - 1] * s1
+        s[k] = s[k - 1] * c1 + c[k - 1] * s1
     return c.T, s.T
-
-
-def _basis(c: Array, s: Array, period: float, order: int) -> Array:
-    H = c.shape[-1]
-    scale = (2.0 * np.pi / period * np.arange(1, H + 1)) ** (order - 1)
-    # velocity: a cos + b sin; each derivative turns cos into -sin and sin into cos
-    of_a, of_b = ((s, -c), (c, s), (-s, c), (-c, -s))[order % 4]
-    first = np.ones((len(c), 1)) if order == 0 else np.zeros((len(c), 1))
-    return np.hstack((first, of_a * scale, of_b * scale))

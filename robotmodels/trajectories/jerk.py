@@ -15,23 +15,20 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .checks import (
-    ROUNDING,
-    checked_limits,
-    given_durations,
-    joint_vectors,
-    limits_along,
-    refuse_extremes,
-)
+from .checks import ROUNDING, checked_request, joint_vectors, least_shown, limits_along
 from .laws import TimeLaw
 from .limits import MotionLimits
-from .number_text import least_shown
-from .piecewise import PiecewisePolynomial
-from .point_to_point import Synchronisation, along_line
+from .motions import PiecewisePolynomial
+from .point_to_point import Synchronisation, law_motion
 from .trajectory import Trajectory
 
 _PHASES = 9  # two that bring a start back inside the limits, and seven
 _STATES = ("q0", "q1", "v0", "v1", "a0", "a1")
+_GIVEN = (
+    *("current_position", "current_velocity", "current_acceleration"),
+    *("target_position", "target_velocity", "target_acceleration"),
+    *("max_velocity", "min_velocity", "max_acceleration", "min_acceleration", "max_jerk"),
+)  # as ruckig calls them
 
 
 def jerk_limited(
@@ -47,9 +44,9 @@ def jerk_limited(
 ) -> Trajectory:
     """The quickest motion under limits of velocity, acceleration and jerk, between any states.
 
-    Also called double S, seven-phase profile, online trajectory generation. Coordinated joints
-    stay on the straight line between the postures, which states at the ends must lie along;
-    joints that share the time only may start and end in any state.
+    Also called double S, seven-phase profile, online trajectory generation. Coordinated joints stay
+    on the straight line between the postures, which states at the ends must lie along; joints that
+    share the time only may start and end in any state.
 
     Parameters
     ----------
@@ -58,9 +55,9 @@ def jerk_limited(
     duration : array_like, shape () or (...), optional
         Seconds; default the least.
     limits : MotionLimits
-        Of velocity, acceleration and jerk, which may be asymmetric; all but that of jerk may be
-        infinite. Where a state at an end moves, ruckig keeps the smaller limit of jerk both ways:
-        only from rest to rest is the motion then the quickest.
+        May be asymmetric; all but that of jerk may be infinite. Where a state at an end moves,
+        ruckig keeps the smaller limit of jerk both ways: only from rest to rest is the motion the
+        quickest.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation or str
@@ -74,9 +71,8 @@ def jerk_limited(
     Raises
     ------
     ShapeError, InvalidValueError
-        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or
-        not along the line of coordinated joints; a duration that cannot be had, with the least
-        that can; a limit of zero for a joint that has to move.
+        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or not
+        along the line; a duration that cannot be had, with the least that can; a limit of zero.
 
     References
     ----------
@@ -86,8 +82,6 @@ def jerk_limited(
     Examples
     --------
     >>> limits = MotionLimits(velocity=1.0, acceleration=1.0, jerk=2.0)
-    >>> jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits).duration
-    3.50...
     >>> move = jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits, v0=[0.0, 0.5],
     ...                     synchronisation=Synchronisation.SAME_TIME)
     >>> move.duration, move.v(0.0)
@@ -99,30 +93,22 @@ def jerk_limited(
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
     R, n = states["q0"].shape
     if not any(states[name].any() for name in _STATES[2:]):
-        start, end = (states[name].reshape(*batch, n) for name in ("q0", "q1"))
-        rest = along_line(TimeLaw.JERK_LIMITED, start, end, duration, limits, synchronisation)
-        return Trajectory(rest.motion, scalar)
-    T = given_durations(duration, batch)
-    bounds = checked_limits(limits, n, states["q0"], states["q1"])
+        law = TimeLaw.JERK_LIMITED
+        return law_motion(law, states, batch, scalar, duration, limits, synchronisation)
+    T, bounds = checked_request(states, batch, duration, limits)
     assert bounds is not None
-    refuse_extremes(states, bounds)
     breaks, c = np.zeros((R, n, _PHASES + 2)), np.zeros((R, _PHASES + 1, 4, n))
     lengths = np.zeros((R, n, _PHASES + 1))
+    find = _on_line if synchronisation is Synchronisation.COORDINATED else _of_joints
     for i in range(R):
         state = {name: value[i] for name, value in states.items()}
         asked = None if T is None else float(T[i])
-        if synchronisation is Synchronisation.COORDINATED:
-            breaks[i], c[i], lengths[i] = _on_line(state, bounds, asked)
-        else:
-            breaks[i], c[i], lengths[i] = _of_joints(state, bounds, asked, synchronisation)
+        breaks[i], c[i], lengths[i] = find(state, bounds, asked, synchronisation)
     motion = PiecewisePolynomial(
         breaks.reshape(*batch, n, _PHASES + 2),
         c.reshape(*batch, _PHASES + 1, 4, n),
         lengths.reshape(*batch, n, _PHASES + 1),
     )
-    moves = Trajectory(motion, scalar)
-    if np.isinf(bounds.lower).all() and np.isinf(bounds.upper).all():
-        return moves
     low, high = motion.extremes(0)
     outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
     if outside.any():
@@ -132,7 +118,7 @@ def jerk_limited(
             f"{high[..., j].max():.6g}, outside its limits {bounds.lower[j]:.6g} to "
             f"{bounds.upper[j]:.6g}; give states at the ends that are slower."
         )
-    return moves
+    return Trajectory(motion, scalar)
 
 
 class _Box(NamedTuple):
@@ -145,25 +131,23 @@ class _Box(NamedTuple):
     jerk: Array
 
 
-def _on_line(state: dict[str, Array], limits: MotionLimits, T: float | None) -> Any:
+def _on_line(
+    state: dict[str, Array], limits: MotionLimits, T: float | None, how: Synchronisation
+) -> Any:
     """Coordinated joints: one coordinate along their common direction."""
-    D = state["q1"] - state["q0"]
-    rows = np.stack((D, *(state[name] for name in _STATES[2:])))
+    rows = np.stack((state["q1"] - state["q0"], *(state[name] for name in _STATES[2:])))
     size = np.abs(rows).max(axis=-1)
     u = rows[int((size > 0.0).argmax())]
     u = u / np.abs(u).max()
     along = rows @ u / (u @ u)
-    off = np.abs(rows - along[:, None] * u).max(axis=-1)
-    if (off > 1e-9 * size).any():
+    if (np.abs(rows - along[:, None] * u).max(axis=-1) > 1e-9 * size).any():
         raise InvalidValueError(
             "The velocities and accelerations at the ends are not along the line from q0 to q1, "
             "so the joints cannot stay on it; pass synchronisation=Synchronisation.SAME_TIME."
         )
-    V, A, B, J, K, back = (float(v[0]) for v in limits_along(limits, u[None, None, :]))
-    one = {name: along[k : k + 1] for k, name in enumerate(("q1", *_STATES[2:]))}
-    one["q0"] = np.zeros(1)
-    box = _Box(*(np.array([v]) for v in (V, -back, A, -B, min(J, K))))
-    breaks, c, lengths = _ruckig(one, box, T, Synchronisation.SAME_TIME)
+    V, A, B, J, K, back = limits_along(limits, u[None, None, :])
+    one = dict(zip(("q1", *_STATES[2:]), along[:, None], strict=True)) | {"q0": np.zeros(1)}
+    breaks, c, lengths = _by_ruckig(one, _Box(V, -back, A, -B, np.minimum(J, K)), T, how)
     c = c * u
     c[:, 0] += state["q0"]
     return breaks, c, lengths
@@ -179,50 +163,72 @@ def _of_joints(
             "Independent joints wait where they arrive, so v1 and a1 must be 0; pass "
             "synchronisation=Synchronisation.SAME_TIME."
         )
-    D = state["q1"] - state["q0"]
-    moves = (D != 0.0) | np.any([state[name] != 0.0 for name in _STATES[2:]], axis=0)
-    rows = [
-        row[moves]
-        for row in (
-            limits.velocity, limits.velocity_lower, limits.acceleration,
-            limits.acceleration_lower, np.minimum(limits.jerk, -limits.jerk_lower),
-        )
-    ]  # fmt: skip
+    moves = np.any([state["q1"] != state["q0"], *(state[k] != 0.0 for k in _STATES[2:])], axis=0)
+    rows = [getattr(limits, name)[moves] for name in _Box._fields[:4]]
+    box = _Box._make((*rows, np.minimum(limits.jerk, -limits.jerk_lower)[moves]))
     breaks, c = np.zeros((n, _PHASES + 2)), np.zeros((_PHASES + 1, 4, n))
     lengths = np.zeros((n, _PHASES + 1))
     active = {name: value[moves] for name, value in state.items()}
-    breaks[moves], c[..., moves], lengths[moves] = _ruckig(active, _Box(*rows), T, how)
+    breaks[moves], c[..., moves], lengths[moves] = _by_ruckig(active, box, T, how)
     breaks[~moves, 1:] = lengths[~moves, 0] = breaks.max()
     c[:, 0, ~moves] = state["q0"][~moves]
     return breaks, c, lengths
 
 
-def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
-    """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints."""
+def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
+    """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints.
+
+    Each joint is solved in units of its own, in which its numbers are near to 1.
+    """
+    from ..kernels.jerk_phases import polished_phases
+
     k = state["q0"].size
     _refuse_states(state, box)
-    independent = how is Synchronisation.INDEPENDENT and T is None
-    found = _phases(state, box, T, independent)
-    if isinstance(found, str) and k > 1:
-        found = _one_by_one(state, box, T, independent)
-    if isinstance(found, str):
-        message = f"No motion between these states was found by ruckig: {found}."
+    waits = how is Synchronisation.INDEPENDENT and T is None
+    s, unit = _units(state, box)  # metres or radians, and seconds, to the unit
+    scales = np.stack((s, s / unit, s / unit**2), axis=-1)
+    start = np.stack((np.zeros(k), state["v0"], state["a0"]), axis=-1) / scales
+    goal = np.stack((state["q1"] - state["q0"], state["v1"], state["a1"]), axis=-1) / scales
+    rates = (scales[:, 1], scales[:, 1], scales[:, 2], scales[:, 2], scales[:, 2] / unit)
+    bounds = np.stack([bound / rate for bound, rate in zip(box, rates, strict=True)], axis=-1)
+    common, longest = T, 0.0
+    for _ in range(50):
+        times = np.zeros(k) if common is None else common / unit
+        rows = (start.tolist(), goal.tolist(), bounds.tolist(), times.tolist())
+        found = [_solved(*of) for of in zip(*rows, strict=True)]
+        failed = [one for one in found if isinstance(one, str)]
+        if failed:
+            break
+        longest = float(max(one.duration * u for one, u in zip(found, unit, strict=True)))
+        if waits or k == 1 or (common is not None and longest <= common * (1.0 + ROUNDING)):
+            break
+        # one joint cannot take the time of the others: all take the next that it can
+        common = longest
+    else:
+        failed = ["no duration that all joints can take"]
+    if failed:
+        message = f"No motion between these states was found by ruckig: {failed[0]}."
         if T is not None:
-            breaks, _, _ = _ruckig(state, box, None, how)
+            breaks, _, _ = _by_ruckig(state, box, None, how)
             message = f"duration: {message} The least duration is {least_shown(breaks.max())} s."
         raise InvalidValueError(message)
-    duration, h, phases = found
-    if T is not None and abs(duration - T) > ROUNDING * max(T, duration):
+    if T is not None and abs(longest - T) > ROUNDING * max(T, longest):
         raise InvalidValueError(
             f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
-            f"with which they are is {least_shown(duration)} s."
+            f"with which they are is {least_shown(longest)} s."
         )
+    h, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
+    given, jerk = (np.array(rows) for rows in zip(*map(_phases, found), strict=True))
+    # where ruckig is asked for a time it meets positions to 1e-8 only
+    polished_phases(given, jerk, start, goal, h, phases)
+    h, phases = h * unit[:, None], phases * s[:, None, None]
     breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
     lengths[:, :-1], breaks[:, 1:-1] = h, np.cumsum(h, axis=-1)
     c = np.zeros((_PHASES + 1, 4, k))
     c[:-1], c[-1, 0] = np.moveaxis(phases, 0, -1), state["q1"]
+    c[:-1, 0] += state["q0"]
     breaks[:, -1] = breaks.max() if T is None else T
-    if independent:
+    if waits:
         lengths[:, -1] = breaks[:, -1] - breaks[:, -2]
     else:  # all joints end together, to the last digit
         late = breaks[:, :-1] >= breaks[:, -2:-1]
@@ -230,107 +236,51 @@ def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronis
     return breaks, c, lengths
 
 
-def _phases(
-    state: dict[str, Array], box: _Box, T: float | None, independent: bool
-) -> tuple[float, Array, Array] | str:
-    """Duration, and durations (k, 9) and coefficients (k, 9, 4) of phases; or what ruckig says."""
+def _solved(start: list[float], goal: list[float], bounds: list[float], least: float) -> Any:
+    """Motion of one joint, not shorter than the least duration; or what ruckig says."""
     import ruckig
 
-    from ..kernels.jerk_phases import polished_phases
-
-    k = state["q0"].size
-    s, unit = _units(state, box)  # metres or radians of each joint, and seconds, to the unit
-    v, a = unit / s, unit * unit / s
-    start = np.stack((np.zeros(k), state["v0"] * v, state["a0"] * a), axis=-1)
-    goal = np.stack(((state["q1"] - state["q0"]) / s, state["v1"] * v, state["a1"] * a), axis=-1)
-    given = ruckig.InputParameter(k)
-    given.current_position, given.current_velocity, given.current_acceleration = start.T.tolist()
-    given.target_position, given.target_velocity, given.target_acceleration = goal.T.tolist()
-    given.max_velocity = (box.velocity * v).tolist()
-    given.min_velocity = (box.velocity_lower * v).tolist()
-    given.max_acceleration = (box.acceleration * a).tolist()
-    given.min_acceleration = (box.acceleration_lower * a).tolist()
-    given.max_jerk = (box.jerk * a * unit).tolist()
-    modes = ruckig.Synchronization
-    given.synchronization = modes.No if independent else modes.Time
-    if T is not None:
-        given.minimum_duration = T / unit
-    found = ruckig.Trajectory(k)
+    given, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    for name, value in zip(_GIVEN, (*start, *goal, *bounds), strict=True):
+        setattr(given, name, [value])
+    if least > 0.0:
+        given.minimum_duration = least
     try:
-        code = ruckig.Ruckig(k).calculate(given, found).name
+        code = ruckig.Ruckig(1).calculate(given, found).name
     except (ruckig.RuckigError, ValueError) as error:  # or a number for which it has no name
         code = str(error).strip().partition("\n")[0]
-    if code not in ("Working", "Finished"):
-        return code
-    h, jerk = np.empty((k, _PHASES)), np.empty((k, _PHASES))
-    brakes = np.empty((k, 1))
-    for i, profile in enumerate(found.profiles[0]):
-        brake = profile.brake
-        h[i], jerk[i], brakes[i] = (*brake.t, *profile.t), (*brake.j, *profile.j), brake.duration
+    return found if code in ("Working", "Finished") else code
+
+
+def _phases(found: Any) -> tuple[list[float], list[float]]:
+    """Times and jerks of the phases of the motion of one joint."""
+    profile = found.profiles[0][0]
+    brake = profile.brake
     # phases of a brake that is not used hold what was there before
-    used = np.cumsum(h[:, :2], axis=-1) <= brakes * (1.0 + 1e-12)
-    h[:, :2] = np.where(used, h[:, :2], 0.0)
-    # where ruckig is asked for a time it meets positions to 1e-8 only
-    polished, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
-    polished_phases(h, jerk, start, goal, polished, phases)
-    phases *= s[:, None, None]
-    phases[..., 0] += state["q0"][:, None]
-    return found.duration * unit, polished * unit, phases
+    used = np.cumsum(brake.t) <= brake.duration * (1.0 + 1e-12)
+    return [*np.where(used, brake.t, 0.0), *profile.t], [*brake.j, *profile.j]
 
 
-def _one_by_one(
-    state: dict[str, Array], box: _Box, T: float | None, independent: bool
-) -> tuple[float, Array, Array] | str:
-    """As `_phases`, each joint in units of its own: for joints that have little in common."""
-    joints = [
-        ({name: value[i : i + 1] for name, value in state.items()},
-         _Box(*(bound[i : i + 1] for bound in box)))
-        for i in range(state["q0"].size)
-    ]  # fmt: skip
-    common = T
-    for _ in range(50):
-        found = [_phases(own, limits, common, independent) for own, limits in joints]
-        for one in found:
-            if isinstance(one, str):
-                return one
-        rows = [one for one in found if not isinstance(one, str)]
-        longest = max(duration for duration, _, _ in rows)
-        if independent or (common is not None and longest <= common * (1.0 + ROUNDING)):
-            h, phases = (np.concatenate(parts) for parts in list(zip(*rows, strict=True))[1:])
-            return longest, h, phases
-        # one joint cannot take the time of the others: all take the next that it can
-        common = longest
-    return "no duration that all joints can take"
-
-
-def _units(state: dict[str, Array], box: _Box) -> tuple[Array, float]:
-    """Units of length (k,) and time with which numbers are near to 1: ruckig expects such.
+def _units(state: dict[str, Array], box: _Box) -> tuple[Array, Array]:
+    """Units of length and time (k,) in which numbers are near to 1, as ruckig expects.
 
     They are powers of two, so that no digit is lost.
     """
-    D = np.abs(state["q1"] - state["q0"])
-    v = np.maximum(np.abs(state["v0"]), np.abs(state["v1"]))
-    a = np.maximum(np.abs(state["a0"]), np.abs(state["a1"]))
+    v, a = (np.maximum(*np.abs((state[f"{k}0"], state[f"{k}1"]))) for k in "va")
     V = np.minimum(box.velocity, -box.velocity_lower)
     A = np.minimum(box.acceleration, -box.acceleration_lower)
-    ends = a / box.jerk  # until the states at the ends have come to rest
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = ends + v / A + np.sqrt(v / box.jerk)
-        size = D + v * ends + a * ends * ends
-        times = ends + np.where(size > 0.0, size / V + np.sqrt(size / A), 0.0)
-    times = times + np.cbrt(size / box.jerk)
-    times = times[np.isfinite(times)]
-    unit = 2.0 ** np.round(np.log2(times.max(initial=0.0) or 1.0))
-    s: Array = np.exp2(np.round(np.log2(np.where(size > 0.0, size, 1.0))))
-    return s, float(unit)
+    ends = a / box.jerk + v / A + np.sqrt(v / box.jerk)  # until they have come to rest
+    size = np.abs(state["q1"] - state["q0"]) + v * ends + a * ends * ends
+    times = ends + size / V + np.sqrt(size / A) + np.cbrt(size / box.jerk)
+    s, unit = (np.exp2(np.round(np.log2(np.where(x > 0.0, x, 1.0)))) for x in (size, times))
+    return s, unit
 
 
 def _refuse_states(state: dict[str, Array], box: _Box) -> None:
     """States at the ends that no motion within the limits has."""
     if np.isinf(box.jerk).any():
         raise InvalidValueError("limits: JERK_LIMITED needs a limit of jerk.")
-    for name, bound in (("velocity", box.velocity), ("acceleration", box.acceleration),
-                        ("jerk", box.jerk)):  # fmt: skip
+    for name, bound in zip(_Box._fields[::2], box[::2], strict=True):
         if (bound == 0.0).any():
             raise InvalidValueError(
                 f"limits: a limit of {name} of a joint that has to move is 0; any other will do."
@@ -339,18 +289,17 @@ def _refuse_states(state: dict[str, Array], box: _Box) -> None:
     for end, sense in (("0", 1.0), ("1", -1.0)):
         v, a = state["v" + end], state["a" + end]
         # the velocity after the acceleration is taken away as fast as may be, forth or back
-        swing = v + sense * a * np.abs(a) / (2.0 * box.jerk)
-        high, low = np.maximum(v, swing), np.minimum(v, swing)
-        for what, most, least, upper, lower in (
-            ("velocity", high, low, box.velocity, box.velocity_lower),
-            ("acceleration", a, a, box.acceleration, box.acceleration_lower),
+        after = v + sense * a * np.abs(a) / (2.0 * box.jerk)
+        for what, upper, lower, values in (
+            ("velocity", box.velocity, box.velocity_lower, (v, after)),
+            ("acceleration", box.acceleration, box.acceleration_lower, (a,)),
         ):
-            bad = (most > upper * slack) | (least < lower * slack)
-            if bad.any():
-                j = int(bad.argmax())
-                need = most[j] if most[j] > upper[j] * slack else least[j]
-                raise InvalidValueError(
-                    f"limits: v{end} and a{end} need a {what} of {need:.9g}, outside "
-                    f"{lower[j]:.9g} to {upper[j]:.9g}; the least limit that will do is "
-                    f"{least_shown(abs(need), 9)}."
-                )
+            for value in values:
+                bad = (value > upper * slack) | (value < lower * slack)
+                if bad.any():
+                    j = int(bad.argmax())
+                    raise InvalidValueError(
+                        f"limits: v{end} and a{end} need a {what} of {value[j]:.9g}, outside "
+                        f"{lower[j]:.9g} to {upper[j]:.9g}; the least limit that will do is "
+                        f"{least_shown(abs(value[j]), 9)}."
+                    )

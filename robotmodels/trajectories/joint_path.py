@@ -8,15 +8,14 @@ robot, meet a singular position or ask for joint velocities that no motor has; w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_mask, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats, as_mask
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
@@ -27,7 +26,7 @@ from .pose_trajectory import PoseTrajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath:
+class JointPath(Frozen):
     """Postures that follow poses, and what happens on the way.
 
     Parameters
@@ -47,16 +46,6 @@ class JointPath:
         Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
         What happens, in the order of the path.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.trajectories import cartesian_trajectory
-    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
-    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 50), q)
-    >>> path.complete, path.q[-1].round(6)
-    (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
 
     t: Array
@@ -66,13 +55,6 @@ class JointPath:
     conditioning: Array
     branch: NDArray[np.str_]
     events: tuple[PathEvent, ...]
-
-    def __post_init__(self) -> None:
-        kinds = {"status": np.int8, "branch": str}
-        for field in fields(self):
-            if field.name != "events":
-                value = read_only(getattr(self, field.name), kinds.get(field.name, float))
-                object.__setattr__(self, field.name, value)
 
     @property
     def complete(self) -> bool:
@@ -91,9 +73,6 @@ class JointPath:
         state = "complete" if self.complete else "not complete"
         lines = [f"<JointPath: {len(self.q)} poses, {state}>", *(str(e) for e in self.events)]
         return "\n  ".join(lines)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
 def joint_path(
@@ -114,9 +93,9 @@ def joint_path(
     Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
     nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
     with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
-    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if
-    it has one; others go on by the least steps from the last posture, and are solved for all
-    postures only where that fails.
+    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if it
+    has one; others go on by the least steps from the last posture, and are solved for all postures
+    only where that fails.
 
     Parameters
     ----------
@@ -126,19 +105,16 @@ def joint_path(
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
         Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
-        value (without it 0, or the nearest value inside their limits). A
-        first posture that is more than 0.1 away from it is reported as a jump.
+        value (without it 0, or the nearest value inside their limits). A first posture that is more
+        than 0.1 away from it is reported as a jump.
     q_near : array_like, shape (n,), optional
-        A guess instead of ``q_start``: the path begins with the solution of the first pose that is
-        nearest to it, however far that is.
+        A guess instead: the path begins with the solution of the first pose that is nearest to it.
     t : array_like, shape (N,), optional
         Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
         Into how many poses a `PoseTrajectory` is divided.
-    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
-        Ones for the components ``x y z rx ry rz`` that are asked for, as in `igm`.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
+    mask, mask_axes
+        Components ``x y z rx ry rz`` that are asked for, and their axes, as in `igm`.
     position_tolerance, orientation_tolerance : float
         When a pose counts as met, m and rad.
     singular_below : float
@@ -160,16 +136,13 @@ def joint_path(
 
     Examples
     --------
-    The exercise's path from A to B: positions are reached all the way.
-
+    >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
     >>> from robotmodels.trajectories import cartesian_trajectory
-    >>> A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
-    >>> B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
-    >>> path = joint_path(load("lab_trr"), cartesian_trajectory(A, B, 50), [-0.3, -0.8, -0.8],
-    ...                   mask=[1, 1, 1, 0, 0, 0], position_tolerance=1e-6)
-    >>> path.complete, path.q[0].round(2)
-    (True, array([-0.3 , -0.79, -0.79]))
+    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
+    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 50), q)
+    >>> path.complete, path.q[-1].round(6)
+    (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
@@ -193,24 +166,17 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = float(as_floats(singular_below, "singular_below"))
+    given = (mask, mask_axes)
     tolerances = {
         "position_tolerance": position_tolerance,
         "orientation_tolerance": orientation_tolerance,
     }
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
-        return igm(model, targets, near, mask, mask_axes, **tolerances)  # type: ignore[arg-type]
+        return igm(model, targets, near, *given, **tolerances)  # type: ignore[arg-type]
 
     def go_on(i: int, near: Array) -> IGMSolutions:
-        return igm_numeric(
-            model,
-            T[i],
-            near,
-            mask,
-            mask_axes,
-            restarts=0,
-            **tolerances,  # type: ignore[arg-type]
-        )
+        return igm_numeric(model, T[i], near, *given, restarts=0, **tolerances)  # type: ignore[arg-type]
 
     columns = joint_chain(model).columns
     found = None
@@ -218,7 +184,7 @@ def joint_path(
         # without a reference postures come in the order of their branches
         found = solve(T, None)
     if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
-        rows = follow(model, T, found, near, lambda i, near: solve(T[i], near))
+        rows = follow(model, found, near, lambda i, near: solve(T[i], near))
     else:
         rows = follow_singly(model, len(T), near, lambda i, near: solve(T[i], near), go_on)
     # joints that do not move the tool stand still: at the start, else near zero
@@ -231,28 +197,26 @@ def joint_path(
         v = task.rates(twists)
     else:
         v = _differences(times, q, rows.reached)
-    events = list(path_events(model, times, q, v, rows, task, singular_below, start))
+    events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
-        known = partial(_reached, motion, lambda pose: solve(pose, near))
-        events = [_located(event, times, known) for event in events]
+        pose = motion.pose
+        events = [
+            _located(event, times, lambda t: bool(solve(pose(t), near).count > 0))
+            for event in events
+        ]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 
 
 def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
     """Velocities from the neighbours of each pose on either side that are reached."""
-    v = np.full(q.shape, np.nan)
     if np.isnan(times).any() or len(q) < 2:
-        return v
+        return np.full(q.shape, np.nan)
     with np.errstate(invalid="ignore"):
         slope = np.diff(q, axis=0) / np.diff(times)[:, None]
-    left = np.vstack((np.full((1, q.shape[1]), np.nan), slope))
-    right = np.vstack((slope, np.full((1, q.shape[1]), np.nan)))
+    none = np.full((1, q.shape[1]), np.nan)
+    left, right = np.vstack((none, slope)), np.vstack((slope, none))
     both = np.where(np.isnan(left), right, np.where(np.isnan(right), left, 0.5 * (left + right)))
     return np.where(reached[:, None], both, np.nan)
-
-
-def _reached(motion: PoseTrajectory, solve: Callable[[Array], IGMSolutions], time: float) -> bool:
-    return bool(solve(motion.pose(time)).count > 0)
 
 
 def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -> PathEvent:
@@ -260,15 +224,14 @@ def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -
     if event.kind is not PathEventKind.OUT_OF_REACH:
         return event
 
-    def edge(inside: float, outside: float) -> float:
+    def edge(inside: int, outside: float) -> float:
+        if not 0 <= inside < len(times):
+            return outside
+        good = times[inside]
         for _ in range(30):
-            middle = 0.5 * (inside + outside)
-            if reached(middle):
-                inside = middle
-            else:
-                outside = middle
+            middle = 0.5 * (good + outside)
+            good, outside = (middle, outside) if reached(middle) else (good, middle)
         return outside
 
-    start = edge(times[event.first - 1], event.start) if event.first > 0 else event.start
-    stop = edge(times[event.last + 1], event.stop) if event.last + 1 < len(times) else event.stop
+    start, stop = edge(event.first - 1, event.start), edge(event.last + 1, event.stop)
     return replace(event, start=start, stop=stop)

@@ -29,7 +29,7 @@ def _collect(
             r = b[i + end, k]
             p = a[i + end, k] + 2.0 * step * r * end
             for side in (1.0, -1.0):
-                h = upper[k] - c[i + end, k] if side > 0.0 else c[i + end, k] - lower[k]
+                h = upper[i, k] - c[i + end, k] if side > 0.0 else c[i + end, k] - lower[i, k]
                 if h < np.inf:
                     rows[count, 0], rows[count, 1], rows[count, 2] = side * p, side * r, h
                     rows[count, 3] = k
@@ -85,7 +85,7 @@ def _acceleration(rows: Floats, count: int, x: float) -> float:
 
 
 @compiled(
-    INT(VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INTS, VECTOR, VECTOR, OUT2)
+    INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, INTS, VECTOR, VECTOR, OUT2)
 )  # fmt: skip
 def path_rates(
     steps: Floats, a: Floats, b: Floats, c: Floats, lower: Floats, upper: Floats, ends: Ints,
@@ -93,7 +93,7 @@ def path_rates(
 ) -> int:  # fmt: skip
     """Quickest squared rates on a grid; the first point that is not controllable, or -1.
 
-    Shapes: steps (N,), a, b, c (N + 1, K), lower, upper, ends (K,), top (N + 1,), given (2,)
+    Shapes: steps (N,), a, b, c (N + 1, K), lower, upper (N, K), ends (K,), top (N + 1,), given (2,)
     -> out (N + 1, 6): x, u, range of x, greatest x under the limits, number of the active limit.
     """
     N, K = steps.shape[0], a.shape[1]

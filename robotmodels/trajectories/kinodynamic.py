@@ -1,9 +1,14 @@
-"""Kinodynamic planning: the best motion between configurations or poses under limits of torque."""
+"""Kinodynamic planning: the best motion between configurations or poses under limits of torque.
+
+References
+----------
+Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import product
 from typing import Any
@@ -26,22 +31,16 @@ from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, knots_of
 from .checks import checked_limits
 from .limits import MotionLimits
-from .path_limits import SLOWEST, PathLimits
+from .path_limits import SLOWEST, PathLimits, not_held
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
-from .trajectory import Trajectory
+from .trajectory import TimingResult, Trajectory
 
 _NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
 
 
 class Timing(Enum):
-    """How a candidate of the planner is timed; the value says how.
-
-    Examples
-    --------
-    >>> Timing.PROFILE.value
-    'its own profile over time, evenly stretched to the least duration'
-    """
+    """How a candidate of the planner is timed; the value says how."""
 
     OPTIMAL = "the quickest motion along its path"
     PROFILE = "its own profile over time, evenly stretched to the least duration"
@@ -64,16 +63,6 @@ class Pose(Value):
     ----------
     T : array_like, shape (4, 4)
         World pose of the tool, m.
-
-    Raises
-    ------
-    ShapeError, NotARotationError
-        An array that is no pose.
-
-    Examples
-    --------
-    >>> Pose(np.eye(4)).T.shape
-    (4, 4)
     """
 
     T: Array
@@ -83,7 +72,7 @@ class Pose(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(Value):
+class Plan(TimingResult):
     """The best motion that the planner found.
 
     Parameters
@@ -105,15 +94,6 @@ class Plan(Value):
         Times at which the via points are met, s.
     explanation : str
         Details of the status.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import MotionLimits, kinodynamic
-    >>> plan = kinodynamic(load("ur5e"), np.zeros(6), np.full(6, 0.2), MotionLimits(),
-    ...                    torque=[1, 1, 1, 1, 1, 1])
-    >>> plan.status.name, plan.trajectory
-    ('ENDS_NOT_HELD', None)
     """
 
     trajectory: Trajectory | None
@@ -124,16 +104,6 @@ class Plan(Value):
     restarts: Array
     via_times: Array
     explanation: str = ""
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                object.__setattr__(self, field.name, read_only(value))
-
-    @property
-    def duration(self) -> float:
-        """Seconds; NaN without a motion."""
-        return np.nan if self.trajectory is None else self.trajectory.duration
 
     @property
     def evaluations(self) -> int:
@@ -146,10 +116,6 @@ class Plan(Value):
         if not np.isfinite(self.restarts).all() or not self.restarts.size:
             return np.inf
         return float(np.ptp(self.restarts) / self.restarts.min())
-
-    def reason(self) -> str:
-        """The status as a sentence, with the end and the joint."""
-        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         lines = [f"<Plan: {self.status.name}, {self.duration:.6g} s, cost {self.cost:.6g}"]
@@ -234,10 +200,6 @@ def kinodynamic(
         Vectors of the wrong length, ends outside of the limits of position, ends or via points
         that coincide, NaN, limits that are all infinite.
 
-    References
-    ----------
-    Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -264,33 +226,30 @@ def kinodynamic(
         name = _name(missing[0], len(given))
         why = f"No posture reaches the pose {name} within the limits of position."
         return _without(PlanStatus.NONE_FOUND, why)
-    for status, test in (
-        (PlanStatus.ENDS_NOT_HELD, _held), (PlanStatus.ENDS_IN_COLLISION, _clear),
-    ):  # fmt: skip
-        for k in range(len(given)):
-            if 0 < k < len(given) - 1 and test is _held:
-                continue
-            good, why = test(problem, postures[k], bodies, wanted, _name(k, len(given)))
-            postures[k] = postures[k][good]
-            if not good.any():
-                end = k in (0, len(given) - 1)
-                return _without(status if end else PlanStatus.NONE_FOUND, why)
+    for k, q in enumerate(postures):
+        end, name = k in (0, len(given) - 1), _name(k, len(given))
+        held, why = _held(problem, q, name) if end else (np.ones(len(q), np.bool_), "")
+        if not held.any():
+            return _without(PlanStatus.ENDS_NOT_HELD, why)
+        clear, why = _clear(model, q, bodies, wanted, name)
+        if not (held & clear).any():
+            return _without(PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND, why)
+        postures[k] = q[held & clear]
     generator = generator_of(rng)
     tasks = []
     for choice in product(*postures):
         stations = np.array(choice)
-        if not np.any(np.diff(stations, axis=0), axis=1).all():
-            continue
-        at = knots_of(stations, count)
-        optimal = timing is Timing.OPTIMAL
-        task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-        straight = task.evaluated(task.straight())
-        if straight.duration < _NO_TIME:
-            raise InvalidValueError(
-                "limits, torque: nothing limits the straight motion, so its time would be zero; "
-                "give the robot inertia, or limits of velocity and acceleration of every joint."
-            )
-        tasks.append((straight.penalized, len(tasks), task))
+        if np.any(np.diff(stations, axis=0), axis=1).all():
+            at, optimal = knots_of(stations, count), timing is Timing.OPTIMAL
+            task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
+            straight = task.evaluated(task.straight())
+            if straight.duration < _NO_TIME:
+                raise InvalidValueError(
+                    "limits, torque: nothing limits the straight motion, so its time would be "
+                    "zero; give the robot inertia, or limits of velocity and acceleration of "
+                    "every joint."
+                )
+            tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
@@ -356,28 +315,25 @@ def _postures(
     return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
 
 
-def _held(
-    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[NDArray[np.bool_], str]:
+def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) the torques hold, and a sentence about the first."""
     rest = np.zeros(q.shape)
-    load = np.abs(problem.rows(q, rest, rest).held)
+    load = problem.rows(q, rest, rest).held
     stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-    margin = problem.torque * (1.0 + 1e-9) + stuck - load
-    j = int(margin[0].argmin())
-    return np.atleast_1d((margin >= 0.0).all(axis=1)), (
-        f"The torques do not hold the robot at {name}: joint {j + 1} needs {load[0, j]:.6g} and "
-        f"has {problem.torque[j]:.6g}, a margin of {margin[0, j]:.4g} (N m or N)."
-    )
+    why = [
+        not_held(load[k : k + 1], problem.torque, lambda _: name, stuck[k : k + 1])
+        for k in range(len(q))
+    ]
+    return np.array([not text for text in why]), why[0]
 
 
 def _clear(
-    problem: PathLimits, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
+    model: RobotModel, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
 ) -> tuple[NDArray[np.bool_], str]:
     """Which configurations (m, n) keep the clearance, and a sentence about the first."""
-    if not bodies or problem.model is None:
+    if not bodies:
         return np.ones(len(q), np.bool_), ""
-    distance = clearance_of(problem.model, q, bodies)
-    return np.atleast_1d(distance >= wanted), (
+    distance = np.atleast_1d(clearance_of(model, q, bodies))
+    return distance >= wanted, (
         f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
     )

@@ -4,11 +4,14 @@ Seed book sections 4.2.1 (fifth-order polynomial), 4.2.2 (trapezoidal velocity) 
 trapezoidal velocity). A law moves ``s`` from 0 to a distance; whatever follows it, joints on a
 straight line or a pose on a path, keeps its shape. Everything here works on rows, one per motion.
 
-Source: Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
+References
+----------
+Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from typing import NamedTuple
 
@@ -19,19 +22,12 @@ from ..errors import InvalidValueError
 
 _MARGIN = 1.0 + 1e-14
 """Durations are this much above the least, so that rounding does not exceed a limit."""
-
 _PHASE = 1.0 / 3.0
 """Part of the duration of each ramp without limits, as in the Robotics Toolbox's ``ctraj``."""
 
 
 class TimeLaw(Enum):
-    """How the motion is distributed over its time; the value describes the law.
-
-    Examples
-    --------
-    >>> TimeLaw.QUINTIC.value
-    'fifth-order polynomial: starts and stops with zero acceleration'
-    """
+    """How the motion is distributed over its time; the value describes the law."""
 
     LINEAR = "constant velocity: starts and stops with a jump of velocity"
     CUBIC = "third-order polynomial: starts and stops with a jump of acceleration"
@@ -67,41 +63,38 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
     """The quickest motion of a law that keeps limits. Shapes: distance (R,)."""
     moves = distance > 0.0
     V, A, B, J, K, _ = (np.where(moves, limit, np.inf) for limit in limits)
-    L = np.where(moves, distance, 0.0)
     any_jerk = np.minimum(J, K)
     if law in (TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL) and np.isfinite(any_jerk).any():
         raise InvalidValueError(
             f"limits: the acceleration of {law.name} jumps, which keeps no limit of jerk; pass "
             "limits.without_jerk(), or take SMOOTHED_TRAPEZOIDAL or JERK_LIMITED."
         )
-    needed = {
+    both = np.maximum(A, B)
+    any_limit = ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk]))
+    what, limit = {
         TimeLaw.LINEAR: ("velocity", V),
-        TimeLaw.CUBIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
-        TimeLaw.QUINTIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
-        TimeLaw.BANG_BANG: ("velocity or acceleration", np.minimum(V, np.maximum(A, B))),
-        TimeLaw.TRAPEZOIDAL: ("acceleration and deceleration", np.maximum(A, B)),
+        TimeLaw.BANG_BANG: ("velocity or acceleration", np.minimum(V, both)),
+        TimeLaw.TRAPEZOIDAL: ("acceleration and deceleration", both),
         TimeLaw.SMOOTHED_TRAPEZOIDAL: (
-            "jerk, or of acceleration and deceleration", np.minimum(np.maximum(A, B), any_jerk),
+            "jerk, or of acceleration and deceleration", np.minimum(both, any_jerk)
         ),
         TimeLaw.JERK_LIMITED: ("jerk", any_jerk),
-    }  # fmt: skip
-    what, limit = needed[law]
+    }.get(law, any_limit)  # fmt: skip
     if np.isinf(limit[moves]).any():
         raise InvalidValueError(f"limits: {law.name} needs a limit of {what}.")
-    pieces = _quickest(law, L, V, A, B, J, K)
+    pieces = _quickest(law, np.where(moves, distance, 0.0), V, A, B, J, K)
     return Pieces(pieces.durations * _MARGIN, pieces.coefficients)
 
 
 def law_of_duration(law: TimeLaw, distance: Array, duration: Array) -> Pieces:
     """A law of a given duration: equal ramps of one third of it (one half for BANG_BANG)."""
-    L, T = distance, duration
     if law is TimeLaw.JERK_LIMITED:
         raise InvalidValueError("JERK_LIMITED has no shape without limits; give limits.")
     if law in _POLYNOMIALS:
-        return Pieces(T[:, None], L[:, None, None] * np.array([[_POLYNOMIALS[law]]]))
-    phase = 0.5 if law is TimeLaw.BANG_BANG else _PHASE
-    part = np.full(L.shape, phase)
-    return ramped(law, L, L / (1.0 - phase), T, part, part)
+        c = distance[:, None, None] * np.array([[_POLYNOMIALS[law]]])
+        return Pieces(duration[:, None], c)
+    part = np.full(distance.shape, 0.5 if law is TimeLaw.BANG_BANG else _PHASE)
+    return ramped(law, distance, distance / (1.0 - part), duration, part, part)
 
 
 _POLYNOMIALS = {
@@ -120,28 +113,31 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K:
         # its jerk is constant, and downwards
         return law_of_duration(law, L, np.maximum(T, np.cbrt(12.0 * L / K)))
     if law is TimeLaw.QUINTIC:
-        peak = 10.0 / np.sqrt(3.0)
-        T = np.maximum(1.875 * L / V, np.sqrt(peak * L / np.minimum(A, B)))
+        T = np.maximum(1.875 * L / V, np.sqrt(10.0 / np.sqrt(3.0) * L / np.minimum(A, B)))
         # upwards at the ends, half as much downwards in the middle
         by_jerk = np.cbrt(np.maximum(60.0 * L / J, 30.0 * L / K))
         return law_of_duration(law, L, np.maximum(T, by_jerk))
-    if law is TimeLaw.JERK_LIMITED:
-        return Pieces(*seven_phases(L, V, A, B, J, K))
     if law is TimeLaw.BANG_BANG:
         up, down = 1.0 / A, 1.0 / B
         T = np.maximum(2.0 * L / V, np.sqrt(2.0 * L * (up + down)))
         both = np.where(up + down > 0.0, up + down, 1.0)
         share = np.where(up + down > 0.0, up / both, 0.5)
         return ramped(law, L, 2.0 * L, T, share, 1.0 - share)
-    V, up, down = _fastest(law, L, V, A, B, np.minimum(J, K))
-    ramps = up + down
+    if law is not TimeLaw.SMOOTHED_TRAPEZOIDAL:  # a trapezoid is what no limit of jerk leaves
+        h, c = seven_phases(L, V, A, B, J, K)
+        return Pieces(h[:, 1::2], c[:, 1::2, :3]) if law is TimeLaw.TRAPEZOIDAL else Pieces(h, c)
+    J = np.minimum(J, K)
     with np.errstate(divide="ignore", invalid="ignore"):
-        cruise = np.where(L > 0.0, L / V - 0.5 * ramps, 0.0)
-        none = cruise <= 1e-14 * ramps
+        # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
+        full = np.minimum(np.sqrt(2.0 * L / (1.5 / A + 1.5 / B)), np.cbrt(L) ** 2 * np.cbrt(J / 6))
+    V = _cruise(L, V, full, lambda v: (_smooth_ramp(v, A, J), _smooth_ramp(v, B, J)))
+    up, down = _smooth_ramp(V, A, J).time, _smooth_ramp(V, B, J).time
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cruise = np.where(L > 0.0, L / V - 0.5 * (up + down), 0.0)
+        none = cruise <= 1e-14 * (up + down)
         # without a cruise the ramps alone cover the distance, to the last digit
-        V = np.where(L > 0.0, np.where(none, 2.0 * L / ramps, V), 0.0)
-    cruise = np.where(none, 0.0, cruise)
-    return _three_phases(law, L, V, up, cruise, down)
+        V = np.where(L > 0.0, np.where(none, 2.0 * L / (up + down), V), 0.0)
+    return _three_phases(law, L, V, up, np.where(none, 0.0, cruise), down)
 
 
 def ramped(law: TimeLaw, L: Array, VT: Array, T: Array, up: Array, down: Array) -> Pieces:
@@ -168,51 +164,13 @@ def _three_phases(
     return Pieces(np.stack((up, cruise, down), axis=-1), c)
 
 
-def _ramp_time(law: TimeLaw, V: Array, A: Array, J: Array) -> tuple[Array, Array]:
-    """Least time of a ramp from rest to a velocity, and V times its derivative."""
-    if law is TimeLaw.TRAPEZOIDAL:
-        return V / A, V / A
-    # a parabola of acceleration peaks at 1.5 V / time and starts with the jerk 6 V / time^2
-    by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V / J)
-    return np.maximum(by_a, by_j), np.where(by_a >= by_j, by_a, 0.5 * by_j)
-
-
-def _fastest(
-    law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array
-) -> tuple[Array, Array, Array]:
-    """Greatest useful cruise velocity and the times of its ramps.
-
-    The quickest motion cruises as fast as it may: the time ``L / V + (up + down) / 2`` falls with
-    V as long as the ramps, which cover ``V (up + down) / 2``, fit into the distance.
-    """
-    at_rest = L == 0.0
-    a = 1.5 if law is TimeLaw.SMOOTHED_TRAPEZOIDAL else 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
-        full = np.sqrt(2.0 * L / (a / A + a / B))
-        if law is not TimeLaw.TRAPEZOIDAL:
-            full = np.minimum(full, np.cbrt(L) ** 2 * np.cbrt(J / 6.0))
-    full = np.where(at_rest, 0.0, full)
-    # V (up + down) is convex in V, so Newton's method comes down from there to its root and stays
-    for _ in range(60 if law is not TimeLaw.TRAPEZOIDAL else 0):
-        up, rise = _ramp_time(law, full, A, J)
-        down, fall = _ramp_time(law, full, B, J)
-        slope = np.where(at_rest, 1.0, up + down + rise + fall)
-        step = np.where(at_rest, 0.0, (full * (up + down) - 2.0 * L) / slope)
-        full = full - step
-        if (np.abs(step) <= 1e-10 * full).all():
-            break  # the next step would be nothing: convergence is quadratic
-    V = np.where(at_rest, 0.0, np.minimum(V, full))
-    return V, _ramp_time(law, V, A, J)[0], _ramp_time(law, V, B, J)[0]
-
-
 # With limits of jerk a ramp from rest bends up with the greatest jerk, may go on with the greatest
 # acceleration, and bends down with the least jerk to the velocity of the cruise. The ramp back to
 # rest is such a ramp run backwards, so the same formulas serve, with J and K in the same roles.
 
 
 class Ramp(NamedTuple):
-    """From rest to a velocity; arrays of shape (R,)."""
+    """From rest to a velocity: times of its parts, distance, slope of that by the velocity (R,)."""
 
     rise: Array
     level: Array
@@ -226,6 +184,14 @@ class Ramp(NamedTuple):
         return self.rise + self.level + self.fall
 
 
+def _smooth_ramp(V: Array, A: Array, J: Array) -> Ramp:
+    """The quickest ramp from rest to a velocity whose acceleration is a parabola of time."""
+    # it peaks at 1.5 V / time and starts with the jerk 6 V / time^2
+    by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V / J)
+    time, rise = np.maximum(by_a, by_j), np.where(by_a >= by_j, by_a, 0.5 * by_j)
+    return Ramp(time, 0.0 * time, 0.0 * time, 0.5 * V * time, 0.5 * (time + rise))
+
+
 def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
     """The quickest ramp from rest to a velocity. Shapes: V, A, up, down (R,)."""
     bends = up + down  # time of both bends for each unit of acceleration
@@ -234,14 +200,11 @@ def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
         short = np.where(V > 0.0, np.sqrt(2.0 * V / bends), 0.0)
         a = np.minimum(A, short)
         level = np.where(short > A, np.maximum(V / A - 0.5 * A * bends, 0.0), 0.0)
-    rise, fall = a * up, a * down
-    # what the middle of the acceleration lacks of the whole time, times the velocity
-    distance = a * (
-        rise * (rise / 6.0 + 0.5 * level + 0.5 * fall)
-        + level * (0.5 * level + fall)
-        + fall * fall / 3.0
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
+        rise, fall = (np.where(bend > 0.0, a * bend, 0.0) for bend in (up, down))
+        # what the middle of the acceleration lacks of the whole time, times the velocity
+        distance = rise * (rise / 6.0 + 0.5 * level + 0.5 * fall)
+        distance = distance + level * (0.5 * level + fall) + fall * fall / 3.0
+        distance = np.where(distance > 0.0, a * distance, 0.0)
         slope = np.where(level > 0.0, 0.5 * rise + level + fall, 1.5 * distance / V)
     return Ramp(rise, level, fall, distance, np.where(V > 0.0, slope, 0.0))
 
@@ -252,7 +215,15 @@ def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> 
     Shapes: L, V, A, B, J, K (R,) -> durations (R, 7), coefficients (R, 7, 4).
     """
     up, down = 1.0 / J, 1.0 / K
-    V = _cruise(L, V, A, B, up, down)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
+        full = np.sqrt(2.0 * L / (1.0 / A + 1.0 / B))
+        if not (up + down).any():
+            V = np.where(L > 0.0, np.minimum(V, full), 0.0)
+        else:
+            of_one = ramp(np.ones_like(L), np.full_like(L, np.inf), up, down).distance
+            full = np.minimum(full, np.cbrt(0.5 * L / of_one) ** 2)
+            V = _cruise(L, V, full, lambda v: (ramp(v, A, up, down), ramp(v, B, up, down)))
     first, last = ramp(V, A, up, down), ramp(V, B, up, down)
     ramps = first.distance + last.distance
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -298,21 +269,16 @@ def _on_ramp(r: Ramp, V: Array) -> tuple[Array, Array]:
     return c, c[:, 2].sum(axis=-1)
 
 
-def _cruise(L: Array, V: Array, A: Array, B: Array, up: Array, down: Array) -> Array:
-    """Greatest useful velocity.
+def _cruise(L: Array, V: Array, full: Array, ramps: Callable[[Array], tuple[Ramp, Ramp]]) -> Array:
+    """Greatest useful velocity, at most V and the bound ``full`` from above.
 
-    The quickest motion cruises as fast as it may, as long as its ramps fit into the distance.
+    The quickest motion cruises as fast as it may, as long as its ramps fit into the distance. That
+    of the ramps is convex in the velocity: Newton's method comes down to its root and stays.
     """
     moves = L > 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
-        full = np.sqrt(2.0 * L / (1.0 / A + 1.0 / B))
-        of_one = ramp(np.where(moves, 1.0, 0.0), np.full_like(L, np.inf), up, down).distance
-        full = np.minimum(full, np.cbrt(0.5 * L / of_one) ** 2)
     full = np.where(moves, full, 0.0)
-    # the distance of the ramps is convex in V: Newton's method comes down to its root and stays
     for _ in range(60):
-        first, last = ramp(full, A, up, down), ramp(full, B, up, down)
+        first, last = ramps(full)
         slope = np.where(moves, first.slope + last.slope, 1.0)
         step = np.where(moves, (first.distance + last.distance - L) / slope, 0.0)
         full = full - step

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_reals, read_only
+from .._arrays import Array, Rebuilt, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..table_text import joints_text
 
+RATES = ("velocity", "acceleration", "jerk")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionLimits:
+class MotionLimits(Rebuilt):
     """Limits that a motion keeps; a number stands for all joints.
 
     Parameters
     ----------
-    velocity : array_like, shape () or (n,)
-        Greatest velocity, rad/s or m/s. Infinity is no limit, as everywhere here.
-    acceleration : array_like, shape () or (n,)
-        Greatest acceleration, rad/s^2 or m/s^2.
-    jerk : array_like, shape () or (n,)
-        Greatest jerk, rad/s^3 or m/s^3.
+    velocity, acceleration, jerk : array_like, shape () or (n,)
+        Greatest ones, rad or m, per s, s^2 and s^3. Infinity is no limit, as everywhere here.
     velocity_lower, acceleration_lower, jerk_lower : array_like, shape () or (n,), optional
         The least ones, not above zero; default the greatest with the sign changed.
     lower, upper : array_like, shape () or (n,)
@@ -55,16 +53,15 @@ class MotionLimits:
     upper: Array = np.inf  # type: ignore[assignment]
 
     def __str__(self) -> str:
-        shown = [f for f in fields(self) if np.isfinite(getattr(self, f.name)).any()]
-        rows = np.broadcast_arrays(np.zeros(1), *(getattr(self, f.name) for f in shown))[1:]
-        columns = {f.name: row for f, row in zip(shown, rows, strict=True)}
+        shown = [f.name for f in fields(self) if np.isfinite(getattr(self, f.name)).any()]
+        columns = {name: np.atleast_1d(getattr(self, name)) for name in shown}
         return joints_text(columns) if columns else "MotionLimits: no limits"
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in fields(self)}
-        for side in ("velocity", "acceleration", "jerk"):
-            if given[f"{side}_lower"] is None:
-                given[f"{side}_lower"] = -as_reals(given[side], side)
+        for rate in RATES:
+            if given[f"{rate}_lower"] is None:
+                given[f"{rate}_lower"] = -as_reals(given[rate], rate)
         arrays = {name: as_reals(value, name) for name, value in given.items()}
         for name, array in arrays.items():
             if array.ndim > 1:
@@ -73,12 +70,9 @@ class MotionLimits:
                 )
             if np.isnan(array).any():
                 raise InvalidValueError(f"{name}: a limit is NaN; infinity means no limit.")
-            if name in ("velocity", "acceleration", "jerk") and (array < 0.0).any():
+            if name in RATES and (array < 0.0).any():
                 raise InvalidValueError(f"{name}: expected limits of at least 0, got {array}.")
-            if (
-                name in ("velocity_lower", "acceleration_lower", "jerk_lower")
-                and (array > 0.0).any()
-            ):
+            if name.removesuffix("_lower") != name and (array > 0.0).any():
                 raise InvalidValueError(f"{name}: expected limits of at most 0, got {array}.")
         try:
             shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
@@ -97,13 +91,9 @@ class MotionLimits:
         cls, model: RobotModel, acceleration: ArrayLike = np.inf, jerk: ArrayLike = np.inf
     ) -> Self:
         """Limits of a robot: positions and velocities from its table, the others as given."""
-        return cls(
-            velocity=model.table.velocity,
-            acceleration=as_reals(acceleration, "acceleration"),
-            jerk=as_reals(jerk, "jerk"),
-            lower=model.lower,
-            upper=model.upper,
-        )
+        bounds = {"lower": model.lower, "upper": model.upper, "velocity": model.table.velocity}
+        rates = {"acceleration": acceleration, "jerk": jerk}
+        return cls(**bounds, **{name: as_reals(value, name) for name, value in rates.items()})
 
     def for_joints(self, n: int) -> Self:
         """The same limits as arrays (n,); an error if they are of another number of joints."""
@@ -124,8 +114,11 @@ class MotionLimits:
         free = np.full(self.jerk.shape, np.inf)
         return replace(self, jerk=free, jerk_lower=-free)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+def ranges_of(limits: MotionLimits) -> tuple[tuple[str, Array, Array], ...]:
+    """Name, least and greatest value of the position and its three derivatives."""
+    rates = ((name, getattr(limits, f"{name}_lower"), getattr(limits, name)) for name in RATES)
+    return (("position", limits.lower, limits.upper), *rates)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,25 +155,24 @@ class LimitsReport:
         Duration times this keeps velocity, acceleration and jerk. Positions are not touched.
         """
         need = 0.0
-        for order, (_, low, high, least, most) in enumerate(self._rows()):
-            if order:
-                worst = max(_ratio(high, most), _ratio(-low, -least))
-                need = max(need, worst ** (1.0 / order))
+        for order, (name, least, most) in enumerate(ranges_of(self.limits)):
+            low, high = getattr(self, name)
+            for value, bound in ((high, most), (-low, -least)) if order else ():
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    ratio = np.where((value > 0.0) & np.isfinite(bound), value / bound, 0.0)
+                need = max(need, float(ratio.max(initial=0.0)) ** (1.0 / order))
         return need
 
     def violations(self) -> tuple[str, ...]:
         """The limits that are not kept, one sentence each."""
         found = []
-        for name, low, high, least, most in self._rows():
-            n = low.shape[-1]
-            below = low.reshape(-1, n).min(axis=0)
-            above = high.reshape(-1, n).max(axis=0)
-            for j in range(n):
-                for value, bound, side in ((above[j], most[j], 1.0), (below[j], least[j], -1.0)):
-                    if np.isinf(bound):
-                        continue
-                    slack = self.tolerance * max(abs(bound), float(name == "position"))
-                    if side * (value - bound) > slack:
+        for name, least, most in ranges_of(self.limits):
+            low, high = (x.reshape(-1, x.shape[-1]) for x in getattr(self, name))
+            for j, bounds in enumerate(zip(most, least, strict=True)):
+                ends = (high[:, j].max(initial=-np.inf), low[:, j].min(initial=np.inf))
+                for value, bound, side in zip(ends, bounds, (1.0, -1.0), strict=True):
+                    size = max(abs(bound), float(name == "position"))
+                    if size < np.inf and side * (value - bound) > self.tolerance * size:
                         found.append(f"joint {j + 1}: {name} {value:.6g}, allowed {bound:.6g}")
         return tuple(found)
 
@@ -188,19 +180,3 @@ class LimitsReport:
         if self.kept:
             return "<LimitsReport: every limit is kept>"
         return "\n  ".join(["<LimitsReport: limits are exceeded", *self.violations()]) + ">"
-
-    def _rows(self) -> list[tuple[str, Array, Array, Array, Array]]:
-        of = self.limits
-        return [
-            ("position", *self.position, of.lower, of.upper),  # type: ignore[list-item]
-            ("velocity", *self.velocity, of.velocity_lower, of.velocity),
-            ("acceleration", *self.acceleration, of.acceleration_lower, of.acceleration),
-            ("jerk", *self.jerk, of.jerk_lower, of.jerk),
-        ]
-
-
-def _ratio(value: Array, bound: Array) -> float:
-    """Greatest value / bound where the value counts."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where((value > 0.0) & np.isfinite(bound), value / bound, 0.0)
-    return float(ratio.max(initial=0.0))

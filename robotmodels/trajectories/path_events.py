@@ -1,8 +1,12 @@
-"""Events along poses, and the Jacobians of the task that show them."""
+"""Events along poses, and the Jacobians of the task that show them.
+
+References
+----------
+Seed book section 4.3.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -27,13 +31,7 @@ _FAR = 0.5 * np.pi
 
 
 class PathEventKind(Enum):
-    """What may happen on the way; the value is the sentence a person reads.
-
-    Examples
-    --------
-    >>> PathEventKind.SINGULAR.value
-    'The path meets a singular position.'
-    """
+    """What may happen on the way; the value is the sentence a person reads."""
 
     OUT_OF_REACH = "The path leaves the reach of the robot."
     OUTSIDE_LIMITS = "The posture is outside the joint limits."
@@ -79,17 +77,6 @@ class Task:
     Shapes: T (N, 4, 4); q (N, n); reached, conditioning, sign (N,); mask (6,); columns (k,).
     """
 
-    __slots__ = (
-        "_asked",
-        "_inverse",
-        "_length",
-        "_poses",
-        "_tool",
-        "conditioning",
-        "sign",
-        "square",
-    )
-
     def __init__(
         self,
         model: RobotModel,
@@ -100,21 +87,18 @@ class Task:
         mask_axes: str,
         columns: NDArray[np.int64],
     ) -> None:
-        N, n = q.shape
         self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         self._tool, self._poses = mask_axes == "tool", T
         J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
-        lever = np.linalg.norm(J[:, :3], axis=-2).max(initial=0.0)
-        self._length = float(lever) if lever > 0.0 else 1.0
+        self._length = np.linalg.norm(J[:, :3], axis=-2).max(initial=0.0) or 1.0
         J[:, :3] /= self._length
         J = J[:, self._asked][..., columns]
         self.square = J.shape[-1] == J.shape[-2]
-        self.conditioning, self.sign = np.full(N, np.nan), np.zeros(N)
-        self._inverse = np.full((N, n, J.shape[-2]), np.nan)
-        inverse, conditioning, sign = _inverted(J)
-        self._inverse[reached], self.conditioning[reached] = 0.0, conditioning
+        self.conditioning, self.sign = np.full(len(q), np.nan), np.zeros(len(q))
+        self._inverse = np.full((*q.shape, J.shape[-2]), np.nan)
+        self._inverse[reached] = 0.0
+        inverse, self.conditioning[reached], self.sign[reached] = _inverted(J)
         self._inverse[np.ix_(reached, columns)] = inverse
-        self.sign[reached] = sign
 
     def rates(self, twists: Array) -> Array:
         """Joint velocities (N, n) for twists (N, 6) in world axes; the least of many."""
@@ -173,76 +157,58 @@ def path_events(
     task: Task,
     singular_below: float,
     start: Array | None = None,
-) -> Iterator[PathEvent]:
+) -> list[PathEvent]:
     """Events along a path, in order. Shapes: times (N,); q, v (N, n); start (n,)."""
     reached = rows.reached
     events: list[PathEvent] = []
 
-    def report(kind: PathEventKind, where: Any, detail: Callable[[int, int], str]) -> None:
-        for first, last in _runs(where):
-            text = detail(first, last)
-            events.append(PathEvent(kind, first, last, times[first], times[last], text))
+    def add(kind: PathEventKind, i: int, j: int, text: str) -> None:
+        events.append(PathEvent(kind, i, j, times[i], times[j], text))
 
-    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, j: _missed(rows, i, j))
-    with np.errstate(invalid="ignore"):
-        slack = 1e-9
+    for i, j in _runs(~reached):
+        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
+    with np.errstate(invalid="ignore", divide="ignore"):
         over = np.maximum(q - model.upper, model.lower - q)
-        outside = over > slack
-    report(
-        PathEventKind.OUTSIDE_LIMITS,
-        outside.any(axis=-1),
-        lambda i, j: _worst(over[i : j + 1], "is outside by {:.4g}."),
-    )
+        share = np.abs(v) / model.table.velocity
+        outside, fast = over > 1e-9, share > 1.0 + 1e-9
+    for i, j in _runs(np.any(outside, axis=-1)):
+        add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     step, jump, gaps = _jumps(q, reached, task)
-    flips = reached[1:] & reached[:-1] & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
-    low = reached & (task.conditioning < singular_below)
+    adjacent = reached[1:] & reached[:-1]
+    flips = adjacent & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
     # a determinant that changes its sign between two samples passed a singular position
-    passed = np.zeros_like(low)
-    passed[:-1] |= flips
-    passed[1:] |= flips
-    report(
-        PathEventKind.SINGULAR,
-        low | passed,
-        lambda i, j: (
-            f"The least conditioning of the samples is "
-            f"{np.nanmin(task.conditioning[i : j + 1]):.2g}."
-        ),
-    )
-    for k in np.flatnonzero(jump):
-        i, j = int(k), int(k) + 1
+    low = reached & (task.conditioning < singular_below)
+    low[:-1] |= flips
+    low[1:] |= flips
+    for i, j in _runs(low):
+        least = np.nanmin(task.conditioning[i : j + 1])
+        text = f"The least conditioning of the samples is {least:.2g}."
+        add(PathEventKind.SINGULAR, i, j, text)
+    for i in np.flatnonzero(jump).tolist():
         text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
-        events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
+        add(PathEventKind.JUMP, i, i + 1, text)
     if start is not None and reached.any():
         k = int(reached.argmax())
         away = np.abs(q[k : k + 1] - start)
         if away.max(initial=0.0) > (_FAR if k else _JUMP):
-            text = _worst(away, "is {:.4g} away from q_start.")
-            events.append(PathEvent(PathEventKind.JUMP, k, k, times[k], times[k], text))
+            add(PathEventKind.JUMP, k, k, _worst(away, "is {:.4g} away from q_start."))
     for i, j in gaps:
         between = f"{i + 1}" + (f" to {j - 1}" if j > i + 2 else "")
         text = _worst(np.abs(q[j : j + 1] - q[i]), "steps by {:.4g}")
         text += f"; in between, at pose {between}, the path is out of reach."
-        events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
-    changed = reached[1:] & reached[:-1] & ((rows.branch[1:] != rows.branch[:-1]) | flips)
-    for k in np.flatnonzero(changed):
-        i, j = int(k), int(k) + 1
-        before, after = str(rows.branch[i]), str(rows.branch[j])
+        add(PathEventKind.JUMP, i, j, text)
+    changed = adjacent & ((rows.branch[1:] != rows.branch[:-1]) | flips)
+    for i in np.flatnonzero(changed).tolist():
+        before, after = str(rows.branch[i]), str(rows.branch[i + 1])
         # numbers are ranks among the postures of a pose, not names
         named = before != after and before[:1].isalpha() and after[:1].isalpha()
         if named or flips[i]:
             text = f"From {before} to {after}." if named else ""
-            kind = PathEventKind.CHANGES_POSTURE
-            events.append(PathEvent(kind, i, j, times[i], times[j], text))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.abs(v) / model.table.velocity
-        fast = share > 1.0 + 1e-9
-    report(
-        PathEventKind.TOO_FAST,
-        fast.any(axis=-1),
-        lambda i, j: _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity."),
-    )
-    events.sort(key=lambda event: (event.first, event.last))
-    yield from events
+            add(PathEventKind.CHANGES_POSTURE, i, i + 1, text)
+    for i, j in _runs(np.any(fast, axis=-1)):
+        text = _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity.")
+        add(PathEventKind.TOO_FAST, i, j, text)
+    return sorted(events, key=lambda event: (event.first, event.last))
 
 
 def _missed(rows: Followed, first: int, last: int) -> str:
@@ -284,7 +250,7 @@ def _jumps(
     return step, jump, gaps
 
 
-def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(where: Any) -> list[tuple[int, int]]:
     """First and last number of every run of true values."""
     edges = np.diff(np.concatenate(((False,), where, (False,))).astype(np.int8))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

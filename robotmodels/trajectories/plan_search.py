@@ -1,4 +1,9 @@
-"""Search of the kinodynamic planner: annealing, local improvement, and the check of the motion."""
+"""Search of the kinodynamic planner: annealing, local improvement, and the check of the motion.
+
+References
+----------
+Seed book section 4.4.1 and the appendix of chapter 4.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +19,13 @@ import numpy as np
 from .._arrays import Array
 from ..dynamics import idm
 from ..model import RobotModel
-from .candidates import Candidates, Evaluated, spread
+from .candidates import Candidates, Evaluated, half_width, spread
 from .descent import descended
-from .limits import MotionLimits
+from .limits import MotionLimits, ranges_of
 from .motions import TimedMotion
-from .random_profiles import half_width
 from .time_optimal import law_of, time_optimal
 from .time_scaling import at_rest, stretched, time_scaled
-from .trajectory import Samples, Trajectory
+from .trajectory import Trajectory
 
 RATE = 500  # evaluations for each second
 RESTARTS = 3
@@ -35,13 +39,7 @@ _NARROW = 0.1  # of the first steps: the last ones
 
 
 class PlanMethod(Enum):
-    """How the planner searches; the value says how.
-
-    Examples
-    --------
-    >>> PlanMethod.DESCENT.value
-    'local improvement of the straight path and of random ones'
-    """
+    """How the planner searches; the value says how."""
 
     ANNEAL = "simulated annealing of the nodes, then local improvement"
     DESCENT = "local improvement of the straight path and of random ones"
@@ -196,7 +194,10 @@ def best_motion(
             times = _times_at(motion, task.stations[1:-1])
             missed = np.abs(motion.q(times) - task.stations[1:-1]).max(initial=0.0)
             if missed <= _MET:
-                kept.append(Best(motion, *_cost_of(task, model, motion), times))
+                share, weights = _shares(task, model, motion), task.cost
+                cost = weights.time + weights.torque * float((share**2).sum(axis=1).mean())
+                use = np.abs(share).max(axis=0)
+                kept.append(Best(motion, cost * motion.duration, use, times))
         if kept:
             return min(kept, key=lambda best: best.cost)
     return None
@@ -212,9 +213,7 @@ def _finished(
     for _ in range(4):
         path = task.path(free)
         scaled = time_scaled(path, model, task.limits.torque, rates).trajectory
-        if scaled is None:
-            break
-        short = _short(task, scaled)
+        short = 0.0 if scaled is None else _short(task, scaled)
         if short <= 0.0:
             break
         task.margin += 1.5 * short + 1e-6
@@ -228,61 +227,29 @@ def _finished(
 
 def _retimed(task: Candidates, path: Trajectory, model: RobotModel) -> Trajectory | None:
     """The quickest motion along a path that keeps the limits between the points of its grid too."""
-    given = task.limits.limits
-    share = 1.0
+    given, share = task.limits.limits.without_jerk(), 1.0
     for _ in range(4):
-        tight = MotionLimits(
-            given.velocity * share, given.acceleration * share,
-            velocity_lower=given.velocity_lower * share,
-            acceleration_lower=given.acceleration_lower * share,
-        )  # fmt: skip
+        v, a = ((share * x, share * y) for _, x, y in ranges_of(given)[1:3])
+        tight = MotionLimits(v[1], a[1], velocity_lower=v[0], acceleration_lower=a[0])
         motion = time_optimal(
             path, tight, model, task.limits.torque * share, points=400, both_ends=True
         ).trajectory
         if motion is None:
             return None
-        over = _use(task, model, motion)[1]
+        over = float(np.abs(_shares(task, model, motion)).max(initial=0.0))
+        over = max(over, motion.check(given).stretch)
         if over <= 1.0 + 1e-6:
             return motion
         share /= over
     return None
 
 
-def _use(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[Array, float]:
-    """Greatest torques over their limits (n,), and the greatest ratio to any limit."""
+def _shares(task: Candidates, model: RobotModel, motion: Trajectory) -> Array:
+    """Torques over their limits at many times, shape (N, n)."""
     seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
-    bound, limits = task.limits.torque, task.limits.limits
-    use = np.zeros(bound.size)
-    if np.isfinite(bound).any():
-        use = np.abs(_shares(model, seen, bound)).max(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rates = [
-            np.where(side * x > 0.0, x / most, 0.0).max()
-            for x, upper, lower in (
-                (seen.v, limits.velocity, limits.velocity_lower),
-                (seen.a, limits.acceleration, limits.acceleration_lower),
-            )
-            for side, most in ((1.0, upper), (-1.0, lower))
-        ]
-    return use, float(max(use.max(), *rates))
-
-
-def _shares(model: RobotModel, seen: Samples, bound: Array) -> Array:
-    """Torques over their limits (N, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         tau = idm(model, seen.q, at_rest(seen.v), seen.a)
-        return np.where(tau != 0.0, tau / bound, 0.0)
-
-
-def _cost_of(task: Candidates, model: RobotModel, motion: Trajectory) -> tuple[float, Array]:
-    """Cost of a motion and the greatest torques over their limits (n,)."""
-    use, _ = _use(task, model, motion)
-    cost = task.cost.time * motion.duration
-    if task.cost.torque:
-        seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
-        ratio = _shares(model, seen, task.limits.torque)
-        cost += task.cost.torque * float((ratio**2).sum(axis=1).mean()) * motion.duration
-    return cost, use
+        return np.where(tau != 0.0, tau / task.limits.torque, 0.0)
 
 
 def _short(task: Candidates, motion: Trajectory) -> float:

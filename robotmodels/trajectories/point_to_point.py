@@ -49,32 +49,19 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
+from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .between_states import motion_between
-from .checks import (
-    checked_limits,
-    given_durations,
-    joint_vectors,
-    limits_along,
-    refuse_extremes,
-    refuse_short,
-)
-from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
+from .checks import checked_request, joint_vectors, limits_along, refuse_short, sample_count
+from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
-from .piecewise import PiecewisePolynomial
-from .trajectory import Trajectory
+from .motions import PiecewisePolynomial
+from .splines import motion_between
+from .trajectory import Samples, Trajectory
 
 
 class Synchronisation(Enum):
-    """How joints that move together are kept in step; the value says what is common to them.
-
-    Examples
-    --------
-    >>> Synchronisation.SAME_TIME.value
-    'start and end: each joint has its own quickest law, slowed down to the slowest joint'
-    """
+    """How joints that move together are kept in step; the value says what is common to them."""
 
     COORDINATED = "one law: the ratio of the joints' motions is kept along the whole path"
     SAME_TIME = (
@@ -90,13 +77,7 @@ def linear(
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there.
-
-    Examples
-    --------
-    >>> linear([0.0, 0.0], [1.0, 4.0], limits=MotionLimits(velocity=2.0)).duration
-    2.00...
-    """
+    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there."""
     return along_line(TimeLaw.LINEAR, q0, q1, duration, limits, synchronisation)
 
 
@@ -111,11 +92,6 @@ def bang_bang(
 
     With asymmetric limits the two parts share the time so that both accelerations are used in
     full; without limits they are equal.
-
-    Examples
-    --------
-    >>> bang_bang(0.0, 1.0, limits=MotionLimits(acceleration=4.0)).duration
-    1.00...
     """
     return along_line(TimeLaw.BANG_BANG, q0, q1, duration, limits, synchronisation)
 
@@ -153,12 +129,6 @@ def smoothed_trapezoidal(
 
     The acceleration is continuous, also at the ends. A ramp to the velocity V takes
     ``1.5 V / acceleration``, or longer where a limit of jerk needs it.
-
-    Examples
-    --------
-    >>> limits = MotionLimits(velocity=1.0, acceleration=1.5)
-    >>> smoothed_trapezoidal(0.0, 3.0, limits=limits).duration
-    4.00...
     """
     return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
 
@@ -171,20 +141,9 @@ def cubic(
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
 ) -> Trajectory:
-    """Third-order polynomials with given velocities at the ends.
-
-    Examples
-    --------
-    >>> cubic([0.0, 1.0], [1.0, 0.0], duration=1.0).v(0.5)
-    array([ 1.5, -1.5])
-    >>> cubic(0.0, 1.0, limits=MotionLimits(velocity=0.75)).duration
-    2.00...
-    """
+    """Third-order polynomials with given velocities at the ends."""
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
-    states |= {"a0": np.zeros_like(states["q0"]), "a1": np.zeros_like(states["q0"])}
-    if not (states["v0"].any() or states["v1"].any()):
-        return _from_rest(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
-    return motion_between(3, states, batch, scalar, duration, limits)
+    return _polynomial(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
 
 
 def quintic(
@@ -208,22 +167,55 @@ def quintic(
     1.0745...
     """
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
-    if not any(states[name].any() for name in ("v0", "v1", "a0", "a1")):
-        return _from_rest(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
-    return motion_between(5, states, batch, scalar, duration, limits)
+    return _polynomial(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
 
 
-def _from_rest(
-    law: TimeLaw,
-    states: dict[str, Array],
-    batch: tuple[int, ...],
-    scalar: bool,
-    duration: ArrayLike | None,
-    limits: MotionLimits | None,
-) -> Trajectory:
-    shape = (*batch, states["q0"].shape[-1])
-    q0, q1 = states["q0"].reshape(shape), states["q1"].reshape(shape)
-    return Trajectory(along_line(law, q0, q1, duration, limits).motion, scalar)
+def _polynomial(
+    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
+    duration: ArrayLike | None, limits: MotionLimits | None,
+) -> Trajectory:  # fmt: skip
+    """From rest to rest the law of its name, else polynomials of its order."""
+    if not any(states[name].any() for name in states if name not in ("q0", "q1")):
+        return law_motion(law, states, batch, scalar, duration, limits)
+    return motion_between(3 if law is TimeLaw.CUBIC else 5, states, batch, scalar, duration, limits)
+
+
+def joint_trajectory(
+    q0: ArrayLike, q1: ArrayLike, N: int | ArrayLike, v0: ArrayLike = 0.0, v1: ArrayLike = 0.0
+) -> Samples:
+    """Positions, velocities and accelerations between two postures, fifth-order polynomials.
+
+    Also called ``jtraj``. For limits, other laws and continuous time see `quintic`.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape (..., n)
+        First and last postures, rad or m.
+    N : int or array_like, shape (N,)
+        How many samples, equally spaced over one second; or their times, s, ascending.
+    v0, v1 : array_like, shape () or (..., n)
+        Velocities at the ends, rad/s or m/s.
+
+    Returns
+    -------
+    Samples
+        ``t (N,)`` and ``q, v, a, jerk (..., N, n)``; as an array its positions.
+
+    Examples
+    --------
+    >>> path = joint_trajectory([0.0, 1.0], [1.0, -1.0], 5)
+    >>> path.q[2], path.q.shape
+    (array([0.5, 0. ]), (5, 2))
+    """
+    if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
+        t = np.linspace(0.0, 1.0, sample_count(N))
+    else:
+        t = as_floats(N, "N")  # type: ignore[arg-type]
+        if t.ndim != 1 or (t[1:] < t[:-1]).any():
+            raise InvalidValueError("N: expected a number of samples or times that ascend.")
+    times = t - t[0] if t.size else t
+    samples = quintic(q0, q1, float(times.max(initial=0.0)) or 1.0, v0=v0, v1=v1).at(times)
+    return Samples(t, samples.q, samples.v, samples.a, samples.jerk)
 
 
 def along_line(
@@ -234,113 +226,83 @@ def along_line(
     limits: MotionLimits | None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Motion from rest to rest by any law, for programs that choose it.
-
-    Examples
-    --------
-    >>> along_line(TimeLaw.CUBIC, 0.0, 1.0, None, MotionLimits(velocity=1.5)).duration
-    1.00...
-    """
+    """Motion from rest to rest by any law, for programs that choose it."""
     law = chosen(TimeLaw, law, "law")
-    synchronisation = chosen(Synchronisation, synchronisation, "synchronisation")
-    given, batch, scalar = joint_vectors(q0=q0, q1=q1)
-    start, end = given["q0"], given["q1"]
-    R, n = start.shape
-    T = given_durations(duration, batch)
-    if T is None and limits is None:
-        raise InvalidValueError("Give duration, limits or both.")
-    bounds = checked_limits(limits, n, start, end)
-    together = bounds is None or synchronisation is Synchronisation.COORDINATED
+    how = chosen(Synchronisation, synchronisation, "synchronisation")
+    return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)
+
+
+def law_motion(
+    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
+    duration: ArrayLike | None, limits: MotionLimits | None,
+    how: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:  # fmt: skip
+    """Motion from rest to rest between checked positions q0, q1 (R, n)."""
+    start, end = states["q0"], states["q1"]
+    n = start.shape[1]
+    T, bounds = checked_request(states, batch, duration, limits)
+    together = bounds is None or how is Synchronisation.COORDINATED
     # one law for all joints of a motion, or one law each
-    refuse_extremes({"q0": start, "q1": end} | ({} if T is None else {"duration": T}), bounds)
     difference = np.where(np.abs(end - start) < 1e-50, 0.0, end - start)
     way = difference[:, None, :] if together else difference[:, :, None]
-    laws = 1 if together else n  # of each motion
-    length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
+    length = np.abs(way).max(axis=-1, initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
+        direction = np.where(way != 0.0, way / length[..., None], 0.0)
     if bounds is None:
         assert T is not None
-        pieces = law_of_duration(law, length, np.repeat(T, laws))
-        least = np.zeros(R)
-    else:
-        along = limits_along(bounds, direction)
-        pieces = law_of_limits(law, length, along)
-        totals = pieces.durations.sum(axis=-1).reshape(R, laws)
-        least = totals.max(axis=-1, initial=0.0)
-        if T is None and synchronisation is Synchronisation.INDEPENDENT:
-            _refuse_waiting(law, along, totals)
-    refuse_short(T, least, length.reshape(R, laws))
-    pieces = stretched(pieces, T, least, synchronisation, laws)
-    return assembled(pieces, laws, start, direction, batch, scalar, T)
-
-
-def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
-    """Jumps at the end of a law, totals (R, n), are inside the motion where a joint waits."""
-    if law is TimeLaw.LINEAR:
-        jump, kind = "velocity", "acceleration or jerk"
-        bound = np.minimum(limits.deceleration, np.minimum(limits.jerk, limits.jerk_down))
-        others = "take SAME_TIME, or a law that ends at rest"
-    elif law is TimeLaw.CUBIC:
-        jump, kind, bound = "acceleration", "jerk", limits.jerk
-        others = "pass limits.without_jerk(), or take SAME_TIME or QUINTIC"
-    else:  # those of jerk are refused for BANG_BANG and TRAPEZOIDAL anywhere
-        return
-    early = (totals > 0.0) & (totals < totals.max(axis=-1, keepdims=True, initial=0.0))
-    wrong = early & np.isfinite(bound.reshape(totals.shape))
-    if wrong.any():
-        j = int(np.argwhere(wrong)[0][-1])
-        raise InvalidValueError(
-            f"limits: joint {j + 1} arrives early and waits, and the {jump} of {law.name} jumps at "
-            f"its end, which keeps no limit of {kind}; {others}."
-        )
-
-
-def stretched(
-    pieces: Pieces, T: Array | None, least: Array, how: Synchronisation, laws: int
-) -> Pieces:
-    """Stretch the laws of each motion to its duration, and let those that arrive early wait."""
-    total = pieces.durations.sum(axis=-1)
-    goal = np.repeat(least if T is None else T, laws)
-    if T is None and how is Synchronisation.INDEPENDENT:
-        wait = goal - total
-    else:
-        wait = np.where(total > 0.0, 0.0, goal)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            factor = np.where(total > 0.0, goal / total, 1.0)
-        pieces = Pieces(pieces.durations * factor[:, None], pieces.coefficients)
-    if not (wait > 0.0).any():
-        return pieces
-    rest = np.zeros_like(pieces.coefficients[:, :1])
-    rest[:, 0, 0] = pieces.coefficients[:, -1].sum(axis=-1)
-    return Pieces(
-        np.concatenate((pieces.durations, wait[:, None]), axis=1),
-        np.concatenate((pieces.coefficients, rest), axis=1),
-    )
+        refuse_short(T, np.zeros(len(start)), length)
+        pieces = law_of_duration(law, length.reshape(-1), np.repeat(T, 1 if together else n))
+        return assembled(pieces, start, direction, batch, scalar, T)
+    along = limits_along(bounds, direction)
+    pieces = law_of_limits(law, length.reshape(-1), along)
+    totals = pieces.durations.sum(axis=-1).reshape(length.shape)
+    refuse_short(T, totals.max(axis=-1, initial=0.0), length)
+    waits = T is None and how is Synchronisation.INDEPENDENT
+    moves = assembled(pieces, start, direction, batch, scalar, T, waits)
+    if waits and law in (TimeLaw.LINEAR, TimeLaw.CUBIC):  # jumps at an end are inside the motion
+        report = moves.check(bounds)
+        if not report.kept:
+            raise InvalidValueError(
+                f"limits: {law.name} ends with a jump, and where a joint arrives early and waits, "
+                f"limits are not kept: {'; '.join(report.violations())}. Take SAME_TIME, or a law "
+                "that ends at rest."
+            )
+    return moves
 
 
 def assembled(
-    pieces: Pieces, columns: int, start: Array, direction: Array, batch: tuple[int, ...],
-    scalar: bool, T: Array | None,
+    pieces: Pieces, start: Array, direction: Array, batch: tuple[int, ...], scalar: bool,
+    T: Array | None = None, waits: bool = False,
 ) -> Trajectory:  # fmt: skip
-    """Trajectory from motion laws along given directions.
+    """Trajectory of laws along given directions, stretched to the durations T (R,).
 
-    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1), T (R,).
+    Without them to the longest of each motion, or each law ``waits`` at its end.
+    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1).
     """
-    R, n = start.shape
-    K, powers = pieces.coefficients.shape[1:]
+    (R, n), columns = start.shape, direction.shape[1]
+    h, c = pieces.durations, pieces.coefficients
+    total = h.sum(axis=-1)
+    ends = total.reshape(R, columns).max(axis=-1, initial=0.0) if T is None else T
+    goal = np.repeat(ends, columns)
+    stretches = (total > 0.0) & (not waits)
+    h = h * np.where(stretches, goal / np.where(stretches, total, 1.0), 1.0)[:, None]
+    rest = np.where(stretches, 0.0, goal - total)
+    if (rest > 0.0).any():
+        last = np.zeros_like(c[:, :1])
+        last[:, 0, 0] = c[:, -1].sum(axis=-1)
+        h, c = np.append(h, rest[:, None], axis=1), np.append(c, last, axis=1)
+    K, powers = c.shape[1:]
     breaks = np.zeros((R, columns, K + 1))
-    breaks[..., 1:] = np.cumsum(pieces.durations, axis=-1).reshape(R, columns, K)
+    breaks[..., 1:] = np.cumsum(h, axis=-1).reshape(R, columns, K)
     if T is not None:
         # times of all laws end together to the last digit
         breaks = np.minimum(breaks, T[:, None, None])
         breaks[..., -1] = T[:, None]
-    c = pieces.coefficients.reshape(R, columns, K, powers)
-    c = np.moveaxis(c, 1, -1) * direction.reshape(R, 1, 1, n)
+    c = np.moveaxis(c.reshape(R, columns, K, powers), 1, -1) * direction.reshape(R, 1, 1, n)
     c[:, :, 0] += start[:, None, :]
     motion = PiecewisePolynomial(
         breaks.reshape(*batch, columns, K + 1),
         c.reshape(*batch, K, powers, n),
-        pieces.durations.reshape(*batch, columns, K),
+        h.reshape(*batch, columns, K),
     )
     return Trajectory(motion, scalar)

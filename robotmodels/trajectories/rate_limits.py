@@ -7,14 +7,13 @@ then as long as the motion becomes quicker: the result is a local optimum.
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any, cast
 
 import numpy as np
 
 from .._arrays import Array
+from .motions import PiecewisePolynomial
 from .path_limits import PathLimits, Rows
-from .piecewise import PiecewisePolynomial
 from .splines import cubic_spline
 
 _FIRST, _LEAST = 0.3, 1e-4  # of x: bounds of a step
@@ -28,7 +27,7 @@ def rate_limited(
     problem: PathLimits, s: Array, q: Array, rate: Array, rows: Rows, x: Array
 ) -> tuple[Array, PiecewisePolynomial] | None:
     """Squared rates (N + 1,) and a law that keep limits and rates, or None if none was found."""
-    share = 1.0
+    share, law = 1.0, None
     for _ in range(_TRIES):
         found = _improved(problem, s, q, rate, rows, x, share * problem.rates)
         if found is None:
@@ -46,6 +45,7 @@ def rate_limited(
         if over <= 1.0 + _KEPT:
             break
         share /= over
+    assert law is not None
     return x, law
 
 
@@ -55,22 +55,18 @@ def _improved(
     """Squared rates (N + 1,) that are a local optimum, or None where a limit is not kept."""
     from scipy.optimize import linprog
 
-    radius, moving = _FIRST, np.diff(s)
-    now = _Program(problem, moving, problem.tangent(rows, x, q, rate), x, rates)
+    def program_at(x: Array) -> _Program:
+        return _Program(problem, np.diff(s), problem.tangent(rows, x, q, rate), x, rates)
+
+    radius, now = _FIRST, program_at(x)
     for _ in range(_STEPS):
         if radius < _LEAST:
             break
         gain, A, room = now.program()
-        bounds = [
-            (-radius * v, min(radius * v, t - v)) for v, t in zip(now.x, rows.top, strict=True)
-        ]
-        bounds[0] = bounds[-1] = (0.0, 0.0)
-        found = linprog(gain, A, room, bounds=[*bounds, (0.0, np.inf)], method="highs")
-        if found.x is None:
-            radius *= 0.3
-            continue
-        trial = now.x + found.x[:-1]
-        then = _Program(problem, moving, problem.tangent(rows, trial, q, rate), trial, rates)
+        bounds = np.stack((-radius * now.x, np.minimum(radius * now.x, rows.top - now.x)), axis=1)
+        bounds[[0, -1]] = 0.0
+        found = linprog(gain, A, room, bounds=[*bounds.tolist(), (0.0, np.inf)], method="highs")
+        then = now if found.x is None else program_at(now.x + found.x[:-1])
         better = now.merit - then.merit
         if not better > 0.0:
             radius *= 0.3
@@ -90,95 +86,67 @@ class _Program:
     def __init__(
         self, problem: PathLimits, steps: Array, rows: Rows, x: Array, rates: Array
     ) -> None:  # fmt: skip
-        self.x, self.problem, self.steps, self.rates = x, problem, steps, rates
+        from scipy.sparse import csr_array, diags_array
+
+        N = steps.size
+
+        def banded(*bands: Array) -> Any:
+            """Rows with entries on the diagonal and beside it."""
+            shape = (bands[0].size, bands[0].size + 1)
+            return diags_array(bands, offsets=(0, 1), shape=shape, format="csr")
+
+        self.x = x
         root = np.sqrt(x)
         pace = root[1:] + root[:-1]
-        self.h = 2.0 * steps / pace
+        h = 2.0 * steps / pace
         with np.errstate(divide="ignore"):
-            slope = -self.h / pace * 0.5
-            self.left = np.where(x[:-1] > 0.0, slope / root[:-1], 0.0)
-            self.right = np.where(x[1:] > 0.0, slope / root[1:], 0.0)
-        # of each quantity at the start and at the end of every interval, by x there
-        half = 0.5 / steps[:, None]
-        a, b, c = rows.a, rows.b, rows.c
-        self.start = (b[:-1] - a[:-1] * half, a[:-1] * half, c[:-1])
-        self.end = (-a[1:] * half, b[1:] + a[1:] * half, c[1:])
-        self.values = [p * x[:-1, None] + r * x[1:, None] + k for p, r, k in (self.start, self.end)]
-        middle = 0.5 * (self.values[0] + self.values[1])
-        self.change = np.diff(middle, axis=0)
-        allowed = self.rates * 0.5 * (self.h[1:] + self.h[:-1])[:, None]
-        self.allowed = np.where(np.isfinite(self.rates), allowed, np.inf)
+            slope = -0.5 * h / pace
+            left, right = (np.where(r > 0.0, slope / r, 0.0) for r in (root[:-1], root[1:]))
+        self.by_duration, self.duration = banded(left, right), float(h.sum())
+        one, half = np.ones(N - 1), 0.5 / steps
+        change, mean = banded(-one, one), banded(0.5 * one, 0.5 * one)
         # from rest the mean acceleration of the first interval is 3/4 of the one that is reached
-        self.jumps = [
-            (e, middle[e] - rows.c[e], 0.75 * self.rates * self.h[e])
-            for e in (0, -1)
-            if x[e] == 0.0
-        ]
-        self.excess = max(float((np.abs(self.change) / self.allowed).max(initial=0.0)) - 1.0, 0.0)
-        for _, jump, most in self.jumps:
-            self.excess = max(self.excess, float((np.abs(jump) / most).max(initial=0.0)) - 1.0)
+        rests = np.flatnonzero(x[[0, -1]] == 0.0)
+        ends = csr_array(np.eye(N)[rests * (N - 1)])
+        self.blocks: list[tuple[Any, Array, Array | None]] = []  # rows, values and room, slack
+        excess = 0.0
         for k in range(problem.scale.size):
-            for _, value in self.imposed(k):
-                over = max(*(value[:, k] - problem.upper[k]), *(problem.lower[k] - value[:, k]))
-                self.excess = max(self.excess, float(over))
-        self.duration = float(self.h.sum())
+            a, b, c = rows.a[:, k], rows.b[:, k], rows.c[:, k]
+            start = banded(b[:-1] - a[:-1] * half, a[:-1] * half)  # of every interval
+            end = banded(-a[1:] * half, b[1:] + a[1:] * half)
+            for part, still in ((start, c[:-1]), (end, c[1:]))[: 1 + int(problem.ends[k])]:
+                value = part @ x + still
+                for side, bound in ((1.0, problem.upper[k]), (-1.0, -problem.lower[k])):
+                    excess = max(excess, float((side * value - bound).max()))
+                    if np.isfinite(bound):
+                        room = np.maximum(bound - side * value, 0.0)
+                        self.blocks.append((side * part, room, None))
+            if not np.isfinite(rates[k]):
+                continue
+            middle = 0.5 * (start + end)
+            value, still = middle @ x, 0.5 * (c[1:] + c[:-1])
+            at_ends = ends @ (value + still) - c[[0, -1]][rests]
+            for moved, by_x, weight in (
+                (change @ (value + still), change @ middle, mean),
+                (at_ends, ends @ middle, 0.75 * ends),
+            ):
+                allowed = rates[k] * (weight @ h)
+                excess = max(excess, float((np.abs(moved) / allowed).max(initial=0.0)) - 1.0)
+                by_time = rates[k] * (weight @ self.by_duration)
+                for side in (1.0, -1.0):
+                    self.blocks.append((side * by_x - by_time, allowed - side * moved, allowed))
+        self.excess = excess
         self.merit = self.duration * (1.0 + self.excess)
-
-    def imposed(self, k: int) -> list[tuple[tuple[Array, Array, Array], Array]]:
-        """Where a limit of quantity k is imposed: at the start of every interval, or at both."""
-        both = list(zip((self.start, self.end), self.values, strict=True))
-        return both[: 1 + int(self.problem.ends[k])]
 
     def program(self) -> tuple[Array, Any, Array]:
         """Objective, rows and bounds of the step (N + 1,) and the slack."""
-        from scipy.sparse import coo_array, vstack
+        from scipy.sparse import csr_array, hstack, vstack
 
-        problem, N = self.problem, self.steps.size
-        gain = np.zeros(N + 2)
-        gain[:N] += self.left
-        gain[1 : N + 1] += self.right
-        gain[-1] = self.duration
-        blocks: list[Any] = []
-        room: list[Array] = []
-
-        def add(columns: Any, coefficients: Array, most: Array, slack: Array | None) -> None:
-            """Rows with entries at columns (M, e), and a slack."""
-            wanted = np.flatnonzero(np.isfinite(most))
-            columns, coefficients = columns[wanted], coefficients[wanted]
-            M, e = columns.shape
-            i = np.repeat(np.arange(M), e)
-            block = coo_array((coefficients.ravel(), (i, columns.ravel())), shape=(M, N + 2))
-            if slack is not None:
-                block = block + coo_array(
-                    (-slack[wanted], (np.arange(M), np.full(M, N + 1))), shape=(M, N + 2)
-                )
-            blocks.append(block)
-            room.append(most[wanted])
-
-        i = np.arange(N)
-        for k in range(problem.scale.size):
-            for (p, r, _), value in self.imposed(k):
-                for side, bound in ((1.0, problem.upper[k]), (-1.0, -problem.lower[k])):
-                    spare = bound - side * value[:, k]
-                    add(np.stack((i, i + 1), 1), side * np.stack((p[:, k], r[:, k]), 1),
-                        np.maximum(spare, 0.0), None)  # fmt: skip
-            if not np.isfinite(self.rates[k]):
-                continue
-            p, r = (0.5 * (self.start[e][:, k] + self.end[e][:, k]) for e in (0, 1))
-            R = 0.5 * self.rates[k]
-            for side, (e, jump, most) in product((1.0, -1.0), self.jumps):
-                at = i[e]
-                slope = 0.75 * self.rates[k] * np.array([self.left[e], self.right[e]])
-                entry = side * np.array([p[e], r[e]]) - slope
-                add(np.array([[at, at + 1]]), entry[None], most[k : k + 1] - side * jump[k : k + 1],
-                    most[k : k + 1])  # fmt: skip
-            for side in (1.0, -1.0):
-                entries = (
-                    -side * p[:-1] - R * self.left[:-1],
-                    side * (p[1:] - r[:-1]) - R * (self.right[:-1] + self.left[1:]),
-                    side * r[1:] - R * self.right[1:],
-                )
-                spare = self.allowed[:, k] - side * self.change[:, k]
-                add(np.stack((i[:-1], i[:-1] + 1, i[:-1] + 2), 1), np.stack(entries, 1),
-                    spare, self.allowed[:, k])  # fmt: skip
-        return gain, vstack(blocks).tocsr(), np.concatenate(room)
+        gain = np.append(self.by_duration.sum(axis=0), self.duration)
+        rows = [
+            hstack(
+                (block, csr_array(np.zeros((room.size, 1)) if slack is None else -slack[:, None]))
+            )
+            for block, room, slack in self.blocks
+        ]
+        return gain, vstack(rows).tocsr(), np.concatenate([room for _, room, _ in self.blocks])

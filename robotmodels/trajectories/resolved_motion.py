@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import Array, Rebuilt, as_exact, read_only
 from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
@@ -25,13 +25,14 @@ from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
-from .checks import ROUNDING
-from .number_text import counted, greatest_shown, most_shown, seconds_shown
+from .checks import ROUNDING, counted, greatest_shown, least_shown, seconds_shown
 from .pose_trajectory import PoseTrajectory
+
+_MOVE, _TURN = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResolvedMotion:
+class ResolvedMotion(Rebuilt):
     """Joints that follow a trajectory of poses by their velocities.
 
     Parameters
@@ -46,11 +47,6 @@ class ResolvedMotion:
         Codes of `IKMStatus`.
     position_error, orientation_error : ndarray, shape (N,)
         How far the tool is behind in what was asked for, m and rad.
-
-    Examples
-    --------
-    >>> ResolvedMotion.__slots__[:3]
-    ('t', 'q', 'v')
     """
 
     t: Array
@@ -70,20 +66,19 @@ class ResolvedMotion:
 
     def __repr__(self) -> str:
         unmet = int(np.count_nonzero(self.status != IKMStatus.MET))
-        behind = (error.max(initial=0.0) for error in (self.position_error, self.orientation_error))
-        lines = (
-            f"<ResolvedMotion: {seconds_shown(self.t)}, {counted(self.q.shape[-1], 'joint')}, "
-            + (f"{counted(unmet, 'motion')} not met" if unmet else "all met"),
-            greatest_shown([("velocity", self.v)])
-            + "; behind by at most {:.2g} m and {:.2g} rad>".format(*behind),
+        met = f"{counted(unmet, 'motion')} not met" if unmet else "all met"
+        metres, angle = (
+            self.position_error.max(initial=0.0),
+            self.orientation_error.max(initial=0.0),
         )
-        return "\n  ".join(lines)
+        return (
+            f"<ResolvedMotion: {seconds_shown(self.t)}, {counted(self.q.shape[-1], 'joint')}, {met}"
+            f"\n  {greatest_shown([('velocity', self.v)])}; behind by at most {metres:.2g} m and "
+            f"{angle:.2g} rad>"
+        )
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.q, dtype=dtype, copy=copy)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
 def resolved_motion(
@@ -134,8 +129,8 @@ def resolved_motion(
     Raises
     ------
     ShapeError, InvalidValueError
-        A posture of the wrong length; fewer than two samples; a feedback that is negative or
-        faster than the steps; limits with a shorter step; what is no `PoseTrajectory`.
+        A posture of the wrong length; fewer than two samples; a feedback that is negative or faster
+        than the steps; limits with a shorter step; what is no `PoseTrajectory`.
 
     References
     ----------
@@ -146,11 +141,9 @@ def resolved_motion(
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.trajectories import straight_line
-    >>> arm = load("panda")
-    >>> q = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    >>> arm, q = load("panda"), np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
     >>> start = dgm(arm, q)
-    >>> goal = start.copy()
-    >>> goal[:3, 3] += [0.1, 0.2, -0.1]
+    >>> goal = start + np.eye(4, k=3) * 0.1  # 0.1 m along x
     >>> motion = resolved_motion(arm, straight_line(start, goal, duration=2.0), q)
     >>> bool(motion.position_error.max() < 1e-5)
     True
@@ -167,15 +160,14 @@ def resolved_motion(
     t = np.linspace(0.0, float(poses.duration), samples)
     step = float(t[1])
     if not 0.0 <= feedback * step <= 1.0 + ROUNDING:
-        fastest = most_shown(1.0 / step, 4) if step > 0 else "infinity"
+        fastest = least_shown(-1.0 / step, 4)[1:] if step > 0 else "infinity"
         raise InvalidValueError(
             f"feedback: expected between 0 and {fastest} 1/s, one over the step of {step:.4g} s, "
             f"got {feedback}; take more samples, or a smaller feedback."
         )
     bounds = _bounds_of_steps(limits, step)
     asked = np.ones(6) if mask is None else np.asarray(mask, dtype=np.float64)
-    ahead = t[:-1] + 0.5 * step
-    goals, twists, halfway = poses.pose(t), poses.twist(t), poses.twist(ahead)
+    goals, twists, halfway = poses.pose(t), poses.twist(t), poses.twist(t[:-1] + 0.5 * step)
 
     def asked_of(posture: Array, twist: Array) -> IKMSolution:
         return ikm(
@@ -184,11 +176,9 @@ def resolved_motion(
         )  # fmt: skip
 
     Q, V = np.empty((samples, model.n)), np.empty((samples, model.n))
-    status = np.zeros(samples, dtype=np.int8)
-    behind = np.empty((samples, 6))
+    status, behind = np.zeros(samples, dtype=np.int8), np.empty((samples, 6))
     for k in range(samples):
-        Q[k] = q
-        behind[k] = _behind(goals[k], dgm(model, q))
+        Q[k], behind[k] = q, _behind(goals[k], dgm(model, q))
         if k == samples - 1:
             break
         posture = q
@@ -198,15 +188,8 @@ def resolved_motion(
         V[k], status[k] = found.v, found.status
         q = q + step * found.v
     V[-1], status[-1] = V[-2], status[-2]
-    missed = behind * asked
-    return ResolvedMotion(
-        t,
-        Q,
-        V,
-        status,
-        np.linalg.norm(missed[:, :3], axis=1),
-        np.linalg.norm(missed[:, 3:], axis=1),
-    )
+    errors = (np.linalg.norm((behind * asked)[:, part], axis=1) for part in (_MOVE, _TURN))
+    return ResolvedMotion(t, Q, V, status, *errors)
 
 
 def _bounds_of_steps(limits: JointBounds | bool | None, step: float) -> JointBounds | None:
@@ -216,14 +199,12 @@ def _bounds_of_steps(limits: JointBounds | bool | None, step: float) -> JointBou
     bounds = JointBounds() if limits is True else limits
     if not isinstance(bounds, JointBounds):
         raise InvalidValueError(f"limits: expected JointBounds, True or None, got {limits!r:.80}.")
-    if bounds.step is None:
-        return replace(bounds, step=step)
-    if bounds.step < step * (1.0 - 1e-9):
+    if bounds.step is not None and bounds.step < step * (1.0 - 1e-9):
         raise InvalidValueError(
             f"limits: their step of {bounds.step:.4g} s is shorter than that of the motion, "
             f"{step:.4g} s, in which joints could pass a limit; leave it out, or take more samples."
         )
-    return bounds
+    return replace(bounds, step=step) if bounds.step is None else bounds
 
 
 def _behind(goal: Array, now: Array) -> Array:

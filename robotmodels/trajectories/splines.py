@@ -36,6 +36,7 @@ Khalil and Dombre, Modeling, identification and control of robots, section 13.5.
 from __future__ import annotations
 
 from enum import Enum
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -44,21 +45,24 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, refuse_jointless
-from .limits import MotionLimits
-from .number_text import least_shown
-from .piecewise import PiecewisePolynomial
+from .checks import (
+    ROUNDING,
+    checked_limits,
+    checked_request,
+    least_shown,
+    refuse_jointless,
+    refuse_short,
+)
+from .limits import MotionLimits, ranges_of
+from .motions import PiecewisePolynomial
 from .trajectory import Trajectory
+
+_KEPT = 1e-14  # relative excess that rounding alone makes
+_TRIALS = 2000  # durations of the grid
 
 
 class SplineEnds(Enum):
-    """What is asked of a cubic spline at its ends.
-
-    Examples
-    --------
-    >>> SplineEnds.NATURAL.value
-    'no acceleration at the ends'
-    """
+    """What is asked of a cubic spline at its ends."""
 
     CLAMPED = "given velocities at the ends"
     NATURAL = "no acceleration at the ends"
@@ -99,22 +103,14 @@ def cubic_spline(
                 f"points: a periodic spline ends where it began; joint {j + 1} ends {gap[j]:.3g} "
                 "beside its start. Give the first point again as the last."
             )
-        q = q.copy()
-        q[-1] = q[0]
+        q = knots.points = np.vstack((q[:-1], q[:1]))
     condition: Any = {
         SplineEnds.CLAMPED: ((1, knots.rates["v0"]), (1, knots.rates["v1"])),
         SplineEnds.NATURAL: "natural",
         SplineEnds.NOT_A_KNOT: "not-a-knot",
         SplineEnds.PERIODIC: "periodic",
     }[ends]
-    spline = CubicSpline(knots.times, q, bc_type=condition)
-    # highest power of the time first
-    c = np.moveaxis(np.asarray(spline.c)[::-1], 0, 1)
-    c = c * np.diff(knots.times)[:, None, None] ** np.arange(4.0)[:, None]
-    trajectory = knots.finished(c, knots.times)
-    if ends is SplineEnds.PERIODIC:
-        return Trajectory(trajectory.motion, trajectory.scalar)
-    return trajectory
+    return knots.finished(3, v=CubicSpline(knots.times, q, bc_type=condition)(knots.times, 1))
 
 
 def quintic_spline(
@@ -130,12 +126,6 @@ def quintic_spline(
 
     The continuity of these two loses digits where intervals of time differ by more than a factor
     of 1000.
-
-    Examples
-    --------
-    >>> path = quintic_spline([0.0, 1.0, 0.5], times=[0.0, 1.0, 2.0])
-    >>> path.q([0.0, 1.0, 2.0]).round(12), path.a([0.0, 2.0]).round(9) + 0.0
-    (array([0. , 1. , 0.5]), array([0., 0.]))
     """
     from scipy.interpolate import make_interp_spline
 
@@ -145,14 +135,7 @@ def quintic_spline(
     spline = make_interp_spline(knots.times, knots.points, k=5, bc_type=ends)
     v, a = spline(knots.times, 1), spline(knots.times, 2)
     v[[0, -1]], a[[0, -1]] = (rates["v0"], rates["v1"]), (rates["a0"], rates["a1"])
-    h = np.diff(knots.times)[:, None]
-    # between two states: points are met and the acceleration goes on however uneven the times are
-    q, d = knots.points[:-1], np.diff(knots.points, axis=0)
-    V0, V1, A0, A1 = h * v[:-1], h * v[1:], h * h * a[:-1], h * h * a[1:]
-    cubed = 10.0 * d - 6.0 * V0 - 4.0 * V1 - 1.5 * A0 + 0.5 * A1
-    fourth = -15.0 * d + 8.0 * V0 + 7.0 * V1 + 1.5 * A0 - A1
-    fifth = 6.0 * d - 3.0 * (V0 + V1) - 0.5 * (A0 - A1)
-    return knots.finished(np.stack((q, V0, 0.5 * A0, cubed, fourth, fifth), axis=1), knots.times)
+    return knots.finished(5, v=v, a=a)
 
 
 class _Knots:
@@ -183,26 +166,30 @@ class _Knots:
         self.chosen = times is None
         self.times = _chosen_times(self) if times is None else _given_times(times, len(q))
 
-    def finished(self, c: Array, x: Array) -> Trajectory:
-        """The trajectory of coefficients (K, d + 1, n) of normalised time, and its limits."""
-        h = np.diff(x)
-        motion = PiecewisePolynomial(x[None], c)
-        trajectory = Trajectory(motion, self.scalar)
+    def finished(self, order: int, **rates: Array) -> Trajectory:
+        """Polynomials between the states at the knots, each (m, n), and the check of the limits.
+
+        Points are met and the derivatives go on however uneven the times are.
+        """
+        states = {"q": self.points} | rates
+        ends = {name + "0": x[:-1] for name, x in states.items()}
+        ends |= {name + "1": x[1:] for name, x in states.items()}
+        h = np.diff(self.times)
+        c = np.swapaxes(between_states(order, ends, h[:, None]), 0, 1)
+        trajectory = Trajectory(PiecewisePolynomial(self.times[None], c), self.scalar)
         if self.limits is None:
             return trajectory
         report = trajectory.check(self.limits, ROUNDING)
         if self.chosen:
             factor = report.stretch * (1.0 + 1e-14)
-            motion = PiecewisePolynomial(x[None] * factor, c, h[None] * factor)
+            motion = PiecewisePolynomial(self.times[None] * factor, c, h[None] * factor)
             trajectory = Trajectory(motion, self.scalar)
             report = trajectory.check(self.limits, ROUNDING)
         if not report.kept:
             sentences = "; ".join(report.violations())
-            advice = (
-                f"The least factor on the times is {least_shown(report.stretch)}."
-                if report.stretch > 1.0 and not self.moving
-                else "Choose other points or times."
-            )
+            advice = "Choose other points or times."
+            if report.stretch > 1.0 and not self.moving:
+                advice = f"The least factor on the times is {least_shown(report.stretch)}."
             raise InvalidValueError(f"The limits are not kept: {sentences}. {advice}")
         return trajectory
 
@@ -238,3 +225,138 @@ def _chosen_times(knots: _Knots) -> Array:
             "give times."
         )
     return np.concatenate(((0.0,), np.cumsum(needs)))
+
+
+def motion_between(
+    order: int, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
+    duration: ArrayLike | None, limits: MotionLimits | None,
+) -> Trajectory:  # fmt: skip
+    """Motion by polynomials of an order between states (R, n), checked against the limits."""
+    T, bounds = checked_request(states, batch, duration, limits)
+    R, n = states["q0"].shape
+    refuse_short(T, np.zeros(R), np.ones((R, 1)))
+    if bounds is not None:
+        rows = [{name: value[i] for name, value in states.items()} for i in range(R)]
+        if T is None:
+            T = np.array([_least(order, row, bounds) for row in rows])
+        for row, time in zip(rows, T, strict=True):
+            if excess(order, row, np.array([time]), bounds)[0] > ROUNDING:
+                _refuse(order, row, bounds, float(time))
+    assert T is not None
+    c = np.moveaxis(between_states(order, states, T[:, None]), 0, -2)
+    breaks = np.stack((np.zeros(R), T), axis=-1).reshape(*batch, 1, 2)
+    return Trajectory(PiecewisePolynomial(breaks, c.reshape(*batch, 1, order + 1, n)), scalar)
+
+
+def _least(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
+    """Least duration, or why there is none."""
+    for rate, (_, least, most) in zip("va", ranges_of(limits)[1:3], strict=True):
+        for name in (f"{rate}0", f"{rate}1") if f"{rate}0" in state else ():
+            wrong = (state[name] > most) | (state[name] < least)
+            if wrong.any():
+                j = int(wrong.argmax())
+                raise InvalidValueError(
+                    f"limits: {name} of joint {j + 1} is {state[name][j]:.9g}, outside its limits "
+                    f"{least[j]:.9g} to {most[j]:.9g}; the least limit that will do is "
+                    f"{least_shown(abs(state[name][j]))}."
+                )
+    T = least_duration(order, state, limits)
+    if T is None:
+        raise InvalidValueError(
+            "limits: no duration keeps them with these states at the ends; give slower states or "
+            "greater limits, or take jerk_limited, which finds a motion between any states."
+        )
+    return T
+
+
+def _refuse(order: int, state: dict[str, Array], limits: MotionLimits, T: float) -> None:
+    least = _least(order, state, limits)
+    message = (
+        f"duration: with {T:.9g} s the limits are not kept; the least duration that keeps them is "
+        f"{least_shown(least)} s."
+    )
+    if least < T:
+        longer = least_duration(order, state, limits, T)
+        message += (
+            " No longer one does."
+            if longer is None
+            else f" The least that is longer than that given is {least_shown(longer)} s."
+        )
+    raise InvalidValueError(message)
+
+
+def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
+    """Coefficients of normalised time of the polynomials between two states.
+
+    Shapes: states (R, n) or (n,) -> (order + 1, ...).
+    """
+    q0, D = states["q0"] + 0.0 * T, states["q1"] - states["q0"]
+    v0, v1 = T * states["v0"], T * states["v1"]
+    if order == 3:
+        return np.stack((q0, v0, 3.0 * D - 2.0 * v0 - v1, v0 + v1 - 2.0 * D))
+    a0, a1 = T * T * states["a0"], T * T * states["a1"]
+    cubed = 10.0 * D - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
+    fourth = -15.0 * D + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
+    fifth = 6.0 * D - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
+    return np.stack((q0, v0, 0.5 * a0, cubed, fourth, fifth))
+
+
+def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) -> Array:
+    """Relative excess over the worst limit for given durations."""
+    c = np.moveaxis(between_states(order, state, T[:, None]), 0, -2)[:, None]
+    motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
+    worst = np.full(T.shape, -np.inf)
+    for k, (_, least, most) in enumerate(ranges_of(limits)):
+        if np.isfinite((least, most)).any():
+            low, high = motion.extremes(k)
+            size = np.maximum(np.abs(least), np.abs(most))
+            size = np.where(np.isfinite(size) & (size > 0.0), size, 1.0)
+            over = np.maximum((high - most) / size, (least - low) / size)
+            worst = np.maximum(worst, over.max(axis=-1))
+    return worst
+
+
+def least_duration(
+    order: int, state: dict[str, Array], limits: MotionLimits, after: float = 0.0
+) -> float | None:
+    """Least duration with which the polynomials keep the limits."""
+    scales = _scales(state, limits)
+    if not scales.size:
+        return 0.0
+    trials = np.geomspace(scales.min() / 1e3, scales.max() * 1e3, _TRIALS)
+    trials = np.append(after, trials[trials > after]) if after > 0.0 else trials
+    kept = excess(order, state, trials, limits) <= _KEPT
+    if not kept.any():
+        return None
+    k = int(kept.argmax())
+    if k == 0 and after == 0.0:
+        raise InvalidValueError(
+            "limits: between these states they are kept in any time, however short; give duration."
+        )
+    below, T = float(trials[max(k - 1, 0)]), float(trials[k])
+    while np.nextafter(below, T) < T:
+        finer = np.linspace(below, T, 18)
+        inner = np.append(excess(order, state, finer[1:-1], limits) <= _KEPT, True)
+        k = int(inner.argmax()) + 1
+        if (below, T) == (finer[k - 1], finer[k]):
+            break
+        below, T = float(finer[k - 1]), float(finer[k])
+    return T
+
+
+def _scales(state: dict[str, Array], limits: MotionLimits) -> Array:
+    """Times that the states and limits make: the durations sought are of their size."""
+    q0, q1 = state["q0"], state["q1"]
+    room = np.minimum(limits.upper - np.maximum(q0, q1), np.minimum(q0, q1) - limits.lower)
+    sizes = [(0, np.abs(q1 - q0))]
+    sizes += [("qva".index(name[0]), np.abs(x)) for name, x in state.items() if name[0] != "q"]
+    if not any(size.any() for _, size in sizes):
+        return np.empty(0)
+    sizes += [(0, np.maximum(room, 0.0))]
+    sizes += [(k, np.minimum(m, -x)) for k, (_, x, m) in enumerate(ranges_of(limits)) if k]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pairs = combinations(sorted(sizes, key=lambda size: size[0]), 2)
+        times = [(x / y) ** (1.0 / (k - i)) for (i, x), (k, y) in pairs if k > i]
+    times = np.concatenate(times)
+    times = times[np.isfinite(times) & (times > 0.0)]
+    return times if times.size else np.ones(1)

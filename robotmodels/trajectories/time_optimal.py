@@ -7,24 +7,26 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_number, read_only
+from .._arrays import Array, as_number
 from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..friction import Friction
+from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from .checks import checked_limits
 from .limits import MotionLimits
-from .motions import TimedMotion
-from .path_limits import SLOWEST, Passes, PathLimits, Rows
-from .piecewise import PiecewisePolynomial
+from .motions import Motion, PiecewisePolynomial, TimedMotion
+from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
-from .regular_paths import checked_points, path_of, toward_ends
-from .trajectory import Trajectory
+from .trajectory import TimingResult, Trajectory
 
 _BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
-_INSIDE = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of an interval
+_INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
+_BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
+_HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
+_ROUNDS = 12
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
 
@@ -38,7 +40,7 @@ class TimingStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TimedPath(Value):
+class TimedPath(TimingResult):
     """The quickest motion along a path, and what limits it.
 
     Parameters
@@ -64,13 +66,6 @@ class TimedPath(Value):
         estimates the relative error of the duration; infinite without one.
     explanation : str
         Details of the status; where torques exceed their limits between the points of the grid.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
-    >>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0), points=10)
-    >>> timed.status.name, str(timed.active[0]), str(timed.active[5])
-    ('OPTIMAL', 'acceleration of joint 1', 'velocity of joint 1')
     """
 
     trajectory: Trajectory | None
@@ -82,22 +77,8 @@ class TimedPath(Value):
     grid_gap: float = np.inf
     explanation: str = field(default="")
 
-    def __post_init__(self) -> None:
-        for name in ("parameter", "rate", "maximum_rate"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-        object.__setattr__(self, "active", read_only(self.active, str))
-
     def __hash__(self) -> int:
         return hash((self.status, self.duration, self.explanation))
-
-    @property
-    def duration(self) -> float:
-        """Seconds; NaN without a motion."""
-        return np.nan if self.trajectory is None else self.trajectory.duration
-
-    def reason(self) -> str:
-        """The status as a sentence, with the place and the joint."""
-        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         lines = [f"<TimedPath: {self.status.name}"]
@@ -129,9 +110,11 @@ def time_optimal(
     Also called TOPP, TOPP-RA. The path keeps its shape and loses its own timing. On a grid of its
     parameter, the rates from which the end is reached are computed backward, and the greatest of
     them forward (reachability analysis). Accelerations are limited at both ends of every interval
-    of the grid, torques at its start, with ``both_ends`` at both. Between points torques may be
-    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where five
-    times in each interval show more than 2 %; take more points then.
+    of the grid, torques at its start, as is usual (collocation). Between points torques may then be
+    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where it is more
+    than 2 %. With ``both_ends`` torques are limited at both ends and, by narrower limits where that
+    is needed, between them to 1.001 of their limits, but for moments where dry friction changes its
+    sign.
 
     Parameters
     ----------
@@ -143,8 +126,7 @@ def time_optimal(
     model : RobotModel, optional
         The robot, n joints, for limits of torque.
     torque : array_like, shape () or (n,), optional
-        Greatest torques of both signs, N m or N; default those of the model's table. Infinity is
-        no limit.
+        Greatest torques of both signs, N m or N; default those of the model's table.
     torque_rate : array_like, shape () or (n,), optional
         Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
         is then a local optimum, found from the one without them, and keeps them within 1 %.
@@ -156,7 +138,7 @@ def time_optimal(
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
     both_ends : bool
-        Whether torques are limited at both ends of each interval.
+        Whether torques are limited at both ends of each interval, and inside.
 
     Returns
     -------
@@ -166,8 +148,8 @@ def time_optimal(
     Raises
     ------
     ShapeError, InvalidValueError
-        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates,
-        no finite limit, a path outside the limits of position.
+        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates, no
+        finite limit, a path outside the limits of position.
 
     References
     ----------
@@ -179,10 +161,10 @@ def time_optimal(
     >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
     >>> line = linear([0.0, 0.0], [1.0, 0.5], duration=1.0)
     >>> timed = time_optimal(line, MotionLimits(velocity=1.0, acceleration=2.0))
-    >>> round(timed.duration, 6)  # D / v + v / a
-    1.5
+    >>> round(timed.duration, 6), str(timed.active[100])  # D / v + v / a
+    (1.5, 'velocity of joint 1')
     """
-    points = checked_points(points)
+    points = whole_number(points, "points", 2)
     rates = tuple(as_number(r, k, least=0.0) for r, k in
                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
     motion, scalar = path_of(path, model, points)
@@ -201,18 +183,21 @@ def time_optimal(
         rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
     ends = (rates[0], rates[1])
     rows = problem.rows(q, rate, bend)
-    at_rest = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
-    found = not_held(problem, rows.held, s, q, at_rest)
+    rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
+    stuck = np.abs(problem.drag(q[rests], np.full((len(rests), n), SLOWEST)))
+    found = not_held(rows.held[rests], problem.torque, lambda i: f"s = {s[rests[i]]:.6g}", stuck)
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
-        found = not_held(problem, rows.held, s, q)
+        found = not_held(rows.held, problem.torque, lambda i: f"s = {s[i]:.6g}")
         if found:
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = problem.passes(s[half], q[half], rate[half], bend[half], ends, _part(rows, half))
+    coarse = problem.passes(
+        s[half], q[half], rate[half], bend[half], ends, Rows(*(part[half] for part in rows))
+    )
     gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
     if not x.max() < 1e200:
@@ -220,7 +205,9 @@ def time_optimal(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
-    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    law, slowed, tight = law_of(s, x), np.zeros(x.shape, np.bool_), np.zeros((2, points, 1))
+    inside = _INSIDE if both_ends else _INSIDE[::2]
+    use = _uses(problem, motion, law, inside)
     if np.isfinite(problem.rates).any():
         slower = rate_limited(problem, s, q, rate, rows, x)
         if slower is None:
@@ -230,46 +217,65 @@ def time_optimal(
             )
         slowed = slower[0] < x * (1.0 - 1e-3)
         x, law = slower
-    trajectory = Trajectory(TimedMotion(motion, law), scalar)
-    beyond = _between(problem, trajectory, law)
+        use = _uses(problem, motion, law, inside)
+    elif both_ends:
+        for _ in range(_ROUNDS):
+            over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
+            if not over.max(initial=0.0) > _HELD:
+                break
+            # where torques inside an interval exceed their limits, those at its ends are narrower
+            wide = np.zeros((2, points, problem.scale.size))
+            wide[..., problem.acceleration.size :] = 1.1 * np.maximum(over[..., problem.loaded], 0)
+            tight = tight + wide
+            then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
+            if then.failed >= 0 or np.isinf(then.duration):
+                break
+            passes, law = then, law_of(s, then.found[:, 0])
+            x, use = passes.found[:, 0], _uses(problem, motion, law, inside)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
     if velocity.any():
         with np.errstate(divide="ignore"):
             spare = np.where(rate > 0.0, problem.limits.velocity, -problem.limits.velocity_lower)
             code[velocity] += (spare / np.abs(rate)).argmin(axis=1)[velocity]
-    return TimedPath(
-        trajectory,
-        TimingStatus.OPTIMAL,
-        s,
-        np.sqrt(np.maximum(x, 0.0)),
-        np.sqrt(np.maximum(passes.found[:, 4], 0.0)),
-        np.where(slowed, "rate", problem.names[code]),
-        gap,
-        beyond,
-    )
+    most = np.sqrt(np.maximum(passes.found[:, 4], 0.0))
+    active = np.where(slowed, "rate", problem.names[code])
+    trajectory = Trajectory(TimedMotion(motion, law), scalar)
+    x = np.sqrt(np.maximum(x, 0.0))
+    why = _beyond(use, s, both_ends)
+    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, x, most, active, gap, why)
 
 
-def _between(problem: PathLimits, motion: Trajectory, law: PiecewisePolynomial) -> str:
-    """Where torques inside of intervals exceed their limits, as a sentence, or nothing."""
+def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside: Array) -> Array:
+    """Torques (N, P, n) at places inside the intervals, over their limits."""
+    N = law.lengths.size
     if problem.model is None or not problem.loaded.size:
-        return ""
-    begin, end = law.breaks[0, :-1], law.breaks[0, 1:]
-    times = (begin[:, None] + (end - begin)[:, None] * _INSIDE).ravel()
-    q, v, a = motion.motion.derivatives(times, (0, 1, 2))
+        return np.zeros((N, 1, problem.n))
+    timed, places = TimedMotion(motion, law), np.tile(inside, (N, 1))
+    if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
+        (v,) = timed.derivatives(law.breaks[0], (1,))
+        turns = v[1:] * v[:-1] < 0.0
+        at = np.where(turns, v[:-1] / np.where(turns, v[:-1] - v[1:], 1.0), 0.0).max(axis=1)
+        places = np.hstack((places, np.clip(at[:, None] + _BESIDE, 0.0, 1.0 - 1e-9)))
+    times = (law.breaks[0, :-1, None] + law.lengths[0][:, None] * places).reshape(-1)
+    q, v, a = timed.derivatives(times, (0, 1, 2))
     tau = rigid_torques(problem.model, q, v, a) + problem.drag(q, v)
     if problem.drives is not None:
         tau = tau + a @ problem.drives.rotor + problem.drives.offset
     with np.errstate(divide="ignore", invalid="ignore"):
-        use = np.nan_to_num(np.abs(tau) / problem.torque, nan=0.0)
-    if not use.size or use.max() <= _BETWEEN:
+        return np.nan_to_num(tau / problem.torque, nan=0.0).reshape(N, -1, problem.n)
+
+
+def _beyond(use: Array, s: Array, both_ends: bool) -> str:
+    """Where torques inside of intervals exceed their limits, as a sentence, or nothing."""
+    size = np.abs(use).max(axis=1, initial=0.0)
+    if not size.max(initial=0.0) > _BETWEEN:
         return ""
-    i, j = np.unravel_index(int(use.argmax()), use.shape)
-    (place,) = law.derivatives(times[i : i + 1], (0,))
+    i, j = np.unravel_index(int(size.argmax()), size.shape)
     return (
         f"The motion is the quickest on this grid, but between its points the torque of joint "
-        f"{j + 1} reaches {use.max():.3g} times its limit at s = {place.item():.6g}. Take "
-        "more points."
+        f"{j + 1} reaches {size[i, j]:.3g} times its limit at s = {s[i]:.6g} to {s[i + 1]:.6g}. "
+        f"Take more points{'' if both_ends else ', or both_ends=True'}."
     )
 
 
@@ -286,31 +292,6 @@ def law_of(s: Array, x: Array) -> PiecewisePolynomial:
 def _without(status: TimingStatus, why: str) -> TimedPath:
     none = np.empty(0)
     return TimedPath(None, status, none, none, none, np.empty(0, str), np.inf, why)
-
-
-def _part(rows: Rows, at: NDArray[np.intp]) -> Rows:
-    """Rows of some points of the grid."""
-    return Rows(*(part[at] for part in rows))
-
-
-def not_held(
-    problem: PathLimits, held: Array, s: Array, q: Array, at_rest: list[int] | None = None
-) -> str:  # fmt: skip
-    """Where gravity exceeds the torques most, as a sentence; at points at rest friction helps."""
-    margin = problem.torque * (1.0 + 1e-9) - np.abs(held)
-    help_ = ""
-    if at_rest is not None:
-        s, q, held, margin = s[at_rest], q[at_rest], held[at_rest], margin[at_rest]
-        stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-        margin, help_ = margin + stuck, " and dry friction" if stuck.any() else ""
-    if (margin >= 0.0).all():
-        return ""
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    return (
-        f"Gravity exceeds the torques at s = {s[i]:.6g}: joint {j + 1} needs "
-        f"{abs(held[i, j]):.6g} to be held still and has {problem.torque[j]:.6g}{help_}, a margin "
-        f"of {margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def _where(passes: Passes, s: Array, ends: tuple[float, float]) -> str:

@@ -12,19 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, read_only
+from .._arrays import Array
 from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .checks import checked_limits
 from .limits import MotionLimits
-from .motions import Motion, TimedMotion
-from .path_limits import checked_torque
-from .piecewise import PiecewisePolynomial
-from .trajectory import Trajectory
+from .motions import Motion, PiecewisePolynomial, TimedMotion
+from .path_limits import checked_torque, not_held
+from .trajectory import TimingResult, Trajectory
 
-_SAMPLES, _FINE = 501, 4001
+_FINE, _SHOWN = 4001, 8  # samples, and which of them have windows
 _ZOOM = 41
 _ROUNDS = 4
 _WORST = 4
@@ -42,7 +41,7 @@ class ScalingStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ScaledTrajectory(Value):
+class ScaledTrajectory(TimingResult):
     """A motion with the least duration that its profile allows.
 
     Parameters
@@ -59,15 +58,6 @@ class ScaledTrajectory(Value):
         infinite where the robot is held still.
     explanation : str
         Details of the status.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import MotionLimits, quintic, time_scaled
-    >>> move = quintic(np.zeros(6), np.full(6, 0.1), duration=1.0)
-    >>> scaled = time_scaled(move, load("ur5e"), None, MotionLimits(velocity=0.5))
-    >>> scaled.status.name, round(scaled.duration, 6)
-    ('SCALED', 0.375)
     """
 
     trajectory: Trajectory | None
@@ -75,19 +65,6 @@ class ScaledTrajectory(Value):
     fraction: Array
     windows: Array
     explanation: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "fraction", read_only(self.fraction))
-        object.__setattr__(self, "windows", read_only(self.windows))
-
-    @property
-    def duration(self) -> float:
-        """Seconds; NaN without a motion."""
-        return np.nan if self.trajectory is None else self.trajectory.duration
-
-    def reason(self) -> str:
-        """The status as a sentence, with the joint and the margin where it is not held."""
-        return self.explanation or self.status.sentence
 
     def __repr__(self) -> str:
         most = self.windows[:, 0].max(initial=0.0)
@@ -166,33 +143,21 @@ def time_scaled(
         raise InvalidValueError(
             "limits, torque: all are infinite or the motion is none, so any duration keeps them."
         )
-    fraction = np.linspace(0.0, 1.0, _SAMPLES)
+    fraction = np.linspace(0.0, 1.0, _FINE)
     parts = torque_parts(model, motion, fraction)
-    windows = windows_of(parts, bound, least)
-    if not _held(model, motion, bound):
-        why = _heaviest(parts[2], bound, fraction)
-        return ScaledTrajectory(None, ScalingStatus.NOT_HELD_STILL, fraction, windows, why)
-    T = _least_duration(model, motion, bound, least)
+    fraction, held = fraction[::_SHOWN], parts[2][::_SHOWN]
+    windows = windows_of((parts[0][::_SHOWN], parts[1][::_SHOWN], held), bound, least)
+    T = (
+        _least_duration(model, motion, parts, bound, least)
+        if _held(model, motion, bound)
+        else np.inf
+    )
     if np.isinf(T):
-        heavy = (np.abs(parts[2]) > bound).any()
-        status = ScalingStatus.NOT_HELD_STILL if heavy else ScalingStatus.NO_WINDOW
-        why = _heaviest(parts[2], bound, fraction) if heavy else ""
+        why = not_held(held, bound, lambda i: f"the fraction {fraction[i]:.4g} of the motion")
+        status = ScalingStatus.NOT_HELD_STILL if why else ScalingStatus.NO_WINDOW
         return ScaledTrajectory(None, status, fraction, windows, why)
     result = Trajectory(stretched(motion, T * _MARGIN), trajectory.scalar)
     return ScaledTrajectory(result, ScalingStatus.SCALED, fraction, windows)
-
-
-def _heaviest(held: Array, bound: Array, fraction: Array) -> str:
-    """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence."""
-    margin = bound - np.abs(held)
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    if margin[i, j] >= 0.0:
-        return ""
-    return (
-        f"Gravity exceeds the torques at the fraction {fraction[i]:.4g} of the motion: joint "
-        f"{j + 1} needs {abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}, a margin of "
-        f"{margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:
@@ -252,30 +217,23 @@ def _forbidden(parts: tuple[Array, Array, Array], bound: Array) -> tuple[Array, 
     return low.reshape(shape), high.reshape(shape)
 
 
-def _least_duration(model: RobotModel, motion: Motion, bound: Array, least: float) -> float:
+def _least_duration(
+    model: RobotModel, motion: Motion, parts: tuple[Array, Array, Array], bound: Array, least: float
+) -> float:
     """Least duration that keeps the limits at all samples, and between those that decide."""
-    fraction = np.linspace(0.0, 1.0, _FINE)
-    samples = [fraction]
-    latest = _earliest(model, motion, fraction, bound, least)
+    fraction, every = np.linspace(0.0, 1.0, _FINE), [parts]
+    latest = windows_of(parts, bound, least)[:, 0]
     for k in np.argsort(-latest, kind="stable")[:_WORST]:
         low, high = fraction[max(k - 1, 0)], fraction[min(k + 1, _FINE - 1)]
         for _ in range(_ROUNDS):
             fine = np.linspace(low, high, _ZOOM)
-            i = int(_earliest(model, motion, fine, bound, least).argmax())
+            every.append(torque_parts(model, motion, fine))
+            i = int(windows_of(every[-1], bound, least)[:, 0].argmax())
             low, high = fine[max(i - 1, 0)], fine[min(i + 1, _ZOOM - 1)]
-            samples.append(fine)
-    every = np.concatenate(samples)
-    together = tuple(x.reshape(-1) for x in torque_parts(model, motion, every))
+    A, B, C = (np.concatenate(rows).reshape(-1) for rows in zip(*every, strict=True))
     # all samples at once, as limits of one joint each
     least = max(least, float(latest[np.isfinite(latest)].max(initial=0.0)))
-    return float(windows_of(together, np.tile(bound, every.size), least)[0])  # type: ignore[arg-type]
-
-
-def _earliest(
-    model: RobotModel, motion: Motion, fraction: Array, bound: Array, least: float
-) -> Array:  # fmt: skip
-    """Least duration (N,) at samples; infinite where there is none."""
-    return windows_of(torque_parts(model, motion, fraction), bound, least)[:, 0]
+    return float(windows_of((A, B, C), np.resize(bound, A.size), least)[0])
 
 
 def _held(model: RobotModel, motion: Motion, bound: Array) -> bool:

@@ -9,15 +9,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_floats, as_number, read_only
+from .._arrays import Array, Frozen, Rebuilt, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .limits import LimitsReport, MotionLimits
+from .checks import counted, greatest_shown, seconds_shown
+from .limits import RATES, LimitsReport, MotionLimits
 from .motions import FunctionMotion, Motion
-from .number_text import counted, greatest_shown, seconds_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(Rebuilt):
     """A trajectory at given times. As an array (``np.asarray``) it is its positions.
 
     Parameters
@@ -26,12 +26,6 @@ class Samples:
         Times, s.
     q, v, a, jerk : ndarray, shape (..., N, n)
         Positions and their first three derivatives, rad or m, and per s.
-
-    Examples
-    --------
-    >>> joint_samples = Samples([0.0, 1.0], [[0.0], [1.0]], *np.zeros((3, 2, 1)))
-    >>> np.asarray(joint_samples).shape
-    (2, 1)
     """
 
     t: Array
@@ -44,8 +38,7 @@ class Samples:
         for field in fields(self):
             value = getattr(self, field.name)
             if not isinstance(value, np.ndarray) or value.flags.writeable:
-                value = read_only(value)
-            object.__setattr__(self, field.name, value)
+                object.__setattr__(self, field.name, read_only(value))
 
     def __len__(self) -> int:
         return self.t.size
@@ -54,21 +47,14 @@ class Samples:
         k, shape = self.t.ndim, self.q.shape
         scalar = len(shape) <= k or shape[-1 - k : -1] != self.t.shape
         values = [x[..., None] if scalar else x for x in (self.v, self.a, self.jerk)]
-        *batch, n = values[0].shape
-        batch = batch[: len(batch) - k]
-        names = ("velocity", "acceleration", "jerk")
-        lines = (
+        batch, n = values[0].shape[: -1 - k], values[0].shape[-1]
+        return (
             f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}"
-            f"{_motions(tuple(batch))}",
-            greatest_shown(zip(names, values, strict=True)) + ">",
+            f"{_motions(batch)}\n  {greatest_shown(zip(RATES, values, strict=True))}>"
         )
-        return "\n  ".join(lines)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.q, dtype=dtype, copy=copy)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,27 +128,27 @@ class Trajectory(Value):
         Leading axes are those of a batch of motions. A time outside of a motion that does not rest
         there is an error.
         """
-        return self._at(t, (0,))[0]
+        return self._at(as_floats(t, "t"), (0,))[0]
 
     def v(self, t: ArrayLike) -> Array:
         """Velocities, rad/s or m/s, as `q`."""
-        return self._at(t, (1,))[0]
+        return self._at(as_floats(t, "t"), (1,))[0]
 
     def a(self, t: ArrayLike) -> Array:
         """Accelerations, rad/s^2 or m/s^2, as `q`; where they jump, the value after the jump."""
-        return self._at(t, (2,))[0]
+        return self._at(as_floats(t, "t"), (2,))[0]
 
     def jerk(self, t: ArrayLike) -> Array:
         """Derivatives of the accelerations, as `q`, without the pulses where those jump."""
-        return self._at(t, (3,))[0]
+        return self._at(as_floats(t, "t"), (3,))[0]
 
     def at(self, t: ArrayLike) -> Samples:
         """Positions and derivatives together at times t."""
-        t = read_only(as_floats(t, "t"))
-        values = self._at(t, (0, 1, 2, 3))
+        times = read_only(as_floats(t, "t"))
+        values = self._at(times, (0, 1, 2, 3))
         for value in values:
             value.setflags(write=False)  # nobody else has them: they need no copy
-        return Samples(t, *values)
+        return Samples(times, *values)
 
     def resample(self, samples: int | None = None, period: float | None = None) -> Samples:
         """The motion on the regular grid of time of `grid`."""
@@ -174,24 +160,19 @@ class Trajectory(Value):
         Those end at or after the duration, or before it where the motion does not end at rest. A
         batch of motions has no common grid.
         """
-        if (samples is None) == (period is None):
-            raise InvalidValueError("resample: give either samples or period.")
         if self.motion.batch:
             raise InvalidValueError("resample: a batch of motions has no common grid; use at(t).")
         T = self.duration
-        if samples is not None:
+        if samples is not None and period is None:
             return np.linspace(0.0, T, _count(samples))
-        step = float(as_floats(period, "period"))  # type: ignore[arg-type]
-        if step <= 0.0:
-            raise InvalidValueError(f"period: expected a positive time, got {step:g} s.")
-        count = T / step
-        near = round(count)
-        if abs(count - near) <= 1e-9 * max(1.0, count):  # a multiple up to rounding
-            t = step * np.arange(near + 1.0)
-            t[-1] = min(t[-1], T) if near else 0.0
-            return t
+        if samples is not None or period is None:
+            raise InvalidValueError("resample: give either samples or period.")
+        step = as_number(period, "period", above=0.0)
+        near = round(T / step)
+        if abs(T / step - near) <= 1e-9 * max(1.0, T / step):  # a multiple up to rounding
+            return np.minimum(step * np.arange(near + 1.0), T)
         at_rest = self.repeats or self.holds or not self._moving(np.array([T]))
-        return step * np.arange(int(count) + 1.0 + at_rest)
+        return step * np.arange(int(T / step) + 1.0 + at_rest)
 
     def check(self, limits: MotionLimits, tolerance: float = 1e-9) -> LimitsReport:
         """Compare the motion with limits, everywhere on it and not at samples only.
@@ -204,55 +185,63 @@ class Trajectory(Value):
     def _moving(self, ends: Array) -> bool:
         """Whether any joint has a velocity at one of the times."""
         (v,) = self.motion.derivatives(ends, (1,))
-        scale = max(np.abs(peak).max(initial=0.0) for peak in self.motion.extremes(1))
-        return bool(np.abs(v).max(initial=0.0) > 1e-9 * scale) if scale > 0.0 else False
+        scale = np.abs(self.motion.extremes(1)).max(initial=0.0)
+        return bool(np.abs(v).max(initial=0.0) > 1e-9 * scale)
 
-    def _at(self, t: ArrayLike, orders: tuple[int, ...]) -> list[Array]:
-        t = as_floats(t, "t")
-        batch, duration = self.motion.batch, self.motion.duration
+    def _at(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives at times t, those outside of the motion included."""
+        batch, end = self.motion.batch, np.asarray(self.motion.duration)[..., None]
         flat = np.broadcast_to(t.reshape(-1), (*batch, t.size))
-        before = after = None
-        if not self.repeats and t.size:
-            end = np.asarray(duration)[..., None]
-            if (flat < 0.0).any() or (flat > end).any():
-                # a few roundings beside an end, where sums of steps arrive, are the end
-                near = 4.0 * np.spacing(end)
-                before, after = flat < -near, flat > end + near
-                if not self.holds:
-                    self._refuse_outside(flat, before, after, duration)
-                flat = np.clip(flat, 0.0, end)
+        outside = None
+        if not self.repeats and ((flat < 0.0) | (flat > end)).any():
+            # a few roundings beside an end, where sums of steps arrive, are the end
+            before, after = flat < -4.0 * np.spacing(end), flat > end + 4.0 * np.spacing(end)
+            if not self.holds:
+                self._refuse_outside(flat, before, np.zeros_like(end), "before the start")
+                self._refuse_outside(flat, after, end, "after the end")
+            flat, outside = np.clip(flat, 0.0, end), before | after
         values = self.motion.derivatives(np.ascontiguousarray(flat), orders)
-        if before is not None and after is not None:
-            for value, order in zip(values, orders, strict=True):
-                if order:
-                    value[before | after] = 0.0
+        for value, order in zip(values, orders, strict=True):
+            if outside is not None and order:
+                value[outside] = 0.0
         shape = (*batch, *t.shape) if self.scalar else (*batch, *t.shape, self.n)
         return [value.reshape(shape) for value in values]
 
-    def _refuse_outside(self, t: Array, before: Any, after: Any, duration: Array) -> None:
-        end = np.broadcast_to(np.asarray(duration)[..., None], (*self.motion.batch, 1))
-        for outside, edge, side in ((before, np.zeros_like(end), "before the start"),
-                                    (after, end, "after the end")):  # fmt: skip
-            if outside.any() and self._moving(edge):
-                raise InvalidValueError(
-                    f"t: {float(t[outside].ravel()[0]):g} s is {side} of a motion of "
-                    f"{float(np.max(end)):g} s that does not rest there; ask for times inside it."
-                )
+    def _refuse_outside(self, t: Array, outside: Any, edge: Array, side: str) -> None:
+        if outside.any() and self._moving(np.broadcast_to(edge, (*self.motion.batch, 1))):
+            raise InvalidValueError(
+                f"t: {float(t[outside][0]):g} s is {side} of a motion of "
+                f"{float(np.max(self.motion.duration)):g} s that does not rest there; ask for "
+                "times inside it."
+            )
 
     def __repr__(self) -> str:
-        names = ("velocity", "acceleration", "jerk")
-        peaks = (np.stack(self.motion.extremes(order)) for order in (1, 2, 3))
+        peaks = [np.stack(self.motion.extremes(order)) for order in (1, 2, 3)]
         durations = np.unique(self.motion.duration)
         T = " to ".join(f"{x:.6g}" for x in durations[[0, -1][: durations.size]])
-        of = f"{counted(self.n, 'joint')}, {T or 0} s" + ", periodic" * self.repeats
-        lines = (
-            f"<Trajectory: {of}{_motions(self.motion.batch)}",
-            greatest_shown(zip(names, peaks, strict=True)) + ">",
+        return (
+            f"<Trajectory: {counted(self.n, 'joint')}, {T or 0} s{', periodic' * self.repeats}"
+            f"{_motions(self.motion.batch)}\n  {greatest_shown(zip(RATES, peaks, strict=True))}>"
         )
-        return "\n  ".join(lines)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.motion, self.scalar, self.repeats, self.holds)
+
+class TimingResult(Frozen, Value):
+    """Base of what the search of a motion under limits gives."""
+
+    __slots__ = ()
+
+    trajectory: Trajectory | None
+    status: Any
+    explanation: str
+
+    @property
+    def duration(self) -> float:
+        """Seconds; NaN without a motion."""
+        return np.nan if self.trajectory is None else self.trajectory.duration
+
+    def reason(self) -> str:
+        """The status as a sentence, with the place and the joint."""
+        return self.explanation or self.status.sentence
 
 
 def _motions(batch: tuple[int, ...]) -> str:

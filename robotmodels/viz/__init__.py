@@ -72,11 +72,11 @@ from .show import (
     show,
 )
 from .time_optimal import (
+    plot_joint_motion,
     plot_phase_plane,
     plot_plan,
 )
 from .trajectories import (
-    plot_joint_motion,
     plot_joint_path,
     plot_pose_path,
     plot_profiles,

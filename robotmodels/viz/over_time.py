@@ -14,7 +14,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..trajectories.limits import MotionLimits
-from ..trajectories.piecewise import PiecewisePolynomial
+from ..trajectories.motions import PiecewisePolynomial
 from ..trajectories.pose_trajectory import PoseTrajectory
 from ..trajectories.trajectory import Samples, Trajectory
 from . import style

@@ -1,4 +1,4 @@
-"""Figures of optimal motion: the phase plane of a path, and the plan of a motion.
+"""Figures of motions within limits: phase plane of a path, plan, joints in their ranges.
 
 Parameters
 ----------
@@ -14,24 +14,29 @@ matplotlib.figure.Figure
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import Array, as_floats, as_reals
 from ..dynamics import idm
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.kinodynamic import Plan
 from ..trajectories.time_optimal import TimedPath
-from . import style
-from .style import COLUMN, DASHED, INK, PAGE, PALE, PALETTE
+from . import over_time, style
+from .over_time import Unit
+from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALE, PALETTE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _HIGHEST = 2.5  # of the greatest rate: the maximum velocity curve is drawn up to this
 _SAMPLES = 501
+_MARGIN = 0.12  # of the range of a joint, shown beyond either limit
 
 
 @style.plot
@@ -134,7 +139,7 @@ def plot_plan(
         for j in range(n):
             left[1].plot(t, share[:, j], label=labels[j], **style.line(j))
         for side in (-1.0, 1.0):
-            left[1].axhline(side, color=PALE, label=style.LIMIT, **DASHED)
+            left[1].axhline(side, color=PALE, label=LIMIT, **DASHED)
         left[1].set_ylabel("torque\n(of its limit)")
         left[0].sharex(left[1])
         left[0].tick_params(labelbottom=False)
@@ -145,7 +150,128 @@ def plot_plan(
     shown = np.isfinite(cost) & (cost <= 3.0 * best[-1])
     right.plot(count[shown], cost[shown], ".", color=PALE, markersize=1.5, label="candidates")
     right.plot(count, best, color=INK, label="least cost")
-    right.axhline(plan.cost, color=style.ALERT, label="checked motion", **DASHED)
+    right.axhline(plan.cost, color=ALERT, label="checked motion", **DASHED)
     right.set_xlabel("evaluations")
     right.set_ylabel("cost")
     return style.finished(figure, title, labels)
+
+
+@style.plot
+def plot_joint_motion(
+    model: RobotModel,
+    t: ArrayLike,
+    q: ArrayLike | Mapping[str, ArrayLike],
+    *,
+    degrees: bool = True,
+    columns: int | None = None,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Positions of all joints within their limits, and the margin that is left.
+
+    Every joint has a panel that is as high as its range, so that heights compare between joints;
+    values beyond the limits are shaded. The last panel, if any joint has both limits, has the least
+    margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
+    at a limit.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    t : array_like, shape (N,)
+        Times, s.
+    q : array_like, shape (N, n), or mapping of str to such arrays
+        Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
+    degrees : bool
+        Whether angles are in degrees instead of radians.
+    columns : int, optional
+        How many panels stand in a row; default one, or two from five joints on.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], lower=[-1.0, 0.0],
+    ...                                     upper=[1.0, 0.5]))
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> figure = plot_joint_motion(arm, t, np.c_[np.sin(t), 0.3 * t])
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['joint_1 (deg)', 'joint_2 (m)', 'least margin (%)']
+    """
+    style.as_instance(model, RobotModel, "model", "")
+    times = as_floats(t, "t")
+    if times.ndim != 1 or not times.size:
+        raise ShapeError(f"t: expected shape (N,) with N at least 1, got {times.shape}.")
+    motions = _motions(q, times.size, model.n)
+    labels = list(motions) if len(motions) > 1 else ["_motion"]
+    names = over_time.joint_names(None, model.n, model)
+    units = over_time.joint_units(None, model.n, model)
+    if degrees:
+        units = [Unit.DEGREE if unit is Unit.RADIAN else unit for unit in units]
+    bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
+    count = model.n + bool(bounded.any())
+    wide = style.as_columns(columns, count, 1 if count < 6 else 2)
+    figure, order = style.panel_list(count, wide, 0.95, size)
+    for j, (axes, unit) in enumerate(zip(order, units, strict=False)):
+        k = unit.factor
+        over_time.lines_over_time(
+            axes, times, k * np.stack([v[:, j] for v in motions.values()], 1), labels
+        )
+        _draw_range(axes, k * float(model.lower[j]), k * float(model.upper[j]))
+        axes.set_title(f"{names[j]} ({unit.value})", loc="left")
+    if bounded.any():
+        lower, upper = model.lower[bounded], model.upper[bounded]
+        inside = np.stack([values[:, bounded] for values in motions.values()], axis=1)
+        margin = np.minimum(inside - lower, upper - inside) / (0.5 * (upper - lower))
+        axes = order[-1]
+        over_time.lines_over_time(axes, times, 100.0 * margin.min(axis=2), labels)
+        axes.set_title("least margin (%)", loc="left")
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -0.08 * max(high, 1.0)), high)
+        _shade_beyond(axes, 0.0, np.inf)
+    return style.finished(figure, title, labels)
+
+
+def _draw_range(axes: Axes, lower: float, upper: float) -> None:
+    """The range of a joint from one limit to the other, with shades beyond."""
+    low, high = axes.get_ylim()
+    if np.isfinite(lower) and np.isfinite(upper) and upper > lower:
+        margin = _MARGIN * (upper - lower)
+        low = min(lower - margin, axes.dataLim.y0 - 0.3 * margin)
+        high = max(upper + margin, axes.dataLim.y1 + 0.3 * margin)
+        axes.set_yticks([lower, 0.5 * (lower + upper), upper])
+        axes.yaxis.set_major_formatter(lambda x, _: f"{x:.3g}".replace("-", "\N{MINUS SIGN}"))
+    else:  # a limit that is far away, or none, is no reason to make the line flat
+        low = lower if np.isfinite(lower) and lower > low else low
+        high = upper if np.isfinite(upper) and upper < high else high
+    axes.set_ylim(low, high)
+    _shade_beyond(axes, lower, upper)
+
+
+def _shade_beyond(axes: Axes, lower: float, upper: float) -> None:
+    """Shades from the limits to the edges, and lines at the limits."""
+    low, high = axes.get_ylim()
+    for limit, edge in ((lower, low), (upper, high)):
+        if low <= limit <= high:
+            ends = sorted((limit, edge))
+            axes.axhspan(*ends, facecolor=ALERT, alpha=0.16, linewidth=0.0, label=BEYOND)
+            axes.axhline(limit, color=INK, zorder=1.5, label=LIMIT, **DASHED)
+    axes.set_ylim(low, high)
+
+
+def _motions(q: Any, N: int, n: int) -> dict[str, Array]:
+    """Positions of each motion, NaN where they are missing. Shapes: -> (N, n) each."""
+    motions = {}
+    for name, values in style.as_named(
+        q if isinstance(q, Mapping) else [q], None, "q", "motion"
+    ).items():
+        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
+        array = as_reals(values, where)
+        if array.shape != (N, n):
+            raise ShapeError(
+                f"{where}: expected positions of shape ({N}, {n}) for {N} times and {n} joints, "
+                f"got {array.shape}."
+            )
+        if np.isinf(array).any():
+            raise InvalidValueError(f"{where}: expected finite positions, or NaN for a gap.")
+        motions[name] = array
+    return motions

@@ -1,4 +1,4 @@
-"""Figures of motions: over time, as laws of motion, along paths of poses, within joint limits.
+"""Figures of motions: over time, as laws of motion, along paths of poses.
 
 Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
 (``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_reals
+from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
@@ -43,7 +43,7 @@ from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Sampled, Unit
 from .space import across, fill_cells, space
-from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALETTE
+from .style import COLUMN, INK, PAGE, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +60,6 @@ _EVENTS: dict[PathEventKind, tuple[str, Any, str]] = {
 _RUNS = (PathEventKind.OUT_OF_REACH, PathEventKind.SINGULAR)
 _SEEN_ON_LINES = (PathEventKind.OUTSIDE_LIMITS, PathEventKind.TOO_FAST)
 _LEAST = 1e-6  # conditioning that is drawn
-_MARGIN = 0.12  # of the range of a joint, shown beyond either limit
 _POSES = 301
 _STILL = 1e-3  # m: a tool that moves less turns on the spot
 
@@ -103,11 +102,8 @@ def plot_trajectory(
     motion = over_time.sampled(trajectory)
     n = motion.n
     labels, kinds = over_time.joint_names(names, n, model), over_time.joint_units(units, n, model)
-    bounds, shown, columns = (
-        over_time.as_limits(limits, n),
-        over_time.as_orders(orders),
-        over_time.joints_by_unit(kinds),
-    )
+    bounds, shown = over_time.as_limits(limits, n), over_time.as_orders(orders)
+    columns = over_time.joints_by_unit(kinds)
     if n == 1 and names is None and model is None:
         labels = ["_joint"]  # one line needs no legend
     width, height = COLUMN if len(columns) == 1 else PAGE, 0.55 + 1.05 * len(shown) + 0.02 * n
@@ -245,10 +241,9 @@ def plot_joint_path(
     lowest.set_ylim(max(len(happens), 1) - 0.4, -0.6)
     lowest.grid(False, axis="y")
     lowest.tick_params(axis="y", length=0.0)
-    for row, kind in enumerate(happens):
-        for event in path.of_kind(kind):
-            ends = (event.start, event.stop) if timed else (event.first, event.last)
-            _draw_event(lowest, above, row, kind, ends)
+    for event in path.events:
+        ends = (event.start, event.stop) if timed else (event.first, event.last)
+        _draw_event(lowest, above, happens.index(event.kind), event.kind, ends)
     if not happens:
         style.note(lowest, "no events on the path")
     lowest.set_xlabel("time (s)" if timed else "number of the pose")
@@ -348,15 +343,9 @@ def plot_pose_path(
     axes = space(figure, (1, 1, 1), every, length, angles)
     axes.plot(*points.T, color=INK, label="path")
     for a, (color, dashes) in enumerate(((1, "-"), (2, (0, (3.0, 1.0))), (0, (0, (1.0, 0.8))))):
-        for i, tip in zip(some, tips[:, a], strict=True):
-            ends = np.stack((points[i], tip)).T
-            axes.plot(
-                *ends,
-                color=PALETTE[color],
-                linestyle=dashes,
-                linewidth=1.2,
-                label=f"tool {'xyz'[a]}",
-            )
+        look = {"color": PALETTE[color], "linestyle": dashes, "linewidth": 1.2}
+        for ends in np.stack((points[some], tips[:, a]), axis=-1):
+            axes.plot(*ends, label=f"tool {'xyz'[a]}", **look)
     for i, marker, text in ((0, "o", "start"), (-1, "s", "end")):
         axes.plot(*points[i], marker, color=INK, markersize=4.0, label=text)
     for event in () if path is None else path.events:
@@ -380,126 +369,3 @@ def _poses(poses: Any, path: JointPath | None) -> Array:
     if T.ndim != 3 or not len(T):
         raise ShapeError(f"poses: expected shape (N, 4, 4) with N at least 1, got {T.shape}.")
     return T
-
-
-@style.plot
-def plot_joint_motion(
-    model: RobotModel,
-    t: ArrayLike,
-    q: ArrayLike | Mapping[str, ArrayLike],
-    *,
-    degrees: bool = True,
-    columns: int | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
-) -> Figure:
-    """Positions of all joints within their limits, and the margin that is left.
-
-    Every joint has a panel that is as high as its range, so that heights compare between joints;
-    values beyond the limits are shaded. The last panel, if any joint has both limits, has the least
-    margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
-    at a limit.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    t : array_like, shape (N,)
-        Times, s.
-    q : array_like, shape (N, n), or mapping of str to such arrays
-        Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
-    degrees : bool
-        Whether angles are in degrees instead of radians.
-    columns : int, optional
-        How many panels stand in a row; default one, or two from five joints on.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], lower=[-1.0, 0.0],
-    ...                                     upper=[1.0, 0.5]))
-    >>> t = np.linspace(0.0, 1.0, 11)
-    >>> figure = plot_joint_motion(arm, t, np.c_[np.sin(t), 0.3 * t])
-    >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['joint_1 (deg)', 'joint_2 (m)', 'least margin (%)']
-    """
-    style.as_instance(model, RobotModel, "model", "")
-    times = as_floats(t, "t")
-    if times.ndim != 1 or not times.size:
-        raise ShapeError(f"t: expected shape (N,) with N at least 1, got {times.shape}.")
-    motions = _motions(q, times.size, model.n)
-    labels = list(motions) if len(motions) > 1 else ["_motion"]
-    names, units = (
-        over_time.joint_names(None, model.n, model),
-        over_time.joint_units(None, model.n, model),
-    )
-    if degrees:
-        units = [Unit.DEGREE if unit is Unit.RADIAN else unit for unit in units]
-    bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
-    count = model.n + bool(bounded.any())
-    wide = style.as_columns(columns, count, 1 if count < 6 else 2)
-    figure, order = style.panel_list(count, wide, 0.95, size)
-    for j, (axes, unit) in enumerate(zip(order, units, strict=False)):
-        k = unit.factor
-        over_time.lines_over_time(
-            axes, times, k * np.stack([v[:, j] for v in motions.values()], 1), labels
-        )
-        _draw_range(axes, k * float(model.lower[j]), k * float(model.upper[j]))
-        axes.set_title(f"{names[j]} ({unit.value})", loc="left")
-    if bounded.any():
-        lower, upper = model.lower[bounded], model.upper[bounded]
-        inside = np.stack([values[:, bounded] for values in motions.values()], axis=1)
-        margin = np.minimum(inside - lower, upper - inside) / (0.5 * (upper - lower))
-        axes = order[-1]
-        over_time.lines_over_time(axes, times, 100.0 * margin.min(axis=2), labels)
-        axes.set_title("least margin (%)", loc="left")
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(low, -0.08 * max(high, 1.0)), high)
-        _shade_beyond(axes, 0.0, np.inf)
-    return style.finished(figure, title, labels)
-
-
-def _draw_range(axes: Axes, lower: float, upper: float) -> None:
-    """The range of a joint from one limit to the other, with shades beyond."""
-    low, high = axes.get_ylim()
-    if np.isfinite(lower) and np.isfinite(upper) and upper > lower:
-        margin = _MARGIN * (upper - lower)
-        low = min(lower - margin, axes.dataLim.y0 - 0.3 * margin)
-        high = max(upper + margin, axes.dataLim.y1 + 0.3 * margin)
-        axes.set_yticks([lower, 0.5 * (lower + upper), upper])
-        axes.yaxis.set_major_formatter(lambda x, _: f"{x:.3g}".replace("-", "\N{MINUS SIGN}"))
-    else:  # a limit that is far away, or none, is no reason to make the line flat
-        low = lower if np.isfinite(lower) and lower > low else low
-        high = upper if np.isfinite(upper) and upper < high else high
-    axes.set_ylim(low, high)
-    _shade_beyond(axes, lower, upper)
-
-
-def _shade_beyond(axes: Axes, lower: float, upper: float) -> None:
-    """Shades from the limits to the edges, and lines at the limits."""
-    low, high = axes.get_ylim()
-    for limit, edge in ((lower, low), (upper, high)):
-        if low <= limit <= high:
-            ends = sorted((limit, edge))
-            axes.axhspan(*ends, facecolor=ALERT, alpha=0.16, linewidth=0.0, label=BEYOND)
-            axes.axhline(limit, color=INK, zorder=1.5, label=LIMIT, **DASHED)
-    axes.set_ylim(low, high)
-
-
-def _motions(q: Any, N: int, n: int) -> dict[str, Array]:
-    """Positions of each motion, NaN where they are missing. Shapes: -> (N, n) each."""
-    motions = {}
-    for name, values in style.as_named(
-        q if isinstance(q, Mapping) else [q], None, "q", "motion"
-    ).items():
-        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
-        array = as_reals(values, where)
-        if array.shape != (N, n):
-            raise ShapeError(
-                f"{where}: expected positions of shape ({N}, {n}) for {N} times and {n} joints, "
-                f"got {array.shape}."
-            )
-        if np.isinf(array).any():
-            raise InvalidValueError(f"{where}: expected finite positions, or NaN for a gap.")
-        motions[name] = array
-    return motions
