@@ -1,20 +1,20 @@
-"""Features of an image: what all of them have, and points, lines and segments."""
+"""Features of an image: points, lines, segments, circles, spheres and cylinders."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
+from .._arrays import Array, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from ..se3 import as_pose
+from ..se3 import as_pose, as_single_pose
 from .camera import Camera
-from .matrices import interaction_line, interaction_segment, point_rows
-from .results import brief
+from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
+from .results import Value
 
 THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _TURN = 2.0 * np.pi
@@ -27,7 +27,7 @@ class Sight(NamedTuple):
     """Whether the feature exists, bool (...)."""
     s: Array
     """Measurement (..., k)."""
-    depth: Any
+    depth: Any = None
     """Depths, or planes (A, B, C, D), that the rows need."""
     image: Any = None
     """Points (..., m, 2) that have to be inside the image, None where there are none."""
@@ -73,11 +73,15 @@ class Feature(Value):
 
     __slots__ = ()
     depends_on_depth: ClassVar[bool] = True
-    _period: ClassVar[tuple[float, ...]] = (0.0,)
-    """Periods of the components of one element, 0 where there is none."""
-
+    _period: ClassVar[tuple[float, ...]]  # of the components of one element, 0 for none
     _see: ClassVar[Callable[..., Sight]]  # (T): what is seen of the object
     _rows: ClassVar[Callable[..., Array]]  # (s, depth, image): interaction matrix (..., k, 6)
+
+    def __post_init__(self) -> None:
+        for f in fields(self):  # type: ignore[arg-type]
+            value = _CHECKS[f.name](getattr(self, f.name), f.name)
+            value = read_only(value) if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, f.name, value)
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
@@ -94,18 +98,17 @@ class Feature(Value):
 
     def _periods(self) -> Array:
         """Period of each component. Shapes: -> (k,)."""
-        objects = getattr(self, "object_points", getattr(self, "points", (0,)))
-        return np.tile(self._period, len(objects))
+        elements = getattr(self, "object_points", getattr(self, "points", (0,)))
+        return np.tile(self._period, len(elements))
 
-    def _parallel(self, Z: float) -> Any:
-        """Depth of an object parallel to the image."""
-        return np.array((0.0, 0.0, 1.0, -Z))
+    def _parallel(self, Z: float) -> float:
+        """Depth of an object parallel to the image, checked."""
+        return Z
 
     def _seen(self, T: Any) -> Sight:
         """Sight at checked poses, where the feature exists."""
         poses = as_pose(T)
-        with np.errstate(all="ignore"):
-            sight = self._see(poses)
+        sight = sight_of(self, poses)
         if not np.all(sight.exists):
             row = f" (row {np.argwhere(~sight.exists)[0].tolist()})" if poses.ndim > 2 else ""
             raise InvalidValueError(
@@ -119,13 +122,17 @@ class Feature(Value):
         """Whether a camera has a measurement (k,), of points (m, 2), inside its image."""
         return image is None or bool(camera.sees(image))
 
-    def __repr__(self) -> str:
-        return brief(self)
+
+def sight_of(feature: Feature, T: Array) -> Sight:
+    """Sight of an object that may be behind the camera."""
+    with np.errstate(all="ignore"):
+        return feature._see(T)
 
 
 def placed(T: Array, points: Array) -> Array:
-    """Points of the object in the camera. Shapes: T (..., 4, 4), (m, 3) -> (..., m, 3)."""
-    return points @ np.swapaxes(T[..., :3, :3], -1, -2) + T[..., None, :3, 3]
+    """Points of the object in the camera. Shapes: points (m, 3) or (3,)."""
+    X = points @ np.swapaxes(T[..., :3, :3], -1, -2)
+    return X + (T[..., :3, 3] if points.ndim == 1 else T[..., None, :3, 3])
 
 
 def inner(a: Array, b: Array) -> Array:
@@ -133,38 +140,9 @@ def inner(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1, keepdims=True)
 
 
-def unit(vector: Any, name: str) -> Array:
-    """A direction as a unit vector."""
-    array = as_exact(vector, (3,), name)
-    length = float(np.linalg.norm(array))
-    if not length > 0.0:
-        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
-    # unit vectors stay as they are, so that copies are equal
-    return read_only(array if abs(length - 1.0) < 4e-16 else array / length)
-
-
-def _pairs(points: Any) -> Array:
-    """Distinct pairs of points. Shapes: -> (n, 2, 3)."""
-    pairs = as_core(points, (2, 3), "points")
-    pairs = pairs[None] if pairs.ndim == 2 else pairs
-    if pairs.ndim != 3 or not len(pairs):
-        raise ShapeError(f"points: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
-    lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
-    if not (lengths > THIN * np.abs(pairs).max()).all():
-        raise InvalidValueError("points: expected two different points on each line or segment.")
-    return read_only(pairs)
-
-
-def set_fields(feature: Any, **fields: Any) -> None:
-    """Checked centre, directions and radius of a solid, or other fields."""
-    for name, value in fields.items():
-        if name in ("normal", "axis"):
-            value = unit(value, name)
-        elif name == "centre":
-            value = read_only(as_exact(value, (3,), name))
-        elif name == "radius":
-            value = as_number(value, name, above=0.0)
-        object.__setattr__(feature, name, value)
+def norm(a: Array) -> Array:
+    """Lengths of vectors in the last axis, which is kept."""
+    return np.sqrt(inner(a, a))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -174,25 +152,16 @@ class Points(Feature):
     object_points: Array
     _period = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        points = as_core(self.object_points, (3,), "object_points")
-        points = points[None] if points.ndim == 1 else points
-        if points.ndim != 2 or not len(points):
-            raise ShapeError(f"object_points: expected (k, 3), k from 1, got {points.shape}.")
-        set_fields(self, object_points=read_only(points))
-
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.object_points)
-        image = X[..., :2] / X[..., 2:]
-        return Sight((X[..., 2] > 0.0).all(axis=-1), _flat(image), X[..., 2], image)
-
-    def _parallel(self, Z: float) -> Array:
-        return np.full(len(self.object_points), Z)
+        Z = X[..., 2]
+        image = X[..., :2] / Z[..., None]
+        return Sight((Z > 0.0).all(axis=-1), _flat(image), Z, image)
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         return bool(camera.sees(s.reshape(-1, 2)))
 
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         return point_rows(s[..., 0::2], s[..., 1::2], 1.0 / depth).reshape(*s.shape, 6)
 
 
@@ -207,19 +176,10 @@ class Lines(Feature):
     points: Array
     _period = (0.0, _TURN)
 
-    def __post_init__(self) -> None:
-        set_fields(self, points=_pairs(self.points))
-
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
-        p, along = X[..., 0::2, :], X[..., 1::2, :] - X[..., 0::2, :]
-        normal = np.cross(p, along)
-        size = np.hypot(normal[..., 0], normal[..., 1])
-        exists = (X[..., 2] > 0.0).all(axis=-1) & (
-            size > THIN * (norm(p) * norm(along))[..., 0]
-        ).all(axis=-1)
-        plane = plane_at(p - inner(p, along) / inner(along, along) * along)
-        return Sight(exists, *lines_of(normal, plane))
+        sight = _sight_of_lines(X[..., 0::2, :], X[..., 1::2, :] - X[..., 0::2, :])
+        return sight._replace(exists=sight.exists & (X[..., 2] > 0.0).all(axis=-1))
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         ends = camera.normalise((0.0 * camera.size, camera.size))
@@ -228,8 +188,9 @@ class Lines(Feature):
         side = x * np.cos(theta) + y * np.sin(theta) - rho  # of the corners of the image
         return bool(((side.min(axis=1) <= 0.0) & (side.max(axis=1) >= 0.0)).all())
 
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
-        return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        L = interaction_line(s[..., 0::2], s[..., 1::2], depth)
+        return L.reshape(*s.shape, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -239,36 +200,95 @@ class Segments(Feature):
     points: Array
     _period = (0.0, 0.0, 0.0, _TURN)
 
-    def __post_init__(self) -> None:
-        set_fields(self, points=_pairs(self.points))
-
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
-        image, depth = (
-            X[..., :2] / X[..., 2:],
-            np.stack((X[..., 0::2, 2], X[..., 1::2, 2]), axis=-1),
-        )
+        Z = X[..., 2]
+        image = X[..., :2] / Z[..., None]
         p, q = image[..., 0::2, :], image[..., 1::2, :]
-        (x, y), (dx, dy) = np.moveaxis(0.5 * (p + q), -1, 0), np.moveaxis(q - p, -1, 0)
-        s = _flat(np.stack((x, y, np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1))
-        return Sight((X[..., 2] > 0.0).all(axis=-1), s, depth, image)
+        dx, dy = np.moveaxis(q - p, -1, 0)
+        polar = np.stack((np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1)
+        s = _flat(np.concatenate((0.5 * (p + q), polar), axis=-1))
+        return Sight(
+            (Z > 0.0).all(axis=-1), s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image
+        )
 
-    def _parallel(self, Z: float) -> Array:
-        return np.full((len(self.points), 2), Z)
-
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
-        x, y, length, alpha = (s[..., k::4] for k in range(4))
-        return _flat_rows(interaction_segment(x, y, length, alpha, depth))
-
-
-def norm(a: Array) -> Array:
-    """Lengths of vectors in the last axis, which is kept."""
-    return np.sqrt(inner(a, a))
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        depth = depth if np.ndim(depth) else np.full(2, depth)
+        L = interaction_segment(*(s[..., k::4] for k in range(4)), depth)  # type: ignore[call-arg]
+        return L.reshape(*s.shape, 6)
 
 
-def plane_at(point: Array) -> Array:
-    """Planes through points, normal to their vectors. Shapes: (..., 3) -> (..., 4)."""
-    return np.concatenate((point, -inner(point, point)), axis=-1)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Circle(Feature):
+    """A circle: x, y, n20, n02, n11 of the ellipse of its image, of moments divided by the area."""
+
+    centre: Array
+    normal: Array
+    radius: float
+    _period = (0.0,) * 5
+
+    def _see(self, T: Array) -> Sight:
+        return _sight_of_circle(placed(T, self.centre), T[..., :3, :3] @ self.normal, self.radius)
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        return interaction_ellipse(*np.moveaxis(s, -1, 0), depth)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sphere(Feature):
+    """A sphere: x, y, n20, n02, n11 of the ellipse of its outline."""
+
+    centre: Array
+    radius: float
+    _period = (0.0,) * 5
+
+    def _see(self, T: Array) -> Sight:
+        centre = placed(T, self.centre)
+        return self._outline(centre)._replace(depth=centre[..., 2])
+
+    def _outline(self, centre: Array) -> Sight:
+        """Sight of the circle that is the outline of the sphere with this centre."""
+        part = 1.0 - self.radius**2 / inner(centre, centre)
+        return _sight_of_circle(part * centre, centre / norm(centre), self.radius * np.sqrt(part))
+
+    def _parallel(self, Z: float) -> float:
+        if not self.radius < Z:
+            raise InvalidValueError(
+                f"depth: expected the depth of the centre of the sphere, above its radius "
+                f"{self.radius:g} m, got {Z:g} m."
+            )
+        return Z
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        Z = np.broadcast_to(depth, s.shape[:-1])[..., None]
+        centre = np.concatenate((s[..., :2] * (Z - self.radius**2 / Z), Z), axis=-1)
+        seen = self._outline(centre)  # so that the matrix has rank 3 at any depth
+        return interaction_ellipse(*np.moveaxis(seen.s, -1, 0), seen.depth)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Cylinder(Feature):
+    """An infinite cylinder: rho, theta of the two lines of its outline."""
+
+    centre: Array
+    axis: Array
+    radius: float
+    _period = (0.0, _TURN, 0.0, _TURN)
+
+    def _see(self, T: Array) -> Sight:
+        p, u = placed(T, self.centre), T[..., :3, :3] @ self.axis
+        nearest = p - inner(p, u) * u
+        sine = np.minimum(self.radius / norm(nearest), 1.0)
+        towards = nearest / norm(nearest)
+        beside = np.sqrt(1.0 - sine**2) * np.cross(u, towards)
+        n = np.stack((sine * towards + beside, sine * towards - beside), axis=-2)
+        contact = nearest[..., None, :] - self.radius * n
+        sight = _sight_of_lines(contact, np.stack((-u, u), axis=-2))
+        ahead = (p[..., 2] > 0.0) | (contact[..., 2] > 0.0).all(axis=-1)
+        return sight._replace(exists=sight.exists & ahead & (sine < 1.0 - THIN)[..., 0])
+
+    _in_image = Lines._in_image
+    _rows = Lines._rows
 
 
 def _flat(image: Array) -> Array:
@@ -276,16 +296,31 @@ def _flat(image: Array) -> Array:
     return image.reshape(*image.shape[:-2], image.shape[-2] * image.shape[-1])
 
 
-def _flat_rows(L: Array) -> Array:
-    """Rows of all elements below each other. Shapes: (..., n, m, 6) -> (..., n m, 6)."""
-    return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
-
-
-def lines_of(normal: Array, plane: Array) -> tuple[Array, Array]:
-    """Image lines (..., 2 n) of planes through the camera, and their depths."""
+def _sight_of_lines(p: Array, along: Array) -> Sight:
+    """Sight of the image lines of lines in space through points p. Shapes: (..., n, 3)."""
+    normal = np.cross(p, along)
     x, y, z = np.moveaxis(normal, -1, 0)
-    rho, theta = -z / np.hypot(x, y), np.arctan2(y, x)
-    return _flat(np.stack((rho, theta), axis=-1)), plane
+    size = np.hypot(x, y)
+    s = _flat(np.stack((-z / size, np.arctan2(y, x)), axis=-1))
+    foot = p - inner(p, along) / inner(along, along) * along
+    plane = np.concatenate((foot, -inner(foot, foot)), axis=-1)
+    return Sight((size > THIN * (norm(p) * norm(along))[..., 0]).all(axis=-1), s, plane)
+
+
+def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
+    """Sight of the ellipse ``[x y 1] Q [x y 1]^T = 0`` that is the image of a circle."""
+    lowest = c[..., 2:] - radius * np.sqrt(np.maximum(1.0 - n[..., 2:] ** 2, 0.0))
+    d, excess = inner(c, n), (inner(c, c) - radius**2)[..., None]
+    cn, nn = c[..., :, None] * n[..., None, :], n[..., :, None] * n[..., None, :]
+    Q = d[..., None] ** 2 * np.eye(3) - d[..., None] * (cn + np.swapaxes(cn, -1, -2)) + excess * nn
+    exists = ((lowest > 0.0) & (np.abs(d) > THIN * norm(c)))[..., 0]
+    adjugate = np.linalg.cross(Q[..., 0, :], Q[..., 1, :])
+    determinant = adjugate[..., 2]
+    x, y = adjugate[..., 0] / determinant, adjugate[..., 1] / determinant
+    scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
+    s = np.stack((x, y, scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]), axis=-1)
+    reach, plane = 2.0 * np.sqrt(s[..., 2:4]), np.concatenate((n, -d), axis=-1)
+    return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))
 
 
 def wrapped(error: Array, periods: Array) -> Array:
@@ -303,3 +338,51 @@ def as_measurement(s: Any, feature: Feature, name: str) -> Array:
             f"(4, 4) of the object in the camera, got shape {array.shape}."
         )
     return array
+
+
+def _vector(value: Any, name: str) -> Array:
+    return as_exact(value, (3,), name)
+
+
+def _unit(value: Any, name: str) -> Array:
+    """A direction as a unit vector."""
+    array = _vector(value, name)
+    length = float(np.linalg.norm(array))
+    if not length > 0.0:
+        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
+    # unit vectors stay as they are, so that copies are equal
+    return array if abs(length - 1.0) < 4e-16 else array / length
+
+
+def as_points(value: Any, name: str, least: int = 1) -> Array:
+    """Points of an object. Shapes: -> (k, 3)."""
+    points = as_core(value, (3,), name)
+    points = points[None] if points.ndim == 1 else points
+    if points.ndim != 2 or len(points) < least:
+        raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
+    return points
+
+
+def _pairs(value: Any, name: str) -> Array:
+    """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
+    pairs = as_core(value, (2, 3), name)
+    pairs = pairs[None] if pairs.ndim == 2 else pairs
+    if pairs.ndim != 3 or not len(pairs):
+        raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
+    lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
+    if not (lengths > THIN * np.abs(pairs).max()).all():
+        raise InvalidValueError(f"{name}: expected two different points on each line or segment.")
+    return pairs
+
+
+_CHECKS: dict[str, Callable[[Any, str], Any]] = {
+    "object_points": as_points,
+    "points": _pairs,
+    "centre": _vector,
+    "point": _vector,
+    "normal": _unit,
+    "axis": _unit,
+    "radius": lambda value, name: as_number(value, name, above=0.0),
+    "distance": lambda value, name: as_number(value, name),
+    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
+}

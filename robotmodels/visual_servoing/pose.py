@@ -61,9 +61,9 @@ from .._arrays import Array, as_core
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
-from .features import Points
-from .results import Result, code_of
-from .velocity import moved, sight_of
+from .features import Points, sight_of
+from .results import Result
+from .velocity import moved
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
@@ -104,15 +104,12 @@ class PoseSolutions(Result):
     valid: NDArray[np.bool_]
     residual: Array
     status: NDArray[np.int8]
+    _outcome = PoseStatus
 
     @property
     def count(self) -> NDArray[np.int64]:
         """Number of solutions, shape (...)."""
         return self.valid.sum(axis=-1)
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status, of row i in a batch."""
-        return PoseStatus(code_of(self.status, i)).sentence
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.T, dtype=dtype)

@@ -1,51 +1,19 @@
-"""Results: read-only, equal by value, printed in one line."""
+"""Bases of values and results: equal by value, printed in one line, statuses with sentences."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any
+from operator import index
+from typing import Any, ClassVar
 
 import numpy as np
 
-from .._arrays import Frozen, value_hash
+from .._arrays import Frozen
+from .._arrays import Value as _Value
+from .._outcomes import Outcome
 from ..errors import InvalidValueError
 
 _SHOWN = 6  # numbers of an array that are printed
-
-
-class Result(Frozen):
-    """Base of results: equal if their fields are, where NaN equals NaN."""
-
-    __slots__ = ()
-
-    def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        pairs = [(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)]  # type: ignore[arg-type]
-        return all(
-            np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-            if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
-            else bool(a == b)
-            for a, b in pairs
-        )
-
-    def __hash__(self) -> int:
-        return value_hash(*(getattr(self, f.name) for f in fields(self)))  # type: ignore[arg-type]
-
-    def __repr__(self) -> str:
-        return brief(self)
-
-
-def code_of(status: Any, i: Any) -> int:
-    """Code of row i of a batch of codes, or the code of one result."""
-    codes = np.asarray(status)
-    try:
-        code = np.asarray(codes[i] if codes.ndim else codes)
-    except (IndexError, TypeError):
-        code = np.zeros(1)
-    if code.ndim:
-        raise InvalidValueError(f"i: expected the index of one row of {codes.shape}, got {i!r}.")
-    return int(code)
 
 
 def brief(value: Any) -> str:
@@ -58,3 +26,43 @@ def brief(value: Any) -> str:
             text = f"<{entry.shape} array>" if long else f"{entry!r}"
             parts.append(f"{f.name}={' '.join(text.split())}")
     return f"{type(value).__name__}({', '.join(parts)})"
+
+
+class Value(_Value):
+    """Base of descriptions."""
+
+    __slots__ = ()
+    __repr__ = brief
+
+
+class Result(Frozen):
+    """Base of results: equal if their fields are, where NaN equals NaN."""
+
+    __slots__ = ()
+    _outcome: ClassVar[type[Outcome]]
+    __repr__ = brief
+
+    def _key(self) -> tuple[Any, ...]:
+        entries = [getattr(self, f.name) for f in fields(self)]  # type: ignore[arg-type]
+        return tuple(
+            (e.shape, e.tolist() if e.dtype.kind == "U" else (e + 0.0).tobytes())
+            if isinstance(e, np.ndarray)
+            else e
+            for e in entries
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status, of row i in a batch."""
+        codes = np.asarray(self.status)  # type: ignore[attr-defined]
+        try:
+            return self._outcome(index(codes[i if codes.ndim else ()])).sentence
+        except (IndexError, TypeError):
+            raise InvalidValueError(
+                f"i: expected the index of one row of {codes.shape}, got {i!r}."
+            ) from None

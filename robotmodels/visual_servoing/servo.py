@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays import Array, as_exact, as_number, read_only
 from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
@@ -17,10 +17,11 @@ from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose, inverse
 from .camera import Camera
-from .results import Result, brief
+from .features import sight_of
+from .results import Result, Value
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, law, moved, sight_of
+from .velocity import ServoStatus, law, moved
 
 _MOST = 1_000_000  # steps of a simulation
 
@@ -46,9 +47,6 @@ class EyeInHand(Value):
         T = as_single_pose(self.T_tool_camera, "T_tool_camera")
         object.__setattr__(self, "T_tool_camera", read_only(T))
 
-    def __repr__(self) -> str:
-        return brief(self)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EyeToHand(Value):
@@ -70,9 +68,6 @@ class EyeToHand(Value):
     def __post_init__(self) -> None:
         T = as_single_pose(self.T_world_camera, "T_world_camera")
         object.__setattr__(self, "T_world_camera", read_only(T))
-
-    def __repr__(self) -> str:
-        return brief(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

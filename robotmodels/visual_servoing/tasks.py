@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
+from .._arrays import Array, as_core, as_exact, as_floats, as_number, read_only
 from ..errors import InvalidValueError
-from ..se3 import as_single_pose, inverse
+from ..se3 import as_single_pose
 from .features import Feature, Sight, as_measurement
-from .features_3d import PointAndRotation, PoseError, rotations
-from .results import brief
+from .features_3d import PointAndRotation, PoseError
+from .results import Value
 
 _MATRICES = ("current", "desired", "mean")
 
@@ -135,9 +135,6 @@ class Task(Value):
             w = sight.depth
         return self.feature._rows(s, w, image)
 
-    def __repr__(self) -> str:
-        return brief(self)
-
 
 def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
     """Position-based (3-D) visual servoing: a `Task` whose two errors decay by themselves.
@@ -237,9 +234,6 @@ class Hybrid(Value):
         """The primary task."""
         return self.primary
 
-    def __repr__(self) -> str:
-        return brief(self)
-
 
 def _goal(feature: Feature, desired: Any) -> tuple[Feature, Array, Array | None]:
     """Feature, desired measurement, and desired pose where one is given."""
@@ -252,11 +246,7 @@ def _goal(feature: Feature, desired: Any) -> tuple[Feature, Array, Array | None]
         T = as_single_pose(desired, "desired")
     else:
         s = as_exact(as_measurement(desired, feature, "desired"), (feature.size,), "desired")
-        if not isinstance(feature, PoseError):
-            return feature, s, None
-        M = np.eye(4)
-        M[:3, :3], M[:3, 3] = rotations(s[3:]), s[:3]
-        T = inverse(M) if feature.desired is None else inverse(M) @ feature.desired
+        return feature, s, None
     if isinstance(feature, PoseError):
         feature = PoseError(T)
     if isinstance(feature, PointAndRotation):

@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from .._arrays import Array, as_exact, as_floats, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..se3 import as_pose
 from .camera import Camera
-from .features import Feature, Sight, as_measurement, wrapped
-from .results import Result, code_of
+from .features import Feature, as_measurement, sight_of, wrapped
+from .results import Result
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
 """Singular values of an interaction matrix up to this part of the largest are zero."""
 _ZERO = 1e-10  # error of a task that is met
 _REDUCIBLE = 1e-3  # part of the error below which a velocity cannot reduce it
-_NEARBY = 0.05 * np.random.default_rng(0).normal(size=(3, 6))  # motions off a singular pose
 
 
 class ServoStatus(Outcome):
@@ -88,13 +88,10 @@ class ServoStep(Result):
     error: Array
     rank: int | NDArray[np.int8]
     status: ServoStatus | NDArray[np.int8]
+    _outcome = ServoStatus
 
     def __post_init__(self) -> None:
         self.v.flags.writeable = self.error.flags.writeable = False  # quicker than copies
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status, of row i in a batch."""
-        return ServoStatus(code_of(self.status, i)).sentence
 
 
 def camera_velocity(
@@ -179,9 +176,7 @@ def law(
     size = math.sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
-        if rank < min(A.shape) and _loses_rank(
-            feature, primary.T_desired if T is None else T, rank
-        ):
+        if rank < min(A.shape) and rank < _generic_rank(feature):
             status = ServoStatus.SINGULAR
         elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
@@ -195,12 +190,6 @@ def law(
         z = _secondary(task, s, T)
         v = v + task.weight * (z - own @ (A @ z))
     return v, error, rank, status, inverse
-
-
-def sight_of(feature: Feature, T: Array) -> Sight:
-    """Sight of an object that may be behind the camera."""
-    with np.errstate(all="ignore"):
-        return feature._see(T)
 
 
 @cache
@@ -222,21 +211,14 @@ def pseudo_inverse(A: Array) -> tuple[Array, int]:
     return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
 
 
-def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
-    """Whether the rank is less than at poses nearby."""
-    T = _somewhere(feature) if T is None else T
-    reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
-    poses = [moved(T, twist * reach) for twist in _NEARBY]
-    seen = [nearby for nearby in poses if sight_of(feature, nearby).exists]
-    return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
-
-
 @lru_cache(maxsize=64)
-def _somewhere(feature: Feature) -> Array:
-    """A pose at which a feature exists."""
-    turns = [moved(np.eye(4), twist) for twist in 20.0 * _NEARBY]
-    poses = [moved(R, np.eye(6)[2] * -(10.0**k)) for k in range(-2, 8) for R in turns]
-    return next((T for T in poses if sight_of(feature, T).exists), np.eye(4))
+def _generic_rank(feature: Feature) -> int:
+    """Rank of the interaction matrix where it is not singular: its largest at random poses."""
+    T = np.tile(np.eye(4), (10, 8, 1, 1))
+    T[..., :3, :3] = Rotation.random(8, random_state=0).as_matrix()
+    T[..., 2, 3] = 10.0 ** np.arange(-2.0, 8.0)[:, None]
+    L = feature.interaction(T[sight_of(feature, T).exists])
+    return int(np.linalg.matrix_rank(L, rtol=RANK_TOLERANCE).max(initial=0))
 
 
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
