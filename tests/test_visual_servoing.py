@@ -424,7 +424,7 @@ EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
         (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
          "on a line"),
         (lambda: vs.p3p(np.eye(3), np.eye(3)), ShapeError, "image"),
-        (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "n from 3"),
+        (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "from 3"),
         (lambda: vs.pnp(np.outer(range(5), [1, 2, 3]), np.ones((5, 2))), InvalidValueError, "line"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], -GOAL), NotARotationError, "T0"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),

@@ -345,7 +345,7 @@ def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.boo
         cost_after = np.where(other.exists, ((other.s - m) ** 2).sum(axis=-1), np.inf)
         reach = np.maximum(1.0, np.abs(T[:, :3, 3]).max(axis=-1))
         small = np.abs(step).max(axis=-1) <= 1e-11 * reach
-        better = (cost_after <= cost) & ~done
+        better = ((cost_after <= (1.0 + 1e-13) * cost) | small & other.exists) & ~done
         T = np.where(better[:, None, None], after, T)
         cost, done = np.where(better, cost_after, cost), done | small
         damping = np.clip(np.where(better, 0.1, 10.0) * damping, 1e-12, 1e12)
