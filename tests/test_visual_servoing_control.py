@@ -82,7 +82,7 @@ def test_matrices_of_the_law():
         vs.Circle([0, 0, 0], [0, 0, 1], 0.1),
         vs.Sphere([0, 0, 0], 0.1),
         vs.Cylinder([0, 0, 0], [0.2, 1, 0], 0.05),
-        vs.Moments(points=[*SQUARE, [0.2, 0.3, 0.0]]),
+        vs.Moments(points=[*SQUARE, [0.2, 0.3, 0.0]], components=("xn", "yn", "an", "alpha")),
         vs.Plane3D([0, 0, 1], 0.0),
         vs.PointAndRotation([0.1, 0, 0], GOAL),
     ],

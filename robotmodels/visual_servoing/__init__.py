@@ -4,8 +4,9 @@ from .camera import Camera
 from .features import Circle, Cylinder, Feature, Lines, Points, Segments, Sphere
 from .features_3d import Plane3D, Point3D, PointAndRotation, PoseError
 from .homography import PlaneMotions, decompose_homography, homography
-from .links import VirtualLink, broyden, estimate_interaction, virtual_link
 from .matrices import (
+    broyden,
+    estimate_interaction,
     interaction_ellipse,
     interaction_line,
     interaction_moment,
@@ -20,7 +21,7 @@ from .pose import PoseSolutions, PoseStatus, p3p, pnp, refine_pose
 from .servo import EyeInHand, EyeToHand, ServoMotion, servo
 from .tasks import Hybrid, Task, task_2_1_2d, task_3d
 from .tracking import TargetEstimate, TargetMotion
-from .velocity import ServoStatus, ServoStep, camera_velocity
+from .velocity import ServoStatus, ServoStep, VirtualLink, camera_velocity, virtual_link
 
 __all__ = [
     "Camera",

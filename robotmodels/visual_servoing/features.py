@@ -323,21 +323,29 @@ def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
     return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))
 
 
-def wrapped(error: Array, periods: Array) -> Array:
-    """Differences of features with angles in their period. Shapes: (..., k), (k,) -> (..., k)."""
-    whole = np.where(periods > 0.0, periods, 1.0)
-    return np.where(periods > 0.0, error - whole * np.round(error / whole), error)
-
-
-def as_measurement(s: Any, feature: Feature, name: str) -> Array:
-    """A measurement (..., k) of a feature."""
-    array = as_floats(s, name)
+def as_sensed(given: Any, feature: Feature, name: str) -> tuple[Array, bool]:
+    """Checked measurements (..., k) or poses (..., 4, 4), and whether they are poses."""
+    array = as_floats(getattr(given, "homogeneous", given), name)
+    if array.shape[-2:] == (4, 4):
+        four = array.ndim == 2 and feature.size == 4  # may be four measurements
+        if not four or np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
+            return array if array.ndim == 2 and _is_exact(array) else as_pose(array, name), True
     if array.ndim == 0 or array.shape[-1] != feature.size:
         raise ShapeError(
             f"{name}: expected {feature.size} numbers of {type(feature).__name__}, or a pose "
             f"(4, 4) of the object in the camera, got shape {array.shape}."
         )
-    return array
+    return array, False
+
+
+def _is_exact(T: Array) -> bool:
+    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), last = T.tolist()
+    off = (
+        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, a * d + b * e + c * f),
+        *(b * f - c * e - g, c * d - a * f - h, a * e - b * d - i),
+    )
+    return max(off) < 1e-12 and min(off) > -1e-12 and last == [0.0, 0.0, 0.0, 1.0]
 
 
 def _vector(value: Any, name: str) -> Array:

@@ -97,7 +97,7 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
 def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneMotions:
     """Motions and planes of a homography: four in general, two with the plane in front."""
     A = as_core(H, (3, 3), "H")
-    U, sizes, Vt = np.linalg.svd(A)
+    _, sizes, Vt = np.linalg.svd(A)
     if not (sizes[..., 2] > 1e-12 * sizes[..., 0]).all():
         raise InvalidValueError("H: expected a regular matrix; this one has a zero singular value.")
     A = A * (np.sign(np.linalg.det(A)) / sizes[..., 1])[..., None, None]

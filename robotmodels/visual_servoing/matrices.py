@@ -1,4 +1,4 @@
-"""Interaction matrices in closed form, for measured features: ``ds/dt = L [v; w]``.
+"""Interaction matrices ``ds/dt = L [v; w]``: closed forms, and estimates from motions.
 
 The twist is that of the camera in its own axes, linear then angular; the object stands still.
 Coordinates are normalised: x = X / Z, y = Y / Z. Arguments broadcast against each other.
@@ -25,6 +25,13 @@ moments : array_like, shape (..., K, K)
     Raw moments of a region, [p, q] the integral of ``x^p y^q``; used up to order i + j + 1.
 i, j : int
     Order of the moment, K at least i + j + 2.
+dS, dX : array_like, shapes (N, k) and (N, 6)
+    Changes of a measurement, and the small displacements [v; w] of the camera in its own axes that
+    caused them, m and rad.
+L, ds, dx : array_like, shapes (k, 6), (k,) and (6,)
+    Estimate so far; the last change and its displacement, which leaves L as it is where it is zero.
+factor : float
+    Part of the correction, in (0, 1].
 
 Returns
 -------
@@ -35,18 +42,23 @@ Raises
 ------
 ShapeError, InvalidValueError
     Arguments that do not fit each other, NaN; a depth that is not positive; a plane through the
-    centre of the camera; a rotation of a turn or more; a normal of another length than 1.
+    centre of the camera; a rotation of a turn or more; a normal of another length than 1;
+    displacements that do not span all six directions.
 
 References
 ----------
-Seed book sections 6.2.4.1 to 6.2.4.3 and 6.2.5.2 to 6.2.5.4; F. Chaumette, "Image moments: a
-general and useful set of features for visual servoing", IEEE Trans. Robotics 20(4), 2004.
+Seed book sections 6.2.4.1 to 6.2.4.4 and 6.2.5.2 to 6.2.5.4; F. Chaumette, "Image moments: a
+general and useful set of features for visual servoing", IEEE Trans. Robotics 20(4), 2004;
+M. Jagersand, O. Fuentes and R. Nelson, "Experimental evaluation of uncalibrated visual servoing",
+ICRA 1997.
 
 Examples
 --------
 >>> interaction_point(0.1, 0.2, 2.0).round(3)
 array([[-0.5 ,  0.  ,  0.05,  0.02, -1.01,  0.2 ],
        [ 0.  , -0.5 ,  0.1 ,  1.04, -0.02, -0.1 ]])
+>>> broyden(np.zeros((1, 6)), [0.2], [0.1, 0, 0, 0, 0, 0])
+array([[2., 0., 0., 0., 0., 0.]])
 """
 
 from __future__ import annotations
@@ -56,7 +68,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_floats
+from .._arrays import Array, as_core, as_floats, as_number, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import skew
 
@@ -194,6 +206,42 @@ def interaction_plane_3d(normal: ArrayLike) -> Array:
     L[..., :3, 3:] = skew(n)
     L[..., 3, :3] = -n
     return L
+
+
+def estimate_interaction(dS: ArrayLike, dX: ArrayLike) -> Array:
+    """Interaction matrix from motions of the camera: least squares of ``dS = dX L^T``."""
+    S, X = as_floats(dS, "dS"), as_vector(dX, 6, "dX")
+    if S.ndim != 2 or X.ndim != 2 or len(S) != len(X):
+        raise ShapeError(f"dS, dX: expected shapes (N, k) and (N, 6), got {S.shape} and {X.shape}.")
+    scale = np.abs(X).max(axis=0, initial=0.0)
+    L, _, rank, _ = np.linalg.lstsq(X / np.where(scale > 0.0, scale, 1.0), S, rcond=1e-10)
+    if rank < 6:
+        raise InvalidValueError(
+            f"dX: the displacements span {rank} of 6 directions; translate along and rotate about "
+            "all three axes of the camera."
+        )
+    return (L / scale[:, None]).T
+
+
+def broyden(L: ArrayLike, ds: ArrayLike, dx: ArrayLike, factor: float = 1.0) -> Array:
+    """Broyden's update: the matrix nearest to L that explains the last motion."""
+    A, s, x = as_vector(L, 6, "L"), as_floats(ds, "ds"), as_vector(dx, 6, "dx")
+    if A.ndim != 2 or s.shape != A.shape[:1] or x.ndim != 1:
+        raise ShapeError(
+            f"L, ds, dx: expected (k, 6), (k,), (6,), got {A.shape}, {s.shape}, {x.shape}."
+        )
+    part = as_number(factor, "factor", above=0.0)
+    if part > 1.0:
+        raise InvalidValueError(f"factor: expected a number in (0, 1], got {factor}.")
+    size = float(np.abs(x).max())
+    if size == 0.0:
+        return A.copy()
+    unit = x / size
+    with np.errstate(over="ignore"):
+        B = A + part * np.outer((s - A @ x) / size, unit / (unit @ unit))
+    if not np.isfinite(B).all():
+        raise InvalidValueError(f"dx: expected a displacement that can cause ds, got {dx!r:.60}.")
+    return B
 
 
 def _together(**given: Any) -> list[Array]:

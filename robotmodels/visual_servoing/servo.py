@@ -1,9 +1,66 @@
-"""Simulation of visual servoing: a free camera, eye in hand, eye to hand."""
+"""Simulation of visual servoing: a free camera, eye in hand, eye to hand.
+
+A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
+robot, noise or tracking the law is sampled: every velocity is held for one step.
+
+Parameters
+----------
+task : Task or Hybrid
+    What is regulated, k components.
+T0 : array_like, shape (4, 4)
+    Pose of the object in the camera at the start.
+camera : Camera, optional
+    Whose image has to contain the object.
+robot : RobotModel, optional
+    Carries the camera or the object; n joints.
+q0 : array_like, shape (n,), optional
+    Its joint variables at the start, rad or m.
+mounting : EyeInHand or EyeToHand, optional
+    Default ``EyeInHand()``.
+duration, step : float
+    Seconds.
+noise : float
+    Standard deviation of every component of the measurement, in its unit.
+rng : Generator or int, optional
+    Source of the noise, default 0.
+target : array_like, shape (6,), or function of t -> (6,), optional
+    Twist [v; w] of the object in its own axes.
+tracking : TargetMotion, optional
+    Estimates and compensates the motion of the target.
+limits : JointBounds or bool
+    Limits of the joints, see `ikm`, for the step of the simulation; True takes those of the robot.
+T_tool_camera, T_world_camera : array_like, shape (4, 4), optional
+    Pose of the camera in the tool or in the world, by default the identity.
+
+Returns
+-------
+ServoMotion
+    Poses, measurements, errors, velocities and the status.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
+
+References
+----------
+Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
+
+Examples
+--------
+>>> from robotmodels.se3 import rotation, translation
+>>> from robotmodels.visual_servoing import Points
+>>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+>>> start = translation(0.1, 0.0, 1.0) @ rotation("z", 0.5)
+>>> run = servo(Task(square, translation(0, 0, 0.5), gain=1.0), start)
+>>> run.status, bool(abs(run.error[-1]).max() < 1e-4)
+(<ServoStatus.CONVERGES: 0>, True)
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,53 +78,34 @@ from .features import sight_of
 from .results import Result, Value
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, law, moved
+from .velocity import ServoStatus, check_kinds, law, moved
 
 _MOST = 1_000_000  # steps of a simulation
 
 
+class _Mounting(Value):
+    """Base of the places of a camera."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for f in fields(self):  # type: ignore[arg-type]
+            T = as_single_pose(getattr(self, f.name), f.name)
+            object.__setattr__(self, f.name, read_only(T))
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeInHand(Value):
-    """A camera on the tool of a robot (section 6.2.2), at ``T_tool_camera (4, 4)``.
-
-    Parameters
-    ----------
-    T_tool_camera : array_like, shape (4, 4), optional
-        Pose of the camera in the tool; default the tool itself.
-
-    Examples
-    --------
-    >>> EyeInHand().T_tool_camera.shape
-    (4, 4)
-    """
+class EyeInHand(_Mounting):
+    """A camera on the tool of a robot (section 6.2.2)."""
 
     T_tool_camera: Array = None  # type: ignore[assignment]
 
-    def __post_init__(self) -> None:
-        T = as_single_pose(self.T_tool_camera, "T_tool_camera")
-        object.__setattr__(self, "T_tool_camera", read_only(T))
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeToHand(Value):
-    """A camera fixed in the world that sees the object on the tool (section 6.2.3).
-
-    Parameters
-    ----------
-    T_world_camera : array_like, shape (4, 4), optional
-        Pose of the camera; default the world itself.
-
-    Examples
-    --------
-    >>> EyeToHand().T_world_camera.shape
-    (4, 4)
-    """
+class EyeToHand(_Mounting):
+    """A camera fixed in the world that sees the object on the tool (section 6.2.3)."""
 
     T_world_camera: Array = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        T = as_single_pose(self.T_world_camera, "T_world_camera")
-        object.__setattr__(self, "T_world_camera", read_only(T))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -94,13 +132,6 @@ class ServoMotion(Result):
         `ServoStatus` of every sample.
     camera : Camera or None
         The camera of the call.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import task_3d
-    >>> servo(task_3d(translation(0, 0, 0.5)), translation(0, 0, 1), duration=20.0).status
-    <ServoStatus.CONVERGES: 0>
     """
 
     task: Task | Hybrid
@@ -119,7 +150,7 @@ class ServoMotion(Result):
         """Outcome at the end."""
         return ServoStatus(int(self.codes[-1]))
 
-    def reason(self) -> str:
+    def reason(self) -> str:  # type: ignore[override]
         """Sentence of the status, with the error at the end."""
         return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
 
@@ -143,71 +174,14 @@ def servo(
     tracking: TargetMotion | None = None,
     limits: JointBounds | bool = True,
 ) -> ServoMotion:
-    """Simulate visual servoing.
-
-    A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
-    robot, noise or tracking the law is sampled: every velocity is held for one step.
-
-    Parameters
-    ----------
-    task : Task or Hybrid
-        What is regulated, k components.
-    T0 : array_like, shape (4, 4)
-        Pose of the object in the camera at the start.
-    camera : Camera, optional
-        Whose image has to contain the object.
-    robot : RobotModel, optional
-        Carries the camera or the object; n joints.
-    q0 : array_like, shape (n,), optional
-        Its joint variables at the start, rad or m.
-    mounting : EyeInHand or EyeToHand, optional
-        Default ``EyeInHand()``.
-    duration, step : float
-        Seconds.
-    noise : float
-        Standard deviation of every component of the measurement, in its unit.
-    rng : Generator or int, optional
-        Source of the noise, default 0.
-    target : array_like, shape (6,), or function of t -> (6,), optional
-        Twist [v; w] of the object in its own axes.
-    tracking : TargetMotion, optional
-        Estimates and compensates the motion of the target.
-    limits : JointBounds or bool
-        Limits of the joints, see `ikm`, for the step of the simulation; True takes those of the
-        robot.
-
-    Returns
-    -------
-    ServoMotion
-        Poses, measurements, errors, velocities and the status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
-
-    References
-    ----------
-    Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import Points
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> start = translation(0.1, 0.0, 1.0) @ rotation("z", 0.5)
-    >>> run = servo(Task(square, translation(0, 0, 0.5), gain=1.0), start)
-    >>> run.status, bool(abs(run.error[-1]).max() < 1e-4)
-    (<ServoStatus.CONVERGES: 0>, True)
-    """
-    if not isinstance(task, Task | Hybrid):
-        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    for name, value, kind in (
-        ("camera", camera, Camera), ("tracking", tracking, TargetMotion),
-        ("limits", None if isinstance(limits, bool) else limits, JointBounds),
-    ):  # fmt: skip
-        if value is not None and not isinstance(value, kind):
-            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
+    """Simulate visual servoing."""
+    bounds = None if isinstance(limits, bool) else limits
+    check_kinds(
+        task,
+        camera=(camera, Camera),
+        tracking=(tracking, TargetMotion),
+        limits=(bounds, JointBounds),
+    )
     primary = task.regulated
     T = as_single_pose(T0, "T0")
     h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
@@ -252,7 +226,10 @@ def servo(
 
 
 class _Arm:
-    """The robot of a simulation; it carries the camera or the object, the other is ``fixed``."""
+    """The robot of a simulation: ``held`` is on its tool, ``fixed`` in the world.
+
+    In hand the camera is held and the object is fixed, otherwise the object and the camera.
+    """
 
     def __init__(self, robot: Any, q0: Any, mounting: Any, T: Array, h: float, limits: Any) -> None:
         check_model(robot)
@@ -269,20 +246,17 @@ class _Arm:
         upper = robot.upper if bounds.upper is None else bounds.upper
         if self.limits is not None and not ((lower <= self.q) & (self.q <= upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
-        tool = dgm(robot, self.q)
-        self.in_hand = isinstance(mounting, EyeInHand)
+        self.tool, self.in_hand = dgm(robot, self.q), isinstance(mounting, EyeInHand)
         if isinstance(mounting, EyeInHand):
-            self.held, self.fixed = mounting.T_tool_camera, tool @ mounting.T_tool_camera @ T
+            self.held, self.fixed = mounting.T_tool_camera, self.tool @ mounting.T_tool_camera @ T
         else:
-            self.held, self.fixed = (
-                inverse(tool) @ mounting.T_world_camera @ T,
-                mounting.T_world_camera,
-            )
+            self.fixed = mounting.T_world_camera
+            self.held = inverse(self.tool) @ self.fixed @ T
 
     @property
     def camera(self) -> Array:
         """Pose of the camera in the world."""
-        return dgm(self.model, self.q) @ self.held if self.in_hand else self.fixed
+        return self.tool @ self.held if self.in_hand else self.fixed
 
     def follow(self, v: Array, T: Array, shift: Array) -> tuple[Array, bool]:
         """Move for one step, the target by a shift: its pose, whether the velocity was met."""
@@ -295,31 +269,28 @@ class _Arm:
         twist = np.concatenate((linear + np.cross(p, angular), angular))
         found = ikm(self.model, self.q, twist, reference="local", limits=self.limits)
         self.q = self.q + self.h * found.v
-        met |= bool(found.status == IKMStatus.MET)
+        self.tool = dgm(self.model, self.q)
         if self.in_hand:
             self.fixed = self.fixed @ shift
-            return inverse(self.camera) @ self.fixed, met
-        self.held = self.held @ shift
-        return inverse(self.fixed) @ dgm(self.model, self.q) @ self.held, met
+        else:
+            self.held = self.held @ shift
+        T = inverse(self.fixed) @ self.tool @ self.held
+        return inverse(T) if self.in_hand else T, met or bool(found.status == IKMStatus.MET)
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
-    """Pose after a step of the continuous law: Munthe-Kaas' Runge-Kutta method of order 4."""
-    q1 = -h * v
-    q2 = -h * law(task, None, moved(T, -0.5 * q1))[0] - q1
-    third = moved(T, -0.5 * (q1 + q2) + 0.125 * _bracket(q1, q2))
-    q3 = -h * law(task, None, third)[0] - q1 - q2
-    q4 = -h * law(task, None, moved(T, -q1 - q2 - q3))[0] - q1 - 2.0 * q2
-    whole = q1 + q2 + q3 / 3.0 + q4 / 6.0 - _bracket(q1, q2) / 6.0 - _bracket(q1, q4) / 12.0
-    return moved(T, -whole)
+    """Pose after a step of the continuous law by the Runge-Kutta method of order 4."""
+    rates = [_rate(v, T)]
+    for part in (0.5, 0.5, 1.0):
+        between = T + part * h * rates[-1]
+        rates.append(_rate(law(task, None, between)[0], between))
+    after = T + h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
+    R = after[:3, :3]
+    after[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R  # back to a rotation, to which it is close
+    return after
 
 
-def _bracket(a: Array, b: Array) -> Array:
-    """Lie bracket of twists."""
-    (p, q, r, x, y, z), (i, j, k, u, v, w) = a.tolist(), b.tolist()
-    linear = (
-        y * k - z * j + q * w - r * v,
-        z * i - x * k + r * u - p * w,
-        x * j - y * i + p * v - q * u,
-    )
-    return np.array((*linear, y * w - z * v, z * u - x * w, x * v - y * u))
+def _rate(v: Array, T: Array) -> Array:
+    """Rate of the pose of an object that stands still, seen by a moving camera."""
+    a, b, c, x, y, z = v.tolist()
+    return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4)) @ T

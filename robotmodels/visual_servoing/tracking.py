@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_floats, as_number
+from .._arrays import Array, as_exact, as_floats, as_number
 from ..errors import InvalidValueError
-from .results import Result
+from .results import Result, Value
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -30,7 +30,7 @@ class TargetEstimate(Result):
     covariance: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TargetMotion(Value):
     """Estimation of the rate of s by a moving target: of ``(s_k - s_{k-1}) / step - L [v; w]``.
 

@@ -1,4 +1,47 @@
-"""Velocity of the camera for one measurement, and a status that states what it achieves."""
+"""Velocity of the camera that regulates a task, and a status that states what it achieves.
+
+Parameters
+----------
+task : Task or Hybrid
+    The task, k components.
+measurement : array_like, shape (..., k) or (..., 4, 4)
+    Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
+camera : Camera, optional
+    Whose image has to contain the object.
+f : Points, Lines, Segments, Circle, ...
+    Feature that is kept by a virtual link.
+T : array_like, shape (..., 4, 4)
+    Poses of the object in the camera.
+
+Returns
+-------
+ServoStep or VirtualLink
+    Velocity, error, rank and status; or the motions that leave the feature unchanged.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    A measurement of another feature, NaN, a matrix that is not a pose, a pose at which the feature
+    of a virtual link does not exist.
+
+References
+----------
+Seed book sections 6.3.2 and 6.3.3.
+
+Examples
+--------
+>>> from robotmodels.se3 import rotation, translation
+>>> from robotmodels.visual_servoing import Points, Sphere
+>>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+>>> goal = translation(0, 0, 0.5)
+>>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
+array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
+>>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
+<ServoStatus.SINGULAR: 2>
+>>> link = virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1))
+>>> link.link_class, link.rank, link.name
+(3, 3, 'ball joint')
+"""
 
 from __future__ import annotations
 
@@ -8,15 +51,14 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_exact, as_floats, read_only
+from .._arrays import Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-from ..se3 import as_pose
 from .camera import Camera
-from .features import Feature, as_measurement, sight_of, wrapped
+from .features import Feature, as_sensed, sight_of
 from .results import Result
 from .tasks import Hybrid, Task
 
@@ -32,16 +74,6 @@ class ServoStatus(Outcome):
     With the current matrix at true depths the velocity of ``CONVERGES`` reduces the error. With
     other matrices or depths the error may grow, as with the desired matrix of an object that is
     turned by more than a quarter.
-
-    Attributes
-    ----------
-    sentence : str
-        The meaning of the code.
-
-    Examples
-    --------
-    >>> ServoStatus.BEHIND.sentence
-    'A part of the object is not in front of the plane of the camera, or is seen edge-on.'
     """
 
     CONVERGES = 0, "The law gives a velocity, or the error is zero."
@@ -77,11 +109,6 @@ class ServoStep(Result):
         Rank of the matrix of the law.
     status : ServoStatus, or ndarray of int8, shape (...)
         What the velocity achieves.
-
-    Examples
-    --------
-    >>> ServoStep(np.zeros(6), np.zeros(8), 6, ServoStatus.CONVERGES).reason()
-    'The law gives a velocity, or the error is zero.'
     """
 
     v: Array
@@ -97,59 +124,30 @@ class ServoStep(Result):
 def camera_velocity(
     task: Task | Hybrid, measurement: Any, camera: Camera | None = None
 ) -> ServoStep:
-    """Velocity of the camera that regulates a task.
-
-    Parameters
-    ----------
-    task : Task or Hybrid
-        The task, k components.
-    measurement : array_like, shape (..., k) or (..., 4, 4)
-        Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
-    camera : Camera, optional
-        Whose image has to contain the object.
-
-    Returns
-    -------
-    ServoStep
-        Velocity, error, rank and status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        A measurement of another feature, NaN, a matrix that is not a pose.
-
-    References
-    ----------
-    Seed book sections 6.3.2 and 6.3.3.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import Points
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> goal = translation(0, 0, 0.5)
-    >>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
-    array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
-    >>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
-    <ServoStatus.SINGULAR: 2>
-    """
-    if not isinstance(task, Task | Hybrid):
-        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    if camera is not None and not isinstance(camera, Camera):
-        raise InvalidValueError(f"camera: expected a Camera, got {type(camera).__name__}.")
+    """Velocity of the camera that regulates a task."""
+    check_kinds(task, camera=(camera, Camera))
     feature = task.regulated.feature
-    given, is_pose = _sensed(feature, measurement)
+    given, is_pose = as_sensed(measurement, feature, "measurement")
     core = 2 if is_pose else 1
-    if given.ndim == core:
-        return ServoStep(*law(task, *((None, given) if is_pose else (given, None)), camera)[:4])
     batch = given.shape[:-core]
     rows = given.reshape(math.prod(batch), *given.shape[-core:])
     found = [law(task, *((None, x) if is_pose else (x, None)), camera)[:4] for x in rows]
+    if not batch:
+        return ServoStep(*found[0])
     v, error, ranks, codes = zip(*found, strict=True) if found else ((),) * 4
     return ServoStep(
         np.reshape(v, (*batch, 6)), np.reshape(error, (*batch, feature.size)),
         read_only(np.reshape(ranks, batch), np.int8), read_only(np.reshape(codes, batch), np.int8),
     )  # fmt: skip
+
+
+def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
+    """Raise for what is no task, and for options of another kind."""
+    if not isinstance(task, Task | Hybrid):
+        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    for name, (value, kind) in given.items():
+        if value is not None and not isinstance(value, kind):
+            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
 
 
 def law(
@@ -163,9 +161,7 @@ def law(
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     measured: Any = sight.s if s is None and sight is not None else s
-    error = measured - primary.s_desired
-    if primary.periods is not None:
-        error = wrapped(error, primary.periods)
+    error = primary.error(measured)
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
     inverse, rank = own, _ = pseudo_inverse(A)
@@ -238,33 +234,6 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
     return as_exact(asked, (6,), "secondary(T)")
 
 
-def _sensed(feature: Feature, measurement: Any) -> tuple[Array, bool]:
-    """Checked measurements or poses, and whether they are poses."""
-    given = getattr(measurement, "homogeneous", measurement)
-    shape = given.shape if type(given) is np.ndarray else as_floats(given, "measurement").shape
-    if shape[-2:] == (4, 4):
-        if type(measurement) is np.ndarray and len(shape) == 2 and _is_exact(measurement):
-            return measurement, True
-        four = feature.size == 4 and len(shape) == 2  # may be four measurements
-        if not four or np.array_equal(np.asarray(measurement)[3], (0.0, 0.0, 0.0, 1.0)):
-            return as_pose(measurement, "measurement"), True
-    return as_measurement(measurement, feature, "measurement"), False
-
-
-def _is_exact(T: Array) -> bool:
-    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
-    if T.dtype != np.float64:
-        return False
-    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
-    off = (
-        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),
-        *(a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i),
-        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) - 1.0,
-    )
-    rounding = all(-1e-12 < number < 1e-12 for number in off)
-    return rounding and math.isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
-
-
 def moved(T: Array, twist: Array) -> Array:
     """Pose of the object after the camera has moved by a constant twist for 1 s."""
     v, w = -twist[:3], -twist[3:]
@@ -282,3 +251,49 @@ def moved(T: Array, twist: Array) -> Array:
     after[:3, :3] += a * W + b * WW
     after[:3, 3] = v + b * (W @ v) + c * (WW @ v)
     return after @ T
+
+
+_LINKS = {
+    (0, 0): "rigid", (1, 1): "prismatic", (1, 0): "revolute", (2, 1): "cylindrical joint",
+    (3, 2): "planar joint", (3, 0): "ball joint", (4, 2): "line contact",
+    (4, 1): "sphere in a cylinder", (5, 2): "point contact", (6, 3): "free",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class VirtualLink(Result):
+    """The motions of a camera that leave a feature unchanged at a pose (section 6.3.3.1).
+
+    Parameters
+    ----------
+    link_class : int, or ndarray, shape (...)
+        Dimension of the motions, 6 - rank.
+    rank : int, or ndarray, shape (...)
+        Rank of the interaction matrix.
+    kernel_twists : ndarray, shape (..., class, 6)
+        Orthonormal twists [v; w] of the camera in its own axes; missing rows of a batch are NaN.
+    name : str, or ndarray, shape (...)
+        Of the mechanical link with as many rotations and translations, "" for others.
+    """
+
+    link_class: int | NDArray[np.int64]
+    rank: int | NDArray[np.int64]
+    kernel_twists: Array
+    name: str | NDArray[np.str_] = ""
+
+
+def virtual_link(f: Feature, T: ArrayLike) -> VirtualLink:
+    """Virtual link between a camera and an object: the kernel of the interaction matrix."""
+    if not isinstance(f, Feature):
+        raise InvalidValueError(f"f: expected a feature, got {type(f).__name__}.")
+    _, sizes, Vt = np.linalg.svd(f.interaction(T))
+    rank = (sizes > RANK_TOLERANCE * sizes[..., :1]).sum(axis=-1)
+    free = np.arange(6) < 6 - rank[..., None]  # the last rows, which come first now
+    kernel = np.where(free[..., None], Vt[..., ::-1, :], 0.0)
+    motions = 6 - rank
+    shifts = motions - np.linalg.matrix_rank(kernel[..., 3:], tol=1e-6)
+    kernel = np.where(free[..., None], kernel, np.nan)[..., : motions.max(initial=0), :]
+    names = [_LINKS.get(pair, "") for pair in zip(motions.flat, shifts.flat, strict=True)]
+    if not motions.ndim:
+        return VirtualLink(int(motions), int(rank), kernel, names[0])
+    return VirtualLink(motions, rank, kernel, np.reshape(np.array(names, str), motions.shape))
