@@ -75,7 +75,7 @@ class Feature(Value):
     depends_on_depth: ClassVar[bool] = True
     _period: ClassVar[tuple[float, ...]]  # of the components of one element, 0 for none
     _see: ClassVar[Callable[..., Sight]]  # (T): what is seen of the object
-    _rows: ClassVar[Callable[..., Array]]  # (s, depth, image): interaction matrix (..., k, 6)
+    _matrix: ClassVar[Callable[..., Array]]  # interaction matrix of one element
 
     def __post_init__(self) -> None:
         for f in fields(self):  # type: ignore[arg-type]
@@ -100,6 +100,11 @@ class Feature(Value):
         """Period of each component. Shapes: -> (k,)."""
         elements = getattr(self, "object_points", getattr(self, "points", (0,)))
         return np.tile(self._period, len(elements))
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        """Interaction matrix (..., k, 6) of a measurement with depths or planes."""
+        elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
+        return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
 
     def _parallel(self, Z: float) -> float:
         """Depth of an object parallel to the image, checked."""
@@ -175,6 +180,7 @@ class Lines(Feature):
 
     points: Array
     _period = (0.0, _TURN)
+    _matrix = interaction_line
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
@@ -188,10 +194,6 @@ class Lines(Feature):
         side = x * np.cos(theta) + y * np.sin(theta) - rho  # of the corners of the image
         return bool(((side.min(axis=1) <= 0.0) & (side.max(axis=1) >= 0.0)).all())
 
-    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        L = interaction_line(s[..., 0::2], s[..., 1::2], depth)
-        return L.reshape(*s.shape, 6)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Segments(Feature):
@@ -199,6 +201,7 @@ class Segments(Feature):
 
     points: Array
     _period = (0.0, 0.0, 0.0, _TURN)
+    _matrix = interaction_segment
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
@@ -212,11 +215,6 @@ class Segments(Feature):
             (Z > 0.0).all(axis=-1), s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image
         )
 
-    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        depth = depth if np.ndim(depth) else np.full(2, depth)
-        L = interaction_segment(*(s[..., k::4] for k in range(4)), depth)  # type: ignore[call-arg]
-        return L.reshape(*s.shape, 6)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Circle(Feature):
@@ -226,12 +224,10 @@ class Circle(Feature):
     normal: Array
     radius: float
     _period = (0.0,) * 5
+    _matrix = interaction_ellipse
 
     def _see(self, T: Array) -> Sight:
         return _sight_of_circle(placed(T, self.centre), T[..., :3, :3] @ self.normal, self.radius)
-
-    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        return interaction_ellipse(*np.moveaxis(s, -1, 0), depth)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -241,6 +237,7 @@ class Sphere(Feature):
     centre: Array
     radius: float
     _period = (0.0,) * 5
+    _matrix = interaction_ellipse
 
     def _see(self, T: Array) -> Sight:
         centre = placed(T, self.centre)
@@ -250,6 +247,11 @@ class Sphere(Feature):
         """Sight of the circle that is the outline of the sphere with this centre."""
         part = 1.0 - self.radius**2 / inner(centre, centre)
         return _sight_of_circle(part * centre, centre / norm(centre), self.radius * np.sqrt(part))
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        """Interaction matrix (..., k, 6) of a measurement with depths or planes."""
+        elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
+        return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
 
     def _parallel(self, Z: float) -> float:
         if not self.radius < Z:
@@ -263,7 +265,7 @@ class Sphere(Feature):
         Z = np.broadcast_to(depth, s.shape[:-1])[..., None]
         centre = np.concatenate((s[..., :2] * (Z - self.radius**2 / Z), Z), axis=-1)
         seen = self._outline(centre)  # so that the matrix has rank 3 at any depth
-        return interaction_ellipse(*np.moveaxis(seen.s, -1, 0), seen.depth)
+        return Feature._rows(self, seen.s, seen.depth)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -273,7 +275,8 @@ class Cylinder(Feature):
     centre: Array
     axis: Array
     radius: float
-    _period = (0.0, _TURN, 0.0, _TURN)
+    _period = (0.0, _TURN)
+    _matrix = interaction_line
 
     def _see(self, T: Array) -> Sight:
         p, u = placed(T, self.centre), T[..., :3, :3] @ self.axis
@@ -287,8 +290,10 @@ class Cylinder(Feature):
         ahead = (p[..., 2] > 0.0) | (contact[..., 2] > 0.0).all(axis=-1)
         return sight._replace(exists=sight.exists & ahead & (sine < 1.0 - THIN)[..., 0])
 
+    def _periods(self) -> Array:
+        return np.tile(self._period, 2)
+
     _in_image = Lines._in_image
-    _rows = Lines._rows
 
 
 def _flat(image: Array) -> Array:
@@ -319,7 +324,7 @@ def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
     x, y = adjugate[..., 0] / determinant, adjugate[..., 1] / determinant
     scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
     s = np.stack((x, y, scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]), axis=-1)
-    reach, plane = 2.0 * np.sqrt(s[..., 2:4]), np.concatenate((n, -d), axis=-1)
+    reach, plane = 2.0 * np.sqrt(s[..., 2:4]), np.concatenate((n, -d), axis=-1)[..., None, :]
     return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))
 
 

@@ -105,8 +105,9 @@ def interaction_line(rho: ArrayLike, theta: ArrayLike, plane: ArrayLike) -> Arra
 def interaction_segment(
     x: ArrayLike, y: ArrayLike, length: ArrayLike, alpha: ArrayLike, Z: ArrayLike
 ) -> Array:
-    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2)."""
-    depth = _in_front(as_core(Z, (2,), "Z"))
+    """Interaction matrix of a segment: x, y of its middle, length, alpha; Z (..., 2) or ()."""
+    depth = _in_front(as_floats(Z, "Z"))
+    depth = as_core(np.full(2, depth) if depth.ndim == 0 else depth, (2,), "Z")
     x, y, length, alpha, near, far = _together(
         x=x, y=y, length=length, alpha=alpha, Z_1=depth[..., 0], Z_2=depth[..., 1]
     )

@@ -78,7 +78,7 @@ from .features import sight_of
 from .results import Result, Value
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, check_kinds, law, moved
+from .velocity import ServoStatus, check_kinds, law, moved, rate_matrix
 
 _MOST = 1_000_000  # steps of a simulation
 
@@ -190,10 +190,10 @@ def servo(
         raise InvalidValueError(f"step: {total:g} s in steps of {h:g} s are more than {_MOST}.")
     if robot is None and (q0 is not None or mounting is not None):
         raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
-    arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
+    arm = None if robot is None else _Arm(robot, q0, mounting, h, limits)
+    place = np.eye(4) if arm is None else arm.object_at(T)  # of the object in the world
     source = generator_of(rng)
     feature, sampled = primary.feature, arm is not None or sigma > 0.0 or tracking is not None
-    object_pose = np.eye(4)  # in the world, which without a robot is the object at the start
     estimate, own = None, np.zeros(feature.size)
     rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
@@ -206,32 +206,27 @@ def servo(
             estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
             own = primary.matrix(s, sight_of(feature, T)) @ v
-        place, q = (object_pose, None) if arm is None else (arm.camera, arm.q)
-        rows.append([k * h, T, place, q, s, error, v, code])
+        rows.append([k * h, T, place, None if arm is None else arm.q, s, error, v, code])
         if lost:
             break
         given: Any = target(k * h) if callable(target) else target
         twist = np.zeros(6) if given is None else as_exact(given, (6,), "target")
         shift = moved(np.eye(4), -h * twist)
-        if arm is not None:
-            T, met = arm.follow(v, T, shift)
-            rows[-1][-1] = code if met else ServoStatus.LIMITED
-        else:
+        if arm is None:
             T = (moved(T, h * v) if sampled else _continued(task, T, v, h)) @ shift
-            object_pose = object_pose @ shift
-    t, T, cameras, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
-    cameras, joints = (cameras @ inverse(T), None) if arm is None else (cameras, q)
-    codes = codes.astype(np.int8)
-    return ServoMotion(task, t, T, cameras, joints, s, error, velocity, codes, camera)
+            place = place @ shift
+        else:
+            T, place, met = arm.follow(v, T, place, shift)
+            rows[-1][-1] = code if met else ServoStatus.LIMITED
+    t, T, place, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
+    joints, codes = None if arm is None else q, codes.astype(np.int8)
+    return ServoMotion(task, t, T, place @ inverse(T), joints, s, error, velocity, codes, camera)
 
 
 class _Arm:
-    """The robot of a simulation: ``held`` is on its tool, ``fixed`` in the world.
+    """The robot of a simulation; it carries the camera, or the object in view of a fixed camera."""
 
-    In hand the camera is held and the object is fixed, otherwise the object and the camera.
-    """
-
-    def __init__(self, robot: Any, q0: Any, mounting: Any, T: Array, h: float, limits: Any) -> None:
+    def __init__(self, robot: Any, q0: Any, mounting: Any, h: float, limits: Any) -> None:
         check_model(robot)
         if q0 is None:
             raise InvalidValueError("q0: expected the joint variables of the robot at the start.")
@@ -246,51 +241,37 @@ class _Arm:
         upper = robot.upper if bounds.upper is None else bounds.upper
         if self.limits is not None and not ((lower <= self.q) & (self.q <= upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
-        self.tool, self.in_hand = dgm(robot, self.q), isinstance(mounting, EyeInHand)
-        if isinstance(mounting, EyeInHand):
-            self.held, self.fixed = mounting.T_tool_camera, self.tool @ mounting.T_tool_camera @ T
-        else:
-            self.fixed = mounting.T_world_camera
-            self.held = inverse(self.tool) @ self.fixed @ T
+        self.tool, self.mounting = dgm(robot, self.q), mounting
 
-    @property
-    def camera(self) -> Array:
-        """Pose of the camera in the world."""
-        return self.tool @ self.held if self.in_hand else self.fixed
+    def object_at(self, T: Array) -> Array:
+        """Place of the object in the world, of a pose in the camera."""
+        mounting = self.mounting
+        if isinstance(mounting, EyeToHand):
+            return mounting.T_world_camera @ T
+        return self.tool @ mounting.T_tool_camera @ T
 
-    def follow(self, v: Array, T: Array, shift: Array) -> tuple[Array, bool]:
-        """Move for one step, the target by a shift: its pose, whether the velocity was met."""
-        met = bool(np.abs(v).max() < 1e-9)
-        if not self.in_hand:  # the object moves in its axes as the camera would in the other sense
-            seen = np.stack((v[:3] + np.cross(v[3:], T[:3, 3]), v[3:]))
-            v = -seen @ T[:3, :3]
-        R, p = self.held[:3, :3], self.held[:3, 3]
-        linear, angular = np.reshape(v, (2, 3)) @ R.T
-        twist = np.concatenate((linear + np.cross(p, angular), angular))
+    def follow(self, v: Array, T: Array, place: Array, shift: Array) -> tuple[Array, Array, bool]:
+        """Move for one step, the target by a shift: its pose and place, whether v was met."""
+        camera = inverse(self.tool) @ place @ inverse(T)
+        linear, angular = np.reshape(v, (2, 3)) @ camera[:3, :3].T
+        twist = np.concatenate((linear + np.cross(camera[:3, 3], angular), angular))
+        to_hand = isinstance(self.mounting, EyeToHand)
+        twist = -twist if to_hand else twist  # the object moves in the other sense
         found = ikm(self.model, self.q, twist, reference="local", limits=self.limits)
         self.q = self.q + self.h * found.v
-        self.tool = dgm(self.model, self.q)
-        if self.in_hand:
-            self.fixed = self.fixed @ shift
-        else:
-            self.held = self.held @ shift
-        T = inverse(self.fixed) @ self.tool @ self.held
-        return inverse(T) if self.in_hand else T, met or bool(found.status == IKMStatus.MET)
+        before, self.tool = self.tool, dgm(self.model, self.q)
+        place = (self.tool @ inverse(before) @ place if to_hand else place) @ shift
+        T = inverse(self.object_at(np.eye(4))) @ place
+        return T, place, bool(np.abs(v).max() < 1e-9 or found.status == IKMStatus.MET)
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
     """Pose after a step of the continuous law by the Runge-Kutta method of order 4."""
-    rates = [_rate(v, T)]
+    rates = [rate_matrix(v) @ T]
     for part in (0.5, 0.5, 1.0):
         between = T + part * h * rates[-1]
-        rates.append(_rate(law(task, None, between)[0], between))
+        rates.append(rate_matrix(law(task, None, between)[0]) @ between)
     after = T + h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
     R = after[:3, :3]
     after[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R  # back to a rotation, to which it is close
     return after
-
-
-def _rate(v: Array, T: Array) -> Array:
-    """Rate of the pose of an object that stands still, seen by a moving camera."""
-    a, b, c, x, y, z = v.tolist()
-    return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4)) @ T

@@ -47,7 +47,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -188,20 +188,13 @@ def law(
     return v, error, rank, status, inverse
 
 
-@cache
-def _decompositions() -> Any:
-    """The kernel of singular values, imported when it is first used."""
-    from ..kernels.svd import decompositions
-
-    return decompositions
-
-
 def pseudo_inverse(A: Array) -> tuple[Array, int]:
     """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
-    m, n = A.shape
-    p = min(m, n)
-    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
-    _decompositions()(np.ascontiguousarray(A[None]), U, S, V)
+    from ..kernels.svd import decompositions
+
+    m, p = A.shape[0], min(A.shape)
+    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, A.shape[1], p))
+    decompositions(np.ascontiguousarray(A[None]), U, S, V)
     sizes = S[0].tolist()
     rank = sum(size > RANK_TOLERANCE * sizes[0] for size in sizes)
     return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
@@ -234,23 +227,21 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
     return as_exact(asked, (6,), "secondary(T)")
 
 
+def rate_matrix(v: Array) -> Array:
+    """M of ``dT/dt = M T``, the motion of what stands still, seen by a camera with the twist v."""
+    a, b, c, x, y, z = v.tolist()
+    return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4))
+
+
 def moved(T: Array, twist: Array) -> Array:
     """Pose of the object after the camera has moved by a constant twist for 1 s."""
-    v, w = -twist[:3], -twist[3:]
-    square = float(w @ w)
-    if square < 1e-8:
-        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    else:
+    M, square = rate_matrix(twist), float(twist[3:] @ twist[3:])
+    b, c = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    if square > 1e-8:
         angle = math.sqrt(square)
-        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
-        c = (1.0 - a) / square
-    x, y, z = w.tolist()
-    W = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    WW = W @ W
-    after = np.eye(4)
-    after[:3, :3] += a * W + b * WW
-    after[:3, 3] = v + b * (W @ v) + c * (WW @ v)
-    return after @ T
+        b, c = 2.0 * (math.sin(0.5 * angle) / angle) ** 2, (1.0 - math.sin(angle) / angle) / square
+    MM = M @ M
+    return T + (M + b * MM + c * (M @ MM)) @ T
 
 
 _LINKS = {
