@@ -23,14 +23,10 @@ _TURN = 2.0 * np.pi
 class Sight(NamedTuple):
     """An object as a camera sees it."""
 
-    exists: Any
-    """Whether the feature exists, bool (...)."""
-    s: Array
-    """Measurement (..., k)."""
-    depth: Any = None
-    """Depths, or planes (A, B, C, D), that the rows need."""
-    image: Any = None
-    """Points (..., m, 2) that have to be inside the image, None where there are none."""
+    exists: Any  # whether the feature exists, bool (...)
+    s: Array  # measurement (..., k)
+    depth: Any = None  # depths, or planes (A, B, C, D), that the rows need
+    image: Any = None  # points (..., m, 2) that have to be inside the image, None without any
 
 
 class Feature(Value):
@@ -57,24 +53,21 @@ class Feature(Value):
 
     References
     ----------
-    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2 to 6.2.5.4; B. Espiau, F. Chaumette and
-    P. Rives, "A new approach to visual servoing in robotics", IEEE Trans. Robotics and Automation
-    8(3), 1992.
+    Seed book sections 6.2.4 and 6.2.5; B. Espiau, F. Chaumette and P. Rives, "A new approach to
+    visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
 
     Examples
     --------
     >>> from robotmodels.se3 import translation
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> square.measure(translation(0, 0, 1.0))
-    array([-0.1, -0.1,  0.1, -0.1,  0.1,  0.1, -0.1,  0.1])
-    >>> square.interaction(translation(0, 0, 1.0)).shape
-    (8, 6)
+    >>> edge = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0]])
+    >>> edge.measure(translation(0, 0, 1.0)), edge.interaction(translation(0, 0, 1.0)).shape
+    (array([-0.1, -0.1,  0.1, -0.1]), (4, 6))
     """
 
     __slots__ = ()
     depends_on_depth: ClassVar[bool] = True
     _period: ClassVar[tuple[float, ...]]  # of the components of one element, 0 for none
-    _see: ClassVar[Callable[..., Sight]]  # (T): what is seen of the object
+    _see: ClassVar[Callable[..., Sight]]  # sight at poses T, NaN where it does not exist
     _matrix: ClassVar[Callable[..., Array]]  # interaction matrix of one element
 
     def __post_init__(self) -> None:
@@ -97,17 +90,14 @@ class Feature(Value):
         return len(self._periods())
 
     def _periods(self) -> Array:
-        """Period of each component. Shapes: -> (k,)."""
         elements = getattr(self, "object_points", getattr(self, "points", (0,)))
         return np.tile(self._period, len(elements))
 
     def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        """Interaction matrix (..., k, 6) of a measurement with depths or planes."""
         elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
         return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
 
     def _parallel(self, Z: float) -> float:
-        """Depth of an object parallel to the image, checked."""
         return Z
 
     def _seen(self, T: Any) -> Sight:
@@ -124,7 +114,6 @@ class Feature(Value):
         return sight
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
-        """Whether a camera has a measurement (k,), of points (m, 2), inside its image."""
         return image is None or bool(camera.sees(image))
 
 
@@ -249,7 +238,6 @@ class Sphere(Feature):
         return _sight_of_circle(part * centre, centre / norm(centre), self.radius * np.sqrt(part))
 
     def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        """Interaction matrix (..., k, 6) of a measurement with depths or planes."""
         elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
         return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
 
@@ -353,20 +341,6 @@ def _is_exact(T: Array) -> bool:
     return max(off) < 1e-12 and min(off) > -1e-12 and last == [0.0, 0.0, 0.0, 1.0]
 
 
-def _vector(value: Any, name: str) -> Array:
-    return as_exact(value, (3,), name)
-
-
-def _unit(value: Any, name: str) -> Array:
-    """A direction as a unit vector."""
-    array = _vector(value, name)
-    length = float(np.linalg.norm(array))
-    if not length > 0.0:
-        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
-    # unit vectors stay as they are, so that copies are equal
-    return array if abs(length - 1.0) < 4e-16 else array / length
-
-
 def as_points(value: Any, name: str, least: int = 1) -> Array:
     """Points of an object. Shapes: -> (k, 3)."""
     points = as_core(value, (3,), name)
@@ -382,20 +356,29 @@ def _pairs(value: Any, name: str) -> Array:
     pairs = pairs[None] if pairs.ndim == 2 else pairs
     if pairs.ndim != 3 or not len(pairs):
         raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
-    lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
-    if not (lengths > THIN * np.abs(pairs).max()).all():
+    if not (norm(pairs[:, 1] - pairs[:, 0]) > THIN * np.abs(pairs).max()).all():
         raise InvalidValueError(f"{name}: expected two different points on each line or segment.")
     return pairs
+
+
+def _unit(value: Any, name: str) -> Array:
+    """A direction as a unit vector."""
+    array = as_exact(value, (3,), name)
+    length = float(np.linalg.norm(array))
+    if not length > 0.0:
+        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
+    # unit vectors stay as they are, so that copies are equal
+    return array if abs(length - 1.0) < 4e-16 else array / length
 
 
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "object_points": as_points,
     "points": _pairs,
-    "centre": _vector,
-    "point": _vector,
     "normal": _unit,
     "axis": _unit,
+    "centre": lambda value, name: as_exact(value, (3,), name),
+    "point": lambda value, name: as_exact(value, (3,), name),
     "radius": lambda value, name: as_number(value, name, above=0.0),
-    "distance": lambda value, name: as_number(value, name),
+    "distance": as_number,
     "desired": lambda value, name: None if value is None else as_single_pose(value, name),
 }

@@ -16,74 +16,64 @@ from .._arrays import Array
 from ..se3 import inverse
 from ..se3.orientation import rotation_vectors_of
 from .features import Feature, Sight, inner, norm, placed
-from .matrices import (
-    interaction_plane_3d,
-    interaction_point_3d,
-    interaction_theta_u,
-    point_rows,
-)
+from .matrices import interaction_plane_3d, interaction_point_3d, interaction_theta_u, point_rows
 
 
-def _in_space(s: Array, X: Array) -> Sight:
-    """Sight of a feature in space with a point X (..., 3)."""
-    image = (X[..., :2] / X[..., 2:])[..., None, :] if (X[..., 2] > 0.0).all() else None
-    return Sight(np.ones(s.shape[:-1], bool), s, None, image)
+class _InSpace(Feature):
+    """A feature that exists at any pose and is measured with its depth."""
+
+    __slots__ = ()
+    depends_on_depth = False
+
+    def _sight(self, s: Array, X: Array) -> Sight:
+        """Sight with a point X (..., 3)."""
+        image = (X[..., :2] / X[..., 2:])[..., None, :] if (X[..., 2] > 0.0).all() else None
+        return Sight(np.ones(s.shape[:-1], bool), s, None, image)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PoseError(Feature):
+class PoseError(_InSpace):
     """Pose of the camera in the desired camera: translation, m, and rotation vector theta u, rad.
 
     ``desired`` is the pose of the object in the desired camera, by default the identity: the
     desired camera is at the frame of the object. In a `Task` it is the pose of the task.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation
-    >>> PoseError().measure(rotation("z", 0.3)).round(3) + 0.0
-    array([ 0. ,  0. ,  0. ,  0. ,  0. , -0.3])
     """
 
     desired: Array | None = None
-    depends_on_depth = False
     _period = (0.0,) * 6
 
     def _see(self, T: Array) -> Sight:
         M = inverse(T) if self.desired is None else self.desired @ inverse(T)
         s = np.concatenate((M[..., :3, 3], rotation_vectors_of(M[..., :3, :3])), axis=-1)
-        return _in_space(s, T[..., :3, 3])
+        return self._sight(s, T[..., :3, 3])
 
     def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        L = np.zeros((*s.shape, 6))
         turns = Rotation.from_rotvec(np.array(s[..., 3:]).reshape(-1, 3)).as_matrix()
-        L[..., :3, :3] = turns.reshape(*s.shape[:-1], 3, 3)
-        L[..., 3:, :] = interaction_theta_u(s[..., 3:])
-        return L
+        shifts = np.insert(turns, (3, 3, 3), 0.0, axis=-1).reshape(*s.shape[:-1], 3, 6)
+        return np.concatenate((shifts, interaction_theta_u(s[..., 3:])), axis=-2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Point3D(Feature):
+class Point3D(_InSpace):
     """Coordinates X, Y, Z of ``point (3,)`` in the camera, m."""
 
     point: Array
-    depends_on_depth = False
     _period = (0.0,) * 3
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.point)
-        return _in_space(X, X)
+        return self._sight(X, X)
 
     def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         return interaction_point_3d(s)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plane3D(Feature):
+class Plane3D(_InSpace):
     """A plane ``normal . X = distance``: its unit normal and its distance in the camera, m."""
 
     normal: Array
     distance: float
-    depends_on_depth = False
     _period = (0.0,) * 4
 
     def _see(self, T: Array) -> Sight:
@@ -96,7 +86,7 @@ class Plane3D(Feature):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PointAndRotation(Feature):
+class PointAndRotation(_InSpace):
     """Features of 2 1/2-D servoing: x, y, log(Z) of ``point (3,)``, and theta u as in `PoseError`.
 
     Their interaction matrix is block triangular: the rotation alone moves theta u, and the image
@@ -106,7 +96,6 @@ class PointAndRotation(Feature):
 
     point: Array
     desired: Array
-    depends_on_depth = False
     _period = (0.0,) * 6
 
     def _see(self, T: Array) -> Sight:

@@ -1,4 +1,4 @@
-"""Bases of values and results: equal by value, printed in one line, statuses with sentences."""
+"""Bases of descriptions and results: equal by value, printed in one line."""
 
 from __future__ import annotations
 
@@ -8,34 +8,31 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .._arrays import Frozen
-from .._arrays import Value as _Value
+from .. import _arrays
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-
-_SHOWN = 6  # numbers of an array that are printed
 
 
 def brief(value: Any) -> str:
     """One line for a value with arrays: those of more than six numbers by their shapes."""
-    parts = []
-    for f in fields(value):
-        if f.init:
-            entry = getattr(value, f.name)
-            long = isinstance(entry, np.ndarray) and entry.size > _SHOWN
-            text = f"<{entry.shape} array>" if long else f"{entry!r}"
-            parts.append(f"{f.name}={' '.join(text.split())}")
-    return f"{type(value).__name__}({', '.join(parts)})"
+    given = [(f.name, getattr(value, f.name)) for f in fields(value) if f.init]
+    texts = [
+        f"{name}=<{entry.shape} array>"
+        if isinstance(entry, np.ndarray) and entry.size > 6
+        else f"{name}={' '.join(repr(entry).split())}"
+        for name, entry in given
+    ]
+    return f"{type(value).__name__}({', '.join(texts)})"
 
 
-class Value(_Value):
+class Value(_arrays.Value):
     """Base of descriptions."""
 
     __slots__ = ()
     __repr__ = brief
 
 
-class Result(Frozen):
+class Result(_arrays.Frozen):
     """Base of results: equal if their fields are, where NaN equals NaN."""
 
     __slots__ = ()
@@ -43,19 +40,18 @@ class Result(Frozen):
     __repr__ = brief
 
     def _key(self) -> tuple[Any, ...]:
-        entries = [getattr(self, f.name) for f in fields(self)]  # type: ignore[arg-type]
         return tuple(
             (e.shape, e.tolist() if e.dtype.kind == "U" else (e + 0.0).tobytes())
             if isinstance(e, np.ndarray)
             else e
-            for e in entries
+            for e in (getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
         )
 
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
 
     def __hash__(self) -> int:
-        return hash(self._key())
+        return hash(str(self._key()))
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
