@@ -2,12 +2,11 @@
 
 Parameters
 ----------
-image_1, image_2 : array_like, shape (..., n, 2)
-    The same points in both images, normalised coordinates, n from 4.
+image_1, image_2, image : array_like, shape (..., n, 2)
+    The same points in both images, normalised coordinates, n from 4; points of the plane in the
+    first image, of which only motions with them in front are given.
 H : array_like, shape (..., 3, 3)
     Homography of normalised coordinates, with any scale.
-image : array_like, shape (..., n, 2), optional
-    Points of the plane in the first image: only motions with them in front of it are given.
 
 Returns
 -------
@@ -42,7 +41,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core
 from ..errors import InvalidValueError, ShapeError
-from .results import Result
+from .results import Result, packed
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,13 +50,11 @@ class PlaneMotions(Result):
 
     Parameters
     ----------
-    R : ndarray, shape (..., k, 3, 3)
-        Rotations from the first camera to the second, ``X_2 = R X_1 + t``.
-    t : ndarray, shape (..., k, 3)
-        Translations divided by the distance of the plane from the first camera.
+    R, t : ndarray, shapes (..., k, 3, 3) and (..., k, 3)
+        Motions of points from the first camera to the second, ``X_2 = R X_1 + t``, translations
+        divided by the distance of the plane from the first camera.
     n : ndarray, shape (..., k, 3)
-        Unit normals of the plane in the first camera, ``n . X_1 = distance``; NaN without
-        translation, which gives one motion.
+        Unit normals of the plane in the first camera; NaN without translation, for one motion.
     """
 
     R: Array
@@ -67,20 +64,16 @@ class PlaneMotions(Result):
 
 def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
     """Homography ``x_2 ~ H x_1`` of points of a plane, by least squares of normalised points."""
-    given = as_core(image_1, (2,), "image_1"), as_core(image_2, (2,), "image_2")
-    try:
-        p, q = np.broadcast_arrays(*given)
-    except ValueError:
-        p = q = given[0][..., :0]
-    if p.ndim < 2 or p.shape[-2] < 4 or len({a.shape[-2:] for a in given}) > 1:
+    p, q = as_core(image_1, (2,), "image_1"), as_core(image_2, (2,), "image_2")
+    if p.ndim < 2 or p.shape != q.shape or p.shape[-2] < 4:
         raise ShapeError(
             "image_1, image_2: expected the same shape (..., n, 2), n from 4, got "
-            f"{given[0].shape}, {given[1].shape}."
+            f"{p.shape}, {q.shape}."
         )
     (x, N), (y, M) = _scaled(p), _scaled(q)
-    x_rows = np.stack((x, 0.0 * x, -y[..., :1] * x), axis=-2)
-    y_rows = np.stack((0.0 * x, x, -y[..., 1:2] * x), axis=-2)
-    A = np.concatenate((x_rows, y_rows), axis=-3).reshape(*x.shape[:-2], -1, 9)
+    in_x = np.concatenate((x, 0.0 * x, -y[..., :1] * x), axis=-1)
+    in_y = np.concatenate((0.0 * x, x, -y[..., 1:2] * x), axis=-1)
+    A = np.concatenate((in_x, in_y), axis=-2)
     _, sizes, Vt = np.linalg.svd(A)
     if (sizes[..., 7] <= 1e-9 * sizes[..., 0]).any():
         raise InvalidValueError(
@@ -97,48 +90,33 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
 def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneMotions:
     """Motions and planes of a homography: four in general, two with the plane in front."""
     A = as_core(H, (3, 3), "H")
-    _, sizes, Vt = np.linalg.svd(A)
+    sizes, Vt = np.linalg.svd(A)[1:]
     if not (sizes[..., 2] > 1e-12 * sizes[..., 0]).all():
         raise InvalidValueError("H: expected a regular matrix; this one has a zero singular value.")
     A = A * (np.sign(np.linalg.det(A)) / sizes[..., 1])[..., None, None]
-    a = (sizes[..., 0] / sizes[..., 1]) ** 2 - 1.0
-    c = 1.0 - (sizes[..., 2] / sizes[..., 1]) ** 2
+    squares = (sizes / sizes[..., 1:2]) ** 2
+    a, c = squares[..., 0] - 1.0, 1.0 - squares[..., 2]
     still = a + c < 1e-12  # no translation
     axial = np.minimum(a, c) <= 1e-13  # along the normal: both signs are the same motion
-    a, c = np.where(axial & (a <= c), 0.0, a), np.where(axial & (a > c), 0.0, c)
-    a, c = np.sqrt(np.array((a, c)) / np.where(still, 1.0, a + c))[..., None]
+    a, c = np.where(still | axial & (a <= c), 0.0, a), np.where(axial & (a > c), 0.0, c)
+    a, c = np.sqrt((a, np.where(still, 1.0, c)) / np.where(still, 1.0, a + c))[..., None]
     v1, v2, v3 = np.moveaxis(Vt, -2, 0)
     u = np.stack((c * v1 + a * v3, c * v1 - a * v3), axis=-2)
-    v2 = np.broadcast_to(v2[..., None, :], u.shape)
-    At = np.swapaxes(A, -1, -2)
-    n, after = np.cross(v2, u), (v2 @ At, u @ At)
-    bases = (v2, u, n), (*after, np.cross(*after))
-    before, after = (np.stack(basis, axis=-1) for basis in bases)
-    R = _rotation_of(after @ np.swapaxes(before, -1, -2))
-    R[still] = _rotation_of(A)[still][:, None]
+    v2, At = np.broadcast_to(v2[..., None, :], u.shape), np.swapaxes(A, -1, -2)
+    n = np.cross(v2, u)
+    before = np.stack((v2, u, n), axis=-2)
+    after = np.stack((v2 @ At, u @ At, np.cross(v2 @ At, u @ At)), axis=-1)
+    U, _, Wt = np.linalg.svd(after @ before)
+    R = U @ Wt
     t = np.where(still[..., None, None], 0.0, ((A[..., None, :, :] - R) @ n[..., None])[..., 0])
     n = np.where(still[..., None, None], np.nan, n)
-    R = np.repeat(R, 2, axis=-3)
     t, n = (np.stack((x, -x), axis=-2).reshape(*x.shape[:-2], 4, 3) for x in (t, n))
-    most = np.where(still, 1, np.where(axial, 2, 4))
-    valid = np.arange(4) < most[..., None]
+    valid = np.arange(4) < np.where(still, 1, np.where(axial, 2, 4))[..., None]
     if image is not None:
-        x = as_core(image, (2,), "image")
-        x = x[None] if x.ndim == 1 else x
+        x = np.atleast_2d(as_core(image, (2,), "image"))
         height = n[..., :2] @ np.swapaxes(x, -1, -2) + n[..., 2:]
         valid = valid & ((height > 0.0).all(axis=-1) | still[..., None])
-    k = int(valid.sum(axis=-1).max(initial=0))
-    order = np.argsort(~valid, axis=-1, kind="stable")[..., :k]
-    kept = np.take_along_axis(valid, order, -1)[..., None]
-    t, n = (np.where(kept, np.take_along_axis(x, order[..., None], -2), np.nan) for x in (t, n))
-    R = np.take_along_axis(R, order[..., None, None], -3)
-    return PlaneMotions(np.where(kept[..., None], R, np.nan), t, n)
-
-
-def _rotation_of(A: Array) -> Array:
-    """Nearest orthogonal matrix."""
-    U, _, Vt = np.linalg.svd(A)
-    return U @ Vt
+    return PlaneMotions(*packed(valid, np.repeat(R, 2, axis=-3), t, n)[1:])
 
 
 def _scaled(p: Array) -> tuple[Array, Array]:

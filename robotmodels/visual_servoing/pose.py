@@ -18,7 +18,7 @@ T0 : array_like, shape (4, 4)
 Returns
 -------
 PoseSolutions
-    Poses with all points in front of the camera, by growing image error.
+    Poses with all points in front of the camera.
 
 Raises
 ------
@@ -36,20 +36,14 @@ pose estimation from a planar target", IEEE Trans. PAMI 28(12), 2006; E. Marchan
 Examples
 --------
 >>> import numpy as np
->>> from robotmodels.se3 import translation
->>> corners = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
->>> image = corners[:, :2] / 0.5
->>> pnp(corners, image).T[0, :3, 3].round(9) + 0.0
-array([0. , 0. , 0.5])
->>> refine_pose(corners, image, translation(0.1, 0, 0.7)).T[0, :3, 3].round(9) + 0.0
-array([0. , 0. , 0.5])
->>> triangle = [[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]]
->>> p3p(triangle, np.array(triangle)[:, :2] / 12**0.5)
+>>> triangle = np.array([[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]])
+>>> p3p(triangle, triangle[:, :2] / 12**0.5)
 <PoseSolutions: 4 poses. Each pose found is a minimum of the image error.>
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -63,7 +57,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points, as_points, placed, sight_of
-from .results import Result
+from .results import Result, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
@@ -85,16 +79,12 @@ class PoseStatus(Outcome):
 class PoseSolutions(Result):
     """Poses of an object in the camera; rows are packed, missing ones NaN. Read-only.
 
-    As an array (``np.asarray``) it is ``T``.
-
     Parameters
     ----------
     T : ndarray, shape (..., S, 4, 4)
-        Poses ``T_camera_object``.
-    valid : ndarray of bool, shape (..., S)
-        Whether the row is a solution.
-    residual : ndarray, shape (..., S)
-        Largest distance of an image point from its measurement, normalised.
+        Poses ``T_camera_object``, by growing misfit; also ``np.asarray`` of the result.
+    valid, residual : ndarray, shape (..., S)
+        Whether the row is a solution; largest distance of an image point from its measurement.
     status : ndarray of int8, shape (...)
         Codes of `PoseStatus`.
     """
@@ -136,61 +126,66 @@ def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
             f"points: expected three points that are not on a line, row {int(flat.argmax())} are; "
             "no finite number of poses has their image."
         )
-    T, valid = _poses_of_triples(P, m)
-    return _packed(T, _residual(T, P, m), valid, None, batch)
+    T, s, off = _poses_of_triples(P, m)
+    longest = ((P[:, _I] - P[:, _J]) ** 2).sum(axis=-1).max(axis=-1, keepdims=True)
+    off = np.where((off <= _FITS * longest) & (s > 0.0).all(axis=-1), off, np.inf)
+    return _packed((P, m, batch), T, off, s, _SAME * np.sqrt(longest), off < np.inf, 4)
 
 
 def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     """Pose of three or more points of least squared image error; both minima if planar."""
-    P, images = _checked(points, image)
+    P, m, batch = _checked(points, image)
     if len(P) == 3:
-        return p3p(P, images)
-    sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
-    most = 2 if sizes[2] <= 1e-6 * sizes[0] else 1
-    m = images.reshape(-1, len(P), 2)
-    T, valid = np.full((len(m), most, 4, 4), np.nan), np.zeros((len(m), most), bool)
-    codes = np.full(len(m), PoseStatus.NONE_FOUND, np.int8)
-    for k, one in enumerate(m):
-        poses, codes[k] = _minima(P, one, most)
-        T[k, : len(poses)], valid[k, : len(poses)] = poses, True
-    return _packed(T, _residual(T, P, m), valid, codes, images.shape[:-2])
+        return p3p(P, m.reshape(*batch, 3, 2))
+    sizes, axes = np.linalg.svd(P - P.mean(axis=0))[1:]
+    planar = bool(sizes[2] <= 1e-6 * sizes[0])
+    n, draws = len(P), np.random.default_rng(0)
+    triples = np.array(list(combinations(range(min(n, 8)), 3)))
+    if n > 8:
+        triples = np.array([draws.choice(n, 3, replace=False) for _ in range(4 * _TRIPLES)])
+    triples = triples[np.argsort(-_sine(P[triples]), kind="stable")[:_TRIPLES]]
+    triples = triples[_sine(P[triples]) > _THIN]
+    three = np.tile(P[triples], (len(m), 1, 1)), m[:, triples].reshape(-1, 3, 2)
+    T = _poses_of_triples(*three)[0].reshape(len(m), 12 * len(triples), 4, 4)
+    off = np.where((placed(T, P)[..., 2] > 0.0).all(axis=-1), _residual(T, P, m), np.inf)
+    T = taken(T, np.argsort(off, axis=-1)[:, :_STARTS])
+    if planar:  # the other pose of a planar object: its normal mirrored at the line of sight
+        centre, other = placed(T, P.mean(axis=0)), T.copy()
+        sight = centre / np.linalg.norm(centre, axis=-1, keepdims=True)
+        for x in (T[..., :3, :3] @ axes[2], sight):  # half turns
+            half = 2.0 * x[..., :, None] * x[..., None, :] - np.eye(3)
+            other[..., :3, :3] = half @ other[..., :3, :3]
+        other[..., :3, 3] = centre - other[..., :3, :3] @ P.mean(axis=0)
+        T = np.concatenate((T, other), axis=1)
+    T, cost, done = _refined(P, m, T)
+    cost = np.where(done | ~done.any(axis=-1, keepdims=True), cost, np.inf)
+    same = 1e-5 * np.abs(T[:, :1, 2, 3])
+    return _packed((P, m, batch), T, cost, T.reshape(*cost.shape, 16), same, done, 1 + planar)
 
 
 def refine_pose(points: ArrayLike, image: ArrayLike, T0: ArrayLike) -> PoseSolutions:
     """Virtual visual servoing: the pose of least image error near a first one."""
-    P, images = _checked(points, image)
+    P, m, batch = _checked(points, image)
     start = as_single_pose(T0, "T0")
     Points(P).measure(start)  # raises where points are behind the camera
-    m = images.reshape(-1, len(P), 2)
-    T, _, done = _refined(P, m, np.tile(start, (len(m), 1, 1)))
-    codes = np.where(done, PoseStatus.FOUND, PoseStatus.NOT_CONVERGED)
-    T = T[:, None]
-    return _packed(T, _residual(T, P, m), np.ones((len(m), 1), bool), codes, images.shape[:-2])
+    T, cost, done = _refined(P, m, np.tile(start, (len(m), 1, 1, 1)))
+    return _packed((P, m, batch), T, cost, cost[..., None], 0.0, done, 1)
 
 
-def _poses_of_triples(P: Array, m: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Poses (N, 12, 4, 4) of three points, and which of them are distinct solutions (N, 12).
+def _poses_of_triples(P: Array, m: Array) -> tuple[Array, Array, Array]:
+    """Candidates T (N, 12, 4, 4) with distances s (N, 12, 3) and their misfits (N, 12).
 
     Shapes: P (N, 3, 3), m (N, 3, 2).
     """
     rays = np.concatenate((m, np.ones((len(m), 3, 1))), axis=-1)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    sides = ((P[:, _I] - P[:, _J]) ** 2).sum(axis=-1)
-    chords = ((rays[:, _I] - rays[:, _J]) ** 2).sum(axis=-1)
+    sides, chords = (((x[:, _I] - x[:, _J]) ** 2).sum(axis=-1) for x in (P, rays))
     s, off = _fitted(_cones(chords, sides), chords[:, None], sides[:, None])
-    order = np.argsort(off, axis=-1)  # of starts that lead to the same pose the best is kept
-    s, off = np.take_along_axis(s, order[..., None], 1), np.take_along_axis(off, order, 1)
-    longest = sides.max(axis=-1)[:, None]
-    good = (off <= _FITS * longest) & (s > 0.0).all(axis=-1)
-    near = np.abs(s[:, :, None] - s[:, None]).max(axis=-1) <= _SAME * np.sqrt(longest)[..., None]
-    good &= ~np.any(near & np.tril(good[:, None] & np.ones((12, 12), bool), -1), axis=-1)
-    good &= good.cumsum(axis=-1) <= 4
-    C = np.abs(s)[..., None] * rays[:, None]
-    T = np.zeros((*s.shape[:2], 4, 4))
+    C, T = np.abs(s)[..., None] * rays[:, None], np.zeros((*s.shape[:2], 4, 4))
     T[..., :3, :3] = R = _triad(C) @ np.swapaxes(_triad(P), -1, -2)[:, None]
     T[..., :3, 3] = C.mean(axis=-2) - np.einsum("npij,nj->npi", R, P.mean(axis=-2))
     T[..., 3, 3] = 1.0
-    return T, good
+    return T, s, off
 
 
 def _cones(chords: Array, sides: Array) -> Array:
@@ -203,18 +198,16 @@ def _cones(chords: Array, sides: Array) -> Array:
     k = chords / angle[:, None] ** 2
     M, mixed = np.zeros((len(k), 3, 3, 3)), 0.5 * angle[:, None] * k
     M[:, (0, 1, 2, 2), (0, 1, 0, 1), (0, 1, 0, 1)] = 1.0
-    M[:, (0, 1, 2, 2), (0, 1, 0, 1), 2] = M[:, (0, 1, 2, 2), 2, (0, 1, 0, 1)] = mixed[
-        :, (0, 1, 2, 2)
-    ]
+    mixed = mixed[:, (0, 1, 2, 2)]
+    M[:, (0, 1, 2, 2), (0, 1, 0, 1), 2] = M[:, (0, 1, 2, 2), 2, (0, 1, 0, 1)] = mixed
     M[:, 2, 0, 1] = M[:, 2, 1, 0] = angle * mixed[:, 2] - 1.0
     M[:, :, 2, 2] = k
     # two combinations without the sides, and the three line pairs that they contain
     a = sides / sides.max(axis=-1)[:, None]
     n = np.cross(a, (1.0, -1.0, 0.0))
     n = np.stack((n, np.cross(a, n)), axis=1)
-    A, B = np.moveaxis(
-        np.einsum("npi,nijk->npjk", n / np.linalg.norm(n, axis=-1)[..., None], M), 1, 0
-    )
+    n /= np.linalg.norm(n, axis=-1, keepdims=True)
+    A, B = np.einsum("npi,nijk->pnjk", n, M)
     adjugate = [np.cross(D[:, (1, 2, 0)], D[:, (2, 0, 1)]) for D in (A, B)]
     cubic = [(x * y).sum(axis=(-2, -1)) for x in adjugate for y in (A, B)]
     companion = np.zeros(A.shape)
@@ -278,10 +271,8 @@ def _triad(P: Array) -> Array:
 def _sine(P: Array) -> Array:
     """Double area by the square of the longest side. Shapes: (..., 3, 3) -> (...)."""
     longest = ((P[..., _I, :] - P[..., _J, :]) ** 2).sum(axis=-1).max(axis=-1)
-    area = np.linalg.norm(
-        np.cross(P[..., 1, :] - P[..., 0, :], P[..., 2, :] - P[..., 0, :]), axis=-1
-    )
-    return area / np.where(longest > 0.0, longest, 1.0)
+    a, b = P[..., 1, :] - P[..., 0, :], P[..., 2, :] - P[..., 0, :]
+    return np.linalg.norm(np.cross(a, b), axis=-1) / np.where(longest > 0.0, longest, 1.0)
 
 
 def _residual(T: Array, P: Array, m: Array) -> Array:
@@ -292,61 +283,29 @@ def _residual(T: Array, P: Array, m: Array) -> Array:
         return np.linalg.norm(X[..., :2] / X[..., 2:] - m[:, None], axis=-1).max(axis=-1)
 
 
-def _minima(P: Array, m: Array, most: int) -> tuple[Array, PoseStatus]:
-    """Poses of least image error and the status. Shapes: P (n, 3), m (n, 2) -> (most, 4, 4)."""
-    n, draws = len(P), np.random.default_rng(0)
-    triples = np.array(list(combinations(range(min(n, 8)), 3)))
-    if n > 8:
-        triples = np.array([draws.choice(n, 3, replace=False) for _ in range(4 * _TRIPLES)])
-    triples = triples[np.argsort(-_sine(P[triples]), kind="stable")[:_TRIPLES]]
-    triples = triples[_sine(P[triples]) > _THIN]
-    T = _poses_of_triples(P[triples], m[triples])[0].reshape(-1, 4, 4)
-    T = T[(placed(T, P)[..., 2] > 0.0).all(axis=-1)]
-    T = T[np.argsort(_residual(T[None], P, m[None])[0])[:_STARTS]]
-    if most > 1:  # the other pose of a planar object: its normal mirrored at the line of sight
-        centre = placed(T, P.mean(axis=0))
-        normal = T[:, :3, :3] @ np.linalg.svd(P - P.mean(axis=0))[2][2]
-        sight = centre / np.linalg.norm(centre, axis=-1, keepdims=True)
-        half, turn = (2.0 * x[:, :, None] * x[:, None] - np.eye(3) for x in (normal, sight))
-        other = T.copy()
-        other[:, :3, :3] = turn @ half @ T[:, :3, :3]
-        other[:, :3, 3] = centre - other[:, :3, :3] @ P.mean(axis=0)
-        T = np.concatenate((T, other))
-    T, cost, done = _refined(P, np.tile(m, (len(T), 1, 1)), T)
-    order = [k for k in np.lexsort((cost, ~done)) if np.isfinite(cost[k])]
-    kept = order[:1]
-    for k in order[1:]:
-        apart = np.abs(T[k] - T[kept]).max(axis=(1, 2)) > 1e-5 * T[kept, 2, 3]
-        if done[k] and len(kept) < most and apart.all():
-            kept.append(k)
-    if not kept:
-        return T[:0], PoseStatus.NONE_FOUND
-    code = PoseStatus.TWO_MINIMA if len(kept) == 2 else PoseStatus.FOUND
-    return T[kept], code if done[kept[0]] else PoseStatus.NOT_CONVERGED
-
-
 def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Levenberg-Marquardt on the image error: poses, squared errors, whether they converged.
 
-    Shapes: m (N, n, 2), T (N, 4, 4) -> (N, 4, 4), (N,), (N,).
+    Shapes: m (N, n, 2), T (N, S, 4, 4) -> (N, S, 4, 4), (N, S), (N, S).
     """
-    feature, m = Points(P), m.reshape(len(T), -1)
-    damping, done, sight = np.full(len(T), 1e-6), np.zeros(len(T), bool), sight_of(feature, T)
+    feature, m = Points(P), m.reshape(len(m), 1, 2 * len(P))
+    damping, done = np.full(T.shape[:2], 1e-6), np.zeros(T.shape[:2], bool)
+    sight = sight_of(feature, T)
     cost = np.where(sight.exists, ((sight.s - m) ** 2).sum(axis=-1), np.inf)
     for _ in range(_ITERATIONS):
         A = feature._rows(sight.s, sight.depth)
-        H, g = np.swapaxes(A, -1, -2) @ A, ((sight.s - m)[:, None] @ A)[:, 0]
-        H = H * (1.0 + damping[:, None, None] * np.eye(6))
-        step = -np.linalg.solve(H, g[..., None])[..., 0]
-        turn, after = Rotation.from_rotvec(-step[:, 3:]).as_matrix(), T.copy()
-        after[:, :3] = turn @ T[:, :3]
-        after[:, :3, 3] -= step[:, :3]
+        H = np.swapaxes(A, -1, -2) @ A * (1.0 + damping[..., None, None] * np.eye(6))
+        step = np.linalg.solve(H, np.swapaxes(A, -1, -2) @ (sight.s - m)[..., None])[..., 0]
+        after = T.copy()
+        turn = Rotation.from_rotvec(step[..., 3:].reshape(-1, 3)).as_matrix()
+        after[..., :3, :] = turn.reshape(*step.shape[:-1], 3, 3) @ T[..., :3, :]
+        after[..., :3, 3] += step[..., :3]
         other = sight_of(feature, after)
         cost_after = np.where(other.exists, ((other.s - m) ** 2).sum(axis=-1), np.inf)
-        reach = np.maximum(1.0, np.abs(T[:, :3, 3]).max(axis=-1))
+        reach = np.maximum(1.0, np.abs(T[..., :3, 3]).max(axis=-1))
         small = np.abs(step).max(axis=-1) <= 1e-11 * reach
         better = ((cost_after <= (1.0 + 1e-13) * cost) | small & other.exists) & ~done
-        T = np.where(better[:, None, None], after, T)
+        T = np.where(better[..., None, None], after, T)
         cost, done = np.where(better, cost_after, cost), done | small
         damping = np.clip(np.where(better, 0.1, 10.0) * damping, 1e-12, 1e12)
         if done.all():
@@ -355,7 +314,8 @@ def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.boo
     return T, cost, done
 
 
-def _checked(points: Any, image: Any) -> tuple[Array, Array]:
+def _checked(points: Any, image: Any) -> tuple[Array, Array, tuple[int, ...]]:
+    """Points (n, 3), images (N, n, 2) and the shape of their batch."""
     P = as_points(points, "points", 3)
     m = as_core(image, (len(P), 2), "image")
     sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
@@ -363,21 +323,27 @@ def _checked(points: Any, image: Any) -> tuple[Array, Array]:
         raise InvalidValueError("points: expected points that are not all on one line.")
     if (np.ptp(m, axis=-2) <= _THIN * np.abs(m).max(axis=-2)).all(axis=-1).any():
         raise InvalidValueError("image: expected image points that do not all coincide.")
-    return P, m
+    batch = m.shape[:-2]
+    return P, m.reshape(math.prod(batch), *m.shape[-2:]), batch
 
 
-def _packed(T: Array, residual: Array, valid: Array, codes: Any, batch: tuple[int, ...]) -> Any:
-    """Solutions first, the others NaN. Shapes: T (N, S, 4, 4), residual and valid (N, S)."""
-    S = int(valid.sum(axis=-1).max(initial=0))
-    order = np.argsort(~valid, axis=-1, kind="stable")[:, :S]
-    valid = np.take_along_axis(valid, order, 1)
-    T = np.where(valid[..., None, None], np.take_along_axis(T, order[..., None, None], 1), np.nan)
-    residual = np.where(valid, np.take_along_axis(residual, order, 1), np.nan)
-    if codes is None:
-        codes = np.where(valid.any(axis=-1), PoseStatus.FOUND, PoseStatus.NONE_FOUND)
-    return PoseSolutions(
-        T.reshape(*batch, S, 4, 4),
-        valid.reshape(*batch, S),
-        residual.reshape(*batch, S),
-        codes.astype(np.int8).reshape(batch),
-    )
+def _packed(
+    given: tuple[Array, Array, tuple[int, ...]], T: Array, off: Array, x: Array, same: Any,
+    done: Array, most: int,
+) -> PoseSolutions:  # fmt: skip
+    """Solutions by growing misfits, without those whose x differ by up to ``same``.
+
+    Shapes: T (N, S, 4, 4), off and done (N, S), infinite for none, x (N, S, k), same (N, 1).
+    """
+    P, m, batch = given
+    order = np.argsort(off, axis=-1)
+    T, valid, x, done = (taken(a, order) for a in (T, np.isfinite(off), x, done))
+    near = np.abs(x[:, :, None] - x[:, None]).max(axis=-1) <= np.reshape(same, (-1, 1, 1))
+    valid &= ~np.tril(near & valid[:, None], -1).any(axis=-1)
+    valid &= valid.cumsum(axis=-1) <= most
+    codes = np.where(valid.any(axis=-1), PoseStatus.FOUND, PoseStatus.NONE_FOUND)
+    codes[(valid.sum(axis=-1) == 2) & (most == 2)] = PoseStatus.TWO_MINIMA
+    codes[(valid & ~done).any(axis=-1)] = PoseStatus.NOT_CONVERGED
+    valid, T = packed(valid, T)
+    found = (x.reshape(*batch, *x.shape[1:]) for x in (T, valid, _residual(T, P, m)))
+    return PoseSolutions(*found, codes.astype(np.int8).reshape(batch))

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _arrays
+from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 
@@ -41,7 +42,7 @@ class Result(_arrays.Frozen):
 
     def _key(self) -> tuple[Any, ...]:
         return tuple(
-            (e.shape, e.tolist() if e.dtype.kind == "U" else (e + 0.0).tobytes())
+            (e.shape, (e + 0.0 if e.dtype.kind == "f" else e).tobytes())
             if isinstance(e, np.ndarray)
             else e
             for e in (getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
@@ -51,7 +52,7 @@ class Result(_arrays.Frozen):
         return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
 
     def __hash__(self) -> int:
-        return hash(str(self._key()))
+        return hash(self._key())
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
@@ -62,3 +63,21 @@ class Result(_arrays.Frozen):
             raise InvalidValueError(
                 f"i: expected the index of one row of {codes.shape}, got {i!r}."
             ) from None
+
+
+def taken(x: Array, order: Any) -> Array:
+    """Rows of solutions in an order. Shapes: x (..., S, *core), order (..., s)."""
+    core = (1,) * (x.ndim - order.ndim)
+    return np.take_along_axis(x, order.reshape(*order.shape, *core), order.ndim - 1)
+
+
+def packed(valid: Any, *solutions: Array) -> list[Any]:
+    """Flags and solutions with the valid rows first and NaN in the others, as few as possible."""
+    order = np.argsort(~valid, axis=-1, kind="stable")
+    order = order[..., : int(valid.sum(axis=-1).max(initial=0))]
+    kept = taken(valid, order)
+    core = [(1,) * (x.ndim - kept.ndim) for x in solutions]
+    return [kept] + [
+        np.where(kept.reshape(*kept.shape, *k), taken(x, order), np.nan)
+        for x, k in zip(solutions, core, strict=True)
+    ]

@@ -59,7 +59,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .camera import Camera
 from .features import Feature, as_sensed, sight_of
-from .results import Result
+from .results import Result, packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -279,11 +279,10 @@ def virtual_link(f: Feature, T: ArrayLike) -> VirtualLink:
         raise InvalidValueError(f"f: expected a feature, got {type(f).__name__}.")
     _, sizes, Vt = np.linalg.svd(f.interaction(T))
     rank = (sizes > RANK_TOLERANCE * sizes[..., :1]).sum(axis=-1)
-    free = np.arange(6) < 6 - rank[..., None]  # the last rows, which come first now
-    kernel = np.where(free[..., None], Vt[..., ::-1, :], 0.0)
-    motions = 6 - rank
-    shifts = motions - np.linalg.matrix_rank(kernel[..., 3:], tol=1e-6)
-    kernel = np.where(free[..., None], kernel, np.nan)[..., : motions.max(initial=0), :]
+    free, motions = np.arange(6) >= rank[..., None], 6 - rank
+    turns = np.where(free[..., None], Vt[..., 3:], 0.0)
+    shifts = motions - np.linalg.matrix_rank(turns, tol=1e-6)
+    kernel = packed(free, Vt)[1]
     names = [_LINKS.get(pair, "") for pair in zip(motions.flat, shifts.flat, strict=True)]
     if not motions.ndim:
         return VirtualLink(int(motions), int(rank), kernel, names[0])
