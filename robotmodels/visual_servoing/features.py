@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact, as_floats, as_number, read_only
+from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from ..se3 import as_pose, as_single_pose
+from ..se3 import as_pose
 from .camera import Camera
 from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
-from .results import Value
+from .results import THIN, Value
 
-THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _TURN = 2.0 * np.pi
 
 
@@ -69,12 +68,6 @@ class Feature(Value):
     _period: ClassVar[tuple[float, ...]]  # of the components of one element, 0 for none
     _see: ClassVar[Callable[..., Sight]]  # sight at poses T, NaN where it does not exist
     _matrix: ClassVar[Callable[..., Array]]  # interaction matrix of one element
-
-    def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            value = _CHECKS[f.name](getattr(self, f.name), f.name)
-            value = read_only(value) if isinstance(value, np.ndarray) else value
-            object.__setattr__(self, f.name, value)
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
@@ -339,46 +332,3 @@ def _is_exact(T: Array) -> bool:
         *(b * f - c * e - g, c * d - a * f - h, a * e - b * d - i),
     )
     return max(off) < 1e-12 and min(off) > -1e-12 and last == [0.0, 0.0, 0.0, 1.0]
-
-
-def as_points(value: Any, name: str, least: int = 1) -> Array:
-    """Points of an object. Shapes: -> (k, 3)."""
-    points = as_core(value, (3,), name)
-    points = points[None] if points.ndim == 1 else points
-    if points.ndim != 2 or len(points) < least:
-        raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
-    return points
-
-
-def _pairs(value: Any, name: str) -> Array:
-    """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
-    pairs = as_core(value, (2, 3), name)
-    pairs = pairs[None] if pairs.ndim == 2 else pairs
-    if pairs.ndim != 3 or not len(pairs):
-        raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
-    if not (norm(pairs[:, 1] - pairs[:, 0]) > THIN * np.abs(pairs).max()).all():
-        raise InvalidValueError(f"{name}: expected two different points on each line or segment.")
-    return pairs
-
-
-def _unit(value: Any, name: str) -> Array:
-    """A direction as a unit vector."""
-    array = as_exact(value, (3,), name)
-    length = float(np.linalg.norm(array))
-    if not length > 0.0:
-        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
-    # unit vectors stay as they are, so that copies are equal
-    return array if abs(length - 1.0) < 4e-16 else array / length
-
-
-_CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "object_points": as_points,
-    "points": _pairs,
-    "normal": _unit,
-    "axis": _unit,
-    "centre": lambda value, name: as_exact(value, (3,), name),
-    "point": lambda value, name: as_exact(value, (3,), name),
-    "radius": lambda value, name: as_number(value, name, above=0.0),
-    "distance": as_number,
-    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
-}

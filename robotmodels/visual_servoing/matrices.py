@@ -21,15 +21,12 @@ theta_u : array_like, shape (..., 3)
     Rotation vector of the current camera in the axes of the desired one, rad.
 point, normal : array_like, shape (..., 3)
     Point and unit normal in the camera, m.
-moments : array_like, shape (..., K, K)
-    Raw moments of a region, [p, q] the integral of ``x^p y^q``; used up to order i + j + 1.
-i, j : int
-    Order of the moment, K at least i + j + 2.
+moments, i, j : array_like, shape (..., K, K), and int
+    Raw moments of a region, [p, q] the integral of ``x^p y^q``; order, K at least i + j + 2.
 dS, dX : array_like, shapes (N, k) and (N, 6)
-    Changes of a measurement, and the small displacements [v; w] of the camera in its own axes that
-    caused them, m and rad.
+    Changes of a measurement, and the small displacements [v; w] of the camera that caused them.
 L, ds, dx : array_like, shapes (k, 6), (k,) and (6,)
-    Estimate so far; the last change and its displacement, which leaves L as it is where it is zero.
+    Estimate so far; the last change and its displacement.
 factor : float
     Part of the correction, in (0, 1].
 

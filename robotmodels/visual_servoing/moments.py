@@ -10,8 +10,9 @@ import numpy as np
 
 from .._arrays import Array, read_only
 from ..errors import InvalidValueError
-from .features import THIN, Feature, Sight, as_points, inner, norm, placed
+from .features import Feature, Sight, inner, norm, placed
 from .matrices import point_rows
+from .results import THIN, as_points
 
 _COMPONENTS = (
     *("area", "x", "y", "n20", "n02", "n11"),

@@ -56,8 +56,8 @@ from .._arrays import Array, as_core
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
-from .features import Points, as_points, placed, sight_of
-from .results import Result, packed, taken
+from .features import Points, placed, sight_of
+from .results import Result, as_points, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides

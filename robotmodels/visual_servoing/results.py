@@ -1,7 +1,8 @@
-"""Bases of descriptions and results: equal by value, printed in one line."""
+"""Bases of descriptions and results: checked, equal by value, printed in one line."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from operator import index
 from typing import Any, ClassVar
@@ -9,9 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _arrays
-from .._arrays import Array
+from .._arrays import Array, as_core, as_exact, as_number, read_only
 from .._outcomes import Outcome
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
+from ..se3 import as_single_pose
+
+THIN = 1e-9  # relative: lengths, areas and angles below are zero
 
 
 def brief(value: Any) -> str:
@@ -27,10 +31,16 @@ def brief(value: Any) -> str:
 
 
 class Value(_arrays.Value):
-    """Base of descriptions."""
+    """Base of descriptions, whose fields are checked by their names."""
 
     __slots__ = ()
     __repr__ = brief
+
+    def __post_init__(self) -> None:
+        for f in fields(self):  # type: ignore[arg-type]
+            value = _CHECKS[f.name](getattr(self, f.name), f.name)
+            value = read_only(value) if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, f.name, value)
 
 
 class Result(_arrays.Frozen):
@@ -81,3 +91,56 @@ def packed(valid: Any, *solutions: Array) -> list[Any]:
         np.where(kept.reshape(*kept.shape, *k), taken(x, order), np.nan)
         for x, k in zip(solutions, core, strict=True)
     ]
+
+
+def as_points(value: Any, name: str, least: int = 1) -> Array:
+    """Points of an object. Shapes: -> (k, 3)."""
+    points = as_core(value, (3,), name)
+    points = points[None] if points.ndim == 1 else points
+    if points.ndim != 2 or len(points) < least:
+        raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
+    return points
+
+
+def _pairs(value: Any, name: str) -> Array:
+    """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
+    pairs = as_core(value, (2, 3), name)
+    pairs = pairs[None] if pairs.ndim == 2 else pairs
+    if pairs.ndim != 3 or not len(pairs):
+        raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
+    if not (np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1) > THIN * np.abs(pairs).max()).all():
+        raise InvalidValueError(f"{name}: expected two different points on each line or segment.")
+    return pairs
+
+
+def _unit(value: Any, name: str) -> Array:
+    """A direction as a unit vector."""
+    array = as_exact(value, (3,), name)
+    length = float(np.linalg.norm(array))
+    if not length > 0.0:
+        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
+    # unit vectors stay as they are, so that copies are equal
+    return array if abs(length - 1.0) < 4e-16 else array / length
+
+
+def _flag(value: Any, name: str) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.40}.")
+    return bool(value)
+
+
+def _vector(value: Any, name: str) -> Array:
+    return as_exact(value, (3,), name)
+
+
+def _positive(value: Any, name: str) -> float:
+    return as_number(value, name, above=0.0)
+
+
+_CHECKS: dict[str, Callable[[Any, str], Any]] = {
+    "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
+    "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
+    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
+    "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
+    "kalman": _flag, "process": _positive, "noise": _positive,
+}  # fmt: skip

@@ -11,16 +11,12 @@ T0 : array_like, shape (4, 4)
     Pose of the object in the camera at the start.
 camera : Camera, optional
     Whose image has to contain the object.
-robot : RobotModel, optional
-    Carries the camera or the object; n joints.
-q0 : array_like, shape (n,), optional
-    Its joint variables at the start, rad or m.
+robot, q0 : RobotModel, and array_like of shape (n,), optional
+    The robot that carries the camera or the object; its joint variables at the start, rad or m.
 mounting : EyeInHand or EyeToHand, optional
     Default ``EyeInHand()``.
-duration, step : float
-    Seconds.
-noise : float
-    Standard deviation of every component of the measurement, in its unit.
+duration, step, noise : float
+    Seconds; standard deviation of every component of the measurement, in its unit.
 rng : Generator or int, optional
     Source of the noise, default 0.
 target : array_like, shape (6,), or function of t -> (6,), optional
@@ -60,13 +56,13 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_exact, as_number, read_only
+from .._arrays import Array, as_exact, as_number
 from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
@@ -83,26 +79,15 @@ from .velocity import ServoStatus, check_kinds, law, moved, rate_matrix
 _MOST = 1_000_000  # steps of a simulation
 
 
-class _Mounting(Value):
-    """Base of the places of a camera."""
-
-    __slots__ = ()
-
-    def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            T = as_single_pose(getattr(self, f.name), f.name)
-            object.__setattr__(self, f.name, read_only(T))
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeInHand(_Mounting):
+class EyeInHand(Value):
     """A camera on the tool of a robot (section 6.2.2)."""
 
     T_tool_camera: Array = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeToHand(_Mounting):
+class EyeToHand(Value):
     """A camera fixed in the world that sees the object on the tool (section 6.2.3)."""
 
     T_world_camera: Array = None  # type: ignore[assignment]
@@ -114,24 +99,19 @@ class ServoMotion(Result):
 
     Parameters
     ----------
-    task : Task or Hybrid
-        What was regulated.
+    task, camera : Task or Hybrid, Camera or None
+        Of the call.
     t : ndarray, shape (N,)
         Times, s; they end early where the object is behind the camera or out of sight.
-    T : ndarray, shape (N, 4, 4)
-        Poses of the object in the camera.
-    cameras : ndarray, shape (N, 4, 4)
-        Poses of the camera in the world; without a robot, in the object at the start.
+    T, cameras : ndarray, shape (N, 4, 4)
+        Poses of the object in the camera; of the camera in the world, which without a robot is the
+        object at the start.
     q : ndarray, shape (N, n), or None
         Joint variables, rad or m.
-    s, error : ndarray, shape (N, k)
-        Measurements, and ``s - s*``.
-    velocity : ndarray, shape (N, 6)
-        Twists [v; w] of the camera in its own axes that the law asks for.
+    s, error, velocity : ndarray, shapes (N, k), (N, k) and (N, 6)
+        Measurements; ``s - s*``; twists [v; w] of the camera that the law asks for.
     codes : ndarray of int8, shape (N,)
         `ServoStatus` of every sample.
-    camera : Camera or None
-        The camera of the call.
     """
 
     task: Task | Hybrid

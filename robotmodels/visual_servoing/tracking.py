@@ -60,12 +60,6 @@ class TargetMotion(Value):
     process: float = 1.0
     noise: float = 1e-4
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.kalman, bool | np.bool_):
-            raise InvalidValueError(f"kalman: expected True or False, got {self.kalman!r:.40}.")
-        for name in ("process", "noise"):
-            object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
-
     def start(self, s: ArrayLike) -> TargetEstimate:
         """Estimate before any motion was seen, of a measurement s (k,)."""
         s = as_floats(s, "s")

@@ -8,10 +8,8 @@ measurement : array_like, shape (..., k) or (..., 4, 4)
     Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
 camera : Camera, optional
     Whose image has to contain the object.
-f : Points, Lines, Segments, Circle, ...
-    Feature that is kept by a virtual link.
-T : array_like, shape (..., 4, 4)
-    Poses of the object in the camera.
+f, T : Points, Lines, ..., and array_like of shape (..., 4, 4)
+    Feature that is kept by a virtual link, and poses of its object in the camera.
 
 Returns
 -------
@@ -36,11 +34,8 @@ Examples
 >>> goal = translation(0, 0, 0.5)
 >>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
 array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
->>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
-<ServoStatus.SINGULAR: 2>
->>> link = virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1))
->>> link.link_class, link.rank, link.name
-(3, 3, 'ball joint')
+>>> virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1)).name
+'ball joint'
 """
 
 from __future__ import annotations
@@ -77,21 +72,11 @@ class ServoStatus(Outcome):
     """
 
     CONVERGES = 0, "The law gives a velocity, or the error is zero."
-    AT_MINIMUM = (
-        1,
-        "The error is not zero, yet no velocity of this law reduces it: a local minimum.",
-    )
+    AT_MINIMUM = 1, "The error is not zero, yet no velocity of the law reduces it: a local minimum."
     SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
-    BEHIND = (
-        4,
-        "A part of the object is not in front of the plane of the camera, or is seen edge-on.",
-    )
-    LIMITED = (
-        5,
-        "The robot cannot give the camera the velocity of the law: its joints are at their limits, "
-        "its posture is singular, or it has too few joints.",
-    )
+    BEHIND = 4, "A part of the object is not in front of the camera, or is seen edge-on."
+    LIMITED = 5, "The robot cannot follow: limits of joints, a singular posture, too few joints."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -100,15 +85,11 @@ class ServoStep(Result):
 
     Parameters
     ----------
-    v : ndarray, shape (..., 6)
-        Twist [v; w] of the camera in its own axes, m/s and rad/s; zero for an object that is
-        behind the camera or out of sight.
-    error : ndarray, shape (..., k)
-        ``s - s*``; NaN for an object behind the camera.
-    rank : int or ndarray, shape (...)
-        Rank of the matrix of the law.
-    status : ServoStatus, or ndarray of int8, shape (...)
-        What the velocity achieves.
+    v, error : ndarray, shapes (..., 6) and (..., k)
+        Twist [v; w] of the camera in its own axes, m/s and rad/s, zero for an object that is
+        behind the camera or out of sight; ``s - s*``, NaN behind the camera.
+    rank, status : int and ServoStatus, or ndarrays of int8, shape (...)
+        Rank of the matrix of the law; what the velocity achieves.
     """
 
     v: Array
@@ -257,10 +238,8 @@ class VirtualLink(Result):
 
     Parameters
     ----------
-    link_class : int, or ndarray, shape (...)
-        Dimension of the motions, 6 - rank.
-    rank : int, or ndarray, shape (...)
-        Rank of the interaction matrix.
+    link_class, rank : int, or ndarray, shape (...)
+        Dimension of the motions, 6 - rank; rank of the interaction matrix.
     kernel_twists : ndarray, shape (..., class, 6)
         Orthonormal twists [v; w] of the camera in its own axes; missing rows of a batch are NaN.
     name : str, or ndarray, shape (...)
