@@ -96,7 +96,7 @@ def interaction_line(rho: ArrayLike, theta: ArrayLike, plane: ArrayLike) -> Arra
     still, square = np.zeros_like(rho), 1.0 + rho**2
     first = shift * cos, shift * sin, -shift * rho, square * sin, -square * cos, still
     second = turn * cos, turn * sin, -turn * rho, -rho * cos, -rho * sin, still - 1.0
-    return np.stack((np.stack(first, axis=-1), np.stack(second, axis=-1)), axis=-2)
+    return np.moveaxis(np.array((first, second)), (0, 1), (-2, -1))
 
 
 def interaction_segment(
@@ -146,14 +146,10 @@ def interaction_ellipse(
 def interaction_moment(moments: ArrayLike, i: int, j: int, plane: ArrayLike) -> Array:
     """Interaction matrix (..., 1, 6) of the raw moment m_ij of a region."""
     m = as_floats(moments, "moments")
-    for name, value in (("i", i), ("j", j)):
-        if not isinstance(value, int | np.integer):
-            raise InvalidValueError(f"{name}: expected an integer from 0, got {value!r:.40}.")
-    if min(i, j) < 0 or m.ndim < 2 or min(m.shape[-2:]) < i + j + 2:
-        raise ShapeError(
-            f"moments: expected shape (..., K, K) with K from i + j + 2 = {i + j + 2} and i, j not "
-            f"negative, got {m.shape}."
-        )
+    if not all(isinstance(k, int | np.integer) and k >= 0 for k in (i, j)):
+        raise InvalidValueError(f"i, j: expected integers from 0, got {i!r:.40} and {j!r:.40}.")
+    if m.ndim < 2 or min(m.shape[-2:]) < i + j + 2:
+        raise ShapeError(f"moments: expected (..., K, K), K from {i + j + 2}, got {m.shape}.")
     _, a, b, c = _together(moments=m[..., 0, 0], **_inverse_depth(plane))
     here, right, up = m[..., i, j], m[..., i + 1, j], m[..., i, j + 1]
     left, down = m[..., i - 1, j], m[..., i, j - 1]  # without effect where i or j is 0
@@ -231,12 +227,8 @@ def broyden(L: ArrayLike, ds: ArrayLike, dx: ArrayLike, factor: float = 1.0) -> 
     part = as_number(factor, "factor", above=0.0)
     if part > 1.0:
         raise InvalidValueError(f"factor: expected a number in (0, 1], got {factor}.")
-    size = float(np.abs(x).max())
-    if size == 0.0:
-        return A.copy()
-    unit = x / size
-    with np.errstate(over="ignore"):
-        B = A + part * np.outer((s - A @ x) / size, unit / (unit @ unit))
+    with np.errstate(all="ignore"):
+        B = A + part * np.outer(s - A @ x, np.linalg.pinv(x[:, None]))
     if not np.isfinite(B).all():
         raise InvalidValueError(f"dx: expected a displacement that can cause ds, got {dx!r:.60}.")
     return B

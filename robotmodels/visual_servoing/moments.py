@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, read_only
+from .._arrays import Array
 from ..errors import InvalidValueError
 from .features import Feature, Sight, inner, norm, placed
 from .matrices import point_rows
@@ -90,8 +90,8 @@ class Moments(Feature):
             _check_polygon(corners)
         elif not np.ptp(corners, axis=0).any():
             raise InvalidValueError("points: expected points that do not all coincide.")
-        object.__setattr__(self, name, read_only(corners))
-        object.__setattr__(self, "components", words)
+        self._set(name, corners)
+        self._set("components", words)
 
     @property
     def _corners(self) -> Any:

@@ -37,10 +37,15 @@ class Value(_arrays.Value):
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            value = _CHECKS[f.name](getattr(self, f.name), f.name)
-            value = read_only(value) if isinstance(value, np.ndarray) else value
-            object.__setattr__(self, f.name, value)
+        self._check(*(f.name for f in fields(self)))  # type: ignore[arg-type]
+
+    def _check(self, *names: str) -> None:
+        for name in names:
+            self._set(name, _CHECKS[name](getattr(self, name), name))
+
+    def _set(self, name: str, value: Any) -> None:
+        value = read_only(value) if isinstance(value, np.ndarray) else value
+        object.__setattr__(self, name, value)
 
 
 class Result(_arrays.Frozen):
@@ -137,10 +142,25 @@ def _positive(value: Any, name: str) -> float:
     return as_number(value, name, above=0.0)
 
 
+def _interaction(value: Any, name: str) -> str:
+    if isinstance(value, str) and value in ("current", "desired", "mean"):
+        return value
+    raise InvalidValueError(f"{name}: expected current, desired or mean, got {value!r:.40}.")
+
+
+def _depth(value: Any, name: str) -> str | float:
+    if not isinstance(value, str):
+        return as_number(value, name, above=0.0)
+    if value in ("true", "desired"):
+        return value
+    raise InvalidValueError(f'{name}: expected "true", "desired" or metres, got {value!r:.40}.')
+
+
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
     "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
     "desired": lambda value, name: None if value is None else as_single_pose(value, name),
     "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
+    "gain": _positive, "weight": as_number, "interaction": _interaction, "depth": _depth,
     "kalman": _flag, "process": _positive, "noise": _positive,
 }  # fmt: skip

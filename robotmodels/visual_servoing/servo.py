@@ -172,26 +172,26 @@ def servo(
         raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
     arm = None if robot is None else _Arm(robot, q0, mounting, h, limits)
     place = np.eye(4) if arm is None else arm.object_at(T)  # of the object in the world
+    shift = np.eye(4)  # of the object in a step
     source = generator_of(rng)
     feature, sampled = primary.feature, arm is not None or sigma > 0.0 or tracking is not None
     estimate, own = None, np.zeros(feature.size)
     rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
-        s = None
-        if sigma and (sight := sight_of(feature, T)).exists:
-            s = sight.s + sigma * source.normal(size=own.size)
-        v, error, _, code, pseudo = law(task, s, T, camera)
+        sight = sight_of(feature, T)
+        s = sight.s + sigma * source.normal(size=own.size) if sigma else None
+        v, error, _, code, pseudo = law(task, s, T, camera, sight)
         s, lost = error + primary.s_desired, code >= ServoStatus.OUT_OF_SIGHT
         if tracking is not None and not lost:
             estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
-            own = primary.matrix(s, sight_of(feature, T)) @ v
+            own = primary.matrix(s, sight) @ v
         rows.append([k * h, T, place, None if arm is None else arm.q, s, error, v, code])
         if lost:
             break
         given: Any = target(k * h) if callable(target) else target
-        twist = np.zeros(6) if given is None else as_exact(given, (6,), "target")
-        shift = moved(np.eye(4), -h * twist)
+        if given is not None:
+            shift = moved(np.eye(4), -h * as_exact(given, (6,), "target"))
         if arm is None:
             T = (moved(T, h * v) if sampled else _continued(task, T, v, h)) @ shift
             place = place @ shift

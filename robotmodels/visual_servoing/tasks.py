@@ -16,13 +16,9 @@ depth : {"true", "desired"} or float
     to the image at this depth, m; of a sphere the depth of its centre.
 points : array_like, shape (k, 3) or (3,)
     Points of the object, m; the first is the reference point.
-primary : Task
-    The task that is kept.
-secondary : Task, array_like of shape (6,), or function of the pose (4, 4) -> (6,)
-    Another task, a constant twist of the camera in its own axes, or a function of the pose of the
-    object in the camera, such as minus the gradient of a cost.
-weight : float
-    Of the secondary motion.
+primary, secondary, weight : Task; Task, array_like (6,) or function (4, 4) -> (6,); float
+    The task that is kept; another task, a constant twist of the camera in its own axes, or a
+    function of the pose of the object, such as minus the gradient of a cost; and its weight.
 
 Returns
 -------
@@ -50,27 +46,23 @@ Examples
 >>> along = Hybrid(line, [0.1, 0, 0, 0, 0, 0])
 >>> camera_velocity(along, translation(0, 0, 0.5)).v.round(6) + 0.0
 array([0.1, 0. , 0. , 0. , 0. , 0. ])
->>> task_2_1_2d([0.1, 0.0, 0.0], translation(0, 0, 0.5)).s_desired[:2]
-array([0.2, 0. ])
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact, as_number, read_only
-from ..errors import InvalidValueError
+from .._arrays import Array, as_core, as_exact
+from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Feature, Sight, as_sensed
 from .features_3d import PointAndRotation, PoseError
 from .results import Value
-
-_MATRICES = ("current", "desired", "mean")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -89,6 +81,7 @@ class Task(Value):
     _w: Any = field(init=False)
 
     def __post_init__(self) -> None:
+        self._check("gain", "interaction", "depth")
         feature: Any = self.feature
         if not isinstance(feature, Feature):
             raise InvalidValueError(
@@ -100,43 +93,32 @@ class Task(Value):
                 f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} "
                 f"or a pose (4, 4), got {type(self.desired).__name__}; give its measure(T)."
             )
-        given, is_pose = as_sensed(self.desired, feature, "desired")
-        T = as_single_pose(given, "desired") if is_pose else None
-        if T is not None and isinstance(feature, PoseError):
-            feature = PoseError(T)
-        elif T is not None and isinstance(feature, PointAndRotation):
-            feature = PointAndRotation(feature.point, T)
-        s = as_exact(given, (feature.size,), "desired") if T is None else feature.measure(T)
-        if not isinstance(self.interaction, str) or self.interaction not in _MATRICES:
-            words = ", ".join(_MATRICES)
-            raise InvalidValueError(
-                f"interaction: expected one of {words}, got {self.interaction!r:.40}."
-            )
-        depth, w, L = self.depth, None, None
-        if not isinstance(depth, str):
-            depth = as_number(depth, "depth", above=0.0)
-            w = feature._parallel(depth)
-        elif depth not in ("true", "desired"):
-            raise InvalidValueError(
-                f'depth: expected "true", "desired" or metres above 0, got {depth!r:.40}.'
-            )
-        needs_pose = depth == "desired" or (self.interaction != "current" and w is None)
+        s, is_pose = as_sensed(self.desired, feature, "desired")
+        T, w, L = None, None, None
+        if is_pose:
+            T = as_single_pose(s, "desired")
+            if isinstance(feature, PoseError | PointAndRotation):
+                feature = replace(feature, desired=T)
+            s = feature.measure(T)
+        elif s.ndim > 1:
+            raise ShapeError(f"desired: expected one measurement, got shape {s.shape}.")
+        if not isinstance(self.depth, str):
+            w = feature._parallel(self.depth)
+        needs_pose = self.depth == "desired" or (self.interaction != "current" and w is None)
         if T is None and needs_pose and feature.depends_on_depth:
             raise InvalidValueError(
-                f"desired: interaction={self.interaction!r} with depth={depth!r} needs the depth "
-                "of the desired pose; give desired as a pose (4, 4), or depth in metres."
+                f"desired: interaction={self.interaction!r} with depth={self.depth!r} needs the "
+                "depth of the desired pose; give desired as a pose (4, 4), or depth in metres."
             )
-        if depth == "desired" and T is not None:
+        if self.depth == "desired" and T is not None:
             w = feature._see(T).depth
         if self.interaction != "current":
             L = feature._rows(s, w) if T is None else feature.interaction(T)
-        values = {"feature": feature, "desired": s if T is None else T, "depth": depth}
         periods = feature._periods() if feature._periods().any() else None
-        values |= {"periods": periods, "gain": as_number(self.gain, "gain", above=0.0), "_w": w}
-        values |= {"s_desired": s, "T_desired": T, "L_desired": L}
-        for name, value in values.items():
-            given = read_only(value) if isinstance(value, np.ndarray) else value
-            object.__setattr__(self, name, given)
+        derived = {"s_desired": s, "T_desired": T, "L_desired": L, "periods": periods, "_w": w}
+        given = {"feature": feature, "desired": s if T is None else T}
+        for name, value in (given | derived).items():
+            self._set(name, value)
 
     @property
     def regulated(self) -> Task:
@@ -176,13 +158,12 @@ class Hybrid(Value):
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        self._check("weight")
         if not isinstance(self.primary, Task):
             got = type(self.primary).__name__
             raise InvalidValueError(f"primary: expected a Task, got {got}.")
         if not isinstance(self.secondary, Task | Callable):
-            twist = read_only(as_exact(self.secondary, (6,), "secondary"))
-            object.__setattr__(self, "secondary", twist)
-        object.__setattr__(self, "weight", as_number(self.weight, "weight"))
+            self._set("secondary", as_exact(self.secondary, (6,), "secondary"))
 
     @property
     def regulated(self) -> Task:

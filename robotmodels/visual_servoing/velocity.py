@@ -111,7 +111,7 @@ def camera_velocity(
     given, is_pose = as_sensed(measurement, feature, "measurement")
     core = 2 if is_pose else 1
     batch = given.shape[:-core]
-    rows = given.reshape(math.prod(batch), *given.shape[-core:])
+    rows = [given] if not batch else given.reshape(math.prod(batch), *given.shape[-core:])
     found = [law(task, *((None, x) if is_pose else (x, None)), camera)[:4] for x in rows]
     if not batch:
         return ServoStep(*found[0])
@@ -132,16 +132,17 @@ def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
 
 
 def law(
-    task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
+    task: Task | Hybrid, s: Any, T: Array | None, camera: Camera | None = None, sight: Any = None
 ) -> tuple[Array, Array, int, ServoStatus, Array]:
     """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
     primary = task.regulated
     feature, L_desired = primary.feature, primary.L_desired
-    sight = None if T is None else sight_of(feature, T)
+    if sight is None and T is not None:
+        sight = sight_of(feature, T)
     if sight is not None and not sight.exists:
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
-    measured: Any = sight.s if s is None and sight is not None else s
+    measured = sight.s if s is None else s
     error = primary.error(measured)
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
