@@ -328,16 +328,16 @@ def _checked(points: Any, image: Any) -> tuple[Array, Array, tuple[int, ...]]:
 
 
 def _packed(
-    given: tuple[Array, Array, tuple[int, ...]], T: Array, off: Array, x: Array, same: Any,
-    done: Array, most: int,
-) -> PoseSolutions:  # fmt: skip
+    given: tuple[Array, Array, Any], T: Array, off: Array, x: Array, same: Any, done: Any, most: int
+) -> PoseSolutions:
     """Solutions by growing misfits, without those whose x differ by up to ``same``.
 
     Shapes: T (N, S, 4, 4), off and done (N, S), infinite for none, x (N, S, k), same (N, 1).
     """
     P, m, batch = given
     order = np.argsort(off, axis=-1)
-    T, valid, x, done = (taken(a, order) for a in (T, np.isfinite(off), x, done))
+    T, x, done, off = (taken(a, order) for a in (T, x, done, off))
+    valid = np.isfinite(off)
     near = np.abs(x[:, :, None] - x[:, None]).max(axis=-1) <= np.reshape(same, (-1, 1, 1))
     valid &= ~np.tril(near & valid[:, None], -1).any(axis=-1)
     valid &= valid.cumsum(axis=-1) <= most
@@ -345,5 +345,5 @@ def _packed(
     codes[(valid.sum(axis=-1) == 2) & (most == 2)] = PoseStatus.TWO_MINIMA
     codes[(valid & ~done).any(axis=-1)] = PoseStatus.NOT_CONVERGED
     valid, T = packed(valid, T)
-    found = (x.reshape(*batch, *x.shape[1:]) for x in (T, valid, _residual(T, P, m)))
-    return PoseSolutions(*found, codes.astype(np.int8).reshape(batch))
+    T, valid, off = (a.reshape(*batch, *a.shape[1:]) for a in (T, valid, _residual(T, P, m)))
+    return PoseSolutions(T, valid, off, codes.astype(np.int8).reshape(batch))

@@ -18,16 +18,16 @@ from ..se3 import as_single_pose
 THIN = 1e-9  # relative: lengths, areas and angles below are zero
 
 
-def brief(value: Any) -> str:
+def brief(self: Any) -> str:
     """One line for a value with arrays: those of more than six numbers by their shapes."""
-    given = [(f.name, getattr(value, f.name)) for f in fields(value) if f.init]
+    given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.init]
     texts = [
         f"{name}=<{entry.shape} array>"
         if isinstance(entry, np.ndarray) and entry.size > 6
         else f"{name}={' '.join(repr(entry).split())}"
         for name, entry in given
     ]
-    return f"{type(value).__name__}({', '.join(texts)})"
+    return f"{type(self).__name__}({', '.join(texts)})"
 
 
 class Value(_arrays.Value):

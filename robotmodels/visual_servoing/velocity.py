@@ -142,7 +142,7 @@ def law(
     if sight is not None and not sight.exists:
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
-    measured = sight.s if s is None else s
+    measured: Any = sight.s if s is None and sight is not None else s
     error = primary.error(measured)
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
