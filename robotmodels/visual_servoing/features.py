@@ -52,8 +52,8 @@ class Feature(Value):
 
     References
     ----------
-    Seed book sections 6.2.4 and 6.2.5; B. Espiau, F. Chaumette and P. Rives, "A new approach to
-    visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
+    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2; B. Espiau, F. Chaumette and P. Rives, "A new
+    approach to visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
 
     Examples
     --------
