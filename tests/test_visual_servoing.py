@@ -355,6 +355,21 @@ def test_virtual_links(feature, link_class, name):
         assert moved == pytest.approx(1e-6 * size, rel=0.01)
 
 
+def test_virtual_links_of_many_poses():
+    circle = vs.Circle([0, 0, 0], [0, 0, 1], 0.2)
+    T = np.array([translation(0, 0, 1), pose(np.random.default_rng(3))])
+    links = vs.virtual_link(circle, T[:, None])
+    for k, one in enumerate(vs.virtual_link(circle, place) for place in T):
+        assert (links.link_class[k, 0], links.rank[k, 0]) == (one.link_class, one.rank)
+        assert links.name[k, 0] == one.name
+        kept = links.kernel_twists[k, 0]
+        assert kept[: one.link_class] == pytest.approx(one.kernel_twists)
+        assert np.isnan(kept[one.link_class :]).all()
+    assert links.kernel_twists.shape == (2, 1, 3, 6)
+    assert vs.virtual_link(circle, T[:0]).kernel_twists.shape == (0, 0, 6)
+    assert pickle.loads(pickle.dumps(links)) == links
+
+
 def test_a_circle_seen_centred_has_a_larger_class():
     assert vs.virtual_link(vs.Circle([0, 0, 0], [0, 0, 1], 0.2), translation(0, 0, 1)).rank == 3
 
@@ -424,7 +439,7 @@ EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
         (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
          "on a line"),
         (lambda: vs.p3p(np.eye(3), np.eye(3)), ShapeError, "image"),
-        (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "n from 3"),
+        (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "from 3"),
         (lambda: vs.pnp(np.outer(range(5), [1, 2, 3]), np.ones((5, 2))), InvalidValueError, "line"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], -GOAL), NotARotationError, "T0"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),

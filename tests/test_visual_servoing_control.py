@@ -82,7 +82,7 @@ def test_matrices_of_the_law():
         vs.Circle([0, 0, 0], [0, 0, 1], 0.1),
         vs.Sphere([0, 0, 0], 0.1),
         vs.Cylinder([0, 0, 0], [0.2, 1, 0], 0.05),
-        vs.Moments(points=[*SQUARE, [0.2, 0.3, 0.0]]),
+        vs.Moments(points=[*SQUARE, [0.2, 0.3, 0.0]], components=("xn", "yn", "an", "alpha")),
         vs.Plane3D([0, 0, 1], 0.0),
         vs.PointAndRotation([0.1, 0, 0], GOAL),
     ],
@@ -427,9 +427,10 @@ def test_fischler_and_bolles():
     assert found.count == 4
 
 
-def test_the_true_pose_is_among_those_of_three_points():
+@pytest.mark.parametrize("size", [1.0, 0.1, 0.01, 0.001])
+def test_the_true_pose_is_among_those_of_three_points(size):
     rng = np.random.default_rng(5)
-    P, T = rng.uniform(-1.0, 1.0, (1500, 3, 3)), np.tile(np.eye(4), (1500, 1, 1))
+    P, T = size * rng.uniform(-1.0, 1.0, (1500, 3, 3)), np.tile(np.eye(4), (1500, 1, 1))
     T[:, :3, :3] = Rotation.random(1500, random_state=rng).as_matrix()
     T[:, :3, 3] = np.c_[rng.uniform(-1, 1, (1500, 2)), rng.uniform(2.5, 6, 1500)]
     X = P @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
@@ -527,6 +528,15 @@ def test_homographies():
             assert (off + abs(motions.n - n).max(axis=1)).min() < 1e-8
             back = motions.R + motions.t[:, :, None] * motions.n[:, None]
             assert back == pytest.approx(np.broadcast_to(H, back.shape), abs=1e-9)
+    both = np.stack((R, H))  # a batch: no translation, then two motions in front
+    many, one = vs.decompose_homography(both, x), vs.decompose_homography(H, x)
+    assert many.R[1] == pytest.approx(one.R)
+    assert many.n[1] == pytest.approx(one.n)
+    assert many.R[0, 0] == pytest.approx(R)
+    assert np.isnan(many.t[0, 1:]).all()
+    image = Y[:, :2] / Y[:, 2:]
+    assert vs.homography([x, image], [image, x])[0] == pytest.approx(H, abs=1e-9)
+    assert vs.decompose_homography(np.empty((0, 3, 3))).R.shape == (0, 0, 3, 3)
     n = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
     for size in (0.3, -0.3):  # translation along the normal
         R = rotation("z", 0.4)[:3, :3]

@@ -1,11 +1,12 @@
 """Visual servoing (chapter 6): image features, interaction matrices, tasks, pose, simulation."""
 
 from .camera import Camera
-from .features import Feature, Lines, Points, Segments
+from .features import Circle, Cylinder, Feature, Lines, Points, Segments, Sphere
 from .features_3d import Plane3D, Point3D, PointAndRotation, PoseError
 from .homography import PlaneMotions, decompose_homography, homography
-from .links import VirtualLink, broyden, estimate_interaction, virtual_link
 from .matrices import (
+    broyden,
+    estimate_interaction,
     interaction_ellipse,
     interaction_line,
     interaction_moment,
@@ -18,10 +19,9 @@ from .matrices import (
 from .moments import Moments
 from .pose import PoseSolutions, PoseStatus, p3p, pnp, refine_pose
 from .servo import EyeInHand, EyeToHand, ServoMotion, servo
-from .solids import Circle, Cylinder, Sphere
 from .tasks import Hybrid, Task, task_2_1_2d, task_3d
 from .tracking import TargetEstimate, TargetMotion
-from .velocity import ServoStatus, ServoStep, camera_velocity
+from .velocity import ServoStatus, ServoStep, VirtualLink, camera_velocity, virtual_link
 
 __all__ = [
     "Camera",

@@ -20,22 +20,14 @@ class Camera(Value):
 
     Parameters
     ----------
-    focal : array_like, shape (2,) or ()
-        Focal lengths in pixels, not zero.
-    centre : array_like, shape (2,)
-        Principal point, pixels.
-    size : array_like, shape (2,)
-        Width and height of the image, pixels, above zero.
+    focal, centre, size : array_like, shape (2,)
+        Focal lengths, not zero, or one for both; principal point; width and height of the image,
+        above zero. Pixels.
 
     Raises
     ------
     ShapeError, InvalidValueError
-        Arrays of another shape, NaN, a focal length of zero, an image without pixels, points at or
-        behind the plane of the camera.
-
-    References
-    ----------
-    Seed book section 6.2.4.1.
+        Arrays of another shape, NaN, values out of range, points that are not in front.
 
     Examples
     --------

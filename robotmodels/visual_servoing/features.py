@@ -1,4 +1,4 @@
-"""Features of an image: what all of them have, and points, lines and segments."""
+"""Features of an image: points, lines, segments, circles, spheres and cylinders."""
 
 from __future__ import annotations
 
@@ -9,28 +9,23 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
+from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
 from .camera import Camera
-from .matrices import interaction_line, interaction_segment, point_rows
-from .results import brief
+from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
+from .results import THIN, Value
 
-THIN = 1e-9  # relative: lengths, areas and angles below are zero
 _TURN = 2.0 * np.pi
 
 
 class Sight(NamedTuple):
     """An object as a camera sees it."""
 
-    exists: Any
-    """Whether the feature exists, bool (...)."""
-    s: Array
-    """Measurement (..., k)."""
-    depth: Any
-    """Depths, or planes (A, B, C, D), that the rows need."""
-    image: Any = None
-    """Points (..., m, 2) that have to be inside the image, None where there are none."""
+    exists: Any  # whether the feature exists, bool (...)
+    s: Array  # measurement (..., k)
+    depth: Any = None  # depths, or planes (A, B, C, D), that the rows need
+    image: Any = None  # points (..., m, 2) that have to be inside the image, None without any
 
 
 class Feature(Value):
@@ -57,27 +52,22 @@ class Feature(Value):
 
     References
     ----------
-    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2 to 6.2.5.4; B. Espiau, F. Chaumette and
-    P. Rives, "A new approach to visual servoing in robotics", IEEE Trans. Robotics and Automation
-    8(3), 1992.
+    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2; B. Espiau, F. Chaumette and P. Rives, "A new
+    approach to visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
 
     Examples
     --------
     >>> from robotmodels.se3 import translation
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> square.measure(translation(0, 0, 1.0))
-    array([-0.1, -0.1,  0.1, -0.1,  0.1,  0.1, -0.1,  0.1])
-    >>> square.interaction(translation(0, 0, 1.0)).shape
-    (8, 6)
+    >>> edge = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0]])
+    >>> edge.measure(translation(0, 0, 1.0)), edge.interaction(translation(0, 0, 1.0)).shape
+    (array([-0.1, -0.1,  0.1, -0.1]), (4, 6))
     """
 
     __slots__ = ()
     depends_on_depth: ClassVar[bool] = True
-    _period: ClassVar[tuple[float, ...]] = (0.0,)
-    """Periods of the components of one element, 0 where there is none."""
-
-    _see: ClassVar[Callable[..., Sight]]  # (T): what is seen of the object
-    _rows: ClassVar[Callable[..., Array]]  # (s, depth, image): interaction matrix (..., k, 6)
+    _period: ClassVar[tuple[float, ...]]  # of the components of one element, 0 for none
+    _see: ClassVar[Callable[..., Sight]]  # sight at poses T, NaN where it does not exist
+    _matrix: ClassVar[Callable[..., Array]]  # interaction matrix of one element
 
     def measure(self, T: ArrayLike) -> Array:
         """Measurement s (..., k) of the object at poses T."""
@@ -93,19 +83,20 @@ class Feature(Value):
         return len(self._periods())
 
     def _periods(self) -> Array:
-        """Period of each component. Shapes: -> (k,)."""
-        objects = getattr(self, "object_points", getattr(self, "points", (0,)))
-        return np.tile(self._period, len(objects))
+        elements = getattr(self, "object_points", getattr(self, "points", (0,)))
+        return np.tile(self._period, len(elements))
 
-    def _parallel(self, Z: float) -> Any:
-        """Depth of an object parallel to the image."""
-        return np.array((0.0, 0.0, 1.0, -Z))
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
+        return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
+
+    def _parallel(self, Z: float) -> float:
+        return Z
 
     def _seen(self, T: Any) -> Sight:
         """Sight at checked poses, where the feature exists."""
         poses = as_pose(T)
-        with np.errstate(all="ignore"):
-            sight = self._see(poses)
+        sight = sight_of(self, poses)
         if not np.all(sight.exists):
             row = f" (row {np.argwhere(~sight.exists)[0].tolist()})" if poses.ndim > 2 else ""
             raise InvalidValueError(
@@ -116,16 +107,19 @@ class Feature(Value):
         return sight
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
-        """Whether a camera has a measurement (k,), of points (m, 2), inside its image."""
         return image is None or bool(camera.sees(image))
 
-    def __repr__(self) -> str:
-        return brief(self)
+
+def sight_of(feature: Feature, T: Array) -> Sight:
+    """Sight of an object that may be behind the camera."""
+    with np.errstate(all="ignore"):
+        return feature._see(T)
 
 
 def placed(T: Array, points: Array) -> Array:
-    """Points of the object in the camera. Shapes: T (..., 4, 4), (m, 3) -> (..., m, 3)."""
-    return points @ np.swapaxes(T[..., :3, :3], -1, -2) + T[..., None, :3, 3]
+    """Points of the object in the camera. Shapes: points (m, 3) or (3,)."""
+    X = points @ np.swapaxes(T[..., :3, :3], -1, -2)
+    return X + (T[..., :3, 3] if points.ndim == 1 else T[..., None, :3, 3])
 
 
 def inner(a: Array, b: Array) -> Array:
@@ -133,38 +127,9 @@ def inner(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1, keepdims=True)
 
 
-def unit(vector: Any, name: str) -> Array:
-    """A direction as a unit vector."""
-    array = as_exact(vector, (3,), name)
-    length = float(np.linalg.norm(array))
-    if not length > 0.0:
-        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
-    # unit vectors stay as they are, so that copies are equal
-    return read_only(array if abs(length - 1.0) < 4e-16 else array / length)
-
-
-def _pairs(points: Any) -> Array:
-    """Distinct pairs of points. Shapes: -> (n, 2, 3)."""
-    pairs = as_core(points, (2, 3), "points")
-    pairs = pairs[None] if pairs.ndim == 2 else pairs
-    if pairs.ndim != 3 or not len(pairs):
-        raise ShapeError(f"points: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
-    lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
-    if not (lengths > THIN * np.abs(pairs).max()).all():
-        raise InvalidValueError("points: expected two different points on each line or segment.")
-    return read_only(pairs)
-
-
-def set_fields(feature: Any, **fields: Any) -> None:
-    """Checked centre, directions and radius of a solid, or other fields."""
-    for name, value in fields.items():
-        if name in ("normal", "axis"):
-            value = unit(value, name)
-        elif name == "centre":
-            value = read_only(as_exact(value, (3,), name))
-        elif name == "radius":
-            value = as_number(value, name, above=0.0)
-        object.__setattr__(feature, name, value)
+def norm(a: Array) -> Array:
+    """Lengths of vectors in the last axis, which is kept."""
+    return np.sqrt(inner(a, a))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -174,25 +139,16 @@ class Points(Feature):
     object_points: Array
     _period = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        points = as_core(self.object_points, (3,), "object_points")
-        points = points[None] if points.ndim == 1 else points
-        if points.ndim != 2 or not len(points):
-            raise ShapeError(f"object_points: expected (k, 3), k from 1, got {points.shape}.")
-        set_fields(self, object_points=read_only(points))
-
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.object_points)
-        image = X[..., :2] / X[..., 2:]
-        return Sight((X[..., 2] > 0.0).all(axis=-1), _flat(image), X[..., 2], image)
-
-    def _parallel(self, Z: float) -> Array:
-        return np.full(len(self.object_points), Z)
+        Z = X[..., 2]
+        image = X[..., :2] / Z[..., None]
+        return Sight((Z > 0.0).all(axis=-1), _flat(image), Z, image)
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         return bool(camera.sees(s.reshape(-1, 2)))
 
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
         return point_rows(s[..., 0::2], s[..., 1::2], 1.0 / depth).reshape(*s.shape, 6)
 
 
@@ -206,20 +162,12 @@ class Lines(Feature):
 
     points: Array
     _period = (0.0, _TURN)
-
-    def __post_init__(self) -> None:
-        set_fields(self, points=_pairs(self.points))
+    _matrix = interaction_line
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
-        p, along = X[..., 0::2, :], X[..., 1::2, :] - X[..., 0::2, :]
-        normal = np.cross(p, along)
-        size = np.hypot(normal[..., 0], normal[..., 1])
-        exists = (X[..., 2] > 0.0).all(axis=-1) & (
-            size > THIN * (norm(p) * norm(along))[..., 0]
-        ).all(axis=-1)
-        plane = plane_at(p - inner(p, along) / inner(along, along) * along)
-        return Sight(exists, *lines_of(normal, plane))
+        sight = _sight_of_lines(X[..., 0::2, :], X[..., 1::2, :] - X[..., 0::2, :])
+        return sight._replace(exists=sight.exists & (X[..., 2] > 0.0).all(axis=-1))
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         ends = camera.normalise((0.0 * camera.size, camera.size))
@@ -228,9 +176,6 @@ class Lines(Feature):
         side = x * np.cos(theta) + y * np.sin(theta) - rho  # of the corners of the image
         return bool(((side.min(axis=1) <= 0.0) & (side.max(axis=1) >= 0.0)).all())
 
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
-        return _flat_rows(interaction_line(s[..., 0::2], s[..., 1::2], depth))
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Segments(Feature):
@@ -238,37 +183,98 @@ class Segments(Feature):
 
     points: Array
     _period = (0.0, 0.0, 0.0, _TURN)
-
-    def __post_init__(self) -> None:
-        set_fields(self, points=_pairs(self.points))
+    _matrix = interaction_segment
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self.points.reshape(-1, 3))
-        image, depth = (
-            X[..., :2] / X[..., 2:],
-            np.stack((X[..., 0::2, 2], X[..., 1::2, 2]), axis=-1),
-        )
+        Z = X[..., 2]
+        image = X[..., :2] / Z[..., None]
         p, q = image[..., 0::2, :], image[..., 1::2, :]
-        (x, y), (dx, dy) = np.moveaxis(0.5 * (p + q), -1, 0), np.moveaxis(q - p, -1, 0)
-        s = _flat(np.stack((x, y, np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1))
-        return Sight((X[..., 2] > 0.0).all(axis=-1), s, depth, image)
-
-    def _parallel(self, Z: float) -> Array:
-        return np.full((len(self.points), 2), Z)
-
-    def _rows(self, s: Array, depth: Array, image: Any = None) -> Array:
-        x, y, length, alpha = (s[..., k::4] for k in range(4))
-        return _flat_rows(interaction_segment(x, y, length, alpha, depth))
+        dx, dy = np.moveaxis(q - p, -1, 0)
+        polar = np.stack((np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1)
+        s = _flat(np.concatenate((0.5 * (p + q), polar), axis=-1))
+        return Sight(
+            (Z > 0.0).all(axis=-1), s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image
+        )
 
 
-def norm(a: Array) -> Array:
-    """Lengths of vectors in the last axis, which is kept."""
-    return np.sqrt(inner(a, a))
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Circle(Feature):
+    """A circle: x, y, n20, n02, n11 of the ellipse of its image, of moments divided by the area."""
+
+    centre: Array
+    normal: Array
+    radius: float
+    _period = (0.0,) * 5
+    _matrix = interaction_ellipse
+
+    def _see(self, T: Array) -> Sight:
+        return _sight_of_circle(placed(T, self.centre), T[..., :3, :3] @ self.normal, self.radius)
 
 
-def plane_at(point: Array) -> Array:
-    """Planes through points, normal to their vectors. Shapes: (..., 3) -> (..., 4)."""
-    return np.concatenate((point, -inner(point, point)), axis=-1)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sphere(Feature):
+    """A sphere: x, y, n20, n02, n11 of the ellipse of its outline."""
+
+    centre: Array
+    radius: float
+    _period = (0.0,) * 5
+    _matrix = interaction_ellipse
+
+    def _see(self, T: Array) -> Sight:
+        centre = placed(T, self.centre)
+        return self._outline(centre)._replace(depth=centre[..., 2])
+
+    def _outline(self, centre: Array) -> Sight:
+        """Sight of the circle that is the outline of the sphere with this centre."""
+        part = 1.0 - self.radius**2 / inner(centre, centre)
+        return _sight_of_circle(part * centre, centre / norm(centre), self.radius * np.sqrt(part))
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
+        return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
+
+    def _parallel(self, Z: float) -> float:
+        if not self.radius < Z:
+            raise InvalidValueError(
+                f"depth: expected the depth of the centre of the sphere, above its radius "
+                f"{self.radius:g} m, got {Z:g} m."
+            )
+        return Z
+
+    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
+        Z = np.broadcast_to(depth, s.shape[:-1])[..., None]
+        centre = np.concatenate((s[..., :2] * (Z - self.radius**2 / Z), Z), axis=-1)
+        seen = self._outline(centre)  # so that the matrix has rank 3 at any depth
+        return Feature._rows(self, seen.s, seen.depth)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Cylinder(Feature):
+    """An infinite cylinder: rho, theta of the two lines of its outline."""
+
+    centre: Array
+    axis: Array
+    radius: float
+    _period = (0.0, _TURN)
+    _matrix = interaction_line
+
+    def _see(self, T: Array) -> Sight:
+        p, u = placed(T, self.centre), T[..., :3, :3] @ self.axis
+        nearest = p - inner(p, u) * u
+        sine = np.minimum(self.radius / norm(nearest), 1.0)
+        towards = nearest / norm(nearest)
+        beside = np.sqrt(1.0 - sine**2) * np.cross(u, towards)
+        n = np.stack((sine * towards + beside, sine * towards - beside), axis=-2)
+        contact = nearest[..., None, :] - self.radius * n
+        sight = _sight_of_lines(contact, np.stack((-u, u), axis=-2))
+        ahead = (p[..., 2] > 0.0) | (contact[..., 2] > 0.0).all(axis=-1)
+        return sight._replace(exists=sight.exists & ahead & (sine < 1.0 - THIN)[..., 0])
+
+    def _periods(self) -> Array:
+        return np.tile(self._period, 2)
+
+    _in_image = Lines._in_image
 
 
 def _flat(image: Array) -> Array:
@@ -276,30 +282,53 @@ def _flat(image: Array) -> Array:
     return image.reshape(*image.shape[:-2], image.shape[-2] * image.shape[-1])
 
 
-def _flat_rows(L: Array) -> Array:
-    """Rows of all elements below each other. Shapes: (..., n, m, 6) -> (..., n m, 6)."""
-    return L.reshape(*L.shape[:-3], L.shape[-3] * L.shape[-2], 6)
-
-
-def lines_of(normal: Array, plane: Array) -> tuple[Array, Array]:
-    """Image lines (..., 2 n) of planes through the camera, and their depths."""
+def _sight_of_lines(p: Array, along: Array) -> Sight:
+    """Sight of the image lines of lines in space through points p. Shapes: (..., n, 3)."""
+    normal = np.cross(p, along)
     x, y, z = np.moveaxis(normal, -1, 0)
-    rho, theta = -z / np.hypot(x, y), np.arctan2(y, x)
-    return _flat(np.stack((rho, theta), axis=-1)), plane
+    size = np.hypot(x, y)
+    s = _flat(np.stack((-z / size, np.arctan2(y, x)), axis=-1))
+    foot = p - inner(p, along) / inner(along, along) * along
+    plane = np.concatenate((foot, -inner(foot, foot)), axis=-1)
+    return Sight((size > THIN * (norm(p) * norm(along))[..., 0]).all(axis=-1), s, plane)
 
 
-def wrapped(error: Array, periods: Array) -> Array:
-    """Differences of features with angles in their period. Shapes: (..., k), (k,) -> (..., k)."""
-    whole = np.where(periods > 0.0, periods, 1.0)
-    return np.where(periods > 0.0, error - whole * np.round(error / whole), error)
+def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
+    """Sight of the ellipse ``[x y 1] Q [x y 1]^T = 0`` that is the image of a circle."""
+    lowest = c[..., 2:] - radius * np.sqrt(np.maximum(1.0 - n[..., 2:] ** 2, 0.0))
+    d, excess = inner(c, n), (inner(c, c) - radius**2)[..., None]
+    cn, nn = c[..., :, None] * n[..., None, :], n[..., :, None] * n[..., None, :]
+    Q = d[..., None] ** 2 * np.eye(3) - d[..., None] * (cn + np.swapaxes(cn, -1, -2)) + excess * nn
+    exists = ((lowest > 0.0) & (np.abs(d) > THIN * norm(c)))[..., 0]
+    adjugate = np.linalg.cross(Q[..., 0, :], Q[..., 1, :])
+    determinant = adjugate[..., 2]
+    x, y = adjugate[..., 0] / determinant, adjugate[..., 1] / determinant
+    scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
+    s = np.stack((x, y, scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]), axis=-1)
+    reach, plane = 2.0 * np.sqrt(s[..., 2:4]), np.concatenate((n, -d), axis=-1)[..., None, :]
+    return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))
 
 
-def as_measurement(s: Any, feature: Feature, name: str) -> Array:
-    """A measurement (..., k) of a feature."""
-    array = as_floats(s, name)
+def as_sensed(given: Any, feature: Feature, name: str) -> tuple[Array, bool]:
+    """Checked measurements (..., k) or poses (..., 4, 4), and whether they are poses."""
+    array = as_floats(getattr(given, "homogeneous", given), name)
+    if array.shape[-2:] == (4, 4):
+        four = array.ndim == 2 and feature.size == 4  # may be four measurements
+        if not four or np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
+            return array if array.ndim == 2 and _is_exact(array) else as_pose(array, name), True
     if array.ndim == 0 or array.shape[-1] != feature.size:
         raise ShapeError(
             f"{name}: expected {feature.size} numbers of {type(feature).__name__}, or a pose "
             f"(4, 4) of the object in the camera, got shape {array.shape}."
         )
-    return array
+    return array, False
+
+
+def _is_exact(T: Array) -> bool:
+    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), last = T.tolist()
+    off = (
+        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, a * d + b * e + c * f),
+        *(b * f - c * e - g, c * d - a * f - h, a * e - b * d - i),
+    )
+    return max(off) < 1e-12 and min(off) > -1e-12 and last == [0.0, 0.0, 0.0, 1.0]

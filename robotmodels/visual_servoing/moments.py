@@ -1,26 +1,27 @@
-"""Moments of complex shapes: polygons, by Green's theorem, and sets of points."""
+"""Moments of complex shapes: of polygons and of sets of points."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
-from math import comb
 from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, as_core, read_only
-from ..errors import InvalidValueError, ShapeError
-from .features import THIN, Feature, Sight, inner, norm, placed
-from .matrices import interaction_moment, point_rows
+from .._arrays import Array
+from ..errors import InvalidValueError
+from .features import Feature, Sight, inner, norm, placed
+from .matrices import point_rows
+from .results import THIN, as_points
 
 _COMPONENTS = (
     *("area", "x", "y", "n20", "n02", "n11"),
     *("alpha", "xn", "yn", "an", "c_x", "c_y"),
 )
-_ORDERS = [(i, j) for i in range(4) for j in range(4 - i)]
 _FLAT = 1e-6  # of the size: heights above the plane of a polygon, and areas
+_STEP = 1e-30  # of the complex step, so small that its square vanishes
+_NODES = np.array(((1.0, 1.0, 1.0), (1.8, 0.6, 0.6), (0.6, 1.8, 0.6), (0.6, 0.6, 1.8))) / 3.0
+_WEIGHTS = np.array((-27.0, 25.0, 25.0, 25.0)) / 48.0  # exact integrals of cubics on a triangle
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -33,7 +34,8 @@ class Moments(Feature):
     ``xn = an x``, ``yn = an y``. Skewness in x and y, zero for centrally symmetric images:
     ``c_x = sqrt(a) (mu30 + mu12) / (mu20 + mu02)^(3/2)`` and ``c_y`` with mu03 + mu21; they keep
     their values when the image is shifted or scaled, and turn with it as a vector. Sums over k
-    points have the factor sqrt(k) instead of sqrt(a).
+    points have the factor sqrt(k) instead of sqrt(a). Interaction matrices follow from those of
+    the corners or points by the chain rule.
 
     Parameters
     ----------
@@ -50,8 +52,8 @@ class Moments(Feature):
     ------
     ShapeError, InvalidValueError
         A polygon with fewer than three corners, without area, not planar or that crosses or
-        touches itself; unknown components; ``alpha`` of an image without
-        orientation, such as a square.
+        touches itself; unknown components; ``alpha`` of an image without orientation, such as a
+        square.
 
     References
     ----------
@@ -75,13 +77,10 @@ class Moments(Feature):
         if (self.polygon is None) == (self.points is None):
             raise InvalidValueError("Moments: expected a polygon or points=, one of the two.")
         name, least = ("points", 2) if self.polygon is None else ("polygon", 3)
-        corners = as_core(getattr(self, name), (3,), name)
-        if corners.ndim != 2 or len(corners) < least:
-            raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {corners.shape}.")
+        corners = as_points(getattr(self, name), name, least)
         words: Any = self.components
-        words = (
-            (words,) if isinstance(words, str) or not isinstance(words, Iterable) else tuple(words)
-        )
+        several = isinstance(words, Iterable) and not isinstance(words, str)
+        words = tuple(words) if several else (words,)
         known = [name for name in words if isinstance(name, str) and name in _COMPONENTS]
         if not words or len(set(known)) < len(words):
             raise InvalidValueError(
@@ -91,8 +90,8 @@ class Moments(Feature):
             _check_polygon(corners)
         elif not np.ptp(corners, axis=0).any():
             raise InvalidValueError("points: expected points that do not all coincide.")
-        object.__setattr__(self, name, read_only(corners))
-        object.__setattr__(self, "components", words)
+        self._set(name, corners)
+        self._set("components", words)
 
     @property
     def _corners(self) -> Any:
@@ -103,19 +102,11 @@ class Moments(Feature):
 
     def _see(self, T: Array) -> Sight:
         X = placed(T, self._corners)
-        image, corner, depth = X[..., :2] / X[..., 2:], X[..., 0, :], X[..., 2]
-        exists = (X[..., 2] > 0.0).all(axis=-1)
+        image, exists = X[..., :2] / X[..., 2:], (X[..., 2] > 0.0).all(axis=-1)
         if self.points is None:
-            n = T[..., :3, :3] @ _axes(self._corners)[2]
+            n, corner = T[..., :3, :3] @ _axes(self._corners)[2], X[..., 0, :]
             exists &= (np.abs(inner(n, corner)) > _FLAT * norm(corner))[..., 0]  # not edge-on
-            depth = np.concatenate((n, -inner(n, corner)), axis=-1)
-        m, _ = self._raw(image, None)
-        if not exists.all():
-            return Sight(exists, m[..., 0, 0, None] * np.full(self.size, np.nan), depth, image)
-        return Sight(exists, self._of(m, np.zeros((*m.shape[:-2], 4, 4, 6)))[0], depth, image)
-
-    def _parallel(self, Z: float) -> Array:
-        return Feature._parallel(self, Z) if self.points is None else np.full(len(self.points), Z)
+        return Sight(exists, self._of(image[..., 0], image[..., 1]).real, X[..., 2], image)
 
     def _rows(self, s: Any, depth: Any, image: Any = None) -> Array:
         if image is None:
@@ -123,113 +114,53 @@ class Moments(Feature):
                 "measurement: the interaction matrix of moments needs moments of higher order than "
                 'those measured; give the pose of the object, or interaction="desired" to the task.'
             )
-        return self._of(*self._raw(image, depth))[1]
-
-    def _raw(self, image: Array, depth: Any) -> tuple[Array, Any]:
-        """Raw moments (..., 5, 5) and their rates (..., 4, 4, 6), up to orders 4 and 3."""
         x, y = image[..., 0], image[..., 1]
-        if self.points is None:
-            m = _polygon_moments(x, y)
-            m = m * np.sign(m[..., :1, :1])  # of corners in either sense
-            if depth is None:
-                return m, None
-            rates = np.zeros((*m.shape[:-2], 4, 4, 6))
-            for i, j in _ORDERS:
-                rates[..., i, j, :] = interaction_moment(m, i, j, depth)[..., 0, :]
-            return m, rates
-        p, q = (np.stack([z**k for k in range(5)], axis=-1) for z in (x, y))
-        m = np.einsum("...ki,...kj->...ij", p, q)
-        if depth is None:
-            return m, None
-        L = point_rows(x, y, 1.0 / depth)
-        dp, dq = (
-            np.concatenate((0.0 * z[..., :1], z[..., :3]), -1) * np.arange(4.0) for z in (p, q)
-        )
-        rates = np.einsum("...ki,...kj,...kr->...ijr", dp, q[..., :4], L[..., 0, :])
-        return m, rates + np.einsum("...ki,...kj,...kr->...ijr", p[..., :4], dq, L[..., 1, :])
+        dx, dy = 1j * _STEP * np.moveaxis(point_rows(x, y, 1.0 / depth), (-2, -1), (0, 1))
+        return np.moveaxis(self._of(x + dx, y + dy).imag / _STEP, 0, -1)
 
-    def _of(self, raw: Array, rates: Array) -> tuple[Array, Array]:
-        """Components (..., k) and their interaction matrix (..., k, 6) by the chain rule."""
-        m = {(i, j): _Rate(raw[..., i, j], rates[..., i, j, :]) for i, j in _ORDERS}
-        whole = m[0, 0]
-        x, y = m[1, 0] / whole, m[0, 1] / whole
-        mu20, mu02 = m[2, 0] - x * m[1, 0], m[0, 2] - y * m[0, 1]
-        mu11 = m[1, 1] - x * m[0, 1]
-        mu30 = m[3, 0] - x * m[2, 0] * 3.0 + x * x * m[1, 0] * 2.0
-        mu03 = m[0, 3] - y * m[0, 2] * 3.0 + y * y * m[0, 1] * 2.0
-        mu21 = m[2, 1] - x * m[1, 1] * 2.0 - y * m[2, 0] + x * x * m[0, 1] * 2.0
-        mu12 = m[1, 2] - y * m[1, 1] * 2.0 - x * m[0, 2] + y * y * m[1, 0] * 2.0
-        spread = mu20 + mu02
+    def _of(self, x: Array, y: Array) -> Array:
+        """Components of points or corners, complex ones for derivatives. Shapes: -> (..., k)."""
+        weight, own = np.ones(x.shape), ((self._corners - self._corners.mean(axis=0)) ** 2).sum()
+        if self.points is None:  # triangles of two corners and the mean, with cubic quadratures
+            own = _area(self._corners)
+            corners = [np.stack((z, np.roll(z, -1, axis=-1))) for z in (x, y)]
+            (x0, u), (y0, v) = (
+                (z.mean(axis=-1, keepdims=True), pair - z.mean(axis=-1, keepdims=True))
+                for z, pair in zip((x, y), corners, strict=True)
+            )
+            areas = 0.5 * (u[0] * v[1] - u[1] * v[0])
+            areas = areas * np.sign(areas.sum(axis=-1).real)[..., None]  # corners in either sense
+            x, y = (
+                np.concatenate([z0 + b * d[0] + c * d[1] for _, b, c in _NODES], axis=-1)
+                for z0, d in ((x0, u), (y0, v))
+            )
+            weight = np.concatenate([w * areas for w in _WEIGHTS], axis=-1)
+        whole = weight.sum(axis=-1)
+        x0, y0 = (weight * x).sum(axis=-1) / whole, (weight * y).sum(axis=-1) / whole
+        dx, dy = x - x0[..., None], y - y0[..., None]
+        mu20, mu02, mu11 = (
+            (weight * a * b).sum(axis=-1) for a, b in ((dx, dx), (dy, dy), (dx, dy))
+        )
+        spread, squared = mu20 + mu02, weight * (dx * dx + dy * dy)
         area = whole if self.points is None else spread
-        spread_3d = self._corners - self._corners.mean(axis=0)
-        own = (spread_3d**2).sum() if self.points is not None else _area(self._corners)
-        an = area**-0.5 * float(np.sqrt(own))
-        skewness = whole**0.5 * spread**-1.5
+        an, skewness = np.sqrt(own / area), np.sqrt(whole) * spread**-1.5
         found = {
-            "area": area, "x": x, "y": y, "n20": mu20 / whole, "n02": mu02 / whole,
-            "n11": mu11 / whole, "xn": an * x, "yn": an * y, "an": an,
-            "c_x": skewness * (mu30 + mu12), "c_y": skewness * (mu03 + mu21),
+            "area": area, "x": x0, "y": y0, "n20": mu20 / whole, "n02": mu02 / whole,
+            "n11": mu11 / whole, "xn": an * x0, "yn": an * y0, "an": an,
+            "c_x": skewness * (squared * dx).sum(axis=-1),
+            "c_y": skewness * (squared * dy).sum(axis=-1),
         }  # fmt: skip
         if "alpha" in self.components:
-            found["alpha"] = _half_angle(mu11 * 2.0, mu20 - mu02, spread.value)
-        parts = [found[name] for name in self.components]
-        return np.stack([p.value for p in parts], -1), np.stack([p.rate for p in parts], -2)
-
-
-class _Rate:
-    """A number (...) and its row (..., 6) of the interaction matrix, with its rules."""
-
-    def __init__(self, value: Array, rate: Array) -> None:
-        self.value, self.rate = value, rate
-
-    def __add__(self, other: _Rate) -> _Rate:
-        return _Rate(self.value + other.value, self.rate + other.rate)
-
-    def __sub__(self, other: _Rate) -> _Rate:
-        return self + other * -1.0
-
-    def __mul__(self, other: _Rate | float) -> _Rate:
-        if not isinstance(other, _Rate):
-            return _Rate(self.value * other, self.rate * other)
-        rate = self.value[..., None] * other.rate + other.value[..., None] * self.rate
-        return _Rate(self.value * other.value, rate)
-
-    def __pow__(self, power: float) -> _Rate:
-        slope = power * self.value ** (power - 1.0)
-        return _Rate(self.value**power, slope[..., None] * self.rate)
-
-    def __truediv__(self, other: _Rate) -> _Rate:
-        return self * other**-1.0
-
-
-def _half_angle(sine: _Rate, cosine: _Rate, spread: Array) -> _Rate:
-    """Half the angle of a vector."""
-    square = sine.value**2 + cosine.value**2
-    if not (square > (_FLAT * spread) ** 2).all():
-        raise InvalidValueError(
-            "components: alpha does not exist for an image whose n20 and n02 are equal and n11 is "
-            "0, such as a square; leave alpha out."
-        )
-    rate = cosine.value[..., None] * sine.rate - sine.value[..., None] * cosine.rate
-    return _Rate(0.5 * np.arctan2(sine.value, cosine.value), 0.5 * rate / square[..., None])
-
-
-def _polygon_moments(x: Array, y: Array) -> Array:
-    """Raw moments up to order 4 of polygons. Shapes: x, y (..., k) -> (..., 5, 5)."""
-    X, Y = np.roll(x, -1, axis=-1), np.roll(y, -1, axis=-1)
-    (p0, p1), (q0, q1) = (
-        [np.stack([z**k for k in range(5)]) for z in ends] for ends in ((x, X), (y, Y))
-    )
-    m = np.zeros((*x.shape[:-1], 5, 5))
-    for p, q in product(range(5), range(5)):
-        if p + q < 5:
-            terms = sum(
-                comb(k + n, n) * comb(p + q - k - n, q - n) * p1[k] * p0[p - k] * q1[n] * q0[q - n]
-                for k, n in product(range(p + 1), range(q + 1))
-            )
-            factor = (p + q + 2) * (p + q + 1) * comb(p + q, p)
-            m[..., p, q] = ((x * Y - X * y) * terms).sum(axis=-1) / factor
-    return m
+            sine, cosine = 2.0 * mu11, mu20 - mu02
+            square = sine.real**2 + cosine.real**2
+            if (square <= (_FLAT * spread.real) ** 2).any():
+                raise InvalidValueError(
+                    "components: alpha does not exist for an image whose n20 and n02 are equal and "
+                    "n11 is 0, such as a square; leave alpha out."
+                )
+            slope = (sine * np.conj(cosine)).imag / square
+            found["alpha"] = 0.5 * (np.arctan2(sine.real, cosine.real) + 1j * slope)
+        return np.stack([found[name] for name in self.components], axis=-1)
 
 
 def _axes(corners: Array) -> Array:
@@ -251,26 +182,17 @@ def _check_polygon(corners: Array) -> None:
     if np.abs(p[:, 2]).max() > _FLAT * size:
         raise InvalidValueError("polygon: expected corners in one plane; points= need not be.")
     p = p[(np.abs(p - np.roll(p, -1, axis=0)) > THIN * size).any(axis=1), :2]  # repeated corners
-    x, y = p[:, 0], p[:, 1]
-    X, Y = np.roll(x, -1), np.roll(y, -1)
-
-    def side(u: Array, v: Array) -> Array:  # on which of each edge points (u, v) are
-        return (X - x)[:, None] * (v - y[:, None]) - (Y - y)[:, None] * (u - x[:, None])
-
-    apart = side(x, y) * side(X, Y) < -((_FLAT * size) ** 4)
-    if (apart & apart.T).any():
-        i, j = np.argwhere(apart & apart.T)[0]
-        raise InvalidValueError(
-            f"polygon: its edges {i} and {j} cross; expected the corners in order."
-        )
     along, n = np.roll(p, -1, axis=0) - p, np.arange(len(p))
-    part = np.einsum("ejk,ek->ej", p - p[:, None], along) / (along**2).sum(axis=1)[:, None]
-    foot = p[:, None] + np.clip(part, 0.0, 1.0)[..., None] * along[:, None]
-    gap = np.linalg.norm(p - foot, axis=2)  # of each edge and corner
+    lever = p - p[:, None]  # [e, j]: from the start of edge e to corner j
+    side = along[:, None, 0] * lever[..., 1] - along[:, None, 1] * lever[..., 0]
+    apart = side * np.roll(side, -1, axis=1) < -((_FLAT * size) ** 4)
+    part = np.einsum("ejk,ek->ej", lever, along) / (along**2).sum(axis=1)[:, None]
+    gap = np.linalg.norm(lever - np.clip(part, 0.0, 1.0)[..., None] * along[:, None], axis=2)
     gap[n, n] = gap[n, (n + 1) % len(p)] = np.inf
-    if gap.min() <= THIN * size:
-        edge, corner = np.argwhere(gap <= THIN * size)[0]
+    faults = np.argwhere((apart & apart.T) | (gap <= THIN * size))
+    if len(faults):
+        edge, other = faults[0]
         raise InvalidValueError(
-            f"polygon: corner {corner} is on edge {edge}; expected an outline that does not touch "
-            "itself."
+            f"polygon: the edge from corner {edge} crosses or touches that from corner {other}; "
+            "expected an outline that does not touch itself, its corners in order."
         )

@@ -1,60 +1,166 @@
-"""Results: read-only, equal by value, printed in one line."""
+"""Bases of descriptions and results: checked, equal by value, printed in one line."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
-from typing import Any
+from operator import index
+from typing import Any, ClassVar
 
 import numpy as np
 
-from .._arrays import Frozen, value_hash
-from ..errors import InvalidValueError
+from .. import _arrays
+from .._arrays import Array, as_core, as_exact, as_number, read_only
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, ShapeError
+from ..se3 import as_single_pose
 
-_SHOWN = 6  # numbers of an array that are printed
+THIN = 1e-9  # relative: lengths, areas and angles below are zero
 
 
-class Result(Frozen):
+def brief(self: Any) -> str:
+    """One line for a value with arrays: those of more than six numbers by their shapes."""
+    given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.init]
+    texts = [
+        f"{name}=<{entry.shape} array>"
+        if isinstance(entry, np.ndarray) and entry.size > 6
+        else f"{name}={' '.join(repr(entry).split())}"
+        for name, entry in given
+    ]
+    return f"{type(self).__name__}({', '.join(texts)})"
+
+
+class Value(_arrays.Value):
+    """Base of descriptions, whose fields are checked by their names."""
+
+    __slots__ = ()
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        self._check(*(f.name for f in fields(self)))  # type: ignore[arg-type]
+
+    def _check(self, *names: str) -> None:
+        for name in names:
+            self._set(name, _CHECKS[name](getattr(self, name), name))
+
+    def _set(self, name: str, value: Any) -> None:
+        value = read_only(value) if isinstance(value, np.ndarray) else value
+        object.__setattr__(self, name, value)
+
+
+class Result(_arrays.Frozen):
     """Base of results: equal if their fields are, where NaN equals NaN."""
 
     __slots__ = ()
+    _outcome: ClassVar[type[Outcome]]
+    __repr__ = brief
 
-    def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        pairs = [(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)]  # type: ignore[arg-type]
-        return all(
-            np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-            if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
-            else bool(a == b)
-            for a, b in pairs
+    def _key(self) -> tuple[Any, ...]:
+        return tuple(
+            (e.shape, (e + 0.0 if e.dtype.kind == "f" else e).tobytes())
+            if isinstance(e, np.ndarray)
+            else e
+            for e in (getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
         )
 
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
+
     def __hash__(self) -> int:
-        return value_hash(*(getattr(self, f.name) for f in fields(self)))  # type: ignore[arg-type]
+        return hash(self._key())
 
-    def __repr__(self) -> str:
-        return brief(self)
-
-
-def code_of(status: Any, i: Any) -> int:
-    """Code of row i of a batch of codes, or the code of one result."""
-    codes = np.asarray(status)
-    try:
-        code = np.asarray(codes[i] if codes.ndim else codes)
-    except (IndexError, TypeError):
-        code = np.zeros(1)
-    if code.ndim:
-        raise InvalidValueError(f"i: expected the index of one row of {codes.shape}, got {i!r}.")
-    return int(code)
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Sentence of the status, of row i in a batch."""
+        codes = np.asarray(self.status)  # type: ignore[attr-defined]
+        try:
+            return self._outcome(index(codes[i if codes.ndim else ()])).sentence
+        except (IndexError, TypeError):
+            raise InvalidValueError(
+                f"i: expected the index of one row of {codes.shape}, got {i!r}."
+            ) from None
 
 
-def brief(value: Any) -> str:
-    """One line for a value with arrays: those of more than six numbers by their shapes."""
-    parts = []
-    for f in fields(value):
-        if f.init:
-            entry = getattr(value, f.name)
-            long = isinstance(entry, np.ndarray) and entry.size > _SHOWN
-            text = f"<{entry.shape} array>" if long else f"{entry!r}"
-            parts.append(f"{f.name}={' '.join(text.split())}")
-    return f"{type(value).__name__}({', '.join(parts)})"
+def taken(x: Array, order: Any) -> Array:
+    """Rows of solutions in an order. Shapes: x (..., S, *core), order (..., s)."""
+    core = (1,) * (x.ndim - order.ndim)
+    return np.take_along_axis(x, order.reshape(*order.shape, *core), order.ndim - 1)
+
+
+def packed(valid: Any, *solutions: Array) -> list[Any]:
+    """Flags and solutions with the valid rows first and NaN in the others, as few as possible."""
+    order = np.argsort(~valid, axis=-1, kind="stable")
+    order = order[..., : int(valid.sum(axis=-1).max(initial=0))]
+    kept = taken(valid, order)
+    core = [(1,) * (x.ndim - kept.ndim) for x in solutions]
+    return [kept] + [
+        np.where(kept.reshape(*kept.shape, *k), taken(x, order), np.nan)
+        for x, k in zip(solutions, core, strict=True)
+    ]
+
+
+def as_points(value: Any, name: str, least: int = 1) -> Array:
+    """Points of an object. Shapes: -> (k, 3)."""
+    points = as_core(value, (3,), name)
+    points = points[None] if points.ndim == 1 else points
+    if points.ndim != 2 or len(points) < least:
+        raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
+    return points
+
+
+def _pairs(value: Any, name: str) -> Array:
+    """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
+    pairs = as_core(value, (2, 3), name)
+    pairs = pairs[None] if pairs.ndim == 2 else pairs
+    if pairs.ndim != 3 or not len(pairs):
+        raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
+    if not (np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1) > THIN * np.abs(pairs).max()).all():
+        raise InvalidValueError(f"{name}: expected two different points on each line or segment.")
+    return pairs
+
+
+def _unit(value: Any, name: str) -> Array:
+    """A direction as a unit vector."""
+    array = as_exact(value, (3,), name)
+    length = float(np.linalg.norm(array))
+    if not length > 0.0:
+        raise InvalidValueError(f"{name}: expected a vector that is not zero.")
+    # unit vectors stay as they are, so that copies are equal
+    return array if abs(length - 1.0) < 4e-16 else array / length
+
+
+def _flag(value: Any, name: str) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.40}.")
+    return bool(value)
+
+
+def _vector(value: Any, name: str) -> Array:
+    return as_exact(value, (3,), name)
+
+
+def _positive(value: Any, name: str) -> float:
+    return as_number(value, name, above=0.0)
+
+
+def _interaction(value: Any, name: str) -> str:
+    if isinstance(value, str) and value in ("current", "desired", "mean"):
+        return value
+    raise InvalidValueError(f"{name}: expected current, desired or mean, got {value!r:.40}.")
+
+
+def _depth(value: Any, name: str) -> str | float:
+    if not isinstance(value, str):
+        return as_number(value, name, above=0.0)
+    if value in ("true", "desired"):
+        return value
+    raise InvalidValueError(f'{name}: expected "true", "desired" or metres, got {value!r:.40}.')
+
+
+_CHECKS: dict[str, Callable[[Any, str], Any]] = {
+    "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
+    "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
+    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
+    "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
+    "gain": _positive, "weight": as_number, "interaction": _interaction, "depth": _depth,
+    "kalman": _flag, "process": _positive, "noise": _positive,
+}  # fmt: skip

@@ -1,4 +1,57 @@
-"""Simulation of visual servoing: a free camera, eye in hand, eye to hand."""
+"""Simulation of visual servoing: a free camera, eye in hand, eye to hand.
+
+A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
+robot, noise or tracking the law is sampled: every velocity is held for one step.
+
+Parameters
+----------
+task : Task or Hybrid
+    What is regulated, k components.
+T0 : array_like, shape (4, 4)
+    Pose of the object in the camera at the start.
+camera : Camera, optional
+    Whose image has to contain the object.
+robot, q0 : RobotModel, and array_like of shape (n,), optional
+    The robot that carries the camera or the object; its joint variables at the start, rad or m.
+mounting : EyeInHand or EyeToHand, optional
+    Default ``EyeInHand()``.
+duration, step, noise : float
+    Seconds; standard deviation of every component of the measurement, in its unit.
+rng : Generator or int, optional
+    Source of the noise, default 0.
+target : array_like, shape (6,), or function of t -> (6,), optional
+    Twist [v; w] of the object in its own axes.
+tracking : TargetMotion, optional
+    Estimates and compensates the motion of the target.
+limits : JointBounds or bool
+    Limits of the joints, see `ikm`, for the step of the simulation; True takes those of the robot.
+T_tool_camera, T_world_camera : array_like, shape (4, 4), optional
+    Pose of the camera in the tool or in the world, by default the identity.
+
+Returns
+-------
+ServoMotion
+    Poses, measurements, errors, velocities and the status.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
+
+References
+----------
+Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
+
+Examples
+--------
+>>> from robotmodels.se3 import rotation, translation
+>>> from robotmodels.visual_servoing import Points
+>>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+>>> start = translation(0.1, 0.0, 1.0) @ rotation("z", 0.5)
+>>> run = servo(Task(square, translation(0, 0, 0.5), gain=1.0), start)
+>>> run.status, bool(abs(run.error[-1]).max() < 1e-4)
+(<ServoStatus.CONVERGES: 0>, True)
+"""
 
 from __future__ import annotations
 
@@ -9,7 +62,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays import Array, as_exact, as_number
 from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
@@ -17,62 +70,27 @@ from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose, inverse
 from .camera import Camera
-from .results import Result, brief
+from .features import sight_of
+from .results import Result, Value
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, law, moved, sight_of
+from .velocity import ServoStatus, check_kinds, law, moved, rate_matrix
 
 _MOST = 1_000_000  # steps of a simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EyeInHand(Value):
-    """A camera on the tool of a robot (section 6.2.2), at ``T_tool_camera (4, 4)``.
-
-    Parameters
-    ----------
-    T_tool_camera : array_like, shape (4, 4), optional
-        Pose of the camera in the tool; default the tool itself.
-
-    Examples
-    --------
-    >>> EyeInHand().T_tool_camera.shape
-    (4, 4)
-    """
+    """A camera on the tool of a robot (section 6.2.2)."""
 
     T_tool_camera: Array = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        T = as_single_pose(self.T_tool_camera, "T_tool_camera")
-        object.__setattr__(self, "T_tool_camera", read_only(T))
-
-    def __repr__(self) -> str:
-        return brief(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EyeToHand(Value):
-    """A camera fixed in the world that sees the object on the tool (section 6.2.3).
-
-    Parameters
-    ----------
-    T_world_camera : array_like, shape (4, 4), optional
-        Pose of the camera; default the world itself.
-
-    Examples
-    --------
-    >>> EyeToHand().T_world_camera.shape
-    (4, 4)
-    """
+    """A camera fixed in the world that sees the object on the tool (section 6.2.3)."""
 
     T_world_camera: Array = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        T = as_single_pose(self.T_world_camera, "T_world_camera")
-        object.__setattr__(self, "T_world_camera", read_only(T))
-
-    def __repr__(self) -> str:
-        return brief(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -81,31 +99,19 @@ class ServoMotion(Result):
 
     Parameters
     ----------
-    task : Task or Hybrid
-        What was regulated.
+    task, camera : Task or Hybrid, Camera or None
+        Of the call.
     t : ndarray, shape (N,)
         Times, s; they end early where the object is behind the camera or out of sight.
-    T : ndarray, shape (N, 4, 4)
-        Poses of the object in the camera.
-    cameras : ndarray, shape (N, 4, 4)
-        Poses of the camera in the world; without a robot, in the object at the start.
+    T, cameras : ndarray, shape (N, 4, 4)
+        Poses of the object in the camera; of the camera in the world, which without a robot is the
+        object at the start.
     q : ndarray, shape (N, n), or None
         Joint variables, rad or m.
-    s, error : ndarray, shape (N, k)
-        Measurements, and ``s - s*``.
-    velocity : ndarray, shape (N, 6)
-        Twists [v; w] of the camera in its own axes that the law asks for.
+    s, error, velocity : ndarray, shapes (N, k), (N, k) and (N, 6)
+        Measurements; ``s - s*``; twists [v; w] of the camera that the law asks for.
     codes : ndarray of int8, shape (N,)
         `ServoStatus` of every sample.
-    camera : Camera or None
-        The camera of the call.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import task_3d
-    >>> servo(task_3d(translation(0, 0, 0.5)), translation(0, 0, 1), duration=20.0).status
-    <ServoStatus.CONVERGES: 0>
     """
 
     task: Task | Hybrid
@@ -124,7 +130,7 @@ class ServoMotion(Result):
         """Outcome at the end."""
         return ServoStatus(int(self.codes[-1]))
 
-    def reason(self) -> str:
+    def reason(self) -> str:  # type: ignore[override]
         """Sentence of the status, with the error at the end."""
         return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
 
@@ -148,71 +154,14 @@ def servo(
     tracking: TargetMotion | None = None,
     limits: JointBounds | bool = True,
 ) -> ServoMotion:
-    """Simulate visual servoing.
-
-    A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
-    robot, noise or tracking the law is sampled: every velocity is held for one step.
-
-    Parameters
-    ----------
-    task : Task or Hybrid
-        What is regulated, k components.
-    T0 : array_like, shape (4, 4)
-        Pose of the object in the camera at the start.
-    camera : Camera, optional
-        Whose image has to contain the object.
-    robot : RobotModel, optional
-        Carries the camera or the object; n joints.
-    q0 : array_like, shape (n,), optional
-        Its joint variables at the start, rad or m.
-    mounting : EyeInHand or EyeToHand, optional
-        Default ``EyeInHand()``.
-    duration, step : float
-        Seconds.
-    noise : float
-        Standard deviation of every component of the measurement, in its unit.
-    rng : Generator or int, optional
-        Source of the noise, default 0.
-    target : array_like, shape (6,), or function of t -> (6,), optional
-        Twist [v; w] of the object in its own axes.
-    tracking : TargetMotion, optional
-        Estimates and compensates the motion of the target.
-    limits : JointBounds or bool
-        Limits of the joints, see `ikm`, for the step of the simulation; True takes those of the
-        robot.
-
-    Returns
-    -------
-    ServoMotion
-        Poses, measurements, errors, velocities and the status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
-
-    References
-    ----------
-    Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import Points
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> start = translation(0.1, 0.0, 1.0) @ rotation("z", 0.5)
-    >>> run = servo(Task(square, translation(0, 0, 0.5), gain=1.0), start)
-    >>> run.status, bool(abs(run.error[-1]).max() < 1e-4)
-    (<ServoStatus.CONVERGES: 0>, True)
-    """
-    if not isinstance(task, Task | Hybrid):
-        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    for name, value, kind in (
-        ("camera", camera, Camera), ("tracking", tracking, TargetMotion),
-        ("limits", None if isinstance(limits, bool) else limits, JointBounds),
-    ):  # fmt: skip
-        if value is not None and not isinstance(value, kind):
-            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
+    """Simulate visual servoing."""
+    bounds = None if isinstance(limits, bool) else limits
+    check_kinds(
+        task,
+        camera=(camera, Camera),
+        tracking=(tracking, TargetMotion),
+        limits=(bounds, JointBounds),
+    )
     primary = task.regulated
     T = as_single_pose(T0, "T0")
     h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
@@ -221,45 +170,43 @@ def servo(
         raise InvalidValueError(f"step: {total:g} s in steps of {h:g} s are more than {_MOST}.")
     if robot is None and (q0 is not None or mounting is not None):
         raise InvalidValueError("robot: q0 and mounting need the robot that they belong to.")
-    arm = None if robot is None else _Arm(robot, q0, mounting, T, h, limits)
+    arm = None if robot is None else _Arm(robot, q0, mounting, h, limits)
+    place = np.eye(4) if arm is None else arm.object_at(T)  # of the object in the world
+    shift = np.eye(4)  # of the object in a step
     source = generator_of(rng)
     feature, sampled = primary.feature, arm is not None or sigma > 0.0 or tracking is not None
-    object_pose = np.eye(4)  # in the world, which without a robot is the object at the start
     estimate, own = None, np.zeros(feature.size)
     rows: list[Any] = []
     for k in range(int(np.floor(total / h + 1e-9)) + 1):
-        s = None
-        if sigma and (sight := sight_of(feature, T)).exists:
-            s = sight.s + sigma * source.normal(size=own.size)
-        v, error, _, code, pseudo = law(task, s, T, camera)
+        sight = sight_of(feature, T)
+        s = sight.s + sigma * source.normal(size=own.size) if sigma else None
+        v, error, _, code, pseudo = law(task, s, T, camera, sight)
         s, lost = error + primary.s_desired, code >= ServoStatus.OUT_OF_SIGHT
         if tracking is not None and not lost:
             estimate = tracking.update(estimate, s, own, h) if estimate else tracking.start(s)
             v = v - pseudo @ estimate.rate
-            own = primary.matrix(s, sight_of(feature, T)) @ v
-        place, q = (object_pose, None) if arm is None else (arm.camera, arm.q)
-        rows.append([k * h, T, place, q, s, error, v, code])
+            own = primary.matrix(s, sight) @ v
+        rows.append([k * h, T, place, None if arm is None else arm.q, s, error, v, code])
         if lost:
             break
         given: Any = target(k * h) if callable(target) else target
-        twist = np.zeros(6) if given is None else as_exact(given, (6,), "target")
-        shift = moved(np.eye(4), -h * twist)
-        if arm is not None:
-            T, met = arm.follow(v, T, shift)
-            rows[-1][-1] = code if met else ServoStatus.LIMITED
-        else:
+        if given is not None:
+            shift = moved(np.eye(4), -h * as_exact(given, (6,), "target"))
+        if arm is None:
             T = (moved(T, h * v) if sampled else _continued(task, T, v, h)) @ shift
-            object_pose = object_pose @ shift
-    t, T, cameras, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
-    cameras, joints = (cameras @ inverse(T), None) if arm is None else (cameras, q)
-    codes = codes.astype(np.int8)
-    return ServoMotion(task, t, T, cameras, joints, s, error, velocity, codes, camera)
+            place = place @ shift
+        else:
+            T, place, met = arm.follow(v, T, place, shift)
+            rows[-1][-1] = code if met else ServoStatus.LIMITED
+    t, T, place, q, s, error, velocity, codes = map(np.array, zip(*rows, strict=True))
+    joints, codes = None if arm is None else q, codes.astype(np.int8)
+    return ServoMotion(task, t, T, place @ inverse(T), joints, s, error, velocity, codes, camera)
 
 
 class _Arm:
-    """The robot of a simulation; it carries the camera or the object, the other is ``fixed``."""
+    """The robot of a simulation; it carries the camera, or the object in view of a fixed camera."""
 
-    def __init__(self, robot: Any, q0: Any, mounting: Any, T: Array, h: float, limits: Any) -> None:
+    def __init__(self, robot: Any, q0: Any, mounting: Any, h: float, limits: Any) -> None:
         check_model(robot)
         if q0 is None:
             raise InvalidValueError("q0: expected the joint variables of the robot at the start.")
@@ -274,57 +221,37 @@ class _Arm:
         upper = robot.upper if bounds.upper is None else bounds.upper
         if self.limits is not None and not ((lower <= self.q) & (self.q <= upper)).all():
             raise InvalidValueError(f"q0: expected joints inside the limits, got {self.q}.")
-        tool = dgm(robot, self.q)
-        self.in_hand = isinstance(mounting, EyeInHand)
-        if isinstance(mounting, EyeInHand):
-            self.held, self.fixed = mounting.T_tool_camera, tool @ mounting.T_tool_camera @ T
-        else:
-            self.held, self.fixed = (
-                inverse(tool) @ mounting.T_world_camera @ T,
-                mounting.T_world_camera,
-            )
+        self.tool, self.mounting = dgm(robot, self.q), mounting
 
-    @property
-    def camera(self) -> Array:
-        """Pose of the camera in the world."""
-        return dgm(self.model, self.q) @ self.held if self.in_hand else self.fixed
+    def object_at(self, T: Array) -> Array:
+        """Place of the object in the world, of a pose in the camera."""
+        mounting = self.mounting
+        if isinstance(mounting, EyeToHand):
+            return mounting.T_world_camera @ T
+        return self.tool @ mounting.T_tool_camera @ T
 
-    def follow(self, v: Array, T: Array, shift: Array) -> tuple[Array, bool]:
-        """Move for one step, the target by a shift: its pose, whether the velocity was met."""
-        met = bool(np.abs(v).max() < 1e-9)
-        if not self.in_hand:  # the object moves in its axes as the camera would in the other sense
-            seen = np.stack((v[:3] + np.cross(v[3:], T[:3, 3]), v[3:]))
-            v = -seen @ T[:3, :3]
-        R, p = self.held[:3, :3], self.held[:3, 3]
-        linear, angular = np.reshape(v, (2, 3)) @ R.T
-        twist = np.concatenate((linear + np.cross(p, angular), angular))
+    def follow(self, v: Array, T: Array, place: Array, shift: Array) -> tuple[Array, Array, bool]:
+        """Move for one step, the target by a shift: its pose and place, whether v was met."""
+        camera = inverse(self.tool) @ place @ inverse(T)
+        linear, angular = np.reshape(v, (2, 3)) @ camera[:3, :3].T
+        twist = np.concatenate((linear + np.cross(camera[:3, 3], angular), angular))
+        to_hand = isinstance(self.mounting, EyeToHand)
+        twist = -twist if to_hand else twist  # the object moves in the other sense
         found = ikm(self.model, self.q, twist, reference="local", limits=self.limits)
         self.q = self.q + self.h * found.v
-        met |= bool(found.status == IKMStatus.MET)
-        if self.in_hand:
-            self.fixed = self.fixed @ shift
-            return inverse(self.camera) @ self.fixed, met
-        self.held = self.held @ shift
-        return inverse(self.fixed) @ dgm(self.model, self.q) @ self.held, met
+        before, self.tool = self.tool, dgm(self.model, self.q)
+        place = (self.tool @ inverse(before) @ place if to_hand else place) @ shift
+        T = inverse(self.object_at(np.eye(4))) @ place
+        return T, place, bool(np.abs(v).max() < 1e-9 or found.status == IKMStatus.MET)
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
-    """Pose after a step of the continuous law: Munthe-Kaas' Runge-Kutta method of order 4."""
-    q1 = -h * v
-    q2 = -h * law(task, None, moved(T, -0.5 * q1))[0] - q1
-    third = moved(T, -0.5 * (q1 + q2) + 0.125 * _bracket(q1, q2))
-    q3 = -h * law(task, None, third)[0] - q1 - q2
-    q4 = -h * law(task, None, moved(T, -q1 - q2 - q3))[0] - q1 - 2.0 * q2
-    whole = q1 + q2 + q3 / 3.0 + q4 / 6.0 - _bracket(q1, q2) / 6.0 - _bracket(q1, q4) / 12.0
-    return moved(T, -whole)
-
-
-def _bracket(a: Array, b: Array) -> Array:
-    """Lie bracket of twists."""
-    (p, q, r, x, y, z), (i, j, k, u, v, w) = a.tolist(), b.tolist()
-    linear = (
-        y * k - z * j + q * w - r * v,
-        z * i - x * k + r * u - p * w,
-        x * j - y * i + p * v - q * u,
-    )
-    return np.array((*linear, y * w - z * v, z * u - x * w, x * v - y * u))
+    """Pose after a step of the continuous law by the Runge-Kutta method of order 4."""
+    rates = [rate_matrix(v) @ T]
+    for part in (0.5, 0.5, 1.0):
+        between = T + part * h * rates[-1]
+        rates.append(rate_matrix(law(task, None, between)[0]) @ between)
+    after = T + h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
+    R = after[:3, :3]
+    after[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R  # back to a rotation, to which it is close
+    return after

@@ -1,64 +1,73 @@
-"""Tasks: what a camera regulates, with which interaction matrix (section 6.3)."""
+"""Tasks: what a camera regulates, with which interaction matrix (section 6.3).
+
+Parameters
+----------
+feature : Points, Lines, Segments, Circle, Sphere, Cylinder, Moments, PoseError, ...
+    Feature of k components.
+desired : array_like, shape (k,) or (4, 4)
+    Desired measurement s*, or the desired pose of the object in the camera, which is also the
+    reference of `PoseError` and `PointAndRotation`.
+gain : float
+    Above 0, 1/s.
+interaction : {"current", "desired", "mean"}
+    Matrix of the law; "mean" is half the sum of the pseudo-inverses of the other two.
+depth : {"true", "desired"} or float
+    Of the object in the current matrix: of its pose, of the desired pose, or of an object parallel
+    to the image at this depth, m; of a sphere the depth of its centre.
+points : array_like, shape (k, 3) or (3,)
+    Points of the object, m; the first is the reference point.
+primary, secondary, weight : Task; Task, array_like (6,) or function (4, 4) -> (6,); float
+    The task that is kept; another task, a constant twist of the camera in its own axes, or a
+    function of the pose of the object, such as minus the gradient of a cost; and its weight.
+
+Returns
+-------
+Task
+    Of `task_3d` with `PoseError`, whose two errors decay by themselves; of `task_2_1_2d` with
+    `PointAndRotation`, which moves the image of a point straight to its goal.
+
+Raises
+------
+ShapeError, InvalidValueError
+    A desired value of another feature; options that need a desired pose without one.
+
+References
+----------
+Seed book sections 6.3.1 to 6.3.3; F. Chaumette, "Potential problems of stability and convergence
+in image-based and position-based visual servoing", 1998; E. Malis, "Improving vision-based control
+using efficient second-order minimization techniques", ICRA 2004; C. Samson, M. Le Borgne and
+B. Espiau, "Robot control: the task function approach", 1991.
+
+Examples
+--------
+>>> from robotmodels.se3 import translation
+>>> from robotmodels.visual_servoing import Lines, camera_velocity
+>>> line = Task(Lines([[0, 0, 0], [1, 0, 0]]), desired=translation(0, 0, 0.5))
+>>> along = Hybrid(line, [0.1, 0, 0, 0, 0, 0])
+>>> camera_velocity(along, translation(0, 0, 0.5)).v.round(6) + 0.0
+array([0.1, 0. , 0. , 0. , 0. , 0. ])
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, read_only
-from ..errors import InvalidValueError
-from ..se3 import as_single_pose, inverse
-from .features import Feature, Sight, as_measurement
-from .features_3d import PointAndRotation, PoseError, rotations
-from .results import brief
-
-_MATRICES = ("current", "desired", "mean")
+from .._arrays import Array, as_core, as_exact
+from ..errors import InvalidValueError, ShapeError
+from ..se3 import as_single_pose
+from .features import Feature, Sight, as_sensed
+from .features_3d import PointAndRotation, PoseError
+from .results import Value
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Task(Value):
-    """Regulation of a feature: ``[v; w] = -gain L^+ (s - s*)``.
-
-    Parameters
-    ----------
-    feature : Points, Lines, Segments, Circle, Sphere, Cylinder, Moments, PoseError, ...
-        Feature of k components.
-    desired : array_like, shape (k,) or (4, 4)
-        Desired measurement s*, or the desired pose of the object in the camera, which is also
-        the reference of `PoseError` and `PointAndRotation`.
-    gain : float
-        Above 0, 1/s.
-    interaction : {"current", "desired", "mean"}
-        Matrix of the law; "mean" is half the sum of the pseudo-inverses of the other two.
-    depth : {"true", "desired"} or float
-        Of the object in the current matrix: of its pose, of the desired pose, or of an object
-        parallel to the image at this depth, m; of a sphere the depth of its centre.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        A desired value of another feature; options that need a desired pose without one.
-
-    References
-    ----------
-    Seed book sections 6.3.1 and 6.3.2; F. Chaumette, "Potential problems of stability and
-    convergence in image-based and position-based visual servoing", 1998; E. Malis, "Improving
-    vision-based control using efficient second-order minimization techniques", ICRA 2004.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import Points, camera_velocity
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> task = Task(square, desired=translation(0, 0, 0.5))
-    >>> step = camera_velocity(task, translation(0, 0, 1.0))
-    >>> step.v.round(6) + 0.0, step.reason()
-    (array([0.  , 0.  , 0.5, 0.  , 0.  , 0.  ]), 'The law gives a velocity, or the error is zero.')
-    """
+    """Regulation of a feature: ``[v; w] = -gain L^+ (s - s*)``."""
 
     feature: Feature
     desired: Any
@@ -72,56 +81,57 @@ class Task(Value):
     _w: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.feature, Feature):
+        self._check("gain", "interaction", "depth")
+        feature: Any = self.feature
+        if not isinstance(feature, Feature):
             raise InvalidValueError(
                 "feature: expected a feature such as Points(...) or Lines(...), got "
-                f"{type(self.feature).__name__}."
+                f"{type(feature).__name__}."
             )
-        feature, s, T = _goal(self.feature, self.desired)
-        if not isinstance(self.interaction, str) or self.interaction not in _MATRICES:
-            words = ", ".join(_MATRICES)
+        if isinstance(self.desired, Feature | Task):
             raise InvalidValueError(
-                f"interaction: expected one of {words}, got {self.interaction!r:.40}."
+                f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} "
+                f"or a pose (4, 4), got {type(self.desired).__name__}; give its measure(T)."
             )
-        gain, depth, w = as_number(self.gain, "gain", above=0.0), self.depth, None
-        if not isinstance(depth, str):
-            depth = as_number(depth, "depth", above=0.0)
-            w = feature._parallel(depth)
-        elif depth not in ("true", "desired"):
+        s, is_pose = as_sensed(self.desired, feature, "desired")
+        T, w, L = None, None, None
+        if is_pose:
+            T = as_single_pose(s, "desired")
+            if isinstance(feature, PoseError | PointAndRotation):
+                feature = replace(feature, desired=T)
+            s = feature.measure(T)
+        elif s.ndim > 1:
+            raise ShapeError(f"desired: expected one measurement, got shape {s.shape}.")
+        if not isinstance(self.depth, str):
+            w = feature._parallel(self.depth)
+        needs_pose = self.depth == "desired" or (self.interaction != "current" and w is None)
+        if T is None and needs_pose and feature.depends_on_depth:
             raise InvalidValueError(
-                f'depth: expected "true", "desired" or metres above 0, got {depth!r:.40}.'
+                f"desired: interaction={self.interaction!r} with depth={self.depth!r} needs the "
+                "depth of the desired pose; give desired as a pose (4, 4), or depth in metres."
             )
-        needed = feature.depends_on_depth and (
-            depth == "desired" or (self.interaction != "current" and w is None)
-        )
-        if T is None and needed:
-            raise InvalidValueError(
-                f"desired: interaction={self.interaction!r} with depth={depth!r} needs the depth "
-                "of the desired pose; give desired as a pose (4, 4), or depth in metres."
-            )
-        if depth == "desired":
-            w = None if T is None else feature._see(T).depth
-        L = None
+        if self.depth == "desired" and T is not None:
+            w = feature._see(T).depth
         if self.interaction != "current":
             L = feature._rows(s, w) if T is None else feature.interaction(T)
         periods = feature._periods() if feature._periods().any() else None
-        values = {"feature": feature, "desired": s if T is None else T, "gain": gain}
-        values |= {
-            "depth": depth,
-            "s_desired": s,
-            "periods": periods,
-            "T_desired": T,
-            "L_desired": L,
-            "_w": w,
-        }
-        for name, value in values.items():
-            given = read_only(value) if isinstance(value, np.ndarray) else value
-            object.__setattr__(self, name, given)
+        derived = {"s_desired": s, "T_desired": T, "L_desired": L, "periods": periods, "_w": w}
+        given = {"feature": feature, "desired": s if T is None else T}
+        for name, value in (given | derived).items():
+            self._set(name, value)
 
     @property
     def regulated(self) -> Task:
         """The task itself; of a `Hybrid` its primary task."""
         return self
+
+    def error(self, s: Array) -> Array:
+        """Difference of a measurement (k,) from the desired one, angles in their period."""
+        error = s - self.s_desired
+        if self.periods is None:
+            return error
+        whole = np.where(self.periods > 0.0, self.periods, 1.0)
+        return error - self.periods * np.round(error / whole)
 
     def matrix(self, s: Array, sight: Sight | None) -> Array:
         """Current interaction matrix (k, 6) of a measurement, and of the sight if it is known."""
@@ -135,88 +145,12 @@ class Task(Value):
             w = sight.depth
         return self.feature._rows(s, w, image)
 
-    def __repr__(self) -> str:
-        return brief(self)
-
-
-def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
-    """Position-based (3-D) visual servoing: a `Task` whose two errors decay by themselves.
-
-    Parameters
-    ----------
-    desired : array_like, shape (4, 4)
-        Desired pose of the object in the camera.
-    gain : float
-        Above 0, 1/s.
-
-    Returns
-    -------
-    Task
-        With the feature `PoseError`; see sections 6.2.5.2 and 6.3.2.1.
-
-    Examples
-    --------
-    >>> task_3d(np.eye(4)).feature.size
-    6
-    """
-    return Task(PoseError(), as_single_pose(desired, "desired"), gain)
-
-
-def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
-    """2 1/2-D visual servoing: a `Task` that moves the image of a point straight to its goal.
-
-    Parameters
-    ----------
-    points : array_like, shape (k, 3) or (3,)
-        Points of the object, m; the first is the reference point.
-    desired, gain
-        As of `task_3d`.
-
-    Returns
-    -------
-    Task
-        With the feature `PointAndRotation`; see section 6.3.2.1.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> task_2_1_2d([0.1, 0.0, 0.0], translation(0, 0, 0.5)).s_desired[:2]
-    array([0.2, 0. ])
-    """
-    first = as_core(points, (3,), "points").reshape(-1, 3)[0]
-    T = as_single_pose(desired, "desired")
-    return Task(PointAndRotation(first, T), T, gain)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hybrid(Value):
-    """A primary task, and a secondary motion in what the primary task leaves free.
+    """A primary task, and a secondary motion z in what it leaves free.
 
-    ``[v; w] = primary + weight (I - L^+ L) secondary``.
-
-    Parameters
-    ----------
-    primary : Task
-        The task that is kept.
-    secondary : Task, array_like of shape (6,), or function of the pose (4, 4) -> (6,)
-        Another task, a constant twist of the camera in its own axes, or a function of the pose
-        of the object in the camera, such as minus the gradient of a cost.
-    weight : float
-        Of the secondary motion.
-
-    References
-    ----------
-    Seed book section 6.3.3.2; C. Samson, M. Le Borgne and B. Espiau, "Robot control: the task
-    function approach", 1991.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import Lines, camera_velocity
-    >>> line = Task(Lines([[0, 0, 0], [1, 0, 0]]), desired=translation(0, 0, 0.5))
-    >>> along = Hybrid(line, [0.1, 0, 0, 0, 0, 0])
-    >>> camera_velocity(along, translation(0, 0, 0.5)).v.round(6) + 0.0
-    array([0.1, 0. , 0. , 0. , 0. , 0. ])
+    ``[v; w] = primary + weight (I - L^+ L) z``.
     """
 
     primary: Task
@@ -224,41 +158,26 @@ class Hybrid(Value):
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        self._check("weight")
         if not isinstance(self.primary, Task):
             got = type(self.primary).__name__
             raise InvalidValueError(f"primary: expected a Task, got {got}.")
         if not isinstance(self.secondary, Task | Callable):
-            twist = read_only(as_exact(self.secondary, (6,), "secondary"))
-            object.__setattr__(self, "secondary", twist)
-        object.__setattr__(self, "weight", as_number(self.weight, "weight"))
+            self._set("secondary", as_exact(self.secondary, (6,), "secondary"))
 
     @property
     def regulated(self) -> Task:
         """The primary task."""
         return self.primary
 
-    def __repr__(self) -> str:
-        return brief(self)
+
+def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
+    """Position-based (3-D) visual servoing."""
+    return Task(PoseError(), as_single_pose(desired, "desired"), gain)
 
 
-def _goal(feature: Feature, desired: Any) -> tuple[Feature, Array, Array | None]:
-    """Feature, desired measurement, and desired pose where one is given."""
-    if isinstance(desired, Feature | Task):
-        raise InvalidValueError(
-            f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} or a "
-            f"pose (4, 4), got {type(desired).__name__}; give its measure(T)."
-        )
-    if hasattr(desired, "homogeneous") or as_floats(desired, "desired").shape == (4, 4):
-        T = as_single_pose(desired, "desired")
-    else:
-        s = as_exact(as_measurement(desired, feature, "desired"), (feature.size,), "desired")
-        if not isinstance(feature, PoseError):
-            return feature, s, None
-        M = np.eye(4)
-        M[:3, :3], M[:3, 3] = rotations(s[3:]), s[:3]
-        T = inverse(M) if feature.desired is None else inverse(M) @ feature.desired
-    if isinstance(feature, PoseError):
-        feature = PoseError(T)
-    if isinstance(feature, PointAndRotation):
-        feature = PointAndRotation(feature.point, T)
-    return feature, feature.measure(T), T
+def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
+    """2 1/2-D visual servoing."""
+    first = as_core(points, (3,), "points").reshape(-1, 3)[0]
+    T = as_single_pose(desired, "desired")
+    return Task(PointAndRotation(first, T), T, gain)

@@ -1,4 +1,34 @@
-"""Tracking of a moving target: estimation of the motion that the camera does not cause."""
+"""Tracking of a moving target: estimation of the motion that the camera does not cause.
+
+The rate of s by the target is ``(s_k - s_{k-1}) / step - L [v; w]``.
+
+Parameters
+----------
+kalman : bool
+    Whether a Kalman filter with constant slope filters the differences, or they are used as they
+    are.
+process, noise : float
+    Standard deviations: of the change of the slope in one second, 1/s^2 per root second; of a
+    component of s.
+s, rate, slope : ndarray, shape (k,)
+    Last measurement, its rate by the target per s, and the slope of the rate per s^2.
+covariance : ndarray, shape (2, 2)
+    Of rate and slope, the same for every component.
+
+References
+----------
+Seed book section 6.3.4; P. Corke and M. Good, "Dynamic effects in visual closed-loop systems",
+IEEE Trans. Robotics and Automation 12(5), 1996.
+
+Examples
+--------
+>>> tracker = TargetMotion()
+>>> found = tracker.start([0.0])
+>>> for k in range(1, 200):
+...     found = tracker.update(found, [0.02 * k * 0.3], [0.0], 0.02)
+>>> found.rate.round(6)
+array([0.3])
+"""
 
 from __future__ import annotations
 
@@ -7,22 +37,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_floats, as_number
+from .._arrays import Array, as_exact, as_floats, as_number
 from ..errors import InvalidValueError
-from .results import Result
+from .results import Result, Value
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TargetEstimate(Result):
-    """Estimate of a target: last s (k,), its rate by the target, the slope of the rate, covariance.
-
-    Parameters
-    ----------
-    s, rate, slope : ndarray, shape (k,)
-        Units of s, per s, per s^2.
-    covariance : ndarray, shape (2, 2)
-        Of rate and slope, the same for every component.
-    """
+    """Estimate of the motion of a target."""
 
     s: Array
     rate: Array
@@ -30,49 +52,18 @@ class TargetEstimate(Result):
     covariance: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TargetMotion(Value):
-    """Estimation of the rate of s by a moving target: of ``(s_k - s_{k-1}) / step - L [v; w]``.
-
-    Parameters
-    ----------
-    kalman : bool
-        Whether a Kalman filter with constant slope filters the differences; otherwise they are
-        used as they are.
-    process : float
-        Standard deviation of the change of the slope in one second, 1/s^2 per root second.
-    noise : float
-        Standard deviation of a component of s.
-
-    References
-    ----------
-    Seed book section 6.3.4; P. Corke and M. Good, "Dynamic effects in visual closed-loop systems",
-    IEEE Trans. Robotics and Automation 12(5), 1996.
-
-    Examples
-    --------
-    >>> tracker = TargetMotion()
-    >>> found = tracker.start([0.0])
-    >>> for k in range(1, 200):
-    ...     found = tracker.update(found, [0.02 * k * 0.3], [0.0], 0.02)
-    >>> found.rate.round(6)
-    array([0.3])
-    """
+    """Estimation of the rate of a measurement by a moving target."""
 
     kalman: bool = True
     process: float = 1.0
     noise: float = 1e-4
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.kalman, bool | np.bool_):
-            raise InvalidValueError(f"kalman: expected True or False, got {self.kalman!r:.40}.")
-        for name in ("process", "noise"):
-            object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
-
     def start(self, s: ArrayLike) -> TargetEstimate:
         """Estimate before any motion was seen, of a measurement s (k,)."""
         s = as_floats(s, "s")
-        return TargetEstimate(s, 0.0 * s, 0.0 * s, np.diag((1.0, 1.0)))
+        return TargetEstimate(s, 0.0 * s, 0.0 * s, np.eye(2))
 
     def update(
         self, last: TargetEstimate, s: ArrayLike, own: ArrayLike, step: float

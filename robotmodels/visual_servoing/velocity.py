@@ -1,29 +1,66 @@
-"""Velocity of the camera for one measurement, and a status that states what it achieves."""
+"""Velocity of the camera that regulates a task, and a status that states what it achieves.
+
+Parameters
+----------
+task : Task or Hybrid
+    The task, k components.
+measurement : array_like, shape (..., k) or (..., 4, 4)
+    Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
+camera : Camera, optional
+    Whose image has to contain the object.
+f, T : Points, Lines, ..., and array_like of shape (..., 4, 4)
+    Feature that is kept by a virtual link, and poses of its object in the camera.
+
+Returns
+-------
+ServoStep or VirtualLink
+    Velocity, error, rank and status; or the motions that leave the feature unchanged.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    A measurement of another feature, NaN, a matrix that is not a pose, a pose at which the feature
+    of a virtual link does not exist.
+
+References
+----------
+Seed book sections 6.3.2 and 6.3.3.
+
+Examples
+--------
+>>> from robotmodels.se3 import rotation, translation
+>>> from robotmodels.visual_servoing import Points, Sphere
+>>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+>>> goal = translation(0, 0, 0.5)
+>>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
+array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
+>>> virtual_link(Sphere([0, 0, 0], 0.2), translation(0, 0, 1)).name
+'ball joint'
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_exact, as_floats, read_only
+from .._arrays import Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-from ..se3 import as_pose
 from .camera import Camera
-from .features import Feature, Sight, as_measurement, wrapped
-from .results import Result, code_of
+from .features import Feature, as_sensed, sight_of
+from .results import Result, packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
 """Singular values of an interaction matrix up to this part of the largest are zero."""
 _ZERO = 1e-10  # error of a task that is met
 _REDUCIBLE = 1e-3  # part of the error below which a velocity cannot reduce it
-_NEARBY = 0.05 * np.random.default_rng(0).normal(size=(3, 6))  # motions off a singular pose
 
 
 class ServoStatus(Outcome):
@@ -32,34 +69,14 @@ class ServoStatus(Outcome):
     With the current matrix at true depths the velocity of ``CONVERGES`` reduces the error. With
     other matrices or depths the error may grow, as with the desired matrix of an object that is
     turned by more than a quarter.
-
-    Attributes
-    ----------
-    sentence : str
-        The meaning of the code.
-
-    Examples
-    --------
-    >>> ServoStatus.BEHIND.sentence
-    'A part of the object is not in front of the plane of the camera, or is seen edge-on.'
     """
 
     CONVERGES = 0, "The law gives a velocity, or the error is zero."
-    AT_MINIMUM = (
-        1,
-        "The error is not zero, yet no velocity of this law reduces it: a local minimum.",
-    )
+    AT_MINIMUM = 1, "The error is not zero, yet no velocity of the law reduces it: a local minimum."
     SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
-    BEHIND = (
-        4,
-        "A part of the object is not in front of the plane of the camera, or is seen edge-on.",
-    )
-    LIMITED = (
-        5,
-        "The robot cannot give the camera the velocity of the law: its joints are at their limits, "
-        "its posture is singular, or it has too few joints.",
-    )
+    BEHIND = 4, "A part of the object is not in front of the camera, or is seen edge-on."
+    LIMITED = 5, "The robot cannot follow: limits of joints, a singular posture, too few joints."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -68,86 +85,36 @@ class ServoStep(Result):
 
     Parameters
     ----------
-    v : ndarray, shape (..., 6)
-        Twist [v; w] of the camera in its own axes, m/s and rad/s; zero for an object that is
-        behind the camera or out of sight.
-    error : ndarray, shape (..., k)
-        ``s - s*``; NaN for an object behind the camera.
-    rank : int or ndarray, shape (...)
-        Rank of the matrix of the law.
-    status : ServoStatus, or ndarray of int8, shape (...)
-        What the velocity achieves.
-
-    Examples
-    --------
-    >>> ServoStep(np.zeros(6), np.zeros(8), 6, ServoStatus.CONVERGES).reason()
-    'The law gives a velocity, or the error is zero.'
+    v, error : ndarray, shapes (..., 6) and (..., k)
+        Twist [v; w] of the camera in its own axes, m/s and rad/s, zero for an object that is
+        behind the camera or out of sight; ``s - s*``, NaN behind the camera.
+    rank, status : int and ServoStatus, or ndarrays of int8, shape (...)
+        Rank of the matrix of the law; what the velocity achieves.
     """
 
     v: Array
     error: Array
     rank: int | NDArray[np.int8]
     status: ServoStatus | NDArray[np.int8]
+    _outcome = ServoStatus
 
     def __post_init__(self) -> None:
         self.v.flags.writeable = self.error.flags.writeable = False  # quicker than copies
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status, of row i in a batch."""
-        return ServoStatus(code_of(self.status, i)).sentence
 
 
 def camera_velocity(
     task: Task | Hybrid, measurement: Any, camera: Camera | None = None
 ) -> ServoStep:
-    """Velocity of the camera that regulates a task.
-
-    Parameters
-    ----------
-    task : Task or Hybrid
-        The task, k components.
-    measurement : array_like, shape (..., k) or (..., 4, 4)
-        Measured s, or the pose of the object in the camera, which ``depth="true"`` needs.
-    camera : Camera, optional
-        Whose image has to contain the object.
-
-    Returns
-    -------
-    ServoStep
-        Velocity, error, rank and status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        A measurement of another feature, NaN, a matrix that is not a pose.
-
-    References
-    ----------
-    Seed book sections 6.3.2 and 6.3.3.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation, translation
-    >>> from robotmodels.visual_servoing import Points
-    >>> square = Points([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
-    >>> goal = translation(0, 0, 0.5)
-    >>> camera_velocity(Task(square, goal), goal @ rotation("z", np.pi)).v.round(6) + 0.0
-    array([ 0. ,  0. , -0.5,  0. ,  0. ,  0. ])
-    >>> camera_velocity(Task(square, goal, interaction="mean"), goal @ rotation("z", np.pi)).status
-    <ServoStatus.SINGULAR: 2>
-    """
-    if not isinstance(task, Task | Hybrid):
-        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
-    if camera is not None and not isinstance(camera, Camera):
-        raise InvalidValueError(f"camera: expected a Camera, got {type(camera).__name__}.")
+    """Velocity of the camera that regulates a task."""
+    check_kinds(task, camera=(camera, Camera))
     feature = task.regulated.feature
-    given, is_pose = _sensed(feature, measurement)
+    given, is_pose = as_sensed(measurement, feature, "measurement")
     core = 2 if is_pose else 1
-    if given.ndim == core:
-        return ServoStep(*law(task, *((None, given) if is_pose else (given, None)), camera)[:4])
     batch = given.shape[:-core]
-    rows = given.reshape(math.prod(batch), *given.shape[-core:])
+    rows = [given] if not batch else given.reshape(math.prod(batch), *given.shape[-core:])
     found = [law(task, *((None, x) if is_pose else (x, None)), camera)[:4] for x in rows]
+    if not batch:
+        return ServoStep(*found[0])
     v, error, ranks, codes = zip(*found, strict=True) if found else ((),) * 4
     return ServoStep(
         np.reshape(v, (*batch, 6)), np.reshape(error, (*batch, feature.size)),
@@ -155,20 +122,28 @@ def camera_velocity(
     )  # fmt: skip
 
 
+def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
+    """Raise for what is no task, and for options of another kind."""
+    if not isinstance(task, Task | Hybrid):
+        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    for name, (value, kind) in given.items():
+        if value is not None and not isinstance(value, kind):
+            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
+
+
 def law(
-    task: Task | Hybrid, s: Array | None, T: Array | None, camera: Camera | None = None
+    task: Task | Hybrid, s: Any, T: Array | None, camera: Camera | None = None, sight: Any = None
 ) -> tuple[Array, Array, int, ServoStatus, Array]:
     """Velocity, error, rank, status and pseudo-inverse (6, k) of a measurement, a pose or both."""
     primary = task.regulated
     feature, L_desired = primary.feature, primary.L_desired
-    sight = None if T is None else sight_of(feature, T)
+    if sight is None and T is not None:
+        sight = sight_of(feature, T)
     if sight is not None and not sight.exists:
         nothing = np.full(feature.size, np.nan)
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     measured: Any = sight.s if s is None and sight is not None else s
-    error = measured - primary.s_desired
-    if primary.periods is not None:
-        error = wrapped(error, primary.periods)
+    error = primary.error(measured)
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
     inverse, rank = own, _ = pseudo_inverse(A)
@@ -179,9 +154,7 @@ def law(
     size = math.sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
-        if rank < min(A.shape) and _loses_rank(
-            feature, primary.T_desired if T is None else T, rank
-        ):
+        if rank < min(A.shape) and rank < _generic_rank(feature):
             status = ServoStatus.SINGULAR
         elif math.sqrt(seen @ seen) <= _REDUCIBLE * size:
             status = ServoStatus.AT_MINIMUM
@@ -197,46 +170,26 @@ def law(
     return v, error, rank, status, inverse
 
 
-def sight_of(feature: Feature, T: Array) -> Sight:
-    """Sight of an object that may be behind the camera."""
-    with np.errstate(all="ignore"):
-        return feature._see(T)
-
-
-@cache
-def _decompositions() -> Any:
-    """The kernel of singular values, imported when it is first used."""
-    from ..kernels.svd import decompositions
-
-    return decompositions
-
-
 def pseudo_inverse(A: Array) -> tuple[Array, int]:
     """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
-    m, n = A.shape
-    p = min(m, n)
-    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, n, p))
-    _decompositions()(np.ascontiguousarray(A[None]), U, S, V)
+    from ..kernels.svd import decompositions
+
+    m, p = A.shape[0], min(A.shape)
+    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, A.shape[1], p))
+    decompositions(np.ascontiguousarray(A[None]), U, S, V)
     sizes = S[0].tolist()
     rank = sum(size > RANK_TOLERANCE * sizes[0] for size in sizes)
     return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
 
 
-def _loses_rank(feature: Feature, T: Array | None, rank: int) -> bool:
-    """Whether the rank is less than at poses nearby."""
-    T = _somewhere(feature) if T is None else T
-    reach = np.repeat((float(np.linalg.norm(T[:3, 3])), 1.0), 3)
-    poses = [moved(T, twist * reach) for twist in _NEARBY]
-    seen = [nearby for nearby in poses if sight_of(feature, nearby).exists]
-    return any(pseudo_inverse(feature.interaction(nearby))[1] > rank for nearby in seen)
-
-
 @lru_cache(maxsize=64)
-def _somewhere(feature: Feature) -> Array:
-    """A pose at which a feature exists."""
-    turns = [moved(np.eye(4), twist) for twist in 20.0 * _NEARBY]
-    poses = [moved(R, np.eye(6)[2] * -(10.0**k)) for k in range(-2, 8) for R in turns]
-    return next((T for T in poses if sight_of(feature, T).exists), np.eye(4))
+def _generic_rank(feature: Feature) -> int:
+    """Rank of the interaction matrix where it is not singular: its largest at random poses."""
+    T = np.tile(np.eye(4), (10, 8, 1, 1))
+    T[..., :3, :3] = Rotation.random(8, random_state=0).as_matrix()
+    T[..., 2, 3] = 10.0 ** np.arange(-2.0, 8.0)[:, None]
+    L = feature.interaction(T[sight_of(feature, T).exists])
+    return int(np.linalg.matrix_rank(L, rtol=RANK_TOLERANCE).max(initial=0))
 
 
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
@@ -256,47 +209,61 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
     return as_exact(asked, (6,), "secondary(T)")
 
 
-def _sensed(feature: Feature, measurement: Any) -> tuple[Array, bool]:
-    """Checked measurements or poses, and whether they are poses."""
-    given = getattr(measurement, "homogeneous", measurement)
-    shape = given.shape if type(given) is np.ndarray else as_floats(given, "measurement").shape
-    if shape[-2:] == (4, 4):
-        if type(measurement) is np.ndarray and len(shape) == 2 and _is_exact(measurement):
-            return measurement, True
-        four = feature.size == 4 and len(shape) == 2  # may be four measurements
-        if not four or np.array_equal(np.asarray(measurement)[3], (0.0, 0.0, 0.0, 1.0)):
-            return as_pose(measurement, "measurement"), True
-    return as_measurement(measurement, feature, "measurement"), False
-
-
-def _is_exact(T: Array) -> bool:
-    """Whether a matrix is a pose to rounding: a quick answer for control loops."""
-    if T.dtype != np.float64:
-        return False
-    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
-    off = (
-        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),
-        *(a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i),
-        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) - 1.0,
-    )
-    rounding = all(-1e-12 < number < 1e-12 for number in off)
-    return rounding and math.isfinite(x + y + z) and last == [0.0, 0.0, 0.0, 1.0]
+def rate_matrix(v: Array) -> Array:
+    """M of ``dT/dt = M T``, the motion of what stands still, seen by a camera with the twist v."""
+    a, b, c, x, y, z = v.tolist()
+    return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4))
 
 
 def moved(T: Array, twist: Array) -> Array:
     """Pose of the object after the camera has moved by a constant twist for 1 s."""
-    v, w = -twist[:3], -twist[3:]
-    square = float(w @ w)
-    if square < 1e-8:
-        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    else:
+    M, square = rate_matrix(twist), float(twist[3:] @ twist[3:])
+    b, c = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    if square > 1e-8:
         angle = math.sqrt(square)
-        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
-        c = (1.0 - a) / square
-    x, y, z = w.tolist()
-    W = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    WW = W @ W
-    after = np.eye(4)
-    after[:3, :3] += a * W + b * WW
-    after[:3, 3] = v + b * (W @ v) + c * (WW @ v)
-    return after @ T
+        b, c = 2.0 * (math.sin(0.5 * angle) / angle) ** 2, (1.0 - math.sin(angle) / angle) / square
+    MM = M @ M
+    return T + (M + b * MM + c * (M @ MM)) @ T
+
+
+_LINKS = {
+    (0, 0): "rigid", (1, 1): "prismatic", (1, 0): "revolute", (2, 1): "cylindrical joint",
+    (3, 2): "planar joint", (3, 0): "ball joint", (4, 2): "line contact",
+    (4, 1): "sphere in a cylinder", (5, 2): "point contact", (6, 3): "free",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class VirtualLink(Result):
+    """The motions of a camera that leave a feature unchanged at a pose (section 6.3.3.1).
+
+    Parameters
+    ----------
+    link_class, rank : int, or ndarray, shape (...)
+        Dimension of the motions, 6 - rank; rank of the interaction matrix.
+    kernel_twists : ndarray, shape (..., class, 6)
+        Orthonormal twists [v; w] of the camera in its own axes; missing rows of a batch are NaN.
+    name : str, or ndarray, shape (...)
+        Of the mechanical link with as many rotations and translations, "" for others.
+    """
+
+    link_class: int | NDArray[np.int64]
+    rank: int | NDArray[np.int64]
+    kernel_twists: Array
+    name: str | NDArray[np.str_] = ""
+
+
+def virtual_link(f: Feature, T: ArrayLike) -> VirtualLink:
+    """Virtual link between a camera and an object: the kernel of the interaction matrix."""
+    if not isinstance(f, Feature):
+        raise InvalidValueError(f"f: expected a feature, got {type(f).__name__}.")
+    _, sizes, Vt = np.linalg.svd(f.interaction(T))
+    rank = (sizes > RANK_TOLERANCE * sizes[..., :1]).sum(axis=-1)
+    free, motions = np.arange(6) >= rank[..., None], 6 - rank
+    turns = np.where(free[..., None], Vt[..., 3:], 0.0)
+    shifts = motions - np.linalg.matrix_rank(turns, tol=1e-6)
+    kernel = packed(free, Vt)[1]
+    names = [_LINKS.get(pair, "") for pair in zip(motions.flat, shifts.flat, strict=True)]
+    if not motions.ndim:
+        return VirtualLink(int(motions), int(rank), kernel, names[0])
+    return VirtualLink(motions, rank, kernel, np.reshape(np.array(names, str), motions.shape))

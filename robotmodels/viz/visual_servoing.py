@@ -1,18 +1,35 @@
 """Pictures of visual servoing: image paths, errors, velocities, path and view of the camera.
 
-``title`` is a text over the figure, ``size`` its width and height in inches, shape (2,).
-
 Parameters
 ----------
 run : ServoMotion
     Result of `servo`.
+title, size : str and array_like of shape (2,), optional
+    Text over the figure; its width and height in inches.
+model : RobotModel, optional
+    The robot of the run; it moves, and a camera on its tool moves with it.
+height, dark : int and bool
+    Of the picture in a notebook, pixels; whether the background is dark.
+
+Returns
+-------
+matplotlib.figure.Figure or Scene
+    A scene shows itself in a notebook; ``.save("servo.html")`` writes one offline page.
 
 Raises
 ------
-ShapeError, InvalidValueError
-    Arguments that do not fit.
-MissingExtraError
-    A package that draws is not installed.
+ShapeError, InvalidValueError, MissingExtraError
+    Arguments that do not fit; a package that draws is not installed.
+
+Examples
+--------
+>>> from robotmodels.se3 import translation
+>>> from robotmodels.visual_servoing import servo, task_3d
+>>> run = servo(task_3d(translation(0, 0, 0.5)), translation(0.1, 0, 1), duration=2.0)
+>>> [axes.get_xlabel() for axes in plot_servo(run).axes]
+['x (1)', 'time (s)', 'time (s)', 'x (m)']
+>>> show_servo(run)
+<Scene 'visual servoing': 12 shapes>
 """
 
 from __future__ import annotations
@@ -44,6 +61,9 @@ if TYPE_CHECKING:
 
 _DARK: Color = (0.10, 0.10, 0.10, 1.0)
 _LAST: Color = (0.80, 0.10, 0.45, 1.0)
+_SQUARE = np.array(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+_VIEW = Sensor(1.0, (0.4, 0.3), (0.8, 0.6))  # type: ignore[arg-type]
+"""Drawn for runs without a camera."""
 
 
 @style.plot
@@ -53,19 +73,7 @@ def plot_servo(
     """Image paths, errors and velocities over time, and the path of the camera.
 
     Circles are the start, crosses the goal. Pixels with the camera of the run, otherwise
-    normalised coordinates; features without points have no image paths.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import servo, task_3d
-    >>> run = servo(task_3d(translation(0, 0, 0.5)), translation(0.1, 0, 1), duration=2.0)
-    >>> [axes.get_xlabel() for axes in plot_servo(run).axes]
-    ['x (1)', 'time (s)', 'time (s)', 'x (m)']
+    normalised coordinates; features without points show their centre.
     """
     style.as_instance(run, ServoMotion, "run", "servo")
     figure, grid = style.panels(PAGE, 5.4, size, 2, 2)
@@ -107,30 +115,7 @@ def plot_servo(
 def show_servo(
     run: ServoMotion, model: RobotModel | None = None, *, height: int = 480, dark: bool = False
 ) -> Scene:
-    """Scene with the object, the camera's view and path, the robot, and the image beside.
-
-    Parameters
-    ----------
-    model : RobotModel, optional
-        The robot of the run; it moves, and a camera on its tool moves with it.
-    height : int
-        Of the picture in a notebook, pixels.
-    dark : bool
-        Whether the background is dark.
-
-    Returns
-    -------
-    Scene
-        Shows itself in a notebook; ``.save("servo.html")`` writes one offline page.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.visual_servoing import servo, task_3d
-    >>> run = servo(task_3d(translation(0, 0, 0.5)), translation(0.1, 0, 1), duration=2.0)
-    >>> show_servo(run)
-    <Scene 'visual servoing': 12 shapes>
-    """
+    """Scene with the object, the camera's view and path, the robot, and the image beside."""
     style.as_instance(run, ServoMotion, "run", "servo")
     places, track = object_points(run), run.cameras[:, :3, 3]
     points = np.concatenate((places, track))
@@ -154,14 +139,11 @@ def show_servo(
         Node(f"{path}/view", np.eye(4), Segments(view), _DARK),
         Node("goal", run.cameras[-1], Segments(view), _LAST),
         *path_node("camera", track, size),
-        *(
-            Node(
-                f"object/{k + 1}", se3.translation(*place), Box((body, body, body)), PALETTE[k % 16]
-            )
-            for k, place in enumerate(places)
-        ),
         *beside,
     ]
+    for k, place in enumerate(places):
+        cube = Box((body, body, body))
+        nodes.append(Node(f"object/{k + 1}", se3.translation(*place), cube, PALETTE[k % 16]))
     points = np.concatenate((points, corners))
     nodes += floor_grid(points, dark)
     return Scene("visual servoing", tuple(nodes), framed(points), motion, height, dark=dark)
@@ -169,10 +151,8 @@ def show_servo(
 
 def frustum(camera: Sensor | None, depth: float) -> Array:
     """Edges of the pyramid that a camera sees, pairs of points (16, 3) in its axes."""
-    if camera is None:
-        corners = np.array(((-0.4, -0.3), (0.4, -0.3), (0.4, 0.3), (-0.4, 0.3)))
-    else:
-        corners = camera.normalise(np.array(((0, 0), (1, 0), (1, 1), (0, 1))) * camera.size)
+    camera = camera or _VIEW
+    corners = camera.normalise(_SQUARE * camera.size)
     far = depth * np.c_[corners, np.ones(4)]
     sides = np.stack((np.zeros((4, 3)), far), axis=1)
     return np.concatenate((sides, np.stack((far, np.roll(far, -1, axis=0)), axis=1))).reshape(-1, 3)
@@ -218,8 +198,7 @@ def _image_beside(run: ServoMotion, points: Array, size: float) -> tuple[list[No
         upright = corner + np.c_[flat[:, 0], np.zeros(len(flat)), -flat[:, 1]]
         return Node(f"image/{name}", np.eye(4), Segments(upright), color)
 
-    square = np.array(((0, 0), (1, 0), (1, 1), (0, 1)))
-    border = first + span * square
+    border = first + span * _SQUARE
     nodes = [drawn("border", np.stack((border, np.roll(border, -1, axis=0)), axis=1), _DARK)]
     for k, path in enumerate(paths.swapaxes(0, 1)):
         path = path[~np.isnan(path[:, 0])]
