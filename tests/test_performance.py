@@ -377,7 +377,7 @@ def test_cuspidal_arms_with_six_joints(name):
 
 
 def test_the_bound_holds_for_random_pairs():
-    from robotmodels.performance.certificate import bound_of
+    from robotmodels.performance.singularity import bound_of
 
     rng = np.random.default_rng(5)
     for arm in (WENGER, rm.load("crx10ia"), rm.load("ur5e"), rm.load("lab_rrt")):
@@ -391,7 +391,7 @@ def test_the_bound_holds_for_random_pairs():
 
 
 def test_bound_of_the_proof():
-    from robotmodels.performance.certificate import bound_of, certified
+    from robotmodels.performance.singularity import bound_of, certified
 
     bound = bound_of(TWO, np.array(PLANE, bool))
     assert certified(bound, np.array([[0.0, 0.5], [1.0, -0.5]])) == 0.0
