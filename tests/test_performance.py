@@ -1,6 +1,10 @@
 """Workspaces, singular curves, aspects, cuspidality: published results, identities, refusals."""
 
+import gc
 import pickle
+import weakref
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -650,3 +654,57 @@ def test_an_orientation_of_a_redundant_arm_is_not_counted():
 def test_arguments_that_would_be_ignored_are_refused(call):
     with pytest.raises(InvalidValueError, match="expected"):
         call()
+
+
+# --- long calls ----------------------------------------------------------------------------------
+
+
+LONG = {
+    "workspace": lambda **o: pf.workspace(rm.load("puma560"), resolution=25, **o),
+    "primary": lambda **o: pf.workspace(TWO, "primary", mask=PLANE, resolution=20, **o),
+    "accessibility": lambda **o: pf.accessibility(TWO, rm.dgm(TWO, np.ones((40000, 2))), **o),
+    "aspects": lambda **o: pf.aspects(WENGER, **o),
+    "free_components": lambda **o: pf.free_components(TWO, Sphere([1.0, 0.4, 0.0], 0.2), **o),
+    "regions": lambda **o: pf.regions(TWO, "t", pf.workspace(TWO, resolution=20), **o),
+    "cuspidality": lambda **o: pf.cuspidality(WENGER, poses=5, **o),
+    "dexterity_map": lambda **o: pf.dexterity_map(
+        WENGER, pf.workspace(WENGER, resolution=150), **o
+    ),
+    "global_index": lambda **o: pf.global_index(TWO, "manipulability", "joints", **o),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_calls_are_the_same_with_many_workers_and_report_progress(name, pools):
+    done = []
+    alone = LONG[name](progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == pytest.approx(1.0) or name == "cuspidality"
+    for pool in pools:
+        assert LONG[name](executor=pool) == alone
+
+
+@pytest.fixture(scope="module")
+def pools():
+    with (
+        ThreadPoolExecutor(3) as threads,
+        ProcessPoolExecutor(2, get_context("spawn")) as processes,
+    ):
+        yield threads, processes
+
+
+@pytest.mark.parametrize("option", [{"executor": 4}, {"progress": True}])
+def test_workers_of_the_wrong_kind_are_refused(option):
+    with pytest.raises(InvalidValueError, match="expected a"):
+        pf.aspects(TWO, **option)
+
+
+def test_caches_keep_no_model_alive():
+    arm = three(2, 1.5, 1)
+    assert pf.workspace(arm, resolution=5).area > 0.0
+    pf.aspects(arm, resolution=30)
+    pf.nodes(arm)
+    gone = weakref.ref(arm)
+    del arm
+    gc.collect()
+    assert gone() is None

@@ -28,8 +28,6 @@ Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 T = TypeVar("T")
 PLACE = np.repeat((True, False), 3)
-_MOST_BYTES = 1e9
-_CELL_BYTES = 170
 _SLACK = 1e-9  # rad or m, of limits
 
 
@@ -190,8 +188,6 @@ class SectionArm:
     columns: Ints
     local: Array
     frame: Array
-    flip: Array
-    shift: Array
     size: float
 
     @property
@@ -210,9 +206,6 @@ class SectionArm:
 
         out = np.empty((len(x), VALUES))
         section_values(self.kinds, self.local, np.ascontiguousarray(x), out)
-        out[:, :2] = out[:, :2] @ self.flip.T + self.shift
-        A = self.flip @ out[:, 2:6].reshape(-1, 2, 2)
-        out[:, 2:6] = A.reshape(-1, 4)
         return out
 
     def world(self, section: Array) -> Array:
@@ -265,27 +258,23 @@ def section_arm(model: RobotModel) -> SectionArm | None:
     elif chain.k != 3 or prepare_position(chain) is None:
         return None
     whole = np.array([D, *rest])
-    local = whole.copy()
-    local[0] = np.eye(4)
-    radial = kinds[0] == 0
-    axis = whole[0, :3, 2]
-    R = axes_along(axis)
-    frame = np.eye(4)
-    flip, shift = np.eye(2), np.zeros(2)
-    origin = whole[0, :3, 3]
-    if radial:
-        # columns: radial direction, height, and the third; the origin on the axis at height zero
-        frame[:3, :3] = np.column_stack((R[:, 0], R[:, 2], -R[:, 1]))
-        frame[:3, 3] = origin - R[:, 2] * (R[:, 2] @ origin)
-        flip[1, 1], shift[1] = float(R[:, 2] @ axis), float(R[:, 2] @ origin)
-    else:
-        frame[:3, :3] = R
-        frame[:3, 3] = R[:, 2] * (R[:, 2] @ origin)
-        flip = R[:, :2].T @ whole[0, :3, :2]
-        shift = R[:, :2].T @ origin
+    own, frame = axis_frames(D, radial=bool(kinds[0] == 0))
+    local = np.array([se3.inverse(own) @ D, *rest])
     size = float(np.linalg.norm(whole[1:, :3, 3], axis=1).sum()) or 1.0
     kinds, columns = np.asarray(kinds, np.int64), np.asarray(columns, np.int64)
-    return SectionArm(kinds, whole, columns, local, frame, flip, shift, size)
+    return SectionArm(kinds, whole, columns, local, frame, size)
+
+
+def axis_frames(D: Array, radial: bool) -> tuple[Array, Array]:
+    """Frame along the first axis, and its columns in the order of the section's coordinates.
+
+    Radial: the distance from the axis, the height, the third; the origin on the axis.
+    """
+    own, origin = np.eye(4), D[:3, 3]
+    R = own[:3, :3] = axes_along(D[:3, 2])
+    height = R[:, 2] * (R[:, 2] @ origin)
+    own[:3, 3] = origin - height if radial else height
+    return own, own[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0) if radial else own
 
 
 def axes_along(axis: Array) -> Array:
@@ -333,30 +322,11 @@ def leaves_a_family(model: RobotModel, mask: Flags | None = None) -> bool:
     k = joint_chain(model).k
     if k == 0:
         return False
-    rows = np.ones(6, np.bool_) if mask is None else mask
+    rows = as_mask(mask)
     weights = np.repeat((1.0 / characteristic_length(model), 1.0), 3)[rows]
     J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
     rank = np.linalg.matrix_rank(J[:, rows] * weights[:, None], tol=1e-9) if rows.any() else 0
     return int(np.max(rank)) < k
-
-
-def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
-    """Cells along each axis, whose grid fits into 1 GB."""
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidValueError(
-            f"resolution: expected the number of cells along each axis, a whole number of at "
-            f"least {least}, got {value!r:.60}."
-        )
-    most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
-    if value > most:
-        need = _CELL_BYTES * float(value) ** dimensions / 1e9
-        raise InvalidValueError(
-            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
-            f"than 1 GB; at most {most} fit."
-        )
-    return int(value)
 
 
 def sequence(count: int, dimensions: int) -> Array:

@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..model import RobotModel
@@ -163,17 +165,21 @@ def boundary(model: RobotModel, limits: bool) -> list[Array]:
     # lower ends run to the right, upper ends to the left: columns are start and end of each
     x = np.concatenate((found.strip[first] + [[0], [1]], found.strip[last] + [[1], [0]]), axis=1)
     y = np.concatenate((sides[first, :2].T, sides[last, :1:-1].T), axis=1)
-    # at each end of a strip the next start in height belongs to an end
-    order = [np.lexsort((y[k], x[k])) for k in (0, 1)]
-    follows = np.empty(len(x[0]), np.int64)
-    follows[order[1]] = order[0]
     points = np.stack((ends[x], y), axis=-1)
-    loops, open_ones = [], np.ones(len(follows), np.bool_)
-    for start in range(len(follows)):
-        loop, k = [], start
+    # at each end of a strip the next start in height belongs to an end
+    return closed_loops(*points, *np.stack((y, x), axis=-1))
+
+
+def closed_loops(start: Array, end: Array, first: NDArray[Any], last: NDArray[Any]) -> list[Array]:
+    """Closed polylines of edges (E, 2), each followed by the one whose first key is its last."""
+    follows = np.empty(len(start), np.int64)
+    follows[np.lexsort(last.T)] = np.lexsort(first.T)
+    loops, open_ones = [], np.ones(len(start), np.bool_)
+    for k in range(len(start)):
+        loop = []
         while open_ones[k]:
             open_ones[k] = False
-            loop += [points[0, k], points[1, k]]
+            loop += [start[k], end[k]]
             k = int(follows[k])
         if loop:
             loops.append(np.array([*loop, loop[0]]))

@@ -16,7 +16,8 @@ from .._arrays.tasks import Workers
 from .._outcomes import Outcome
 from ..igm.loop import joint_chain
 from ..model import RobotModel
-from .arms import Flags, Ints, JointSpace, Result, Values, checked_resolution, joint_space, wrapped
+from .arms import Flags, Ints, JointSpace, Result, Values, joint_space, wrapped
+from .cells import checked_resolution
 from .singularity import Factors, sign_factors
 
 # cells along each of so many joints: at first, and when a grid does not separate all aspects

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from math import pi, tau
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,10 +23,11 @@ from .arms import (
     JointSpace,
     SectionArm,
     axes_along,
-    checked_resolution,
+    axis_frames,
     plane_normal,
     section_arm,
 )
+from .arrangement import closed_loops
 
 SECTIONS = ("auto", "plane", "space")
 SAMPLES = 400000
@@ -33,6 +35,8 @@ _EXTENT = 20000  # samples that find the extent of a workspace
 _GRID = 160
 _MARGIN = 0.02
 _CHUNK = 50000
+_MOST_BYTES = 1e9
+_CELL_BYTES = 170
 _STEPS = 25
 _ROUNDS = 60
 
@@ -68,6 +72,15 @@ class Space:
         if arm is None or self.kind != ("half plane" if arm.radial else "plane"):
             return False
         return np.allclose(self.frame, arm.frame, rtol=0.0, atol=1e-9 * max(arm.size, 1.0))
+
+    def turning_axis(self, joints: JointSpace) -> Array | None:
+        """Where the first axis (2,) stands across a plane if it turns freely."""
+        chain = joint_chain(joints.model)
+        D, first = joints.model.base @ chain.D[0], chain.columns[0]
+        across = self.kind == "plane" and abs(D[:3, 2] @ self.frame[:3, 2]) > 1.0 - 1e-12
+        if not across or joints.free is not None or not joints.ranges([])[1][first]:
+            return None
+        return self.of_world(D[None, :3, 3])[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,13 +157,27 @@ def space_of(
         arm = section_arm(model)
         if arm is not None:
             return Space("half plane", arm.frame)
-        base = model.base @ chain.D[0]
-        R = axes_along(base[:3, 2])
-        frame = np.eye(4)
-        frame[:3, :3] = np.column_stack((R[:, 0], R[:, 2], -R[:, 1]))
-        frame[:3, 3] = base[:3, 3] - R[:, 2] * (R[:, 2] @ base[:3, 3])
-        return Space("half plane", frame)
+        return Space("half plane", axis_frames(model.base @ chain.D[0], radial=True)[1])
     return Space("space", np.eye(4))
+
+
+def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
+    """Cells along each axis, whose grid fits into 1 GB."""
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidValueError(
+            f"resolution: expected the number of cells along each axis, a whole number of at "
+            f"least {least}, got {value!r:.60}."
+        )
+    most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
+    if value > most:
+        need = _CELL_BYTES * float(value) ** dimensions / 1e9
+        raise InvalidValueError(
+            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
+            f"than 1 GB; at most {most} fit."
+        )
+    return int(value)
 
 
 def cells_of(joints: JointSpace, space: Space, resolution: int | None, default: int) -> Cells:
@@ -160,16 +187,18 @@ def cells_of(joints: JointSpace, space: Space, resolution: int | None, default: 
         section_arm(joints.model),
     )
     if arm is not None and space.is_section(arm):
-        axes = [
-            np.linspace(ends[0], ends[1], _GRID)
-            for ends in joints.ranges(arm.columns[1:])[0][arm.columns[1:]]
-        ]
+        last = arm.columns[1:]
+        axes = [np.linspace(low, high, _GRID) for low, high in joints.ranges(last)[0][last]]
         x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         points = arm.values(x)[:, :2]
     else:
         q = JointSpace(joints.model, joints.limits).samples(_EXTENT)
         points = space.of_world(dgm(joints.model, q)[:, :3, 3])
     low, high = points.min(axis=0), points.max(axis=0)
+    axis = space.turning_axis(joints)
+    if axis is not None:  # a disc about the axis, whose cells come in eights of one distance
+        size = np.full(2, np.abs(points - axis).max())
+        low, high = axis - size, axis + size
     room = _MARGIN * max(float((high - low).max()), 1e-9)
     low, high = low - room, high + room
     if space.kind == "half plane":
@@ -189,31 +218,18 @@ def neighbours(flags: Flags) -> Flags:
 
 def outlines(cells: Cells, reached: Flags) -> list[Array]:
     """Outlines of the cells that are reached, which lie on their left."""
-    flags = np.pad(reached.reshape(cells.shape), 1)
-    follows: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for i, j in zip(*np.nonzero(flags), strict=True):
-        sides = (
-            (flags[i, j - 1], (i, j), (i + 1, j)),
-            (flags[i + 1, j], (i + 1, j), (i + 1, j + 1)),
-            (flags[i, j + 1], (i + 1, j + 1), (i, j + 1)),
-            (flags[i - 1, j], (i, j + 1), (i, j)),
-        )
-        for other, start, end in sides:
-            if not other:
-                follows.setdefault(start, []).append(end)
-    origin = cells.points[0] - 1.5 * cells.size
-    loops = []
-    while follows:
-        start = next(iter(follows))
-        path = [start]
-        while path[-1] in follows:
-            ends = follows[path[-1]]
-            step = ends.pop()
-            if not ends:
-                del follows[path[-1]]
-            path.append(step)
-        loops.append(origin + cells.size * np.array(path))
-    return loops
+    flags = np.pad(reached.reshape(cells.shape), 1).astype(int)
+    starts, ends = [], []
+    for axis, along in enumerate(np.eye(2, dtype=int)[::-1]):
+        change = np.diff(flags, axis=axis)
+        for side in (-1, 1):
+            low = np.argwhere(change == side) + 1 - along
+            forward = side == (-1, 1)[axis]
+            starts.append(low if forward else low + along)
+            ends.append(low + along if forward else low)
+    start, end = np.concatenate(starts), np.concatenate(ends)
+    corners = (cells.points[0] - 1.5 * cells.size + cells.size * part for part in (start, end))
+    return closed_loops(*corners, start, end)
 
 
 def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:

@@ -242,8 +242,10 @@ def cusps_of(arm: SectionArm, lines: tuple[Line, ...]) -> tuple[Array, Array]:
         A = values[:, 2:6].reshape(-1, 2, 2)
         # both rows are along the direction that keeps the point
         still = np.stack((-A[..., 1], A[..., 0]), axis=-1)
-        positive = np.einsum("nij,nj->ni", still, values[:, 7:9]) > 0.0
-        starts.append(line.x[:-1][(positive[1:] != positive[:-1]).any(axis=1)])
+        for g in np.einsum("nij,nj->in", still, values[:, 7:9]):
+            at = np.flatnonzero((g[1:] > 0.0) != (g[:-1] > 0.0))
+            share = (g[at] / (g[at] - g[at + 1]))[:, None]
+            starts.append(line.x[at] + share * (line.x[at + 1] - line.x[at]))
     x, residual = _solved(arm, np.concatenate(starts), _cusp_equations)
     values = arm.values(x)
     # where the determinant has no slope, singular curves touch or cross: no fold either
@@ -256,7 +258,7 @@ def cusps_of(arm: SectionArm, lines: tuple[Line, ...]) -> tuple[Array, Array]:
     x, residual = _distinct(arm, x[good], residual[good])
     # a cusp takes three of at most four postures, so that a point has no second one
     points = arm.values(x)[:, :2]
-    near = np.linalg.norm(points[:, None] - points, axis=2) < 1e-7 * arm.size
+    near = np.linalg.norm(points[:, None] - points, axis=2) < 1e-9 * arm.size
     first = ~np.tril(near, -1).any(axis=1)
     return x[first], residual[first]
 

@@ -202,7 +202,7 @@ def _closed(arm: RobotModel, section: SectionArm, x: Array) -> list[Array]:
         ]
         turn = np.diff(np.arctan2(ends[:, 2], ends[:, 0]))[0]
         turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
-        q[:, column] = np.linspace(0.0, turn if section.flip[1, 1] > 0.0 else -turn, len(q))
+        q[:, column] = np.linspace(0.0, turn if section.local[0, 2, 2] > 0.0 else -turn, len(q))
     solved, valid = section.postures(first[None])
     moved = wrapped(section.model_postures(arm, solved[valid]) - q[-1], turning(arm))
     if not len(moved):

@@ -33,7 +33,7 @@ from .arrangement import boundary, measures
 from .cells import SECTIONS, Cells, Space, cells_of, outlines, reached_cells, space_of
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
-_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "space": 28}
+_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "turned": 240, "space": 28}
 
 
 class WorkspaceStatus(Outcome):
@@ -317,7 +317,7 @@ def workspace(
     counted = _is_counted(space, arm)
     default = "space" if space.kind == "space" else "counted" if counted else "reached"
     if kind not in ("positions", "free") and default != "space":
-        default = "oriented"
+        default = "oriented" if space.turning_axis(joints) is None else "turned"
     cells = cells_of(joints, space, resolution, _RESOLUTION[default])
     status = WorkspaceStatus.COUNTED
     if rotation is not None:
@@ -333,9 +333,14 @@ def workspace(
         count, status = reached_cells(joints, cells, first), WorkspaceStatus.REACHED_ONLY
     if kind in ("primary", "secondary"):
         reached, status = np.flatnonzero(count), WorkspaceStatus.SAMPLED
-        positions = cells.world(cells.points[reached])
+        axis, own = cells.turning_axis(joints), np.arange(reached.size)
+        first = own
+        if axis is not None:  # cells at one distance from the axis have one answer
+            away = np.linalg.norm(cells.points[reached] - axis, axis=1).round(9)
+            _, first, own = np.unique(away, return_index=True, return_inverse=True)
+        positions = cells.world(cells.points[reached[first]])
         failed, least = in_every_orientation(joints, positions, rows, work.part(0.1, 1.0))
-        every = np.where(failed == 0, least, 0)
+        every = np.where(failed == 0, least, 0)[own]
         count = np.zeros(len(count), np.int64)
         count[reached] = every if kind == "primary" else every == 0
     return _workspace(asked, cells, count, status)
