@@ -23,17 +23,8 @@ from ..igm.request import Task, poses_of
 from ..igm.solver import Tolerances, postures
 from ..kinematics import dgm
 from ..model import RobotModel
-from .arms import (
-    PLACE,
-    Flags,
-    Ints,
-    JointSpace,
-    Values,
-    joint_space,
-    plane_normal,
-    section_arm,
-    sequence,
-)
+from . import arms
+from .arms import Flags, Ints, JointSpace, Values
 
 LEVELS = ("position", "pose", "every_orientation")
 ANGLES, ROTATIONS = 180, 96  # orientations that stand for all, in a plane and in space
@@ -143,12 +134,12 @@ def accessibility(
     >>> found.count, found.reason(1)
     (array([2, 0]), 'No posture reaches the position.')
     """
-    space, work = joint_space(arm, limits, free), Workers(executor, progress)
+    space, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
     one_of(level, LEVELS, "level")
     poses = poses_of(T)
     batch, rows = poses.shape[:-2], poses.reshape(-1, 4, 4)
     components = None if mask is None else as_mask(mask)
-    place = PLACE if components is None else components & PLACE
+    place = arms.PLACE if components is None else components & arms.PLACE
     asked = components if level == "pose" else place
     first = work.part(0.0, 0.1 if level == "every_orientation" else 1.0)
     status, count = posture_counts(space, rows, asked, first)
@@ -209,7 +200,7 @@ def free_of(space: JointSpace, q: Array, valid: Flags) -> Flags:
 
 def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Array, Flags, Flags]:
     """Postures q (N, S, n), valid (N, S), and poses (N,) that lack only the orientation."""
-    section = section_arm(arm)
+    section = arms.section_arm(arm)
     if (
         section is not None
         and mask is not None
@@ -248,7 +239,7 @@ def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:
     """Orientations (K, 3, 3) that stand for all: about the axis asked, the normal, or any."""
     from scipy.spatial.transform import Rotation
 
-    normal = plane_normal(arm)
+    normal = arms.plane_normal(arm)
     if mask is not None and mask[3:].sum() == 1:
         normal = mask[3:].astype(float)
     if normal is not None:
@@ -258,7 +249,7 @@ def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:
             Rotation.from_rotvec(angles[:, None] * normal).as_matrix()
             @ dgm(arm, np.zeros(arm.n))[:3, :3]
         )
-    u, v, w = sequence(ROTATIONS, 3).T * [[1.0], [2.0 * pi], [2.0 * pi]]
+    u, v, w = arms.sequence(ROTATIONS, 3).T * [[1.0], [2.0 * pi], [2.0 * pi]]
     a, b = np.sqrt(1.0 - u), np.sqrt(u)
     # unit quaternions, spread evenly (K. Shoemake, Uniform random rotations, 1992)
     spread = np.column_stack((a * np.sin(v), a * np.cos(v), b * np.sin(w), b * np.cos(w)))

@@ -17,16 +17,8 @@ from ..geometry import REVOLUTE
 from ..igm.loop import joint_chain
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel
-from .arms import (
-    Flags,
-    Ints,
-    JointSpace,
-    SectionArm,
-    axes_along,
-    axis_frames,
-    plane_normal,
-    section_arm,
-)
+from . import arms
+from .arms import Flags, Ints, JointSpace, SectionArm
 from .arrangement import closed_loops
 
 SECTIONS = ("auto", "plane", "space")
@@ -129,7 +121,7 @@ def space_of(
     if rows is not None and rows[:3].sum() == 2:
         normal = np.eye(3)[int(np.argmin(rows[:3]))]
     else:
-        normal = plane_normal(model)
+        normal = arms.plane_normal(model)
     if normal is not None:
         if section == "space":
             raise InvalidValueError(
@@ -137,7 +129,7 @@ def space_of(
                 "plane, got 'space'."
             )
         frame = np.eye(4)
-        frame[:3, :3] = axes_along(normal)
+        frame[:3, :3] = arms.axes_along(normal)
         e3 = frame[:3, 2]
         frame[:3, 3] = e3 * (e3 @ dgm(model, np.zeros(model.n))[:3, 3])
         return Space("plane", frame)
@@ -154,10 +146,10 @@ def space_of(
             "axis; use section='space'."
         )
     if circle and turned and section != "space":
-        arm = section_arm(model)
+        arm = arms.section_arm(model)
         if arm is not None:
             return Space("half plane", arm.frame)
-        return Space("half plane", axis_frames(model.base @ chain.D[0], radial=True)[1])
+        return Space("half plane", arms.axis_frames(model.base @ chain.D[0], radial=True)[1])
     return Space("space", np.eye(4))
 
 
@@ -184,7 +176,7 @@ def cells_of(joints: JointSpace, space: Space, resolution: int | None, default: 
     """Cells over the reach of an arm."""
     count, arm = (
         checked_resolution(resolution, default, space.dimensions),
-        section_arm(joints.model),
+        arms.section_arm(joints.model),
     )
     if arm is not None and space.is_section(arm):
         last = arm.columns[1:]

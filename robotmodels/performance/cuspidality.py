@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 
@@ -24,7 +24,7 @@ from .arms import PLACE, Result, SectionArm, section_arm, turning, wrapped
 from .arrangement import counted_cut, cut, lines_of
 from .aspects import aspects
 from .curves import cusps_of
-from .level_curves import last_two
+from .level_curves import level_set
 from .singularity import Bound, Factors, bound_of, certified, sign_factors
 
 _LEVELS = 24  # of the determinant, each 0.6 of the one before
@@ -175,12 +175,12 @@ def _result(
 
 def _level_paths(arm: RobotModel, section: SectionArm) -> Iterator[Array]:
     """Parts of level curves of the determinant between two postures of one point."""
-    two = last_two(arm, section, False)
+    two = level_set(arm, section, False)
     axes = [np.linspace(ends[0], ends[1], 60) for ends in two.ends]
     mesh = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     top = float(np.abs(section.values(mesh)[:, 6]).max())
     for k in range(2 * _LEVELS):
-        lines, _ = two.level_curves((-1) ** k * top * 0.6 ** (k // 2 + 1))
+        lines, _ = replace(two, level=(-1) ** k * top * 0.6 ** (k // 2 + 1)).curves()
         for (a, start), (b, stop) in cut(tuple(lines)).crossings if lines else ():
             line, places = lines[int(a)], sorted((int(start), int(stop)))
             if a != b:

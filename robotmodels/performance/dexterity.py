@@ -74,9 +74,6 @@ class GlobalIndex(float):
         """Standard deviation over the same measure."""
         return self._spread
 
-    def __getnewargs__(self) -> tuple[float, float]:  # type: ignore[override]
-        return float(self), self.spread
-
     def __repr__(self) -> str:
         return f"{float(self):.6g} (spread {self.spread:.3g})"
 

@@ -9,7 +9,7 @@ step by step, so that none is left for another one where two come close.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi, tau
 from typing import NamedTuple
@@ -52,128 +52,119 @@ class _Arc(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LastTwo:
-    """The last two joints of an arm: ends (2, 2) of their ranges, which are whole circles (2,)."""
+class LevelSet:
+    """Where the determinant of an arm has a level.
+
+    ``ends`` (2, 2) are those of the ranges of the last two joints, of which ``circle`` (2,) tells
+    which are whole circles; ``roots`` are the values of x3 at which the
+    determinant has the level for all x2, by which A, B and C are divided.
+    """
 
     arm: SectionArm
     ends: Array
     circle: Flags
+    level: float = 0.0
+    roots: tuple[float, ...] = ()
 
+    @property
     def unit(self) -> Array:
         """What counts as a radian of each joint: a radian, or a part of the range of a slide."""
         return np.where(self.arm.turns, 1.0, np.ptp(self.ends, axis=1) / tau)
 
-    def coefficients(self, level: float, roots: list[float], x3: Array) -> Array:
-        """A, B and C - level (3, N), without their common roots, in units of the arm."""
-        turns, unit = self.arm.turns, self.arm.size**3
-        x2 = np.array((0.0, 0.5 * pi, pi) if turns[0] else (0.0, 1.0))
-        x = np.stack(np.broadcast_arrays(x2[:, None], x3), axis=-1)
-        f = self.arm.values(x.reshape(-1, 2))[:, 6].reshape(len(x2), -1) / unit
-        if turns[0]:
-            C = 0.5 * (f[0] + f[2])
-            V = np.stack((0.5 * (f[0] - f[2]), f[1] - C, C - level / unit))
-        else:
-            V = np.stack((f[1] - f[0], np.zeros(len(x3)), f[0] - level / unit))
-        for root in roots:
-            V = V / (np.sin(0.5 * (x3 - root)) if turns[1] else x3 - root)
-        return V
-
-    def level_curves(self, level: float = 0.0, step: float = STEP) -> tuple[list[Line], bool]:
-        """All curves on which the determinant has a value; whether two of them touch."""
+    def curves(self, step: float = STEP) -> tuple[list[Line], bool]:
+        """All curves on which the determinant has the level; whether two of them touch."""
         a, b = self.ends[1]
         at = (np.arange(_GRID) + 0.37) / _GRID if self.circle[1] else np.linspace(0.0, 1.0, _GRID)
-        x3 = a + (b - a) * at
-        roots, curves = self._common_roots(level, x3), []
-        for root in roots:
+        x3, rest, found = a + (b - a) * at, self, []
+        for _ in range(3):  # multiple roots
+            fresh = rest._common_roots(x3)
+            rest = replace(rest, roots=rest.roots + fresh)
+        for root in set(rest.roots):
             low, high = self.ends[0]
-            x2 = np.linspace(low, high, _LEAST + int((high - low) / self.unit()[0] / step))
-            curves.append(np.column_stack((x2, np.full(len(x2), root))))
-        V = self.coefficients(level, roots, x3)
-        if np.abs(V).max() < 1e-12:
-            return [], False
-        arcs, touch = self._arcs(level, roots, x3, V)
+            x2 = np.linspace(low, high, _LEAST + int((high - low) / self.unit[0] / step))
+            found.append(np.column_stack((x2, np.full(len(x2), root))))
+        arcs, touch = rest._arcs(x3)
         for arc in arcs:
-            curves += self._inside(self._spread(level, roots, arc, step))
-        return [self.line(x) for x in curves], touch
+            found += self._inside(rest._spread(arc, step))
+        return [self.line(x) for x in found], touch
 
     def line(self, x: Array, of_limit: bool = False) -> Line:
         """A curve with its image."""
         closed = bool(np.abs(wrapped(x[-1] - x[0], self.arm.turns)).max() < 1e-6)
         return Line(x, _image(self.arm, x, closed), closed, of_limit)
 
-    def _common_roots(self, level: float, x3: Array) -> list[float]:
-        """Values of x3 at which the determinant has the level for all x2."""
-        roots: list[float] = []
-        for _ in range(3):  # multiple ones
-            size = np.linalg.norm(self.coefficients(level, roots, x3), axis=0)
-            least = (
-                (size <= np.roll(size, 1)) & (size <= np.roll(size, -1)) & (size < 0.1 * size.max())
-            )
-            x, h = x3[least], 1e-6
-            V = np.zeros((3, 0))
-            for _ in range(30 if x.size else 0):
-                V = self.coefficients(level, roots, x)
-                slope = (
-                    self.coefficients(level, roots, x + h) - self.coefficients(level, roots, x - h)
-                ) / (2.0 * h)
-                step = (V * slope).sum(axis=0) / np.maximum((slope * slope).sum(axis=0), 1e-300)
-                x = x - np.clip(step, -0.01, 0.01)
-            good = np.linalg.norm(V, axis=0) < _ZERO * size.max()
-            if self.circle[1]:
-                x = wrapped(x, self.arm.turns[1:])
-            else:
-                good &= (x >= self.ends[1, 0]) & (x <= self.ends[1, 1])
-            fresh = np.sort(x[good])
-            fresh = fresh[np.append(True, np.diff(fresh) > 1e-6)[: len(fresh)]]
-            if not fresh.size:
-                break
-            roots += fresh.tolist()
-        return roots
+    def _coefficients(self, x3: Array) -> Array:
+        """A, B and C - level (3, N), without their common roots, in units of the arm."""
+        turns, unit = self.arm.turns, self.arm.size**3
+        x2 = np.array((0.0, 0.5 * pi, pi) if turns[0] else (0.0, 1.0))
+        x = np.stack(np.broadcast_arrays(x2[:, None], x3), axis=-1)
+        f = (self.arm.values(x.reshape(-1, 2))[:, 6].reshape(len(x2), -1) - self.level) / unit
+        if turns[0]:
+            C = 0.5 * (f[0] + f[2])
+            V = np.stack((0.5 * (f[0] - f[2]), f[1] - C, C))
+        else:
+            V = np.stack((f[1] - f[0], np.zeros(len(x3)), f[0]))
+        for root in self.roots:
+            V = V / (np.sin(0.5 * (x3 - root)) if turns[1] else x3 - root)
+        return V
 
-    def _condition(self, V: Array) -> Array:
+    def _common_roots(self, x3: Array) -> tuple[float, ...]:
+        """Zeros of A, B and C: Gauss-Newton steps from the least values on a grid."""
+        size = np.linalg.norm(self._coefficients(x3), axis=0)
+        least = (size <= np.roll(size, 1)) & (size <= np.roll(size, -1)) & (size < 0.1 * size.max())
+        x, h, V = x3[least], 1e-6, np.zeros((3, int(least.sum())))
+        for _ in range(30 if x.size else 0):
+            V, up, down = (self._coefficients(y) for y in (x, x + h, x - h))
+            slope = (up - down) / (2.0 * h)
+            step = (V * slope).sum(axis=0) / np.maximum((slope * slope).sum(axis=0), 1e-300)
+            x = x - np.clip(step, -0.01, 0.01)
+        good = np.linalg.norm(V, axis=0) < _ZERO * size.max()
+        good &= self.circle[1] | ((x >= self.ends[1, 0]) & (x <= self.ends[1, 1]))
+        x = np.sort(wrapped(x[good], self.circle[1:]))
+        return tuple(x[np.append(True, np.diff(x) > 1e-6)[: len(x)]].tolist())
+
+    def _condition(self, x3: Array) -> Array:
         """Positive (N,) where there are points of a curve."""
+        A, B, C = self._coefficients(x3)
         if self.arm.turns[0]:
-            return np.asarray(V[0] ** 2 + V[1] ** 2 - V[2] ** 2)
+            return np.asarray(A**2 + B**2 - C**2)
         low, high = self.ends[0]
-        return np.asarray(-(V[0] * low + V[2]) * (V[0] * high + V[2]))
+        return np.asarray(-(A * low + C) * (A * high + C))
 
-    def _arcs(
-        self, level: float, roots: list[float], x3: Array, V: Array
-    ) -> tuple[list[_Arc], bool]:
+    def _arcs(self, x3: Array) -> tuple[list[_Arc], bool]:
         """Ranges of x3 with points of a curve; whether two curves touch."""
-        D = self._condition(V)
+        meets, circle = bool(self.arm.turns[0]), bool(self.circle[1])
+        x3 = np.append(x3, x3[0] + tau) if circle else x3
+        D = self._condition(x3)
         there = D > 0.0
-        if self.circle[1]:
-            x3, D, there = (
-                np.append(x3, x3[0] + tau),
-                np.append(D, D[0]),
-                np.append(there, there[0]),
-            )
+        if np.abs(D).max() < 1e-24:
+            return [], False  # singular everywhere
         bend = D[2:] - 2.0 * D[1:-1] + D[:-2]
         vertex = D[1:-1] - (D[2:] - D[:-2]) ** 2 / (8.0 * np.where(bend == 0.0, 1.0, bend))
         inner = np.abs(D[2:] - D[:-2]) <= 2.0 * np.abs(bend)
-        touch = self.arm.turns[0] & (inner & (np.abs(vertex) < _ZERO * np.abs(D).max())).any()
+        touch = meets and bool((inner & (np.abs(vertex) < _ZERO * np.abs(D).max())).any())
         at = np.flatnonzero(there[1:] != there[:-1])
         low, high = x3[at], x3[at + 1]
         for _ in range(60 if at.size else 0):
             middle = 0.5 * (low + high)
-            same = (self._condition(self.coefficients(level, roots, middle)) > 0.0) == there[at]
+            same = (self._condition(middle) > 0.0) == there[at]
             low, high = np.where(same, middle, low), np.where(same, high, middle)
-        meets = bool(self.arm.turns[0])
-        if self.circle[1] and at.size:
-            ends, inside = np.append(low, low[0] + tau), there[at + 1]
-            turn = np.full(len(ends), meets)
+        if circle and at.size:
+            ends, inside, turn = (
+                np.append(low, low[0] + tau),
+                there[at + 1],
+                [meets] * (at.size + 1),
+            )
         else:
             ends, inside = np.concatenate((x3[:1], low, x3[-1:])), there[np.append(0, at + 1)]
-            turn = np.pad(np.full(at.size, meets), 1)
-        arcs = [
-            _Arc(float(ends[k]), float(ends[k + 1]), (bool(turn[k]), bool(turn[k + 1])), branch)
+            turn = [False, *[meets] * at.size, False]
+        return [
+            _Arc(float(ends[k]), float(ends[k + 1]), (turn[k], turn[k + 1]), branch)
             for k in np.flatnonzero(inside).tolist()
-            for branch in ((1.0, -1.0) if meets and not turn[k : k + 2].any() else (1.0,))
-        ]
-        return arcs, bool(touch)
+            for branch in ((1.0, -1.0) if meets and not any(turn[k : k + 2]) else (1.0,))
+        ], touch
 
-    def _points(self, level: float, roots: list[float], arc: _Arc, t: Array) -> Array:
+    def _points(self, arc: _Arc, t: Array) -> Array:
         """Points (N, 2) of a curve at parameters from -1 to 1."""
         a, b = arc.low, arc.high
         if all(arc.meets):
@@ -182,7 +173,7 @@ class LastTwo:
             x3 = a + (b - a) * t * t if arc.meets[0] else b - (b - a) * t * t
         else:
             x3 = a + 0.5 * (b - a) * (1.0 + t)
-        A, B, C = self.coefficients(level, roots, x3)
+        A, B, C = self._coefficients(x3)
         if not self.arm.turns[0]:
             return np.column_stack((-C / np.where(A == 0.0, 1e-300, A), x3))
         ratio = -C / np.maximum(np.hypot(A, B), 1e-300)
@@ -190,12 +181,12 @@ class LastTwo:
         x2 = np.arctan2(B, A) + side * np.arccos(np.clip(ratio, -1.0, 1.0))
         return np.column_stack((np.unwrap(x2), x3))
 
-    def _spread(self, level: float, roots: list[float], arc: _Arc, step: float) -> Array:
+    def _spread(self, arc: _Arc, step: float) -> Array:
         """Points (K, 2) of a curve at nearly equal distances."""
         from scipy.interpolate import PchipInterpolator
 
-        points = partial(self._points, level, roots, arc)
-        t, unit = np.linspace(-1.0, 1.0, _GRID // 2 + 1), self.unit()
+        points = partial(self._points, arc)
+        t, unit = np.linspace(-1.0, 1.0, _GRID // 2 + 1), self.unit
         for _ in range(2):
             x = points(t) / unit
             s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1) + 1e-12))
@@ -227,20 +218,20 @@ class LastTwo:
         return parts
 
 
-def last_two(model: RobotModel, arm: SectionArm, limits: bool) -> LastTwo:
-    """Where the last two joints move."""
+def level_set(model: RobotModel, arm: SectionArm, limits: bool, level: float = 0.0) -> LevelSet:
+    """Where the determinant has a level."""
     ranges, circle = JointSpace(model, limits).ranges(arm.columns[1:])
-    return LastTwo(arm, ranges[arm.columns[1:]], circle[arm.columns[1:]])
+    return LevelSet(arm, ranges[arm.columns[1:]], circle[arm.columns[1:]], level)
 
 
 def section_lines(model: RobotModel, arm: SectionArm, limits: bool) -> tuple[list[Line], bool]:
     """Singular curves and the lines of the limits with their images; whether two curves touch."""
-    two = last_two(model, arm, limits)
-    lines, touch = two.level_curves()
+    two = level_set(model, arm, limits)
+    lines, touch = two.curves()
     for k in np.flatnonzero(~two.circle):
         low, high = two.ends[1 - k]
         for bound in two.ends[k]:
-            x = np.empty((int((high - low) / two.unit()[1 - k] * 190) + 3, 2))
+            x = np.empty((int((high - low) / two.unit[1 - k] * 190) + 3, 2))
             x[:, k], x[:, 1 - k] = bound, np.linspace(low, high, len(x))
             lines.append(two.line(x, True))
     return lines, touch

@@ -13,20 +13,9 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..model import RobotModel
+from . import arms
 from .accessibility import postures_of
-from .arms import (
-    PLACE,
-    Flags,
-    Ints,
-    JointSpace,
-    Result,
-    joint_space,
-    leaves_a_family,
-    section_arm,
-    task_rows,
-    turning,
-    wrapped,
-)
+from .arms import Flags, Ints, JointSpace, Result, joint_space
 from .continuation import Continuation
 from .singularity import bound_of, sign_factors
 
@@ -166,10 +155,10 @@ def feasible_path(
     T = poses_of(poses)
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
-    rows, asked = task_rows(arm, mask), None if mask is None else as_mask(mask)
-    if mask is None and section_arm(arm) is not None:
-        asked = PLACE
-    if len(T) == 0 or not rows.any() or leaves_a_family(arm, rows):
+    rows, asked = arms.task_rows(arm, mask), None if mask is None else as_mask(mask)
+    if mask is None and arms.section_arm(arm) is not None:
+        asked = arms.PLACE
+    if len(T) == 0 or not rows.any() or arms.leaves_a_family(arm, rows):
         status = PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED
         q, valid = np.zeros((len(T), 0, arm.n)), np.zeros((len(T), 0), np.bool_)
     else:
@@ -207,7 +196,7 @@ def _chains(
         to, move = following[k, at], way[k, at]
         for s in np.flatnonzero(alive & (to < 0)) if through else ():
             # the posture that goes on most smoothly
-            gap = wrapped(q[k + 1] - q[k, at[s]], turning(arm))
+            gap = arms.wrapped(q[k + 1] - q[k, at[s]], arms.turning(arm))
             off = np.where(valid[k + 1], np.linalg.norm(gap - step[s], axis=1), np.inf)
             r = int(off.argmin()) if off.size else -1
             if r >= 0 and np.isfinite(off[r]) and np.abs(gap[r]).max() < _THROUGH:

@@ -266,65 +266,42 @@ def _to_corners(
     return (good,)
 
 
-def _sections(
-    members: Ints, sheet: Ints, S: int, a: Ints,
-    b: Ints,
-) -> list[Ints]:  # fmt: skip
+def _sections(members: Ints, sheet: Ints, S: int, a: Ints, b: Ints) -> list[Ints]:
     """Unions of sheets of one part in which each cell has one node, grown from every sheet."""
-    numbers, own, sizes = np.unique(sheet[members], return_inverse=True, return_counts=True)
-    order = [k for k in np.argsort(-sizes) if sizes[k] >= _LEAST][:_MOST_SHEETS]
-    nodes = {k: members[own == k] for k in order}
-    cells = {k: set((nodes[k] // S).tolist()) for k in order}
-    place = {int(numbers[k]): k for k in order}
-    beside: dict[int, set[int]] = {int(k): set() for k in order}
-    pairs = np.unique(np.stack((sheet[a], sheet[b])), axis=1)
-    for x, y in pairs.T:
-        p, r = place.get(int(x)), place.get(int(y))
-        if p is not None and r is not None and p != r:
-            beside[int(p)].add(int(r))
-            beside[int(r)].add(int(p))
-    found, seen = [], set()
+    numbers, sizes = np.unique(sheet[members], return_counts=True)
+    order = numbers[np.argsort(-sizes)][: min(int((sizes >= _LEAST).sum()), _MOST_SHEETS)].tolist()
+    cells = {k: set((members[sheet[members] == k] // S).tolist()) for k in order}
+    pairs = np.unique(np.sort(np.stack((sheet[a], sheet[b]), axis=1)), axis=0)
+    beside: dict[int, set[int]] = {k: set() for k in order}
+    for x, y in pairs[np.isin(pairs, order).all(axis=1)].tolist():
+        beside[x].add(y)
+        beside[y].add(x)
+    found: set[frozenset[int]] = set()
     for first in order:
-        chosen, covered = {int(first)}, set(cells[first])
-        grew = True
-        while grew:
-            grew = False
-            edge = set().union(*(beside[k] for k in chosen)) - chosen
-            for k in sorted(edge, key=lambda k: -len(cells[k])):
-                if not covered & cells[k]:
-                    chosen.add(k)
-                    covered |= cells[k]
-                    grew = True
-        if frozenset(chosen) not in seen:
-            seen.add(frozenset(chosen))
-            found.append(np.concatenate([nodes[k] for k in sorted(chosen)]))
-    return found
+        chosen, covered, edge = {first}, set(cells[first]), beside[first] - {first}
+        while edge:
+            k = max(edge, key=lambda k: (len(cells[k]), -k))
+            edge.discard(k)
+            if not covered & cells[k]:
+                chosen.add(k)
+                covered |= cells[k]
+                edge |= beside[k] - chosen
+        found.add(frozenset(chosen))
+    return [members[np.isin(sheet[members], list(chosen))] for chosen in found]
 
 
 def _inner(w: Workspace, own: Ints, S: int, a: Ints, b: Ints) -> list[Flags]:
     """Cells of a section without its border and without neighbours that are not joined."""
     from scipy import ndimage
 
-    N = len(w.points)
-    node = np.full(N, -1)
+    node = np.full(len(w.points), -1)
     node[own // S] = own
-    inside = node >= 0
-    good = inside.reshape(w.shape).copy()
-    joined = np.zeros((len(w.shape), N), np.bool_)
     mine = (node[a // S] == a) & (node[b // S] == b)
-    step = b[mine] // S - a[mine] // S
-    strides = [int(np.prod(w.shape[k + 1 :])) for k in range(len(w.shape))]
-    for axis, stride in enumerate(strides):
-        joined[axis, (a[mine] // S)[step == stride]] = True
-        pair = joined[axis].reshape(w.shape)
-        low = [slice(None)] * len(w.shape)
-        high = [slice(None)] * len(w.shape)
-        low[axis], high[axis] = slice(None, -1), slice(1, None)
-        grid = inside.reshape(w.shape)
-        torn = grid[tuple(low)] & grid[tuple(high)] & ~pair[tuple(low)]
-        good[tuple(low)] &= ~torn
-        good[tuple(high)] &= ~torn
-    good &= ~neighbours(~inside.reshape(w.shape))
+    joined = np.bincount(np.concatenate((a[mine], b[mine])) // S, minlength=len(node))
+    beside = sum(
+        2 - (k == 0) - (k == n - 1) for k, n in zip(np.indices(w.shape), w.shape, strict=True)
+    )
+    good = (joined.reshape(w.shape) == beside) & ~neighbours(node.reshape(w.shape) < 0)
     labels, count = ndimage.label(good)
     parts = [(labels == k + 1).ravel() for k in range(count)]
     return [cells for cells in parts if cells.sum() >= _LEAST]

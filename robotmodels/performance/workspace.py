@@ -18,17 +18,9 @@ from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..kinematics import dgm
 from ..model import RobotModel
+from . import arms
 from .accessibility import in_every_orientation, posture_counts
-from .arms import (
-    PLACE,
-    Flags,
-    Ints,
-    JointSpace,
-    Result,
-    joint_space,
-    leaves_a_family,
-    section_arm,
-)
+from .arms import Flags, Ints, JointSpace, Result
 from .arrangement import boundary, measures
 from .cells import SECTIONS, Cells, Space, cells_of, outlines, reached_cells, space_of
 
@@ -120,7 +112,7 @@ class Workspace(Result):
     def place(self) -> Flags | None:
         """The mask with which the postures of the cells are solved."""
         if self.kind != "orientation":
-            return PLACE
+            return arms.PLACE
         return None if self.coordinates == "plane" else self.mask
 
     @property
@@ -208,7 +200,7 @@ class Workspace(Result):
     def _by_curves(self) -> bool:
         """Whether singular curves and limits bound what is reached."""
         planar = self.coordinates != "space" and self.free is None and self.kind == "positions"
-        return planar and self.status <= 1 and self.cells.is_section(section_arm(self.model))
+        return planar and self.status <= 1 and self.cells.is_section(arms.section_arm(self.model))
 
     def _total(self, which: int, count: int | None) -> float:
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
@@ -300,7 +292,7 @@ def workspace(
     >>> round(w.area, 6), w.count.max(), w.contains([[1.0, 0.5], [2.0, 0.5]])
     (12.566371, np.int64(2), array([ True, False]))
     """
-    joints, work = joint_space(arm, limits, free), Workers(executor, progress)
+    joints, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
     one_of(kind, KINDS, "kind")
     one_of(section, SECTIONS, "section")
     rows = None if mask is None else as_mask(mask)
@@ -323,7 +315,7 @@ def workspace(
     if rotation is not None:
         seen = None if space.kind == "plane" else rows
         count = posture_counts(joints, cells.poses(rotation), seen, work)[1]
-        if leaves_a_family(arm, seen):
+        if arms.leaves_a_family(arm, seen):
             count, status = np.minimum(count, 1), WorkspaceStatus.REACHED_ONLY
         return _workspace(asked, cells, count, status)
     first = work if kind in ("positions", "free") else work.part(0.0, 0.1)
@@ -379,7 +371,7 @@ def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | No
 
 def _is_counted(space: Space, arm: RobotModel) -> bool:
     """Whether a point of the space is a position that three joints determine."""
-    three = section_arm(arm)
+    three = arms.section_arm(arm)
     if three is None:
         return False
     return space.kind != "plane" or space.is_section(three)
@@ -389,4 +381,4 @@ def _count_positions(joints: JointSpace, world: Array, work: Workers) -> Ints:
     """Postures of world positions (N, 3) by the quartic."""
     T = np.tile(np.eye(4), (len(world), 1, 1))
     T[:, :3, 3] = world
-    return posture_counts(joints, T, PLACE, work)[1]
+    return posture_counts(joints, T, arms.PLACE, work)[1]
