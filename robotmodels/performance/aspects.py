@@ -81,19 +81,14 @@ class Aspects(Result):
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    limits : bool
-        Whether the joint limits count.
-    free : object
-        Predicate or obstacles, or None.
+    model, limits, free
+        The robot, whether its limits count, and the predicate or obstacles, or None.
     names : tuple of str
         The factors of the determinant; none for components of the free space.
     signs : ndarray of int8, shape (k, factors)
         Signs of the factors in each aspect.
     volume : ndarray, shape (k,)
-        Volume of each, rad^n (and m for slides), largest first. Joints that do not move the tool
-        are left out.
+        Volume of each, rad^n (and m for slides), largest first, of the joints that move the tool.
     groups : tuple
         The grids: joints that no factor shares are apart, and aspects are products of parts.
     order : ndarray of int64, shape (k, groups)
@@ -332,12 +327,10 @@ def _core(value: Array, closed: Flags) -> Flags:
     """Cells in which a factor cannot vanish, judged by its differences to the next cells."""
     change = np.zeros_like(value)
     for axis in range(value.ndim):
-        step = np.abs(np.diff(value, axis=axis, append=np.take(value, [0], axis=axis)))
+        step = np.abs(np.roll(value, -1, axis) - value)
         if not closed[axis]:
-            last = [slice(None)] * value.ndim
-            last[axis] = slice(-1, None)
-            step[tuple(last)] = 0.0
-        change += np.maximum(step, np.roll(step, 1, axis=axis))
+            np.moveaxis(step, axis, 0)[-1] = 0.0
+        change += np.maximum(step, np.roll(step, 1, axis))
     return np.abs(value) > change
 
 
@@ -345,47 +338,41 @@ def _connected(code: Ints, certain: Flags, closed: Flags) -> tuple[NDArray[np.in
     """Labels, from 1, of connected cells with equal codes; whether the grid separates them all."""
     from scipy import ndimage
 
-    labels = np.zeros(code.shape, np.int32)
-    separates, specks = True, _SPECKS * code.size
-    for value in np.unique(code[code >= 0]):
-        same = code == value
-        whole, count = _torus_labels(same, closed)
-        cores, _ = _torus_labels(same & certain, closed)
-        sizes = np.bincount(whole.ravel(), minlength=count + 1)
-        pairs = np.unique(np.stack((whole[cores > 0], cores[cores > 0])), axis=1)
-        per_part = np.bincount(pairs[0], minlength=count + 1)
-        kept = (per_part > 0) | (sizes > specks)
-        kept[0] = False
-        if not kept.any():
-            kept[1:] = sizes[1:] == sizes[1:].max()
-        separates &= bool((per_part[kept] == 1).all())
-        number = np.where(kept, np.cumsum(kept), 0)
-        own = number[whole]
-        lost = same & (own == 0)
-        if lost.any():
-            # the cut-off tips of a part belong to it
-            near = ndimage.distance_transform_edt(own == 0, False, True)
-            own[lost] = own[tuple(axis[lost] for axis in near)]
-        labels[same] = own[same] + labels.max()
-    return labels, separates
+    whole, cores = (_components(c, closed) for c in (code, np.where(certain, code, -1)))
+    code_of = np.zeros(int(whole.max()) + 1, np.int64)
+    code_of[whole] = code.ravel()
+    sizes, sure = np.bincount(whole), certain.ravel()
+    pairs = np.unique(np.stack((whole[sure], cores[sure])), axis=1)
+    number = np.bincount(pairs[0], minlength=len(sizes))
+    kept = (code_of >= 0) & ((number > 0) | (sizes > _SPECKS * code.size))
+    for value in np.setdiff1d(code_of[code_of >= 0], code_of[kept]):
+        kept[np.argmax(np.where(code_of == value, sizes, 0))] = True
+    labels = np.where(kept, np.cumsum(kept), 0)[whole].reshape(code.shape)
+    for value in np.unique(code[(labels == 0) & (code >= 0)]):
+        # the cut-off tips of a part belong to it
+        lost, other = (labels == 0) & (code == value), (labels == 0) | (code != value)
+        near = ndimage.distance_transform_edt(other, False, True)
+        labels[lost] = labels[tuple(axis[lost] for axis in near)]
+    return labels.astype(np.int32), bool((number[kept] == 1).all())
 
 
-def _torus_labels(flags: Flags, closed: Flags) -> tuple[Ints, int]:
-    """Labels of connected cells, the ends of closed axes joined."""
-    from scipy import ndimage, sparse
-
-    labels, count = ndimage.label(flags)
-    pairs = [np.zeros((2, 0), np.int64)]
+def _components(code: Ints, closed: Flags) -> Ints:
+    """Numbers (N,) of the connected parts of equal codes of a grid that closes along some axes."""
+    at, pairs = np.arange(code.size).reshape(code.shape), []
     for axis, joined in enumerate(closed):
-        if joined:
-            ends = np.stack((np.take(labels, 0, axis).ravel(), np.take(labels, -1, axis).ravel()))
-            pairs.append(ends[:, (ends > 0).all(axis=0)])
-    a, b = np.unique(np.concatenate(pairs, axis=1), axis=1)
-    graph = sparse.coo_matrix((np.ones(a.size), (a, b)), (count + 1, count + 1))
-    total, parts = sparse.csgraph.connected_components(graph, directed=False)
-    # the background keeps zero
-    parts = np.where(parts == parts[0], 0, parts + (parts < parts[0]))
-    return parts[labels], int(total) - 1
+        same = (code == np.roll(code, -1, axis)) & (code >= 0)
+        if not joined:
+            np.moveaxis(same, axis, 0)[-1] = False
+        pairs.append((at[same], np.roll(at, -1, axis)[same]))
+    return linked(*map(np.concatenate, zip(*pairs, strict=True)), code.size)
+
+
+def linked(a: Ints, b: Ints, count: int) -> Ints:
+    """Numbers (count,) of the connected parts of a graph with edges from a to b."""
+    from scipy import sparse
+
+    graph = sparse.coo_matrix((np.ones(a.size), (a, b)), (count, count))
+    return np.asarray(sparse.csgraph.connected_components(graph, directed=False)[1], np.int64)
 
 
 def _products(joints: JointSpace, names: tuple[str, ...], groups: tuple[Group, ...]) -> Aspects:

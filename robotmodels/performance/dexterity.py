@@ -230,7 +230,7 @@ def global_index(
 
     References
     ----------
-    Seed book section 3.6; C. Gosselin and J. Angeles, "A global performance index for the kinematic
+    Seed book section 3.6.1; C. Gosselin, J. Angeles, "A global performance index for the kinematic
     optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
 
     Examples

@@ -53,11 +53,9 @@ class _Arc(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelSet:
-    """Where the determinant of an arm has a level.
+    """Where the determinant of an arm has a level: ends (2, 2) of the ranges, whole circles (2,).
 
-    ``ends`` (2, 2) are those of the ranges of the last two joints, of which ``circle`` (2,) tells
-    which are whole circles; ``roots`` are the values of x3 at which the
-    determinant has the level for all x2, by which A, B and C are divided.
+    ``roots`` are the values of x3 at which it has the level for all x2; A, B, C are without them.
     """
 
     arm: SectionArm

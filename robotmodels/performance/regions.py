@@ -20,7 +20,7 @@ from ..kinematics import dgm
 from ..model import RobotModel
 from .accessibility import allowed_postures
 from .arms import Flags, Ints, JointSpace, Result, joint_space, section_arm, task_rows
-from .aspects import Aspects, free_components
+from .aspects import Aspects, free_components, linked
 from .cells import SAMPLES, neighbours
 from .continuation import Continuation
 from .dexterity import workspace_of
@@ -193,13 +193,11 @@ def _images(w: Workspace, parts: Aspects, counted: bool) -> list[Flags]:
 
 def _followed(w: Workspace, work: Workers) -> list[Flags]:
     """Cells of regions in which every path can be followed."""
-    from scipy import sparse
-
     q, valid = allowed_postures(w.joints, w.poses, w.place)
     valid &= (w.count > 0)[:, None]
     (N, S), T = valid.shape, w.poses
     rows = task_rows(w.model, None if w.kind != "orientation" else w.mask)
-    linked = partial(_linked, w.joints, Continuation(w.model, rows))
+    follow = partial(_linked, w.joints, Continuation(w.model, rows))
     links, number = [np.zeros((2, 0), np.int64)], np.arange(N).reshape(w.shape)
     for axis in range(len(w.shape)):
         i = np.take(number, range(w.shape[axis] - 1), axis).ravel()
@@ -207,25 +205,20 @@ def _followed(w: Workspace, work: Workers) -> list[Flags]:
         both = valid[i].any(axis=1) & valid[j].any(axis=1)
         i, j = i[both], j[both]
         part = work.part(0.25 * axis, 0.25 * (axis + 1))
-        (to,) = part.rows(linked, _AT_A_TIME, T[i], T[j], q[i], valid[i], q[j], valid[j])
+        (to,) = part.rows(follow, _AT_A_TIME, T[i], T[j], q[i], valid[i], q[j], valid[j])
         m, s = np.nonzero(to >= 0)
         links.append(np.stack((i[m] * S + s, j[m] * S + to[m, s])))
     a, b = np.concatenate(links, axis=1)
     # sheets: parts of equal numbers of postures
     level = w.count[a // S] == w.count[b // S]
-    (_, part), (_, sheet) = (
-        sparse.csgraph.connected_components(
-            sparse.coo_matrix((np.ones(x.size), (x, y)), (N * S, N * S)), directed=False
-        )
-        for x, y in ((a, b), (a[level], b[level]))
-    )
+    part, sheet = linked(a, b, N * S), linked(a[level], b[level], N * S)
     nodes, sections = np.flatnonzero(valid.ravel()), []
     sizes = np.bincount(part[nodes], minlength=1)
     for k in np.flatnonzero(sizes >= _LEAST):
         members = nodes[part[nodes] == k]
         single = np.unique(members // S).size == members.size
         sections += [members] if single else _sections(members, sheet, S, a, b)
-    found, corners = [], partial(_to_corners, w, linked)
+    found, corners = [], partial(_to_corners, w, follow)
     for k, own in enumerate(sections):
         last = work.part(0.75 + 0.25 * k / len(sections), 0.75 + 0.25 * (k + 1) / len(sections))
         (good,) = last.rows(corners, _AT_A_TIME, own // S, q.reshape(N * S, -1)[own])
@@ -249,7 +242,7 @@ def _linked(
 
 
 def _to_corners(
-    w: Workspace, linked: Callable[..., tuple[Ints]], cells: Ints, q: Array
+    w: Workspace, follow: Callable[..., tuple[Ints]], cells: Ints, q: Array
 ) -> tuple[Flags]:
     """Which postures (m, n) of cells go on to all corners of their cell."""
     T, frame = w.poses[cells], w.frame[:3, : w.size.size]
@@ -262,7 +255,7 @@ def _to_corners(
         goal = T.copy()
         goal[:, :3, 3] += shift @ frame.T
         r, valid = allowed_postures(w.joints, goal, w.place)
-        good &= linked(T, goal, q[:, None], one, r, valid)[0][:, 0] >= 0
+        good &= follow(T, goal, q[:, None], one, r, valid)[0][:, 0] >= 0
     return (good,)
 
 

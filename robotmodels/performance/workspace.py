@@ -49,16 +49,8 @@ class Workspace(Result):
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    kind : str
-        Positions, primary, secondary, orientation or free.
-    limits : bool
-        Whether the joint limits count.
-    free : object
-        Predicate or obstacles, or None.
-    mask : ndarray of bool, shape (6,), or None
-        Components that were asked for.
+    model, kind, limits, free, mask
+        As asked; ``free`` is the predicate or obstacles, ``mask`` (6,) of bool, or None.
     rotation : ndarray, shape (3, 3), or None
         The orientation of kind ``orientation``.
     points : ndarray, shape (N, 2) or (N, 3)
