@@ -146,6 +146,20 @@ def test_curves_are_singular_and_their_kind_holds():
         assert kind in pf.CurveKind
 
 
+def test_level_curves_have_their_level_and_go_on_beyond_their_ends():
+    from robotmodels.performance.arms import section_arm
+    from robotmodels.performance.level_curves import level_set
+
+    arm = section_arm(WENGER)
+    lines, touch = level_set(WENGER, arm, False, 0.5).curves()
+    assert lines
+    assert not touch
+    for line in lines:
+        np.testing.assert_allclose(arm.values(line.x)[:, 6], 0.5, atol=1e-9)
+        part = line.part(len(line.x) - 10, len(line.x) + 10)
+        assert np.abs(np.diff(part.x, axis=0)).max() < 0.1
+
+
 def test_limits_cut_curves_and_add_their_own():
     curves = pf.singular_curves(planar(1.0, 0.6, lower=[-1, -2], upper=[1, 2]))
     assert [k.value for k in curves.kind].count("limit") == 4

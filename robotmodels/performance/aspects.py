@@ -364,7 +364,8 @@ def _components(code: Ints, closed: Flags) -> Ints:
         if not joined:
             np.moveaxis(same, axis, 0)[-1] = False
         pairs.append((at[same], np.roll(at, -1, axis)[same]))
-    return linked(*map(np.concatenate, zip(*pairs, strict=True)), code.size)
+    a, b = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
+    return linked(a, b, code.size)
 
 
 def linked(a: Ints, b: Ints, count: int) -> Ints:

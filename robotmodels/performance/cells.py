@@ -220,8 +220,8 @@ def outlines(cells: Cells, reached: Flags) -> list[Array]:
             starts.append(low if forward else low + along)
             ends.append(low + along if forward else low)
     start, end = np.concatenate(starts), np.concatenate(ends)
-    corners = (cells.points[0] - 1.5 * cells.size + cells.size * part for part in (start, end))
-    return closed_loops(*corners, start, end)
+    low = cells.points[0] - 1.5 * cells.size
+    return closed_loops(low + cells.size * start, low + cells.size * end, start, end)
 
 
 def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
