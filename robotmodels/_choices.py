@@ -22,3 +22,11 @@ def chosen(kind: type[E], value: Any, name: str) -> E:
     raise InvalidValueError(
         f"{name}: expected one of {words}, or a member of {kind.__name__}, got {value!r:.80}."
     )
+
+
+def one_of(value: Any, words: tuple[str, ...], name: str) -> str:
+    """One of several words, exactly as they are written."""
+    if not isinstance(value, str) or value not in words:
+        listed = ", ".join(map(repr, words))
+        raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.")
+    return value

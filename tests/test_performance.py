@@ -1,6 +1,10 @@
 """Workspaces, singular curves, aspects, cuspidality: published results, identities, refusals."""
 
+import gc
 import pickle
+import weakref
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -14,6 +18,7 @@ from robotmodels.se3 import rotation, translation
 
 POSITION = [1, 1, 1, 0, 0, 0]
 PLANE = [1, 1, 0, 0, 0, 0]
+KINDS = ("primary", "secondary")
 
 
 def three(d3, d4, r2, alpha3=np.pi / 2, r3=0.0, **limits):
@@ -49,26 +54,48 @@ def shoelace(line):
 
 WENGER = three(2, 1.5, 1)
 TWO = planar(1.0, 0.6)
-SEEDS = np.random.default_rng(7)
-PARAMETERS = [p for p in SEEDS.uniform(0.1, 3, (40, 3)) if published_cusps(*p)[1] > 1e-3]
+LIMITED = planar(1.0, 0.8, lower=[-1, -2], upper=[1, 2])
+SLIDES = rm.RobotModel.from_table(
+    DHTable(antecedent=[0, 1, 2], sigma=[1, 1, 1], alpha=[0, np.pi / 2, np.pi / 2],
+            theta=[0, np.pi / 2, 0], lower=[0, 0, 0], upper=[1, 2, 3])
+)  # fmt: skip
+BESIDE_A_SURFACE = [
+    (1.4208042100585268, 3.914961079872775, 1.0800949603707881),
+    (2.945455114852277, 3.1149256430854053, 0.6594088334143562),
+    (0.5086990916, 1.8479154978, 1.7129785869),
+    (1.907760080309011, 1.913408770344491, 0.28177146725972213),
+    (1.2582322765569636, 5.23462489563347, 1.0424207609817377),
+]
+SWEEP = [(2, d4, 1) for d4 in (0.1, 0.25, 1.6, 2.0, 2.15, 2.7, 3.1)]
+
+
+def random_arms(count, seed=7):
+    """Parameters (d3, d4, r2) farther than 1e-3 from a surface."""
+    rng, found = np.random.default_rng(seed), []
+    while len(found) < count:
+        p = rng.uniform(0.1, 3, 3)
+        if published_cusps(*p)[1] > 1e-3:
+            found.append(tuple(p))
+    return found
 
 
 # --- singular curves, cusps, nodes ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("p", PARAMETERS[:25], ids=lambda p: "-".join(f"{v:.2f}" for v in p))
-def test_numbers_of_cusps_of_orthogonal_arms(p):
-    found = pf.cusps(three(*p))
-    assert len(found) == published_cusps(*p)[0]
-    assert found.status is pf.SectionStatus.FOUND
+def test_numbers_of_cusps_of_orthogonal_arms():
+    for p in (*random_arms(25), *SWEEP, *BESIDE_A_SURFACE):
+        found = pf.cusps(three(*p))
+        assert (*p, len(found)) == (*p, published_cusps(*p)[0])
+        assert found.status is pf.SectionStatus.FOUND
 
 
-@pytest.mark.parametrize(
-    ("d4", "count"), [(0.1, 0), (0.25, 4), (1.6, 4), (2.0, 4), (2.15, 2), (2.7, 2), (3.1, 4)]
-)
-def test_a_sweep_through_the_surfaces(d4, count):
-    assert published_cusps(2, d4, 1)[0] == count
-    assert len(pf.cusps(three(2, d4, 1))) == count
+@pytest.mark.nightly
+def test_cusps_and_cuspidality_of_500_orthogonal_arms():
+    for p in random_arms(500, 8):
+        count, found = published_cusps(*p)[0], pf.cuspidality(three(*p))
+        assert (*p, len(pf.cusps(three(*p)))) == (*p, count)
+        assert (*p, found.status.name) == (*p, "CUSPIDAL" if count else "NOT_CUSPIDAL")
+        assert count == 0 or proof_holds(three(*p), found, slice(0, 3))
 
 
 def test_a_cusp_is_a_triple_root():
@@ -117,6 +144,20 @@ def test_curves_are_singular_and_their_kind_holds():
         s = np.linalg.svd(rm.jacobian(WENGER, q)[:, :3], compute_uv=False)[:, 2]
         assert s.max() < 1e-9
         assert kind in pf.CurveKind
+
+
+def test_level_curves_have_their_level_and_go_on_beyond_their_ends():
+    from robotmodels.performance.arms import section_arm
+    from robotmodels.performance.level_curves import level_set
+
+    arm = section_arm(WENGER)
+    lines, touch = level_set(WENGER, arm, False, 0.5).curves()
+    assert lines
+    assert not touch
+    for line in lines:
+        np.testing.assert_allclose(arm.values(line.x)[:, 6], 0.5, atol=1e-9)
+        part = line.part(len(line.x) - 10, len(line.x) + 10)
+        assert np.abs(np.diff(part.x, axis=0)).max() < 0.1
 
 
 def test_limits_cut_curves_and_add_their_own():
@@ -191,13 +232,15 @@ def test_first_joint_with_limits_makes_space():
 
 
 def test_primary_space_of_a_planar_arm_is_a_disc_and_a_ring():
-    w = pf.workspace(planar(1, 0.8, 0.3), kind="primary", mask=PLANE, resolution=60)
+    arm = planar(1, 0.8, 0.3)
+    w = pf.workspace(arm, kind="primary", mask=PLANE)
     r = np.hypot(*w.points.T)
     inside = (r < 0.1 - 1e-3) | ((r > 0.5 + 1e-3) & (r < 1.5 - 1e-3))
     outside = ((r > 0.1 + 1e-3) & (r < 0.5 - 1e-3)) | (r > 1.5 + 1e-3)
     assert w.count[inside].min() == 2
     assert w.count[outside].max() == 0
-    rest = pf.workspace(planar(1, 0.8, 0.3), kind="secondary", mask=PLANE, resolution=60)
+    assert w.area == pytest.approx(np.pi * (0.1**2 + 1.5**2 - 0.5**2), rel=1e-3)
+    w, rest = (pf.workspace(arm, kind, mask=PLANE, resolution=40) for kind in KINDS)
     assert not ((w.count > 0) & (rest.count > 0)).any()
 
 
@@ -352,13 +395,17 @@ def proof_holds(arm, found, rows):
     )
 
 
-@pytest.mark.parametrize("p", PARAMETERS[:12], ids=lambda p: "-".join(f"{v:.2f}" for v in p))
-def test_an_orthogonal_arm_is_cuspidal_if_and_only_if_it_has_cusps(p):
-    arm, cuspidal = three(*p), published_cusps(*p)[0] > 0
-    found = pf.cuspidality(arm)
-    assert (found.status is pf.CuspidalityStatus.CUSPIDAL) == cuspidal
-    if cuspidal:
-        assert proof_holds(arm, found, slice(0, 3))
+def test_an_orthogonal_arm_is_cuspidal_if_and_only_if_it_has_cusps():
+    for p in random_arms(12):
+        count, found = published_cusps(*p)[0], pf.cuspidality(three(*p))
+        assert (*p, found.status.name) == (*p, "CUSPIDAL" if count else "NOT_CUSPIDAL")
+        assert count == 0 or proof_holds(three(*p), found, slice(0, 3))
+
+
+def test_a_level_curve_proves_it_where_straight_lines_do_not():
+    found = pf.cuspidality(three(*BESIDE_A_SURFACE[0]), poses=1)
+    assert found.status is pf.CuspidalityStatus.CUSPIDAL
+    assert proof_holds(three(*BESIDE_A_SURFACE[0]), found, slice(0, 3))
 
 
 @pytest.mark.parametrize("name", ["puma560", "rx90", "irb6640", "ur5e", "planar_2r"])
@@ -377,7 +424,7 @@ def test_cuspidal_arms_with_six_joints(name):
 
 
 def test_the_bound_holds_for_random_pairs():
-    from robotmodels.performance.certificate import bound_of
+    from robotmodels.performance.singularity import bound_of
 
     rng = np.random.default_rng(5)
     for arm in (WENGER, rm.load("crx10ia"), rm.load("ur5e"), rm.load("lab_rrt")):
@@ -391,7 +438,7 @@ def test_the_bound_holds_for_random_pairs():
 
 
 def test_bound_of_the_proof():
-    from robotmodels.performance.certificate import bound_of, certified
+    from robotmodels.performance.singularity import bound_of, certified
 
     bound = bound_of(TWO, np.array(PLANE, bool))
     assert certified(bound, np.array([[0.0, 0.5], [1.0, -0.5]])) == 0.0
@@ -406,9 +453,6 @@ def test_cuspidality_of_a_redundant_arm_is_not_defined():
 
 
 # --- regions -------------------------------------------------------------------------------------
-
-
-LIMITED = planar(1.0, 0.8, lower=[-1, -2], upper=[1, 2])
 
 
 @pytest.mark.parametrize(
@@ -490,14 +534,11 @@ def test_arms_of_one_joint_and_slides():
     assert w.count.size == 0
     assert pf.cusps(one).status is pf.SectionStatus.NOT_DEFINED
     assert pf.singular_curves(rm.load("puma560")).status is pf.SectionStatus.NOT_DEFINED
-    slides = rm.RobotModel.from_table(
-        DHTable(antecedent=[0, 1, 2], sigma=[1, 1, 1], alpha=[0, np.pi / 2, np.pi / 2],
-                theta=[0, np.pi / 2, 0], lower=[0, 0, 0], upper=[1, 2, 3])
-    )  # fmt: skip
-    w = pf.workspace(slides, resolution=40)
+    w = pf.workspace(SLIDES, resolution=40)
     assert w.volume == pytest.approx(6.0, rel=0.1)
-    assert pf.cuspidality(slides).status is pf.CuspidalityStatus.NOT_CUSPIDAL
-    assert pf.aspects(slides).count == 1
+    assert abs(w.volume / 6.0 - 1.0) < w.grid_error < 0.3
+    assert pf.cuspidality(SLIDES).status is pf.CuspidalityStatus.NOT_CUSPIDAL
+    assert pf.aspects(SLIDES).count == 1
 
 
 @pytest.mark.parametrize(
@@ -528,19 +569,6 @@ def test_results_are_values(make):
 # --- cases that were wrong once ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "p",
-    [
-        (1.4208042100585268, 3.914961079872775, 1.0800949603707881),
-        (2.945455114852277, 3.1149256430854053, 0.6594088334143562),
-        (0.5086990916, 1.8479154978, 1.7129785869),
-        (1.907760080309011, 1.913408770344491, 0.28177146725972213),
-    ],
-)
-def test_numbers_of_cusps_near_a_surface(p):
-    assert len(pf.cusps(three(*p))) == published_cusps(*p)[0]
-
-
 def test_a_limit_on_one_side():
     for lower, upper in ((-np.inf, 1.0), (-1.0, np.inf)):
         arm = planar(1.0, 0.6, lower=[lower] * 2, upper=[upper] * 2)
@@ -558,15 +586,6 @@ def test_a_plane_that_is_not_the_section_has_its_own_grid():
     assert w.area == pytest.approx(w.grid_area)
     assert w.contains(w.points).sum() == (w.count > 0).sum()
     assert w.area == pytest.approx(np.pi * reach**2, rel=0.2)
-
-
-def test_cells_state_their_error():
-    slides = rm.RobotModel.from_table(
-        DHTable(antecedent=[0, 1, 2], sigma=[1, 1, 1], alpha=[0, np.pi / 2, np.pi / 2],
-                theta=[0, np.pi / 2, 0], lower=[-1] * 3, upper=[1] * 3)
-    )  # fmt: skip
-    w = pf.workspace(slides, resolution=28)
-    assert abs(w.volume / 8.0 - 1.0) < w.grid_error < 0.3
 
 
 def test_maps_and_means_are_values():
@@ -650,3 +669,57 @@ def test_an_orientation_of_a_redundant_arm_is_not_counted():
 def test_arguments_that_would_be_ignored_are_refused(call):
     with pytest.raises(InvalidValueError, match="expected"):
         call()
+
+
+# --- long calls ----------------------------------------------------------------------------------
+
+
+LONG = {
+    "workspace": lambda **o: pf.workspace(rm.load("puma560"), resolution=25, **o),
+    "primary": lambda **o: pf.workspace(TWO, "primary", mask=PLANE, resolution=20, **o),
+    "accessibility": lambda **o: pf.accessibility(TWO, rm.dgm(TWO, np.ones((40000, 2))), **o),
+    "aspects": lambda **o: pf.aspects(WENGER, **o),
+    "free_components": lambda **o: pf.free_components(TWO, Sphere([1.0, 0.4, 0.0], 0.2), **o),
+    "regions": lambda **o: pf.regions(TWO, "t", pf.workspace(TWO, resolution=20), **o),
+    "cuspidality": lambda **o: pf.cuspidality(WENGER, poses=5, **o),
+    "dexterity_map": lambda **o: pf.dexterity_map(
+        WENGER, pf.workspace(WENGER, resolution=150), **o
+    ),
+    "global_index": lambda **o: pf.global_index(TWO, "manipulability", "joints", **o),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_calls_are_the_same_with_many_workers_and_report_progress(name, pools):
+    done = []
+    alone = LONG[name](progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == pytest.approx(1.0) or name == "cuspidality"
+    for pool in pools:
+        assert LONG[name](executor=pool) == alone
+
+
+@pytest.fixture(scope="module")
+def pools():
+    with (
+        ThreadPoolExecutor(3) as threads,
+        ProcessPoolExecutor(2, get_context("spawn")) as processes,
+    ):
+        yield threads, processes
+
+
+@pytest.mark.parametrize("option", [{"executor": 4}, {"progress": True}])
+def test_workers_of_the_wrong_kind_are_refused(option):
+    with pytest.raises(InvalidValueError, match="expected a"):
+        pf.aspects(TWO, **option)
+
+
+def test_caches_keep_no_model_alive():
+    arm = three(2, 1.5, 1)
+    assert pf.workspace(arm, resolution=5).area > 0.0
+    pf.aspects(arm, resolution=30)
+    pf.nodes(arm)
+    gone = weakref.ref(arm)
+    del arm
+    gc.collect()
+    assert gone() is None

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from functools import partial
 
 import numpy as np
 
+from .._arrays.tasks import Task, results
 from ..errors import InvalidValueError
 from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from .equations import Equations
@@ -84,10 +83,6 @@ def reduce_equations(
     return merged_all(leaves())
 
 
-Task = tuple[Callable[[], TriangularFactors], float]
-"""Work on a piece, and the fraction of all work that is done after it; 0 if it is not known."""
-
-
 def parts(system: Equations, sent: bool) -> Iterator[tuple[Equations, Piece]]:
     """Pieces and their equations; what is sent to a worker has the samples of its piece alone."""
     for piece in system.pieces():
@@ -98,7 +93,7 @@ def parts(system: Equations, sent: bool) -> Iterator[tuple[Equations, Piece]]:
             yield system, piece
 
 
-def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[Task]:
+def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[Task[TriangularFactors]]:
     """One task per piece."""
     logs = len(systems) if isinstance(systems, Sized) else 0
     for k, system in enumerate(systems):
@@ -106,30 +101,6 @@ def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[Task]:
         for i, (part, piece) in enumerate(parts(system, sent)):
             fraction = (k + (i + 1) / count) / logs if logs else 0.0
             yield partial(_piece_factors, part, piece), fraction
-
-
-def results(
-    tasks: Iterable[Task], executor: Executor | None, window: int | None = None
-) -> Iterator[tuple[TriangularFactors, float]]:
-    """Results in the order of the tasks, of which at most ``window`` are submitted at a time."""
-    if executor is None:
-        yield from ((task(), fraction) for task, fraction in tasks)
-        return
-    most = 2 * (os.cpu_count() or 1) + 2 if window is None else window
-    waiting: deque[tuple[Future[TriangularFactors], float]] = deque()
-    try:
-        for task, fraction in tasks:
-            if len(waiting) == most:
-                first, done = waiting.popleft()
-                yield first.result(), done
-            waiting.append((executor.submit(task), fraction))
-        while waiting:
-            first, done = waiting.popleft()
-            yield first.result(), done
-    finally:
-        # after an error the pending pieces are cancelled
-        for future, _ in waiting:
-            future.cancel()
 
 
 def _piece_factors(system: Equations, piece: Piece) -> TriangularFactors:

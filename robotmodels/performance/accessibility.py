@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_mask, read_only
+from .._arrays import Array, as_mask
+from .._arrays.tasks import Workers
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..igm import IGMStatus, igm
@@ -17,18 +22,9 @@ from ..igm.known import known_arm, solver_for
 from ..igm.request import Task, poses_of
 from ..igm.solver import Tolerances, postures
 from ..kinematics import dgm
-from ..model import RobotModel, check_model
-from .arms import (
-    Free,
-    Result,
-    checked_flag,
-    checked_word,
-    free_predicate,
-    plane_normal,
-    section_arm,
-    sequence,
-    turned_inside,
-)
+from ..model import RobotModel
+from . import arms
+from .arms import Flags, Ints, JointSpace, Values
 
 LEVELS = ("position", "pose", "every_orientation")
 ANGLES, ROTATIONS = 180, 96  # orientations that stand for all, in a plane and in space
@@ -46,7 +42,7 @@ class AccessStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Accessibility(Result):
+class Accessibility(Values):
     """Accessibility of poses.
 
     Parameters
@@ -61,7 +57,7 @@ class Accessibility(Result):
     """
 
     status: NDArray[np.int8]
-    count: NDArray[np.int64]
+    count: Ints
     level: str
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
@@ -89,6 +85,8 @@ def accessibility(
     limits: bool = True,
     free: Any = None,
     mask: ArrayLike | str | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Accessibility:
     """Accessibility of poses: can the tool be brought there, and if not, why.
 
@@ -108,6 +106,10 @@ def accessibility(
     mask : array_like, shape (6,), optional
         Components of the pose that are asked, see `igm`. Of one component of the orientation
         180 angles about its axis, from the orientation of zero joints, stand for every one.
+    executor : concurrent.futures.Executor, optional
+        Threads or processes that compute; the results do not depend on their number.
+    progress : callable, optional
+        Called with the fraction done.
 
     Returns
     -------
@@ -132,67 +134,73 @@ def accessibility(
     >>> found.count, found.reason(1)
     (array([2, 0]), 'No posture reaches the position.')
     """
-    check_model(arm)
-    checked_word(level, LEVELS, "level")
+    space, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
+    one_of(level, LEVELS, "level")
     poses = poses_of(T)
-    batch = poses.shape[:-2]
-    rows = poses.reshape(-1, 4, 4)
-    bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
+    batch, rows = poses.shape[:-2], poses.reshape(-1, 4, 4)
     components = None if mask is None else as_mask(mask)
+    place = arms.PLACE if components is None else components & arms.PLACE
+    asked = components if level == "pose" else place
+    first = work.part(0.0, 0.1 if level == "every_orientation" else 1.0)
+    status, count = posture_counts(space, rows, asked, first)
     if level == "every_orientation":
-        status, count = _every_orientation(arm, rows, bounded, is_free, components)
-    else:
-        if level == "position":
-            place = np.repeat((True, False), 3)
-            components = place if components is None else components & place
-        status, count = posture_counts(arm, rows, components, bounded, is_free)
-        lost = np.flatnonzero(status == AccessStatus.OUT_OF_REACH)
-        if lost.size and level == "pose":
-            reasons = igm(arm, rows[lost], mask=components).status
-            oriented = reasons == IGMStatus.ORIENTATION_NOT_AVAILABLE
-            status[lost[oriented]] = AccessStatus.ORIENTATION_NOT_AVAILABLE
-    return Accessibility(
-        read_only(status.reshape(batch), np.int8), read_only(count.reshape(batch), np.int64), level
-    )
+        reached = np.flatnonzero(status == AccessStatus.ACCESSIBLE)
+        status[reached], count[reached] = in_every_orientation(
+            space, rows[reached, :3, 3], components, work.part(0.1, 1.0)
+        )
+    lost = np.flatnonzero(status == AccessStatus.OUT_OF_REACH)
+    if lost.size and level == "pose":
+        reasons = igm(arm, rows[lost], mask=components).status
+        oriented = reasons == IGMStatus.ORIENTATION_NOT_AVAILABLE
+        status[lost[oriented]] = AccessStatus.ORIENTATION_NOT_AVAILABLE
+    return Accessibility(status.reshape(batch), count.reshape(batch), level)
 
 
 def posture_counts(
-    arm: RobotModel,
-    poses: Array,
-    mask: NDArray[np.bool_] | None,
-    limits: bool,
-    is_free: Free | None,
-) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    space: JointSpace, poses: Array, mask: Flags | None, work: Workers
+) -> tuple[NDArray[np.int8], Ints]:
     """Status and number of postures of poses (N, 4, 4)."""
-    status, count = np.zeros(len(poses), np.int8), np.zeros(len(poses), np.int64)
-    for k in range(0, len(poses), _AT_A_TIME):
-        part = slice(k, k + _AT_A_TIME)
-        q, valid, oriented = postures_of(arm, poses[part], mask)
-        reached = valid.any(axis=1)
-        q, inside = turned_inside(arm, q, limits)
-        valid &= inside
-        allowed = valid.any(axis=1)
-        if is_free is not None:
-            valid = with_free(valid, q, is_free)
-        count[part] = valid.sum(axis=1)
-        status[part] = np.select(
-            [valid.any(axis=1), allowed, reached, oriented],
-            [
-                AccessStatus.ACCESSIBLE,
-                AccessStatus.ONLY_IN_COLLISION,
-                AccessStatus.ONLY_OUTSIDE_LIMITS,
-                AccessStatus.ORIENTATION_NOT_AVAILABLE,
-            ],
-            AccessStatus.OUT_OF_REACH,
-        )
+    status, count = work.rows(partial(_counts, space, mask), _AT_A_TIME, poses)
     return status, count
 
 
-def postures_of(
-    arm: RobotModel, poses: Array, mask: NDArray[np.bool_] | None
-) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+def _counts(space: JointSpace, mask: Flags | None, poses: Array) -> tuple[NDArray[Any], ...]:
+    q, valid, oriented = postures_of(space.model, poses, mask)
+    reached = valid.any(axis=1)
+    q, inside = space.within(q)
+    valid &= inside
+    allowed = valid.any(axis=1)
+    valid = free_of(space, q, valid)
+    status = np.select(
+        [valid.any(axis=1), allowed, reached, oriented],
+        [
+            AccessStatus.ACCESSIBLE,
+            AccessStatus.ONLY_IN_COLLISION,
+            AccessStatus.ONLY_OUTSIDE_LIMITS,
+            AccessStatus.ORIENTATION_NOT_AVAILABLE,
+        ],
+        AccessStatus.OUT_OF_REACH,
+    )
+    return status.astype(np.int8), valid.sum(axis=1)
+
+
+def allowed_postures(space: JointSpace, poses: Array, mask: Flags | None) -> tuple[Array, Flags]:
+    """Postures q (N, S, n), and which are within the limits and free (N, S)."""
+    q, valid, _ = postures_of(space.model, poses, mask)
+    q, inside = space.within(q)
+    return q, free_of(space, q, valid & inside)
+
+
+def free_of(space: JointSpace, q: Array, valid: Flags) -> Flags:
+    """Which of the valid postures (N, S) are free of collisions."""
+    if space.free is not None and valid.any():
+        valid[valid] = space.is_free(q[valid])
+    return valid
+
+
+def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Array, Flags, Flags]:
     """Postures q (N, S, n), valid (N, S), and poses (N,) that lack only the orientation."""
-    section = section_arm(arm)
+    section = arms.section_arm(arm)
     if (
         section is not None
         and mask is not None
@@ -222,67 +230,35 @@ def postures_of(
     return q, solved.valid.copy(), np.zeros(len(poses), np.bool_)
 
 
-def _spans(frame: Array, mask: NDArray[np.bool_]) -> bool:
+def _spans(frame: Array, mask: Flags) -> bool:
     """Whether two components of a position determine a point of the plane of a frame."""
     return mask.sum() == 2 and abs(float(np.linalg.det(frame[:3, :2][mask]))) > 1e-9
 
 
-def with_free(valid: NDArray[np.bool_], q: Array, is_free: Free) -> NDArray[np.bool_]:
-    """Rows that are valid and free. Shapes: valid (N, S), q (N, S, n)."""
-    kept = valid.copy()
-    kept[valid] = is_free(q[valid]) if valid.any() else False
-    return kept
-
-
-def orientations(arm: RobotModel, mask: NDArray[np.bool_] | None = None) -> Array:
+def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:
     """Orientations (K, 3, 3) that stand for all: about the axis asked, the normal, or any."""
-    normal = plane_normal(arm)
+    from scipy.spatial.transform import Rotation
+
+    normal = arms.plane_normal(arm)
     if mask is not None and mask[3:].sum() == 1:
         normal = mask[3:].astype(float)
     if normal is not None:
-        home = dgm(arm, np.zeros(arm.n))[:3, :3]
-        angles = 2.0 * pi * np.arange(ANGLES) / ANGLES
-        skew = np.cross(np.eye(3), -normal)
-        s, c = np.sin(angles)[:, None, None], 1.0 - np.cos(angles)[:, None, None]
-        return np.asarray((np.eye(3) + s * skew + c * (skew @ skew)) @ home)
-    u, v, w = sequence(ROTATIONS, 3).T
+        # far from each other in turn, so that what fails is left out early
+        angles = 2.0 * pi * (np.arange(ANGLES) * 71 % ANGLES) / ANGLES
+        return (
+            Rotation.from_rotvec(angles[:, None] * normal).as_matrix()
+            @ dgm(arm, np.zeros(arm.n))[:3, :3]
+        )
+    u, v, w = arms.sequence(ROTATIONS, 3).T * [[1.0], [2.0 * pi], [2.0 * pi]]
     a, b = np.sqrt(1.0 - u), np.sqrt(u)
-    v, w = 2.0 * pi * v, 2.0 * pi * w
-    x, y, z, s = a * np.sin(v), a * np.cos(v), b * np.sin(w), b * np.cos(w)
-    # rotations of unit quaternions, spread evenly (K. Shoemake, Uniform random rotations, 1992)
-    return np.moveaxis(
-        np.array([
-            [1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)],
-            [2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)],
-            [2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)],
-        ]), 2, 0,
-    )  # fmt: skip
-
-
-def _every_orientation(
-    arm: RobotModel,
-    poses: Array,
-    limits: bool,
-    is_free: Free | None,
-    mask: NDArray[np.bool_] | None,
-) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """The worst status and the least count over the orientations."""
-    place = np.repeat((True, False), 3)
-    place = place if mask is None else place & mask
-    status, count = posture_counts(arm, poses, place, limits, is_free)
-    rows = np.flatnonzero(status == AccessStatus.ACCESSIBLE)
-    worst, least = in_every_orientation(arm, poses[rows, :3, 3], limits, is_free, mask)
-    status[rows], count[rows] = worst, least
-    return status, count
+    # unit quaternions, spread evenly (K. Shoemake, Uniform random rotations, 1992)
+    spread = np.column_stack((a * np.sin(v), a * np.cos(v), b * np.sin(w), b * np.cos(w)))
+    return Rotation.from_quat(spread).as_matrix()
 
 
 def in_every_orientation(
-    arm: RobotModel,
-    positions: Array,
-    limits: bool,
-    is_free: Free | None,
-    mask: NDArray[np.bool_] | None = None,
-) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    space: JointSpace, positions: Array, mask: Flags | None, work: Workers
+) -> tuple[NDArray[np.int8], Ints]:
     """Status of the first orientation that fails, and the least count, of positions (N, 3).
 
     A mask without components of the orientation asks for all of them.
@@ -290,15 +266,17 @@ def in_every_orientation(
     asked = mask if mask is not None and mask[3:].any() else None
     status = np.zeros(len(positions), np.int8)
     count = np.full(len(positions), np.iinfo(np.int64).max)
-    rest = np.arange(len(positions))
-    for R in orientations(arm, asked):
-        if not rest.size:
-            break
+    rest, every = np.arange(len(positions)), orientations(space.model, asked)
+    for k, R in enumerate(every if rest.size else ()):
         T = np.tile(np.eye(4), (rest.size, 1, 1))
         T[:, :3, :3], T[:, :3, 3] = R, positions[rest]
-        found, number = posture_counts(arm, T, asked, limits, is_free)
+        part = work.part(k / len(every), (k + 1) / len(every))
+        found, number = posture_counts(space, T, asked, part)
         count[rest] = np.minimum(count[rest], number)
         out = found == AccessStatus.OUT_OF_REACH
         status[rest] = np.where(out, AccessStatus.ORIENTATION_NOT_AVAILABLE, found)
         rest = rest[found == AccessStatus.ACCESSIBLE]
+        if not rest.size:
+            break
+    work.done()
     return status, count

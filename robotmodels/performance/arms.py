@@ -1,12 +1,13 @@
-"""Task, ranges of joints and section of an arm, shared by the analyses."""
+"""Joint space, task and section of an arm, and the base of results: shared by the analyses."""
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
+from functools import wraps
 from math import pi, tau
-from typing import Any
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,35 +24,48 @@ from ..model import RobotModel, check_model
 from ..obstacles import clearance
 from ..obstacles.clearance import checked_obstacles
 
+Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+T = TypeVar("T")
+PLACE = np.repeat((True, False), 3)
+_SLACK = 1e-9  # rad or m, of limits
 
-class Result(Rebuilt):
-    """Base of results: read-only, equal if their fields are, NaN included."""
+
+class Values(Rebuilt):
+    """Base of results: read-only copies of arrays, equal if the fields are, NaN included."""
 
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        for value in self._fields():
-            _freeze(value)
+        for f in fields(self):  # type: ignore[arg-type]
+            object.__setattr__(self, f.name, _kept(getattr(self, f.name)))
 
     def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        return _same(self._fields(), other._fields())
+        return _same(self, other) if type(other) is type(self) else NotImplemented
 
     def __hash__(self) -> int:
-        return hash((type(self).__name__, *map(str, self._fields())))
-
-    def _fields(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
+        return hash((type(self).__name__, *map(str, _fields(self))))
 
 
-def _freeze(value: Any) -> None:
-    """Make arrays read-only, also inside tuples."""
-    if isinstance(value, np.ndarray):
-        value.flags.writeable = False
-    elif isinstance(value, tuple):
-        for item in value:
-            _freeze(item)
+class Result(Values):
+    """Base of results with a status."""
+
+    __slots__ = ()
+
+    def reason(self) -> str:
+        """The status as a sentence."""
+        return self.status.sentence  # type: ignore[attr-defined]
+
+
+def _fields(value: Any) -> tuple[Any, ...]:
+    return tuple(getattr(value, f.name) for f in fields(value))
+
+
+def _kept(value: Any) -> Any:
+    """A read-only copy of an array, also inside tuples."""
+    if isinstance(value, tuple):
+        return tuple(map(_kept, value))
+    return read_only(value, value.dtype.type) if isinstance(value, np.ndarray) else value
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -59,21 +73,107 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(map(_same, a, b))
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.shape == b.shape and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    if is_dataclass(a) and type(a) is type(b) and type(a).__eq__ is object.__eq__:
-        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))  # obstacles
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    if is_dataclass(a) and type(a) is type(b) and type(a).__eq__ in (object.__eq__, Values.__eq__):
+        return _same(_fields(a), _fields(b))
     return bool(a == b) or (a != a and b != b)
 
 
-Free = Callable[[Array], NDArray[np.bool_]]
-_CHUNK = 65536  # positions solved at a time
-_MOST_BYTES = 1e9
-_CELL_BYTES = 170
+def per_model(function: Callable[..., T]) -> Callable[..., T]:
+    """Keep what a function of a model returns for as long as the model is in use."""
+    known: WeakKeyDictionary[RobotModel, dict[Any, T]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def kept(model: RobotModel, *given: Any) -> T:
+        of_model = known.setdefault(model, {})
+        if given not in of_model:
+            of_model[given] = function(model, *given)
+        return of_model[given]
+
+    return kept
 
 
-def wrapped(x: Array, turning: NDArray[np.bool_]) -> Array:
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSpace:
+    """Joint space of an arm: its limits if they count, and what is free of collisions."""
+
+    model: RobotModel
+    limits: bool
+    free: Any = None
+
+    def is_free(self, q: Array) -> Flags:
+        """Which configurations (N, n) are free of collisions."""
+        if not callable(self.free):
+            return np.asarray(clearance(self.model, q, self.free) > 0.0)
+        flags = np.asarray(self.free(q))
+        if flags.shape != q.shape[:-1] or flags.dtype != np.bool_:
+            raise ShapeError(
+                f"free: expected a function of q (N, {self.model.n}) that returns bool (N,), got "
+                f"{flags.dtype} {flags.shape} for q {q.shape}."
+            )
+        return flags
+
+    def within(self, q: Array) -> tuple[Array, Flags]:
+        """Configurations (..., n) turned by whole turns into the limits, and whether they fit."""
+        return (
+            self.turned(q, q)[:2] if self.limits else (q, np.asarray(np.isfinite(q).all(axis=-1)))
+        )
+
+    def turned(self, low: Array, high: Array) -> tuple[Array, Flags, Array]:
+        """Ranges (..., n) of motions by whole turns into the limits: low ends, fits, turns."""
+        lower, upper = self.model.lower, self.model.upper
+        with np.errstate(invalid="ignore"):
+            least = np.ceil((lower - low - _SLACK) / tau)
+            least = np.where(np.isfinite(lower), least, np.floor((upper - high + _SLACK) / tau))
+            outside = turning(self.model) & np.isfinite(least) & ((low < lower) | (high > upper))
+            turns = np.where(outside, tau * least, 0.0)
+            fits = (low + turns >= lower - _SLACK) & (high + turns <= upper + _SLACK)
+        return low + turns, np.asarray(fits.all(axis=-1)), turns
+
+    def ranges(self, columns: ArrayLike | None = None) -> tuple[Array, Flags]:
+        """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves.
+
+        A slide among the columns (default those that move the tool) needs limits.
+        """
+        model, turns = self.model, turning(self.model)
+        bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (self.limits | ~turns)
+        asked = joint_chain(model).columns if columns is None else np.asarray(columns)
+        slides = np.intersect1d(np.flatnonzero(~turns & ~bounded), asked)
+        if slides.size:
+            raise InvalidValueError(
+                f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "
+                "infinite; give the table `lower` and `upper`."
+            )
+        low = np.where(bounded, model.lower, np.where(turns, -pi, -np.inf))
+        high = np.where(bounded, model.upper, np.where(turns, pi, np.inf))
+        return np.stack((low, high), axis=1), turns & ~bounded
+
+    def samples(self, count: int) -> Array:
+        """Free configurations (N, n), of ``count`` that fill the ranges; still joints at zero."""
+        columns = joint_chain(self.model).columns
+        low, high = self.ranges()[0][columns].T
+        q = np.zeros((count, self.model.n))
+        q[:, columns] = low + (high - low) * sequence(count, columns.size)
+        return q if self.free is None else q[self.is_free(q)]
+
+
+def joint_space(model: RobotModel, limits: Any = True, free: Any = None) -> JointSpace:
+    """The joint space of an arm, checked; obstacles are kept as a tuple."""
+    check_model(model)
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r:.60}.")
+    obstacles = free if free is None or callable(free) else checked_obstacles(free)
+    return JointSpace(model, bool(limits), obstacles)
+
+
+def turning(model: RobotModel) -> Flags:
+    """Which joints (n,) are revolute."""
+    return np.asarray(model.table.sigma[model.table.joint_rows] == REVOLUTE)
+
+
+def wrapped(x: Array, turns: Flags) -> Array:
     """Differences of joint positions, angles in [-pi, pi)."""
-    return np.where(turning, (x + np.pi) % tau - np.pi, x)
+    return np.where(turns, (x + np.pi) % tau - np.pi, x)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,13 +183,11 @@ class SectionArm:
     Of two joints in a plane the first is a virtual slide, column -1. Shapes: D (4, 4, 4).
     """
 
-    kinds: NDArray[np.int64]
+    kinds: Ints
     D: Array
-    columns: NDArray[np.int64]
+    columns: Ints
     local: Array
     frame: Array
-    flip: Array
-    shift: Array
     size: float
 
     @property
@@ -98,9 +196,9 @@ class SectionArm:
         return bool(self.kinds[0] == 0)
 
     @property
-    def periods(self) -> Array:
-        """Periods of the last two joints; 0 for slides."""
-        return np.where(self.kinds[1:] == 0, tau, 0.0)
+    def turns(self) -> Flags:
+        """Which of the last two joints are revolute."""
+        return np.asarray(self.kinds[1:] == 0)
 
     def values(self, x: Array) -> Array:
         """Rows of `kernels.section_values`, coordinates as in ``frame``. Shapes: (N, 2), (N, 9)."""
@@ -108,16 +206,13 @@ class SectionArm:
 
         out = np.empty((len(x), VALUES))
         section_values(self.kinds, self.local, np.ascontiguousarray(x), out)
-        out[:, :2] = out[:, :2] @ self.flip.T + self.shift
-        A = self.flip @ out[:, 2:6].reshape(-1, 2, 2)
-        out[:, 2:6] = A.reshape(-1, 4)
         return out
 
     def world(self, section: Array) -> Array:
         """World positions of points (N, 2) of the section."""
         return np.asarray(section @ self.frame[:3, :2].T + self.frame[:3, 3])
 
-    def postures(self, positions: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def postures(self, positions: Array) -> tuple[Array, Flags]:
         """All postures of world positions (N, 3): q (N, 4, 3), valid (N, 4)."""
         from ..igm.kernels.pieper import position_solutions
 
@@ -142,20 +237,9 @@ class SectionArm:
         return out
 
 
-_SECTIONS: dict[int, tuple[weakref.ref[RobotModel], SectionArm | None]] = {}
-
-
+@per_model
 def section_arm(model: RobotModel) -> SectionArm | None:
     """The section of an arm whose position three joints, or two in a plane, determine."""
-    key = id(model)
-    entry = _SECTIONS.get(key)
-    if entry is None or entry[0]() is not model:
-        entry = (weakref.ref(model, lambda _: _SECTIONS.pop(key, None)), _section_arm(model))
-        _SECTIONS[key] = entry
-    return entry[1]
-
-
-def _section_arm(model: RobotModel) -> SectionArm | None:
     chain = joint_chain(model)
     D, kinds, columns = model.base @ chain.D[0], chain.sigma, chain.columns
     rest = chain.D[1:]
@@ -165,7 +249,7 @@ def _section_arm(model: RobotModel) -> SectionArm | None:
             return None
         # a slide along the normal of the plane, before the first joint
         slide = np.eye(4)
-        slide[:3, :3] = _axes(normal)
+        slide[:3, :3] = axes_along(normal)
         rest = np.array([se3.inverse(slide) @ D, *rest])
         D, kinds, columns = slide, np.array([1, *kinds]), np.array([-1, *columns])
         tip = dgm(model, np.zeros(model.n))[:3, 3]  # any position gives the height of the plane
@@ -174,34 +258,26 @@ def _section_arm(model: RobotModel) -> SectionArm | None:
     elif chain.k != 3 or prepare_position(chain) is None:
         return None
     whole = np.array([D, *rest])
-    local = whole.copy()
-    local[0] = np.eye(4)
-    radial = kinds[0] == 0
-    axis = whole[0, :3, 2]
-    R = _axes(axis)
-    frame = np.eye(4)
-    flip, shift = np.eye(2), np.zeros(2)
-    origin = whole[0, :3, 3]
-    if radial:
-        # columns: radial direction, height, and the third; the origin on the axis at height zero
-        frame[:3, :3] = np.column_stack((R[:, 0], R[:, 2], -R[:, 1]))
-        frame[:3, 3] = origin - R[:, 2] * (R[:, 2] @ origin)
-        flip[1, 1], shift[1] = float(R[:, 2] @ axis), float(R[:, 2] @ origin)
-    else:
-        frame[:3, :3] = R
-        frame[:3, 3] = R[:, 2] * (R[:, 2] @ origin)
-        flip = R[:, :2].T @ whole[0, :3, :2]
-        shift = R[:, :2].T @ origin
+    own, frame = axis_frames(D, radial=bool(kinds[0] == 0))
+    local = np.array([se3.inverse(own) @ D, *rest])
     size = float(np.linalg.norm(whole[1:, :3, 3], axis=1).sum()) or 1.0
-    arrays = (read_only(a) for a in (whole, local, frame, flip, shift))
-    whole, local, frame, flip, shift = arrays
-    return SectionArm(
-        read_only(kinds, np.int64), whole, read_only(columns, np.int64), local, frame, flip, shift,
-        size,
-    )  # fmt: skip
+    kinds, columns = np.asarray(kinds, np.int64), np.asarray(columns, np.int64)
+    return SectionArm(kinds, whole, columns, local, frame, size)
 
 
-def _axes(axis: Array) -> Array:
+def axis_frames(D: Array, radial: bool) -> tuple[Array, Array]:
+    """Frame along the first axis, and its columns in the order of the section's coordinates.
+
+    Radial: the distance from the axis, the height, the third; the origin on the axis.
+    """
+    own, origin = np.eye(4), D[:3, 3]
+    R = own[:3, :3] = axes_along(D[:3, 2])
+    height = R[:, 2] * (R[:, 2] @ origin)
+    own[:3, 3] = origin - height if radial else height
+    return own, own[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0) if radial else own
+
+
+def axes_along(axis: Array) -> Array:
     """Orthonormal columns e1, e2, e3 with e3 along an axis, its largest component positive."""
     e3 = axis * np.sign(axis[np.argmax(np.abs(axis))])
     first = np.eye(3)[0] if abs(e3[0]) < 0.9 else np.eye(3)[1]
@@ -222,7 +298,7 @@ def plane_normal(model: RobotModel) -> Array | None:
     return np.asarray(vectors[2])
 
 
-def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray[np.bool_]:
+def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> Flags:
     """Components of the twist that the postures of an arm mean (6,): by the mask, or by its joints.
 
     Up to three joints the position if it has as many freedoms, else the rows that move at all if
@@ -241,111 +317,16 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> NDArray
     return moved if moved.sum() == k else np.ones(6, np.bool_)
 
 
-def leaves_a_family(model: RobotModel, mask: NDArray[np.bool_] | None = None) -> bool:
+def leaves_a_family(model: RobotModel, mask: Flags | None = None) -> bool:
     """Whether the rows asked (default all six) leave infinitely many postures."""
     k = joint_chain(model).k
     if k == 0:
         return False
-    rows = np.ones(6, np.bool_) if mask is None else mask
+    rows = as_mask(mask)
     weights = np.repeat((1.0 / characteristic_length(model), 1.0), 3)[rows]
     J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
     rank = np.linalg.matrix_rank(J[:, rows] * weights[:, None], tol=1e-9) if rows.any() else 0
     return int(np.max(rank)) < k
-
-
-def joint_ranges(
-    model: RobotModel, limits: bool, columns: ArrayLike | None = None
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves.
-
-    A slide among the columns (default those that move the tool) needs limits.
-    """
-    turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (limits | ~turning)
-    asked = joint_chain(model).columns if columns is None else np.asarray(columns)
-    slides = np.intersect1d(np.flatnonzero(~turning & ~bounded), asked)
-    if slides.size:
-        raise InvalidValueError(
-            f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "
-            "infinite; give the table `lower` and `upper`."
-        )
-    low = np.where(bounded, model.lower, np.where(turning, -pi, -np.inf))
-    high = np.where(bounded, model.upper, np.where(turning, pi, np.inf))
-    return np.stack((low, high), axis=1), turning & ~bounded
-
-
-def turned_inside(model: RobotModel, q: Array, limits: bool) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures (..., n) turned by whole turns to lie inside the limits, and whether they do."""
-    if not limits:
-        return q, np.asarray(np.isfinite(q).all(axis=-1))
-    turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    lower, upper = model.lower, model.upper
-    with np.errstate(invalid="ignore"):
-        low = np.ceil((lower - q - 1e-9) / tau)
-        low = np.where(np.isfinite(lower), low, np.floor((upper - q + 1e-9) / tau))
-        turns = np.where((q < lower) | (q > upper), low, 0.0)
-        moved = q + tau * np.where(turning, turns, 0.0)
-        inside = (moved >= lower - 1e-9) & (moved <= upper + 1e-9)
-    return moved, np.asarray(inside.all(axis=-1))
-
-
-def free_predicate(model: RobotModel, free: Any) -> Free | None:
-    """Function of rows (N, n) that tells which are free, from a function or from obstacles."""
-    if free is None:
-        return None
-    if callable(free):
-
-        def asked(q: Array) -> NDArray[np.bool_]:
-            flags = np.asarray(free(q))
-            if flags.shape != q.shape[:-1] or flags.dtype != np.bool_:
-                raise ShapeError(
-                    f"free: expected a function of q (N, {model.n}) that returns bool (N,), got "
-                    f"{flags.dtype} {flags.shape} for q {q.shape}."
-                )
-            return flags
-
-        return asked
-    bodies = checked_obstacles(free)
-    return lambda q: clearance(model, q, bodies) > 0.0
-
-
-def kept_free(free: Any) -> Any:
-    """Value of ``free`` that a result keeps: the function, or the obstacles as a tuple."""
-    return free if free is None or callable(free) else checked_obstacles(free)
-
-
-def checked_flag(value: Any, name: str) -> bool:
-    """True or False, nothing else."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.60}.")
-    return bool(value)
-
-
-def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
-    """Cells along each axis, whose grid fits into 1 GB."""
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidValueError(
-            f"resolution: expected the number of cells along each axis, a whole number of at "
-            f"least {least}, got {value!r:.60}."
-        )
-    most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
-    if value > most:
-        need = _CELL_BYTES * float(value) ** dimensions / 1e9
-        raise InvalidValueError(
-            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
-            f"than 1 GB; at most {most} fit."
-        )
-    return int(value)
-
-
-def checked_word(value: Any, words: tuple[str, ...], name: str) -> str:
-    """One of several words."""
-    if not isinstance(value, str) or value not in words:
-        listed = ", ".join(map(repr, words))
-        raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.")
-    return value
 
 
 def sequence(count: int, dimensions: int) -> Array:

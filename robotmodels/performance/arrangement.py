@@ -7,32 +7,24 @@ middle of a trapezoid are those of all of it.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..model import RobotModel
-from .arms import SectionArm, section_arm, turned_inside
-from .level_curves import Curve, last_two_ranges, level_curves, limit_curves
+from .arms import Ints, JointSpace, SectionArm, per_model, section_arm
+from .level_curves import Line, section_lines
 
 _CHUNK = 65536
 
 
-class Line(NamedTuple):
-    """A curve with its image: x (K, 2) joints, section (K, 2), whether closed or of a limit."""
-
-    x: Array
-    section: Array
-    closed: bool
-    of_limit: bool
-
-
-class Cut(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
     """Trapezoids: area (m,), middle (m, 2), strip (m,), sides (m, 4) in y; ends of strips (k + 1,).
 
     Sides are the lower left and right end, then the upper ones. Crossings (k, 2, 2): line, place.
@@ -40,60 +32,25 @@ class Cut(NamedTuple):
 
     area: Array
     middle: Array
-    strip: NDArray[np.int64]
+    strip: Ints
     sides: Array
     ends: Array
     crossings: Array
 
 
-class Piece(NamedTuple):
-    """Part of a line between crossings, the postures on its left and right."""
-
-    line: int
-    x: Array
-    section: Array
-    left: int
-    right: int
-
-
-def section_lines(model: RobotModel, arm: SectionArm, limits: bool) -> list[Line]:
-    """Singular curves, and the lines of the limits, with their images."""
-    ranges = last_two_ranges(model, arm, limits)
-    curves = [(curve, False) for curve in level_curves(arm, ranges)]
-    curves += [(curve, True) for curve in limit_curves(ranges)]
-    return [Line(c.x, _image(arm, c), c.closed, flag) for c, flag in curves]
-
-
-def _image(arm: SectionArm, curve: Curve) -> Array:
-    """Image of a curve, its points moved so that the polyline bounds the area of the curve.
-
-    A chord lies inside a bend; the second difference over twelve makes up for the area.
-    """
-    values = arm.values(curve.x)
-    p = values[:, :2].copy()
-    bend = np.zeros_like(p)
-    bend[1:-1] = p[2:] - 2.0 * p[1:-1] + p[:-2]
-    if curve.closed:
-        bend[0] = bend[-1] = p[1] - 2.0 * p[0] + p[-2]
-    sharp = np.linalg.norm(bend, axis=1) > 4e-4 * arm.size  # reflected by the axis
-    p -= np.where(sharp[:, None], 0.0, bend / 12.0)
-    if arm.radial:
-        p[:, 0] = np.maximum(p[:, 0], 0.0)
-    return p
-
-
-def cut(lines: list[Line]) -> Cut:
+def cut(lines: tuple[Line, ...]) -> Cut:
     """Trapezoids between the lines, and where lines cross."""
     if not lines:
         none = np.zeros(0)
-        return Cut(none, np.zeros((0, 2)), np.zeros(0, int), np.zeros((0, 4)), none,
-                   np.zeros((0, 2, 2)))  # fmt: skip
+        return Cut(
+            none, np.zeros((0, 2)), none.astype(int), np.zeros((0, 4)), none, np.zeros((0, 2, 2))
+        )
     first = np.concatenate([line.section[:-1] for line in lines])
     last = np.concatenate([line.section[1:] for line in lines])
-    place = np.concatenate(
-        [np.column_stack((np.full(len(line.x) - 1, k), np.arange(len(line.x) - 1)))
-         for k, line in enumerate(lines)]
-    )  # fmt: skip
+    sizes = [len(line.x) - 1 for line in lines]
+    place = np.column_stack(
+        (np.repeat(range(len(lines)), sizes), np.concatenate([*map(np.arange, sizes)]))
+    )
     ahead = (first[:, 0] <= last[:, 0])[:, None]
     a, b = np.where(ahead, first, last), np.where(ahead, last, first)
     xs = np.unique(np.concatenate((a[:, 0], b[:, 0])))
@@ -124,117 +81,106 @@ def cut(lines: list[Line]) -> Cut:
     return Cut(area, middle, strip[1:][same], sides, xs, places)
 
 
-def count_postures(
-    model: RobotModel, arm: SectionArm, positions: Array, limits: bool
-) -> NDArray[np.int64]:
-    """Number of postures of world positions (N, 3) within the limits."""
-    counts = np.empty(len(positions), np.int64)
-    for k in range(0, len(positions), _CHUNK):
-        q, valid = arm.postures(positions[k : k + _CHUNK])
-        if limits:
-            valid = valid & turned_inside(model, arm.model_postures(model, q), True)[1]
-        counts[k : k + _CHUNK] = valid.sum(axis=1)
-    return counts
-
-
-@lru_cache(maxsize=32)
-def measures(model: RobotModel, limits: bool) -> tuple[Array, Array]:
-    """Area and swept volume by the number of postures (most + 1,), by the boundary method."""
+@per_model
+def lines_of(model: RobotModel, limits: bool) -> tuple[tuple[Line, ...], bool]:
+    """Singular curves and lines of the limits of an arm with a section; whether curves touch."""
     arm = section_arm(model)
     assert arm is not None
-    lines = section_lines(model, arm, limits)
-    area, middle, *_ = cut(lines)
-    kept = area > 1e-12 * arm.size**2
-    area, middle = area[kept], middle[kept]
-    counts = count_postures(model, arm, arm.world(middle), limits)
-    areas = np.asarray(np.bincount(counts, area, 5), float)
-    sweep = 2.0 * pi * middle[:, 0] if arm.radial else np.full(len(middle), np.nan)
-    volumes = np.asarray(np.bincount(counts, area * sweep, 5), float)
+    lines, touch = section_lines(model, arm, limits)
+    return tuple(lines), touch
+
+
+@per_model
+def counted_cut(model: RobotModel, limits: bool) -> tuple[Cut, Ints]:
+    """The section cut along its curves, and the postures of each trapezoid."""
+    arm, found = section_arm(model), cut(lines_of(model, limits)[0])
+    assert arm is not None
+    counts = np.zeros(len(found.area), np.int64)
+    kept = found.area > 1e-12 * arm.size**2
+    counts[kept] = count_postures(JointSpace(model, limits), arm, found.middle[kept])
+    return found, counts
+
+
+def count_postures(space: JointSpace, arm: SectionArm, points: Array) -> Ints:
+    """Number of postures of points (N, 2) of the section within the limits; 0 beyond the axis."""
+    counts = np.empty(len(points), np.int64)
+    for k in range(0, len(points), _CHUNK):
+        q, valid = arm.postures(arm.world(points[k : k + _CHUNK]))
+        if space.limits:
+            valid = valid & space.within(arm.model_postures(space.model, q))[1]
+        counts[k : k + _CHUNK] = valid.sum(axis=1)
+    return np.where(arm.radial & (points[:, 0] < 0.0), 0, counts)
+
+
+def measures(model: RobotModel, limits: bool) -> tuple[Array, Array]:
+    """Area and swept volume by the number of postures (5,), by the boundary method."""
+    arm, (found, counts) = section_arm(model), counted_cut(model, limits)
+    assert arm is not None
+    areas = np.asarray(np.bincount(counts, found.area, 5), float)
+    sweep = 2.0 * pi * found.middle[:, 0] if arm.radial else np.full(len(counts), np.nan)
+    volumes = np.asarray(np.bincount(counts, found.area * sweep, 5), float)
     areas[0] = volumes[0] = 0.0
     return areas, volumes
 
 
-@lru_cache(maxsize=32)
-def pieces(model: RobotModel, limits: bool) -> tuple[tuple[Piece, ...], tuple[Line, ...]]:
-    """The lines broken at their crossings, with the numbers of postures beside each piece."""
-    arm = section_arm(model)
+def pieces(model: RobotModel, limits: bool) -> list[tuple[Line, Line, int, int]]:
+    """Parts of lines between their crossings: line, part, postures on the left and on the right."""
+    arm, lines = section_arm(model), lines_of(model, limits)[0]
     assert arm is not None
-    lines = section_lines(model, arm, limits)
-    crossings = cut(lines).crossings.reshape(-1, 2)
-    found = []
+    crossings = counted_cut(model, limits)[0].crossings.reshape(-1, 2)
+    parts, normals, middles = [], [], []
     for k, line in enumerate(lines):
-        places = np.unique(crossings[crossings[:, 0] == k, 1])
         last = len(line.x) - 1
+        places = np.floor(crossings[crossings[:, 0] == k, 1]).astype(int)
+        # a closed line from its first crossing once around
+        stops = np.unique(places % last if line.closed and places.size else [0, *places, last])
         if line.closed and places.size:
-            # from the first crossing once around
-            stops = np.append(places, places[0] + last)
-        else:
-            stops = np.unique(np.concatenate(([0.0], places, [last])))
-        for start, stop in pairwise(stops):
-            if stop - start > 1e-6:
-                found.append((k, *_part(line, start, stop, last)))
-    if not found:
-        return (), tuple(lines)
-    middles, normals = [], []
-    for _, _, section in found:
-        m = (len(section) - 1) // 2
-        along = section[m + 1] - section[m]
-        normals.append(np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300))
-        middles.append(0.5 * (section[m] + section[m + 1]))
-    shift = 1e-5 * arm.size * np.array(normals)
-    sides = []
-    for sign in (1.0, -1.0):
-        at = np.array(middles) + sign * shift
-        side = count_postures(model, arm, arm.world(at), limits)
-        sides.append(np.where(arm.radial & (at[:, 0] < 0.0), 0, side))
-    whole = zip(found, *sides, strict=True)
-    return tuple(Piece(k, x, s, int(a), int(b)) for (k, x, s), a, b in whole), tuple(lines)
+            stops = np.append(stops, stops[0] + last)
+        for ends in pairwise(stops.tolist()):
+            part = line.part(*ends)
+            m = (len(part.x) - 1) // 2
+            along = part.section[m + 1] - part.section[m]
+            normals.append(np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300))
+            middles.append(0.5 * (part.section[m] + part.section[m + 1]))
+            parts.append((line, part))
+    shift, middle = 1e-5 * arm.size * np.reshape(normals, (-1, 2)), np.reshape(middles, (-1, 2))
+    left, right = (
+        count_postures(JointSpace(model, limits), arm, middle + sign * shift).tolist()
+        for sign in (1.0, -1.0)
+    )
+    return [(*part, a, b) for part, a, b in zip(parts, left, right, strict=True)]
 
 
-def _part(line: Line, start: float, stop: float, last: int) -> tuple[Array, Array]:
-    """Joints and section of a line between two places along it."""
-    inner = np.arange(np.floor(start) + 1.0, np.ceil(stop))
-    places = np.concatenate(([start], inner, [stop]))
-    places = places[np.append(True, np.diff(places) > 1e-9)]
-    turns, rest = np.divmod(places, last) if line.closed else (0.0 * places, places)
-    shift = line.x[last] - line.x[0] if line.closed else np.zeros(2)
-    low = np.minimum(rest.astype(int), last - 1)
-    share = (rest - low)[:, None]
-    x = line.x[low] + share * (line.x[low + 1] - line.x[low]) + turns[:, None] * shift
-    section = line.section[low] + share * (line.section[low + 1] - line.section[low])
-    return x, section
-
-
-@lru_cache(maxsize=32)
-def boundary(model: RobotModel, limits: bool) -> tuple[Array, ...]:
+def boundary(model: RobotModel, limits: bool) -> list[Array]:
     """Closed polylines around what is reached, which lies on their left."""
-    arm = section_arm(model)
+    arm, (found, counts) = section_arm(model), counted_cut(model, limits)
     assert arm is not None
-    area, middle, strip, sides, ends, _ = cut(section_lines(model, arm, limits))
-    kept = np.flatnonzero(area > 1e-12 * arm.size**2)
-    reached = count_postures(model, arm, arm.world(middle[kept]), limits) > 0
-    parts = kept[reached]
+    parts, sides, ends = np.flatnonzero(counts > 0), found.sides, found.ends
     # trapezoids that lie on each other are one: what is left are their lower and upper ends
-    apart = (strip[parts[1:]] != strip[parts[:-1]]) | (
+    apart = (found.strip[parts[1:]] != found.strip[parts[:-1]]) | (
         np.abs(sides[parts[1:], :2] - sides[parts[:-1], 2:]).max(axis=1) > 1e-9 * arm.size
     )
     first = parts[np.append(True, apart)] if parts.size else parts
     last = parts[np.append(apart, True)] if parts.size else parts
     # lower ends run to the right, upper ends to the left: columns are start and end of each
-    x = np.concatenate((strip[first] + [[0], [1]], strip[last] + [[1], [0]]), axis=1)
+    x = np.concatenate((found.strip[first] + [[0], [1]], found.strip[last] + [[1], [0]]), axis=1)
     y = np.concatenate((sides[first, :2].T, sides[last, :1:-1].T), axis=1)
-    # at each end of a strip the next start in height belongs to an end
-    order = [np.lexsort((y[k], x[k])) for k in (0, 1)]
-    follows = np.empty(len(x[0]), np.int64)
-    follows[order[1]] = order[0]
     points = np.stack((ends[x], y), axis=-1)
-    loops, open_ones = [], np.ones(len(follows), np.bool_)
-    for start in range(len(follows)):
-        loop, k = [], start
+    # at each end of a strip the next start in height belongs to an end
+    return closed_loops(*points, *np.stack((y, x), axis=-1))
+
+
+def closed_loops(start: Array, end: Array, first: NDArray[Any], last: NDArray[Any]) -> list[Array]:
+    """Closed polylines of edges (E, 2), each followed by the one whose first key is its last."""
+    follows = np.empty(len(start), np.int64)
+    follows[np.lexsort(last.T)] = np.lexsort(first.T)
+    loops, open_ones = [], np.ones(len(start), np.bool_)
+    for k in range(len(start)):
+        loop = []
         while open_ones[k]:
             open_ones[k] = False
-            loop += [points[0, k], points[1, k]]
+            loop += [start[k], end[k]]
             k = int(follows[k])
         if loop:
             loops.append(np.array([*loop, loop[0]]))
-    return tuple(loops)
+    return loops

@@ -1,54 +1,29 @@
-"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book.
-
-Parameters
-----------
-arm : RobotModel
-    The robot.
-limits : bool
-    Whether the joint limits cut the joint space.
-free : callable or obstacles, optional
-    Function of q (N, n) that returns bool (N,), or obstacles: parts of the free space.
-resolution : int, optional
-    Cells along each joint.
-
-Raises
-------
-InvalidValueError
-    A slide without limits that obstacles or a factor of the determinant depend on (the volume is
-    infinite if they do not), a resolution that is no number of cells or needs more than 1 GB.
-
-References
-----------
-Seed book sections 3.4.1 to 3.4.4.
-"""
+"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, read_only
+from .._arrays import Array, as_vector
+from .._arrays.tasks import Workers
 from .._outcomes import Outcome
 from ..igm.loop import joint_chain
-from ..model import RobotModel, check_model
-from .arms import (
-    Free,
-    Result,
-    checked_flag,
-    checked_resolution,
-    free_predicate,
-    joint_ranges,
-    kept_free,
-    turned_inside,
-)
-from .components import Group, connected, core_cells, labels_of
-from .factors import Factors, sign_factors
+from ..model import RobotModel
+from .arms import Flags, Ints, JointSpace, Result, Values, joint_space, wrapped
+from .cells import checked_resolution
+from .singularity import Factors, sign_factors
 
 # cells along each of so many joints: at first, and when a grid does not separate all aspects
 _CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
+_AT_A_TIME = 65536
+_SPECKS = 1e-4  # of all cells: components without a core that belong to another
 _FEW = 7
 
 
@@ -63,25 +38,57 @@ class AspectStatus(Outcome):
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Group(Values):
+    """A grid over some joints (columns of q): lower ends, sides, which close, labels from 1."""
+
+    joints: tuple[int, ...]
+    low: Array
+    side: Array
+    closed: Flags
+    factors: tuple[int, ...]
+    labels: NDArray[np.int32]
+    codes: Ints
+    volumes: Array
+    separates: bool
+
+    def labels_of(self, q: Array, values: Array | None) -> Ints:
+        """Label of the part for configurations (N, n); 0 where there is none."""
+        cells = np.array(self.labels.shape)
+        x = wrapped(q[:, self.joints], self.closed)
+        at = np.clip(np.floor((x - self.low) / self.side).astype(int), 0, cells - 1)
+        labels = self.labels[tuple(at.T)].astype(np.int64)
+        if values is None or not self.factors:
+            return labels
+        wanted = (values[:, self.factors] > 0.0) @ (1 << np.array(self.factors))
+        codes = np.append(-1, self.codes)
+        # beside a singular position the cell may be of another aspect: look around
+        for reach in (1, 2):
+            wrong = np.flatnonzero(codes[labels] != wanted)
+            for step in np.ndindex(*(2 * reach + 1,) * len(cells)) if wrong.size else ():
+                to = at[wrong] + np.array(step) - reach
+                good = np.all(self.closed | ((to >= 0) & (to < cells)), axis=1)
+                other = self.labels[tuple((to % cells).T)]
+                good &= codes[other] == wanted[wrong]
+                labels[wrong[good]] = other[good]
+                wrong = wrong[~good]
+        return np.where(codes[labels] == wanted, labels, 0)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Aspects(Result):
     """Parts of the joint space: aspects, or components of the free space.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    limits : bool
-        Whether the joint limits count.
-    free : object
-        Predicate or obstacles, or None.
+    model, limits, free
+        The robot, whether its limits count, and the predicate or obstacles, or None.
     names : tuple of str
         The factors of the determinant; none for components of the free space.
     signs : ndarray of int8, shape (k, factors)
         Signs of the factors in each aspect.
     volume : ndarray, shape (k,)
-        Volume of each, rad^n (and m for slides), largest first. Joints that do not move the tool
-        are left out.
+        Volume of each, rad^n (and m for slides), largest first, of the joints that move the tool.
     groups : tuple
         The grids: joints that no factor shares are apart, and aspects are products of parts.
     order : ndarray of int64, shape (k, groups)
@@ -97,7 +104,7 @@ class Aspects(Result):
     signs: NDArray[np.int8]
     volume: Array
     groups: tuple[Group, ...]
-    order: NDArray[np.int64]
+    order: Ints
     status: AspectStatus
 
     @property
@@ -110,11 +117,7 @@ class Aspects(Result):
         """Whether each aspect has a core away from singular positions, that is of one piece."""
         return self.status is AspectStatus.FOUND
 
-    def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence
-
-    def of(self, q: ArrayLike) -> NDArray[np.int64]:
+    def of(self, q: ArrayLike) -> Ints:
         """Aspect of configurations.
 
         Parameters
@@ -129,18 +132,17 @@ class Aspects(Result):
             singular position that the grid cannot tell.
         """
         given = as_vector(q, self.model.n, "q")
-        rows, inside = turned_inside(self.model, given.reshape(-1, self.model.n), self.limits)
+        joints = JointSpace(self.model, self.limits, self.free)
+        rows, inside = joints.within(given.reshape(-1, self.model.n))
         rows = np.where(inside[:, None], rows, 0.0)
         out = np.full(len(rows), -1)
         if self.count:
-            is_free = free_predicate(self.model, self.free)
-            if is_free is not None:
-                inside &= is_free(rows)
+            if self.free is not None:
+                inside &= joints.is_free(rows)
             factors = sign_factors(self.model) if self.names else None
             values = None if factors is None else factors.values(rows)
-            place = np.stack([labels_of(g, rows, values) for g in self.groups], axis=-1)
-            sizes = [len(g.volumes) + 1 for g in self.groups]
-            number = np.full(sizes, -1)
+            place = np.stack([g.labels_of(rows, values) for g in self.groups], axis=-1)
+            number = np.full([len(g.volumes) + 1 for g in self.groups], -1)
             number[tuple(self.order.T)] = np.arange(self.count)
             out = np.where(inside, number[tuple(place.T)], -1)
         return out.reshape(given.shape[:-1])
@@ -156,7 +158,12 @@ class Aspects(Result):
 
 
 def aspects(
-    arm: RobotModel, limits: bool = True, free: Any = None, resolution: int | None = None
+    arm: RobotModel,
+    limits: bool = True,
+    free: Any = None,
+    resolution: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Aspects:
     """Aspects: the largest connected parts of the joint space without singular positions.
 
@@ -164,10 +171,34 @@ def aspects(
     others the pose. The joint space is cut by every factor of the determinant on a grid that
     closes in itself where no limit cuts it.
 
+    Parameters
+    ----------
+    arm : RobotModel
+        The robot.
+    limits : bool
+        Whether the joint limits cut the joint space.
+    free : callable or obstacles, optional
+        Function of q (N, n) that returns bool (N,), or obstacles: parts of the free space.
+    resolution : int, optional
+        Cells along each joint.
+    executor, progress
+        As for `accessibility`.
+
     Returns
     -------
     Aspects
         The parts with their volumes and signs; none, with a status, for redundant arms.
+
+    Raises
+    ------
+    InvalidValueError
+        A slide without limits that obstacles or a factor of the determinant depend on (the volume
+        is infinite if they do not), a resolution that is no number of cells or needs more than
+        1 GB.
+
+    References
+    ----------
+    Seed book sections 3.4.1 to 3.4.4.
 
     Examples
     --------
@@ -176,14 +207,27 @@ def aspects(
     >>> found.count, found.signs.ravel(), found.of([[0.3, 1.0], [0.3, -1.0]])
     (2, array([-1,  1], dtype=int8), array([1, 0]))
     """
-    check_model(arm)
-    return _divided(arm, sign_factors(arm), True, limits, free, resolution)
+    joints, work = joint_space(arm, limits, free), Workers(executor, progress)
+    factors = sign_factors(arm)
+    if factors is None:
+        return _none(joints, AspectStatus.NOT_DEFINED)
+    return _divided(joints, factors, resolution, work)
 
 
 def free_components(
-    arm: RobotModel, free: Any = None, limits: bool = True, resolution: int | None = None
+    arm: RobotModel,
+    free: Any = None,
+    limits: bool = True,
+    resolution: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Aspects:
     """Connected components of the free joint space, singular positions included.
+
+    Parameters
+    ----------
+    arm, free, limits, resolution, executor, progress
+        As for `aspects`.
 
     Returns
     -------
@@ -196,48 +240,43 @@ def free_components(
     >>> free_components(load("planar_2r"), lambda q: abs(q[:, 1]) > 0.5, limits=False).count
     1
     """
-    check_model(arm)
-    return _divided(arm, None, False, limits, free, resolution)
+    joints, work = joint_space(arm, limits, free), Workers(executor, progress)
+    return _divided(joints, Factors(arm, (), (), (), np.zeros(6, np.bool_)), resolution, work)
 
 
 def _divided(
-    arm: RobotModel, factors: Factors | None, signed: bool, limits: bool, free: Any,
-    resolution: int | None,
-) -> Aspects:  # fmt: skip
-    bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
-    columns = tuple(int(c) for c in joint_chain(arm).columns)
-    free = kept_free(free)
-    names = () if factors is None else factors.names
-    if not columns or (signed and factors is None):
-        return _none(arm, bounded, free, AspectStatus.NOT_DEFINED)
-    parts = _apart(columns, factors, is_free is not None)
-    needed = [j for joints, members in parts for j in joints if members or is_free is not None]
-    ranges, circle = joint_ranges(arm, bounded, needed)
+    joints: JointSpace, factors: Factors, resolution: int | None, work: Workers
+) -> Aspects:
+    """The parts of all groups of joints that share factors, and their products."""
+    columns = tuple(int(c) for c in joint_chain(joints.model).columns)
+    if not columns:
+        return _none(joints, AspectStatus.NOT_DEFINED)
+    parts = _apart(columns, factors, joints.free is not None)
+    cut = [bool(members) or joints.free is not None for _, members in parts]
+    needed = [j for (own, _), is_cut in zip(parts, cut, strict=True) if is_cut for j in own]
+    ranges, circle = joints.ranges(needed)
     groups = []
-    for joints, members in parts:
-        first, last = _CELLS.get(len(joints), (6, 6))
-        if not members and is_free is None:
-            first = last = 1  # no factor depends on these joints
-        cells = first
-        if resolution is not None or first > 1:
-            cells = checked_resolution(resolution, first, len(joints))
+    for k, (own, members) in enumerate(parts):
+        first, last = _CELLS.get(len(own), (6, 6)) if cut[k] else (1, 1)
+        cells = checked_resolution(resolution, first, len(own)) if cut[k] else 1
+        part = work.part(k / len(parts), (k + 1) / len(parts))
         while True:
-            group = _group(arm, joints, members, factors, is_free, ranges, circle, cells)
+            group = _group(joints, own, members, factors, ranges, circle, cells, part)
             if group.separates or resolution is not None or cells >= last:
                 break
             cells = min(2 * cells, last)
         groups.append(group)
-    return _products(arm, bounded, free, names, tuple(groups))
+    return _products(joints, factors.names, tuple(groups))
 
 
 def _apart(
-    columns: tuple[int, ...], factors: Factors | None, together: bool
+    columns: tuple[int, ...], factors: Factors, together: bool
 ) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Groups of joints that share no factor, with the factors of each."""
     groups: list[tuple[set[int], set[int]]] = []
     if together:
         groups = [(set(columns), set())]
-    for k, joints in enumerate(factors.joints if factors is not None else ()):
+    for k, joints in enumerate(factors.joints):
         own, members = set(joints), {k}
         for group in [g for g in groups if g[0] & own]:
             groups.remove(group)
@@ -251,68 +290,108 @@ def _apart(
 
 
 def _group(
-    arm: RobotModel, joints: tuple[int, ...], members: tuple[int, ...], factors: Factors | None,
-    is_free: Free | None, ranges: Array, circle: NDArray[np.bool_], cells: int,
+    joints: JointSpace, own: tuple[int, ...], members: tuple[int, ...], factors: Factors,
+    ranges: Array, circle: Flags, cells: int, work: Workers,
 ) -> Group:  # fmt: skip
     """The parts of the space of some joints, by connected cells of equal signs."""
-    d = len(joints)
-    low, high = ranges[list(joints)].T
+    low, high = ranges[list(own)].T
     width = high - low
     low = np.where(np.isfinite(width), low, 0.0)  # a slide without limits, in one cell
-    side = np.where(np.isfinite(width), width, 1.0) / cells
-    closed = tuple(bool(circle[j]) for j in joints)
-    axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, side, strict=True)]
-    q = np.zeros((cells**d, arm.n))
-    for j, mesh in zip(joints, np.meshgrid(*axes, indexing="ij"), strict=True):
-        q[:, j] = mesh.ravel()
-    shape = (cells,) * d
-    code = np.zeros(shape, np.int64)
-    certain = np.ones(shape, np.bool_)
-    if members:
-        assert factors is not None
-        values = factors.values(q)[:, list(members)].T.reshape(-1, *shape)
-        for k, value in zip(members, values, strict=True):
-            code |= (value > 0.0).astype(np.int64) << k
-            certain &= core_cells(value, closed)
-    if is_free is not None:
-        flags = is_free(q).reshape(shape)
-        code = np.where(flags, code, -1)
-    labels, separates = connected(code, certain & (code >= 0), closed)
+    side, shape = np.where(np.isfinite(width), width, 1.0) / cells, (cells,) * len(own)
+    closed = circle[list(own)]
+    q = np.zeros((cells ** len(own), joints.model.n))
+    q[:, own] = low + side * (np.indices(shape).reshape(len(own), -1).T + 0.5)
+    values, flags = work.rows(partial(_at, joints, factors, members), _AT_A_TIME, q)
+    certain = flags.reshape(shape).copy()
+    code = np.where(flags, (values > 0.0) @ (1 << np.array(members, np.int64)), -1).reshape(shape)
+    for value in values.T:
+        certain &= _core(value.reshape(shape), closed)
+    labels, separates = _connected(code, certain, closed)
     count = int(labels.max())
     sizes = np.bincount(labels.ravel(), minlength=count + 1)[1:]
     codes = np.zeros(count, np.int64)
     codes[labels[labels > 0] - 1] = code[labels > 0]
-    return Group(
-        joints, read_only(low), read_only(side), closed, members, read_only(labels, np.int32),
-        read_only(codes, np.int64), read_only(sizes * float(np.prod(width / cells))), separates,
-    )  # fmt: skip
+    volumes = np.asarray(sizes * np.prod(width / cells), float)
+    return Group(own, low, side, closed, members, labels, codes, volumes, separates)
 
 
-def _products(
-    arm: RobotModel, limits: bool, free: Any, names: tuple[str, ...], groups: tuple[Group, ...]
-) -> Aspects:
+def _at(
+    joints: JointSpace, factors: Factors, members: tuple[int, ...], q: Array
+) -> tuple[Array, Flags]:
+    """Values (N, k) of some factors, and which configurations are free (N,)."""
+    values = factors.values(q)[:, members] if members else np.zeros((len(q), 0))
+    return values, joints.is_free(q) if joints.free is not None else np.ones(len(q), np.bool_)
+
+
+def _core(value: Array, closed: Flags) -> Flags:
+    """Cells in which a factor cannot vanish, judged by its differences to the next cells."""
+    change = np.zeros_like(value)
+    for axis in range(value.ndim):
+        step = np.abs(np.roll(value, -1, axis) - value)
+        if not closed[axis]:
+            np.moveaxis(step, axis, 0)[-1] = 0.0
+        change += np.maximum(step, np.roll(step, 1, axis))
+    return np.abs(value) > change
+
+
+def _connected(code: Ints, certain: Flags, closed: Flags) -> tuple[NDArray[np.int32], bool]:
+    """Labels, from 1, of connected cells with equal codes; whether the grid separates them all."""
+    from scipy import ndimage
+
+    whole, cores = (_components(c, closed) for c in (code, np.where(certain, code, -1)))
+    code_of = np.zeros(int(whole.max()) + 1, np.int64)
+    code_of[whole] = code.ravel()
+    sizes, sure = np.bincount(whole), certain.ravel()
+    pairs = np.unique(np.stack((whole[sure], cores[sure])), axis=1)
+    number = np.bincount(pairs[0], minlength=len(sizes))
+    kept = (code_of >= 0) & ((number > 0) | (sizes > _SPECKS * code.size))
+    for value in np.setdiff1d(code_of[code_of >= 0], code_of[kept]):
+        kept[np.argmax(np.where(code_of == value, sizes, 0))] = True
+    labels = np.where(kept, np.cumsum(kept), 0)[whole].reshape(code.shape)
+    for value in np.unique(code[(labels == 0) & (code >= 0)]):
+        # the cut-off tips of a part belong to it
+        lost, other = (labels == 0) & (code == value), (labels == 0) | (code != value)
+        near = ndimage.distance_transform_edt(other, False, True)
+        labels[lost] = labels[tuple(axis[lost] for axis in near)]
+    return labels.astype(np.int32), bool((number[kept] == 1).all())
+
+
+def _components(code: Ints, closed: Flags) -> Ints:
+    """Numbers (N,) of the connected parts of equal codes of a grid that closes along some axes."""
+    at, pairs = np.arange(code.size).reshape(code.shape), []
+    for axis, joined in enumerate(closed):
+        same = (code == np.roll(code, -1, axis)) & (code >= 0)
+        if not joined:
+            np.moveaxis(same, axis, 0)[-1] = False
+        pairs.append((at[same], np.roll(at, -1, axis)[same]))
+    a, b = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
+    return linked(a, b, code.size)
+
+
+def linked(a: Ints, b: Ints, count: int) -> Ints:
+    """Numbers (count,) of the connected parts of a graph with edges from a to b."""
+    from scipy import sparse
+
+    graph = sparse.coo_matrix((np.ones(a.size), (a, b)), (count, count))
+    return np.asarray(sparse.csgraph.connected_components(graph, directed=False)[1], np.int64)
+
+
+def _products(joints: JointSpace, names: tuple[str, ...], groups: tuple[Group, ...]) -> Aspects:
     """Aspects as products of the parts of all groups, largest first."""
     if any(len(g.volumes) == 0 for g in groups):
-        return _none(arm, limits, free, AspectStatus.NO_FREE_SPACE)
-    mesh = np.meshgrid(*(np.arange(len(g.volumes)) for g in groups), indexing="ij")
-    order = np.stack([m.ravel() for m in mesh], axis=-1)
+        return _none(joints, AspectStatus.NO_FREE_SPACE)
+    order = np.indices([len(g.volumes) for g in groups]).reshape(len(groups), -1).T
     volume = np.prod([g.volumes[order[:, k]] for k, g in enumerate(groups)], axis=0)
-    code = np.zeros(len(order), np.int64)
-    for k, group in enumerate(groups):
-        code |= group.codes[order[:, k]]
-    signs = np.where((code[:, None] >> np.arange(len(names))) & 1, 1, -1)
+    code = np.bitwise_or.reduce([g.codes[order[:, k]] for k, g in enumerate(groups)])
+    signs = np.where((code[:, None] >> np.arange(len(names))) & 1, 1, -1).astype(np.int8)
     rank = np.lexsort((code, -volume.round(9)))
-    status = AspectStatus.FOUND
-    if not all(g.separates for g in groups):
-        status = AspectStatus.NOT_SEPARATED
-    return Aspects(
-        arm, limits, free, names, read_only(signs[rank], np.int8), read_only(volume[rank]), groups,
-        read_only(order[rank] + 1, np.int64), status,
-    )  # fmt: skip
+    found = all(g.separates for g in groups)
+    status = AspectStatus.FOUND if found else AspectStatus.NOT_SEPARATED
+    parts = signs[rank], volume[rank], groups, order[rank] + 1
+    return Aspects(joints.model, joints.limits, joints.free, names, *parts, status)
 
 
-def _none(arm: RobotModel, limits: bool, free: Any, status: AspectStatus) -> Aspects:
-    return Aspects(
-        arm, limits, free, (), read_only(np.zeros((0, 0)), np.int8), read_only(np.zeros(0)), (),
-        read_only(np.zeros((0, 0)), np.int64), status,
-    )  # fmt: skip
+def _none(joints: JointSpace, status: AspectStatus) -> Aspects:
+    none = np.zeros((0, 0), np.int64)
+    parts = (), none.astype(np.int8), np.zeros(0), (), none
+    return Aspects(joints.model, joints.limits, joints.free, *parts, status)

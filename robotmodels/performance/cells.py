@@ -1,33 +1,36 @@
-"""Grids of cells over a workspace: half a plane through the first axis, a plane, or space."""
+"""Grids of cells over a workspace, and which of them are reached in infinitely many postures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import pi, tau
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_mask, read_only
+from .._arrays import Array, as_mask
+from .._arrays.tasks import Workers
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm.loop import joint_chain
-from ..kinematics import dgm
+from ..kinematics import dgm, jacobian
 from ..model import RobotModel
-from .arms import (
-    SectionArm,
-    _axes,
-    checked_resolution,
-    joint_ranges,
-    plane_normal,
-    section_arm,
-    sequence,
-)
+from . import arms
+from .arms import Flags, Ints, JointSpace, SectionArm
+from .arrangement import closed_loops
 
 SECTIONS = ("auto", "plane", "space")
-_SAMPLES = 20000
+SAMPLES = 400000
+_EXTENT = 20000  # samples that find the extent of a workspace
 _GRID = 160
 _MARGIN = 0.02
+_CHUNK = 50000
+_MOST_BYTES = 1e9
+_CELL_BYTES = 170
+_STEPS = 25
+_ROUNDS = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,22 +59,69 @@ class Space:
             return np.column_stack((np.hypot(local[:, 0], local[:, 2]), local[:, 1]))
         return np.asarray(local[:, : self.dimensions])
 
+    def is_section(self, arm: SectionArm | None) -> bool:
+        """Whether the coordinates are those of the section of an arm."""
+        if arm is None or self.kind != ("half plane" if arm.radial else "plane"):
+            return False
+        return np.allclose(self.frame, arm.frame, rtol=0.0, atol=1e-9 * max(arm.size, 1.0))
+
+    def turning_axis(self, joints: JointSpace) -> Array | None:
+        """Where the first axis (2,) stands across a plane if it turns freely."""
+        chain = joint_chain(joints.model)
+        D, first = joints.model.base @ chain.D[0], chain.columns[0]
+        across = self.kind == "plane" and abs(D[:3, 2] @ self.frame[:3, 2]) > 1.0 - 1e-12
+        if not across or joints.free is not None or not joints.ranges([])[1][first]:
+            return None
+        return self.of_world(D[None, :3, 3])[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells(Space):
+    """A grid of cells: centres (N, d), sides (d,), cells along each coordinate."""
+
+    points: Array
+    size: Array
+    shape: tuple[int, ...]
+
+    def numbers(self, points: Array) -> tuple[Ints, Flags]:
+        """Numbers of the cells that hold points (N, d), those that are in one, and which are."""
+        low = self.points[0] - 0.5 * self.size if len(self.points) else np.zeros(len(self.size))
+        with np.errstate(invalid="ignore"):
+            cell = np.floor((points - low) / self.size)
+        inside = np.all((cell >= 0) & (cell < self.shape), axis=1)
+        at = np.ravel_multi_index(tuple(cell[inside].astype(int).T), self.shape)
+        return np.asarray(at), np.asarray(inside)
+
+    def measures(self) -> tuple[Array, Array]:
+        """Area and volume of each cell; NaN for what is not defined."""
+        cell, none = float(np.prod(self.size)), np.full(len(self.points), np.nan)
+        if self.kind == "space":
+            return none, np.full(len(self.points), cell)
+        sweep = 2.0 * pi * self.points[:, 0] if self.kind == "half plane" else none
+        return np.full(len(self.points), cell), sweep * cell
+
+    def poses(self, R: Array) -> Array:
+        """World poses (N, 4, 4) of the cells in an orientation (3, 3)."""
+        T = np.tile(np.eye(4), (len(self.points), 1, 1))
+        T[:, :3, :3], T[:, :3, 3] = R, self.world(self.points)
+        return T
+
 
 def space_of(
-    model: RobotModel, section: str, limits: bool, turned: bool, mask: ArrayLike | str | None
+    joints: JointSpace, section: str, turned: bool, mask: ArrayLike | str | None
 ) -> Space | None:
     """Coordinates of the workspace of an arm; None if it is a curve or a surface in space.
 
     ``turned``: whether a turn of the first joint leaves the question as it is.
     """
-    rows = None if mask is None else as_mask(mask)
+    model, rows = joints.model, None if mask is None else as_mask(mask)
     chain = joint_chain(model)
     if chain.k < 2:
         return None
     if rows is not None and rows[:3].sum() == 2:
         normal = np.eye(3)[int(np.argmin(rows[:3]))]
     else:
-        normal = plane_normal(model)
+        normal = arms.plane_normal(model)
     if normal is not None:
         if section == "space":
             raise InvalidValueError(
@@ -79,15 +129,15 @@ def space_of(
                 "plane, got 'space'."
             )
         frame = np.eye(4)
-        frame[:3, :3] = _axes(normal)
+        frame[:3, :3] = arms.axes_along(normal)
         e3 = frame[:3, 2]
         frame[:3, 3] = e3 * (e3 @ dgm(model, np.zeros(model.n))[:3, 3])
-        return Space("plane", read_only(frame))
+        return Space("plane", frame)
     if chain.k < 3:
         return None
     first = int(chain.columns[0])
     circle = chain.sigma[0] == REVOLUTE and (
-        not limits or not model.upper[first] - model.lower[first] < tau - 1e-9
+        not joints.limits or not model.upper[first] - model.lower[first] < tau - 1e-9
     )
     if section == "plane" and not (circle and turned):
         raise InvalidValueError(
@@ -96,114 +146,161 @@ def space_of(
             "axis; use section='space'."
         )
     if circle and turned and section != "space":
-        arm = section_arm(model)
+        arm = arms.section_arm(model)
         if arm is not None:
             return Space("half plane", arm.frame)
-        base = model.base @ chain.D[0]
-        R = _axes(base[:3, 2])
-        frame = np.eye(4)
-        frame[:3, :3] = np.column_stack((R[:, 0], R[:, 2], -R[:, 1]))
-        frame[:3, 3] = base[:3, 3] - R[:, 2] * (R[:, 2] @ base[:3, 3])
-        return Space("half plane", read_only(frame))
-    return Space("space", read_only(np.eye(4)))
+        return Space("half plane", arms.axis_frames(model.base @ chain.D[0], radial=True)[1])
+    return Space("space", np.eye(4))
 
 
-def samples(model: RobotModel, limits: bool, count: int) -> Array:
-    """Configurations (count, n) that fill the joint ranges evenly; still joints at zero."""
-    columns = joint_chain(model).columns
-    ranges, _ = joint_ranges(model, limits)
-    q = np.zeros((count, model.n))
-    span = ranges[columns, 1] - ranges[columns, 0]
-    q[:, columns] = ranges[columns, 0] + span * sequence(count, columns.size)
-    return q
+def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
+    """Cells along each axis, whose grid fits into 1 GB."""
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidValueError(
+            f"resolution: expected the number of cells along each axis, a whole number of at "
+            f"least {least}, got {value!r:.60}."
+        )
+    most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
+    if value > most:
+        need = _CELL_BYTES * float(value) ** dimensions / 1e9
+        raise InvalidValueError(
+            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
+            f"than 1 GB; at most {most} fit."
+        )
+    return int(value)
 
 
-def grid_of(
-    model: RobotModel, space: Space, limits: bool, resolution: int | None, default: int
-) -> tuple[Array, Array, tuple[int, ...]]:
-    """Centres (N, d) of cells over the reach of an arm, their sizes (d,), and the grid's shape."""
-    cells = checked_resolution(resolution, default, space.dimensions)
-    arm = section_arm(model)
-    if arm is not None and is_section(space.frame, space.kind, arm):
-        points = _of_section(model, arm, limits)
+def cells_of(joints: JointSpace, space: Space, resolution: int | None, default: int) -> Cells:
+    """Cells over the reach of an arm."""
+    count, arm = (
+        checked_resolution(resolution, default, space.dimensions),
+        arms.section_arm(joints.model),
+    )
+    if arm is not None and space.is_section(arm):
+        last = arm.columns[1:]
+        axes = [np.linspace(low, high, _GRID) for low, high in joints.ranges(last)[0][last]]
+        x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        points = arm.values(x)[:, :2]
     else:
-        points = space.of_world(dgm(model, samples(model, limits, _SAMPLES))[:, :3, 3])
+        q = JointSpace(joints.model, joints.limits).samples(_EXTENT)
+        points = space.of_world(dgm(joints.model, q)[:, :3, 3])
     low, high = points.min(axis=0), points.max(axis=0)
+    axis = space.turning_axis(joints)
+    if axis is not None:  # a disc about the axis, whose cells come in eights of one distance
+        size = np.full(2, np.abs(points - axis).max())
+        low, high = axis - size, axis + size
     room = _MARGIN * max(float((high - low).max()), 1e-9)
     low, high = low - room, high + room
     if space.kind == "half plane":
         low[0] = max(low[0], 0.0)
-    size = (high - low) / cells
-    axes = [a + h * (np.arange(cells) + 0.5) for a, h in zip(low, size, strict=True)]
-    mesh = np.meshgrid(*axes, indexing="ij")
-    return np.stack(mesh, axis=-1).reshape(-1, space.dimensions), size, mesh[0].shape
+    size = (high - low) / count
+    axes = [a + h * (np.arange(count) + 0.5) for a, h in zip(low, size, strict=True)]
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(size))
+    return Cells(space.kind, space.frame, centres, size, (count,) * len(size))
 
 
-def is_section(frame: Array, kind: str, arm: SectionArm | None) -> bool:
-    """Whether coordinates are those of the section of an arm."""
-    if arm is None or kind != ("half plane" if arm.radial else "plane"):
-        return False
-    return np.allclose(frame, arm.frame, rtol=0.0, atol=1e-9 * max(arm.size, 1.0))
-
-
-def _of_section(model: RobotModel, arm: SectionArm, limits: bool) -> Array:
-    """Points of the section on a grid of the last two joints, the ends included."""
-    ranges, _ = joint_ranges(model, limits, arm.columns[1:])
-    axes = [np.linspace(low, high, _GRID) for low, high in ranges[arm.columns[1:]]]
-    x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    return arm.values(x)[:, :2]
-
-
-def measure_of_cells(space: Space, points: Array, size: Array) -> tuple[Array, Array]:
-    """Area and volume of each cell; NaN for what is not defined."""
-    cell, none = float(np.prod(size)), np.full(len(points), np.nan)
-    if space.kind == "space":
-        return none, np.full(len(points), cell)
-    area = np.full(len(points), cell)
-    return area, 2.0 * pi * points[:, 0] * cell if space.kind == "half plane" else none
-
-
-def neighbours(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def neighbours(flags: Flags) -> Flags:
     """Cells of a grid beside a marked one, diagonals included."""
-    out = flags.copy()
-    for axis in range(flags.ndim):
-        grown = out.copy()
-        for side in (slice(1, None), slice(None, -1)):
-            to = [slice(None)] * flags.ndim
-            of = [slice(None)] * flags.ndim
-            to[axis] = side
-            of[axis] = slice(None, -1) if side.start else slice(1, None)
-            grown[tuple(to)] |= out[tuple(of)]
-        out = grown
-    return out
+    from scipy import ndimage
+
+    return np.asarray(ndimage.binary_dilation(flags, np.ones((3,) * flags.ndim)))
 
 
-def outlines(
-    reached: NDArray[np.bool_], points: Array, size: Array, shape: tuple[int, ...]
-) -> list[Array]:
+def outlines(cells: Cells, reached: Flags) -> list[Array]:
     """Outlines of the cells that are reached, which lie on their left."""
-    flags = np.pad(reached.reshape(shape), 1)
-    follows: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for i, j in zip(*np.nonzero(flags), strict=True):
-        sides = (
-            (flags[i, j - 1], (i, j), (i + 1, j)),
-            (flags[i + 1, j], (i + 1, j), (i + 1, j + 1)),
-            (flags[i, j + 1], (i + 1, j + 1), (i, j + 1)),
-            (flags[i - 1, j], (i, j + 1), (i, j)),
-        )
-        for other, start, end in sides:
-            if not other:
-                follows.setdefault(start, []).append(end)
-    origin = points[0] - 1.5 * size
-    loops = []
-    while follows:
-        start = next(iter(follows))
-        path = [start]
-        while path[-1] in follows:
-            ends = follows[path[-1]]
-            step = ends.pop()
-            if not ends:
-                del follows[path[-1]]
-            path.append(step)
-        loops.append(origin + size * np.array(path))
-    return loops
+    flags = np.pad(reached.reshape(cells.shape), 1).astype(int)
+    starts, ends = [], []
+    for axis, along in enumerate(np.eye(2, dtype=int)[::-1]):
+        change = np.diff(flags, axis=axis)
+        for side in (-1, 1):
+            low = np.argwhere(change == side) + 1 - along
+            forward = side == (-1, 1)[axis]
+            starts.append(low if forward else low + along)
+            ends.append(low + along if forward else low)
+    start, end = np.concatenate(starts), np.concatenate(ends)
+    low = cells.points[0] - 1.5 * cells.size
+    return closed_loops(low + cells.size * start, low + cells.size * end, start, end)
+
+
+def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
+    """Which centres of cells (N,) some posture reaches: samples, then Newton at the border."""
+    shape = cells.shape
+    q_of = np.full((len(cells.points), joints.model.n), np.nan)
+    q = joints.samples(SAMPLES)
+    (points,) = work.part(0.0, 0.5).rows(partial(_points, joints.model, cells), _CHUNK, q)
+    at, inside = cells.numbers(points)
+    q_of[at] = q[inside]
+    hit = np.asarray(np.isfinite(q_of).all(axis=1))
+    # a sample in a cell says nothing of its centre where the border passes
+    inner = ~neighbours(~hit.reshape(shape)).ravel()
+    reached, tried = inner.copy(), inner.copy()
+    for k in range(_ROUNDS):
+        rows = np.flatnonzero(neighbours((hit | reached).reshape(shape)).ravel() & ~tried)
+        if not rows.size:
+            break
+        part = work.part(1.0 - 0.5 * 0.7**k, 1.0 - 0.5 * 0.7 ** (k + 1))
+        move, start = partial(_moved_to, joints, cells), _starts(q_of, rows, shape)
+        found, good = part.rows(move, _CHUNK, cells.points[rows], start)
+        tried[rows] = True
+        reached[rows[good]] = True
+        q_of[rows[good]] = found[good]
+        hit[rows[~good]] = False
+    work.done()
+    return reached
+
+
+def _points(model: RobotModel, space: Space, q: Array) -> tuple[Array]:
+    return (space.of_world(dgm(model, q)[:, :3, 3]),)
+
+
+def _starts(q_of: Array, rows: Ints, shape: tuple[int, ...]) -> Array:
+    """A posture of the cell or of a neighbour for each row."""
+    start = q_of[rows].copy()
+    at = np.array(np.unravel_index(rows, shape))
+    for step in np.ndindex(*(3,) * len(shape)):
+        lacking = np.isnan(start).any(axis=1)
+        if not lacking.any():
+            break
+        to = np.clip(at + np.array(step)[:, None] - 1, 0, np.array(shape)[:, None] - 1)
+        start[lacking] = q_of[np.ravel_multi_index(tuple(to), shape)][lacking]
+    return np.nan_to_num(start)
+
+
+def _moved_to(joints: JointSpace, space: Space, goals: Array, q: Array) -> tuple[Array, Flags]:
+    """Free postures (N, n) whose tool is at points of the space, by damped Newton steps."""
+    model, (ranges, circle) = joints.model, joints.ranges()
+    low = np.where(circle, -np.inf, ranges[:, 0])
+    high = np.where(circle, np.inf, ranges[:, 1])
+    reach = max(float(np.abs(goals).max(initial=0.0)), 1e-9)
+    q = np.array(q)
+    e = np.full(len(q), np.inf)
+    for _ in range(_STEPS):
+        p = dgm(model, q)[:, :3, 3]
+        error = goals - space.of_world(p)
+        e = np.linalg.norm(error, axis=1)
+        if (e < 1e-9 * reach).all():
+            break
+        local = (p - space.frame[:3, 3]) @ space.frame[:3, :3]
+        J = np.swapaxes(space.frame[:3, :3], 0, 1) @ jacobian(model, q)[:, :3]
+        if space.kind == "half plane":
+            u = local[:, [0, 2]] / np.maximum(np.hypot(local[:, 0], local[:, 2]), 1e-12)[:, None]
+            radial = u[:, :1] * J[:, 0] + u[:, 1:] * J[:, 2]
+            J = np.stack((radial, J[:, 1]), axis=1)
+        else:
+            J = J[:, : space.dimensions]
+        # joints at a limit that would go on are left out
+        gradient = np.einsum("nij,ni->nj", J, error)
+        stuck = ((q <= low) & (gradient < 0.0)) | ((q >= high) & (gradient > 0.0))
+        J = np.where(stuck[:, None], 0.0, J)
+        G = J @ np.swapaxes(J, 1, 2)
+        damping = 1e-9 * reach**2 + 1e-3 * e**2
+        G = G + damping[:, None, None] * np.eye(G.shape[1])
+        step = np.einsum("nij,ni->nj", J, np.linalg.solve(G, error[..., None])[..., 0])
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+        q = np.clip(q + step, low, high)
+    good = e < 1e-7 * reach
+    if joints.free is not None and good.any():
+        good[good] = joints.is_free(q[good])
+    return q, good

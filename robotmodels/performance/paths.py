@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import tau
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_mask, read_only
+from .._arrays import Array, as_mask
+from .._choices import one_of
 from .._outcomes import Outcome
-from ..errors import ShapeError
-from ..geometry import REVOLUTE
-from ..igm.loop import joint_chain
+from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
-from ..kinematics.lengths import characteristic_length
-from ..model import RobotModel, check_model
+from ..model import RobotModel
+from . import arms
 from .accessibility import postures_of
-from .arms import (
-    Result,
-    checked_flag,
-    checked_word,
-    leaves_a_family,
-    section_arm,
-    task_rows,
-    wrapped,
-)
-from .certificate import bound_of
-from .continuation import successors
-from .factors import sign_factors
+from .arms import Flags, Ints, JointSpace, Result, joint_space
+from .continuation import Continuation
+from .singularity import bound_of, sign_factors
 
 COSTS = ("length", "conditioning")
 _THROUGH = 0.5  # rad or m: longest step through a singular position
@@ -69,11 +58,11 @@ class FeasiblePath(Result):
     """
 
     q: Array
-    reached: NDArray[np.bool_]
-    breaks: NDArray[np.int64]
-    aspect: NDArray[np.int64]
+    reached: Flags
+    breaks: Ints
+    aspect: Ints
     postures: Array
-    following: NDArray[np.int64]
+    following: Ints
     status: PathStatus
 
     def reason(self) -> str:
@@ -157,115 +146,81 @@ def feasible_path(
     >>> found.status.name, len(found.reached)
     ('FOLLOWED', 8)
     """
-    check_model(arm)
-    checked_word(cost, COSTS, "cost")
-    bounded = checked_flag(limits, "limits")
-    through = checked_flag(through_singular, "through_singular")
+    joints = joint_space(arm, limits)
+    one_of(cost, COSTS, "cost")
+    if not isinstance(through_singular, (bool, np.bool_)):
+        raise InvalidValueError(
+            f"through_singular: expected True or False, got {through_singular!r:.60}."
+        )
     T = poses_of(poses)
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
-    rows = task_rows(arm, mask)
-    k = joint_chain(arm).k
-    if len(T) == 0 or k == 0 or leaves_a_family(arm, rows):
-        return _nothing(len(T), arm.n, PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED)
-    asked = None if mask is None else as_mask(mask)
-    if mask is None and section_arm(arm) is not None:
-        asked = np.repeat((True, False), 3)
-    q, valid, _ = postures_of(arm, T, asked)
-    length = characteristic_length(arm)
-    following, way = successors(
-        arm, T[:-1], T[1:], q[:-1], valid[:-1], q[1:], valid[1:], rows, length
+    rows, asked = arms.task_rows(arm, mask), None if mask is None else as_mask(mask)
+    if mask is None and arms.section_arm(arm) is not None:
+        asked = arms.PLACE
+    if len(T) == 0 or not rows.any() or arms.leaves_a_family(arm, rows):
+        status = PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED
+        q, valid = np.zeros((len(T), 0, arm.n)), np.zeros((len(T), 0), np.bool_)
+    else:
+        q, valid, _ = postures_of(arm, T, asked)
+        status = PathStatus.BROKEN
+    following, way = Continuation(arm, rows).successors(
+        T[:-1], T[1:], q[:-1], valid[:-1], q[1:], valid[1:]
     )
-    start = np.flatnonzero(valid[0])
-    U, ends = _chains(arm, q, valid, following, way, start, through)
-    breaks, turns = _within(arm, U, ends, bounded)
-    reached = breaks == len(T)
-    best = _best(arm, U, breaks, rows, cost)
-    path = np.full((len(T), arm.n), np.nan)
+    U, ends = _chains(arm, q, valid, following, way, bool(through_singular))
+    breaks, turns = _within(joints, U, ends)
+    best, path = _best(arm, U, breaks, rows, cost), np.full((len(T), arm.n), np.nan)
     if best >= 0:
         last = int(breaks[best])
-        path[:last] = U[:last, best] + tau * turns[max(last - 1, 0), best]
-    there = ~np.isnan(path).any(axis=1)
-    aspect = np.full(len(T), -1)
-    factors = sign_factors(arm, mask)
-    if factors is not None and there.any():
+        path[:last] = U[:last, best] + turns[max(last - 1, 0), best]
+    there, aspect = ~np.isnan(path).any(axis=1), np.full(len(T), -1)
+    factors = sign_factors(arm, mask) if there.any() else None
+    if factors is not None:
         aspect[there] = factors.codes(path[there]) if factors.joints else 0
-    return FeasiblePath(
-        read_only(path), read_only(reached, np.bool_), read_only(breaks, np.int64),
-        read_only(aspect, np.int64), read_only(np.where(valid[..., None], q, np.nan)),
-        read_only(following, np.int64),
-        PathStatus.FOLLOWED if reached.any() else PathStatus.BROKEN,
-    )  # fmt: skip
-
-
-def _nothing(count: int, n: int, status: PathStatus) -> FeasiblePath:
-    """A result without postures."""
-    return FeasiblePath(
-        read_only(np.full((count, n), np.nan)), read_only(np.zeros(0), np.bool_),
-        read_only(np.zeros(0), np.int64), read_only(np.full(count, -1), np.int64),
-        read_only(np.zeros((count, 0, n))), read_only(np.zeros((max(count - 1, 0), 0)), np.int64),
-        status,
-    )  # fmt: skip
+    reached = breaks == len(T)
+    if reached.any():
+        status = PathStatus.FOLLOWED
+    postures = np.where(valid[..., None], q, np.nan)
+    return FeasiblePath(path, reached, breaks, aspect, postures, following, status)
 
 
 def _chains(
-    arm: RobotModel, q: Array, valid: NDArray[np.bool_], following: NDArray[np.int64], way: Array,
-    start: NDArray[np.int64], through: bool,
-) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
+    arm: RobotModel, q: Array, valid: Flags, following: Ints, way: Array, through: bool
+) -> tuple[Array, Ints]:
     """Continuous motions (N, S, n) from the starting postures, and how many poses each reaches."""
-    N, _, n = q.shape
-    turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
-    U = np.full((N, len(start), n), np.nan)
-    at, ends = start.copy(), np.zeros(len(start), np.int64)
-    alive = np.ones(len(start), np.bool_)
-    if len(start):
-        U[0], ends[:] = q[0, start], 1
-    step = np.zeros((len(start), n))
-    for k in range(N - 1):
+    at = np.flatnonzero(valid[:1].any(axis=0))
+    U = np.full((len(q), len(at), arm.n), np.nan)
+    U[:1], ends, alive = q[:1, at], np.ones(len(at), np.int64), np.ones(len(at), np.bool_)
+    step = np.zeros((len(at), arm.n))
+    for k in range(len(q) - 1):
         to, move = following[k, at], way[k, at]
-        alive_now = alive & (to >= 0)
-        if through:
-            for s in np.flatnonzero(alive & (to < 0)):
-                # the posture that goes on most smoothly
-                gap = wrapped(q[k + 1] - q[k, at[s]], turning)
-                off = np.where(valid[k + 1], np.linalg.norm(gap - step[s], axis=1), np.inf)
-                r = int(off.argmin()) if off.size else -1
-                if r >= 0 and np.abs(gap[r]).max() < _THROUGH and np.isfinite(off[r]):
-                    to[s], move[s], alive_now[s] = r, gap[r], True
-        alive = alive_now
+        for s in np.flatnonzero(alive & (to < 0)) if through else ():
+            # the posture that goes on most smoothly
+            gap = arms.wrapped(q[k + 1] - q[k, at[s]], arms.turning(arm))
+            off = np.where(valid[k + 1], np.linalg.norm(gap - step[s], axis=1), np.inf)
+            r = int(off.argmin()) if off.size else -1
+            if r >= 0 and np.isfinite(off[r]) and np.abs(gap[r]).max() < _THROUGH:
+                to[s], move[s] = r, gap[r]
+        alive = alive & (to >= 0)
         if not alive.any():
             break
-        at = np.where(alive, to, 0)
-        step = np.where(alive[:, None], move, 0.0)
+        at, step = np.where(alive, to, 0), np.where(alive[:, None], move, 0.0)
         U[k + 1, alive] = U[k, alive] + move[alive]
         ends[alive] = k + 2
     return U, ends
 
 
-def _within(
-    arm: RobotModel, U: Array, ends: NDArray[np.int64], limits: bool
-) -> tuple[NDArray[np.int64], Array]:
+def _within(joints: JointSpace, U: Array, ends: Ints) -> tuple[Ints, Array]:
     """First pose not reached within the limits (S,), and whole turns (N, S, n) up to each pose."""
-    turns = np.zeros(U.shape)
-    if not limits or not U.size:
-        return ends.copy(), turns
-    turning = arm.table.sigma[arm.table.joint_rows] == REVOLUTE
+    if not joints.limits or not U.size:
+        return ends, np.zeros(U.shape)
     low, high = np.fmin.accumulate(U, axis=0), np.fmax.accumulate(U, axis=0)
-    outside = (low < arm.lower) | (high > arm.upper)
-    with np.errstate(invalid="ignore"):
-        least = np.ceil((arm.lower - low - 1e-9) / tau)
-        most = np.floor((arm.upper - high + 1e-9) / tau)
-        least = np.where(np.isfinite(arm.lower), least, most)
-        turns = np.where(turning & outside & np.isfinite(least), least, 0.0)
-        fits = (low + tau * turns >= arm.lower - 1e-9) & (high + tau * turns <= arm.upper + 1e-9)
-    lost = ~fits.all(axis=2)
-    first = np.where(lost.any(axis=0), lost.argmax(axis=0), len(U))
+    _, fits, turns = joints.turned(low, high)
+    first = np.where(fits.all(axis=0), len(U), (~fits).argmax(axis=0))
     return np.minimum(ends, first), turns
 
 
-def _best(
-    arm: RobotModel, U: Array, breaks: NDArray[np.int64], rows: NDArray[np.bool_], cost: str
-) -> int:
+def _best(arm: RobotModel, U: Array, breaks: Ints, rows: Flags, cost: str) -> int:
     """The motion that goes farthest, of several the one of least cost; -1 without any."""
     if not len(breaks) or breaks.max() == 0:
         return -1

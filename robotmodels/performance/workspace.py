@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_mask, as_reals, read_only
+from .._arrays import Array, as_exact, as_mask, as_reals
+from .._arrays.tasks import Workers
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..kinematics import dgm
-from ..model import RobotModel, check_model
+from ..model import RobotModel
+from . import arms
 from .accessibility import in_every_orientation, posture_counts
-from .arms import (
-    Result,
-    checked_flag,
-    checked_word,
-    free_predicate,
-    kept_free,
-    leaves_a_family,
-    section_arm,
-)
+from .arms import Flags, Ints, JointSpace, Result
 from .arrangement import boundary, measures
-from .cells import SECTIONS, Space, grid_of, is_section, measure_of_cells, outlines, space_of
-from .reach import reached_cells
+from .cells import SECTIONS, Cells, Space, cells_of, outlines, reached_cells, space_of
 
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
-_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "space": 28}
+_RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "turned": 240, "space": 28}
 
 
 class WorkspaceStatus(Outcome):
@@ -53,16 +49,8 @@ class Workspace(Result):
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    kind : str
-        Positions, primary, secondary, orientation or free.
-    limits : bool
-        Whether the joint limits count.
-    free : object
-        Predicate or obstacles, or None.
-    mask : ndarray of bool, shape (6,), or None
-        Components that were asked for.
+    model, kind, limits, free, mask
+        As asked; ``free`` is the predicate or obstacles, ``mask`` (6,) of bool, or None.
     rotation : ndarray, shape (3, 3), or None
         The orientation of kind ``orientation``.
     points : ndarray, shape (N, 2) or (N, 3)
@@ -86,28 +74,38 @@ class Workspace(Result):
     kind: str
     limits: bool
     free: Any
-    mask: NDArray[np.bool_] | None
+    mask: Flags | None
     rotation: Array | None
     points: Array
-    count: NDArray[np.int64]
+    count: Ints
     size: Array
     shape: tuple[int, ...]
     coordinates: str
     frame: Array
     status: WorkspaceStatus
 
-    def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence
+    @property
+    def joints(self) -> JointSpace:
+        """The joint space that counts."""
+        return JointSpace(self.model, self.limits, self.free)
+
+    @property
+    def cells(self) -> Cells:
+        """The grid."""
+        return Cells(self.coordinates, self.frame, self.points, self.size, self.shape)
 
     @property
     def poses(self) -> Array:
         """World poses (N, 4, 4) of the cells, in the orientation asked or that of zero joints."""
-        T = np.tile(np.eye(4), (len(self.points), 1, 1))
         home = dgm(self.model, np.zeros(self.model.n))[:3, :3]
-        T[:, :3, :3] = home if self.rotation is None else self.rotation
-        T[:, :3, 3] = self._space.world(self.points)
-        return T
+        return self.cells.poses(home if self.rotation is None else self.rotation)
+
+    @property
+    def place(self) -> Flags | None:
+        """The mask with which the postures of the cells are solved."""
+        if self.kind != "orientation":
+            return arms.PLACE
+        return None if self.coordinates == "plane" else self.mask
 
     @property
     def area(self) -> float:
@@ -134,7 +132,7 @@ class Workspace(Result):
     @property
     def grid_area(self) -> float:
         """Area of the cells that are reached, m^2."""
-        return float(self._cells[0][self.count > 0].sum())
+        return float(self.cells.measures()[0][self.count > 0].sum())
 
     @property
     def grid_error(self) -> float:
@@ -146,7 +144,7 @@ class Workspace(Result):
         edges = sum(int(np.diff(padded, axis=k).sum()) for k in range(flags.ndim))
         return float(0.5 * edges / flags.sum())
 
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, points: ArrayLike) -> Flags:
         """Whether points are reached.
 
         Parameters
@@ -160,28 +158,22 @@ class Workspace(Result):
             Solved exactly where the postures of an arm are counted; else that of the cell.
         """
         given = as_reals(points, "points")
-        if given.ndim == 0 or given.shape[-1] not in (2, 3):
-            raise ShapeError(
-                f"points: expected shape (..., 2) in the section or (..., 3) in the world, got "
-                f"{given.shape}."
-            )
-        rows = given.reshape(-1, given.shape[-1])
+        if given.ndim == 0 or given.shape[-1] not in (2, 3) or given.shape[-1] < len(self.size):
+            wanted = "(..., 3) in the world"
+            wanted = wanted if len(self.size) == 3 else f"(..., 2) in the section or {wanted}"
+            raise ShapeError(f"points: expected shape {wanted}, got {given.shape}.")
+        rows, cells = given.reshape(-1, given.shape[-1]), self.cells
         inside = np.asarray(np.isfinite(rows).all(axis=1))
-        safe = np.where(inside[:, None], rows, 0.0)
-        local = safe if safe.shape[1] == len(self.size) else self._space.of_world(safe)
-        if safe.shape[1] == 2 and len(self.size) == 3:
-            raise ShapeError("points: expected world positions (..., 3) of this workspace.")
-        if self._counted:
-            world = self._space.world(local)
-            if safe.shape[1] == 3 and self.coordinates == "plane":
-                world = safe
-            exact = _count_positions(self.model, world, self.limits, self.free)
-            return np.asarray((exact > 0) & inside).reshape(given.shape[:-1])
-        low = self.points[0] - 0.5 * self.size if len(self.points) else np.zeros(len(self.size))
-        cell = np.floor((local - low) / self.size).astype(int)
-        inside &= np.all((cell >= 0) & (cell < self.shape), axis=1)
-        flags = (self.count > 0).reshape(self.shape)
-        inside[inside] = flags[tuple(cell[inside].T)]
+        rows = np.where(inside[:, None], rows, 0.0)
+        local = rows if rows.shape[1] == len(self.size) else cells.of_world(rows)
+        if self.kind in ("positions", "free") and _is_counted(cells, self.model):
+            in_world = rows.shape[1] == 3 and self.coordinates == "plane"
+            world = rows if in_world else cells.world(local)
+            inside &= _count_positions(self.joints, world, Workers()) > 0
+        else:
+            number, known = cells.numbers(local)
+            inside &= known
+            inside[known] &= self.count[number] > 0
         return inside.reshape(given.shape[:-1])
 
     def boundary(self) -> list[Array]:
@@ -191,30 +183,16 @@ class Workspace(Result):
         the outlines of the cells.
         """
         if self._by_curves:
-            return [line.copy() for line in boundary(self.model, self.limits)]
+            return boundary(self.model, self.limits)
         if self.coordinates == "space":
             raise InvalidValueError("boundary: expected a workspace in a plane, got one in space.")
-        return outlines(self.count > 0, self.points, self.size, self.shape)
-
-    @property
-    def _space(self) -> Space:
-        return Space(self.coordinates, self.frame)
-
-    @property
-    def _cells(self) -> tuple[Array, Array]:
-        return measure_of_cells(self._space, self.points, self.size)
-
-    @property
-    def _counted(self) -> bool:
-        """Whether the count of a point is that of the postures of its position."""
-        return self.kind in ("positions", "free") and _is_counted(self._space, self.model)
+        return outlines(self.cells, self.count > 0)
 
     @property
     def _by_curves(self) -> bool:
         """Whether singular curves and limits bound what is reached."""
         planar = self.coordinates != "space" and self.free is None and self.kind == "positions"
-        section = is_section(self.frame, self.coordinates, section_arm(self.model))
-        return planar and self.status <= 1 and section
+        return planar and self.status <= 1 and self.cells.is_section(arms.section_arm(self.model))
 
     def _total(self, which: int, count: int | None) -> float:
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
@@ -230,7 +208,7 @@ class Workspace(Result):
         chosen = self.count > 0 if count is None else self.count == count
         if count == 0:
             return 0.0
-        return float(self._cells[which][chosen].sum())
+        return float(self.cells.measures()[which][chosen].sum())
 
     def __repr__(self) -> str:
         unit, value = ("m^3", self.volume) if self.coordinates != "plane" else ("m^2", self.area)
@@ -251,6 +229,8 @@ def workspace(
     resolution: int | None = None,
     orientation: ArrayLike | None = None,
     mask: ArrayLike | str | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Workspace:
     """Workspace of an arm: which positions it reaches, and in how many postures.
 
@@ -274,6 +254,8 @@ def workspace(
         Rotation of the tool, for kind ``orientation``.
     mask : array_like, shape (6,), optional
         Components that are asked; two positions make a planar workspace.
+    executor, progress
+        As for `accessibility`.
 
     Returns
     -------
@@ -302,56 +284,65 @@ def workspace(
     >>> round(w.area, 6), w.count.max(), w.contains([[1.0, 0.5], [2.0, 0.5]])
     (12.566371, np.int64(2), array([ True, False]))
     """
-    check_model(arm)
-    checked_word(kind, KINDS, "kind")
-    checked_word(section, SECTIONS, "section")
-    bounded, is_free = checked_flag(limits, "limits"), free_predicate(arm, free)
-    free = kept_free(free)
-    rows = None if mask is None else read_only(as_mask(mask), np.bool_)
+    joints, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
+    one_of(kind, KINDS, "kind")
+    one_of(section, SECTIONS, "section")
+    rows = None if mask is None else as_mask(mask)
     rotation = _rotation(kind, orientation, free)
-    turned = free is None and kind != "orientation"
-    space = space_of(arm, section, bounded, turned, mask)
+    space = space_of(joints, section, free is None and kind != "orientation", mask)
+    asked = arm, kind, joints.limits, joints.free, rows, rotation
     if space is None:
-        return _nothing(arm, kind, bounded, free, rows, rotation)
+        empty, count = (
+            Cells("space", np.eye(4), np.zeros((0, 3)), np.ones(3), (0, 0, 0)),
+            np.zeros(0),
+        )
+        return _workspace(asked, empty, count, WorkspaceStatus.NOT_DEFINED)
     # a planar question to an arm in space leaves a coordinate open
-    counted = kind in ("positions", "free") and _is_counted(space, arm)
-    default = _RESOLUTION["reached"]
-    if kind not in ("positions", "free"):
-        default = _RESOLUTION["oriented"]
-    elif counted:
-        default = _RESOLUTION["counted"]
-    if space.kind == "space":
-        default = _RESOLUTION["space"]
-    points, size, shape = grid_of(arm, space, bounded, resolution, default)
-    world = space.world(points)
+    counted = _is_counted(space, arm)
+    default = "space" if space.kind == "space" else "counted" if counted else "reached"
+    if kind not in ("positions", "free") and default != "space":
+        default = "oriented" if space.turning_axis(joints) is None else "turned"
+    cells = cells_of(joints, space, resolution, _RESOLUTION[default])
     status = WorkspaceStatus.COUNTED
-    if counted:
-        count = _count_positions(arm, world, bounded, free)
-    elif kind in ("positions", "free"):
-        reached, _ = reached_cells(arm, space, points, size, shape, bounded, is_free)
-        count, status = reached.astype(np.int64), WorkspaceStatus.REACHED_ONLY
-    elif kind == "orientation":
-        T = np.tile(np.eye(4), (len(points), 1, 1))
-        T[:, :3, :3], T[:, :3, 3] = rotation, world
-        asked = None if space.kind == "plane" else rows
-        count = posture_counts(arm, T, asked, bounded, is_free)[1]
-        if leaves_a_family(arm, asked):
+    if rotation is not None:
+        seen = None if space.kind == "plane" else rows
+        count = posture_counts(joints, cells.poses(rotation), seen, work)[1]
+        if arms.leaves_a_family(arm, seen):
             count, status = np.minimum(count, 1), WorkspaceStatus.REACHED_ONLY
+        return _workspace(asked, cells, count, status)
+    first = work if kind in ("positions", "free") else work.part(0.0, 0.1)
+    if counted:
+        count = _count_positions(joints, cells.world(cells.points), first)
     else:
-        reached, _ = _positions(arm, space, points, size, shape, bounded, free)
-        inner = np.flatnonzero(reached)
-        failed, least = in_every_orientation(arm, world[inner], bounded, is_free, rows)
-        count = np.zeros(len(points), np.int64)
-        count[inner] = np.where(failed == 0, least, 0)
-        if kind == "secondary":
-            count = (reached & (count == 0)).astype(np.int64)
-        status = WorkspaceStatus.SAMPLED
-    if not count.any():
+        count, status = reached_cells(joints, cells, first), WorkspaceStatus.REACHED_ONLY
+    if kind in ("primary", "secondary"):
+        reached, status = np.flatnonzero(count), WorkspaceStatus.SAMPLED
+        axis, own = cells.turning_axis(joints), np.arange(reached.size)
+        first = own
+        if axis is not None:  # cells at one distance from the axis have one answer
+            away = np.linalg.norm(cells.points[reached] - axis, axis=1).round(9)
+            _, first, own = np.unique(away, return_index=True, return_inverse=True)
+        positions = cells.world(cells.points[reached[first]])
+        failed, least = in_every_orientation(joints, positions, rows, work.part(0.1, 1.0))
+        every = np.where(failed == 0, least, 0)[own]
+        count = np.zeros(len(count), np.int64)
+        count[reached] = every if kind == "primary" else every == 0
+    return _workspace(asked, cells, count, status)
+
+
+def _workspace(
+    asked: tuple[RobotModel, str, bool, Any, Any, Any],
+    cells: Cells,
+    count: Any,
+    status: WorkspaceStatus,
+) -> Workspace:
+    """The result; empty without a cell that is reached."""
+    if status is not WorkspaceStatus.NOT_DEFINED and not count.any():
         status = WorkspaceStatus.EMPTY
+    count = count.astype(np.int64)
     return Workspace(
-        arm, kind, bounded, free, rows, rotation, read_only(points), read_only(count, np.int64),
-        read_only(size), shape, space.kind, space.frame, status,
-    )  # fmt: skip
+        *asked, cells.points, count, cells.size, cells.shape, cells.kind, cells.frame, status
+    )
 
 
 def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | None:
@@ -367,41 +358,19 @@ def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | No
         return None
     T = np.eye(4)
     T[:3, :3] = as_exact(orientation, (3, 3), "orientation")
-    return read_only(poses_of(T)[:3, :3])
+    return poses_of(T)[:3, :3]
 
 
 def _is_counted(space: Space, arm: RobotModel) -> bool:
     """Whether a point of the space is a position that three joints determine."""
-    three = section_arm(arm)
+    three = arms.section_arm(arm)
     if three is None:
         return False
-    return space.kind != "plane" or is_section(space.frame, space.kind, three)
+    return space.kind != "plane" or space.is_section(three)
 
 
-def _count_positions(model: RobotModel, world: Array, limits: bool, free: Any) -> NDArray[np.int64]:
-    """Postures of world positions by the quartic."""
+def _count_positions(joints: JointSpace, world: Array, work: Workers) -> Ints:
+    """Postures of world positions (N, 3) by the quartic."""
     T = np.tile(np.eye(4), (len(world), 1, 1))
     T[:, :3, 3] = world
-    place = np.repeat((True, False), 3)
-    return posture_counts(model, T, place, limits, free_predicate(model, free))[1]
-
-
-def _positions(
-    model: RobotModel, space: Space, points: Array, size: Array, shape: tuple[int, ...],
-    limits: bool, free: Any,
-) -> tuple[NDArray[np.bool_], Array | None]:  # fmt: skip
-    """Which cells are reached in any orientation."""
-    if _is_counted(space, model):
-        return _count_positions(model, space.world(points), limits, free) > 0, None
-    return reached_cells(model, space, points, size, shape, limits, free_predicate(model, free))
-
-
-def _nothing(
-    arm: RobotModel, kind: str, limits: bool, free: Any, mask: Any, rotation: Any
-) -> Workspace:
-    """A workspace without cells."""
-    return Workspace(
-        arm, kind, limits, free, mask, rotation, read_only(np.zeros((0, 3))),
-        read_only(np.zeros(0), np.int64), read_only(np.ones(3)), (0, 0, 0), "space",
-        read_only(np.eye(4)), WorkspaceStatus.NOT_DEFINED,
-    )  # fmt: skip
+    return posture_counts(joints, T, arms.PLACE, work)[1]

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
 from ..errors import InvalidValueError
 from ..performance import Aspects, FeasiblePath, Workspace, cusps, singular_curves
 from ..performance.arms import section_arm
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
 
 _LINES = {"boundary": (INK, 1.1), "internal": (ALERT, 0.9), "limit": (PALE, 0.9)}
 _TINTS = ("#f4f4f4", "#cfe3f5", "#9cc4e6", "#6aa2d3", "#3f7fbb", "#235c99")
+_SECTION = ("distance from axis 1 (m)", "height (m)")
 _CORNERS = np.array([(i, j, k) for k in (-0.5, 0.5) for j in (-0.5, 0.5) for i in (-0.5, 0.5)])
 _QUADS = ((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
           (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3))  # fmt: skip
@@ -67,18 +67,27 @@ def plot_workspace(
     style.as_instance(w, Workspace, "w", "workspace")
     if not len(w.points):
         raise InvalidValueError(f"w: there are no cells to draw. {w.reason()}")
-    in_space = w.coordinates == "space"
-    figure, grid = style.panels(PAGE if in_space else 1.3 * COLUMN, 3.6, size, 1, 1 + in_space)
-    counts = w.count.reshape(w.shape)
-    axes = [np.unique(w.points[:, k]) for k in range(w.points.shape[1])]
-    names = ("distance from axis 1 (m)", "height (m)")
-    names = names if w.coordinates == "half plane" else ("x (m)", "y (m)", "z (m)")
-    views = ((0, 2, 1), (0, 1, 2)) if in_space else ((0, 1, None),)
-    numbers = np.unique(w.count)
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    in_space, numbers = w.coordinates == "space", np.unique(w.count)
+    width = PAGE if in_space else 1.3 * COLUMN
+    figure, grid = style.panels(width, 3.6, size, 1, 1 + in_space)
+    axes = [np.unique(coordinate) for coordinate in w.points.T]
+    names = _SECTION if w.coordinates == "half plane" else ("x (m)", "y (m)", "z (m)")
+    tints = ListedColormap([_TINTS[min(k, len(_TINTS) - 1)] for k in range(len(numbers))])
+    norm = BoundaryNorm([*(numbers - 0.5), numbers[-1] + 0.5], len(numbers))
+    views = ((0, 2, (1,)), (0, 1, (2,))) if in_space else ((0, 1, ()),)
     for panel, (across, up, along) in zip(grid[0], views, strict=True):
-        shown = counts if along is None else counts.max(axis=along)
-        _cells(figure, panel, axes[across], axes[up], shown, numbers)
+        counts = w.count.reshape(w.shape).max(axis=along).T
+        image = panel.pcolormesh(axes[across], axes[up], counts, cmap=tints, norm=norm,
+                                 shading="nearest", rasterized=True)  # fmt: skip
+        panel.grid(False)
         panel.set(xlabel=names[across], ylabel=names[up], aspect="equal")
+        middles = 0.5 * (norm.boundaries[1:] + norm.boundaries[:-1])
+        bar: Any = figure.colorbar(image, ax=panel, pad=0.03, aspect=25, ticks=middles)
+        bar.ax.set_yticklabels([str(n) for n in numbers])
+        bar.ax.minorticks_off()
+        bar.set_label("postures")
     if curves and not in_space and w.kind == "positions":
         found = singular_curves(w.model, w.limits)
         for line, kind in zip(found.section, found.kind, strict=True):
@@ -88,23 +97,6 @@ def plot_workspace(
         if len(points):
             grid[0, 0].plot(*points.T, "o", color=ALERT, markersize=3.5, label="cusp")
     return style.finished(figure, title, ("boundary", "internal", "limit", "cusp"))
-
-
-def _cells(figure: Figure, axes: Any, x: Array, y: Array, counts: Any, numbers: Any) -> None:
-    """Cells in a colour for each number, with a bar that names the numbers."""
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
-    tints = [_TINTS[min(k, len(_TINTS) - 1)] for k in range(len(numbers))]
-    norm = BoundaryNorm(np.append(numbers - 0.5, numbers[-1] + 0.5), max(len(numbers), 1))
-    image = axes.pcolormesh(
-        x, y, counts.T, cmap=ListedColormap(tints), norm=norm, shading="nearest", rasterized=True
-    )
-    axes.grid(False)
-    middles = 0.5 * (norm.boundaries[1:] + norm.boundaries[:-1])
-    bar: Any = figure.colorbar(image, ax=axes, pad=0.03, aspect=25, ticks=middles)
-    bar.ax.set_yticklabels([str(int(n)) for n in numbers])
-    bar.ax.minorticks_off()
-    bar.set_label("postures")
 
 
 @style.plot
@@ -130,32 +122,24 @@ def plot_aspects(a: Aspects, *, title: str | None = None, size: ArrayLike | None
     from matplotlib.colors import ListedColormap
 
     group = max(a.groups, key=lambda g: (len(g.joints) >= 2, len(g.volumes), len(g.joints)))
-    arm = section_arm(a.model)
+    arm, count = section_arm(a.model), len(group.volumes)
     of_section = arm is not None and len(group.joints) == 2
-    maps = min(len(group.volumes), 3) if of_section else 1
-    figure, grid = style.panels(PAGE, 3.1, size, 1, 1 + maps,
-                                width_ratios=[1.2, *[1.2 / maps] * maps])  # fmt: skip
+    maps = min(count, 3) if of_section else 1
+    figure, grid = style.panels(PAGE, 3.1, size, 1, 1 + maps, width_ratios=[maps, *[1] * maps])
     left, *right = grid[0]
-    labels = group.labels
-    while labels.ndim > 2:
-        labels = labels[..., labels.shape[-1] // 2]
-    labels = labels.reshape(len(labels), -1)
-    count = len(group.volumes)
+    middle = tuple(n // 2 for n in group.labels.shape[2:])
+    labels = group.labels[(..., *middle)].reshape(len(group.labels), -1)
     colors = [PALETTE[k % len(PALETTE)] for k in range(count)]
-    shown = np.ma.masked_equal(labels, 0)
-    x, y = (low + h * (np.arange(n) + 0.5)
-            for low, h, n in zip(group.low, group.side, labels.shape, strict=False)
-            ) if labels.shape[1] > 1 else (group.low[0] + group.side[0] * np.arange(len(labels)),
-                                           np.zeros(1))  # fmt: skip
-    left.pcolormesh(x, y, shown.T, cmap=ListedColormap(colors), vmin=0.5, vmax=count + 0.5,
-                    shading="nearest", alpha=0.75, rasterized=True)  # fmt: skip
+    ends, sides = np.append(group.low, -0.5), np.append(group.side, 1.0)
+    x, y = (ends[k] + sides[k] * (np.arange(labels.shape[k]) + 0.5) for k in range(2))
+    left.pcolormesh(x, y, np.ma.masked_equal(labels, 0).T, cmap=ListedColormap(colors), vmin=0.5,
+                    vmax=count + 0.5, shading="nearest", alpha=0.75, rasterized=True)  # fmt: skip
     names = [f"q{j + 1} (rad)" for j in group.joints] + [""]
     left.set(xlabel=names[0], ylabel=names[1])
     left.grid(False)
     if arm is not None and of_section:
         mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        points = arm.values(mesh)[:, :2]
-        text = ("distance from axis 1 (m)", "height (m)") if arm.radial else ("x (m)", "y (m)")
+        points, text = arm.values(mesh)[:, :2], _SECTION if arm.radial else ("x (m)", "y (m)")
         for k, panel in enumerate(right):
             inside = points[(labels == k + 1).ravel()]
             panel.plot(*points.T, ",", color="#e8e8e8", rasterized=True, label="_all")
@@ -199,8 +183,9 @@ def plot_feasible_path(
     if not q.size or np.isnan(q).all():
         raise InvalidValueError(f"path: there are no postures to draw. {path.reason()}")
     spread = np.nan_to_num(np.nanmax(q, axis=(0, 1)) - np.nanmin(q, axis=(0, 1)))
-    j = int(spread.argmax()) if joint is None else style.as_choice([joint], q.shape[2], "joint",
-                                                                   "a number")[0]  # fmt: skip
+    j = int(spread.argmax())
+    if joint is not None:
+        j = style.as_choice([joint], q.shape[2], "joint", "a number")[0]
     figure, grid = style.panels(0.5 * (COLUMN + PAGE), 3.2, size)
     axes = grid[0, 0]
     k, s = np.nonzero(path.following >= 0)
@@ -210,11 +195,10 @@ def plot_feasible_path(
     )
     lines = lines[np.abs(lines[:, 0, 1] - lines[:, 1, 1]) < np.pi]  # not across the ends of a turn
     axes.add_collection(LineCollection(list(lines), colors=PALE, linewidths=1.2, label="continued"))
-    stops = np.argwhere((path.following < 0) & ~np.isnan(q[:-1, :, j]))
-    if len(stops):
-        at = q[stops[:, 0], stops[:, 1], j]
-        axes.plot(stops[:, 0], at, "x", color=ALERT, markersize=5, label="ends here")
-    best = np.where(np.isnan(path.q[:, j]), np.nan, path.q[:, j])
+    last, s = np.nonzero((path.following < 0) & ~np.isnan(q[:-1, :, j]))
+    if len(last):
+        axes.plot(last, q[last, s, j], "x", color=ALERT, markersize=5, label="ends here")
+    best = path.q[:, j]
     turn = best if spread[j] > 2.0 * np.pi else (best + np.pi) % (2.0 * np.pi) - np.pi
     turn = np.where(np.abs(np.diff(turn, prepend=turn[:1])) > np.pi, np.nan, turn)
     axes.plot(turn, color=PALETTE[0], linewidth=2.2, label="best motion")
@@ -256,25 +240,19 @@ def show_workspace(w: Workspace, q: ArrayLike | None = None, **options: Any) -> 
             inner = inner & np.roll(inner, 1, axis) & np.roll(inner, -1, axis)
         flags = flags & ~inner[1:-1, 1:-1, 1:-1]
     d = len(w.size)
-    corners, quads = (
-        _CORNERS[:, :d] if d == 3 else _CORNERS[:4, :2],
-        _QUADS if d == 3 else _QUADS[:2],
-    )
-    nodes, legend, ends = [], [], [np.zeros((0, 3))]
+    corners, quads = (_CORNERS, _QUADS) if d == 3 else (_CORNERS[:4, :2], _QUADS[:2])
+    nodes, legend, seen = [], [], np.zeros((0, 3))
     for k, number in enumerate(np.unique(w.count[w.count > 0])):
         cells = w.points[flags.ravel() & (w.count == number)]
-        local = (cells[:, None] + corners * w.size).reshape(-1, d)
-        faces = (len(corners) * np.arange(len(cells))[:, None, None] + np.array(quads)).reshape(
-            -1, 3
-        )
-        points = local @ w.frame[:3, :d].T + w.frame[:3, 3]
+        points = (cells[:, None] + corners * w.size).reshape(-1, d) @ w.frame[:3, :d].T
+        points = points + w.frame[:3, 3]
+        faces = len(corners) * np.arange(len(cells))[:, None, None] + np.array(quads)
         color = (*PALETTE[k % 8][:3], 0.35)
-        shape = Triangles(points.astype(np.float32), faces)
+        shape = Triangles(points.astype(np.float32), faces.reshape(-1, 3))
         nodes.append(Node(f"workspace/{number}", np.eye(4), shape, color))
         legend.append((f"{number} posture{'s' if number > 1 else ''}", color))
-        ends.append(points)
+        seen = np.concatenate((seen, points))
     scene = show(w.model, q, **options)
-    seen = np.concatenate(ends)
     return replace(
         scene, nodes=(*scene.nodes, *nodes), legend=(*scene.legend, *legend),
         camera=framed(seen, None) if len(seen) else scene.camera,
