@@ -64,10 +64,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_number, as_reals
+from .._arrays import Array, as_exact, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from .legs import leg_states
-from .robot import Family, ParallelRobot, pose_at
+from .robot import Family, ParallelRobot, for_legs, pose_at
 
 Limit = ArrayLike | None
 _YAWS = np.pi * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 8, -8, 10, -10, 12]) / 12
@@ -187,7 +187,7 @@ def _robot(
     a, b = _points(base, m, flat, "base"), _points(platform, m, flat, "platform")
     _check_anchors(family, a, b)
     crank, rod = (
-        np.zeros(m) if arms is None else _for_legs(value, m, name, 1e-300)
+        np.zeros(m) if arms is None else _bounded(value, m, name, 1e-300)
         for value, name in zip(arms or (0, 0), ("proximal", "distal"), strict=True)
     )
     low, high = checked_limits(lower, upper, m, arms is None)
@@ -222,24 +222,22 @@ def _check_anchors(family: Family, a: Array, b: Array) -> None:
             raise InvalidValueError(f"{name}: all anchors coincide, so that it could turn freely.")
 
 
-def _for_legs(value: ArrayLike, m: int, name: str, least: float) -> Array:
-    """A number or one for each leg, perhaps infinite. Shapes: -> (m,)."""
-    given = as_reals(value, name)
-    if given.shape not in ((), (m,)):
-        raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
+def _bounded(value: ArrayLike, m: int, name: str, least: float) -> Array:
+    """A number or one for each leg, from a least one; NaN is none. Shapes: -> (m,)."""
+    given = for_legs(value, m, name)
     if not (given >= least).all():
         words = {0.0: "numbers that are not negative", -np.inf: "numbers"}
         raise InvalidValueError(
             f"{name}: expected {words.get(least, 'lengths above 0 m')}, got {value!r:.60}."
         )
-    return np.broadcast_to(given, (m,))
+    return given
 
 
 def checked_limits(lower: Limit, upper: Limit, m: int, is_length: bool) -> tuple[Array, Array]:
     """Limits of q, infinite or zero where there are none."""
     least = 0.0 if is_length else -np.inf
-    low = _for_legs(least if lower is None else lower, m, "lower", least)
-    high = _for_legs(np.inf if upper is None else upper, m, "upper", least)
+    low = _bounded(least if lower is None else lower, m, "lower", least)
+    high = _bounded(np.inf if upper is None else upper, m, "upper", least)
     if not (low <= high).all():
         raise InvalidValueError(f"lower, upper: expected lower below upper, got {low} and {high}.")
     return low, high
@@ -267,7 +265,7 @@ def _home(robot: ParallelRobot) -> Array:
     twist = np.zeros((len(_YAWS), 6))
     twist[:, :3], twist[:, 5] = place, _YAWS if 5 in robot.columns else 0.0
     T = pose_at(twist)
-    legs = leg_states(robot, T, np.zeros(len(T), np.int64))
+    legs = leg_states(robot, T)
     J = legs.rows / np.repeat([1.0, robot.length], 3)
     det = np.abs(np.linalg.det(J[..., list(robot.columns)])) * legs.reached
     inside = ((legs.q >= robot.lower) & (legs.q <= robot.upper)).all(axis=1)

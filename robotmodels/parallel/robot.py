@@ -10,21 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, Value, as_core, as_exact, as_floats, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..se3.orientation import rotation_vectors_of
 
 _OFF = 1e-6  # of a pose from the freedoms of the platform, rad, and of the size of the robot
 _AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 class Family(Enum):
-    """Families of parallel robots: name, and components of the platform's twist.
-
-    Examples
-    --------
-    >>> Family.DELTA.value
-    ('Delta robot', (0, 1, 2))
-    """
+    """Families of parallel robots: name, and components of the platform's twist."""
 
     GOUGH = "Gough-Stewart platform", (0, 1, 2, 3, 4, 5)
     PLANAR_3RPR = "planar 3-RPR robot", (0, 1, 5)
@@ -139,7 +134,7 @@ class ParallelRobot(Value):
         T = self.checked(T)
         turn = np.zeros_like(T[..., :3, 3])
         if 3 in self.columns:
-            turn = rotation_vector(T)
+            turn = rotation_vectors_of(T[..., :3, :3])
         elif 5 in self.columns:
             turn[..., 2] = np.arctan2(T[..., 1, 0], T[..., 0, 0])
         return np.concatenate((T[..., :3, 3], turn), axis=-1)[..., list(self.columns)]
@@ -202,39 +197,41 @@ class ParallelRobot(Value):
         mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
         size = np.abs(inertia).max()
-        odd = np.abs(inertia - inertia.T).max() > 1e-9 * size
-        if odd or np.linalg.eigvalsh(inertia).min() < -1e-12 * size:
+        least = np.linalg.eigvalsh(inertia).min()
+        if np.abs(inertia - inertia.T).max() > 1e-9 * size or least < -1e-12 * size:
             raise InvalidValueError(
                 "inertia: expected a symmetric matrix about the centre of mass with positive "
                 f"principal moments, got {inertia.tolist()}."
             )
-        both = np.array([[_for_legs(value, self.m) for value in part] for part in parts])
-        if mass < 0.0 or (both[:, [0, 2]] < 0.0).any():
-            raise InvalidValueError("platform, legs: masses and inertias must not be negative.")
-        first, second = (read_only(part.T) for part in both)
+        both = np.array([[for_legs(x, self.m, "legs") for x in part] for part in parts])
+        if not (mass >= 0.0 and (both[:, [0, 2]] >= 0.0).all() and np.isfinite(both).all()):
+            raise InvalidValueError(
+                "platform, legs: expected finite masses and inertias that are not negative."
+            )
         g = self.gravity if gravity is None else as_exact(gravity, (3,), "gravity")
-        masses = Masses(mass, read_only(com), read_only(inertia), first, second)
+        masses = Masses(mass, *map(read_only, (com, inertia, *np.swapaxes(both, 1, 2))))
         return replace(self, masses=masses, gravity=g)
 
     def __repr__(self) -> str:
         q = "angle" if self.has_cranks else "length"
-        ends = (self.lower.min(), self.upper.max())
-        least = {0.0, -np.inf} if not self.has_cranks else {-np.inf}
-        first = "" if np.isfinite(ends[1]) else "from "
-        words = [] if ends[0] in least else [f"{first}{ends[0]:.4g}"]
-        words += [f"to {ends[1]:.4g}"] if np.isfinite(ends[1]) else []
-        limits = " ".join([q, *words]) if words else "no limits"
+        none = (-np.inf if self.has_cranks else 0.0, np.inf)
+        limits = f"{q} {self.lower.min():.4g} to {self.upper.max():.4g}"
+        limits = "no limits" if (self.lower.min(), self.upper.max()) == none else limits
         words = "with" if self.masses is not None else "without"
-        name = self.family.value[0]
-        return f"<{name}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
+        return f"<{self.family.value[0]}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
 
 
-def _for_legs(value: ArrayLike, m: int) -> Array:
-    """A number or one for each leg. Shapes: -> (m,)."""
-    given = as_floats(value, "legs")
+def for_legs(value: ArrayLike, m: int, name: str) -> Array:
+    """A number or one for each leg, perhaps infinite. Shapes: -> (m,)."""
+    given = as_reals(value, name)
     if given.shape not in ((), (m,)):
-        raise ShapeError(f"legs: expected numbers or shape ({m},), got {given.shape}.")
+        raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
     return np.broadcast_to(given, (m,))
+
+
+def only_freedoms(robot: ParallelRobot, V: Array) -> Array:
+    """Twists or rows without the components that the platform does not have."""
+    return V if robot.m == 6 else V * [k in robot.columns for k in range(6)]
 
 
 def pose_at(twist: Array) -> Array:
@@ -248,12 +245,3 @@ def pose_at(twist: Array) -> Array:
     T[..., :3, 3] = twist[..., :3]
     T[..., 3, 3] = 1.0
     return T
-
-
-def rotation_vector(T: Array) -> Array:
-    """Rotation vectors of poses. Shapes: (..., 4, 4) -> (..., 3)."""
-    from scipy.spatial.transform import Rotation
-
-    R = np.ascontiguousarray(T[..., :3, :3]).reshape(-1, 3, 3)
-    vectors = Rotation.from_matrix(R).as_rotvec() if len(R) else np.empty((0, 3))
-    return vectors.reshape(*T.shape[:-2], 3)

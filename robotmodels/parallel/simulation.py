@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats
+from .._arrays import Array, as_exact
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
+from ..simulation.simulate import law_of, times_of
 from .dynamics import ddm, energies
-from .legs import check_robot, leg_states
-from .looped import LoopedPlatform
+from .legs import Mode, is_looped, leg_states, modes_of
 from .results import Result
-from .robot import ParallelRobot, pose_at
-from .velocities import Mode, ikm, modes_of, only_freedoms, scales
+from .robot import ParallelRobot, only_freedoms
+from .velocities import ikm, scales
 
 _TOO_NEAR = 1e-6  # least singular value, relative, and sine of an elbow
+Law = Callable[[float, Array, Array], ArrayLike]
 
 
 class MotionStatus(Outcome):
@@ -61,9 +62,6 @@ class ParallelMotion(Result):
     status: MotionStatus
 
 
-Law = Callable[[float, Array, Array], ArrayLike]
-
-
 def simulate(
     robot: ParallelRobot,
     T0: ArrayLike,
@@ -86,11 +84,12 @@ def simulate(
         Pose at the start.
     V0 : array_like, shape (6,), optional
         Twist at the start; default at rest.
-    control : callable or array_like, shape (m,), optional
-        Forces or torques of the actuators, constant or a function of (t, T, V); default none.
+    control : callable or array_like, shape (m,) or (N, m), optional
+        Forces or torques of the actuators: a function of (t, T, V), constant, or rows for the times
+        ``t``; default none.
     t : array_like
         Duration, s, of which 201 samples are given, or ascending times (N,).
-    wrench : callable or array_like, shape (6,), optional
+    wrench : callable or array_like, shape (6,) or (N, 6), optional
         Wrench of the platform on the environment, as ``control``.
     mode : int, optional
         Working mode of robots with cranks; default 0.
@@ -120,80 +119,70 @@ def simulate(
     ('FINISHED', True)
     """
     from scipy.integrate import solve_ivp
+    from scipy.spatial.transform import Rotation
 
-    check_robot(robot)
-    if isinstance(robot, LoopedPlatform):
+    if is_looped(robot, mode):
         raise InvalidValueError("robot: simulate kinematic loops by loops.simulate.")
-    start = robot.checked(se3.as_single_pose(T0, "T0"), "T0")
+    T0 = robot.checked(se3.as_single_pose(T0, "T0"), "T0")
     V = only_freedoms(robot, np.zeros(6) if V0 is None else as_exact(V0, (6,), "V0"))
-    times = as_floats(t, "t")
-    if times.ndim == 0 and times > 0.0:
-        times = np.linspace(0.0, float(times), 201)
-    if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
+    first, last, times = times_of(t)
+    if not last > first:
         raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
-    drive, load = _law(control, robot.m, "control"), _law(wrench, 6, "wrench")
-    ddm(robot, start, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
+    times = np.linspace(first, last, 201) if times is None else times
+    drive, load = _law(control, robot.m, times, "control"), _law(wrench, 6, times, "wrench")
+    ddm(robot, T0, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
     columns, unit = list(robot.columns), scales(robot, robot.length)
 
-    def pose(x: Array) -> Array:
-        T = pose_at(x[:6])
-        T[:3, :3] = T[:3, :3] @ start[:3, :3]
+    def poses(x: Array) -> Array:
+        """Poses of states: position, quaternion with the real part last, twist, work."""
+        T = np.tile(np.eye(4), (len(x), 1, 1))
+        T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(x[:, 3:7]).as_matrix(), x[:, :3]
         return T
 
     def rates(time: float, x: Array) -> Array:
         if not np.isfinite(x).all():  # a later stage of such a step
-            return np.full(13, np.nan)
-        T, V = pose(x), x[6:12]
+            return np.full(14, np.nan)
+        T, V = poses(x[None])[0], x[7:13]
         tau, W = drive(time, T, V), load(time, T, V)  # errors of the laws are the caller's
         try:
             a = ddm(robot, T, V, tau, W, mode)
             power = tau @ ikm(robot, T, V, mode) - W @ V
         except InvalidValueError:  # beyond a straight leg: a shorter step is tried
-            return np.full(13, np.nan)
-        return np.concatenate((V[:3], _vector_rate(x[3:6], V[3:]), a, [power]))
+            return np.full(14, np.nan)
+        w, e, real = V[3:], x[3:6], x[6]
+        return np.concatenate((
+            V[:3], 0.5 * (real * w + np.cross(w, e)), [-0.5 * (w @ e)], a, [power],
+        ))  # fmt: skip
 
     def sides(x: Array) -> Array:
         """Determinant of the lines and speeds of the knees, zero at singular positions."""
-        legs = leg_states(robot, pose(x)[None], modes_of(robot, mode, (1,)))
+        legs = leg_states(robot, poses(x[None]), modes_of(robot, mode, (1,)))
         det = np.linalg.det(legs.rows[0][:, columns] * unit)
         return np.append(det, legs.speed[0]) * legs.reached[0]
 
-    x0 = np.concatenate((start[:3, 3], np.zeros(3), V, [0.0]))
-    first = sides(x0)
+    x0 = np.concatenate((T0[:3, 3], Rotation.from_matrix(T0[:3, :3]).as_quat(), V, [0.0]))
+    start = sides(x0)
 
     def margin(time: float, x: Array) -> float:
-        return float((sides(x) / first).min()) - _TOO_NEAR
+        return float((sides(x) / start).min()) - _TOO_NEAR
 
     margin.terminal = True  # type: ignore[attr-defined]
-    span = (float(times[0]), float(times[-1]))
-    found = solve_ivp(rates, span, x0, "DOP853", times, events=margin, rtol=rtol, atol=atol)
+    found = solve_ivp(
+        rates, (first, last), x0, "DOP853", times, events=margin, rtol=rtol, atol=atol
+    )
     status = MotionStatus.FINISHED
     if found.status != 0:
         stuck = found.status < 0 and margin(0.0, found.y[:, -1]) > 0.05
         status = MotionStatus.STEP_TOO_SMALL if stuck else MotionStatus.SINGULAR
-    x = found.y.T
-    T, V = np.array([pose(row) for row in x]), x[:, 6:12]
+    T, V = poses(found.y.T), found.y[7:13].T
     energy = np.add(*energies(robot, T, V, mode))
     tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)])
     q = leg_states(robot, T, modes_of(robot, mode, (len(T),))).q
-    return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - x[:, 12], status)
+    return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - found.y[13], status)
 
 
-def _law(law: Any, size: int, name: str) -> Callable[[float, Array, Array], Array]:
-    """A function of (t, T, V) from one, a constant or nothing."""
-    if law is None or not callable(law):
-        given: Any = np.zeros(size) if law is None else law
-        constant = as_exact(given, (size,), name).copy()
-        return lambda t, T, V: constant
-    function: Callable[..., Any] = law
-    return lambda t, T, V: as_exact(function(t, T.copy(), V.copy()), (size,), f"{name}(t, T, V)")
-
-
-def _vector_rate(r: Array, w: Array) -> Array:
-    """Rate of a rotation vector from the angular velocity in world axes."""
-    angle = float(np.linalg.norm(r))
-    if angle < 1e-4:
-        share = 1.0 / 12.0 + angle**2 / 720.0
-    else:
-        share = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
-    return w - 0.5 * np.cross(r, w) + share * np.cross(r, np.cross(r, w))
+def _law(law: Any, size: int, t: Array, name: str) -> Callable[[float, Array, Array], Array]:
+    """A function of (t, T, V) from one, a constant, rows or nothing."""
+    function = law_of(np.zeros(size) if law is None else law, size, t, name)[0]
+    assert function is not None
+    return lambda time, T, V: function(time, T.copy(), V.copy())

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_number
 from .._outcomes import Outcome
 from ..errors import ShapeError
-from .legs import check_robot, leg_states
-from .looped import LoopedPlatform
+from .legs import Mode, Robot, is_looped, leg_states, modes_of
+from .looped import null_space
 from .results import Result
-from .robot import Family, ParallelRobot
-from .velocities import Mode, Robot, modes_of
+from .robot import Family
+from .velocities import states
 
 _WORDS = {
     "": "the lines are independent",
@@ -80,13 +80,7 @@ class Singularity(Result):
         return self.kind
 
     def reason(self) -> str:
-        """Kind of the position and form of the lines as a sentence.
-
-        Returns
-        -------
-        str
-            The sentence.
-        """
+        """Kind of the position and form of the lines as a sentence."""
         if not self.form:
             return self.kind.sentence
         names = ", ".join(str(i + 1) for i in self.legs)
@@ -137,64 +131,40 @@ def classify_singularity(
     >>> turned.kind.name, turned.variety, turned.motion.shape
     ('PARALLEL', '5a', (1, 6))
     """
-    check_robot(robot)
     epsilon = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     if np.ndim(getattr(T, "homogeneous", T)) != 2:
         raise ShapeError(f"T: expected one pose, shape (4, 4), got {np.shape(T)}; loop over poses.")
-    if isinstance(robot, LoopedPlatform):
-        kind, motion = robot.singular_motions(T, epsilon)
+    if is_looped(robot, mode):
+        code, motion = robot.singular_motions(T, epsilon)
         least = 0.0 if len(motion) else 1.0
-        return Singularity(SingularityKind(kind), motion, (), "", "", least)
+        return Singularity(SingularityKind(code), motion, (), "", "", least)
     pose = robot.checked(T)[None]
     legs = leg_states(robot, pose, modes_of(robot, mode, (1,)))
     if not legs.reached.all():
-        # raises with the sentence
-        from .velocities import states
-
-        states(robot, pose[0], mode)
+        states(robot, mode, pose[0])  # raises with the sentence
     size = robot.crank if robot.has_cranks else np.ones(robot.m)
     straight = np.flatnonzero(np.abs(legs.speed[0]) <= epsilon * size)
-    unit = np.repeat([1.0, 1.0 / robot.length], 3)
+    unit, columns = np.repeat([1.0, 1.0 / robot.length], 3), list(robot.columns)
     rows = legs.rows[0] * unit
-    columns = list(robot.columns)
-    s, motion = _kernel(rows[:, columns], epsilon)
+    s = np.linalg.svd(rows[:, columns], compute_uv=False)
+    motion = null_space(rows[:, columns], epsilon)
     gained = np.zeros((len(motion), 6))
     gained[:, columns] = motion * unit[columns]
     dependent, form = (), ""
     if len(motion):
-        dependent, form = grassmann(_lines(robot, legs.rows[0], legs.arm[0], pose[0]), epsilon)
+        if 5 not in columns:  # rods of a platform that does not turn act as if they met in a point
+            rows[:, 3:] = 0.0
+        dependent, form = grassmann(rows, epsilon)
     kind = SingularityKind((1 if straight.size else 0) + (2 if len(motion) else 0))
-    turning = _lost_constraints(robot, legs.direction[0], epsilon)
-    if len(turning):
-        kind, gained = SingularityKind.CONSTRAINT, np.vstack((gained, turning))
+    if robot.family is Family.DELTA:  # rotations that the pairs of rods do not prevent
+        hips = np.cross(robot.outward, robot.downward)
+        turning = null_space(np.cross(hips, legs.direction[0]), epsilon)
+        if len(turning):
+            kind = SingularityKind.CONSTRAINT
+            gained = np.vstack((gained, np.pad(turning / robot.length, ((0, 0), (3, 0)))))
     chosen = dependent or tuple(int(i) for i in straight)
     variety = form if form.startswith("5") else form[:1]
     return Singularity(kind, gained, chosen, variety, form, float(s[-1] / s[0]))
-
-
-def _kernel(A: Array, epsilon: float) -> tuple[Array, Array]:
-    """Singular values, and an orthonormal basis of the null space. Shapes: (m, k) -> (r, k)."""
-    _, s, Vt = np.linalg.svd(A)
-    full = np.zeros(A.shape[1])
-    full[: len(s)] = s
-    return full, Vt[full <= epsilon * max(full[0], 1e-300)]
-
-
-def _lines(robot: ParallelRobot, rows: Array, arm: Array, T: Array) -> Array:
-    """Unit lines [u; moment] about the platform's origin, moments in units of the robot."""
-    if 5 in robot.columns:
-        return rows / np.repeat([1.0, robot.length], 3)
-    # the rods of a platform that does not turn act as if they met in one point
-    return np.concatenate((rows[:, :3], np.zeros_like(arm)), axis=1)
-
-
-def _lost_constraints(robot: ParallelRobot, direction: Array, epsilon: float) -> Array:
-    """Rotations that the pairs of rods of a Delta do not prevent. Shapes: (m, 3) -> (k, 6)."""
-    if robot.family is not Family.DELTA:
-        return np.empty((0, 6))
-    hips = np.cross(robot.outward, robot.downward)
-    _, free = _kernel(np.cross(hips, direction), epsilon)
-    return np.concatenate((np.zeros_like(free), free), axis=1) / robot.length
 
 
 def grassmann(lines: Array, epsilon: float = 1e-8) -> tuple[tuple[int, ...], str]:
@@ -221,7 +191,8 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
         return "2b"  # three lines of which none coincide
     u = L[:, :3]
     flat = np.linalg.svd(u, compute_uv=False)[-1] <= np.sqrt(epsilon)
-    meet = np.abs(_products(L)) <= np.sqrt(epsilon)
+    mutual = L[:, :3] @ L[:, 3:].T  # their sums with the transposed: zero where two lines meet
+    meet = np.abs(mutual + mutual.T) <= np.sqrt(epsilon)
     if rank == 3:
         if not meet.all():
             return "3a" if not (meet & ~np.eye(4, dtype=bool)).any() else "3b"
@@ -243,9 +214,3 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
     if abs(square) <= epsilon:
         return "4c"
     return "4b" if square > 0.0 else "4a"
-
-
-def _products(L: Array) -> Array:
-    """Mutual moments of lines, zero where two meet or are parallel. Shapes: (k, 6) -> (k, k)."""
-    M = L[:, :3] @ L[:, 3:].T
-    return M + M.T

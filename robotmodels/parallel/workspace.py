@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,13 @@ from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
 from ..performance import Workspace, WorkspaceStatus
 from .families import checked_limits
-from .legs import LegStates, check_robot, leg_states
-from .robot import ParallelRobot
+from .legs import LegStates, is_looped, leg_states
+from .robot import Family, ParallelRobot
 
 KINDS = ("orientation", "dexterous", "reachable")
 _ROWS = 20000  # poses at a time
 _FAR = 1e9
+_FINER = {2: 8, 3: 3}  # lines for one of the grid
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -143,8 +144,7 @@ def workspace(
     >>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
     (1.2, array([ True, False]))
     """
-    check_robot(robot)
-    if not isinstance(robot, ParallelRobot):
+    if is_looped(robot):
         raise InvalidValueError("robot: workspaces of kinematic loops are not computed.")
     if kind not in KINDS:
         raise InvalidValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r:.40}.")
@@ -195,34 +195,21 @@ def workspace(
 
 
 def measure(f: Array, size: Array) -> float:
-    """Area or volume where a function on a grid is positive, linear on simplices of its cells."""
-    d = f.ndim
-    total = 0.0
-    cells = tuple(n - 1 for n in f.shape)
-    for order in permutations(range(d)):
-        corner, values = [0] * d, []
-        for axis in (None, *order):
-            if axis is not None:
-                corner[axis] = 1
-            values.append(f[tuple(slice(c, c + n) for c, n in zip(corner, cells, strict=True))])
-        v = np.stack([x.ravel() for x in values], axis=1)
-        inside = (v > 0.0).all(axis=1)
-        mixed = ~inside & (v > 0.0).any(axis=1)
-        total += inside.sum() + _positive_share(v[mixed]).sum()
-    return float(total / len(list(permutations(range(d)))) * np.prod(size))
+    """Area or volume where a function on a grid is positive, linear between its nodes.
 
-
-def _positive_share(v: Array) -> Array:
-    """Share of simplices where a linear function with these corner values is positive."""
-    v = np.sort(v, axis=1)
-    scale = np.abs(v).max(axis=1, keepdims=True)
-    v = v / scale + 1e-7 * np.arange(v.shape[1])  # corners with equal values
-    d = v.shape[1] - 1
-    share = np.zeros(len(v))
-    for i in range(d + 1):
-        others = [v[:, i] - v[:, j] for j in range(d + 1) if j != i]
-        share += np.maximum(v[:, i], 0.0) ** d / np.prod(others, axis=0)
-    return np.clip(share, 0.0, 1.0)
+    Lengths along the last axis are exact; the lines are interpolated, as they end like a root.
+    """
+    lines, finer = f, _FINER[f.ndim]
+    for axis in range(f.ndim - 1):
+        n = f.shape[axis]
+        at = np.linspace(0.0, n - 1.0, (n - 1) * finer + 1)
+        k = np.minimum(at.astype(int), n - 2)
+        share = (at - k).reshape([-1 if i == axis else 1 for i in range(f.ndim)])
+        lines = (1.0 - share) * lines.take(k, axis) + share * lines.take(k + 1, axis)
+    low, high = lines[..., :-1], lines[..., 1:]
+    top, gap = np.maximum(low, high), np.abs(high - low)
+    share = np.where(top > 0.0, np.clip(top / np.maximum(gap, 1e-300), 0.0, 1.0), 0.0)
+    return float(share.sum() * np.prod(size) / finer ** (f.ndim - 1))
 
 
 def _world(points: Array, frame: Array) -> Array:
@@ -308,7 +295,7 @@ def _margin(
         if robot.has_cranks:
             d = np.linalg.norm(T[:, None, :3, 3] + legs.arm - robot.base, axis=-1)
             reach = np.minimum(robot.crank + robot.rod - d, d - np.abs(robot.crank - robot.rod))
-            if robot.family.value[1] == (0, 1, 2):
+            if robot.family is Family.DELTA:
                 reach = _annulus(robot, T[:, None, :3, 3] + legs.arm - robot.base)
             inside = np.minimum(inside, reach)
         if cone is not None:
@@ -334,7 +321,7 @@ def _annulus(robot: ParallelRobot, d: Array) -> Array:
 
 def _in_cones(robot: ParallelRobot, T: Array, legs: LegStates, cone: float) -> Array:
     """Cone angle minus the angles between legs and their directions at home. Shapes: -> (N, m)."""
-    home = leg_states(robot, robot.home[None], np.zeros(1, np.int64))
+    home = leg_states(robot, robot.home[None])
     angles = []
     for a, b in (
         (legs.direction, home.direction),
@@ -349,13 +336,11 @@ def _clearance(T: Array, legs: LegStates) -> Array:
     """Least distance between rods that do not share an end. Shapes: N poses -> (N,)."""
     start, end = legs.knee, T[:, None, :3, 3] + legs.arm
     least = np.full(len(T), np.inf)
-    for i in range(start.shape[1]):
-        for j in range(i):
-            ends = [x[:, i] - y[:, j] for x in (start, end) for y in (start, end)]
-            if any(np.abs(apart).max(initial=0.0) < 1e-12 for apart in (ends[0], ends[3])):
-                continue
-            a, b, c, e = start[:, i], end[:, i], start[:, j], end[:, j]
-            s, t = nearest_points(a, b, c, e)
-            gap = a + s[:, None] * (b - a) - c - t[:, None] * (e - c)
-            least = np.minimum(least, np.linalg.norm(gap, axis=-1))
+    for i, j in combinations(range(start.shape[1]), 2):
+        a, b, c, e = start[:, i], end[:, i], start[:, j], end[:, j]
+        if any(np.abs(apart).max(initial=0.0) < 1e-12 for apart in (a - c, b - e)):
+            continue
+        s, t = nearest_points(a, b, c, e)
+        gap = a + s[:, None] * (b - a) - c - t[:, None] * (e - c)
+        least = np.minimum(least, np.linalg.norm(gap, axis=-1))
     return least

@@ -292,7 +292,7 @@ def plot_platform_workspace(
 
 def _points(robot: ParallelRobot, T: Array) -> tuple[Array, LegStates]:
     """Points that the picture holds, and the states of the legs."""
-    _, legs = states(robot, T, None)
+    legs = states(robot, None, T)[2]
     anchors = T[:, None, :3, 3] + legs.arm
     every = (robot.base, legs.knee.reshape(-1, 3), anchors.reshape(-1, 3))
     return np.concatenate(every), legs
