@@ -21,6 +21,7 @@ _NEAR = 1e-3  # the same for paths that get stuck at multiple solutions
 _FINITE = 1e-9  # |e.e| beside |e|^2
 _FAR = 1e4  # |g| beside |e|, in units of the robot, of stuck paths to translations at infinity
 _CONJUGATE = 1e-5  # distance of conjugate ends
+_MANY = 8  # stuck paths, not in groups, are a continuum and no numerical accident
 _TURNS = np.array([0.0, 1.1, 2.3, 3.1, 4.7, 5.2, 0.4])  # phases of the equations in new attempts
 _PROJECTION = np.array([0.71, 0.37, 0.53, 0.29])  # no vector that symmetric robots prefer
 _FLAT = 1e-9  # smallest singular value, relative, of a robot that is singular everywhere
@@ -37,41 +38,45 @@ def spatial(robot: ParallelRobot, q: Array) -> Found:
     if _is_singular_everywhere(robot):
         return T, residual, det, status + AssemblyStatus.DEGENERATE, complex_count
     unit, quadrics = _quadrics(robot, q)
-    x, codes = np.empty((N, 40, 8), np.complex128), np.empty((N, 40))
-    start, lost = _stored(), np.ones(N, np.bool_)
+    found: list[tuple[Complex, NDArray[np.bool_]]] = [(np.empty((0, 8)), np.empty(0, np.bool_))] * N
+    lost = np.arange(N)
     for attempt, accuracy in enumerate(_ACCURACIES):
-        rows = np.flatnonzero(lost)
-        ends, code = np.empty((len(rows), 40, 16)), np.empty((len(rows), 40))
-        paths(quadrics[rows], *start, attempt * _TURNS, np.array([accuracy]), ends, code)
-        x[rows], codes[rows] = ends.view(np.complex128), code
-        lost[rows] = [_is_incomplete(x[s], codes[s]) for s in rows]
-    for s in range(N):
-        y, stuck = _finite(x[s], codes[s])
+        ends, codes = np.empty((len(lost), 40, 16)), np.empty((len(lost), 40))
+        paths(quadrics[lost], *_stored(), attempt * _TURNS, np.array([accuracy]), ends, codes)
+        for s, x, code in zip(lost, ends.view(np.complex128), codes, strict=True):
+            found[s] = _finite(x, code)
+        lost = np.array([s for s in lost if _is_incomplete(*found[s])], np.int64)
+    for s, (y, stuck) in enumerate(found):
+        if s in lost:
+            many = stuck.sum() >= _MANY
+            status[s] = AssemblyStatus.DEGENERATE if many else AssemblyStatus.SOME_LOST
         near = np.where(stuck[:, None] | stuck, _NEAR, _SAME)
         first = ~np.tril(_distances(y, y) < near, -1).any(axis=1)
         y, stuck = y[first], stuck[first]
         real = np.abs(y.imag).max(axis=1, initial=0.0) < np.where(stuck, _NEAR, _REAL)
         complex_count[s] = len(y)
         T[s, : len(y)][real] = _poses(robot, y.real[real], unit[s])
-        if any(_is_continuum(quadrics[s], row) for row in y[stuck]):
-            status[s] = AssemblyStatus.DEGENERATE
-    polish(*rods(robot, q), np.array(robot.columns), T, residual, det)
-    T[~(residual <= 1e-11 * (robot.size + unit[:, None]))] = np.nan
-    status[lost & (status == 0)] = AssemblyStatus.SOME_LOST
+    columns, size = np.array(robot.columns), robot.size + unit[:, None]
+    polish(*rods(robot, q), columns, T, residual, det)
+    for s, k in np.argwhere(residual > 1e-14 * size):
+        T[s, k] = _settled(robot, q[s], T[s, k])
+    polish(*rods(robot, q), columns, T, residual, det)
+    residual[~(residual <= 1e-11 * size)] = np.nan
     cosine = 0.5 * (np.einsum("skij,ij->sk", T[..., :3, :3], robot.home[:3, :3]) - 1.0)
     away = np.linalg.norm(T[..., :3, 3] - robot.home[:3, 3], axis=-1) / robot.length
-    order = np.argsort(away + np.arccos(np.clip(cosine, -1.0, 1.0)), axis=1, kind="stable")
+    away = away + np.arccos(np.clip(cosine, -1.0, 1.0))
+    order = np.argsort(np.where(np.isnan(residual), np.nan, away), axis=1, kind="stable")
     residual, det = (np.take_along_axis(values, order, 1) for values in (residual, det))
-    return np.take_along_axis(T, order[..., None, None], 1), residual, det, status, complex_count
+    T = np.take_along_axis(T, order[..., None, None], 1)
+    T[np.isnan(residual)] = det[np.isnan(residual)] = np.nan
+    return T, residual, det, status, complex_count
 
 
 @cache
 def _stored() -> tuple[Array, Array]:
     """The stored member and its 40 solutions: real and imaginary parts in turns."""
-    with (
-        files("robotmodels.parallel").joinpath("start.npz").open("rb") as file,
-        np.load(file) as data,
-    ):
+    path = files("robotmodels.parallel").joinpath("start.npz")
+    with path.open("rb") as file, np.load(file) as data:
         return data["member"], data["solutions"]
 
 
@@ -119,9 +124,8 @@ def _distances(x: Complex, y: Complex) -> Array:
     return np.abs(x[:, None] - y).max(axis=-1)
 
 
-def _is_incomplete(x: Complex, codes: Array) -> bool:
+def _is_incomplete(y: Complex, stuck: NDArray[np.bool_]) -> bool:
     """Whether paths are missing: ends that coincide, got stuck alone, or lack a conjugate."""
-    y, stuck = _finite(x, codes)
     near = np.where(stuck, _NEAR, _SAME)
     twin = (_distances(y, y) + 9.0 * np.eye(len(y)) < near[:, None]).any(axis=1)
     conjugate = _distances(y, _normalised(y.conj())).min(axis=1, initial=9.0)
@@ -140,33 +144,23 @@ def _poses(robot: ParallelRobot, x: Array, unit: float) -> Array:
     return T
 
 
+def _settled(robot: ParallelRobot, q: Array, T: Array) -> Array:
+    """Levenberg-Marquardt iterations at a singular pose, which stops Newton's method early."""
+    for _ in range(40):
+        legs = leg_states(robot, T[None])
+        error, J = q - legs.q[0], legs.rows[0]
+        off = np.abs(error).max()
+        if off <= 1e-15 * robot.size:
+            break
+        step = pose_at(J.T @ np.linalg.solve(J @ J.T + off * np.eye(6), error))
+        step[:3, 3] += T[:3, 3] - step[:3, :3] @ T[:3, 3]
+        T = step @ T
+    return T
+
+
 def _is_singular_everywhere(robot: ParallelRobot) -> bool:
     """Whether the lines of the legs depend on each other at random poses."""
     random = np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6)) * np.repeat([robot.size, 2.0], 3)
     rows = leg_states(robot, pose_at(random)).rows
     s = np.linalg.svd(rows / np.repeat([1.0, robot.length], 3), compute_uv=False)
     return bool((s[:, -1] < _FLAT * s[:, 0]).all())
-
-
-def _is_continuum(m: Array, x: Complex) -> bool:
-    """Whether a solution with a singular derivative lies on a curve of solutions."""
-    i, j = np.triu_indices(4)
-    legs = m[1:].reshape(5, 16)
-    M = np.zeros((7, 8, 8))
-    M[0] = np.diag(np.repeat([-m[0], 4.0], 4))
-    M[1, range(4), range(4, 8)] = 1.0
-    M[2:, i, j] = M[2:, j, i] = legs[:, :10]
-    i, j = i[i != j], j[i != j]
-    M[2:, 4 + i, j], M[2:, 4 + j, i] = legs[:, 10:], -legs[:, 10:]
-    M = 0.5 * (M + np.swapaxes(M, 1, 2))
-
-    def refined(y: Complex) -> Complex:
-        for _ in range(15):
-            step = np.linalg.pinv(np.vstack((2.0 * M @ y, x.conj())), rcond=1e-5)
-            y = y - step @ np.append(y @ M @ y, x.conj() @ (y - x))
-        return y
-
-    x = refined(x)
-    along = np.linalg.svd(np.vstack((2.0 * M @ x, x.conj())))[2][-1].conj()
-    y = refined(x + 0.01 * along)
-    return bool(np.abs(y @ M @ y).max() < 1e-10 and np.abs(y - x).max() > 1e-3)
