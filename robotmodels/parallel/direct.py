@@ -1,4 +1,55 @@
-"""Direct geometric models: the pose near a given one, and all assembly modes."""
+"""Direct geometric models (forward kinematics): the pose near a given one, all assembly modes.
+
+`dgm` iterates Newton's method from a pose nearby; where it leaves the assembly mode, the lengths
+are continued from those at the start in small pieces. `assembly_modes` continues the 40 complex
+solutions of a stored robot (Gough platforms), solves the sextic (planar robots), or intersects
+spheres and circles (Delta and five-bar). Loops of any other kind are searched from random postures,
+which is no proof (``SOME_LOST``).
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+q : array_like, shape (..., m)
+    Actuated lengths, m, or angles, rad.
+T0 : array_like, shape (..., 4, 4), optional
+    Where to start; default the home pose, of a Gough platform without limits raised to the mean of
+    the lengths.
+
+Returns
+-------
+PlatformPoses or AssemblyModes
+    ``T`` are poses (..., 4, 4), NaN where none was found, or (..., S, 4, 4), packed, with ``valid``
+    and ``count``: by ascending angle of planar robots, else by the distance from home. ``status``
+    are codes of `PoseStatus` or `AssemblyStatus`, ``residual`` the largest error of a leg's length,
+    m, and ``det`` determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components
+    of the twist that the platform has: zero at singular poses, one sign for each side.
+    ``iterations`` are those of Newton's method, of loops how often they were closed;
+    ``complex_count`` is the number of solutions in complex numbers, the real ones included.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arrays of the wrong shape, NaN, negative lengths, no poses.
+
+References
+----------
+Seed book section 2.4; C. Wampler, "Forward displacement analysis of general six-in-parallel SPS
+(Stewart) platform manipulators using soma coordinates", Mechanism and Machine Theory 31 (1996)
+331-337; J.-P. Merlet, "Parallel Robots", 2nd ed., chapter 4.
+
+Examples
+--------
+>>> from robotmodels.parallel import gough_symmetric, igm, planar_3rpr
+>>> robot = gough_symmetric(1.0)
+>>> T = robot.pose([0.1, 0.0, 1.1, 0.1, 0.2, 0.0])
+>>> bool(abs(dgm(robot, igm(robot, T).q[0]).T - T).max() < 1e-12)
+True
+>>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
+>>> modes = assembly_modes(robot, [14.98, 15.38, 12.0])
+>>> modes.count, modes.complex_count, modes.reason()
+(np.int64(6), array(6), 'All assembly modes are listed.')
+"""
 
 from __future__ import annotations
 
@@ -34,21 +85,7 @@ class PoseStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlatformPoses(Result):
-    """Poses of the platform. Read-only.
-
-    Parameters
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        Poses; NaN where none was found.
-    status : ndarray of int8, shape (...)
-        Codes of `PoseStatus`.
-    iterations : ndarray of int64, shape (...)
-        Newton iterations; of kinematic loops how often they were closed.
-    residual : ndarray, shape (...)
-        Largest error of a leg's length, m.
-    det : ndarray, shape (...)
-        Determinants of the lines of the legs, see `assembly_modes`.
-    """
+    """Poses of the platform, see the head of the file. Read-only."""
 
     outcomes: ClassVar = PoseStatus
     T: Array
@@ -72,25 +109,7 @@ class AssemblyStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class AssemblyModes(Result):
-    """All poses of the platform at given lengths or angles. Read-only.
-
-    Parameters
-    ----------
-    T : ndarray, shape (..., S, 4, 4)
-        Poses, packed, NaN where there is none: by ascending angle of planar robots, else by the
-        distance from home.
-    valid : ndarray of bool, shape (..., S)
-        Whether the row is a solution.
-    residual : ndarray, shape (..., S)
-        Largest error of a leg's length, m.
-    det : ndarray, shape (..., S)
-        Determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components of the
-        twist that the platform has; zero at singular poses, one sign for each side.
-    status : ndarray of int8, shape (...)
-        Codes of `AssemblyStatus`.
-    complex_count : ndarray of int64, shape (...)
-        Number of solutions in complex numbers, the real ones included.
-    """
+    """All poses of the platform at given lengths or angles, packed. Read-only."""
 
     outcomes: ClassVar = AssemblyStatus
     T: Array
@@ -109,43 +128,7 @@ class AssemblyModes(Result):
 
 
 def dgm(robot: Robot, q: ArrayLike, T0: ArrayLike | None = None) -> PlatformPoses:
-    """Direct geometric model (forward kinematics) by Newton's method from a pose nearby.
-
-    Where Newton's method leaves the assembly mode, the lengths are continued from those at the
-    start in small pieces.
-
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    q : array_like, shape (..., m)
-        Actuated lengths, m, or angles, rad.
-    T0 : array_like, shape (..., 4, 4), optional
-        Where to start; default the home pose, of a Gough platform without limits raised to the
-        mean of the lengths.
-
-    Returns
-    -------
-    PlatformPoses
-        Poses, with a status each.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arrays of the wrong shape, NaN, negative lengths, no poses.
-
-    References
-    ----------
-    Seed book section 2.4.1.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import dgm, gough_symmetric, igm
-    >>> robot = gough_symmetric(1.0)
-    >>> T = robot.pose([0.1, 0.0, 1.1, 0.1, 0.2, 0.0])
-    >>> bool(abs(dgm(robot, igm(robot, T).q[0]).T - T).max() < 1e-12)
-    True
-    """
+    """Direct geometric model by Newton's method from a pose nearby."""
     if is_looped(robot):
         return PlatformPoses(*robot.closed(q, T0))
     q = checked_actuators(robot, q)
@@ -162,43 +145,7 @@ def dgm(robot: Robot, q: ArrayLike, T0: ArrayLike | None = None) -> PlatformPose
 
 
 def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
-    """All assembly modes (all solutions of the forward kinematics).
-
-    Gough platforms: continuation of the 40 complex solutions of a stored robot; planar robots: the
-    sextic; Delta and five-bar: intersections of spheres and circles. Loops of any other kind are
-    searched by Newton's method from random postures, which is no proof (``SOME_LOST``).
-
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    q : array_like, shape (..., m)
-        Actuated lengths, m, or angles, rad.
-
-    Returns
-    -------
-    AssemblyModes
-        Poses, with their determinants.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays of the wrong shape, NaN, negative lengths.
-
-    References
-    ----------
-    Seed book section 2.4.2; C. Wampler, "Forward displacement analysis of general six-in-parallel
-    SPS (Stewart) platform manipulators using soma coordinates", Mechanism and Machine Theory 31
-    (1996) 331-337; J.-P. Merlet, "Parallel Robots", 2nd ed., chapter 4.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import assembly_modes, planar_3rpr
-    >>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
-    >>> modes = assembly_modes(robot, [14.98, 15.38, 12.0])
-    >>> modes.count, modes.complex_count, modes.reason()
-    (np.int64(6), array(6), 'All assembly modes are listed.')
-    """
+    """All assembly modes (all solutions of the direct geometric model)."""
     looped = is_looped(robot)
     q = as_vector(q, robot.m, "q") if looped else checked_actuators(robot, q)
     batch, rows = q.shape[:-1], np.ascontiguousarray(q.reshape(-1, robot.m))

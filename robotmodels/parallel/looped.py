@@ -257,7 +257,9 @@ def from_loops(
     Returns
     -------
     LoopedPlatform
-        Taken by the functions of this room in place of a `ParallelRobot`.
+        Taken by the functions of this package in place of a `ParallelRobot`. A pose is reached if
+        its position and orientation are; the latter does not count where it only follows from the
+        position, as of a five-bar's rod.
 
     Raises
     ------
