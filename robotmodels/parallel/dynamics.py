@@ -139,43 +139,41 @@ def _masses(robot: ParallelRobot) -> Masses:
 
 def _mass_matrix(robot: ParallelRobot, T: Array, legs: LegStates, V: Array) -> tuple[Array, Array]:
     """Mass matrix of the platform's freedoms, and wrench (N, 6) at zero acceleration."""
-    columns, k = list(robot.columns), robot.m + 1
-    units = np.concatenate((np.zeros((1, 6)), np.eye(6)[columns]))
-    T, V, *parts = (np.repeat(x, k, axis=0) for x in (T, V, *legs))
-    A = np.tile(units, (len(T) // k, 1))
-    F = _wrench(robot, T, LegStates(*parts), V, A).reshape(-1, k, 6)
+    columns, parts = list(robot.columns), LegStates(*(x[:, None] for x in legs))
+    A = np.concatenate((np.zeros((1, 6)), np.eye(6)[columns]))
+    F = _wrench(robot, T[:, None], parts, V[:, None], A)
     M = (F[:, 1:] - F[:, :1])[..., columns]
     return 0.5 * (M + np.swapaxes(M, 1, 2)), F[:, 0]
 
 
 def _wrench(robot: ParallelRobot, T: Array, legs: LegStates, V: Array, A: Array) -> Array:
-    """Wrench that moves platform and legs, at the platform's origin. Shapes: (N, 6) -> (N, 6)."""
+    """Wrench that moves platform and legs, at the platform's origin. Shapes: (..., 6)."""
     masses = _masses(robot)
-    v, w, a, alpha = V[:, :3], V[:, 3:], A[:, :3], A[:, 3:]
-    R = T[:, :3, :3]
-    r, inertia = R @ masses.com, R @ masses.inertia @ np.swapaxes(R, 1, 2)
+    v, w, a, alpha = V[..., :3], V[..., 3:], A[..., :3], A[..., 3:]
+    R = T[..., :3, :3]
+    r, inertia = R @ masses.com, R @ masses.inertia @ np.swapaxes(R, -1, -2)
     force = masses.mass * (a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) - robot.gravity)
-    moment = np.einsum("nij,nj->ni", inertia, alpha) + np.cross(r, force)
-    moment = moment + np.cross(w, np.einsum("nij,nj->ni", inertia, w))
+    moment = np.einsum("...ij,...j->...i", inertia, alpha) + np.cross(r, force)
+    moment = moment + np.cross(w, np.einsum("...ij,...j->...i", inertia, w))
     # anchors on the platform
-    w, alpha = w[:, None], alpha[:, None]
+    w, alpha = w[..., None, :], alpha[..., None, :]
     spin = np.cross(w, legs.arm)
-    acceleration = a[:, None] + np.cross(alpha, legs.arm) + np.cross(w, spin)
-    torque = np.zeros(legs.q.shape)
+    acceleration = a[..., None, :] + np.cross(alpha, legs.arm) + np.cross(w, spin)
     if robot.has_cranks:
         at_anchor, torque = _crank_forces(robot, masses, legs, V, A, acceleration)
     else:
-        at_anchor = _strut_forces(robot, masses, legs, v[:, None] + spin, acceleration)
-    force = force + at_anchor.sum(axis=1)
-    moment = moment + np.cross(legs.arm, at_anchor).sum(axis=1)
-    total = only_freedoms(robot, np.concatenate((force, moment), axis=1))
-    return total + np.einsum("nij,ni->nj", legs.jacobian, torque)
+        torque = np.zeros(legs.q.shape)
+        at_anchor = _strut_forces(robot, masses, legs, v[..., None, :] + spin, acceleration)
+    force = force + at_anchor.sum(axis=-2)
+    moment = moment + np.cross(legs.arm, at_anchor).sum(axis=-2)
+    total = only_freedoms(robot, np.concatenate((force, moment), axis=-1))
+    return total + np.einsum("...ij,...i->...j", legs.jacobian, torque)
 
 
 def _strut_forces(
     robot: ParallelRobot, masses: Masses, legs: LegStates, velocity: Array, acceleration: Array
 ) -> Array:
-    """Forces on the anchors that move legs of variable length. Shapes: (N, m, 3)."""
+    """Forces on the anchors that move legs of variable length. Shapes: (..., m, 3)."""
     u, size = legs.direction, legs.q[..., None]
     (m1, s1, i1), (m2, s2, i2) = (part.T[:, :, None] for part in (masses.first, masses.second))
     rate = (u * velocity).sum(axis=-1, keepdims=True)
@@ -191,12 +189,12 @@ def _strut_forces(
 def _crank_forces(
     robot: ParallelRobot, masses: Masses, legs: LegStates, V: Array, A: Array, acceleration: Array
 ) -> tuple[Array, Array]:
-    """Forces on the anchors and torques that move cranks and rods. Shapes: (N, m, 3), (N, m)."""
+    """Forces on the anchors, torques that move cranks and rods. Shapes: (..., m, 3), (..., m)."""
     m1, s1, i1 = masses.first.T
     m2, s2, i2 = (x[:, None] for x in masses.second.T)
-    rate = np.einsum("nij,nj->ni", legs.jacobian, V)
-    second = np.einsum("nij,nj->ni", legs.jacobian, A)
-    second += np.einsum("nij,nj->ni", rates_of_rows(robot, legs, V), V)
+    rate = np.einsum("...ij,...j->...i", legs.jacobian, V)
+    second = np.einsum("...ij,...j->...i", legs.jacobian, A)
+    second += np.einsum("...ij,...j->...i", rates_of_rows(robot, legs, V), V)
     swing, rod, turning = legs.knee - robot.base, robot.rod[:, None], legs.turning
     knee = second[..., None] * turning - (rate**2)[..., None] * swing
     bend = (acceleration - knee) / rod  # u''

@@ -261,7 +261,7 @@ def roots_of(f: Floats, z: Floats, largest: float) -> int:
     for k in range(degree):
         angle = 2.0 * pi * (k + 0.3) / degree
         z[k] = complex(cos(angle), sin(angle)) * (0.7 + 0.11 * k)
-    for _ in range(200):
+    for _ in range(60):
         most = 0.0
         for k in range(degree):
             p, d = f[low + degree], 0j
@@ -277,7 +277,7 @@ def roots_of(f: Floats, z: Floats, largest: float) -> int:
                 d = 1e-300 + 0j
             z[k] -= p / d
             most = max(most, abs(p / d) / (1e-3 + abs(z[k])))
-        if most < 1e-15:
+        if most < 1e-11:  # the error after a step is of its third power
             break
     for k in range(degree):
         root = z[k]

@@ -1,4 +1,37 @@
-"""Inverse geometric model: actuated lengths or angles of all working modes, and states of legs."""
+"""Inverse geometric model: actuated lengths or angles of all working modes, and states of legs.
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+T : array_like, shape (..., 4, 4)
+    Poses of the platform in the world.
+
+Returns
+-------
+LegSolutions
+    One row for each working mode that reaches the pose, ``mode`` ascending (see `ParallelRobot`):
+    one for legs of actuated length, 2^m with cranks where no leg is straight. ``q`` (..., S, m) are
+    lengths, m, or angles in (-pi, pi], rad; ``valid``, ``within_limits`` (angles modulo whole
+    turns) and ``residual``, the largest error of a rod's length, m, are (..., S). Packed: after the
+    solutions NaN, mode -1. ``status`` (...) are codes of `LegStatus`.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    No poses, or poses that the platform cannot have.
+
+References
+----------
+Seed book section 2.3.1.
+
+Examples
+--------
+>>> from robotmodels.parallel import five_bar
+>>> robot = five_bar([[0, 0], [0.5, 0]], 0.4, 0.6)
+>>> igm(robot, robot.home).mode, igm(robot, robot.home).q.shape
+(array([0, 1, 2, 3]), (4, 2))
+"""
 
 from __future__ import annotations
 
@@ -33,28 +66,7 @@ class LegStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LegSolutions(Result):
-    """Actuated lengths or angles that give poses, one row for each working mode. Read-only.
-
-    Parameters
-    ----------
-    q : ndarray, shape (..., S, m)
-        Actuated lengths, m, or angles in (-pi, pi], rad; packed, NaN where there is no solution.
-    mode : ndarray of int64, shape (..., S)
-        Working modes, ascending; -1 where there is no solution. See `ParallelRobot`.
-    valid, within_limits : ndarray of bool, shape (..., S)
-        Whether the row is a solution, and one within the limits; angles count modulo whole turns.
-    residual : ndarray, shape (..., S)
-        Largest error of a rod's length, m.
-    status : ndarray of int8, shape (...)
-        Codes of `LegStatus`.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import five_bar, igm
-    >>> robot = five_bar([[0, 0], [0.5, 0]], 0.4, 0.6)
-    >>> igm(robot, robot.home).mode
-    array([0, 1, 2, 3])
-    """
+    """Actuated lengths or angles that give poses, see the head of the file. Read-only."""
 
     outcomes: ClassVar = LegStatus
     q: Array
@@ -66,11 +78,10 @@ class LegSolutions(Result):
 
 
 class LegStates(NamedTuple):
-    """Legs at poses in one working mode.
+    """Legs at N poses: numbers (N, m), vectors (N, m, 3), rows (N, m, 6), ``speed q' = rows V``.
 
-    Shapes: q, speed, size (N, m), arm, direction, knee, turning (N, m, 3), rows (N, m, 6), reached
-    (N,). ``speed q' = rows [v; w]``; arm are the anchors' positions from the platform's origin,
-    size the lengths of legs or rods, turning the velocities of their other ends for q' = 1.
+    arm: anchors from the platform's origin; size: lengths of legs or rods; turning: velocity of
+    their other ends for q' = 1.
     """
 
     q: Array
@@ -139,36 +150,7 @@ def _bits(robot: ParallelRobot, mode: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def igm(robot: Robot, T: ArrayLike) -> LegSolutions:
-    """Inverse geometric model (inverse kinematics): actuated lengths or angles of all modes.
-
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    T : array_like, shape (..., 4, 4)
-        Poses of the platform in the world.
-
-    Returns
-    -------
-    LegSolutions
-        One working mode for legs of actuated length, 2^m with cranks where no leg is straight.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        No poses, or poses that the platform cannot have.
-
-    References
-    ----------
-    Seed book section 2.3.1.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric, igm
-    >>> robot = gough_symmetric(1.0)
-    >>> igm(robot, robot.home).q.shape
-    (1, 6)
-    """
+    """Inverse geometric model (inverse kinematics): actuated lengths or angles of all modes."""
     modes = np.arange(1)
     if is_looped(robot):
         joints, residual, valid = robot.postures(T)

@@ -1,6 +1,41 @@
 """Parallel robots given as kinematic loops: a platform frame on a robot of `robotmodels.loops`.
 
 The models are numeric: Newton's method on the actuated joints, and the velocity map of the loops.
+A pose is reached if its position and orientation are; the latter does not count where it only
+follows from the position, as of a five-bar's rod.
+
+Parameters
+----------
+looped_robot : LoopedRobot
+    The robot: spanning tree, closures, and actuated joints that determine the platform.
+platform_frame : str or int
+    Name or number of the platform's frame in the tree.
+q_home : array_like, shape (n,), optional
+    All joints near the home posture, rad or m; default the tree's zero posture. The loops are
+    closed from there.
+
+Returns
+-------
+LoopedPlatform
+    Taken by the functions of this package in place of a `ParallelRobot`. Its ``columns`` are the
+    independent components of the platform's twist, from 0.
+
+Raises
+------
+InvalidValueError, LoopError, FrameNotFoundError
+    Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not determine
+    the platform, or more of them than it has freedoms.
+
+Examples
+--------
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.model import RobotModel
+>>> table = DHTable(antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2],
+...                 d=[0, 0.5, 0.4, 0.4, 0.6, 0.6])
+>>> closures = [loops.Closure("cut", (5, 6), "point")]
+>>> five = loops.LoopedRobot(RobotModel.from_table(table), closures, actuated=[0, 1])
+>>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
+2
 """
 
 from __future__ import annotations
@@ -26,19 +61,7 @@ _RANK = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LoopedPlatform(Value):
-    """A parallel robot made of kinematic loops, from `from_loops`. Read-only.
-
-    Parameters
-    ----------
-    robot : LoopedRobot
-        Spanning tree, closures, actuated joints.
-    frame : str or int
-        Frame of the platform.
-    q_home : ndarray, shape (n,)
-        All joints at the home pose, with closed loops.
-    columns : tuple of int
-        Independent components of the platform's twist, from 0; others do not count.
-    """
+    """A parallel robot made of kinematic loops, from `from_loops`. Read-only."""
 
     robot: loops.LoopedRobot
     frame: str | int
@@ -242,43 +265,7 @@ class LoopedPlatform(Value):
 def from_loops(
     looped_robot: loops.LoopedRobot, platform_frame: str | int, q_home: ArrayLike | None = None
 ) -> LoopedPlatform:
-    """Parallel robot of any kind from a robot with kinematic loops.
-
-    Parameters
-    ----------
-    looped_robot : LoopedRobot
-        The robot; its actuated joints determine the platform.
-    platform_frame : str or int
-        Name or number of the platform's frame in the tree.
-    q_home : array_like, shape (n,), optional
-        All joints near the home posture, rad or m; default the tree's zero posture. The loops are
-        closed from there.
-
-    Returns
-    -------
-    LoopedPlatform
-        Taken by the functions of this package in place of a `ParallelRobot`. A pose is reached if
-        its position and orientation are; the latter does not count where it only follows from the
-        position, as of a five-bar's rod.
-
-    Raises
-    ------
-    InvalidValueError, LoopError, FrameNotFoundError
-        Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not
-        determine the platform, or more of them than it has freedoms.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure, LoopedRobot
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2],
-    ...                 d=[0, 0.5, 0.4, 0.4, 0.6, 0.6])
-    >>> tree = RobotModel.from_table(table)
-    >>> five = LoopedRobot(tree, [Closure("cut", (5, 6), "point")], actuated=[0, 1])
-    >>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
-    2
-    """
+    """Parallel robot of any kind from a robot with kinematic loops."""
     if not isinstance(looped_robot, loops.LoopedRobot):
         raise InvalidValueError(
             f"looped_robot: expected a loops.LoopedRobot, got {type(looped_robot).__name__}."

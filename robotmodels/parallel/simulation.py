@@ -1,4 +1,50 @@
-"""Simulation of a parallel robot: the direct dynamic model integrated over time."""
+"""Simulation of a parallel robot: the direct dynamic model integrated over time.
+
+Parameters
+----------
+robot : ParallelRobot
+    The robot with masses.
+T0 : array_like, shape (4, 4)
+    Pose at the start.
+V0 : array_like, shape (6,), optional
+    Twist at the start; default at rest.
+control : callable or array_like, shape (m,) or (N, m), optional
+    Forces or torques of the actuators: a function of (t, T, V), constant, or rows for the times
+    ``t``; default none.
+t : array_like
+    Duration, s, of which 201 samples are given, or ascending times (N,).
+wrench : callable or array_like, shape (6,) or (N, 6), optional
+    Wrench of the platform on the environment, as ``control``.
+mode : int, optional
+    Working mode of robots with cranks; default 0.
+rtol, atol : float
+    Tolerances of a step.
+
+Returns
+-------
+ParallelMotion
+    The motion until the end or a singular position: times ``t`` (N,), poses ``T`` (N, 4, 4), twists
+    ``V`` (N, 6), lengths or angles ``q`` and forces ``tau`` of the actuators (N, m), and
+    ``energy_drift`` (N,), the change of the energy that is not work of actuators or wrench, J:
+    errors of the integration.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arguments of the wrong shape, a robot without masses, a start out of reach or singular.
+
+References
+----------
+Seed book section 2.3.3.5 (singular positions in practice).
+
+Examples
+--------
+>>> from robotmodels.parallel import gough_symmetric
+>>> robot = gough_symmetric(1.0).with_masses(platform=(6.0, [0, 0, 0], 0.1 * np.eye(3)))
+>>> motion = simulate(robot, robot.home, t=0.1)
+>>> motion.status.name, bool(abs(motion.energy_drift).max() < 1e-7)
+('FINISHED', True)
+"""
 
 from __future__ import annotations
 
@@ -34,23 +80,7 @@ class MotionStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ParallelMotion(Result):
-    """Simulated motion of a parallel robot. Read-only.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Times, s; they end early if the simulation did.
-    T : ndarray, shape (N, 4, 4)
-        Poses of the platform.
-    V : ndarray, shape (N, 6)
-        Twists [v; w], world axes, m/s and rad/s.
-    q, tau : ndarray, shape (N, m)
-        Actuated lengths or angles, and forces or torques of the actuators.
-    energy_drift : ndarray, shape (N,)
-        Change of the energy that is not work of actuators or wrench, J: errors of the integration.
-    status : MotionStatus
-        Outcome.
-    """
+    """Simulated motion of a parallel robot, see the head of the file. Read-only."""
 
     outcomes: ClassVar = MotionStatus
     t: Array
@@ -74,50 +104,7 @@ def simulate(
     rtol: float = 1e-9,
     atol: float = 1e-11,
 ) -> ParallelMotion:
-    """Simulate a parallel robot under forces of its actuators.
-
-    Parameters
-    ----------
-    robot : ParallelRobot
-        The robot with masses.
-    T0 : array_like, shape (4, 4)
-        Pose at the start.
-    V0 : array_like, shape (6,), optional
-        Twist at the start; default at rest.
-    control : callable or array_like, shape (m,) or (N, m), optional
-        Forces or torques of the actuators: a function of (t, T, V), constant, or rows for the times
-        ``t``; default none.
-    t : array_like
-        Duration, s, of which 201 samples are given, or ascending times (N,).
-    wrench : callable or array_like, shape (6,) or (N, 6), optional
-        Wrench of the platform on the environment, as ``control``.
-    mode : int, optional
-        Working mode of robots with cranks; default 0.
-    rtol, atol : float
-        Tolerances of a step.
-
-    Returns
-    -------
-    ParallelMotion
-        The motion until the end or a singular position.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arguments of the wrong shape, a robot without masses, a start out of reach or singular.
-
-    References
-    ----------
-    Seed book section 2.3.3.5 (singular positions in practice).
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric, simulate
-    >>> robot = gough_symmetric(1.0).with_masses(platform=(6.0, [0, 0, 0], 0.1 * np.eye(3)))
-    >>> motion = simulate(robot, robot.home, t=0.1)
-    >>> motion.status.name, bool(abs(motion.energy_drift).max() < 1e-7)
-    ('FINISHED', True)
-    """
+    """Simulate a parallel robot under forces of its actuators."""
     from scipy.integrate import solve_ivp
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,45 @@
-"""Singular configurations: kinds, motions gained, Grassmann varieties of the legs' lines."""
+"""Singular configurations: kinds, motions gained, Grassmann varieties of the legs' lines.
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+T : array_like, shape (4, 4)
+    One pose of the platform.
+mode : int, optional
+    Working mode of robots with cranks, as numbered by `igm`; default 0.
+tolerance : float
+    Singular values below this fraction of the largest are zero, and sines of elbows.
+
+Returns
+-------
+Singularity
+    ``kind``; ``motion`` (k, 6), twists [v; w] of the platform that locked actuators do not prevent,
+    norm 1 with angles times the characteristic length, world axes, at the platform's origin;
+    ``legs``, the smallest set of legs whose lines depend on each other, at serial singularities the
+    straight ones, from 0; ``variety``, the class of these lines in Grassmann geometry, "1" to "4",
+    "5a", "5b", which is the dimension they span, empty where they are independent, and ``form``,
+    the same with Merlet's letter; ``least``, the smallest singular value of the unit lines,
+    relative to the largest.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Several poses, poses that the platform cannot have or the legs do not reach.
+
+References
+----------
+Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
+parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
+
+Examples
+--------
+>>> from robotmodels.parallel import gough_symmetric
+>>> robot = gough_symmetric(1.0)
+>>> turned = classify_singularity(robot, robot.pose([0, 0, 1.2, 0, 0, np.pi / 2]))
+>>> turned.kind.name, turned.variety, turned.motion.shape
+('PARALLEL', '5a', (1, 6))
+"""
 
 from __future__ import annotations
 
@@ -46,26 +87,7 @@ class SingularityKind(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Singularity(Result):
-    """Kind of a pose, and what the platform gains there. Read-only.
-
-    Parameters
-    ----------
-    kind : SingularityKind
-        Kind of the position.
-    motion : ndarray, shape (k, 6)
-        Twists [v; w] of the platform that locked actuators do not prevent, norm 1 with angles times
-        the characteristic length; world axes, at the platform's origin.
-    legs : tuple of int
-        Smallest set of legs whose lines depend on each other; of serial singularities the straight
-        legs. From 0.
-    variety : str
-        Class of the lines of ``legs`` in Grassmann geometry: "1" to "4", "5a", "5b", which is the
-        dimension they span; empty where the lines are independent.
-    form : str
-        The same with Merlet's letter, "3c" for instance.
-    least : float
-        Smallest singular value of the unit lines, relative to the largest.
-    """
+    """Kind of a pose, and what the platform gains there. Read-only."""
 
     kind: SingularityKind
     motion: Array
@@ -94,43 +116,7 @@ class Singularity(Result):
 def classify_singularity(
     robot: Robot, T: ArrayLike, mode: Mode = None, tolerance: float = 1e-8
 ) -> Singularity:
-    """Kind of a pose, motions gained, dependent legs and their Grassmann variety.
-
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    T : array_like, shape (4, 4)
-        One pose of the platform.
-    mode : int, optional
-        Working mode of robots with cranks, as numbered by `igm`; default 0.
-    tolerance : float
-        Singular values below this fraction of the largest are zero, and sines of elbows.
-
-    Returns
-    -------
-    Singularity
-        The kind, with the rest.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Several poses, poses that the platform cannot have or the legs do not reach.
-
-    References
-    ----------
-    Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
-    parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.parallel import classify_singularity, gough_symmetric
-    >>> turned = classify_singularity(gough_symmetric(1.0), [[0, -1, 0, 0], [1, 0, 0, 0],
-    ...                                                      [0, 0, 1, 1.2], [0, 0, 0, 1]])
-    >>> turned.kind.name, turned.variety, turned.motion.shape
-    ('PARALLEL', '5a', (1, 6))
-    """
+    """Kind of a pose, motions gained, dependent legs and their Grassmann variety."""
     epsilon = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     if np.ndim(getattr(T, "homogeneous", T)) != 2:
         raise ShapeError(f"T: expected one pose, shape (4, 4), got {np.shape(T)}; loop over poses.")

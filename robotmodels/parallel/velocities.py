@@ -27,7 +27,8 @@ Returns
 -------
 ndarray
     Matrices (..., m, 6) or (..., 6, 6), motion of the actuators (..., m) or of the platform
-    (..., 6), indices (...).
+    (..., 6), indices (...); `LegForces` with ``forces`` (..., m), N, or N m of cranks, and
+    ``status`` (...), codes of `ForceStatus`.
 
 Raises
 ------
@@ -133,15 +134,7 @@ class ForceStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LegForces(Result):
-    """Forces of the actuators that balance a wrench. Read-only.
-
-    Parameters
-    ----------
-    forces : ndarray, shape (..., m)
-        N, positive where a leg pushes, or N m of cranks; NaN at singular poses.
-    status : ndarray of int8, shape (...)
-        Codes of `ForceStatus`.
-    """
+    """Forces (..., m) of the actuators, positive where a leg pushes; NaN at singular poses."""
 
     outcomes: ClassVar = ForceStatus
     forces: Array
@@ -208,10 +201,10 @@ def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
 
 
 def rates_of_rows(robot: ParallelRobot, legs: LegStates, V: Array) -> Array:
-    """Time derivative of the inverse Jacobian. Shapes: legs of N poses, V (N, 6) -> (N, m, 6)."""
-    v, w = V[:, None, :3], V[:, None, 3:]
+    """Time derivative of the inverse Jacobian. Shapes: V (..., 6) -> (..., m, 6)."""
+    v, w = V[..., None, :3], V[..., None, 3:]
     J, u = legs.jacobian, legs.direction
-    rate = np.einsum("nij,nj->ni", J, V)[..., None]
+    rate = np.einsum("...ij,...j->...i", J, V)[..., None]
     spin = np.cross(w, legs.arm)
     # rates of the unit vectors, then of their moments
     turn = (v + spin - rate * legs.turning) / legs.size[..., None]

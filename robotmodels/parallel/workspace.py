@@ -1,4 +1,52 @@
-"""Workspaces of parallel robots: limits of legs, cones of joints, interference of legs."""
+"""Workspaces of parallel robots: limits of legs, cones of joints, interference of legs.
+
+Parameters
+----------
+robot : ParallelRobot
+    The robot.
+kind : {"orientation", "dexterous", "reachable"}
+    Positions in the given orientation, in every one of them, or in at least one of them.
+orientation : array_like, shape (3, 3) or (K, 3, 3), or float, optional
+    Rotations of the platform, or its angle about z, rad. Default the home orientation; of dexterous
+    and reachable workspaces 72 angles about z, in space turned from home.
+limits : bool or tuple (lower, upper)
+    Whether the robot's limits count, or limits in their place, m or rad.
+joint_cone : float, optional
+    Largest angle between a leg and its direction at home, seen from the base and from the platform,
+    rad.
+leg_radius : float, optional
+    Radius of legs and rods, which must not touch each other, m.
+height : float, optional
+    Makes a section at this z of the world, m.
+resolution : int, optional
+    Cells along each axis; default 300 in a plane, 40 in space.
+
+Returns
+-------
+PlatformWorkspace
+    A `performance.Workspace` whose ``count`` is the number of working modes, with ``margin`` (N,)
+    at the centres of the cells: the least distance of lengths or angles from their limits, and of
+    joints and legs from theirs, m or rad, negative outside. Areas and volumes are interpolated from
+    it. ``rotations`` (K, 3, 3), ``lower`` and ``upper`` (m,) are those that count.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Unknown words, legs of unlimited length, rotations that the platform does not have.
+
+References
+----------
+Seed book section 2.3.3.5; C. Gosselin, "Determination of the workspace of 6-DOF parallel
+manipulators", J. of Mechanical Design 112 (1990).
+
+Examples
+--------
+>>> from robotmodels.parallel import planar_3rpr
+>>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
+>>> found = workspace(robot, orientation=0.1, resolution=100)
+>>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
+(1.2, array([ True, False]))
+"""
 
 from __future__ import annotations
 
@@ -22,25 +70,12 @@ KINDS = ("orientation", "dexterous", "reachable")
 _ROWS = 20000  # poses at a time
 _MOST = 1e8  # cells
 _FAR = 1e9
-_FINER = {2: 8, 3: 3}  # lines for one of the grid
+_FINER = {2: 6, 3: 2}  # lines for one of the grid
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlatformWorkspace(Workspace):
-    """Workspace of a platform: `performance.Workspace` with signed margins at the cells' centres.
-
-    Parameters
-    ----------
-    margin : ndarray, shape (N,)
-        Least distance of lengths or angles from their limits, and of joints and legs from theirs,
-        m or rad; negative outside. Areas and volumes are interpolated from it.
-    rotations : ndarray, shape (K, 3, 3)
-        Orientations that were looked at.
-    lower, upper : ndarray, shape (m,)
-        Limits that count, m or rad.
-    joint_cone, leg_radius : float or None
-        As asked for.
-    """
+    """Workspace of a platform: `performance.Workspace` with margins. Read-only."""
 
     margin: Array
     rotations: Array
@@ -91,52 +126,7 @@ def workspace(
     height: float | None = None,
     resolution: int | None = None,
 ) -> PlatformWorkspace:
-    """Workspace of a platform: positions reached in one, every, or some orientation.
-
-    Parameters
-    ----------
-    robot : ParallelRobot
-        The robot.
-    kind : {"orientation", "dexterous", "reachable"}
-        Positions in the given orientation, in every one of them, or in at least one of them.
-    orientation : array_like, shape (3, 3) or (K, 3, 3), or float, optional
-        Rotations of the platform, or its angle about z, rad. Default the home orientation; of
-        dexterous and reachable workspaces 72 angles about z, in space turned from home.
-    limits : bool or tuple (lower, upper)
-        Whether the robot's limits count, or limits in their place, m or rad.
-    joint_cone : float, optional
-        Largest angle between a leg and its direction at home, seen from the base and from the
-        platform, rad.
-    leg_radius : float, optional
-        Radius of legs and rods, which must not touch each other, m.
-    height : float, optional
-        Makes a section at this z of the world, m.
-    resolution : int, optional
-        Cells along each axis; default 300 in a plane, 40 in space.
-
-    Returns
-    -------
-    PlatformWorkspace
-        A `performance.Workspace` whose count is the number of working modes.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Unknown words, legs of unlimited length, rotations that the platform does not have.
-
-    References
-    ----------
-    Seed book section 2.3.3.5; C. Gosselin, "Determination of the workspace of 6-DOF parallel
-    manipulators", J. of Mechanical Design 112 (1990).
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import planar_3rpr, workspace
-    >>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
-    >>> found = workspace(robot, orientation=0.1, resolution=100)
-    >>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
-    (1.2, array([ True, False]))
-    """
+    """Workspace of a platform: positions reached in one, every, or some orientation."""
     if is_looped(robot):
         raise InvalidValueError("robot: workspaces of kinematic loops are not computed.")
     if kind not in KINDS:
