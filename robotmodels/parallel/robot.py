@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, Value, as_core, as_exact, as_reals, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 
@@ -200,7 +200,7 @@ class ParallelRobot(Value):
                 "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
                 "(mass, position, inertia)."
             )
-        mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
+        mass, com = as_number(platform[0], "mass", least=0.0), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
         size = np.abs(inertia).max()
         least = np.linalg.eigvalsh(inertia).min()
@@ -209,13 +209,13 @@ class ParallelRobot(Value):
                 "inertia: expected a symmetric matrix about the centre of mass with positive "
                 f"principal moments, got {inertia.tolist()}."
             )
-        both = np.array([[for_legs(x, self.m, "legs") for x in part] for part in parts])
-        if not (mass >= 0.0 and (both[:, [0, 2]] >= 0.0).all() and np.isfinite(both).all()):
-            raise InvalidValueError(
-                "platform, legs: expected finite masses and inertias that are not negative."
-            )
+        least = (0.0, -np.inf, 0.0)
+        both = [
+            as_floats([for_legs(part[k], self.m, "legs", least[k]) for k in range(3)], "legs").T
+            for part in parts
+        ]
         g = self.gravity if gravity is None else as_exact(gravity, (3,), "gravity")
-        masses = Masses(mass, *map(read_only, (com, inertia, *np.swapaxes(both, 1, 2))))
+        masses = Masses(mass, *map(read_only, (com, inertia, *both)))
         return replace(self, masses=masses, gravity=g)
 
     def __repr__(self) -> str:
@@ -227,11 +227,16 @@ class ParallelRobot(Value):
         return f"<{self.family.value[0]}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
 
 
-def for_legs(value: ArrayLike, m: int, name: str) -> Array:
-    """A number or one for each leg, perhaps infinite. Shapes: -> (m,)."""
+def for_legs(value: ArrayLike, m: int, name: str, least: float = -np.inf) -> Array:
+    """A number or one for each leg, perhaps infinite, from a least one. Shapes: -> (m,)."""
     given = as_reals(value, name)
     if given.shape not in ((), (m,)):
         raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
+    if not (given >= least).all():
+        words = {0.0: "numbers that are not negative", -np.inf: "numbers"}
+        raise InvalidValueError(
+            f"{name}: expected {words.get(least, 'lengths above 0 m')}, got {value!r:.60}."
+        )
     return np.broadcast_to(given, (m,))
 
 
