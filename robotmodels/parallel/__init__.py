@@ -8,12 +8,11 @@ from .direct import (
     assembly_modes,
     dgm,
 )
-from .dynamics import ddm, energies, idm
+from .dynamics import MotionStatus, ParallelMotion, ddm, energies, idm, simulate
 from .families import delta, five_bar, gough, gough_symmetric, planar_3rpr, planar_3rrr
 from .legs import LegSolutions, LegStatus, igm
 from .looped import LoopedPlatform, from_loops
 from .robot import Family, ParallelRobot
-from .simulation import MotionStatus, ParallelMotion, simulate
 from .singularities import Singularity, SingularityKind, classify_singularity
 from .velocities import (
     ForceStatus,

@@ -64,8 +64,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
 from .legs import Robot, is_looped, knees
-from .results import Result
-from .robot import Family, ParallelRobot
+from .robot import Family, ParallelRobot, Result
 
 
 class PoseStatus(Outcome):

@@ -45,8 +45,7 @@ from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .looped import LoopedPlatform
-from .results import Result
-from .robot import ParallelRobot, only_freedoms
+from .robot import ParallelRobot, Result, only_freedoms
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs

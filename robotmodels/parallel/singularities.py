@@ -54,8 +54,7 @@ from .._outcomes import Outcome
 from ..errors import ShapeError
 from .legs import Mode, Robot, is_looped, leg_states, modes_of
 from .looped import null_space
-from .results import Result
-from .robot import Family
+from .robot import Family, Result
 from .velocities import states
 
 _WORDS = {

@@ -64,8 +64,7 @@ from .._arrays import Array, as_core, as_floats, as_number, batch_rows, batch_sh
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
-from .results import Result
-from .robot import ParallelRobot, only_freedoms
+from .robot import ParallelRobot, Result, only_freedoms
 
 _STRAIGHT = 1e-12
 _SINGULAR = 1e-12  # smallest singular value, relative
