@@ -159,10 +159,10 @@ def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
     T, residual, det, status, complex_count = found
     valid = ~np.isnan(residual)
     count = int(valid.sum(axis=1).max(initial=0))
-    fields: list[Any] = [
+    fields: Any = [
         x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
     ]
-    return AssemblyModes(*fields, status.reshape(batch), complex_count.reshape(batch))
+    return AssemblyModes(*(*fields, status.reshape(batch), complex_count.reshape(batch)))
 
 
 Found = tuple[Array, Array, Array, NDArray[np.int8], NDArray[np.int64]]

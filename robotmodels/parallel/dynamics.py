@@ -163,7 +163,8 @@ def _masses(robot: ParallelRobot) -> Masses:
 
 def _mass_matrix(robot: ParallelRobot, T: Array, legs: LegStates, V: Array) -> tuple[Array, Array]:
     """Mass matrix of the platform's freedoms, and wrench (N, 6) at zero acceleration."""
-    columns, parts = list(robot.columns), LegStates(*(x[:, None] for x in legs))
+    every: Any = (x[:, None] for x in legs)
+    columns, parts = list(robot.columns), LegStates(*every)
     A = np.concatenate((np.zeros((1, 6)), np.eye(6)[columns]))
     F = _wrench(robot, T[:, None], parts, V[:, None], A)
     M = (F[:, 1:] - F[:, :1])[..., columns]
@@ -233,7 +234,8 @@ def _solved(B: Array, x: Array, words: str) -> Array:
     s = np.linalg.svd(B, compute_uv=False)
     for n in np.flatnonzero(~(s[:, -1] > _SINGULAR * s[:, 0]))[:1]:
         raise InvalidValueError(words.format(n))
-    return np.linalg.solve(B, x[..., None])[..., 0]
+    y: Array = np.linalg.solve(B, x[..., None])[..., 0]  # type: ignore[assignment]
+    return y
 
 
 class MotionStatus(Outcome):

@@ -38,15 +38,15 @@ def spatial(robot: ParallelRobot, q: Array) -> Found:
     if _is_singular_everywhere(robot):
         return T, residual, det, status + AssemblyStatus.DEGENERATE, complex_count
     unit, quadrics = _quadrics(robot, q)
-    found: list[tuple[Complex, NDArray[np.bool_]]] = [(np.empty((0, 8)), np.empty(0, np.bool_))] * N
+    found: dict[int, tuple[Complex, NDArray[np.bool_]]] = {}
     lost = np.arange(N)
     for attempt, accuracy in enumerate(_ACCURACIES):
         ends, codes = np.empty((len(lost), 40, 16)), np.empty((len(lost), 40))
         paths(quadrics[lost], *_stored(), attempt * _TURNS, np.array([accuracy]), ends, codes)
-        for s, x, code in zip(lost, ends.view(np.complex128), codes, strict=True):
+        for s, x, code in zip(lost.tolist(), ends.view(np.complex128), codes, strict=True):
             found[s] = _finite(x, code)
-        lost = np.array([s for s in lost if _is_incomplete(*found[s])], np.int64)
-    for s, (y, stuck) in enumerate(found):
+        lost = np.array([s for s in lost.tolist() if _is_incomplete(*found[s])], np.int64)
+    for s, (y, stuck) in found.items():
         if s in lost:
             many = stuck.sum() >= _MANY
             status[s] = AssemblyStatus.DEGENERATE if many else AssemblyStatus.SOME_LOST

@@ -293,7 +293,7 @@ def from_loops(
     return LoopedPlatform(looped_robot, platform_frame, found.q, tuple(columns))
 
 
-def null_space(A: Array, epsilon: float) -> Array:
+def null_space(A: Any, epsilon: float) -> Array:
     """Orthonormal basis of a null space. Shapes: (r, n) -> (k, n)."""
     _, s, Vt = np.linalg.svd(A)
     return Vt[int((s > epsilon * max(s.max(initial=0.0), 1e-300)).sum()) :]

@@ -150,12 +150,8 @@ class ParallelRobot(Value):
     def coordinates(self, T: ArrayLike) -> Array:
         """Coordinates (..., m) of poses: position and rotation vector, (x, y, phi), (x, y, z)."""
         T = self.checked(T)
-        turn = np.zeros_like(T[..., :3, 3])
-        if 3 in self.columns:
-            turn = rotation_vectors_of(T[..., :3, :3])
-        elif 5 in self.columns:
-            turn[..., 2] = np.arctan2(T[..., 1, 0], T[..., 0, 0])
-        return np.concatenate((T[..., :3, 3], turn), axis=-1)[..., list(self.columns)]
+        full = np.concatenate((T[..., :3, 3], rotation_vectors_of(T[..., :3, :3])), axis=-1)
+        return full[..., list(self.columns)]
 
     def pose(self, coordinates: ArrayLike) -> Array:
         """Poses (..., 4, 4) of coordinates (..., m), the inverse of `coordinates`."""

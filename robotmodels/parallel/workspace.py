@@ -51,11 +51,12 @@ Examples
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
+from math import factorial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
 from .._arrays import Array, as_core, as_floats, as_number, read_only
@@ -70,7 +71,6 @@ KINDS = ("orientation", "dexterous", "reachable")
 _ROWS = 20000  # poses at a time
 _MOST = 1e8  # cells
 _FAR = 1e9
-_FINER = {2: 6, 3: 2}  # lines for one of the grid
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -173,21 +173,20 @@ def workspace(
 
 
 def measure(f: Array, size: Array, dimension: int) -> float:
-    """Area or volume where a function on a grid is positive, linear between its nodes; else NaN.
-
-    Lengths along the last axis are exact; the lines are interpolated, as they end like a root.
-    """
-    if f.ndim != dimension:
+    """Area or volume where a function is positive, linear within cells about nodes; else NaN."""
+    d = f.ndim
+    if d != dimension:
         return float("nan")
-    finer = _FINER[f.ndim]
-    for axis in range(f.ndim - 1):
-        at = np.linspace(0.0, f.shape[axis] - 1.0, (f.shape[axis] - 1) * finer + 1)
-        k = np.minimum(at.astype(int), f.shape[axis] - 2)
-        share = (at - k).reshape([-1 if i == axis else 1 for i in range(f.ndim)])
-        f = (1.0 - share) * f.take(k, axis) + share * f.take(k + 1, axis)
-    top, gap = np.maximum(f[..., :-1], f[..., 1:]), np.abs(np.diff(f))
-    share = np.clip(np.maximum(top, 0.0) / np.maximum(gap, 1e-300), 0.0, 1.0)
-    return float(share.sum() * np.prod(size) / finer ** (f.ndim - 1))
+    rise = np.abs(np.gradient(f))  # across a cell, along each axis
+    rise = np.maximum(rise, 1e-3 * rise.max(axis=0) + 1e-30)
+    half = 0.5 * rise.sum(axis=0)
+    f = np.clip(f, -half, half)
+    share = np.zeros(f.shape)
+    for corner in product((-0.5, 0.5), repeat=d):
+        value = f + np.tensordot(corner, rise, axes=1)
+        share += np.sign(np.prod(corner)) * np.maximum(value, 0.0) ** d
+    share /= factorial(d) * rise.prod(axis=0)
+    return float(share.sum() * np.prod(size))
 
 
 def _world(points: Array, frame: Array) -> Array:
@@ -205,8 +204,9 @@ def _rotations(robot: ParallelRobot, kind: str, orientation: Any) -> Array:
     elif orientation is not None and np.ndim(orientation) == 0:
         home, turns = np.eye(3), np.array([as_number(orientation, "orientation")])
     R = np.array([se3.rotation("z", angle)[:3, :3] for angle in turns]) @ home
-    if np.ndim(orientation):
-        R = as_floats(orientation, "orientation")
+    given: Any = orientation
+    if np.ndim(given):
+        R = as_floats(given, "orientation")
     if R.shape[-2:] != (3, 3) or R.ndim > 3 or not len(R):
         raise ShapeError(
             f"orientation: expected an angle, or rotations (3, 3) or (K, 3, 3), got {R.shape}."
@@ -227,12 +227,13 @@ def _limits(robot: ParallelRobot, limits: Any) -> tuple[Array, Array]:
         raise InvalidValueError(
             f"limits: expected True, False or (lower, upper), got {limits!r:.60}."
         )
-    return checked_limits(*limits, robot.m, not robot.has_cranks)
+    lower, upper = limits
+    return checked_limits(lower, upper, robot.m, not robot.has_cranks)
 
 
 def _margins(
     robot: ParallelRobot, kind: str, places: Array, options: tuple[Any, ...]
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.int64]]:
     """Margins and numbers of working modes at positions (N, 3)."""
     R = options[0]
     margin = np.full(len(places), -_FAR if kind == "reachable" else _FAR)
