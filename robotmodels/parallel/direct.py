@@ -63,7 +63,7 @@ from .._arrays import Array, as_vector, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
-from .legs import Robot, is_looped, knees
+from .legs import Found, Robot, is_looped, rods
 from .robot import Family, ParallelRobot, Result
 
 
@@ -159,14 +159,12 @@ def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
     T, residual, det, status, complex_count = found
     valid = ~np.isnan(residual)
     count = int(valid.sum(axis=1).max(initial=0))
-    fields: Any = [
+    cut: Any = [
         x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
     ]
-    return AssemblyModes(*(*fields, status.reshape(batch), complex_count.reshape(batch)))
-
-
-Found = tuple[Array, Array, Array, NDArray[np.int8], NDArray[np.int64]]
-"""T (N, S, 4, 4), residual, det (N, S), packed, NaN after; status, complex count (N,)."""
+    poses, valid, residual, det = cut
+    count, status = complex_count.reshape(batch), status.reshape(batch)
+    return AssemblyModes(poses, valid, residual, det, status, count)
 
 
 def _planar(robot: ParallelRobot, q: Array) -> Found:
@@ -223,13 +221,6 @@ def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
             f"{q.min():.6g}."
         )
     return q
-
-
-def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
-    """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
-    c = np.ascontiguousarray(knees(robot, q))
-    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
-    return c, robot.platform, np.ascontiguousarray(lengths)
 
 
 def _start(robot: ParallelRobot, q: Array) -> Array:

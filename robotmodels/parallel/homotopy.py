@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .direct import AssemblyStatus, Found, rods
-from .legs import leg_states
+from .legs import Found, leg_states, rods
 from .robot import ParallelRobot, pose_at
 
 Complex = NDArray[np.complex128]
+_DEGENERATE, _SOME_LOST = 1, 2  # codes of AssemblyStatus
 _ACCURACIES = 3e-2, 1e-3, 1e-4  # of predictions, and what is tried where paths are missing
 _REAL = 1e-6  # imaginary parts, relative, at simple ends of paths
 _SAME = 1e-7  # distance of ends of two paths
@@ -36,7 +36,7 @@ def spatial(robot: ParallelRobot, q: Array) -> Found:
     T, status = np.full((N, 40, 4, 4), np.nan), np.zeros(N, np.int8)
     residual, det, complex_count = T[..., 0, 0].copy(), T[..., 0, 0].copy(), np.zeros(N, np.int64)
     if _is_singular_everywhere(robot):
-        return T, residual, det, status + AssemblyStatus.DEGENERATE, complex_count
+        return T, residual, det, status + _DEGENERATE, complex_count
     unit, quadrics = _quadrics(robot, q)
     found: dict[int, tuple[Complex, NDArray[np.bool_]]] = {}
     lost = np.arange(N)
@@ -49,7 +49,7 @@ def spatial(robot: ParallelRobot, q: Array) -> Found:
     for s, (y, stuck) in found.items():
         if s in lost:
             many = stuck.sum() >= _MANY
-            status[s] = AssemblyStatus.DEGENERATE if many else AssemblyStatus.SOME_LOST
+            status[s] = _DEGENERATE if many else _SOME_LOST
         near = np.where(stuck[:, None] | stuck, _NEAR, _SAME)
         first = ~np.tril(_distances(y, y) < near, -1).any(axis=1)
         y, stuck = y[first], stuck[first]

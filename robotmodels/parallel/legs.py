@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
 Robot = ParallelRobot | LoopedPlatform
 Mode = int | ArrayLike | None
+Found = tuple[Array, Array, Array, NDArray[np.int8], NDArray[np.int64]]
+"""T (N, S, 4, 4), residual, det (N, S), packed, NaN after; status, complex count (N,)."""
 _TOUCHING = 1e-12  # of the cosine of an elbow: both solutions coincide
 
 
@@ -125,6 +127,13 @@ def knees(robot: ParallelRobot, q: Array) -> Array:
     if not robot.has_cranks:
         return np.broadcast_to(robot.base, (*q.shape, 3))
     return robot.base + robot.crank[:, None] * _radial(robot, q)
+
+
+def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
+    """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
+    c = np.ascontiguousarray(knees(robot, q))
+    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
+    return c, robot.platform, np.ascontiguousarray(lengths)
 
 
 def _radial(robot: ParallelRobot, q: Array) -> Array:
