@@ -49,6 +49,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import loops, se3
 from .._arrays import Array, Value, as_core, as_exact, batch_shape, read_only
 from ..errors import InvalidValueError, LoopError
+from ..geometry import PRISMATIC
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..kinematics.lengths import characteristic_length
 from ..se3.orientation import rotation_vectors_of
@@ -112,6 +113,8 @@ class LoopedPlatform(Value):
         """Newton's method on the actuated joints in short steps, the loops closed after each."""
         q, best = self.q_home, np.inf
         columns, unit = list(self.columns), np.repeat([1.0, self.length], 3)
+        table = self.robot.tree.table
+        slides = table.sigma[table.joint_rows] == PRISMATIC
         for _ in range(_STEPS):
             error = self._error(q, target)
             away = np.abs(error[columns]).max()
@@ -127,8 +130,9 @@ class LoopedPlatform(Value):
             found = loops.close(self.robot, q[self.actuated] + J @ step, q)
             if not found.residual < _CLOSED:
                 break
-            q = found.q
-        return q, float(np.abs(self._error(q, target) * self._counts(q)).max())
+            turns = np.round((found.q - self.q_home) / (2.0 * np.pi))
+            q = np.where(slides, found.q, found.q - 2.0 * np.pi * turns)
+        return q, float(np.abs(self._error(q, target) * self._counts()).max())
 
     def _error(self, q: Array, target: Array) -> Array:
         """Small twist (6,) from the pose at q to another."""
@@ -136,9 +140,9 @@ class LoopedPlatform(Value):
         turn = rotation_vectors_of(target[:3, :3] @ T[:3, :3].T)
         return np.concatenate((target[:3, 3] - T[:3, 3], turn))
 
-    def _counts(self, q: Array) -> NDArray[np.bool_]:
+    def _counts(self) -> NDArray[np.bool_]:
         """Components (6,) that a pose must have; turns that follow from the position are free."""
-        turns = np.abs(self._twists(q)[3:]).max() > _RANK and max(self.columns) < 3
+        turns = max(self.columns) < 3 and np.abs(self._twists(self.q_home)[3:]).max() > _RANK
         return np.repeat([True, not turns], 3)
 
     def _reached(self, T: ArrayLike) -> Array:
