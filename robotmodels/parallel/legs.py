@@ -45,7 +45,7 @@ from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .looped import LoopedPlatform
-from .robot import ParallelRobot, Result, only_freedoms
+from .robot import ParallelRobot, Result
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -113,7 +113,8 @@ def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64] | int = 0
         knee, d = knee + swing, d - swing
     size = np.linalg.norm(d, axis=-1)
     direction = d / np.where(size > 0.0, size, 1.0)[..., None]
-    rows = only_freedoms(robot, np.concatenate((direction, np.cross(arm, direction)), axis=-1))
+    rows = np.concatenate((direction, np.cross(arm, direction)), axis=-1)
+    rows[..., [k for k in range(6) if k not in robot.columns]] = 0.0
     turning, speed = direction, np.where(size > 0.0, 1.0, 0.0)
     if robot.has_cranks:
         turning = robot.crank[:, None] * _radial(robot, q + 0.5 * np.pi)

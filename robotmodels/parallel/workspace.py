@@ -183,8 +183,8 @@ def measure(f: Array, size: Array, dimension: int) -> float:
     f = np.clip(f, -half, half)
     share = np.zeros(f.shape)
     for corner in product((-0.5, 0.5), repeat=d):
-        value = f + np.tensordot(corner, rise, axes=1)
-        share += np.sign(np.prod(corner)) * np.maximum(value, 0.0) ** d
+        top = np.maximum(f + np.tensordot(corner, rise, axes=1), 0.0)
+        share += np.sign(np.prod(corner)) * top**2 * top ** (d - 2)  # quicker than a cube
     share /= factorial(d) * rise.prod(axis=0)
     return float(share.sum() * np.prod(size))
 

@@ -70,7 +70,7 @@ MUTATIONS = [
         "reduce(every).min(axis=1)", "reduce(every).max(axis=1)",
         f"{MOTION} -k constant_orientation"),
     Mutation("parallel: workspace", "shares of cells by the wrong power",
-        "def measure(f: Array, size", "np.maximum(value, 0.0) ** d", "np.maximum(value, 0.0)",
+        "def measure(f: Array, size", "top**2 * top", "top * top",
         f"{MOTION} -k in_each_cell"),
     Mutation("parallel: loops", "the height of a planar robot does not count", "def _counts(self",
         "np.repeat([True, not turns], 3)", "np.isin(np.arange(6), self.columns)",
