@@ -301,6 +301,22 @@ def test_postures_that_nearly_coincide_are_both_listed():
     assert double.count == 1
     assert double.status == pr.AssemblyStatus.ALL
     assert np.abs(double.T - pose(z0)).max() < 1e-5
+    assert double.residual.max() < 1e-12
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_singular_poses_of_similar_platforms_are_exact_solutions(factor):
+    """All lines of the legs meet in a point, also at infinity: solutions of high multiplicity."""
+    for seed in range(3):
+        flat = np.random.default_rng(seed).normal(size=(6, 3)) * [1.0, 1.0, 0.0]
+        for base in (flat, np.random.default_rng(seed).normal(size=(6, 3))):
+            robot = pr.gough(base, factor * base)
+            T = robot.pose([0.1, 0.2, 0.9, 0, 0, 0])
+            lengths = pr.igm(robot, T).q[0]
+            modes = pr.assembly_modes(robot, lengths)
+            assert modes.status == pr.AssemblyStatus.ALL
+            assert leg_errors(robot.base, robot.platform, modes.T, lengths).max() < 1e-12
+            assert np.abs(modes.T - T).max(axis=(1, 2)).min() < 1e-3
 
 
 def test_robots_that_move_with_locked_legs_are_degenerate():
@@ -309,6 +325,11 @@ def test_robots_that_move_with_locked_legs_are_degenerate():
         modes = pr.assembly_modes(pr.gough(symmetric.base, platform), [1.0] * 6)
         assert modes.status == pr.AssemblyStatus.DEGENERATE
         assert "do not determine" in modes.reason()
+    rng = np.random.default_rng(0)
+    for flat in (False, True):  # equal legs: the platform moves on a sphere without turning
+        for base in rng.normal(size=(3, 6, 3)) * [1.0, 1.0, 1.0 - flat]:
+            modes = pr.assembly_modes(pr.gough(base, base), [1.0] * 6)
+            assert modes.status == pr.AssemblyStatus.DEGENERATE
     # Bricard's line-symmetric octahedron is not singular everywhere, but flexible
     for seed in (0, 1):
         corner = np.random.default_rng(seed).normal(size=(3, 3))

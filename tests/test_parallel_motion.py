@@ -15,6 +15,7 @@ from robotmodels.geometry import DHTable
 from robotmodels.loops import Closure, LoopedRobot
 from robotmodels.model import RobotModel
 from robotmodels.parallel import SingularityKind as Kind
+from robotmodels.parallel.workspace import measure
 
 # --- statics -------------------------------------------------------------------------------------
 
@@ -255,6 +256,20 @@ def test_shells_about_one_centre_have_a_known_volume():
     assert found.volume == pytest.approx(4 / 3 * np.pi * (1 - 0.027), rel=3e-3)
 
 
+@pytest.mark.parametrize("resolution", [40, 41])
+def test_measures_are_those_of_a_linear_function_in_each_cell(resolution):
+    """Of planes, exactly, and of a ball."""
+    x = (np.arange(resolution) + 0.5) * 2.0 / resolution - 1.0
+    size, (a, b, c) = np.full(3, x[1] - x[0]), np.meshgrid(x, x, x, indexing="ij")
+    assert measure(a + b - 0.3, size, 3) == pytest.approx(2 * 0.5 * 1.7**2, rel=1e-3)
+    assert measure((a + b - 0.3)[..., 0], size[:2], 2) == pytest.approx(0.5 * 1.7**2, rel=1e-3)
+    assert measure(a + 2 * b - 3 * c, size, 3) == pytest.approx(4.0, rel=1e-9)
+    assert measure(2 * c[0] - 0.5, size[:2], 2) == pytest.approx(1.5, rel=1e-9)
+    ball = measure(0.7 - np.sqrt(a * a + b * b + c * c), size, 3)
+    assert ball == pytest.approx(4 / 3 * np.pi * 0.343, rel=3e-3)
+    assert np.isnan(measure(a, size, 2))
+
+
 def test_cones_and_legs_that_touch_cut_the_workspace():
     robot = pr.gough_symmetric(1.0, lower=0.8, upper=1.5)
     options = {"height": 1.0, "resolution": 60}
@@ -449,8 +464,21 @@ def test_a_five_bar_as_loops_is_the_five_bar():
     np.testing.assert_allclose(np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8)
     assert pr.classify_singularity(looped, T).kind == Kind.REGULAR
     np.testing.assert_allclose(looped.coordinates(T), place[:2], atol=1e-12)
-    with pytest.raises(InvalidValueError, match="mode"):
-        pr.inverse_jacobian(looped, T, mode=3)
+    for call in (
+        lambda: pr.inverse_jacobian(looped, T, mode=3),
+        lambda: pr.classify_singularity(looped, T, mode=1),
+        lambda: pr.idm(looped, T, V, V, mode=1),
+        lambda: pr.ddm(looped, T, V, [0, 0], mode=1),
+        lambda: pr.condition(looped, T, mode=1),
+    ):
+        with pytest.raises(InvalidValueError, match="mode"):
+            call()
+    lifted = np.array([T, T])
+    lifted[1, 2, 3] = 0.1  # the position is that of the plane, the height is not
+    assert pr.igm(looped, lifted).status.tolist() == [0, pr.LegStatus.OUT_OF_REACH]
+    with pytest.raises(InvalidValueError, match="does not reach"):
+        pr.inverse_jacobian(looped, lifted)
+    assert pr.dgm(looped, q, T).iterations == 1
     with pytest.raises(InvalidValueError, match="loops"):
         pr.determinant(looped, T)
     far = pr.igm(looped, five.pose([3.0, 0.0]))
@@ -536,6 +564,8 @@ def test_a_gough_platform_as_loops_is_the_gough_platform():
     forces = pr.leg_forces(robot, T, W).forces
     np.testing.assert_allclose(pr.leg_forces(looped, T, W).forces, forces, atol=1e-9)
     assert pr.classify_singularity(looped, T[0]).kind == Kind.REGULAR
+    np.testing.assert_allclose(looped.coordinates(T), robot.coordinates(T), atol=1e-12)
+    assert pr.igm(looped, np.empty((0, 4, 4))).count.shape == (0,)
 
 
 # --- pictures ------------------------------------------------------------------------------------
@@ -554,6 +584,8 @@ def test_pictures_show_the_legs_where_they_are():
     frame = next(path for path in sliders.paths if path.endswith("/end"))
     np.testing.assert_allclose(sliders.pose(frame), T, atol=1e-12)
     assert len(sliders.sliders.data()["struts"]) == 6
+    planar = viz.jog_parallel(ROBOTS["3-RPR"]).sliders.data()["joints"]
+    assert [s["name"] for s in planar if s["leads"]] == ["x", "y", "yaw"]
     with pytest.raises(InvalidValueError, match="variable length"):
         viz.jog_parallel(ROBOTS["delta"])
     with pytest.raises(InvalidValueError, match="plane"):

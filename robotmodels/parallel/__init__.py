@@ -1,30 +1,33 @@
 """Parallel robots (chapter 2): geometric models, statics, singularities, workspaces, dynamics."""
 
-from .assembly import AssemblyModes, AssemblyStatus, assembly_modes
-from .direct import PlatformPoses, PoseStatus, dgm
-from .dynamics import ddm, energies, idm
+from .direct import (
+    AssemblyModes,
+    AssemblyStatus,
+    PlatformPoses,
+    PoseStatus,
+    assembly_modes,
+    dgm,
+)
+from .dynamics import MotionStatus, ParallelMotion, ddm, energies, idm, simulate
 from .families import delta, five_bar, gough, gough_symmetric, planar_3rpr, planar_3rrr
 from .legs import LegSolutions, LegStatus, igm
 from .looped import LoopedPlatform, from_loops
 from .robot import Family, ParallelRobot
-from .simulation import MotionStatus, ParallelMotion, simulate
 from .singularities import Singularity, SingularityKind, classify_singularity
-from .statics import (
+from .velocities import (
     ForceStatus,
     LegForces,
     condition,
     determinant,
-    leg_forces,
-    maneuverability,
-    stiffness,
-)
-from .velocities import (
     dkm,
     dkm_second_order,
     ikm,
     ikm_second_order,
     inverse_jacobian,
     inverse_jacobian_rate,
+    leg_forces,
+    maneuverability,
+    stiffness,
 )
 from .workspace import PlatformWorkspace, workspace
 

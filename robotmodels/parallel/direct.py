@@ -1,21 +1,70 @@
-"""Direct geometric model by Newton's method: the pose near a given one, for batches."""
+"""Direct geometric models (forward kinematics): the pose near a given one, all assembly modes.
+
+`dgm` iterates Newton's method from a pose nearby; where it leaves the assembly mode, the lengths
+are continued from those at the start in small pieces. `assembly_modes` continues the 40 complex
+solutions of a stored robot (Gough platforms), solves the sextic (planar robots), or intersects
+spheres and circles (Delta and five-bar). Loops of any other kind are searched from random postures,
+which is no proof (``SOME_LOST``).
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+q : array_like, shape (..., m)
+    Actuated lengths, m, or angles, rad.
+T0 : array_like, shape (..., 4, 4), optional
+    Where to start; default the home pose, of a Gough platform without limits raised to the mean of
+    the lengths.
+
+Returns
+-------
+PlatformPoses or AssemblyModes
+    ``T`` are poses (..., 4, 4), NaN where none was found, or (..., S, 4, 4), packed, with ``valid``
+    and ``count``: by ascending angle of planar robots, else by the distance from home. ``status``
+    are codes of `PoseStatus` or `AssemblyStatus`, ``residual`` the largest error of a leg's length,
+    m, and ``det`` determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components
+    of the twist that the platform has: zero at singular poses, one sign for each side.
+    ``iterations`` are those of Newton's method, of loops how often they were closed;
+    ``complex_count`` is the number of solutions in complex numbers, the real ones included.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Arrays of the wrong shape, NaN, negative lengths, no poses.
+
+References
+----------
+Seed book section 2.4; C. Wampler, "Forward displacement analysis of general six-in-parallel SPS
+(Stewart) platform manipulators using soma coordinates", Mechanism and Machine Theory 31 (1996)
+331-337; J.-P. Merlet, "Parallel Robots", 2nd ed., chapter 4.
+
+Examples
+--------
+>>> from robotmodels.parallel import gough_symmetric, igm, planar_3rpr
+>>> robot = gough_symmetric(1.0)
+>>> T = robot.pose([0.1, 0.0, 1.1, 0.1, 0.2, 0.0])
+>>> bool(abs(dgm(robot, igm(robot, T).q[0]).T - T).max() < 1e-12)
+True
+>>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
+>>> modes = assembly_modes(robot, [14.98, 15.38, 12.0])
+>>> modes.count, modes.complex_count, modes.reason()
+(np.int64(6), array(6), 'All assembly modes are listed.')
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_shape
+from .._arrays import Array, as_vector, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
-from .legs import check_robot, knees
-from .looped import LoopedPlatform
-from .results import Result
-from .robot import Family, ParallelRobot
+from .legs import Found, Robot, is_looped, rods
+from .robot import Family, ParallelRobot, Result
 
 
 class PoseStatus(Outcome):
@@ -35,21 +84,7 @@ class PoseStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlatformPoses(Result):
-    """Poses of the platform. Read-only.
-
-    Parameters
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        Poses; NaN where none was found.
-    status : ndarray of int8, shape (...)
-        Codes of `PoseStatus`.
-    iterations : ndarray of int64, shape (...)
-        Newton iterations.
-    residual : ndarray, shape (...)
-        Largest error of a leg's length, m.
-    det : ndarray, shape (...)
-        Determinants of the lines of the legs, see `assembly_modes`.
-    """
+    """Poses of the platform, see the head of the file. Read-only."""
 
     outcomes: ClassVar = PoseStatus
     T: Array
@@ -59,62 +94,122 @@ class PlatformPoses(Result):
     det: Array
 
 
-def dgm(
-    robot: ParallelRobot | LoopedPlatform, q: ArrayLike, T0: ArrayLike | None = None
-) -> PlatformPoses:
-    """Direct geometric model (forward kinematics) by Newton's method from a pose nearby.
+class AssemblyStatus(Outcome):
+    """Completeness of the assembly modes."""
 
-    Where Newton's method leaves the assembly mode, the lengths are continued from those at the
-    start in small pieces.
+    ALL = 0, "All assembly modes are listed."
+    DEGENERATE = (
+        1,
+        "The legs do not determine the platform: solutions form a continuum, or the robot is "
+        "singular at every pose.",
+    )
+    SOME_LOST = 2, "Assembly modes may be missing: not every path or start led to a solution."
 
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    q : array_like, shape (..., m)
-        Actuated lengths, m, or angles, rad.
-    T0 : array_like, shape (..., 4, 4), optional
-        Where to start; default the home pose, of a Gough platform without limits raised to the
-        mean of the lengths.
 
-    Returns
-    -------
-    PlatformPoses
-        Poses, with a status each.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AssemblyModes(Result):
+    """All poses of the platform at given lengths or angles, packed. Read-only."""
 
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Arrays of the wrong shape, NaN, negative lengths, no poses.
+    outcomes: ClassVar = AssemblyStatus
+    T: Array
+    valid: NDArray[np.bool_]
+    residual: Array
+    det: Array
+    status: NDArray[np.int8]
+    complex_count: NDArray[np.int64]
 
-    References
-    ----------
-    Seed book section 2.4.1.
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Outcome of row i as a sentence; i is left out for a single row."""
+        words = Result.reason(self, i)
+        if words == AssemblyStatus.ALL.sentence and not self.count[i]:
+            return "There is no assembly mode: legs of these lengths do not meet the platform."
+        return words
 
-    Examples
-    --------
-    >>> from robotmodels.parallel import dgm, gough_symmetric, igm
-    >>> robot = gough_symmetric(1.0)
-    >>> T = robot.pose([0.1, 0.0, 1.1, 0.1, 0.2, 0.0])
-    >>> bool(abs(dgm(robot, igm(robot, T).q[0]).T - T).max() < 1e-12)
-    True
-    """
-    check_robot(robot)
-    if isinstance(robot, LoopedPlatform):
+
+def dgm(robot: Robot, q: ArrayLike, T0: ArrayLike | None = None) -> PlatformPoses:
+    """Direct geometric model by Newton's method from a pose nearby."""
+    if is_looped(robot):
         return PlatformPoses(*robot.closed(q, T0))
     q = checked_actuators(robot, q)
     start = _start(robot, q) if T0 is None else robot.checked(T0, "T0")
-    batch = batch_shape((q, start[..., 0]), ("q", "T0"))
-    rows = np.ascontiguousarray(np.broadcast_to(q, (*batch, robot.m))).reshape(-1, robot.m)
-    poses = np.ascontiguousarray(np.broadcast_to(start, (*batch, 4, 4))).reshape(-1, 4, 4)
+    batch, (rows, T0) = batch_rows((q, start.reshape(*start.shape[:-2], 16)), ("q", "T0"))
     T, out = np.empty((len(rows), 4, 4)), np.empty((len(rows), 4))
     from .kernels import direct
 
-    direct(*rods(robot, rows), poses, np.array(robot.columns), T, out)
+    direct(*rods(robot, rows), T0.reshape(-1, 4, 4), np.array(robot.columns), T, out)
     T[out[:, 0] == PoseStatus.NOT_CONVERGED] = np.nan
     code, iterations, residual, det = (x.reshape(batch) for x in out.T)
     T = T.reshape(*batch, 4, 4)
     return PlatformPoses(T, code.astype(np.int8), iterations.astype(np.int64), residual, det)
+
+
+def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
+    """All assembly modes (all solutions of the direct geometric model)."""
+    looped = is_looped(robot)
+    q = as_vector(q, robot.m, "q") if looped else checked_actuators(robot, q)
+    batch, rows = q.shape[:-1], np.ascontiguousarray(q.reshape(-1, robot.m))
+    if is_looped(robot):
+        found = robot.assemblies(rows)
+    elif robot.family is Family.GOUGH:
+        from .homotopy import spatial
+
+        found = spatial(robot, rows)
+    else:
+        found = (_planar if robot.m == 3 and 5 in robot.columns else _spheres)(robot, rows)
+    T, residual, det, status, complex_count = found
+    valid = ~np.isnan(residual)
+    count = int(valid.sum(axis=1).max(initial=0))
+    cut: Any = [
+        x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
+    ]
+    poses, valid, residual, det = cut
+    count, status = complex_count.reshape(batch), status.reshape(batch)
+    return AssemblyModes(poses, valid, residual, det, status, count)
+
+
+def _planar(robot: ParallelRobot, q: Array) -> Found:
+    """Three legs in the plane."""
+    from .kernels import planar
+
+    N = len(q)
+    T, residual, det, out = (np.empty((N, *shape)) for shape in ((6, 4, 4), (6,), (6,), (2,)))
+    planar(*rods(robot, q), robot.home, np.array(robot.columns), T, residual, det, out)
+    return T, residual, det, out[:, 0].astype(np.int8), out[:, 1].astype(np.int64)
+
+
+def _spheres(robot: ParallelRobot, q: Array) -> Found:
+    """Three spheres about the shifted knees, or two circles. Shapes: q (N, m)."""
+    from .kernels import polish
+
+    c, b, lengths = rods(robot, q)
+    o = c - b
+    # planes of two spheres each, a . x = h from the first centre; circles are in the plane z = 0
+    a = np.zeros((len(q), 2, 3))
+    a[:, : robot.m - 1] = o[:, 1:] - o[:, :1]
+    h = 0.5 * ((a * a).sum(axis=-1) + lengths[:, :1] ** 2)
+    h[:, : robot.m - 1] -= 0.5 * lengths[:, 1:] ** 2
+    if robot.m == 2:
+        a[:, 1, 2], h[:, 1] = 1.0, 0.0
+    n = np.cross(a[:, 0], a[:, 1])
+    nn, size = (n * n).sum(axis=1), robot.size
+    flat = nn <= 1e-18 * size ** (2 * robot.m - 2)
+    nn = np.where(flat, 1.0, nn)
+    x = (h[:, :1] * np.cross(a[:, 1], n) + h[:, 1:] * np.cross(n, a[:, 0])) / nn[:, None]
+    square = lengths[:, 0] ** 2 - (x * x).sum(axis=1)
+    double = np.abs(square) <= 1e-13 * size**2
+    up = np.sqrt(np.maximum(square, 0.0) / nn)[:, None] * n
+    T = np.tile(np.eye(4), (len(q), 2, 1, 1))
+    T[..., :3, 3] = (o[:, 0] + x)[:, None] + np.stack((up, -up), axis=1)
+    T[flat | ~((square > 0.0) | double)] = T[double, 1] = np.nan
+    residual, det = np.full((len(q), 2), np.nan), np.full((len(q), 2), np.nan)
+    polish(c, b, lengths, np.array(robot.columns), T, residual, det)
+    # planes that are parallel and agree leave a circle; those of coinciding centres a sphere
+    cross = h[:, :1] * a[:, 1] - h[:, 1:] * a[:, 0]
+    agree = (cross * cross).sum(axis=1) <= 1e-18 * size**6
+    apart = (a * a).sum(axis=-1) > 1e-18 * size**2
+    agree &= (apart | (np.abs(h) <= 1e-9 * size**2)).all(axis=1)
+    status = (flat & agree).astype(np.int8)
+    return T, residual, det, status, np.where(flat, 0, np.where(double, 1, 2))
 
 
 def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
@@ -128,24 +223,13 @@ def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
     return q
 
 
-def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
-    """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
-    c = np.ascontiguousarray(knees(robot, q))
-    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
-    return c, robot.platform, np.ascontiguousarray(lengths)
-
-
 def _start(robot: ParallelRobot, q: Array) -> Array:
     """Where Newton's method starts without a given pose. Shapes: (..., m) -> (..., 4, 4)."""
-    limited = np.isfinite(robot.upper).all()
-    if (
-        robot.family is not Family.GOUGH
-        or limited
-        or not np.allclose(robot.home[:3, :3], np.eye(3))
-    ):
-        return robot.home
     place = robot.base.mean(axis=0) - robot.platform.mean(axis=0)
     up = robot.home[:3, 3] - place
+    turned = not np.allclose(robot.home[:3, :3], np.eye(3))
+    if robot.family is not Family.GOUGH or np.isfinite(robot.upper).all() or turned:
+        return robot.home
     normal = up / np.linalg.norm(up) if up.any() else np.array([0.0, 0.0, 1.0])
     start = np.broadcast_to(robot.home, (*q.shape[:-1], 4, 4)).copy()
     height = height_above(robot, place, normal, (q**2).mean(axis=-1))

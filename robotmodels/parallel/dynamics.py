@@ -1,7 +1,7 @@
-"""Dynamic models in Khalil's form: the wrench of the platform and of all legs on its coordinates.
+"""Dynamic models in Khalil's form, and their simulation.
 
-``J^-T tau = F_platform + sum (dq_i/dX)^T H_i + wrench``; the motion of the legs follows from that
-of their anchors on the platform.
+``J^-T tau = F_platform + sum (dq_i/dX)^T H_i + wrench`` with the wrenches of the platform and of
+all legs on its coordinates; the motion of the legs follows from that of their anchors.
 
 Parameters
 ----------
@@ -11,29 +11,40 @@ T : array_like, shape (..., 4, 4)
     Poses of the platform in the world.
 V, A : array_like, shape (..., 6)
     Twist [v; w] of the platform and its time derivative, world axes, m/s, rad/s and per s.
-wrench : array_like, shape (..., 6), optional
-    Wrench [f; m] of the platform on the environment at its origin, world axes, N and N m.
-mode : int, optional
-    Working mode of robots with cranks; default 0.
-
 tau : array_like, shape (..., m)
     Forces of the actuators, N, or torques, N m.
+wrench : array_like, shape (..., 6), optional
+    Wrench [f; m] of the platform on the environment at its origin, world axes, N and N m.
+mode : int or array_like of int, shape (...), optional
+    Working mode of robots with cranks; default 0.
+T0, V0 : array_like, shapes (4, 4) and (6,)
+    Pose and twist at the start of a simulation; the latter at rest by default.
+control : callable or array_like, shape (m,) or (N, m), optional
+    Forces or torques of the actuators: a function of (t, T, V), constant, or rows for the times
+    ``t``; default none. The wrench of a simulation is given alike.
+t : array_like
+    Duration, s, of which 201 samples are given, or ascending times (N,).
+rtol, atol : float
+    Tolerances of a step.
 
 Returns
 -------
-ndarray
-    Forces (..., m), or the acceleration (..., 6) of the platform.
+ndarray or ParallelMotion
+    Forces (..., m), the acceleration (..., 6) of the platform, energies (...); or the motion until
+    the end or a singular position: times ``t`` (N,), poses ``T`` (N, 4, 4), twists ``V`` (N, 6),
+    lengths or angles ``q`` and forces ``tau`` of the actuators (N, m), and ``energy_drift`` (N,),
+    the change of the energy that is not work of actuators or wrench, J: errors of the integration.
 
 Raises
 ------
 ShapeError, InvalidValueError, NotARotationError
     As for `inverse_jacobian`; a robot without masses; singular poses, where no bounded forces move
-    the platform or the accelerations are not unique.
+    the platform or the accelerations are not unique, also at the start of a simulation.
 
 References
 ----------
 W. Khalil and O. Ibrahim, "General solution for the dynamic modeling of parallel robots", J. of
-Intelligent and Robotic Systems 49 (2007) 19-37.
+Intelligent and Robotic Systems 49 (2007) 19-37; seed book section 2.3.3.5 (singular positions).
 
 Examples
 --------
@@ -45,21 +56,40 @@ array([11.772, 11.772, 11.772, 11.772, 11.772, 11.772])
 array([ 0.  ,  0.  , -9.81,  0.  ,  0.  ,  0.  ])
 >>> float(energies(robot, robot.home, [0, 0, 1, 0, 0, 0])[0].round(6))
 3.0
+>>> motion = simulate(robot, robot.home, t=0.1)
+>>> motion.status.name, bool(abs(motion.energy_drift).max() < 1e-7)
+('FINISHED', True)
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core
-from ..errors import InvalidValueError
-from .legs import LegStates, check_robot
-from .looped import LoopedPlatform
-from .robot import Masses, ParallelRobot
-from .velocities import Mode, Robot, broadcast, only_freedoms, rates_of_rows, scales, states
+from .. import se3
+from .._arrays import Array, as_exact
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, ShapeError
+from ..simulation.simulate import law_of, times_of
+from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
+from .robot import Masses, ParallelRobot, Result, only_freedoms
+from .velocities import ikm, rates_of_rows, scales, states
 
 _SINGULAR = 1e-12  # smallest singular value, relative
+_TOO_NEAR = 1e-6  # the same at the end of a simulation, and sine of an elbow
+Law = Callable[[float, Array, Array], ArrayLike]
+_POSE = (
+    "T: the pose of row {} is singular: no bounded forces of the legs balance every load; see "
+    "classify_singularity and leg_forces."
+)
+_MASS = (
+    "robot: the mass matrix of the platform is singular at row {}; give the platform mass and "
+    "inertia by with_masses."
+)
 
 
 def idm(
@@ -71,17 +101,14 @@ def idm(
     mode: Mode = None,
 ) -> Array:
     """Inverse dynamic model: forces or torques of the actuators for a motion of the platform."""
-    check_robot(robot)
-    if isinstance(robot, LoopedPlatform):
-        return robot.idm(T, V, A, wrench)
-    batch, T, V, A, W = _rows(robot, T, V, A, wrench)
-    legs = states(robot, T, mode)[1]
-    total = _wrench(robot, T, legs, V, A) + W
+    load = np.zeros(6) if wrench is None else wrench
+    if is_looped(robot, mode):
+        return robot.idm(T, V, A, load)
+    batch, T, legs, (V, A, W) = states(robot, mode, T, V=V, A=A, wrench=load)
     columns, unit = list(robot.columns), scales(robot, robot.length)
     B = np.swapaxes(legs.jacobian[..., columns] * unit, -1, -2)
-    _check_regular(B)
-    tau: Array = np.linalg.solve(B, (total[..., columns] * unit)[..., None])  # type: ignore[assignment]
-    return tau.reshape(*batch, robot.m)
+    total = (_wrench(robot, T, legs, V, A) + W)[:, columns]
+    return _solved(B, total * unit, _POSE).reshape(*batch, robot.m)
 
 
 def ddm(
@@ -93,21 +120,15 @@ def ddm(
     mode: Mode = None,
 ) -> Array:
     """Direct dynamic model: acceleration of the platform under forces of the actuators."""
-    check_robot(robot)
-    force = as_core(tau, (robot.m,), "tau")
-    if isinstance(robot, LoopedPlatform):
-        return robot.ddm(T, V, force, wrench)
-    zero = np.zeros((*force.shape[:-1], 6))
-    batch, T, V, _, W = _rows(robot, T, V, zero, wrench)
-    legs, columns = states(robot, T, mode)[1], list(robot.columns)
-    force = np.broadcast_to(force, (*batch, robot.m)).reshape(-1, robot.m)
+    load = np.zeros(6) if wrench is None else wrench
+    if is_looped(robot, mode):
+        return robot.ddm(T, V, tau, load)
+    batch, T, legs, (V, force, W) = states(robot, mode, T, V=V, tau=tau, wrench=load)
+    columns, unit = list(robot.columns), scales(robot, robot.length)
     M, h = _mass_matrix(robot, T, legs, V)
-    unit = scales(robot, robot.length)
-    M = M * unit * unit[:, None]
-    _check_regular(M, "mass")
-    rest = np.einsum("nij,ni->nj", legs.jacobian, force)[:, columns] - (h + W)[:, columns]
+    rest = (np.einsum("nij,ni->nj", legs.jacobian, force) - h - W)[:, columns]
     out = np.zeros((len(T), 6))
-    out[:, columns] = np.linalg.solve(M, (rest * unit)[..., None])[..., 0] * unit
+    out[:, columns] = _solved(M * unit * unit[:, None], rest * unit, _MASS) * unit
     return out.reshape(*batch, 6)
 
 
@@ -115,25 +136,20 @@ def energies(
     robot: ParallelRobot, T: ArrayLike, V: ArrayLike, mode: Mode = None
 ) -> tuple[Array, Array]:
     """Kinetic and potential energy (...) of platform and legs, J; potential zero at the origin."""
-    check_robot(robot)
-    if isinstance(robot, LoopedPlatform):
+    if is_looped(robot, mode):
         raise InvalidValueError("robot: energies of kinematic loops are those of their tree.")
-    batch, T, V, _, _ = _rows(robot, T, V, np.zeros(6), None)
-    legs = states(robot, T, mode)[1]
-    M, _ = _mass_matrix(robot, T, legs, V)
-    v = V[:, list(robot.columns)]
-    kinetic = 0.5 * np.einsum("ni,nij,nj->n", v, M, v)
-    masses = _masses(robot)
-    (m1, s1, _), (m2, s2, _) = masses.first.T, masses.second.T
+    batch, T, legs, (V,) = states(robot, mode, T, V=V)
+    masses, v = _masses(robot), V[:, list(robot.columns)]
+    kinetic = 0.5 * np.einsum("ni,nij,nj->n", v, _mass_matrix(robot, T, legs, V)[0], v)
+    (m1, s1, _), (m2, s2, _) = masses.first.T[..., None], masses.second.T[..., None]
     if robot.has_cranks:
         along = (legs.knee - robot.base) / robot.crank[:, None]
-        second = legs.knee + s2[:, None] * legs.direction
+        second = legs.knee + s2 * legs.direction
     else:
         along = legs.direction
-        second = T[:, None, :3, 3] + legs.arm - s2[:, None] * along
+        second = T[:, None, :3, 3] + legs.arm - s2 * along
     moment = masses.mass * (T[:, :3, 3] + T[:, :3, :3] @ masses.com)
-    moment += np.einsum("i,nij->nj", m1, robot.base + s1[:, None] * along)
-    moment += np.einsum("i,nij->nj", m2, second)
+    moment += (m1 * (robot.base + s1 * along) + m2 * second).sum(axis=1)
     return kinetic.reshape(batch), (-moment @ robot.gravity).reshape(batch)
 
 
@@ -145,63 +161,44 @@ def _masses(robot: ParallelRobot) -> Masses:
     return robot.masses
 
 
-def _rows(
-    robot: ParallelRobot, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike | None
-) -> tuple[tuple[int, ...], Array, Array, Array, Array]:
-    """Checked arguments as N rows."""
-    T = robot.checked(T)
-    V, A = as_core(V, (6,), "V"), as_core(A, (6,), "A")
-    W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
-    batch = T.shape[:-2]
-    for x in (V, A, W):
-        batch = broadcast(batch, x.shape[:-1])
-    flat = [np.broadcast_to(x, (*batch, 6)).reshape(-1, 6) for x in (V, A, W)]
-    V, A = only_freedoms(robot, flat[0]), only_freedoms(robot, flat[1])
-    return batch, np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4), V, A, flat[2]
-
-
 def _mass_matrix(robot: ParallelRobot, T: Array, legs: LegStates, V: Array) -> tuple[Array, Array]:
-    """Mass matrix of the platform's freedoms and wrench at zero acceleration."""
-    columns = list(robot.columns)
-    h = _wrench(robot, T, legs, V, np.zeros_like(V))
-    M = np.empty((len(T), robot.m, robot.m))
-    for k, column in enumerate(columns):
-        unit = np.zeros_like(V)
-        unit[:, column] = 1.0
-        M[:, :, k] = (_wrench(robot, T, legs, V, unit) - h)[:, columns]
-    return 0.5 * (M + np.swapaxes(M, 1, 2)), h
+    """Mass matrix of the platform's freedoms, and wrench (N, 6) at zero acceleration."""
+    every: Any = (x[:, None] for x in legs)
+    columns, parts = list(robot.columns), LegStates(*every)
+    A = np.concatenate((np.zeros((1, 6)), np.eye(6)[columns]))
+    F = _wrench(robot, T[:, None], parts, V[:, None], A)
+    M = (F[:, 1:] - F[:, :1])[..., columns]
+    return 0.5 * (M + np.swapaxes(M, 1, 2)), F[:, 0]
 
 
 def _wrench(robot: ParallelRobot, T: Array, legs: LegStates, V: Array, A: Array) -> Array:
-    """Wrench that moves platform and legs, at the platform's origin. Shapes: (N, 6) -> (N, 6)."""
+    """Wrench that moves platform and legs, at the platform's origin. Shapes: (..., 6)."""
     masses = _masses(robot)
-    v, w, a, alpha = V[:, :3], V[:, 3:], A[:, :3], A[:, 3:]
-    R = T[:, :3, :3]
-    r = R @ masses.com
-    inertia = R @ masses.inertia @ np.swapaxes(R, 1, 2)
+    v, w, a, alpha = V[..., :3], V[..., 3:], A[..., :3], A[..., 3:]
+    R = T[..., :3, :3]
+    r, inertia = R @ masses.com, R @ masses.inertia @ np.swapaxes(R, -1, -2)
     force = masses.mass * (a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) - robot.gravity)
-    moment = np.einsum("nij,nj->ni", inertia, alpha) + np.cross(r, force)
-    moment = moment + np.cross(w, np.einsum("nij,nj->ni", inertia, w))
-    total = np.concatenate((force, moment), axis=1)
+    moment = np.einsum("...ij,...j->...i", inertia, alpha) + np.cross(r, force)
+    moment = moment + np.cross(w, np.einsum("...ij,...j->...i", inertia, w))
     # anchors on the platform
-    w, alpha = w[:, None], alpha[:, None]
+    w, alpha = w[..., None, :], alpha[..., None, :]
     spin = np.cross(w, legs.arm)
-    velocity = v[:, None] + spin
-    acceleration = a[:, None] + np.cross(alpha, legs.arm) + np.cross(w, spin)
-    total = only_freedoms(robot, total)
+    acceleration = a[..., None, :] + np.cross(alpha, legs.arm) + np.cross(w, spin)
     if robot.has_cranks:
         at_anchor, torque = _crank_forces(robot, masses, legs, V, A, acceleration)
-        total += np.einsum("nij,ni->nj", legs.jacobian, torque)
     else:
-        at_anchor = _strut_forces(robot, masses, legs, velocity, acceleration)
-    on_platform = (at_anchor.sum(axis=1), np.cross(legs.arm, at_anchor).sum(axis=1))
-    return total + only_freedoms(robot, np.concatenate(on_platform, axis=1))
+        torque = np.zeros(legs.q.shape)
+        at_anchor = _strut_forces(robot, masses, legs, v[..., None, :] + spin, acceleration)
+    force = force + at_anchor.sum(axis=-2)
+    moment = moment + np.cross(legs.arm, at_anchor).sum(axis=-2)
+    total = only_freedoms(robot, np.concatenate((force, moment), axis=-1))
+    return total + np.einsum("...ij,...i->...j", legs.jacobian, torque)
 
 
 def _strut_forces(
     robot: ParallelRobot, masses: Masses, legs: LegStates, velocity: Array, acceleration: Array
 ) -> Array:
-    """Forces on the anchors that move legs of variable length. Shapes: (N, m, 3)."""
+    """Forces on the anchors that move legs of variable length. Shapes: (..., m, 3)."""
     u, size = legs.direction, legs.q[..., None]
     (m1, s1, i1), (m2, s2, i2) = (part.T[:, :, None] for part in (masses.first, masses.second))
     rate = (u * velocity).sum(axis=-1, keepdims=True)
@@ -217,14 +214,13 @@ def _strut_forces(
 def _crank_forces(
     robot: ParallelRobot, masses: Masses, legs: LegStates, V: Array, A: Array, acceleration: Array
 ) -> tuple[Array, Array]:
-    """Forces on the anchors and torques that move cranks and rods. Shapes: (N, m, 3), (N, m)."""
+    """Forces on the anchors, torques that move cranks and rods. Shapes: (..., m, 3), (..., m)."""
     m1, s1, i1 = masses.first.T
     m2, s2, i2 = (x[:, None] for x in masses.second.T)
-    rate = np.einsum("nij,nj->ni", legs.jacobian, V)
-    second = np.einsum("nij,nj->ni", legs.jacobian, A)
-    second += np.einsum("nij,nj->ni", rates_of_rows(robot, legs, V), V)
-    swing, rod = legs.knee - robot.base, robot.rod[:, None]
-    turning = np.cross(np.cross(robot.outward, robot.downward), swing)
+    rate = np.einsum("...ij,...j->...i", legs.jacobian, V)
+    second = np.einsum("...ij,...j->...i", legs.jacobian, A)
+    second += np.einsum("...ij,...j->...i", rates_of_rows(robot, legs, V), V)
+    swing, rod, turning = legs.knee - robot.base, robot.rod[:, None], legs.turning
     knee = second[..., None] * turning - (rate**2)[..., None] * swing
     bend = (acceleration - knee) / rod  # u''
     force, couple = m2 * (knee + s2 * bend - robot.gravity), i2 * bend / rod
@@ -233,16 +229,115 @@ def _crank_forces(
     return s2 / rod * force + couple, torque + (turning * at_knee).sum(axis=-1)
 
 
-def _check_regular(B: Array, what: str = "") -> None:
-    """Raise for singular matrices. Shapes: (N, m, m)."""
+def _solved(B: Array, x: Array, words: str) -> Array:
+    """Solutions of B y = x; raises for singular matrices. Shapes: (N, m, m), (N, m) -> (N, m)."""
     s = np.linalg.svd(B, compute_uv=False)
     for n in np.flatnonzero(~(s[:, -1] > _SINGULAR * s[:, 0]))[:1]:
-        if what:
-            raise InvalidValueError(
-                f"robot: the mass matrix of the platform is singular at row {n}; give the platform "
-                "mass and inertia by with_masses."
-            )
-        raise InvalidValueError(
-            f"T: the pose of row {n} is singular: no bounded forces of the legs balance every "
-            "load; see classify_singularity and leg_forces."
-        )
+        raise InvalidValueError(words.format(n))
+    y: Array = np.linalg.solve(B, x[..., None])[..., 0]  # type: ignore[assignment]
+    return y
+
+
+class MotionStatus(Outcome):
+    """Outcome of a simulation; the motion until then is given for every status."""
+
+    FINISHED = 0, "The motion was followed to its end."
+    SINGULAR = 1, "The robot came to a singular position, where its motion is not determined."
+    STEP_TOO_SMALL = 2, "The steps became too small to go on."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ParallelMotion(Result):
+    """Simulated motion of a parallel robot, see the head of the file. Read-only."""
+
+    outcomes: ClassVar = MotionStatus
+    t: Array
+    T: Array
+    V: Array
+    q: Array
+    tau: Array
+    energy_drift: Array
+    status: MotionStatus
+
+
+def simulate(
+    robot: ParallelRobot,
+    T0: ArrayLike,
+    V0: ArrayLike | None = None,
+    control: Law | ArrayLike | None = None,
+    t: ArrayLike = 1.0,
+    wrench: Law | ArrayLike | None = None,
+    mode: Mode = None,
+    *,
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
+) -> ParallelMotion:
+    """Simulate a parallel robot under forces of its actuators."""
+    from scipy.integrate import solve_ivp
+    from scipy.spatial.transform import Rotation
+
+    if is_looped(robot, mode):
+        raise InvalidValueError("robot: simulate kinematic loops by loops.simulate.")
+    T0 = robot.checked(se3.as_single_pose(T0, "T0"), "T0")
+    V = only_freedoms(robot, np.zeros(6) if V0 is None else as_exact(V0, (6,), "V0"))
+    first, last, times = times_of(t)
+    if not last > first:
+        raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
+    times = np.linspace(first, last, 201) if times is None else times
+    drive, load = _law(control, robot.m, times, "control"), _law(wrench, 6, times, "wrench")
+    ddm(robot, T0, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
+    columns, unit = list(robot.columns), scales(robot, robot.length)
+
+    def poses(x: Array) -> Array:
+        """Poses of states: position, quaternion with the real part last, twist, work."""
+        T = np.tile(np.eye(4), (len(x), 1, 1))
+        T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(x[:, 3:7]).as_matrix(), x[:, :3]
+        return T
+
+    def rates(time: float, x: Array) -> Array:
+        if not np.isfinite(x).all():  # a later stage of such a step
+            return np.full(14, np.nan)
+        T, V = poses(x[None])[0], x[7:13]
+        tau, W = drive(time, T, V), load(time, T, V)  # errors of the laws are the caller's
+        try:
+            a = ddm(robot, T, V, tau, W, mode)
+            power = tau @ ikm(robot, T, V, mode) - W @ V
+        except InvalidValueError:  # beyond a straight leg: a shorter step is tried
+            return np.full(14, np.nan)
+        w, e, real = V[3:], x[3:6], x[6]
+        return np.concatenate((
+            V[:3], 0.5 * (real * w + np.cross(w, e)), [-0.5 * (w @ e)], a, [power],
+        ))  # fmt: skip
+
+    def sides(x: Array) -> Array:
+        """Determinant of the lines and speeds of the knees, zero at singular positions."""
+        legs = leg_states(robot, poses(x[None]), modes_of(robot, mode, (1,)))
+        det = np.linalg.det(legs.rows[0][:, columns] * unit)
+        return np.append(det, legs.speed[0]) * legs.reached[0]
+
+    x0 = np.concatenate((T0[:3, 3], Rotation.from_matrix(T0[:3, :3]).as_quat(), V, [0.0]))
+    start = sides(x0)
+
+    def margin(time: float, x: Array) -> float:
+        return float((sides(x) / start).min()) - _TOO_NEAR
+
+    margin.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(
+        rates, (first, last), x0, "DOP853", times, events=margin, rtol=rtol, atol=atol
+    )
+    status = MotionStatus.FINISHED
+    if found.status != 0:
+        stuck = found.status < 0 and margin(0.0, found.y[:, -1]) > 0.05
+        status = MotionStatus.STEP_TOO_SMALL if stuck else MotionStatus.SINGULAR
+    T, V = poses(found.y.T), found.y[7:13].T
+    energy = np.add(*energies(robot, T, V, mode))
+    tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)])
+    q = leg_states(robot, T, modes_of(robot, mode, (len(T),))).q
+    return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - found.y[13], status)
+
+
+def _law(law: Any, size: int, t: Array, name: str) -> Callable[[float, Array, Array], Array]:
+    """A function of (t, T, V) from one, a constant, rows or nothing."""
+    function = law_of(np.zeros(size) if law is None else law, size, t, name)[0]
+    assert function is not None
+    return lambda time, T, V: function(time, T.copy(), V.copy())

@@ -64,24 +64,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_number, as_reals
+from .._arrays import Array, as_exact, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from .legs import leg_states
-from .robot import Family, ParallelRobot, pose_at
+from .robot import Family, ParallelRobot, for_legs, pose_at
 
+Points = ArrayLike
 Limit = ArrayLike | None
 _YAWS = np.pi * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 8, -8, 10, -10, 12]) / 12
 
 
 def gough(
-    base: ArrayLike,
-    platform: ArrayLike,
-    lower: Limit = None,
-    upper: Limit = None,
-    home: ArrayLike | None = None,
+    base: Points, platform: Points, lower: Limit = None, upper: Limit = None, home: Limit = None
 ) -> ParallelRobot:
     """Gough-Stewart platform (hexapod): six legs of actuated length between any points."""
-    return _robot(Family.GOUGH, base, platform, lower, upper, home)
+    return _robot(Family.GOUGH, (base, platform), (lower, upper, home))
 
 
 def gough_symmetric(
@@ -92,7 +89,7 @@ def gough_symmetric(
     kind: str = "SSM",
     lower: Limit = None,
     upper: Limit = None,
-    home: ArrayLike | None = None,
+    home: Limit = None,
 ) -> ParallelRobot:
     """Gough-Stewart platform whose anchors lie on two circles in pairs."""
     big = as_number(radius, "radius", above=0.0)
@@ -111,72 +108,66 @@ def gough_symmetric(
 
 
 def planar_3rpr(
-    base: ArrayLike,
-    platform: ArrayLike,
-    lower: Limit = None,
-    upper: Limit = None,
-    home: ArrayLike | None = None,
+    base: Points, platform: Points, lower: Limit = None, upper: Limit = None, home: Limit = None
 ) -> ParallelRobot:
     """Planar robot with three legs of actuated length between revolute joints."""
-    return _robot(Family.PLANAR_3RPR, base, platform, lower, upper, home)
+    return _robot(Family.PLANAR_3RPR, (base, platform), (lower, upper, home))
 
 
 def planar_3rrr(
-    base: ArrayLike,
-    platform: ArrayLike,
+    base: Points,
+    platform: Points,
     proximal: ArrayLike,
     distal: ArrayLike,
     lower: Limit = None,
     upper: Limit = None,
-    home: ArrayLike | None = None,
+    home: Limit = None,
 ) -> ParallelRobot:
     """Planar robot with three legs of an actuated crank and a rod."""
-    arms = proximal, distal
-    return _robot(Family.PLANAR_3RRR, base, platform, lower, upper, home, arms)
+    points, limits = (base, platform), (lower, upper, home)
+    return _robot(Family.PLANAR_3RRR, points, limits, (proximal, distal))
 
 
 def five_bar(
-    base: ArrayLike,
+    base: Points,
     proximal: ArrayLike,
     distal: ArrayLike,
     lower: Limit = None,
     upper: Limit = None,
-    home: ArrayLike | None = None,
+    home: Limit = None,
 ) -> ParallelRobot:
     """Planar five-bar robot: two cranks and rods that meet in the tool point.
 
     In working mode 0 the elbows point away from each other where the tool is to the left of the
     line from the first axis to the second.
     """
-    arms, point = (proximal, distal), np.zeros((2, 2))
-    return _robot(Family.FIVE_BAR, base, point, lower, upper, home, arms)
+    points, limits = (base, np.zeros((2, 2))), (lower, upper, home)
+    return _robot(Family.FIVE_BAR, points, limits, (proximal, distal))
 
 
 def delta(
-    hips: ArrayLike,
-    platform: ArrayLike,
+    hips: Points,
+    platform: Points,
     azimuth: ArrayLike,
     upper_arm: ArrayLike,
     forearm: ArrayLike,
     lower: Limit = None,
     upper: Limit = None,
-    home: ArrayLike | None = None,
+    home: Limit = None,
 ) -> ParallelRobot:
     """Delta robot: a platform that translates, on three arms with pairs of parallel rods.
 
     In working mode 0 all knees point outward.
     """
-    arms, turn = (upper_arm, forearm), as_exact(azimuth, (3,), "azimuth")
-    return _robot(Family.DELTA, hips, platform, lower, upper, home, arms, turn)
+    points, limits = (hips, platform), (lower, upper, home)
+    turn = as_exact(azimuth, (3,), "azimuth")
+    return _robot(Family.DELTA, points, limits, (upper_arm, forearm), turn)
 
 
 def _robot(
     family: Family,
-    base: ArrayLike,
-    platform: ArrayLike,
-    lower: Limit,
-    upper: Limit,
-    home: ArrayLike | None,
+    points: tuple[Points, Points],
+    limits: tuple[Limit, Limit, Limit],
     arms: tuple[ArrayLike, ArrayLike] | None = None,
     turn: Array | float = 0.0,
 ) -> ParallelRobot:
@@ -184,62 +175,40 @@ def _robot(
     elbow = {Family.GOUGH: [1.0] * 6, Family.FIVE_BAR: [1.0, -1.0], Family.DELTA: [-1.0] * 3}
     signs = np.array(elbow.get(family, [1.0] * 3))
     m, flat = len(signs), 2 not in family.value[1]
-    a, b = _points(base, m, flat, "base"), _points(platform, m, flat, "platform")
-    _check_anchors(family, a, b)
-    crank, rod = (
-        np.zeros(m) if arms is None else _for_legs(value, m, name, 1e-300)
-        for value, name in zip(arms or (0, 0), ("proximal", "distal"), strict=True)
-    )
-    low, high = checked_limits(lower, upper, m, arms is None)
-    outward = np.tile(np.stack(np.broadcast_arrays(np.cos(turn), np.sin(turn), 0.0), -1), (m, 1))
-    downward = np.tile((0.0, 0.0, -1.0) if family is Family.DELTA else (0.0, 1.0, 0.0), (m, 1))
-    given = se3.as_single_pose(home, "home")
-    robot = ParallelRobot(family, a, b, crank, rod, outward[:m], downward, signs, low, high, given)
-    robot.checked(given, "home")
-    return robot if home is not None else replace(robot, home=_home(robot))
-
-
-def _points(points: ArrayLike, m: int, flat: bool, name: str) -> Array:
-    """Anchors as (m, 3)."""
-    P, shape = as_floats(points, name), (m, 2 if flat else 3)
-    if P.shape != shape:
-        raise ShapeError(f"{name}: expected {m} points, shape {shape}, got {P.shape}.")
-    return np.pad(P, ((0, 0), (0, 3 - shape[1])))
-
-
-def _check_anchors(family: Family, a: Array, b: Array) -> None:
-    """Raise for legs or anchors that coincide."""
+    a, b = (as_floats(P, name) for P, name in zip(points, ("base", "platform"), strict=True))
+    for name, P in (("base", a), ("platform", b)):
+        if P.shape != (m, 2 if flat else 3):
+            raise ShapeError(
+                f"{name}: expected {m} points, shape ({m}, {2 if flat else 3}), got {P.shape}."
+            )
+        if 5 in family.value[1] and np.ptp(P, axis=0).max() == 0.0:
+            raise InvalidValueError(f"{name}: all anchors coincide, so that it could turn freely.")
+    a, b = (np.pad(P, ((0, 0), (0, 3 - P.shape[1]))) for P in (a, b))
     size = max(np.ptp(a, axis=0).max(), np.ptp(b, axis=0).max())
-    legs = [] if family is Family.DELTA else combinations(range(len(a)), 2)
-    for i, j in legs:
+    for i, j in combinations(range(m if family is not Family.DELTA else 0), 2):
         if np.abs(a[i] - a[j]).max() + np.abs(b[i] - b[j]).max() <= 1e-12 * size:
             raise InvalidValueError(
                 f"base, platform: legs {i + 1} and {j + 1} have the same anchors on both, they "
                 "coincide; give each leg its own points."
             )
-    for name, points in (("base", a), ("platform", b)):
-        if 5 in family.value[1] and np.ptp(points, axis=0).max() == 0.0:
-            raise InvalidValueError(f"{name}: all anchors coincide, so that it could turn freely.")
-
-
-def _for_legs(value: ArrayLike, m: int, name: str, least: float) -> Array:
-    """A number or one for each leg, perhaps infinite. Shapes: -> (m,)."""
-    given = as_reals(value, name)
-    if given.shape not in ((), (m,)):
-        raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
-    if not (given >= least).all():
-        words = {0.0: "numbers that are not negative", -np.inf: "numbers"}
-        raise InvalidValueError(
-            f"{name}: expected {words.get(least, 'lengths above 0 m')}, got {value!r:.60}."
-        )
-    return np.broadcast_to(given, (m,))
+    crank, rod = (
+        np.zeros(m) if arms is None else for_legs(value, m, name, 1e-300)
+        for value, name in zip(arms or (0, 0), ("proximal", "distal"), strict=True)
+    )
+    low, high = checked_limits(*limits[:2], m, arms is None)
+    outward = np.stack((np.cos(turn), np.sin(turn), 0.0 * np.cos(turn)), axis=-1) + np.zeros((m, 3))
+    downward = np.tile((0.0, 0.0, -1.0) if family is Family.DELTA else (0.0, 1.0, 0.0), (m, 1))
+    given = se3.as_single_pose(limits[2], "home")
+    robot = ParallelRobot(family, a, b, crank, rod, outward, downward, signs, low, high, given)
+    robot.checked(given, "home")
+    return robot if limits[2] is not None else replace(robot, home=_home(robot))
 
 
 def checked_limits(lower: Limit, upper: Limit, m: int, is_length: bool) -> tuple[Array, Array]:
     """Limits of q, infinite or zero where there are none."""
     least = 0.0 if is_length else -np.inf
-    low = _for_legs(least if lower is None else lower, m, "lower", least)
-    high = _for_legs(np.inf if upper is None else upper, m, "upper", least)
+    low = for_legs(least if lower is None else lower, m, "lower", least)
+    high = for_legs(np.inf if upper is None else upper, m, "upper", least)
     if not (low <= high).all():
         raise InvalidValueError(f"lower, upper: expected lower below upper, got {low} and {high}.")
     return low, high
@@ -267,7 +236,7 @@ def _home(robot: ParallelRobot) -> Array:
     twist = np.zeros((len(_YAWS), 6))
     twist[:, :3], twist[:, 5] = place, _YAWS if 5 in robot.columns else 0.0
     T = pose_at(twist)
-    legs = leg_states(robot, T, np.zeros(len(T), np.int64))
+    legs = leg_states(robot, T)
     J = legs.rows / np.repeat([1.0, robot.length], 3)
     det = np.abs(np.linalg.det(J[..., list(robot.columns)])) * legs.reached
     inside = ((legs.q >= robot.lower) & (legs.q <= robot.upper)).all(axis=1)

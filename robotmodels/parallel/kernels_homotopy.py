@@ -93,22 +93,20 @@ def size2(z: complex) -> float:
 
 
 @compiled()
-def solve(J: Floats, c: int, F: Floats, G: Floats) -> float:
-    """Solve J y = F and J y = G in place, column c of J left out; smallest pivot squared, relative.
+def solve(J: Floats, c: int, F: Floats, G: Floats) -> bool:
+    """Solve J y = F and J y = G in place, column c of J left out; False where J is singular.
 
     Shapes: J (7, 8), overwritten, F, G (7,). Column c is replaced by the last one.
     """
     for i in range(7):
         J[i, c] = J[i, 7]
-    least, most = 1e300, 0.0
     for k in range(7):
         best, pivot = k, size2(J[k, k])
         for i in range(k + 1, 7):
             if size2(J[i, k]) > pivot:
                 best, pivot = i, size2(J[i, k])
-        least, most = min(least, pivot), max(most, pivot)
         if pivot == 0.0:
-            return 0.0
+            return False
         if best != k:
             for j in range(k, 7):
                 J[k, j], J[best, j] = J[best, j], J[k, j]
@@ -128,72 +126,74 @@ def solve(J: Floats, c: int, F: Floats, G: Floats) -> float:
             G[k] -= J[k, j] * G[j]
         F[k] *= J[k, k]
         G[k] *= J[k, k]
-    return least / most
+    return True
+
+
+@compiled()
+def newton_step(
+    x: Floats, c: int, m: Floats, change: Floats, F: Floats, G: Floats, J: Floats
+) -> bool:
+    """Error F and slope -G of x along the path with its component c constant. Shapes: (8,)."""
+    value_and_jacobian(x, m, F, J)
+    values(x, change, G)
+    regular = solve(J, c, F, G)
+    F[7], G[7] = F[c], G[c]
+    F[c] = G[c] = 0.0
+    return regular
+
+
+@compiled()
+def chart_of(x: Floats) -> int:
+    """Largest component of e."""
+    best = 0
+    for k in range(1, 4):
+        if size2(x[k]) > size2(x[best]):
+            best = k
+    return best
 
 
 @compiled()
 def track(
     x: Floats, start: Floats, change: Floats, accuracy: float, work: Floats, J: Floats
-) -> tuple[int, int]:
-    """Follow one path from t = 0 to 1: why it ends, and its steps.
+) -> int:
+    """Follow one path from t = 0 to 1: why it ends.
 
     Shapes: x (8,) overwritten, start, change (81,), work (>= 8, 81), J (7, 8).
     """
     m, F, G = work[0], work[1], work[2]
     y, slope, past, past_slope = work[3], work[4], work[5], work[6]
-    t, h, last = 0.0, 0.01, 0.0
-    c = 0
-    steps = 0
-    while steps < _STEPS:
-        # chart
-        best = 0
-        for k in range(1, 4):
-            if size2(x[k]) > size2(x[best]):
-                best = k
-        if size2(x[c]) < 0.25 * size2(x[best]) or steps == 0:
-            c = best
+    t, h, last, c = 0.0, 0.01, 0.0, -1
+    for _ in range(_STEPS):
+        best = chart_of(x)
+        if c < 0 or size2(x[c]) < 0.25 * size2(x[best]):
+            c, last = best, 0.0
             scale = 1.0 / x[c]
             for k in range(8):
                 x[k] *= scale
-            # slope in the new chart
-            for k in range(81):
+            for k in range(PARAMETERS):
                 m[k] = start[k] + t * change[k]
-            value_and_jacobian(x, m, F, J)
-            values(x, change, G)
-            solve(J, c, F, G)
-            for k in range(7):
+            newton_step(x, c, m, change, F, G, J)
+            for k in range(8):
                 slope[k] = -G[k]
-            slope[7] = slope[c]
-            slope[c] = 0.0
-            last = 0.0
         h = min(h, 1.0 - t)
-        steps += 1
-        # prediction
+        # cubic prediction from the last two points, else along the slope
         if last > 0.0:
             r = h / last
-            a = r * r * (2.0 * r + 3.0)
-            p = r * r * (r + 1.0)
-            q = r * (r + 1.0) * (r + 1.0)
+            a, p, q = r * r * (2.0 * r + 3.0), r * r * (r + 1.0), r * (r + 1.0) * (r + 1.0)
             for k in range(8):
                 y[k] = x[k] + a * (past[k] - x[k]) + last * (p * past_slope[k] + q * slope[k])
         else:
             for k in range(8):
                 y[k] = x[k] + h * slope[k]
         y[c] = x[c]
-        t2 = t + h if h < 1.0 - t else 1.0
-        for k in range(81):
-            m[k] = start[k] + t2 * change[k]
-        values(x, change, G)
-        good = False
-        first = 0.0
+        after = t + h if h < 1.0 - t else 1.0
+        for k in range(PARAMETERS):
+            m[k] = start[k] + after * change[k]
+        good, first = False, 0.0
         for correction in range(3):
-            value_and_jacobian(y, m, F, J)
-            values(y, change, G)
-            if solve(J, c, F, G) == 0.0:
+            if not newton_step(y, c, m, change, F, G, J):
                 break
             total, norm = 0.0, 0.0
-            F[7] = F[c]
-            F[c] = 0.0
             for k in range(8):
                 total += size2(F[k])
                 y[k] -= F[k]
@@ -208,33 +208,25 @@ def track(
             if correction > 0 and error < 1e-6:
                 good = True
                 break
-        if not good:
-            h *= 0.5
-            if h < _SHORTEST or (first != first):
-                ee = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]
-                scale = size2(x[0]) + size2(x[1]) + size2(x[2]) + size2(x[3])
-                if sqrt(size2(ee)) < _AT_INFINITY * scale:
-                    return INFINITE, steps
-                return LOST, steps
+        if good:
+            for k in range(8):
+                past[k], past_slope[k] = x[k], slope[k]
+                x[k], slope[k] = y[k], -G[k]
+            last, t = h, after
+            if t >= 1.0:
+                return ARRIVED
+            h *= min(3.0, max(0.5, (0.1 * accuracy / max(first, 1e-12)) ** 0.25))
             continue
-        for k in range(8):
-            past[k], past_slope[k] = x[k], slope[k]
-            x[k] = y[k]
-        for k in range(7):
-            slope[k] = -G[k]
-        slope[7] = slope[c]
-        slope[c] = 0.0
-        last = h
-        t = t2
-        if t >= 1.0:
-            return ARRIVED, steps
-        grow = (0.1 * accuracy / max(first, 1e-12)) ** 0.25
-        h *= min(3.0, max(0.5, grow))
-    return LOST, steps
+        h *= 0.5
+        if h < _SHORTEST or first != first:
+            ee = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]
+            scale2 = size2(x[0]) + size2(x[1]) + size2(x[2]) + size2(x[3])
+            return INFINITE if sqrt(size2(ee)) < _AT_INFINITY * scale2 else LOST
+    return LOST
 
 
 @compiled(NOTHING(MATRIX, VECTOR, MATRIX, VECTOR, VECTOR, OUT3, OUT2))
-def spatial(
+def paths(
     members: Floats,
     start: Floats,
     first: Floats,
@@ -259,19 +251,10 @@ def spatial(
         for i in range(PATHS):
             for k in range(8):
                 x[k] = complex(first[i, 2 * k], first[i, 2 * k + 1])
-            code, _ = track(x, begin, change, options[0], work, J)
-            if code == ARRIVED:
-                for _ in range(3):
-                    c = 0
-                    for k in range(1, 4):
-                        if size2(x[k]) > size2(x[c]):
-                            c = k
-                    value_and_jacobian(x, target, F, J)
-                    solve(J, c, F, G)
-                    F[7] = F[c]
-                    F[c] = 0.0
-                    for k in range(8):
-                        x[k] -= F[k]
-            codes[s, i] = code
+            codes[s, i] = track(x, begin, change, options[0], work, J)
+            for _ in range(3 if codes[s, i] == ARRIVED else 0):
+                newton_step(x, chart_of(x), target, change, F, G, J)
+                for k in range(8):
+                    x[k] -= F[k]
             for k in range(8):
                 ends[s, i, 2 * k], ends[s, i, 2 * k + 1] = x[k].real, x[k].imag

@@ -1,20 +1,59 @@
-"""Inverse geometric model: actuated lengths or angles of all working modes, and states of legs."""
+"""Inverse geometric model: actuated lengths or angles of all working modes, and states of legs.
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+T : array_like, shape (..., 4, 4)
+    Poses of the platform in the world.
+
+Returns
+-------
+LegSolutions
+    One row for each working mode that reaches the pose, ``mode`` ascending (see `ParallelRobot`):
+    one for legs of actuated length, 2^m with cranks where no leg is straight. ``q`` (..., S, m) are
+    lengths, m, or angles in (-pi, pi], rad; ``valid``, ``within_limits`` (angles modulo whole
+    turns) and ``residual``, the largest error of a rod's length, m, are (..., S). Packed: after the
+    solutions NaN, mode -1. ``status`` (...) are codes of `LegStatus`.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    No poses, or poses that the platform cannot have.
+
+References
+----------
+Seed book section 2.3.1.
+
+Examples
+--------
+>>> from robotmodels.parallel import five_bar
+>>> robot = five_bar([[0, 0], [0.5, 0]], 0.4, 0.6)
+>>> igm(robot, robot.home).mode, igm(robot, robot.home).q.shape
+(array([0, 1, 2, 3]), (4, 2))
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array
 from .._outcomes import Outcome
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
 from .looped import LoopedPlatform
-from .results import Result
-from .robot import ParallelRobot
+from .robot import ParallelRobot, Result
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
+Robot = ParallelRobot | LoopedPlatform
+Mode = int | ArrayLike | None
+Found = tuple[Array, Array, Array, NDArray[np.int8], NDArray[np.int64]]
+"""T (N, S, 4, 4), residual, det (N, S), packed, NaN after; status, complex count (N,)."""
 _TOUCHING = 1e-12  # of the cosine of an elbow: both solutions coincide
 
 
@@ -28,30 +67,7 @@ class LegStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LegSolutions(Result):
-    """Actuated lengths or angles that give poses, one row for each working mode. Read-only.
-
-    Parameters
-    ----------
-    q : ndarray, shape (..., S, m)
-        Actuated lengths, m, or angles in (-pi, pi], rad; packed, NaN where there is no solution.
-    mode : ndarray of int64, shape (..., S)
-        Working modes, ascending; -1 where there is no solution. See `ParallelRobot`.
-    valid : ndarray of bool, shape (..., S)
-        Whether the row is a solution.
-    within_limits : ndarray of bool, shape (..., S)
-        Whether the row is a solution within the limits; angles count modulo whole turns.
-    residual : ndarray, shape (..., S)
-        Largest error of a rod's length, m.
-    status : ndarray of int8, shape (...)
-        Codes of `LegStatus`.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import five_bar, igm
-    >>> robot = five_bar([[0, 0], [0.5, 0]], 0.4, 0.6)
-    >>> igm(robot, robot.home).mode
-    array([0, 1, 2, 3])
-    """
+    """Actuated lengths or angles that give poses, see the head of the file. Read-only."""
 
     outcomes: ClassVar = LegStatus
     q: Array
@@ -63,18 +79,20 @@ class LegSolutions(Result):
 
 
 class LegStates(NamedTuple):
-    """Legs at poses in one working mode.
+    """Legs at N poses: numbers (N, m), vectors (N, m, 3), rows (N, m, 6), ``speed q' = rows V``.
 
-    Shapes: q, speed, crossing (N, m), arm, direction, knee (N, m, 3), rows (N, m, 6), reached (N,).
-    ``speed q' = rows [v; w]``; arm are the anchors' positions from the platform's origin.
+    arm: anchors from the platform's origin; size: lengths of legs or rods; turning: velocity of
+    their other ends for q' = 1.
     """
 
     q: Array
     speed: Array
+    size: Array
     rows: Array
     arm: Array
     direction: Array
     knee: Array
+    turning: Array
     reached: NDArray[np.bool_]
 
     @property
@@ -83,14 +101,13 @@ class LegStates(NamedTuple):
         return self.rows / self.speed[..., None]
 
 
-def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64]) -> LegStates:
+def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64] | int = 0) -> LegStates:
     """Directions of the legs' forces and their velocities. Shapes: T (N, 4, 4), mode (N,)."""
     arm = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2)
     d = T[:, None, :3, 3] + arm - robot.base
-    knee = np.broadcast_to(robot.base, d.shape)
-    reached, q = np.ones(len(T), np.bool_), np.zeros(d.shape[:-1])
+    knee, q, reached = np.broadcast_to(robot.base, d.shape), d[..., 0], np.ones(len(T), np.bool_)
     if robot.has_cranks:
-        q, cosine = _angles(robot, d, mode)
+        q, cosine = _angles(robot, d, np.broadcast_to(mode, len(T)))
         reached = np.asarray((np.abs(cosine) <= 1.0 + _TOUCHING).all(axis=1))
         swing = robot.crank[:, None] * _radial(robot, q)
         knee, d = knee + swing, d - swing
@@ -98,12 +115,12 @@ def leg_states(robot: ParallelRobot, T: Array, mode: NDArray[np.int64]) -> LegSt
     direction = d / np.where(size > 0.0, size, 1.0)[..., None]
     rows = np.concatenate((direction, np.cross(arm, direction)), axis=-1)
     rows[..., [k for k in range(6) if k not in robot.columns]] = 0.0
+    turning, speed = direction, np.where(size > 0.0, 1.0, 0.0)
     if robot.has_cranks:
         turning = robot.crank[:, None] * _radial(robot, q + 0.5 * np.pi)
         speed = (direction * turning).sum(axis=-1)
-    else:
-        q, speed = size, np.where(size > 0.0, 1.0, 0.0)
-    return LegStates(q, speed, rows, arm, direction, knee, reached)
+    q = q if robot.has_cranks else size
+    return LegStates(q, speed, size, rows, arm, direction, knee, turning, reached)
 
 
 def knees(robot: ParallelRobot, q: Array) -> Array:
@@ -111,6 +128,13 @@ def knees(robot: ParallelRobot, q: Array) -> Array:
     if not robot.has_cranks:
         return np.broadcast_to(robot.base, (*q.shape, 3))
     return robot.base + robot.crank[:, None] * _radial(robot, q)
+
+
+def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
+    """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
+    c = np.ascontiguousarray(knees(robot, q))
+    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
+    return c, robot.platform, np.ascontiguousarray(lengths)
 
 
 def _radial(robot: ParallelRobot, q: Array) -> Array:
@@ -121,79 +145,47 @@ def _radial(robot: ParallelRobot, q: Array) -> Array:
 def _angles(robot: ParallelRobot, d: Array, mode: NDArray[np.int64]) -> tuple[Array, Array]:
     """Angles of cranks, and the cosines that decide. Shapes: d (N, m, 3), mode (N,) -> (N, m)."""
     x, y = (d * robot.outward).sum(axis=-1), (d * robot.downward).sum(axis=-1)
-    rho = np.hypot(x, y)
     square = (d * d).sum(axis=-1) + robot.crank**2 - robot.rod**2
-    far = 2.0 * robot.crank * rho
-    cosine = np.where(far > 0.0, square / np.where(far > 0.0, far, 1.0), np.inf)
-    sign = robot.elbow * (1 - 2 * ((mode[:, None] >> np.arange(robot.m)) & 1))
+    far = 2.0 * robot.crank * np.hypot(x, y)
+    cosine = np.divide(square, far, out=np.full(far.shape, np.inf), where=far > 0.0)
+    sign = robot.elbow * (1 - 2 * _bits(robot, mode))
     q = np.arctan2(y, x) + sign * np.arccos(np.clip(cosine, -1.0, 1.0))
     return np.pi - np.mod(np.pi - q, 2.0 * np.pi), cosine
 
 
-def igm(robot: ParallelRobot | LoopedPlatform, T: ArrayLike) -> LegSolutions:
-    """Inverse geometric model (inverse kinematics): actuated lengths or angles of all modes.
+def _bits(robot: ParallelRobot, mode: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Which elbows a working mode changes, 0 or 1. Shapes: (...) -> (..., m)."""
+    return (mode[..., None] >> np.arange(robot.m)) & 1
 
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    T : array_like, shape (..., 4, 4)
-        Poses of the platform in the world.
 
-    Returns
-    -------
-    LegSolutions
-        One working mode for legs of actuated length, 2^m with cranks where no leg is straight.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        No poses, or poses that the platform cannot have.
-
-    References
-    ----------
-    Seed book section 2.3.1.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric, igm
-    >>> robot = gough_symmetric(1.0)
-    >>> igm(robot, robot.home).q.shape
-    (1, 6)
-    """
-    if isinstance(robot, LoopedPlatform):
-        return _igm_looped(robot, T)
-    check_robot(robot)
-    T = robot.checked(T)
-    batch, m = T.shape[:-2], robot.m
-    modes = np.arange(2**m if robot.has_cranks else 1)
-    rows = np.repeat(T.reshape(-1, 4, 4), len(modes), axis=0)
-    N, S = len(rows) // len(modes), len(modes)
-    states = leg_states(robot, rows, np.tile(modes, N))
-    q, valid = states.q.reshape(N, S, m), states.reached.reshape(N, S).copy()
-    residual = np.zeros((N, S))
-    if robot.has_cranks:
-        ends = rows[:, None, :3, 3] + states.arm - states.knee
-        error = np.abs(np.linalg.norm(ends, axis=-1) - robot.rod)
-        residual = error.max(axis=-1, initial=0.0).reshape(N, S)
-        # both solutions of a straight leg coincide: of mode 0 and the one with all bits
-        straight = np.abs(np.exp(1j * q[:, :1]) - np.exp(1j * q[:, -1:])) < 1e-9
-        valid &= ~(straight & ((modes[:, None] >> np.arange(m)) & 1 == 1)).any(axis=-1)
+def igm(robot: Robot, T: ArrayLike) -> LegSolutions:
+    """Inverse geometric model (inverse kinematics): actuated lengths or angles of all modes."""
+    modes = np.arange(1)
+    if is_looped(robot):
+        joints, residual, valid = robot.postures(T)
+        batch, q = residual.shape, joints[..., robot.actuated].reshape(-1, 1, robot.m)
+        residual, valid = residual.reshape(-1, 1), valid.reshape(-1, 1)
+        inside = valid
+    else:
+        poses, m = robot.checked(T), robot.m
+        modes = np.arange(2**m if robot.has_cranks else 1)
+        batch, rows = poses.shape[:-2], np.repeat(poses.reshape(-1, 4, 4), len(modes), axis=0)
+        shape = (len(rows) // len(modes), len(modes))
+        legs = leg_states(robot, rows, np.tile(modes, shape[0]))
+        q, valid, residual = legs.q.reshape(*shape, m), legs.reached.reshape(shape), np.zeros(shape)
+        if robot.has_cranks:
+            residual = np.abs(legs.size - robot.rod).max(axis=-1, initial=0.0).reshape(shape)
+            # both solutions of a straight leg coincide: of mode 0 and the one with all bits
+            straight = np.abs(np.exp(1j * q[:, :1]) - np.exp(1j * q[:, -1:])) < 1e-9
+            valid = valid & ~(straight & (_bits(robot, modes) == 1)).any(axis=-1)
+        inside = valid & within(robot, q)
     order = np.argsort(~valid, axis=1, kind="stable")[:, : valid.sum(axis=1).max(initial=0)]
-    keep, mode = np.take_along_axis(valid, order, 1), modes[order]
-    q, residual = np.take_along_axis(q, order[..., None], 1), np.take_along_axis(residual, order, 1)
-    inside = keep & within(robot, q)
-    status = np.where(inside.any(axis=1), 0, np.where(keep.any(axis=1), 1, 2)).astype(np.int8)
-    found = (
-        np.where(keep[..., None], q, np.nan),
-        np.where(keep, mode, -1),
-        keep,
-        inside,
-        np.where(keep, residual, np.nan),
-        status,
-    )
-    fields: list[Any] = [x.reshape((*batch, *x.shape[1:])) for x in found]
-    return LegSolutions(*fields)
+    status = np.where(inside.any(axis=1), 0, np.where(valid.any(axis=1), 1, 2)).astype(np.int8)
+    valid, inside, residual = (np.take_along_axis(x, order, 1) for x in (valid, inside, residual))
+    q = np.where(valid[..., None], np.take_along_axis(q, order[..., None], 1), np.nan)
+    mode, residual = np.where(valid, modes[order], -1), np.where(valid, residual, np.nan)
+    fields: Any = (q, mode, valid, inside, residual, status)
+    return LegSolutions(*(x.reshape((*batch, *x.shape[1:])) for x in fields))
 
 
 def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
@@ -205,20 +197,32 @@ def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
     return np.asarray(inside.all(axis=-1))
 
 
-def check_robot(robot: Any) -> None:
-    """Raise unless the argument is a parallel robot."""
+def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
+    """Whether a parallel robot is one of loops; raises for other objects and modes of loops."""
     if not isinstance(robot, ParallelRobot | LoopedPlatform):
         raise InvalidValueError(
             "robot: expected a parallel robot, as made by parallel.gough and others, got "
             f"{type(robot).__name__}."
         )
+    if isinstance(robot, ParallelRobot):
+        return False
+    if mode is not None and np.any(np.asarray(mode) != 0):
+        raise InvalidValueError(
+            f"mode: a robot from from_loops has the working mode of its home alone, got "
+            f"{mode!r:.40}; give from_loops another q_home."
+        )
+    return True
 
 
-def _igm_looped(robot: LoopedPlatform, T: ArrayLike) -> LegSolutions:
-    """One solution by Newton's method on all joints."""
-    q, residual, reached = robot.postures(T)
-    q = np.where(reached[..., None], q[..., robot.actuated], np.nan)
-    mode, status = np.where(reached, 0, -1), np.where(reached, 0, 2).astype(np.int8)
-    rows: list[Any] = [mode, reached, reached, np.where(reached, residual, np.nan)]
-    mode, valid, within, error = (x[..., None] for x in rows)
-    return LegSolutions(q[..., None, :], mode, valid, within, error, status)
+def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArray[np.int64]:
+    """Checked working modes of N poses. Shapes: -> (N,)."""
+    given, most = np.asarray(0 if mode is None else mode), 2**robot.m if robot.has_cranks else 1
+    if given.dtype.kind not in "iu" or ((given < 0) | (given >= most)).any():
+        raise InvalidValueError(
+            f"mode: expected whole numbers from 0 to {most - 1}, as igm(robot, T).mode numbers the "
+            f"working modes, got {mode!r:.60}."
+        )
+    try:
+        return np.broadcast_to(given, batch).reshape(-1).astype(np.int64)
+    except ValueError:
+        raise ShapeError(f"mode: expected a number or shape {batch}, got {given.shape}.") from None

@@ -1,6 +1,41 @@
 """Parallel robots given as kinematic loops: a platform frame on a robot of `robotmodels.loops`.
 
 The models are numeric: Newton's method on the actuated joints, and the velocity map of the loops.
+A pose is reached if its position and orientation are; the latter does not count where it only
+follows from the position, as of a five-bar's rod.
+
+Parameters
+----------
+looped_robot : LoopedRobot
+    The robot: spanning tree, closures, and actuated joints that determine the platform.
+platform_frame : str or int
+    Name or number of the platform's frame in the tree.
+q_home : array_like, shape (n,), optional
+    All joints near the home posture, rad or m; default the tree's zero posture. The loops are
+    closed from there.
+
+Returns
+-------
+LoopedPlatform
+    Taken by the functions of this package in place of a `ParallelRobot`. Its ``columns`` are the
+    independent components of the platform's twist, from 0.
+
+Raises
+------
+InvalidValueError, LoopError, FrameNotFoundError
+    Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not determine
+    the platform, or more of them than it has freedoms.
+
+Examples
+--------
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.model import RobotModel
+>>> table = DHTable(antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2],
+...                 d=[0, 0.5, 0.4, 0.4, 0.6, 0.6])
+>>> closures = [loops.Closure("cut", (5, 6), "point")]
+>>> five = loops.LoopedRobot(RobotModel.from_table(table), closures, actuated=[0, 1])
+>>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
+2
 """
 
 from __future__ import annotations
@@ -12,33 +47,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import loops, se3
-from .._arrays import Array, Value, as_core, as_exact, read_only
+from .._arrays import Array, Value, as_core, as_exact, batch_shape, read_only
 from ..errors import InvalidValueError, LoopError
 from ..geometry import PRISMATIC
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..kinematics.lengths import characteristic_length
-from .robot import pose_at, rotation_vector
+from ..se3.orientation import rotation_vectors_of
 
-_STEPS, _PIECES, _STARTS = 60, 16, 64
+_STEPS, _STARTS = 60, 64
+_LONGEST = 0.2  # step of the platform, rad or characteristic lengths
 _CLOSED = 1e-10
 _RANK = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LoopedPlatform(Value):
-    """A parallel robot made of kinematic loops, from `from_loops`. Read-only.
-
-    Parameters
-    ----------
-    robot : LoopedRobot
-        Spanning tree, closures, actuated joints.
-    frame : str or int
-        Frame of the platform.
-    q_home : ndarray, shape (n,)
-        All joints at the home pose, with closed loops.
-    columns : tuple of int
-        Independent components of the platform's twist, from 0; others do not count.
-    """
+    """A parallel robot made of kinematic loops, from `from_loops`. Read-only."""
 
     robot: loops.LoopedRobot
     frame: str | int
@@ -68,64 +92,58 @@ class LoopedPlatform(Value):
         """Characteristic length, m: half the reach of the platform's frame in the tree."""
         return 0.5 * characteristic_length(self.robot.tree, self.frame)
 
-    @property
-    def units(self) -> Array:
-        """Natural unit of each joint of the tree: 1 rad, or the characteristic length in metres."""
-        return np.where(self._slides, self.length, 1.0)
-
-    @property
-    def _slides(self) -> NDArray[np.bool_]:
-        """Which joints of the tree are prismatic."""
-        table = self.robot.tree.table
-        return np.asarray(table.sigma[table.joint_rows] == PRISMATIC)
-
-    def _without_turns(self, q: Array) -> Array:
-        """The same postures (..., n), angles within half a turn of home."""
-        turns = np.round((q - self.q_home) / (2.0 * np.pi))
-        return np.where(self._slides, q, q - 2.0 * np.pi * turns)
-
     def coordinates(self, T: ArrayLike) -> Array:
         """Coordinates (..., m) of poses: independent entries of position and rotation vector."""
         T = se3.as_pose(T)
-        full = np.concatenate((T[..., :3, 3], rotation_vector(T)), axis=-1)
+        full = np.concatenate((T[..., :3, 3], rotation_vectors_of(T[..., :3, :3])), axis=-1)
         return np.asarray(full[..., list(self.columns)])
 
     def postures(self, T: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:
         """All joints (..., n) at poses near home, residuals, and whether the poses are reached."""
         poses = se3.as_pose(T)
         rows = poses.reshape(-1, 4, 4)
-        q, rest = self._newton(np.broadcast_to(self.q_home, (len(rows), self.robot.n)), rows)
-        for i in np.flatnonzero(rest > _CLOSED):
-            x = self.q_home[None]
-            for target in _between(self.home, rows[i]):
-                x, away = self._newton(x, target[None])
-            q[i], rest[i] = x[0], away[0]
-        batch = poses.shape[:-2]
-        rest = rest.reshape(batch)
-        return q.reshape(*batch, self.robot.n), rest, rest <= _CLOSED
+        q = np.tile(self.q_home, (len(rows), 1))
+        rest = np.full(len(rows), np.inf)
+        for i, target in enumerate(rows):
+            q[i], rest[i] = self._newton(target)
+        shape = poses.shape[:-2]
+        return q.reshape(*shape, self.robot.n), rest.reshape(shape), rest.reshape(shape) <= _CLOSED
 
-    def _newton(self, q: Array, target: Array) -> tuple[Array, Array]:
-        """Newton's method on the actuated joints, the loops closed after each step, N rows."""
-        q, rest, active = q.copy(), np.full(len(q), np.inf), np.arange(len(q))
+    def _newton(self, target: Array) -> tuple[Array, float]:
+        """Newton's method on the actuated joints in short steps, the loops closed after each."""
+        q, best = self.q_home, np.inf
+        columns, unit = list(self.columns), np.repeat([1.0, self.length], 3)
+        table = self.robot.tree.table
+        slides = table.sigma[table.joint_rows] == PRISMATIC
         for _ in range(_STEPS):
-            error = _difference(dgm(self.robot.tree, q[active], self.frame), target[active])
-            error *= np.isin(np.arange(6), self.columns)
-            away = np.abs(error).max(axis=-1, initial=0.0)
-            better = (away < 0.9 * rest[active]) & (away > 1e-15)
-            rest[active] = np.minimum(rest[active], away)
-            active, error = active[better], error[better]
-            if not active.size:
+            error = self._error(q, target)
+            away = np.abs(error[columns]).max()
+            if away <= 1e-15 or (away < 1e-12 and away >= best):
                 break
+            best = min(best, away)
             try:
-                J = self._inverse(self._twists(q[active]))
+                J = self._inverse(self._twists(q))
             except LoopError:
                 break
-            step = np.einsum("nij,nj->ni", J, error)
-            found = loops.close(self.robot, q[active][:, self.actuated] + step, q[active])
-            good = np.asarray(found.residual) < _CLOSED
-            active = active[good]
-            q[active] = self._without_turns(found.q[good])
-        return q, rest
+            step = error * np.isin(np.arange(6), columns)
+            step = step / max(1.0, np.abs(step * unit).max() / (_LONGEST * self.length))
+            found = loops.close(self.robot, q[self.actuated] + J @ step, q)
+            if not found.residual < _CLOSED:
+                break
+            turns = np.round((found.q - self.q_home) / (2.0 * np.pi))
+            q = np.where(slides, found.q, found.q - 2.0 * np.pi * turns)
+        return q, float(np.abs(self._error(q, target) * self._counts()).max())
+
+    def _error(self, q: Array, target: Array) -> Array:
+        """Small twist (6,) from the pose at q to another."""
+        T = dgm(self.robot.tree, q, self.frame)
+        turn = rotation_vectors_of(target[:3, :3] @ T[:3, :3].T)
+        return np.concatenate((target[:3, 3] - T[:3, 3], turn))
+
+    def _counts(self) -> NDArray[np.bool_]:
+        """Components (6,) that a pose must have; turns that follow from the position are free."""
+        turns = max(self.columns) < 3 and np.abs(self._twists(self.q_home)[3:]).max() > _RANK
+        return np.repeat([True, not turns], 3)
 
     def _reached(self, T: ArrayLike) -> Array:
         """Joints at poses; raises where one is not reached."""
@@ -167,15 +185,14 @@ class LoopedPlatform(Value):
         return -J @ self._twist_rates(q, _times(J, V)) @ J
 
     def closed(self, q: ArrayLike, T0: ArrayLike | None) -> tuple[Any, ...]:
-        """Fields of `PlatformPoses` at actuated positions (..., m), from poses nearby."""
-        q = as_core(q, (self.m,), "q")
+        """Fields of `PlatformPoses` at actuated positions (..., m), by one closing of the loops."""
         guess = self.q_home if T0 is None else self._reached(T0)
-        found = loops.close(self.robot, q, guess)
+        found = loops.close(self.robot, as_core(q, (self.m,), "q"), guess)
         residual = np.asarray(found.residual)
         good, det = residual < 1e-9, self._side(found.q)
         T = np.where(good[..., None, None], dgm(self.robot.tree, found.q, self.frame), np.nan)
         code = np.where(good, np.where(det * self._side(guess) < 0.0, 2, 0), 1).astype(np.int8)
-        return T, code, np.zeros(good.shape, np.int64), residual, np.where(good, det, np.nan)
+        return T, code, np.ones(good.shape, np.int64), residual, np.where(good, det, np.nan)
 
     def _side(self, q: Array) -> Array:
         """Determinants of the inverse Jacobian's independent columns; 0 where there is none."""
@@ -183,27 +200,29 @@ class LoopedPlatform(Value):
         for i in np.ndindex(out.shape):
             try:
                 det = np.linalg.det(self._twists(q[i])[list(self.columns)])
-                out[i] = 1.0 / det if abs(det) > 1e-300 else 0.0
             except LoopError:
-                out[i] = 0.0
+                continue
+            out[i] = 1.0 / det if abs(det) > 1e-300 else 0.0
         return out
 
     def assemblies(self, q: Array) -> tuple[Any, ...]:
         """Assembly modes from random starts, home the first, of N rows (N, m)."""
         T = np.full((len(q), _STARTS, 4, 4), np.nan)
         residual, det = np.full(T.shape[:2], np.nan), np.full(T.shape[:2], np.nan)
-        random = np.random.default_rng(0).uniform(-np.pi, np.pi, (_STARTS, self.robot.n))
-        random[0] = 0.0
+        starts = np.random.default_rng(0).uniform(-np.pi, np.pi, (_STARTS, self.robot.n))
+        starts[0] = 0.0
+        starts = (self.q_home + starts * self.robot.units)[:, self.robot.passive]
+        count = np.zeros(len(q), np.int64)
         for s, row in enumerate(q):
-            starts = self.q_home + random * self.units
             found = loops.close(self.robot, np.broadcast_to(row, (_STARTS, self.m)), starts)
-            joints = self._without_turns(found.q)
-            poses = dgm(self.robot.tree, joints, self.frame)
+            poses = dgm(self.robot.tree, found.q, self.frame)
             for k in np.flatnonzero(np.asarray(found.residual) < 1e-9):
                 if not (np.abs(T[s] - poses[k]).max(axis=(1, 2)) < 1e-6).any():
-                    T[s, k], residual[s, k] = poses[k], found.residual[k]
-                    det[s, k] = self._side(joints[k])
-        return T, residual, det, np.full(len(q), 2, np.int8), (~np.isnan(det)).sum(axis=1)
+                    place = s, count[s]
+                    T[place], residual[place] = poses[k], found.residual[k]
+                    det[place] = self._side(found.q[k])
+                    count[s] += 1
+        return T, residual, det, np.full(len(q), 2, np.int8), count
 
     def _motion(self, T: ArrayLike, V: ArrayLike, A: ArrayLike) -> tuple[Array, ...]:
         """Joints, velocities, accelerations, and the map from actuated velocities to twists."""
@@ -214,34 +233,31 @@ class LoopedPlatform(Value):
         v = _times(G, rate)
         second = _times(J, A - _times(self._twist_rates(q, rate), rate))
         a = _times(G, second) + _times(loops.velocity_map_rate(self.robot, q, v), rate)
-        return np.broadcast_to(q, a.shape), np.broadcast_to(v, a.shape), a, P
+        return np.broadcast_to(q, a.shape), np.broadcast_to(v, a.shape), a, np.swapaxes(P, -1, -2)
 
-    def idm(self, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike | None) -> Array:
+    def idm(self, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike) -> Array:
         """Inverse dynamic model, as `parallel.idm`."""
-        q, v, a, P = self._motion(T, V, A)
-        W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
-        return loops.idm(self.robot, q, v, a) + _times(np.swapaxes(P, -1, -2), W)
+        q, v, a, Pt = self._motion(T, V, A)
+        return loops.idm(self.robot, q, v, a) + _times(Pt, as_core(wrench, (6,), "wrench"))
 
-    def ddm(self, T: ArrayLike, V: ArrayLike, tau: Array, wrench: ArrayLike | None) -> Array:
+    def ddm(self, T: ArrayLike, V: ArrayLike, tau: ArrayLike, wrench: ArrayLike) -> Array:
         """Direct dynamic model, as `parallel.ddm`."""
-        q, v, _, P = self._motion(T, V, np.zeros(6))
-        W = as_core(np.zeros(6) if wrench is None else wrench, (6,), "wrench")
-        a = loops.ddm(self.robot, q, v, tau - _times(np.swapaxes(P, -1, -2), W))
+        q, v, _, Pt = self._motion(T, V, np.zeros(6))
+        load = _times(Pt, as_core(wrench, (6,), "wrench"))
+        a = loops.ddm(self.robot, q, v, as_core(tau, (self.m,), "tau") - load)
         tree, frame = self.robot.tree, self.frame
         return _times(jacobian(tree, q, frame), a) + _times(jacobian_rate(tree, q, v, frame), v)
 
     def singular_motions(self, T: ArrayLike, epsilon: float) -> tuple[int, Array]:
         """Code of `SingularityKind` at a pose, and twists (k, 6) with locked actuators."""
         q, loose = self._reached(T), np.sqrt(epsilon)
-        unit = np.repeat([1.0, self.length], 3)
-        Jp = jacobian(self.robot.tree, q, self.frame) * unit[:, None] * self.units
-        J = loops.closure_jacobian(self.robot, q) * self.units
-        passive = np.setdiff1d(np.arange(self.robot.n), self.actuated)
-        locked = Jp[:, passive] @ _null(J[:, passive], epsilon).T
-        U, s, _ = np.linalg.svd(locked, full_matrices=False)
-        gained = (U / unit[:, None])[:, s > loose * max(1.0, s.max(initial=0.0))].T
-        free = np.linalg.matrix_rank(Jp @ _null(J, epsilon).T, tol=loose)
-        idle = _null(np.concatenate((J, Jp)), epsilon)[:, self.actuated]
+        unit, units = np.repeat([1.0, self.length], 3)[:, None], self.robot.units
+        Jp = jacobian(self.robot.tree, q, self.frame) * unit * units
+        J, passive = loops.closure_jacobian(self.robot, q) * units, self.robot.passive
+        U, s, _ = np.linalg.svd(Jp[:, passive] @ null_space(J[:, passive], epsilon).T)
+        gained = (U / unit)[:, : len(s)][:, s > loose * max(1.0, s.max(initial=0.0))].T
+        free = np.linalg.matrix_rank(Jp @ null_space(J, epsilon).T, tol=loose)
+        idle = null_space(np.concatenate((J, Jp)), epsilon)[:, self.actuated]
         if len(gained) and free > self.m:
             return 4, gained
         return int(np.abs(idle).max(initial=0.0) > loose) + 2 * bool(len(gained)), gained
@@ -253,41 +269,7 @@ class LoopedPlatform(Value):
 def from_loops(
     looped_robot: loops.LoopedRobot, platform_frame: str | int, q_home: ArrayLike | None = None
 ) -> LoopedPlatform:
-    """Parallel robot of any kind from a robot with kinematic loops.
-
-    Parameters
-    ----------
-    looped_robot : LoopedRobot
-        The robot; its actuated joints determine the platform.
-    platform_frame : str or int
-        Name or number of the platform's frame in the tree.
-    q_home : array_like, shape (n,), optional
-        All joints near the home posture, rad or m; default the tree's zero posture. The loops are
-        closed from there.
-
-    Returns
-    -------
-    LoopedPlatform
-        Taken by the functions of this room in place of a `ParallelRobot`.
-
-    Raises
-    ------
-    InvalidValueError, LoopError, FrameNotFoundError
-        Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not
-        determine the platform, or more of them than it has freedoms.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.loops import Closure, LoopedRobot
-    >>> from robotmodels.model import RobotModel
-    >>> table = DHTable(antecedent=[0, 0, 1, 2, 3, 4], sigma=[0, 0, 0, 0, 2, 2],
-    ...                 d=[0, 0.5, 0.4, 0.4, 0.6, 0.6])
-    >>> tree = RobotModel.from_table(table)
-    >>> five = LoopedRobot(tree, [Closure("cut", (5, 6), "point")], actuated=[0, 1])
-    >>> from_loops(five, 5, [2.0, 1.0, -1.0, 1.0]).m
-    2
-    """
+    """Parallel robot of any kind from a robot with kinematic loops."""
     if not isinstance(looped_robot, loops.LoopedRobot):
         raise InvalidValueError(
             f"looped_robot: expected a loops.LoopedRobot, got {type(looped_robot).__name__}."
@@ -315,28 +297,13 @@ def from_loops(
     return LoopedPlatform(looped_robot, platform_frame, found.q, tuple(columns))
 
 
-def _times(J: Array, x: Array) -> Array:
-    """Products of matrices and vectors with batches."""
-    return np.einsum("...ij,...j->...i", J, x)
-
-
-def _difference(T: Array, target: Array) -> Array:
-    """Small twists from poses to others. Shapes: (N, 4, 4) -> (N, 6)."""
-    turn = target.copy()
-    turn[:, :3, :3] = target[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)
-    return np.concatenate((target[:, :3, 3] - T[:, :3, 3], rotation_vector(turn)), axis=1)
-
-
-def _between(start: Array, end: Array) -> Array:
-    """Poses between two, the last included. Shapes: -> (N, 4, 4)."""
-    share = np.linspace(0.0, 1.0, _PIECES + 1)[1:, None]
-    T = pose_at(share * _difference(start[None], end[None]))
-    T[:, :3, :3] = T[:, :3, :3] @ start[:3, :3]
-    T[:, :3, 3] += start[:3, 3]
-    return T
-
-
-def _null(A: Array, epsilon: float) -> Array:
+def null_space(A: Any, epsilon: float) -> Array:
     """Orthonormal basis of a null space. Shapes: (r, n) -> (k, n)."""
     _, s, Vt = np.linalg.svd(A)
     return Vt[int((s > epsilon * max(s.max(initial=0.0), 1e-300)).sum()) :]
+
+
+def _times(J: Array, x: Array) -> Array:
+    """Products of matrices and vectors with batches."""
+    batch_shape((J[..., 0], x), ("the poses' matrices", "the vector"))
+    return np.einsum("...ij,...j->...i", J, x)

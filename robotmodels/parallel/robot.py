@@ -1,17 +1,30 @@
-"""Description of a parallel robot: a platform on legs, with what moves and what limits it."""
+"""Description of a parallel robot: a platform on legs; base of the results of its models."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Value, as_core, as_exact, as_floats, read_only
+from .._arrays import (
+    Array,
+    Rebuilt,
+    Value,
+    as_core,
+    as_exact,
+    as_floats,
+    as_number,
+    as_reals,
+    read_only,
+    value_hash,
+)
+from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
+from ..se3.orientation import rotation_vectors_of
 
 _OFF = 1e-6  # of a pose from the freedoms of the platform, rad, and of the size of the robot
 _AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -137,12 +150,8 @@ class ParallelRobot(Value):
     def coordinates(self, T: ArrayLike) -> Array:
         """Coordinates (..., m) of poses: position and rotation vector, (x, y, phi), (x, y, z)."""
         T = self.checked(T)
-        turn = np.zeros_like(T[..., :3, 3])
-        if 3 in self.columns:
-            turn = rotation_vector(T)
-        elif 5 in self.columns:
-            turn[..., 2] = np.arctan2(T[..., 1, 0], T[..., 0, 0])
-        return np.concatenate((T[..., :3, 3], turn), axis=-1)[..., list(self.columns)]
+        full = np.concatenate((T[..., :3, 3], rotation_vectors_of(T[..., :3, :3])), axis=-1)
+        return full[..., list(self.columns)]
 
     def pose(self, coordinates: ArrayLike) -> Array:
         """Poses (..., 4, 4) of coordinates (..., m), the inverse of `coordinates`."""
@@ -199,42 +208,49 @@ class ParallelRobot(Value):
                 "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
                 "(mass, position, inertia)."
             )
-        mass, com = float(as_exact(platform[0], (), "mass")), as_exact(platform[1], (3,), "com")
+        mass, com = as_number(platform[0], "mass", least=0.0), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
         size = np.abs(inertia).max()
-        odd = np.abs(inertia - inertia.T).max() > 1e-9 * size
-        if odd or np.linalg.eigvalsh(inertia).min() < -1e-12 * size:
+        least = np.linalg.eigvalsh(inertia).min()
+        if np.abs(inertia - inertia.T).max() > 1e-9 * size or least < -1e-12 * size:
             raise InvalidValueError(
                 "inertia: expected a symmetric matrix about the centre of mass with positive "
                 f"principal moments, got {inertia.tolist()}."
             )
-        both = np.array([[_for_legs(value, self.m) for value in part] for part in parts])
-        if mass < 0.0 or (both[:, [0, 2]] < 0.0).any():
-            raise InvalidValueError("platform, legs: masses and inertias must not be negative.")
-        first, second = (read_only(part.T) for part in both)
+        least = (0.0, -np.inf, 0.0)
+        both = [
+            as_floats([for_legs(part[k], self.m, "legs", least[k]) for k in range(3)], "legs").T
+            for part in parts
+        ]
         g = self.gravity if gravity is None else as_exact(gravity, (3,), "gravity")
-        masses = Masses(mass, read_only(com), read_only(inertia), first, second)
+        masses = Masses(mass, *map(read_only, (com, inertia, *both)))
         return replace(self, masses=masses, gravity=g)
 
     def __repr__(self) -> str:
         q = "angle" if self.has_cranks else "length"
-        ends = (self.lower.min(), self.upper.max())
-        least = {0.0, -np.inf} if not self.has_cranks else {-np.inf}
-        first = "" if np.isfinite(ends[1]) else "from "
-        words = [] if ends[0] in least else [f"{first}{ends[0]:.4g}"]
-        words += [f"to {ends[1]:.4g}"] if np.isfinite(ends[1]) else []
-        limits = " ".join([q, *words]) if words else "no limits"
+        none = (-np.inf if self.has_cranks else 0.0, np.inf)
+        limits = f"{q} {self.lower.min():.4g} to {self.upper.max():.4g}"
+        limits = "no limits" if (self.lower.min(), self.upper.max()) == none else limits
         words = "with" if self.masses is not None else "without"
-        name = self.family.value[0]
-        return f"<{name}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
+        return f"<{self.family.value[0]}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
 
 
-def _for_legs(value: ArrayLike, m: int) -> Array:
-    """A number or one for each leg. Shapes: -> (m,)."""
-    given = as_floats(value, "legs")
+def for_legs(value: ArrayLike, m: int, name: str, least: float = -np.inf) -> Array:
+    """A number or one for each leg, perhaps infinite, from a least one. Shapes: -> (m,)."""
+    given = as_reals(value, name)
     if given.shape not in ((), (m,)):
-        raise ShapeError(f"legs: expected numbers or shape ({m},), got {given.shape}.")
+        raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
+    if not (given >= least).all():
+        words = {0.0: "numbers that are not negative", -np.inf: "numbers"}
+        raise InvalidValueError(
+            f"{name}: expected {words.get(least, 'lengths above 0 m')}, got {value!r:.60}."
+        )
     return np.broadcast_to(given, (m,))
+
+
+def only_freedoms(robot: ParallelRobot, V: Array) -> Array:
+    """Twists or rows without the components that the platform does not have."""
+    return V if robot.m == 6 else V * [k in robot.columns for k in range(6)]
 
 
 def pose_at(twist: Array) -> Array:
@@ -250,10 +266,48 @@ def pose_at(twist: Array) -> Array:
     return T
 
 
-def rotation_vector(T: Array) -> Array:
-    """Rotation vectors of poses. Shapes: (..., 4, 4) -> (..., 3)."""
-    from scipy.spatial.transform import Rotation
+class Result(Rebuilt):
+    """Base of results; of batches they have a ``status`` (...) and perhaps ``valid`` (..., S)."""
 
-    R = np.ascontiguousarray(T[..., :3, :3]).reshape(-1, 3, 3)
-    vectors = Rotation.from_matrix(R).as_rotvec() if len(R) else np.empty((0, 3))
-    return vectors.reshape(*T.shape[:-2], 3)
+    __slots__ = ()
+    outcomes: ClassVar[type[Outcome]]
+
+    def __post_init__(self) -> None:
+        for value in self._values:
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of solutions of each row, shape (...)."""
+        return self.valid.sum(axis=-1)  # type: ignore[attr-defined]
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Outcome of row i as a sentence; i is left out for a single row."""
+        status = np.asarray(self.status)  # type: ignore[attr-defined]
+        try:
+            return self.outcomes(int(status[i])).sentence
+        except (IndexError, TypeError):
+            raise InvalidValueError(
+                f"i: expected the index of a row of a batch of shape {status.shape}, got {i!r:.40}."
+            ) from None
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and all(map(_same, self._values, other._values))  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return value_hash(type(self).__name__, *self._values)
+
+    def __repr__(self) -> str:
+        named = zip((f.name for f in fields(self)), self._values, strict=True)  # type: ignore[arg-type]
+        shapes = [f"{name} {x.shape}" for name, x in named if isinstance(x, np.ndarray)]
+        return f"<{type(self).__name__}: {', '.join(shapes)}>"
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Equality of fields; NaN equals NaN."""
+    return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")

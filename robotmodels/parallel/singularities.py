@@ -1,4 +1,45 @@
-"""Singular configurations: kinds, motions gained, Grassmann varieties of the legs' lines."""
+"""Singular configurations: kinds, motions gained, Grassmann varieties of the legs' lines.
+
+Parameters
+----------
+robot : ParallelRobot or LoopedPlatform
+    The robot, m legs.
+T : array_like, shape (4, 4)
+    One pose of the platform.
+mode : int, optional
+    Working mode of robots with cranks, as numbered by `igm`; default 0.
+tolerance : float
+    Singular values below this fraction of the largest are zero, and sines of elbows.
+
+Returns
+-------
+Singularity
+    ``kind``; ``motion`` (k, 6), twists [v; w] of the platform that locked actuators do not prevent,
+    norm 1 with angles times the characteristic length, world axes, at the platform's origin;
+    ``legs``, the smallest set of legs whose lines depend on each other, at serial singularities the
+    straight ones, from 0; ``variety``, the class of these lines in Grassmann geometry, "1" to "4",
+    "5a", "5b", which is the dimension they span, empty where they are independent, and ``form``,
+    the same with Merlet's letter; ``least``, the smallest singular value of the unit lines,
+    relative to the largest.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Several poses, poses that the platform cannot have or the legs do not reach.
+
+References
+----------
+Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
+parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
+
+Examples
+--------
+>>> from robotmodels.parallel import gough_symmetric
+>>> robot = gough_symmetric(1.0)
+>>> turned = classify_singularity(robot, robot.pose([0, 0, 1.2, 0, 0, np.pi / 2]))
+>>> turned.kind.name, turned.variety, turned.motion.shape
+('PARALLEL', '5a', (1, 6))
+"""
 
 from __future__ import annotations
 
@@ -11,11 +52,10 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_number
 from .._outcomes import Outcome
 from ..errors import ShapeError
-from .legs import check_robot, leg_states
-from .looped import LoopedPlatform
-from .results import Result
-from .robot import Family, ParallelRobot
-from .velocities import Mode, Robot, modes_of
+from .legs import Mode, Robot, is_looped, leg_states, modes_of
+from .looped import null_space
+from .robot import Family, Result
+from .velocities import states
 
 _WORDS = {
     "": "the lines are independent",
@@ -46,26 +86,7 @@ class SingularityKind(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Singularity(Result):
-    """Kind of a pose, and what the platform gains there. Read-only.
-
-    Parameters
-    ----------
-    kind : SingularityKind
-        Kind of the position.
-    motion : ndarray, shape (k, 6)
-        Twists [v; w] of the platform that locked actuators do not prevent, norm 1 with angles times
-        the characteristic length; world axes, at the platform's origin.
-    legs : tuple of int
-        Smallest set of legs whose lines depend on each other; of serial singularities the straight
-        legs. From 0.
-    variety : str
-        Class of the lines of ``legs`` in Grassmann geometry: "1" to "4", "5a", "5b", which is the
-        dimension they span; empty where the lines are independent.
-    form : str
-        The same with Merlet's letter, "3c" for instance.
-    least : float
-        Smallest singular value of the unit lines, relative to the largest.
-    """
+    """Kind of a pose, and what the platform gains there. Read-only."""
 
     kind: SingularityKind
     motion: Array
@@ -80,13 +101,7 @@ class Singularity(Result):
         return self.kind
 
     def reason(self) -> str:
-        """Kind of the position and form of the lines as a sentence.
-
-        Returns
-        -------
-        str
-            The sentence.
-        """
+        """Kind of the position and form of the lines as a sentence."""
         if not self.form:
             return self.kind.sentence
         names = ", ".join(str(i + 1) for i in self.legs)
@@ -100,101 +115,41 @@ class Singularity(Result):
 def classify_singularity(
     robot: Robot, T: ArrayLike, mode: Mode = None, tolerance: float = 1e-8
 ) -> Singularity:
-    """Kind of a pose, motions gained, dependent legs and their Grassmann variety.
-
-    Parameters
-    ----------
-    robot : ParallelRobot or LoopedPlatform
-        The robot, m legs.
-    T : array_like, shape (4, 4)
-        One pose of the platform.
-    mode : int, optional
-        Working mode of robots with cranks, as numbered by `igm`; default 0.
-    tolerance : float
-        Singular values below this fraction of the largest are zero, and sines of elbows.
-
-    Returns
-    -------
-    Singularity
-        The kind, with the rest.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Several poses, poses that the platform cannot have or the legs do not reach.
-
-    References
-    ----------
-    Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
-    parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.parallel import classify_singularity, gough_symmetric
-    >>> turned = classify_singularity(gough_symmetric(1.0), [[0, -1, 0, 0], [1, 0, 0, 0],
-    ...                                                      [0, 0, 1, 1.2], [0, 0, 0, 1]])
-    >>> turned.kind.name, turned.variety, turned.motion.shape
-    ('PARALLEL', '5a', (1, 6))
-    """
-    check_robot(robot)
+    """Kind of a pose, motions gained, dependent legs and their Grassmann variety."""
     epsilon = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     if np.ndim(getattr(T, "homogeneous", T)) != 2:
         raise ShapeError(f"T: expected one pose, shape (4, 4), got {np.shape(T)}; loop over poses.")
-    if isinstance(robot, LoopedPlatform):
-        kind, motion = robot.singular_motions(T, epsilon)
+    if is_looped(robot, mode):
+        code, motion = robot.singular_motions(T, epsilon)
         least = 0.0 if len(motion) else 1.0
-        return Singularity(SingularityKind(kind), motion, (), "", "", least)
+        return Singularity(SingularityKind(code), motion, (), "", "", least)
     pose = robot.checked(T)[None]
     legs = leg_states(robot, pose, modes_of(robot, mode, (1,)))
     if not legs.reached.all():
-        # raises with the sentence
-        from .velocities import states
-
-        states(robot, pose[0], mode)
+        states(robot, mode, pose[0])  # raises with the sentence
     size = robot.crank if robot.has_cranks else np.ones(robot.m)
     straight = np.flatnonzero(np.abs(legs.speed[0]) <= epsilon * size)
-    unit = np.repeat([1.0, 1.0 / robot.length], 3)
+    unit, columns = np.repeat([1.0, 1.0 / robot.length], 3), list(robot.columns)
     rows = legs.rows[0] * unit
-    columns = list(robot.columns)
-    s, motion = _kernel(rows[:, columns], epsilon)
+    s = np.linalg.svd(rows[:, columns], compute_uv=False)
+    motion = null_space(rows[:, columns], epsilon)
     gained = np.zeros((len(motion), 6))
     gained[:, columns] = motion * unit[columns]
     dependent, form = (), ""
     if len(motion):
-        dependent, form = grassmann(_lines(robot, legs.rows[0], legs.arm[0], pose[0]), epsilon)
+        if 5 not in columns:  # rods of a platform that does not turn act as if they met in a point
+            rows[:, 3:] = 0.0
+        dependent, form = grassmann(rows, epsilon)
     kind = SingularityKind((1 if straight.size else 0) + (2 if len(motion) else 0))
-    turning = _lost_constraints(robot, legs.direction[0], epsilon)
-    if len(turning):
-        kind, gained = SingularityKind.CONSTRAINT, np.vstack((gained, turning))
+    if robot.family is Family.DELTA:  # rotations that the pairs of rods do not prevent
+        hips = np.cross(robot.outward, robot.downward)
+        turning = null_space(np.cross(hips, legs.direction[0]), epsilon)
+        if len(turning):
+            kind = SingularityKind.CONSTRAINT
+            gained = np.vstack((gained, np.pad(turning / robot.length, ((0, 0), (3, 0)))))
     chosen = dependent or tuple(int(i) for i in straight)
     variety = form if form.startswith("5") else form[:1]
     return Singularity(kind, gained, chosen, variety, form, float(s[-1] / s[0]))
-
-
-def _kernel(A: Array, epsilon: float) -> tuple[Array, Array]:
-    """Singular values, and an orthonormal basis of the null space. Shapes: (m, k) -> (r, k)."""
-    _, s, Vt = np.linalg.svd(A)
-    full = np.zeros(A.shape[1])
-    full[: len(s)] = s
-    return full, Vt[full <= epsilon * max(full[0], 1e-300)]
-
-
-def _lines(robot: ParallelRobot, rows: Array, arm: Array, T: Array) -> Array:
-    """Unit lines [u; moment] about the platform's origin, moments in units of the robot."""
-    if 5 in robot.columns:
-        return rows / np.repeat([1.0, robot.length], 3)
-    # the rods of a platform that does not turn act as if they met in one point
-    return np.concatenate((rows[:, :3], np.zeros_like(arm)), axis=1)
-
-
-def _lost_constraints(robot: ParallelRobot, direction: Array, epsilon: float) -> Array:
-    """Rotations that the pairs of rods of a Delta do not prevent. Shapes: (m, 3) -> (k, 6)."""
-    if robot.family is not Family.DELTA:
-        return np.empty((0, 6))
-    hips = np.cross(robot.outward, robot.downward)
-    _, free = _kernel(np.cross(hips, direction), epsilon)
-    return np.concatenate((np.zeros_like(free), free), axis=1) / robot.length
 
 
 def grassmann(lines: Array, epsilon: float = 1e-8) -> tuple[tuple[int, ...], str]:
@@ -221,7 +176,8 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
         return "2b"  # three lines of which none coincide
     u = L[:, :3]
     flat = np.linalg.svd(u, compute_uv=False)[-1] <= np.sqrt(epsilon)
-    meet = np.abs(_products(L)) <= np.sqrt(epsilon)
+    mutual = L[:, :3] @ L[:, 3:].T  # their sums with the transposed: zero where two lines meet
+    meet = np.abs(mutual + mutual.T) <= np.sqrt(epsilon)
     if rank == 3:
         if not meet.all():
             return "3a" if not (meet & ~np.eye(4, dtype=bool)).any() else "3b"
@@ -243,9 +199,3 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
     if abs(square) <= epsilon:
         return "4c"
     return "4b" if square > 0.0 else "4a"
-
-
-def _products(L: Array) -> Array:
-    """Mutual moments of lines, zero where two meet or are parallel. Shapes: (k, 6) -> (k, k)."""
-    M = L[:, :3] @ L[:, 3:].T
-    return M + M.T

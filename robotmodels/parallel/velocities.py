@@ -1,4 +1,4 @@
-"""Kinematic models: inverse Jacobian, velocities and accelerations of legs and platform.
+"""Kinematic and static models: inverse Jacobian, velocities, forces of the legs, indices.
 
 ``q' = J^-1 [v; w]`` with the velocity v of the platform's origin and its angular velocity w, world
 axes. Columns of components that the platform does not have are zero.
@@ -15,11 +15,20 @@ twist, acceleration : array_like, shape (..., 6)
     Velocity [v; w] of the platform and its time derivative, m/s, rad/s and per s.
 q_rate, q_acceleration : array_like, shape (..., m)
     Velocities and accelerations of the actuators, m/s or rad/s and per s.
+wrench : array_like, shape (..., 6)
+    Wrench [f; m] of the platform at its origin, exerted on the environment, world axes, N and N m.
+k : array_like, scalar or shape (m,)
+    Stiffness of the actuators, N/m or N m/rad, not negative.
+length : float, optional
+    Metres that equal a radian; default `ParallelRobot.length`. The indices mean nothing without
+    it where the platform also rotates.
 
 Returns
 -------
 ndarray
-    Matrices (..., m, 6), motion of the actuators (..., m), or of the platform (..., 6).
+    Matrices (..., m, 6) or (..., 6, 6), motion of the actuators (..., m) or of the platform
+    (..., 6), indices (...); `LegForces` with ``forces`` (..., m), N, or N m of cranks, and
+    ``status`` (...), codes of `ForceStatus`.
 
 Raises
 ------
@@ -29,7 +38,7 @@ ShapeError, InvalidValueError, NotARotationError
 
 References
 ----------
-Seed book section 2.3.2.
+Seed book sections 2.3.2, 2.3.3.1 (statics) and 2.3.3.4 (maneuverability and condition number).
 
 Examples
 --------
@@ -38,23 +47,27 @@ Examples
 >>> rates = ikm(robot, robot.home, V)
 >>> inverse_jacobian(robot, robot.home).shape, dkm(robot, robot.home, rates).round(6).tolist()
 ((6, 6), [0.1, 0.2, 0.3, 0.1, 0.0, 0.2])
+>>> turned = robot.pose([0, 0, 1, 0, 0, np.pi / 2])
+>>> bool(condition(robot, turned) > 1e14), leg_forces(robot, turned, np.ones(6)).reason()
+(True, 'The pose is singular: no bounded forces of the legs balance every wrench.')
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core
+from .._arrays import Array, as_core, as_floats, as_number, batch_rows, batch_shape
+from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
-from .legs import LegStates, check_robot, leg_states
-from .looped import LoopedPlatform
-from .robot import ParallelRobot
+from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
+from .robot import ParallelRobot, Result, only_freedoms
 
-Robot = ParallelRobot | LoopedPlatform
-Mode = int | ArrayLike | None
 _STRAIGHT = 1e-12
-_SINGULAR = 1e-13  # singular values below this, relative, are zero in `dkm`
+_SINGULAR = 1e-12  # smallest singular value, relative
 
 
 def inverse_jacobian(robot: Robot, T: ArrayLike, mode: Mode = None) -> Array:
@@ -62,25 +75,17 @@ def inverse_jacobian(robot: Robot, T: ArrayLike, mode: Mode = None) -> Array:
 
     Of robots with cranks they are divided by the velocities of the knees along the rods.
     """
-    check_robot(robot)
-    if isinstance(robot, LoopedPlatform):
-        _only_mode_zero(mode)
+    if is_looped(robot, mode):
         return robot.inverse_jacobian(T)
-    poses, legs = states(robot, T, mode)
-    return legs.jacobian.reshape(*poses.shape[:-2], robot.m, 6)
+    batch, _, legs, _ = states(robot, mode, T)
+    return legs.jacobian.reshape(*batch, robot.m, 6)
 
 
 def inverse_jacobian_rate(robot: Robot, T: ArrayLike, twist: ArrayLike, mode: Mode = None) -> Array:
     """Time derivative (..., m, 6) of the inverse Jacobian along a motion of the platform."""
-    check_robot(robot)
-    V = as_core(twist, (6,), "twist")
-    if isinstance(robot, LoopedPlatform):
-        _only_mode_zero(mode)
-        return robot.inverse_jacobian_rate(T, V)
-    poses = robot.checked(T)
-    batch = broadcast(poses.shape[:-2], V.shape[:-1])
-    _, legs = states(robot, np.broadcast_to(poses, (*batch, 4, 4)), mode)
-    V = only_freedoms(robot, np.broadcast_to(V, (*batch, 6)).reshape(-1, 6))
+    if is_looped(robot, mode):
+        return robot.inverse_jacobian_rate(T, as_core(twist, (6,), "twist"))
+    batch, _, legs, (V,) = states(robot, mode, T, twist=twist)
     return rates_of_rows(robot, legs, V).reshape(*batch, robot.m, 6)
 
 
@@ -95,14 +100,10 @@ def dkm(robot: Robot, T: ArrayLike, q_rate: ArrayLike, mode: Mode = None) -> Arr
     At parallel singularities the twist is not unique: the one of least norm is returned, angles
     times the characteristic length. See `classify_singularity`.
     """
-    check_robot(robot)
-    rate = as_core(q_rate, (robot.m,), "q_rate")
-    columns, unit = list(robot.columns), scales(robot, robot.length)
-    J = inverse_jacobian(robot, T, mode)[..., columns] * unit
-    inverse: Array = np.linalg.pinv(J, rcond=_SINGULAR)  # type: ignore[assignment]
-    part = _times(inverse, rate) * unit
+    inverse: Array = np.linalg.pinv(_unitless(robot, T, None, mode), rcond=0.1 * _SINGULAR)  # type: ignore[assignment]
+    part = _times(inverse, as_core(q_rate, (robot.m,), "q_rate"))
     V = np.zeros((*part.shape[:-1], 6))
-    V[..., columns] = part
+    V[..., list(robot.columns)] = part * scales(robot, robot.length)
     return V
 
 
@@ -123,40 +124,114 @@ def dkm_second_order(
     return dkm(robot, T, as_core(q_acceleration, (robot.m,), "q_acceleration") - drift, mode)
 
 
+class ForceStatus(Outcome):
+    """Outcome of the statics of a pose."""
+
+    BALANCED = 0, "The forces of the legs balance the wrench."
+    UNBOUNDED = 1, "The pose is singular: no bounded forces of the legs balance every wrench."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LegForces(Result):
+    """Forces (..., m) of the actuators, positive where a leg pushes; NaN at singular poses."""
+
+    outcomes: ClassVar = ForceStatus
+    forces: Array
+    status: NDArray[np.int8]
+
+
+def leg_forces(robot: Robot, T: ArrayLike, wrench: ArrayLike, mode: Mode = None) -> LegForces:
+    """Forces or torques of the actuators for a wrench: ``J^-T forces = wrench``.
+
+    Components of the wrench that the platform cannot move along are borne by the joints.
+    """
+    J, W = _unitless(robot, T, None, mode), as_core(wrench, (6,), "wrench")
+    U, s, Vt = np.linalg.svd(J)
+    singular = s[..., -1:] <= _SINGULAR * s[..., :1]
+    part = _times(Vt, W[..., list(robot.columns)] * scales(robot, robot.length))
+    forces = _times(U, part / np.where(singular, np.nan, s))
+    return LegForces(forces, np.isnan(forces[..., 0]).astype(np.int8))
+
+
+def stiffness(robot: Robot, T: ArrayLike, k: ArrayLike, mode: Mode = None) -> Array:
+    """Stiffness matrix (..., 6, 6) of the platform on elastic actuators, ``J^-T diag(k) J^-1``."""
+    J, values = inverse_jacobian(robot, T, mode), as_floats(k, "k")
+    if values.shape not in ((), (robot.m,)):
+        raise ShapeError(f"k: expected a number or shape ({robot.m},), got {values.shape}.")
+    if (values < 0.0).any():
+        raise InvalidValueError(f"k: expected values that are not negative, got {values.min():g}.")
+    return np.swapaxes(J, -1, -2) @ (np.broadcast_to(values, (robot.m,))[:, None] * J)
+
+
+def maneuverability(
+    robot: Robot, T: ArrayLike, length: float | None = None, mode: Mode = None
+) -> Array:
+    """Maneuverability ``sqrt(det(J J^T)) = 1 / |det J^-1|``: volume of the velocity ellipsoid.
+
+    Yoshikawa's manipulability of the Jacobian J; infinite at parallel singularities.
+    """
+    with np.errstate(divide="ignore"):
+        return 1.0 / _singular_values(robot, T, length, mode).prod(axis=-1)
+
+
+def condition(robot: Robot, T: ArrayLike, length: float | None = None, mode: Mode = None) -> Array:
+    """Condition number of the Jacobian: 1 where isotropic, infinite at parallel singularities."""
+    s = _singular_values(robot, T, length, mode)
+    with np.errstate(divide="ignore"):
+        return s[..., 0] / s[..., -1]
+
+
+def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
+    """Determinant of the unit lines of the legs: zero at parallel singularities, NaN out of reach.
+
+    Its sign tells the sides of singular positions apart, see `assembly_modes`; its zeros in a
+    section are the singular curves. Unit m for each rotation of the platform.
+    """
+    if is_looped(robot, mode):
+        raise InvalidValueError(
+            "robot: the legs of kinematic loops are not known; see condition and "
+            "classify_singularity."
+        )
+    poses = robot.checked(T)
+    modes = modes_of(robot, mode, poses.shape[:-2])
+    legs = leg_states(robot, poses.reshape(-1, 4, 4), modes)
+    det = np.linalg.det(legs.rows[..., list(robot.columns)])
+    return np.where(legs.reached, det, np.nan).reshape(poses.shape[:-2])
+
+
 def rates_of_rows(robot: ParallelRobot, legs: LegStates, V: Array) -> Array:
-    """Time derivative of the inverse Jacobian. Shapes: legs of N poses, V (N, 6) -> (N, m, 6)."""
-    v, w = V[:, None, :3], V[:, None, 3:]
+    """Time derivative of the inverse Jacobian. Shapes: V (..., 6) -> (..., m, 6)."""
+    v, w = V[..., None, :3], V[..., None, 3:]
     J, u = legs.jacobian, legs.direction
-    rate = np.einsum("nij,nj->ni", J, V)[..., None]
+    rate = np.einsum("...ij,...j->...i", J, V)[..., None]
     spin = np.cross(w, legs.arm)
-    swing = legs.knee - robot.base
-    turning = np.cross(np.cross(robot.outward, robot.downward), swing)
-    # rate of the unit vectors
-    if robot.has_cranks:
-        turn = (v + spin - rate * turning) / robot.rod[:, None]
-    else:
-        turn = (v + spin - rate * u) / legs.q[..., None]
+    # rates of the unit vectors, then of their moments
+    turn = (v + spin - rate * legs.turning) / legs.size[..., None]
     moments: Array = np.cross(spin, u) + np.cross(legs.arm, turn)  # type: ignore[assignment]
-    rows = np.concatenate((turn, moments), axis=-1)
-    rows = only_freedoms(robot, rows)
+    rows = only_freedoms(robot, np.concatenate((turn, moments), axis=-1))
     if robot.has_cranks:
-        slower = (turn * turning).sum(-1, keepdims=True) - rate * (u * swing).sum(-1, keepdims=True)
+        swing = legs.knee - robot.base
+        slower = (turn * legs.turning - rate * u * swing).sum(axis=-1, keepdims=True)
         rows = rows - J * slower
     return rows / legs.speed[..., None]
 
 
-def scales(robot: Robot, length: float) -> Array:
-    """Units of the twist's components that the platform has: 1 m, or 1/length rad."""
-    return np.where(np.array(robot.columns) < 3, 1.0, 1.0 / length)
+def states(
+    robot: ParallelRobot, mode: Mode, T: ArrayLike, **vectors: ArrayLike
+) -> tuple[tuple[int, ...], Array, LegStates, list[Array]]:
+    """Batch; poses, states of the legs and vectors in N rows; raises where a leg has no velocity.
 
-
-def states(robot: ParallelRobot, T: ArrayLike, mode: Mode) -> tuple[Array, LegStates]:
-    """Checked poses and the states of the legs in N rows; raises where one is missing."""
+    Vectors are twists and wrenches (..., 6), and forces (..., m) under the name of tau.
+    """
     poses = robot.checked(T)
-    legs = leg_states(robot, poses.reshape(-1, 4, 4), modes_of(robot, mode, poses.shape[:-2]))
+    given = [as_core(x, (robot.m if k == "tau" else 6,), k) for k, x in vectors.items()]
+    flat = (poses.reshape(*poses.shape[:-2], 16), *given)
+    batch, (rows, *others) = batch_rows(flat, ("T", *vectors))
+    rows = rows.reshape(-1, 4, 4)
+    legs = leg_states(robot, rows, modes_of(robot, mode, batch))
     straight = np.abs(legs.speed) <= _STRAIGHT * (robot.crank if robot.has_cranks else 1.0)
     for n, i in np.argwhere(straight | ~legs.reached[:, None])[:1]:
-        row = f" of row {n}" if poses.ndim > 2 else ""
+        row = f" of row {n}" if batch else ""
         if not legs.reached[n]:
             raise InvalidValueError(
                 f"T: the pose{row} is out of reach of the legs, so that there is no Jacobian; see "
@@ -167,48 +242,29 @@ def states(robot: ParallelRobot, T: ArrayLike, mode: Mode) -> tuple[Array, LegSt
             f"T: leg {i + 1} {why} at the pose{row}, so that its velocity is not determined; see "
             "classify_singularity."
         )
-    return poses, legs
+    pairs = zip(vectors, others, strict=True)
+    return batch, rows, legs, [x if k == "tau" else only_freedoms(robot, x) for k, x in pairs]
 
 
-def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArray[np.int64]:
-    """Checked working modes of N poses. Shapes: -> (N,)."""
-    given, most = np.asarray(0 if mode is None else mode), 2**robot.m if robot.has_cranks else 1
-    if given.dtype.kind not in "iu" or ((given < 0) | (given >= most)).any():
-        raise InvalidValueError(
-            f"mode: expected whole numbers from 0 to {most - 1}, as igm(robot, T).mode numbers the "
-            f"working modes, got {mode!r:.60}."
-        )
-    if broadcast(given.shape, batch) != batch:
-        raise ShapeError(f"mode: expected a number or shape {batch}, got {given.shape}.")
-    return np.broadcast_to(given, batch).reshape(-1).astype(np.int64)
+def scales(robot: Robot, length: float) -> Array:
+    """Units of the twist's components that the platform has: 1 m, or 1/length rad."""
+    return np.where(np.array(robot.columns) < 3, 1.0, 1.0 / length)
 
 
-def _only_mode_zero(mode: Mode) -> None:
-    """Raise for working modes of kinematic loops, which are not numbered."""
-    if mode is not None and np.any(np.asarray(mode) != 0):
-        raise InvalidValueError(
-            f"mode: a robot from from_loops has the working mode of its home alone, got "
-            f"{mode!r:.40}; give from_loops another q_home."
-        )
+def _unitless(robot: Robot, T: ArrayLike, length: float | None, mode: Mode) -> Array:
+    """Inverse Jacobian of the platform's freedoms with angles times a length."""
+    J = inverse_jacobian(robot, T, mode)
+    metres = robot.length if length is None else as_number(length, "length", above=0.0)
+    return J[..., list(robot.columns)] * scales(robot, metres)
 
 
-def only_freedoms(robot: Robot, V: Array) -> Array:
-    """Twists or rows without the components that the platform does not have."""
-    return V * np.isin(np.arange(6), robot.columns)
-
-
-def broadcast(first: tuple[int, ...], second: tuple[int, ...]) -> tuple[int, ...]:
-    """Batch of two arguments."""
-    try:
-        return np.broadcast_shapes(first, second)
-    except ValueError:
-        raise ShapeError(
-            f"The batch axes {first} and {second} do not broadcast; give the same number of rows "
-            "in each, or a single one."
-        ) from None
+def _singular_values(robot: Robot, T: ArrayLike, length: float | None, mode: Mode) -> Array:
+    """Singular values (..., m) of the inverse Jacobian; 0 below those of a singular one."""
+    s = np.linalg.svd(_unitless(robot, T, length, mode), compute_uv=False)
+    return np.where(s <= _SINGULAR * s[..., :1], 0.0, s)
 
 
 def _times(J: Array, x: Array) -> Array:
     """Products of matrices and vectors with batches."""
-    broadcast(J.shape[:-2], x.shape[:-1])
+    batch_shape((J[..., 0], x), ("the Jacobian's rows", "the vector"))
     return np.einsum("...ij,...j->...i", J, x)

@@ -1,44 +1,81 @@
-"""Workspaces of parallel robots: limits of legs, cones of joints, interference of legs."""
+"""Workspaces of parallel robots: limits of legs, cones of joints, interference of legs.
+
+Parameters
+----------
+robot : ParallelRobot
+    The robot.
+kind : {"orientation", "dexterous", "reachable"}
+    Positions in the given orientation, in every one of them, or in at least one of them.
+orientation : array_like, shape (3, 3) or (K, 3, 3), or float, optional
+    Rotations of the platform, or its angle about z, rad. Default the home orientation; of dexterous
+    and reachable workspaces 72 angles about z, in space turned from home.
+limits : bool or tuple (lower, upper)
+    Whether the robot's limits count, or limits in their place, m or rad.
+joint_cone : float, optional
+    Largest angle between a leg and its direction at home, seen from the base and from the platform,
+    rad.
+leg_radius : float, optional
+    Radius of legs and rods, which must not touch each other, m.
+height : float, optional
+    Makes a section at this z of the world, m.
+resolution : int, optional
+    Cells along each axis; default 300 in a plane, 40 in space.
+
+Returns
+-------
+PlatformWorkspace
+    A `performance.Workspace` whose ``count`` is the number of working modes, with ``margin`` (N,)
+    at the centres of the cells: the least distance of lengths or angles from their limits, and of
+    joints and legs from theirs, m or rad, negative outside. Areas and volumes are interpolated from
+    it. ``rotations`` (K, 3, 3), ``lower`` and ``upper`` (m,) are those that count.
+
+Raises
+------
+ShapeError, InvalidValueError, NotARotationError
+    Unknown words, legs of unlimited length, rotations that the platform does not have.
+
+References
+----------
+Seed book section 2.3.3.5; C. Gosselin, "Determination of the workspace of 6-DOF parallel
+manipulators", J. of Mechanical Design 112 (1990).
+
+Examples
+--------
+>>> from robotmodels.parallel import planar_3rpr
+>>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
+>>> found = workspace(robot, orientation=0.1, resolution=100)
+>>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
+(1.2, array([ True, False]))
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations, product
+from math import factorial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_bounded, as_core, as_floats, as_number, read_only
+from .._arrays import Array, as_core, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
 from ..performance import Workspace, WorkspaceStatus
 from .families import checked_limits
-from .legs import LegStates, check_robot, leg_states
+from .legs import LegStates, is_looped, leg_states
 from .robot import ParallelRobot
 
 KINDS = ("orientation", "dexterous", "reachable")
 _ROWS = 20000  # poses at a time
+_MOST = 1e8  # cells
 _FAR = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlatformWorkspace(Workspace):
-    """Workspace of a platform: `performance.Workspace` with signed margins at the cells' centres.
-
-    Parameters
-    ----------
-    margin : ndarray, shape (N,)
-        Least distance of lengths or angles from their limits, and of joints and legs from theirs,
-        m or rad; negative outside. Areas and volumes are interpolated from it.
-    rotations : ndarray, shape (K, 3, 3)
-        Orientations that were looked at.
-    lower, upper : ndarray, shape (m,)
-        Limits that count, m or rad.
-    joint_cone, leg_radius : float or None
-        As asked for.
-    """
+    """Workspace of a platform: `performance.Workspace` with margins. Read-only."""
 
     margin: Array
     rotations: Array
@@ -58,28 +95,20 @@ class PlatformWorkspace(Workspace):
     @property
     def area(self) -> float:
         """Area that is reached, m^2; NaN in space."""
-        return self._measure if self.coordinates == "plane" else float("nan")
+        return measure(self.margin.reshape(self.shape), self.size, 2)
 
     @property
     def volume(self) -> float:
         """Volume that is reached, m^3; NaN in a plane."""
-        return self._measure if self.coordinates == "space" else float("nan")
-
-    @property
-    def _options(self) -> tuple[Any, ...]:
-        return self.rotations, self.lower, self.upper, self.joint_cone, self.leg_radius
-
-    @property
-    def _measure(self) -> float:
-        return measure(self.margin.reshape(self.shape), self.size)
+        return measure(self.margin.reshape(self.shape), self.size, 3)
 
     def contains(self, points: ArrayLike) -> Any:
         """Whether points (..., 2 or 3) are reached, computed exactly; shape (...)."""
         given = as_core(points, (len(self.size),), "points")
         rows = _world(given.reshape(-1, given.shape[-1]), self.frame)
-        return (_margins(self.model, self.kind, rows, self._options)[0] >= 0.0).reshape(  # type: ignore[arg-type]
-            given.shape[:-1]
-        )
+        options = self.rotations, self.lower, self.upper, self.joint_cone, self.leg_radius
+        robot: Any = self.model
+        return (_margins(robot, self.kind, rows, options)[0] >= 0.0).reshape(given.shape[:-1])
 
     def __repr__(self) -> str:
         unit, value = ("m^2", self.area) if len(self.size) == 2 else ("m^3", self.volume)
@@ -97,155 +126,87 @@ def workspace(
     height: float | None = None,
     resolution: int | None = None,
 ) -> PlatformWorkspace:
-    """Workspace of a platform: positions reached in one, every, or some orientation.
-
-    Parameters
-    ----------
-    robot : ParallelRobot
-        The robot.
-    kind : {"orientation", "dexterous", "reachable"}
-        Positions in the given orientation, in every one of them, or in at least one of them.
-    orientation : array_like, shape (3, 3) or (K, 3, 3), or float, optional
-        Rotations of the platform, or its angle about z, rad. Default the home orientation; of
-        dexterous and reachable workspaces 72 angles about z, in space turned from home.
-    limits : bool or tuple (lower, upper)
-        Whether the robot's limits count, or limits in their place, m or rad.
-    joint_cone : float, optional
-        Largest angle between a leg and its direction at home, seen from the base and from the
-        platform, rad.
-    leg_radius : float, optional
-        Radius of legs and rods, which must not touch each other, m.
-    height : float, optional
-        Makes a section at this z of the world, m.
-    resolution : int, optional
-        Cells along each axis; default 300 in a plane, 40 in space.
-
-    Returns
-    -------
-    PlatformWorkspace
-        A `performance.Workspace` whose count is the number of working modes.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Unknown words, legs of unlimited length, rotations that the platform does not have.
-
-    References
-    ----------
-    Seed book section 2.3.3.5; C. Gosselin, "Determination of the workspace of 6-DOF parallel
-    manipulators", J. of Mechanical Design 112 (1990).
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import planar_3rpr, workspace
-    >>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
-    >>> found = workspace(robot, orientation=0.1, resolution=100)
-    >>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
-    (1.2, array([ True, False]))
-    """
-    check_robot(robot)
-    if not isinstance(robot, ParallelRobot):
+    """Workspace of a platform: positions reached in one, every, or some orientation."""
+    if is_looped(robot):
         raise InvalidValueError("robot: workspaces of kinematic loops are not computed.")
     if kind not in KINDS:
         raise InvalidValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r:.40}.")
-    R = _rotations(robot, kind, orientation)
-    low, high = _limits(robot, limits)
+    R, (low, high) = _rotations(robot, kind, orientation), _limits(robot, limits)
     bounds = [
         None if x is None else as_number(x, n, above=0.0)
         for x, n in ((joint_cone, "joint_cone"), (leg_radius, "leg_radius"))
     ]
-    flat = 2 not in robot.columns or height is not None
+    d = 2 if 2 not in robot.columns or height is not None else 3
     frame = np.eye(4)
     frame[2, 3] = robot.home[2, 3] if height is None else as_number(height, "height")
-    given = (
-        (300 if flat else 40) if resolution is None else as_bounded(resolution, "resolution", 4e3)
-    )
-    if np.ndim(given) or given != int(given) or given < 2:
-        raise InvalidValueError(f"resolution: expected a whole number from 2, got {resolution!r}.")
+    n = as_number({2: 300, 3: 40}[d] if resolution is None else resolution, "resolution")
+    if n != int(n) or n < 2 or n**d > _MOST:
+        raise InvalidValueError(
+            f"resolution: expected a whole number from 2 to {_MOST ** (1 / d):.0f}, got "
+            f"{resolution!r:.40}."
+        )
     # the boxes about spheres of the legs' longest reach
-    reach = high if not robot.has_cranks else robot.crank + robot.rod
+    reach = robot.crank + robot.rod if robot.has_cranks else high
     if not np.isfinite(reach).all():
         raise InvalidValueError(
             "limits: a leg of unlimited length reaches everywhere; give upper=, or limits=(lower, "
             "upper)."
         )
     centre = robot.base - robot.platform @ np.swapaxes(R, 1, 2)
-    boxes = centre - reach[:, None], centre + reach[:, None]
-    inner = boxes[0].max(axis=1), boxes[1].min(axis=1)
-    d = 2 if flat else 3
-    if kind == "dexterous":
-        ends = inner[0].max(axis=0)[:d], inner[1].min(axis=0)[:d]
-    else:
-        ends = inner[0].min(axis=0)[:d], inner[1].max(axis=0)[:d]
-    n = int(given)
-    middle, half = 0.5 * (ends[0] + ends[1]), 0.5 * np.maximum(ends[1] - ends[0], 1e-3 * robot.size)
+    first, last = (centre - reach[:, None]).max(axis=1), (centre + reach[:, None]).min(axis=1)
+    every = kind == "dexterous"
+    first = first.max(axis=0) if every else first.min(axis=0)
+    last = last.min(axis=0) if every else last.max(axis=0)
+    half = 0.5 * np.maximum(last - first, 1e-3 * robot.size)[:d]
     size = 2.02 * half / (n - 1)  # centres of the outermost cells are outside
-    axes = [middle[k] + size[k] * (np.arange(n) - 0.5 * (n - 1)) for k in range(d)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
+    axes = 0.5 * (first + last)[:d] + np.outer(np.arange(n) - 0.5 * (n - 1), size)
+    points = np.stack(np.meshgrid(*axes.T, indexing="ij"), axis=-1).reshape(-1, d)
     options = (read_only(R), low, high, *bounds)
     margin, count = _margins(robot, kind, _world(points, frame), options)
     status = WorkspaceStatus.COUNTED if len(R) == 1 else WorkspaceStatus.SAMPLED
     status = status if count.any() else WorkspaceStatus.EMPTY
-    where = "plane" if flat else "space"
+    model: Any = robot
     return PlatformWorkspace(
-        robot, kind, limits is not False, None, None, R[0], read_only(points),  # type: ignore[arg-type]
-        read_only(count, np.int64), read_only(size), (n,) * d, where, frame, status,
-        read_only(margin), *options,
+        model, kind, limits is not False, None, None, R[0], points, count, size, (int(n),) * d,
+        "plane" if d == 2 else "space", frame, status, margin, *options,
     )  # fmt: skip
 
 
-def measure(f: Array, size: Array) -> float:
-    """Area or volume where a function on a grid is positive, linear on simplices of its cells."""
+def measure(f: Array, size: Array, dimension: int) -> float:
+    """Area or volume where a function is positive, linear within cells about nodes; else NaN."""
     d = f.ndim
-    total = 0.0
-    cells = tuple(n - 1 for n in f.shape)
-    for order in permutations(range(d)):
-        corner, values = [0] * d, []
-        for axis in (None, *order):
-            if axis is not None:
-                corner[axis] = 1
-            values.append(f[tuple(slice(c, c + n) for c, n in zip(corner, cells, strict=True))])
-        v = np.stack([x.ravel() for x in values], axis=1)
-        inside = (v > 0.0).all(axis=1)
-        mixed = ~inside & (v > 0.0).any(axis=1)
-        total += inside.sum() + _positive_share(v[mixed]).sum()
-    return float(total / len(list(permutations(range(d)))) * np.prod(size))
-
-
-def _positive_share(v: Array) -> Array:
-    """Share of simplices where a linear function with these corner values is positive."""
-    v = np.sort(v, axis=1)
-    scale = np.abs(v).max(axis=1, keepdims=True)
-    v = v / scale + 1e-7 * np.arange(v.shape[1])  # corners with equal values
-    d = v.shape[1] - 1
-    share = np.zeros(len(v))
-    for i in range(d + 1):
-        others = [v[:, i] - v[:, j] for j in range(d + 1) if j != i]
-        share += np.maximum(v[:, i], 0.0) ** d / np.prod(others, axis=0)
-    return np.clip(share, 0.0, 1.0)
+    if d != dimension:
+        return float("nan")
+    rise = np.abs(np.gradient(f))  # across a cell, along each axis
+    rise = np.maximum(rise, 1e-3 * rise.max(axis=0) + 1e-30)
+    half = 0.5 * rise.sum(axis=0)
+    f = np.clip(f, -half, half)
+    share = np.zeros(f.shape)
+    for corner in product((-0.5, 0.5), repeat=d):
+        top = np.maximum(f + np.tensordot(corner, rise, axes=1), 0.0)
+        share += np.sign(np.prod(corner)) * top**2 * top ** (d - 2)  # quicker than a cube
+    share /= factorial(d) * rise.prod(axis=0)
+    return float(share.sum() * np.prod(size))
 
 
 def _world(points: Array, frame: Array) -> Array:
     """World positions of points in a section or in space."""
     if points.shape[-1] == 3:
         return points
-    return np.concatenate((points, np.full((len(points), 1), frame[2, 3])), axis=1)
+    return np.pad(points, ((0, 0), (0, 1)), constant_values=frame[2, 3])
 
 
 def _rotations(robot: ParallelRobot, kind: str, orientation: Any) -> Array:
     """Rotations that are looked at, shape (K, 3, 3)."""
-    turns = None
-    if orientation is None:
-        home = robot.home[:3, :3]
-        if kind == "orientation" or 5 not in robot.columns:
-            return home[None].copy()
-        turns, first = 2.0 * np.pi * np.arange(72) / 72, home
-    elif np.ndim(orientation) == 0:
-        turns, first = np.array([as_number(orientation, "orientation")]), np.eye(3)
-    if turns is not None:
-        return np.array([se3.rotation("z", angle)[:3, :3] for angle in turns]) @ first
+    home, turns = robot.home[:3, :3], np.zeros(1)
+    if orientation is None and kind != "orientation" and 5 in robot.columns:
+        turns = 2.0 * np.pi * np.arange(72) / 72
+    elif orientation is not None and np.ndim(orientation) == 0:
+        home, turns = np.eye(3), np.array([as_number(orientation, "orientation")])
+    R = np.array([se3.rotation("z", angle)[:3, :3] for angle in turns]) @ home
     given: Any = orientation
-    R = as_floats(given, "orientation")
+    if np.ndim(given):
+        R = as_floats(given, "orientation")
     if R.shape[-2:] != (3, 3) or R.ndim > 3 or not len(R):
         raise ShapeError(
             f"orientation: expected an angle, or rotations (3, 3) or (K, 3, 3), got {R.shape}."
@@ -261,20 +222,18 @@ def _rotations(robot: ParallelRobot, kind: str, orientation: Any) -> Array:
 def _limits(robot: ParallelRobot, limits: Any) -> tuple[Array, Array]:
     """Limits that count."""
     if isinstance(limits, bool | np.bool_):
-        if limits:
-            return robot.lower, robot.upper
-        limits = None, None
+        limits = (robot.lower, robot.upper) if limits else (None, None)
     if not isinstance(limits, tuple | list) or len(limits) != 2:
         raise InvalidValueError(
             f"limits: expected True, False or (lower, upper), got {limits!r:.60}."
         )
-    low, high = limits
-    return checked_limits(low, high, robot.m, not robot.has_cranks)
+    lower, upper = limits
+    return checked_limits(lower, upper, robot.m, not robot.has_cranks)
 
 
 def _margins(
     robot: ParallelRobot, kind: str, places: Array, options: tuple[Any, ...]
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.int64]]:
     """Margins and numbers of working modes at positions (N, 3)."""
     R = options[0]
     margin = np.full(len(places), -_FAR if kind == "reachable" else _FAR)
@@ -296,34 +255,28 @@ def _margin(
     robot: ParallelRobot, T: Array, low: Array, high: Array, cone: Any, radius: Any
 ) -> tuple[Array, Array]:
     """Margins and numbers of working modes at poses. Shapes: (N, 4, 4) -> (N,), (N,)."""
-    modes = (0, 2**robot.m - 1) if robot.has_cranks else (0,)
-    both = []
-    for mode in modes:
-        legs = leg_states(robot, T, np.full(len(T), mode))
+    every: list[Array] = []
+    for mode in (0, 2**robot.m - 1) if robot.has_cranks else (0,):
+        legs = leg_states(robot, T, mode)
         q = legs.q
         if robot.has_cranks:
             first = np.where(np.isfinite(low), low, 0.0)
             q = np.where(np.isfinite(low), first + np.mod(q - first, 2.0 * np.pi), q)
         inside = np.minimum(q - low, high - q)
         if robot.has_cranks:
-            d = np.linalg.norm(T[:, None, :3, 3] + legs.arm - robot.base, axis=-1)
-            reach = np.minimum(robot.crank + robot.rod - d, d - np.abs(robot.crank - robot.rod))
-            if robot.family.value[1] == (0, 1, 2):
-                reach = _annulus(robot, T[:, None, :3, 3] + legs.arm - robot.base)
-            inside = np.minimum(inside, reach)
+            inside = np.minimum(inside, _annulus(robot, T[:, None, :3, 3] + legs.arm - robot.base))
         if cone is not None:
-            inside = np.minimum(inside, _in_cones(robot, T, legs, cone))
-        both.append((inside, legs))
-    best = np.maximum.reduce([inside for inside, _ in both])
-    count = np.prod(np.sum([inside >= 0.0 for inside, _ in both], axis=0), axis=1)
-    margin = np.minimum(best.min(axis=1), _FAR)
+            inside = np.minimum(inside, cone - _bend(robot, T, legs))
+        every.append(inside)
+    count = np.prod(np.sum([inside >= 0.0 for inside in every], axis=0), axis=1)
+    margin = np.minimum(np.maximum.reduce(every).min(axis=1), _FAR)
     if radius is not None:
-        margin = np.minimum(margin, _clearance(T, both[0][1]) - 2.0 * radius)
+        margin = np.minimum(margin, _clearance(T, leg_states(robot, T)) - 2.0 * radius)
     return margin, count
 
 
 def _annulus(robot: ParallelRobot, d: Array) -> Array:
-    """Distance of anchors from the reach of cranks that swing in planes. Shapes: -> (N, m)."""
+    """Distance of anchors from the reach of cranks that turn in planes. Shapes: -> (N, m)."""
     x, y = (d * robot.outward).sum(axis=-1), (d * robot.downward).sum(axis=-1)
     across = (d * np.cross(robot.outward, robot.downward)).sum(axis=-1)
     rho, rest = np.hypot(x, y), robot.rod**2 - across**2
@@ -332,30 +285,26 @@ def _annulus(robot: ParallelRobot, d: Array) -> Array:
     return np.where(rest >= 0.0, near, robot.rod - np.abs(across))
 
 
-def _in_cones(robot: ParallelRobot, T: Array, legs: LegStates, cone: float) -> Array:
-    """Cone angle minus the angles between legs and their directions at home. Shapes: -> (N, m)."""
-    home = leg_states(robot, robot.home[None], np.zeros(1, np.int64))
-    angles = []
-    for a, b in (
-        (legs.direction, home.direction),
-        (legs.direction @ T[:, :3, :3], home.direction @ robot.home[:3, :3]),
-    ):
-        sine = np.linalg.norm(np.cross(a, b), axis=-1)
-        angles.append(np.arctan2(sine, (a * b).sum(axis=-1)))
-    return cone - np.maximum(*angles)
+def _bend(robot: ParallelRobot, T: Array, legs: LegStates) -> Array:
+    """Angles of legs from their directions at home, at the base and the platform: the larger."""
+    home = leg_states(robot, robot.home[None]).direction
+    pairs = (
+        (legs.direction, home),
+        (legs.direction @ T[:, :3, :3], home @ robot.home[:3, :3]),
+    )
+    cosine = np.minimum(*((a * b).sum(axis=-1) for a, b in pairs))
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 def _clearance(T: Array, legs: LegStates) -> Array:
     """Least distance between rods that do not share an end. Shapes: N poses -> (N,)."""
     start, end = legs.knee, T[:, None, :3, 3] + legs.arm
     least = np.full(len(T), np.inf)
-    for i in range(start.shape[1]):
-        for j in range(i):
-            ends = [x[:, i] - y[:, j] for x in (start, end) for y in (start, end)]
-            if any(np.abs(apart).max(initial=0.0) < 1e-12 for apart in (ends[0], ends[3])):
-                continue
-            a, b, c, e = start[:, i], end[:, i], start[:, j], end[:, j]
-            s, t = nearest_points(a, b, c, e)
-            gap = a + s[:, None] * (b - a) - c - t[:, None] * (e - c)
-            least = np.minimum(least, np.linalg.norm(gap, axis=-1))
+    for i, j in combinations(range(start.shape[1]), 2):
+        a, b, c, e = start[:, i], end[:, i], start[:, j], end[:, j]
+        if any(np.abs(apart).max(initial=0.0) < 1e-12 for apart in (a - c, b - e)):
+            continue
+        s, t = nearest_points(a, b, c, e)
+        gap = a + s[:, None] * (b - a) - c - t[:, None] * (e - c)
+        least = np.minimum(least, np.linalg.norm(gap, axis=-1))
     return least

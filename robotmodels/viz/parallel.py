@@ -4,11 +4,48 @@ Parameters
 ----------
 robot : ParallelRobot
     The robot; its working mode 0 is drawn.
+T : array_like, shape (4, 4) or (N, 4, 4), optional
+    Pose of the platform, default home; several are played as a motion at 30 a second.
+ghost : bool
+    Whether the platform at home is drawn transparent.
+modes : AssemblyModes
+    Of one set of lengths or angles, from `assembly_modes`; ``columns`` of them stand in a row.
+workspace : PlatformWorkspace
+    From `parallel.workspace`, planar or a section.
+title : str, optional
+    Of the page or over the figure; default the family.
+height : int
+    Pixels in a notebook.
+dark : bool
+    Whether the background is dark.
+size : array_like, shape (2,), optional
+    Width and height of a figure, inches.
+
+Returns
+-------
+Scene or matplotlib.figure.Figure
+    A scene shows itself in a notebook; ``.save("hexapod.html")`` writes one offline page.
 
 Raises
 ------
 InvalidValueError, ShapeError
     Poses out of reach, arguments that do not fit.
+
+Examples
+--------
+>>> from robotmodels import parallel
+>>> hexapod = parallel.gough_symmetric(1.0, lower=0.8, upper=1.4)
+>>> show_parallel(hexapod)
+<Scene 'Gough-Stewart platform': 36 shapes>
+>>> jog_parallel(hexapod)
+<Scene 'Gough-Stewart platform': 30 shapes, 6 sliders>
+>>> robot = parallel.planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
+>>> figure = plot_platform_workspace(parallel.workspace(robot, orientation=0.3, resolution=50))
+>>> figure.axes[0].get_xlabel()
+'x (m)'
+>>> modes = parallel.assembly_modes(robot, [1.0, 1.1, 1.2])
+>>> plot_assembly_modes(robot, modes).axes[0].get_title()
+'1: det -'
 """
 
 from __future__ import annotations
@@ -22,8 +59,8 @@ from numpy.typing import ArrayLike
 from .. import se3
 from .._arrays import Array
 from ..errors import InvalidValueError
-from ..parallel import AssemblyModes, ParallelRobot, PlatformWorkspace, determinant
-from ..parallel.legs import LegStates
+from ..parallel import AssemblyModes, ParallelRobot, PlatformWorkspace, determinant, igm
+from ..parallel.legs import LegStates, knees
 from ..parallel.velocities import states
 from ..visual import Color, Cylinder, Sphere
 from . import style
@@ -40,6 +77,7 @@ if TYPE_CHECKING:
 _BASE: Color = (0.45, 0.48, 0.52, 1.0)
 _GHOST: Color = (0.5, 0.6, 0.7, 0.22)
 _THIN = 0.012
+_ALONG = {"x": se3.rotation("y", 0.5 * np.pi), "y": se3.rotation("x", -0.5 * np.pi), "z": np.eye(4)}
 
 
 def show_parallel(
@@ -51,50 +89,18 @@ def show_parallel(
     height: int = 480,
     dark: bool = False,
 ) -> Scene:
-    """Draw a parallel robot at a pose, with its home pose as a ghost, or play a motion of poses.
-
-    Parameters
-    ----------
-    robot
-        See the head of the file.
-    T : array_like, shape (4, 4) or (N, 4, 4), optional
-        Pose of the platform, default home; several are played as a motion at 30 a second.
-    ghost : bool
-        Whether the platform at home is drawn transparent.
-    title : str, optional
-        Of the page; default the family.
-    height : int
-        Pixels in a notebook.
-    dark : bool
-        Whether the background is dark.
-
-    Returns
-    -------
-    Scene
-        Shows itself in a notebook; ``.save("hexapod.html")`` writes one offline page.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric
-    >>> show_parallel(gough_symmetric(1.0))
-    <Scene 'Gough-Stewart platform': 36 shapes>
-    """
+    """Draw a parallel robot at a pose, with its home pose as a ghost, or play a motion of poses."""
     poses = (robot.home if T is None else robot.checked(T)).reshape(-1, 4, 4)
     points, legs = _points(robot, poses)
-    nodes = _plate(robot, robot.home, "home", _GHOST) if ghost else []
-    nodes += [_ball(f"base/{i}", p, robot, _BASE, 1.6) for i, p in enumerate(robot.base)]
-    tracks: list[Track] = []
-    for name, color, start, end in _bars(robot, poses, legs):
-        bars = _between(start, end)
-        length = float(np.linalg.norm(end[0] - start[0], axis=-1))
+    nodes, tracks = _still(robot, points, ghost, dark), list[Track]()
+    for name, color, width, start, end in _bars(robot, poses, legs):
+        nodes += _placed(name, _between(start, end), tracks)
+        length = float(np.linalg.norm(end[0] - start[0]))
+        bar = Cylinder(width * _THIN * robot.size, length)
         middle = se3.translation(0, 0, 0.5 * length)
-        nodes += _placed(name, bars, tracks)
-        path = nodes[-1].path
-        width = _THIN * robot.size * (0.65 if "piston" in name or "rod" in name else 1.0)
-        nodes.append(Node(f"{path}/bar", middle, Cylinder(width, length), color))
+        nodes.append(Node(f"{nodes[-1].path}/bar", middle, bar, color))
     nodes += _placed("platform", poses, tracks)
     nodes += _plate(robot, np.eye(4), f"{nodes[-1].path}/plate", PALETTE[0])
-    nodes += floor_grid(points, dark)
     motion = None
     if len(poses) > 1:
         motion = Motion(tuple(tracks), len(poses), (len(poses) - 1) / 30.0, True)
@@ -107,40 +113,16 @@ def jog_parallel(
 ) -> Scene:
     """Draw a robot with legs of variable length and sliders for the pose of its platform.
 
-    Parameters
-    ----------
-    robot
-        See the head of the file.
-    T : array_like, shape (4, 4), optional
-        First pose; default home.
-    height : int
-        Pixels in a notebook.
-    dark : bool
-        Whether the background is dark.
-
-    Returns
-    -------
-    Scene
-        The panel shows the lengths of the legs and marks those outside their limits.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric
-    >>> jog_parallel(gough_symmetric(1.0, lower=0.8, upper=1.4))
-    <Scene 'Gough-Stewart platform': 30 shapes, 6 sliders>
+    The panel shows the lengths of the legs and marks those outside their limits.
     """
     if robot.has_cranks:
         raise InvalidValueError("robot: sliders of the platform need legs of variable length.")
     pose = robot.checked(robot.home if T is None else T)
     points, _ = _points(robot, np.stack((robot.home, pose)))
-    nodes = _plate(robot, robot.home, "home", _GHOST)
-    nodes += [_ball(f"base/{i}", p, robot, _BASE, 1.6) for i, p in enumerate(robot.base)]
     chain = _chain("platform", pose)
-    nodes += chain
-    joints = [node.path for node in chain[1::2]]
-    frame = nodes[-1].path
-    nodes += _plate(robot, np.eye(4), f"{frame}/plate", PALETTE[0])
-    struts = []
+    frame = chain[-1].path
+    plate = _plate(robot, np.eye(4), f"{frame}/plate", PALETTE[0])
+    nodes, struts = [*_still(robot, points, True, dark), *chain, *plate], []
     for i in range(robot.m):
         bar = Cylinder(_THIN * robot.size, 1.0)
         nodes.append(Node(f"leg_{i}", np.eye(4)))
@@ -150,19 +132,23 @@ def jog_parallel(
             "end": robot.platform[i].tolist(), "lower": float(robot.lower[i]),
             "upper": float(min(robot.upper[i], 1e9)), "frame": frame,
         })  # fmt: skip
-    nodes += floor_grid(points, dark)
-    start, home = _six(pose), _six(robot.home)
-    kept = [k for k in range(6) if k in robot.columns]
+    start, home, sliders = _six(pose), _six(robot.home), []
+    kept = [3 if k == 5 and robot.m == 3 else k for k in robot.columns]  # planar robots: yaw
+    for k, name in enumerate(("x", "y", "z", "yaw", "pitch", "roll")):
+        reach = 0.4 * robot.size if k < 3 else (0.9 if k == 3 else 0.45) * np.pi
+        middle = home[k] if k < 3 else 0.0
+        sliders.append({
+            "name": name, "path": chain[2 * k + 1].path, "prismatic": k < 3, "lower": -1e9,
+            "upper": 1e9, "ends": [middle - reach, middle + reach], "leads": k in kept,
+            "note": "" if k in kept else "constant",
+        })  # fmt: skip
     matrix = np.eye(6)[:, kept]
-    names = ("x", "y", "z", "yaw", "pitch", "roll")
     panel = SliderPanel(
-        np.array(kept), matrix, start * (matrix.sum(axis=1) == 0), start[kept],
-        tuple(_slider(k, names[k], joints[k], home[k], robot.size, k in kept) for k in range(6)),
+        np.array(kept), matrix, start * (matrix.sum(axis=1) == 0), start[kept], tuple(sliders),
         (("home", home[kept]),), (("platform", frame, np.eye(4)),), tuple(struts),
     )  # fmt: skip
-    camera = framed(points)
-    title = robot.family.value[0]
-    return Scene(title, tuple(nodes), camera, height=height, sliders=panel, dark=dark)
+    name = robot.family.value[0]
+    return Scene(name, tuple(nodes), framed(points), height=height, sliders=panel, dark=dark)
 
 
 @style.plot
@@ -174,64 +160,32 @@ def plot_assembly_modes(
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
-    """All assembly modes beside each other, with the sign of their determinants.
-
-    Parameters
-    ----------
-    robot
-        See the head of the file.
-    modes : AssemblyModes
-        Of one set of lengths or angles, from `assembly_modes`.
-    columns : int, optional
-        How many stand in a row.
-    title : str, optional
-        Over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import assembly_modes, planar_3rpr
-    >>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
-    >>> len(plot_assembly_modes(robot, assembly_modes(robot, [14.98, 15.38, 12.0])).axes)
-    8
-    """
+    """All assembly modes beside each other, with the sign of their determinants."""
     T = np.asarray(modes.T)[modes.valid]
     if modes.valid.ndim != 1 or not len(T):
         raise InvalidValueError("modes: expected the assembly modes of one row, at least one.")
     wide = style.as_columns(columns, len(T), min(len(T), 4 if len(T) < 13 else 8))
     rows, flat = -(-len(T) // wide), 2 not in robot.columns
-    figure, places = style.panels(
-        PAGE, 0.3 + rows * PAGE / wide * (1.0 if flat else 1.1), size, rows, wide
-    )
-    # rods of the same knees for all modes, whatever the mode of their cranks is
-    legs = np.stack([_anchors(robot, pose) for pose in T])
-    q = _knees(robot, modes, T)
-    points = np.concatenate((legs.reshape(-1, 3), robot.base, q.reshape(-1, 3)))
-    x, y = points @ _view(flat).T[:, 0], points @ _view(flat).T[:, 1]
-    half = 0.56 * max(np.ptp(x), np.ptp(y))
+    tall = 0.3 + rows * PAGE / wide * (1.0 if flat else 1.1)
+    figure, places = style.panels(PAGE, tall, size, rows, wide)
+    base, view = np.broadcast_to(robot.base, (len(T), robot.m, 3)), _view(flat)
+    anchors = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
+    paths = np.stack((base, _knees(robot, T), anchors), axis=2) @ view.T
+    low, high = paths.min(axis=(0, 1, 2)), paths.max(axis=(0, 1, 2))
+    middle, half = 0.5 * (low + high), 0.56 * (high - low).max()
     for k, axes in enumerate(places.flat):
         axes.set_axis_off()
         if k >= len(T):
             continue
-        det = modes.det[modes.valid][k]
-        color = PALETTE[0] if det > 0 else PALETTE[1]
-        for i in range(robot.m):
-            path = np.array((robot.base[i], q[k, i], legs[k, i])) @ _view(flat).T
+        sign = modes.det[modes.valid][k] > 0
+        for path in paths[k]:
             axes.plot(*path.T, color="0.45", linewidth=1.0, zorder=2)
-        for outline, look in ((robot.base, "0.75"), (legs[k], color)):
-            ring = outline[_ring(outline)] @ _view(flat).T
+        for outline, look in ((base[k], "0.75"), (anchors[k], PALETTE[0 if sign else 1])):
+            ring = outline[_ring(outline)] @ view.T
             axes.fill(*ring.T, facecolor=look, alpha=0.5, edgecolor=look, linewidth=1.2, zorder=3)
-        axes.plot(*(robot.base @ _view(flat).T).T, "o", color=INK, markersize=2.0, zorder=4)
-        axes.set_title(f"{k + 1}: det {'+' if det > 0 else '-'}", fontsize=7)
-        axes.set_xlim(0.5 * (x.min() + x.max()) - half, 0.5 * (x.min() + x.max()) + half)
-        axes.set_ylim(0.5 * (y.min() + y.max()) - half, 0.5 * (y.min() + y.max()) + half)
-        axes.set_aspect("equal")
+        axes.plot(*paths[k, :, 0].T, "o", color=INK, markersize=2.0, zorder=4)
+        axes.set_title(f"{k + 1}: det {'+' if sign else '-'}", fontsize=7)
+        axes.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], aspect="equal")
     return style.finished(figure, title)
 
 
@@ -239,31 +193,7 @@ def plot_assembly_modes(
 def plot_platform_workspace(
     workspace: PlatformWorkspace, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """A workspace in a plane with the singular curves of its orientation.
-
-    Parameters
-    ----------
-    workspace : PlatformWorkspace
-        From `parallel.workspace`, planar or a section.
-    title : str, optional
-        Over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import planar_3rpr
-    >>> from robotmodels import parallel
-    >>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
-    >>> figure = plot_platform_workspace(parallel.workspace(robot, orientation=0.3, resolution=50))
-    >>> figure.axes[0].get_xlabel()
-    'x (m)'
-    """
+    """A workspace in a plane with the singular curves of its orientation."""
     if workspace.coordinates != "plane":
         raise InvalidValueError("workspace: expected one in a plane; give workspace(height=...).")
     robot: Any = workspace.model
@@ -271,8 +201,7 @@ def plot_platform_workspace(
     axes = places.flat[0]
     x, y = (np.unique(column) for column in workspace.points.T)
     margin = workspace.margin.reshape(workspace.shape).T
-    inside = [0.0, max(margin.max(), 1e-9)]
-    axes.contourf(x, y, margin, levels=inside, colors=[PALETTE[5]], alpha=0.5)
+    axes.contourf(x, y, margin, [0.0, max(margin.max(), 1e-9)], colors=[PALETTE[5]], alpha=0.5)
     axes.contour(x, y, margin, levels=[0.0], colors=[PALETTE[0]], linewidths=1.2)
     names = ["reached"]
     axes.fill([], [], color=PALETTE[5], alpha=0.5, label="reached")
@@ -283,38 +212,44 @@ def plot_platform_workspace(
         names.append("singular")
     axes.plot(*robot.base[:, :2].T, "^", color=INK, markersize=4.0, label="base")
     axes.set_aspect("equal")
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="x (m)", ylabel="y (m)")
     return style.finished(figure, title, [*names, "base"])
 
 
 def _points(robot: ParallelRobot, T: Array) -> tuple[Array, LegStates]:
     """Points that the picture holds, and the states of the legs."""
-    _, legs = states(robot, T, None)
+    legs = states(robot, None, T)[2]
     anchors = T[:, None, :3, 3] + legs.arm
     every = (robot.base, legs.knee.reshape(-1, 3), anchors.reshape(-1, 3))
     return np.concatenate(every), legs
 
 
-def _bars(robot: ParallelRobot, T: Array, legs: LegStates) -> list[tuple[str, Color, Array, Array]]:
-    """Rigid bars of the legs: name, colour, starts and ends (N, 3)."""
-    anchors, bars = T[:, None, :3, 3] + legs.arm, []
+def _still(robot: ParallelRobot, points: Array, ghost: bool, dark: bool) -> list[Node]:
+    """What does not move: the platform at home, anchors of the base, the floor."""
+    nodes = _plate(robot, robot.home, "home", _GHOST) if ghost else []
+    nodes += [_ball(f"base/{i}", p, robot, _BASE, 1.6) for i, p in enumerate(robot.base)]
+    return [*nodes, *floor_grid(points, dark)]
+
+
+Bar = tuple[str, Color, float, Array, Array]
+"""Name, colour, width, starts and ends (N, 3)."""
+
+
+def _bars(robot: ParallelRobot, T: Array, legs: LegStates) -> list[Bar]:
+    """Rigid bars of the legs."""
+    anchors, bars = T[:, None, :3, 3] + legs.arm, list[Bar]()
     base = np.broadcast_to(robot.base, anchors.shape)
-    least = np.linalg.norm(anchors - base, axis=-1).min(axis=0)
     for i in range(robot.m):
         if robot.has_cranks:
-            bars.append((f"crank_{i}", PALETTE[2], base[:, i], legs.knee[:, i]))
+            bars.append((f"crank_{i}", PALETTE[2], 1.0, base[:, i], legs.knee[:, i]))
             side = np.cross(robot.outward, robot.downward)[i] * 0.04 * robot.size
-            pair = (-side, side) if 2 in robot.columns else (0.0 * side,)
-            for k, shift in enumerate(pair):
-                start, end = legs.knee[:, i] + shift, anchors[:, i] + shift
-                bars.append((f"rod_{i}_{k}", PALETTE[1], start, end))
+            for k, shift in enumerate((-side, side) if 2 in robot.columns else (0.0 * side,)):
+                ends = legs.knee[:, i] + shift, anchors[:, i] + shift
+                bars.append((f"rod_{i}_{k}", PALETTE[1], 0.65, *ends))
         else:  # two parts of a strut slide along each other
-            u = 0.75 * least[i] * legs.direction[:, i]
-            bars.append((f"cylinder_{i}", PALETTE[2], base[:, i], base[:, i] + u))
-            bars.append((f"piston_{i}", PALETTE[1], anchors[:, i], anchors[:, i] - u))
+            u = 0.75 * legs.q[:, i].min() * legs.direction[:, i]
+            bars.append((f"cylinder_{i}", PALETTE[2], 1.0, base[:, i], base[:, i] + u))
+            bars.append((f"piston_{i}", PALETTE[1], 0.65, anchors[:, i], anchors[:, i] - u))
     return bars
 
 
@@ -335,20 +270,17 @@ def _six(T: Array) -> Array:
     return np.array(rows).reshape(*T.shape[:-2], 6)
 
 
-_AXES = {"x": se3.rotation("y", 0.5 * np.pi), "y": se3.rotation("x", -0.5 * np.pi), "z": np.eye(4)}
-
-
 def _chain(path: str, T: Array) -> list[Node]:
     """Nodes of three slides and three turns about z, y, x, each below one that aligns its axis."""
     nodes, here, last = [], path, np.eye(4)
     for k, (axis, value) in enumerate(zip("xyzzyx", _six(T), strict=True)):
-        align = se3.inverse(last) @ _AXES[axis]
+        align = se3.inverse(last) @ _ALONG[axis]
         here = f"{here}/{k}a" if k else here
         nodes.append(Node(here, align))
         here = f"{here}/{k}"
         moved = se3.translation(0, 0, value) if k < 3 else se3.rotation("z", value)
         nodes.append(Node(here, moved))
-        last = _AXES[axis]
+        last = _ALONG[axis]
     return [*nodes, Node(f"{here}/end", se3.inverse(last))]
 
 
@@ -391,23 +323,14 @@ def _ring(points: Array) -> list[int]:
     return list(np.argsort(np.arctan2(d @ Vt[1], d @ Vt[0]), kind="stable"))
 
 
-def _anchors(robot: ParallelRobot, T: Array) -> Array:
-    return robot.platform @ T[:3, :3].T + T[:3, 3]
-
-
-def _knees(robot: ParallelRobot, modes: AssemblyModes, T: Array) -> Array:
-    """Knees of the legs, on the base without cranks. Shapes: -> (S, m, 3)."""
-    if not robot.has_cranks:
-        return np.broadcast_to(robot.base, (len(T), robot.m, 3))
-    from ..parallel import igm
-    from ..parallel.legs import knees
-
-    # the angles that all assembly modes have in common
-    every = igm(robot, T)
-    first, last = every.q[0], every.q[-1]
-    away = np.abs(np.exp(1j * first[:, None]) - np.exp(1j * last)).max(axis=-1)
-    best = first[np.nanargmin(np.nanmin(away, axis=1))]
-    return np.broadcast_to(knees(robot, best), (len(T), robot.m, 3))
+def _knees(robot: ParallelRobot, T: Array) -> Array:
+    """Knees of the legs that all assembly modes have in common. Shapes: -> (S, m, 3)."""
+    q = np.zeros((1, robot.m))
+    if robot.has_cranks:
+        every = igm(robot, T).q
+        away = np.abs(np.exp(1j * every[0][:, None]) - np.exp(1j * every[-1])).max(axis=-1)
+        q = every[0, [np.nanargmin(np.nanmin(away, axis=1))]]
+    return np.broadcast_to(knees(robot, q), (len(T), robot.m, 3))
 
 
 def _view(flat: bool) -> Array:
@@ -418,13 +341,3 @@ def _view(flat: bool) -> Array:
     return np.array(
         ((-np.sin(a), np.cos(a), 0.0), (-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)))
     )
-
-
-def _slider(k: int, name: str, path: str, home: float, size: float, leads: bool) -> dict[str, Any]:
-    """A component of the pose as data of the panel."""
-    reach = 0.4 * size if k < 3 else (np.pi if k == 3 else 0.5 * np.pi) * 0.9
-    ends = (home - reach, home + reach) if k < 3 else (-reach, reach)
-    return {
-        "name": name, "path": path, "prismatic": k < 3, "lower": -1e9, "upper": 1e9,
-        "ends": list(ends), "leads": leads, "note": "" if leads else "constant",
-    }  # fmt: skip
