@@ -15,7 +15,9 @@ import robotmodels as rm
 from robotmodels import export
 from robotmodels.cli.program import main
 from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
-from robotmodels.export.tape import Tape, function
+from robotmodels.export.inverse import _SOLVERS, Limits
+from robotmodels.export.tape import Tape, function, operation_count
+from robotmodels.igm.paul import layout
 
 KINDS = (
     "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
@@ -179,7 +181,7 @@ def test_generation_is_quick():
 
 def test_the_tape_shares_and_folds():
     tape = Tape()
-    x, y = tape.inputs(0, 2)
+    x, y = (tape.scalar("input", 0, k) for k in range(2))
     assert (x * y).number == (y * x).number == -(x * -y).number
     assert (x + y).number == (y + x).number == -(-x - y).number
     assert (x - y).number == -(y - x).number
@@ -190,9 +192,7 @@ def test_the_tape_shares_and_folds():
     assert (1.0 * x).number == (x + 0.0).number == x.number
     result = (x * y + 2.0) / (x - y)
     frozen = tape.frozen([[result, -x]])
-    assert frozen.count() == (1, 2, 0, 1)
-    (row,) = frozen.run([np.array([3.0, 5.0])])
-    assert [float(value) for value in row] == [-8.5, -3.0]
+    assert operation_count(frozen[0]) == (1, 2, 0, 1)
 
 
 # --- languages -----------------------------------------------------------------------------------
@@ -305,7 +305,7 @@ def test_matlab():
     code = export.program(rm.load("rx90"), "igm").code("matlab")
     assert "function [q, valid, status] = rx90_igm(T)" in code
     assert "T(1, 4)" in code
-    assert "reshape(q, 6, 8).'" in code
+    assert "q = reshape(q, 6, 8).';" in code
     assert "function z = select_" in code
     lines = export.program(rm.load("rx90"), "idm").code("matlab").splitlines()
     assert all(line.startswith("%") for line in lines[:5])
@@ -355,9 +355,29 @@ def skew_arm():
     return rm.RobotModel.from_table(rm.DHTable.from_rows(rows, degrees=True), name="skew")
 
 
-@pytest.mark.parametrize("name", [*ARMS, "skew"])
+def sliding_arm(columns):
+    """Its plan needs a polynomial of a length, or a length and an angle at once."""
+    names = ("alpha", "d", "r", "theta", "sigma")
+    rows = [dict(zip(names, row, strict=True)) for row in columns]
+    return rm.RobotModel.from_table(rm.DHTable.from_rows(rows, degrees=True), name="sliding")
+
+
+OTHERS = {
+    "skew": skew_arm(),
+    "polynomial": sliding_arm([
+        (0, 0, 0, 0, 1), (-90, 0, 0.2, 0, 0), (90, 0.3, 0, 30, 0), (-90, 0.5, 0.2, 0, 0),
+        (0, 0.5, 0, 0, 0), (0, 0.3, 0, 0, 1),
+    ]),
+    "length and angle": sliding_arm([
+        (-90, 0, 0, 30, 1), (40, 0.5, 0.2, 90, 0), (0, 0.5, 0.4, 30, 0), (40, 0, 0.2, 90, 1),
+        (0, 0, 0, 30, 0), (90, 0, 0, 30, 0),
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*ARMS, *OTHERS])
 def test_all_postures(name):
-    model = skew_arm() if name == "skew" else rm.load(name)
+    model = OTHERS[name] if name in OTHERS else rm.load(name)
     model = model.with_base(rm.se3.translation(0.1, 0.2, 0.3) @ rm.se3.rotation("x", 0.7))
     rng = np.random.default_rng(1)
     T = rm.dgm(
@@ -538,3 +558,41 @@ def test_an_infinite_family_is_stated_before_missing_postures():
     arm = rm.load("ur5")
     _, _, status = export.program(arm, "igm")(rm.dgm(arm, np.zeros(6)))
     assert status == rm.IGMStatus.REACHED_FAMILY
+
+
+@pytest.mark.parametrize("code", list(_SOLVERS))
+def test_types_of_equations_are_solved(code):
+    """Coefficients made of a solution: each solver finds it."""
+    rng = np.random.default_rng(code)
+    for _ in range(50):
+        a, b, r = rng.uniform(-3.0, 3.0, 3)
+        k = rng.normal(size=6)
+        C, S, c, s = np.cos(a), np.sin(a), np.cos(b), np.sin(b)
+        first, turned = k[0] * C + k[1] * S, k[2] * C + k[3] * S
+        g, expected = {
+            layout.ANGLE: ([2.0 * S, 2.0 * C], [a]),
+            layout.OPPOSITE_ANGLES: ([-2.0 * S, -2.0 * C], [a]),
+            layout.ONE_EQUATION: ([k[1], k[0], first], [a]),
+            layout.TWO_EQUATIONS: ([k[1], k[0], first, k[3], k[2], turned], [a]),
+            layout.TWO_ANGLES: (
+                [*k[:4], k[0] * c + k[1] * s - turned, k[0] * s - k[1] * c - k[2] * S + k[3] * C,
+                 1.0], [a, b]
+            ),
+            layout.LENGTH: ([k[0], k[0] * r], [r]),
+            layout.LENGTH_TIMES_ANGLE: ([k[0], k[0] * r * S, k[1], k[1] * r * C], [r, a]),
+            layout.LENGTH_AND_ANGLE: (
+                [k[0], k[0] * S - k[1] * r, k[1], k[2], k[2] * C - k[3] * r, k[3]], [r, a]
+            ),
+            layout.POLYNOMIAL: ([-np.polyval([*k[3::-1], 0.0], r), *k[:4]], [r]),
+            layout.QUARTIC: (
+                [-(first + k[2] * np.cos(2 * a) + k[3] * np.sin(2 * a)), *k[:4]], [a]
+            ),
+        }[code]  # fmt: skip
+        found = _SOLVERS[code](
+            [float(x) for x in (*g, *(0.0,) * 7)][:7], Limits(1e-13, 1e-4, (0, 0))
+        )
+        rows = [[u[0] for u in solution.unknowns] for solution in found if solution.valid]
+        away = np.abs(np.array(rows) - expected)
+        slides = np.arange(len(expected)) == (0 if code >= layout.LENGTH else -1)
+        away = np.where(slides, away, np.minimum(away, 2 * np.pi - away))
+        assert away.max(axis=-1).min() < 1e-8
