@@ -564,19 +564,23 @@ def test_identify_takes_the_rule_of_essential_parameters_by_name(run, motion):
 def test_choices_are_those_of_the_package():
     """The commands list them without importing the rooms that define them."""
     from robotmodels.calibration.parameters import Compliance
-    from robotmodels.cli import calibrate
-    from robotmodels.cli import identify_options as options
     from robotmodels.estimation.losses import Loss
     from robotmodels.identification import method_names
     from robotmodels.identification.forms import EquationForm
 
-    def words(kind):
-        return {member.name.lower() for member in kind}
-
-    assert set(options.METHODS) == set(method_names.METHODS)
-    assert set(options.FORMS) == words(EquationForm)
-    assert words(Loss) == set(calibrate._LOSSES)
-    assert set(calibrate._COMPLIANCES) == words(Compliance)
+    options = {
+        f"{command} {name}": action
+        for command in ("identify", "calibrate")
+        for action in parser_of(command)[1]._actions
+        for name in action.option_strings
+    }
+    listed = options["identify --method"].help.partition(": ")[2].split(", such as")[0]
+    assert set(listed.split(", ")) == set(method_names.METHODS)
+    for option, kind in (
+        ("identify --form", EquationForm), ("calibrate --loss", Loss),
+        ("calibrate --compliance", Compliance),
+    ):  # fmt: skip
+        assert set(options[option].choices) == {member.name.lower() for member in kind}
 
 
 @pytest.mark.parametrize(

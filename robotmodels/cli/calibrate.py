@@ -6,15 +6,15 @@ import argparse
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .arguments import add_delimiter, add_source, add_units, column, columns, numbers, robot_of
+from .arguments import column, columns, numbers, robot_of
 from .option_words import in_options
-from .output import Report, add_output, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus, ending
+from .output import Report, check_output, hand_over, progress, with_extra
+from .terminal import ExitStatus
 
 if TYPE_CHECKING:
     from ..calibration import CalibrationResult, Measurement, ParameterPrior
@@ -25,7 +25,7 @@ _KINDS = (
 )  # fmt: skip
 _LOSSES = ("squares", "huber", "cauchy", "tukey")
 _COMPLIANCES = ("none", "joints", "links", "isotropic", "uniform")
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels calibrate --robot arm.urdf --measurements tracker.csv --kind position \\
       --lengths mm --angles deg --out report/
@@ -39,94 +39,54 @@ result.json (what --json prints) and calibrated.urdf (a robot read from a URDF k
 other origins of joints). Without --out the report is printed."""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "calibrate",
-        usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
-        "[options]",
-        description="Geometric calibration: estimate the parameters that measurements determine, "
-        "with their standard errors; errors before and after, and on held-out measurements.",
-        epilog=ending(_EXAMPLES, "the fit has not converged"),
-    )
-    add_source(parser, option=True)
-    _add_files(parser.add_argument_group("the measurements"))
-    _add_fit(parser.add_argument_group("the fit"))
-    add_output(parser)
-    parser.set_defaults(run=run, options=parser.options)
-
-
-def _add_files(files: Any) -> None:
-    files.add_argument("--measurements", required=True, nargs="+", metavar="FILE",
-                       help="CSV files, or one folder")  # fmt: skip
-    files.add_argument(
-        "--kind",
-        required=True,
-        choices=_KINDS,
-        metavar="KIND",
-        help=f"what was measured: {', '.join(_KINDS)}",
-    )
-    files.add_argument("--pattern", default="*.csv",
-                       help="of the files in a folder (default: %(default)s)")  # fmt: skip
-    add_units(files)
-    files.add_argument("--joint-angles", choices=("rad", "deg"),
-                       help="unit of the readings of joints, if another")  # fmt: skip
-    files.add_argument(
-        "--orientation", metavar="KIND",
-        help="how orientations are written: rpy_urdf, rpy, quaternion (scalar first), angle_axis, "
-        "euler, ...",
-    )  # fmt: skip
-    for option, what in (
-        ("--joints", "columns of the readings of the joints, by name or number from 0"),
-        ("--other-joints", "columns of the readings at the other end of a distance"),
-        ("--columns", "columns of what was measured (x y z, then the orientation)"),
-    ):
-        files.add_argument(option, nargs="+", metavar="COLUMN", help=what)
-    files.add_argument("--label", metavar="COLUMN",
-                       help="column that says which point or plane is touched; default: the names "
-                       "of the files")  # fmt: skip
-    add_delimiter(files)
-    files.add_argument("--frame", help="measured end: a frame of the robot (default: the tool)")
-    files.add_argument("--sigma", metavar="NUMBERS",
-                       help="standard deviations of a measurement in m and rad: one, or one for "
-                       "each coordinate; default: estimated")  # fmt: skip
-    files.add_argument(
-        "--known-distance", nargs=3, action="append", default=[], metavar=("A", "B", "LENGTH"),
-        help="point contacts: distance of two touched points, in the unit of --lengths; may be "
-        "repeated",
-    )  # fmt: skip
-
-
-def _add_fit(fitted: Any) -> None:
-    fitted.add_argument("--parameters", nargs="+", metavar="NAME",
-                        help="candidates, such as theta2 d3 (default: all)")  # fmt: skip
-    fitted.add_argument("--known", nargs="+", default=[], metavar="NAME",
-                        help="parameters that stay as they are")  # fmt: skip
-    fitted.add_argument("--known-lengths", nargs="+", default=[], metavar="NAME",
-                        help="the same, for lengths that give the scale")  # fmt: skip
-    fitted.add_argument("--fixed-base", action="store_true", help="the robot stands as given")
-    fitted.add_argument("--fixed-tool", action="store_true", help="the tool is as given")
-    fitted.add_argument("--gains", action="store_true", help="errors of gain of the encoders")
-    fitted.add_argument("--eccentricity", action="store_true", help="encoders off their axes")
-    fitted.add_argument("--compliance", choices=_COMPLIANCES, default="none",
-                        help="what gives way under gravity (default: %(default)s)")  # fmt: skip
-    fitted.add_argument(
-        "--loss", choices=_LOSSES, default="squares",
-        help="all but the first against outliers (default: %(default)s)",
-    )  # fmt: skip
-    fitted.add_argument("--prior", metavar="LENGTH ANGLE|none",
-                        help="standard deviations of the table's lengths (m) and angles (rad) that "
-                        "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
-    fitted.add_argument(
-        "--folds", type=int, default=5,
-        help="largest number of folds: whole places or runs of postures; 0 for none "
-        "(default: %(default)s)",
-    )  # fmt: skip
-    fitted.add_argument("--held-out", type=float, default=0.2, metavar="SHARE",
-                        help="share of the places or postures that one more fit is tested on, 0 "
-                        "for none (default: %(default)s)")  # fmt: skip
-    fitted.add_argument("--test", nargs="+", metavar="FILE",
-                        help="files of measurements that only test the result")  # fmt: skip
+DESCRIPTION = """\
+Geometric calibration: estimate the parameters that measurements determine, with their standard
+errors; errors before and after, and on held-out measurements."""
+USAGE = "robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND [options]"
+OPTIONS = """\
+@robot_option
+the measurements:
+--measurements FILE [required +] CSV files, or one folder
+--kind KIND [required
+    position|pose|orientation|distance|relative-pose|point-contact|frame-contact|plane-contact] what
+    was measured: position, pose, orientation, distance, relative-pose, point-contact,
+    frame-contact, plane-contact
+--pattern [=*.csv] of the files in a folder (default: %(default)s)
+@units
+--joint-angles [rad|deg] unit of the readings of joints, if another
+--orientation KIND [] how orientations are written: rpy_urdf, rpy, quaternion (scalar first),
+    angle_axis, euler, ...
+--joints COLUMN [+] columns of the readings of the joints, by name or number from 0
+--other-joints COLUMN [+] columns of the readings at the other end of a distance
+--columns COLUMN [+] columns of what was measured (x y z, then the orientation)
+--label COLUMN [] column that says which point or plane is touched; default: the names of the files
+@delimiter
+--frame [] measured end: a frame of the robot (default: the tool)
+--sigma NUMBERS [] standard deviations of a measurement in m and rad: one, or one for each
+    coordinate; default: estimated
+--known-distance A B LENGTH [repeated 3] point contacts: distance of two touched points, in the unit
+    of --lengths; may be repeated
+the fit:
+--parameters NAME [+] candidates, such as theta2 d3 (default: all)
+--known NAME [+ =] parameters that stay as they are
+--known-lengths NAME [+ =] the same, for lengths that give the scale
+--fixed-base [flag] the robot stands as given
+--fixed-tool [flag] the tool is as given
+--gains [flag] errors of gain of the encoders
+--eccentricity [flag] encoders off their axes
+--compliance [none|joints|links|isotropic|uniform =none] what gives way under gravity (default:
+    %(default)s)
+--loss [squares|huber|cauchy|tukey =squares] all but the first against outliers (default:
+    %(default)s)
+--prior LENGTH ANGLE|none [] standard deviations of the table's lengths (m) and angles (rad) that
+    are expected, or none (default: 1e-3 5e-3)
+--folds [int =5] largest number of folds: whole places or runs of postures; 0 for none (default:
+    %(default)s)
+--held-out SHARE [float =0.2] share of the places or postures that one more fit is tested on, 0 for
+    none (default: %(default)s)
+--test FILE [+] files of measurements that only test the result
+@output"""
+NOT_REACHED = "the fit has not converged"
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -8,7 +8,6 @@ import textwrap
 import time
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,10 +21,9 @@ from ..model import RobotModel, write_urdf
 from ..robots import load
 from .igm import as_text
 from .info import pose_text
-from .output import add_quiet, check_output, progress
-from .terminal import ending
+from .output import check_output, progress
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels demo
   robotmodels demo --real --out tx40/
@@ -39,31 +37,17 @@ _RX90_POSTURE = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
 _UR5_POSTURE = np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "demo",
-        description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
-        "from its URDF to its table; print every direct model of both and every posture that "
-        "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead; "
-        "with --chapter, run an example of another chapter of the book.",
-        epilog=ending(_EXAMPLES),
-    )
-    parser.add_argument(
-        "--real", action="store_true",
-        help="identify the dynamic parameters of a real TX40 from the log that is shipped, beside "
-        "published values",
-    )  # fmt: skip
-    parser.add_argument(
-        "--chapter", type=int, choices=range(1, 8), metavar="N",
-        help="chapter 1 (this demonstration) to 7 of the book",
-    )  # fmt: skip
-    parser.add_argument(
-        "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
-        help="where the files go (default: %(default)s)",
-    )  # fmt: skip
-    add_quiet(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 from its URDF to its table;
+print every direct model of both and every posture that reaches a pose, and draw them. With --real,
+identify a Staubli TX40 from its log instead; with --chapter, run an example of another chapter of
+the book."""
+OPTIONS = """\
+--real [flag] identify the dynamic parameters of a real TX40 from the log that is shipped, beside
+    published values
+--chapter N [int 1|2|3|4|5|6|7] chapter 1 (this demonstration) to 7 of the book
+--out FOLDER [path =robotmodels-demo] where the files go (default: %(default)s)
+@quiet"""
 
 
 def run(arguments: argparse.Namespace) -> None:

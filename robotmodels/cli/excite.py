@@ -10,9 +10,9 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .arguments import add_source, joint_numbers, robot_of
-from .output import Report, add_output, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus, ending
+from .arguments import joint_numbers, robot_of
+from .output import Report, check_output, hand_over, progress, with_extra
+from .terminal import ExitStatus
 
 if TYPE_CHECKING:
     from ..identification.excitation import ExcitingTrajectory
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _RATE = 1000.0
 """Default sampling rate of a file, Hz."""
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels excite --robot planar_2r --duration 10 --harmonics 3 --starts 1 --out motion/
   robotmodels excite --robot ur10e --acceleration 4 --box -inf -inf 0.1 inf inf inf \\
@@ -34,81 +34,41 @@ coefficients and all numbers, what --json prints), trajectory.png (if Matplotlib
 summary.txt. Without --out the summary is printed."""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "excite",
-        usage="robotmodels excite --robot ROBOT [options]",
-        description="Exciting trajectory: a periodic motion within the limits of a robot on which "
-        "its base parameters are identified best, with analytic gradients from several starts.",
-        epilog=ending(_EXAMPLES, "no motion within all limits was found"),
-    )
-    add_source(parser, option=True)
-    _add_motion(parser.add_argument_group("the motion"))
-    _add_limits(parser.add_argument_group("the limits"))
-    _add_search(parser.add_argument_group("the search"))
-    files = add_output(parser)
-    files.add_argument(
-        "--rate",
-        type=float,
-        help=f"with --out: samples per second in the file (default: {_RATE:g})",
-    )
-    files.add_argument("--format", choices=("csv", "npz", "yaml"),
-                       help="with --out: of the samples; yaml: ROS JointTrajectory "
-                       "(default: csv)")  # fmt: skip
-    files.add_argument("--degrees", action="store_true",
-                       help="with --out: revolute joints in degrees in the file; --json stays "
-                       "in radians")  # fmt: skip
-    parser.set_defaults(run=run)
-
-
-def _add_motion(motion: Any) -> None:
-    motion.add_argument("--duration", type=float, default=10.0,
-                        help="of one period, s (default: %(default)s)")  # fmt: skip
-    motion.add_argument("--kind", choices=("fourier", "spline"), default="fourier",
-                        help="finite Fourier series or quintic spline "
-                        "(default: %(default)s)")  # fmt: skip
-    motion.add_argument("--harmonics", type=int, default=5,
-                        help="of the series (default: %(default)s)")  # fmt: skip
-    motion.add_argument("--points", type=int,
-                        help="of the spline (default: twice the harmonics)")  # fmt: skip
-    motion.add_argument("--drive", nargs="*", default=["Ia", "Fv", "Fc"],
-                        choices=("Ia", "Fv", "Fc", "offset"), metavar="KIND",
-                        help="drive parameters to be identified: Ia Fv Fc offset, or none "
-                        "(default: Ia Fv Fc)")  # fmt: skip
-
-
-def _add_limits(limits: Any) -> None:
-    for name, unit in (("velocity", "rad/s or m/s"), ("acceleration", "rad/s^2 or m/s^2")):
-        limits.add_argument(f"--{name}", metavar="NUMBERS",
-                            help=f"greatest {name}, {unit}: one, or one for each "
-                            "joint")  # fmt: skip
-    limits.add_argument("--torque-limits", metavar="NUMBERS",
-                        help="greatest torques, N m or N: one, or one for each joint "
-                        "(default: those of the robot)")  # fmt: skip
-    for name, what in (("--box", "stays in"), ("--keep-out", "keeps out of")):
-        limits.add_argument(name, action="append", default=[], metavar="NUMBERS",
-                            help=f"box that the tool {what}: lower x y z, upper x y z, m; inf "
-                            "for no face; may be repeated")  # fmt: skip
-
-
-def _add_search(search: Any) -> None:
-    search.add_argument("--criterion", choices=("condition", "log-det"), default="condition",
-                        help="criterion that is minimised (default: %(default)s)")  # fmt: skip
-    search.add_argument("--sigma", metavar="NUMBERS",
-                        help="standard deviations of the torques, N m or N: one, or one for each "
-                        "joint")  # fmt: skip
-    search.add_argument("--starts", type=int,
-                        help="motions that are improved "
-                        "(default: 8, or as many as the budget has)")  # fmt: skip
-    search.add_argument("--random", type=int, metavar="COUNT",
-                        help="random motions, of which the best are improved "
-                        "(default: 100, or as many as the budget has)")  # fmt: skip
-    search.add_argument("--iterations", type=int,
-                        help="largest number for each stage of a start "
-                        "(default: what the budget has)")  # fmt: skip
-    search.add_argument("--seed", type=int, default=0,
-                        help="of the random generator (default: %(default)s)")  # fmt: skip
+DESCRIPTION = """\
+Exciting trajectory: a periodic motion within the limits of a robot on which its base parameters are
+identified best, with analytic gradients from several starts."""
+USAGE = "robotmodels excite --robot ROBOT [options]"
+OPTIONS = """\
+@robot_option
+the motion:
+--duration [float =10.0] of one period, s (default: %(default)s)
+--kind [fourier|spline =fourier] finite Fourier series or quintic spline (default: %(default)s)
+--harmonics [int =5] of the series (default: %(default)s)
+--points [int] of the spline (default: twice the harmonics)
+--drive KIND [* Ia|Fv|Fc|offset =Ia Fv Fc] drive parameters to be identified: Ia Fv Fc offset, or
+    none (default: Ia Fv Fc)
+the limits:
+--velocity NUMBERS [] greatest velocity, rad/s or m/s: one, or one for each joint
+--acceleration NUMBERS [] greatest acceleration, rad/s^2 or m/s^2: one, or one for each joint
+--torque-limits NUMBERS [] greatest torques, N m or N: one, or one for each joint (default: those of
+    the robot)
+--box NUMBERS [repeated] box that the tool stays in: lower x y z, upper x y z, m; inf for no face;
+    may be repeated
+--keep-out NUMBERS [repeated] box that the tool keeps out of: lower x y z, upper x y z, m; inf for
+    no face; may be repeated
+the search:
+--criterion [condition|log-det =condition] criterion that is minimised (default: %(default)s)
+--sigma NUMBERS [] standard deviations of the torques, N m or N: one, or one for each joint
+--starts [int] motions that are improved (default: 8, or as many as the budget has)
+--random COUNT [int] random motions, of which the best are improved (default: 100, or as many as the
+    budget has)
+--iterations [int] largest number for each stage of a start (default: what the budget has)
+--seed [int =0] of the random generator (default: %(default)s)
+@output
+--rate [float] with --out: samples per second in the file (default: 1000)
+--format [csv|npz|yaml] with --out: of the samples; yaml: ROS JointTrajectory (default: csv)
+--degrees [flag] with --out: revolute joints in degrees in the file; --json stays in radians"""
+NOT_REACHED = "no motion within all limits was found"
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,12 +12,12 @@ from ..csv_table import is_number
 from ..errors import InvalidValueError
 from ..performance import FeasiblePath, feasible_path
 from ..se3 import from_rpy, translation
-from .arguments import add_source, revolute, robot_of
+from .arguments import revolute, robot_of
 from .igm import mask_of
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import print_json
+from .terminal import ExitStatus
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels follow rx90 poses.csv --degrees
   robotmodels follow crx10ia weld.csv --through-singular --motion joints.csv
@@ -29,31 +28,21 @@ quaternion qx qy qz qw; or the 16 numbers of the 4x4 matrix. A row of names may 
 _WIDTHS = (3, 6, 7, 16)
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "follow",
-        description="Follow a path of poses from every posture of its first pose: from which ones "
-        "it reaches the end without a jump, and where it breaks for the others.",
-        epilog=ending(_EXAMPLES, "no posture follows the path to its end"),
-    )
-    add_source(parser)
-    parser.add_argument("poses", type=Path, help="file with one pose in each row")
-    parser.add_argument("--degrees", action="store_true",
-                        help="angles in degrees, those given and those printed")  # fmt: skip
-    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
-    parser.add_argument("--mask", metavar="NUMBERS",
-                        help="1 or 0 for each of x y z rx ry rz: what has to be met")  # fmt: skip
-    parser.add_argument("--through-singular", action="store_true",
-                        help="allow motions through singular positions")  # fmt: skip
-    parser.add_argument("--cost", choices=("length", "conditioning"), default="length",
-                        help="what the best motion minimises (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--motion", type=Path, metavar="FILE",
-                        help="write the best joint motion as CSV")  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE",
-                        help="draw the graph of all postures (.png, .pdf, .svg)")  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Follow a path of poses from every posture of its first pose: from which ones it reaches the end
+without a jump, and where it breaks for the others."""
+OPTIONS = """\
+@robot
+poses [path] file with one pose in each row
+--degrees [flag] angles in degrees, those given and those printed
+--no-limits [flag] leave the joint limits out
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met
+--through-singular [flag] allow motions through singular positions
+--cost [length|conditioning =length] what the best motion minimises (default: %(default)s)
+--motion FILE [path] write the best joint motion as CSV
+--picture FILE [path] draw the graph of all postures (.png, .pdf, .svg)
+@json"""
+NOT_REACHED = "no posture follows the path to its end"
 
 
 def run(arguments: argparse.Namespace) -> int:

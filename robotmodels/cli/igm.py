@@ -16,12 +16,12 @@ from ..igm import igm as inverse_model
 from ..kinematics import dgm
 from ..model import RobotModel
 from ..table_text import boxed
-from .arguments import add_source, numbers, posture, revolute, robot_of
+from .arguments import numbers, posture, revolute, robot_of
 from .info import pose_text
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import print_json
+from .terminal import ExitStatus
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels igm rx90 --xyz 0.3 0.2 0.5 --rpy 0 90 45 --degrees
   robotmodels igm lab_trr --xyz 0.4 0.2 0.5 --mask 1 1 1 0 0 0
@@ -30,59 +30,32 @@ examples:
   robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20"""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "igm",
-        description="Inverse geometric model: print every posture that brings the robot's tool to "
-        "a pose, with its branch, what it misses and whether it is inside the joint limits; or why "
-        "there is none. Lengths are in m, angles in rad unless --degrees is given.",
-        epilog=ending(_EXAMPLES, "the pose is not reached"),
-    )
-    add_source(parser)
-    pose = parser.add_argument_group("the pose of the tool, in one of three ways")
-    pose.add_argument("--xyz", metavar="X Y Z", help="position in world axes")
-    pose.add_argument(
-        "--rpy", metavar="R P Y",
-        help="with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may "
-        "be left out if --mask asks for no rotation",
-    )  # fmt: skip
-    pose.add_argument("--matrix", metavar="NUMBERS", help="16 numbers of the 4x4 pose, row by row")
-    pose.add_argument(
-        "--q", metavar="NUMBERS",
-        help="the pose that these joint variables (or a named configuration) lead to",
-    )  # fmt: skip
-    asked = parser.add_argument_group("what is asked for")
-    asked.add_argument("--degrees", action="store_true",
-                       help="angles in degrees, those given and those printed")  # fmt: skip
-    asked.add_argument("--limits", action="store_true",
-                       help="only postures inside the joint limits")  # fmt: skip
-    asked.add_argument(
-        "--q-ref", metavar="NUMBERS",
-        help="order by the distance to this posture; joints that the pose leaves free take its "
-        "values (default 0)",
-    )  # fmt: skip
-    asked.add_argument(
-        "--mask", metavar="NUMBERS",
-        help="1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words position, "
-        "xyz (the same) and orientation",
-    )  # fmt: skip
-    asked.add_argument("--mask-axes", choices=("world", "tool"), default="world",
-                       help="axes of the mask (default: %(default)s)")  # fmt: skip
-    asked.add_argument(
-        "--lock", action="append", default=[], metavar="JOINT=VALUE",
-        help="a joint, by name or number from 1, that keeps a value; may be repeated",
-    )  # fmt: skip
-    asked.add_argument("--arm-angle", metavar="ANGLE",
-                       help="seven-joint arms: angle of the elbow about the line from shoulder "
-                       "to wrist")  # fmt: skip
-    asked.add_argument(
-        "--tolerance", metavar="NUMBERS",
-        help="how much may be missing: metres and radians, or one number for both (default 1e-9); "
-        "poses given with few digits need more",
-    )  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Inverse geometric model: print every posture that brings the robot's tool to a pose, with its
+branch, what it misses and whether it is inside the joint limits; or why there is none. Lengths are
+in m, angles in rad unless --degrees is given."""
+OPTIONS = """\
+@robot
+@json
+the pose of the tool, in one of three ways:
+--xyz X Y Z [] position in world axes
+--rpy R P Y [] with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may
+    be left out if --mask asks for no rotation
+--matrix NUMBERS [] 16 numbers of the 4x4 pose, row by row
+--q NUMBERS [] the pose that these joint variables (or a named configuration) lead to
+what is asked for:
+--degrees [flag] angles in degrees, those given and those printed
+--limits [flag] only postures inside the joint limits
+--q-ref NUMBERS [] order by the distance to this posture; joints that the pose leaves free take its
+    values (default 0)
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words
+    position, xyz (the same) and orientation
+--mask-axes [world|tool =world] axes of the mask (default: %(default)s)
+--lock JOINT=VALUE [repeated] a joint, by name or number from 1, that keeps a value; may be repeated
+--arm-angle ANGLE [] seven-joint arms: angle of the elbow about the line from shoulder to wrist
+--tolerance NUMBERS [] how much may be missing: metres and radians, or one number for both (default
+    1e-9); poses given with few digits need more"""
+NOT_REACHED = "the pose is not reached"
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,29 +12,23 @@ from ..geometry import PRISMATIC
 from ..inertia import PARAMETERS
 from ..model import RobotModel
 from ..table_text import boxed, length_text
-from .arguments import add_source, robot_of
-from .output import add_json, print_json
-from .terminal import ending
+from .arguments import robot_of
+from .output import print_json
 
 _WIDTH = 88  # columns
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels info rx90
   robotmodels info erd:ur5 --json
   robotmodels info arm.urdf --tip-link link_5"""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "info",
-        description="Print the geometric table of a robot, its base and tool, joint limits, "
-        "inertial parameters with their physical consistency, frames and notes.",
-        epilog=ending(_EXAMPLES),
-    )
-    add_source(parser)
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Print the geometric table of a robot, its base and tool, joint limits, inertial parameters with
+their physical consistency, frames and notes."""
+OPTIONS = """\
+@robot
+@json"""
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -29,23 +29,6 @@ class Report:
     write: Callable[[Path], Sequence[str]]
 
 
-def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add the option for JSON."""
-    parser.add_argument("--json", action="store_true",
-                        help="print JSON in place of text; null is what is not finite or not "
-                        "known")  # fmt: skip
-
-
-def add_output(parser: argparse.ArgumentParser) -> Any:
-    """Add the options of commands that work long and write files."""
-    group: Any = parser.add_argument_group("what is handed over")
-    group.add_argument("--out", type=Path, metavar="FOLDER",
-                       help="write files into this folder (made if it is not there)")  # fmt: skip
-    add_json(group)
-    add_quiet(group)
-    return group
-
-
 def hand_over(report: Report, arguments: argparse.Namespace) -> None:
     """Write the requested files, and print."""
     written: list[Path] = []
@@ -142,13 +125,6 @@ class Bar:
         line = f"[{'#' * full}{'.' * (_CELLS - full)}] {count} {seconds}  {doing}"
         self.stream.write("\r" + line[:_WIDTH].ljust(_WIDTH))
         self.stream.flush()
-
-
-def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Add the option that turns the progress bar off."""
-    parser.add_argument("--quiet", action="store_true",
-                        help="no progress bar (there is none either where standard error is not "
-                        "a terminal)")  # fmt: skip
 
 
 @contextlib.contextmanager

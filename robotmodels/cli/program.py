@@ -14,9 +14,9 @@ from typing import Any, NoReturn
 
 from .. import __version__, show_versions
 from ..errors import RobotModelsError, nearest_names
-from .arguments import joined
+from .arguments import add_options, joined
 from .option_words import in_options
-from .terminal import ExitStatus, give_up_output, noticed, prepared, say, statuses
+from .terminal import ExitStatus, ending, give_up_output, noticed, prepared, say, statuses
 
 _WIDEST = 100  # columns
 
@@ -121,14 +121,22 @@ def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
                         "of Python and the libraries too")  # fmt: skip
     _add_traceback(parser)
     commands: Any = parser.add_subparsers(dest="command", metavar="COMMAND")
+    own: Parser | None = None
     for name, summary in COMMANDS.items():
         if name == command:
-            importlib.import_module(f".{name}", __package__).add_command(commands)
+            module: Any = importlib.import_module(f".{name}", __package__)
+            texts = {
+                "usage": getattr(module, "USAGE", None),
+                "description": module.DESCRIPTION,
+                "epilog": ending(module.EXAMPLES, getattr(module, "NOT_REACHED", None)),
+            }
+            own = commands.add_parser(name, help=summary, **texts)
+            assert own is not None
+            add_options(own, module.OPTIONS)
+            own.set_defaults(run=module.run, options=own.options)
+            _add_traceback(own)
         else:
             commands.add_parser(name, help=summary)
-    own = commands.choices[command] if command in COMMANDS else None
-    if own is not None:
-        _add_traceback(own)
     return parser, own
 
 

@@ -10,44 +10,34 @@ import numpy as np
 
 from ..performance import Workspace, cusps
 from ..performance import workspace as reached
-from .arguments import add_source, robot_of
+from .arguments import robot_of
 from .igm import mask_of
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import print_json
+from .terminal import ExitStatus
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels workspace planar_2r --no-limits
   robotmodels workspace puma560 --resolution 120 --picture section.png
   robotmodels workspace planar_3r --kind primary --mask 1 1 0 0 0 0 --json"""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "workspace",
-        description="Workspace of a robot: area or volume by the number of postures, in a section "
-        "where the first joint turns freely, else in space. Lengths are in m.",
-        epilog=ending(_EXAMPLES, "nothing is reached"),
-    )
-    add_source(parser)
-    parser.add_argument("--kind", choices=("positions", "primary", "secondary"),
-                        default="positions",
-                        help="positions in any orientation, in every one, or in some but not "
-                        "every one (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--section", choices=("auto", "plane", "space"), default="auto",
-                        help="half a plane through the first axis, or space (default: the plane "
-                        "where it stands for all)")  # fmt: skip
-    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
-    parser.add_argument("--resolution", type=int, metavar="CELLS",
-                        help="cells along each coordinate")  # fmt: skip
-    parser.add_argument("--mask", metavar="NUMBERS",
-                        help="1 or 0 for each of x y z rx ry rz: what is asked for")  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE",
-                        help="draw the section or two views (.png, .pdf, .svg), or write a page "
-                        "with the robot (.html)")  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Workspace of a robot: area or volume by the number of postures, in a section where the first joint
+turns freely, else in space. Lengths are in m."""
+OPTIONS = """\
+@robot
+--kind [positions|primary|secondary =positions] positions in any orientation, in every one, or in
+    some but not every one (default: %(default)s)
+--section [auto|plane|space =auto] half a plane through the first axis, or space (default: the plane
+    where it stands for all)
+--no-limits [flag] leave the joint limits out
+--resolution CELLS [int] cells along each coordinate
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what is asked for
+--picture FILE [path] draw the section or two views (.png, .pdf, .svg), or write a page with the
+    robot (.html)
+@json"""
+NOT_REACHED = "nothing is reached"
 
 
 def run(arguments: argparse.Namespace) -> int:
