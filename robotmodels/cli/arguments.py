@@ -31,9 +31,8 @@ robot [] a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file
 --mimic [flag] URDF only: mimic joints follow the joint they mimic; without it they are
     independent""",
     "units": """
---angles [rad|deg =rad] unit of angles in the files (default: %(default)s)
---lengths [m|mm =m] unit of lengths, also of prismatic joints, in the files (default:
-    %(default)s)""",
+--angles [rad|deg =rad] unit of angles in the files
+--lengths [m|mm =m] unit of lengths, also of prismatic joints, in the files""",
     "delimiter": r"""
 --delimiter CHARACTER [character] between cells, \t for a tab (default: ; tab or , as found)""",
     "output": """
@@ -68,6 +67,8 @@ def add_options(parser: argparse.ArgumentParser, text: str) -> None:
         found = _OPTION.fullmatch(entry)
         assert found is not None, entry
         name, metavar, traits, words = found.groups()
+        if not traits.endswith("=") and "=" in traits and "default" not in words:
+            words += " (default: %(default)s)"
         group.add_argument(name, help=words, **_settings(metavar, traits))
 
 

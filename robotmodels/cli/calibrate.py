@@ -19,12 +19,6 @@ from .terminal import ExitStatus
 if TYPE_CHECKING:
     from ..calibration import CalibrationResult, Measurement, ParameterPrior
 
-_KINDS = (
-    "position", "pose", "orientation", "distance", "relative-pose", "point-contact",
-    "frame-contact", "plane-contact",
-)  # fmt: skip
-_LOSSES = ("squares", "huber", "cauchy", "tukey")
-_COMPLIANCES = ("none", "joints", "links", "isotropic", "uniform")
 EXAMPLES = """\
 examples:
   robotmodels calibrate --robot arm.urdf --measurements tracker.csv --kind position \\
@@ -37,8 +31,6 @@ examples:
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
 result.json (what --json prints) and calibrated.urdf (a robot read from a URDF keeps its own, with
 other origins of joints). Without --out the report is printed."""
-
-
 DESCRIPTION = """\
 Geometric calibration: estimate the parameters that measurements determine, with their standard
 errors; errors before and after, and on held-out measurements."""
@@ -49,9 +41,8 @@ the measurements:
 --measurements FILE [required +] CSV files, or one folder
 --kind KIND [required
     position|pose|orientation|distance|relative-pose|point-contact|frame-contact|plane-contact] what
-    was measured: position, pose, orientation, distance, relative-pose, point-contact,
-    frame-contact, plane-contact
---pattern [=*.csv] of the files in a folder (default: %(default)s)
+    was measured: %(choices)s
+--pattern [=*.csv] of the files in a folder
 @units
 --joint-angles [rad|deg] unit of the readings of joints, if another
 --orientation KIND [] how orientations are written: rpy_urdf, rpy, quaternion (scalar first),
@@ -74,16 +65,13 @@ the fit:
 --fixed-tool [flag] the tool is as given
 --gains [flag] errors of gain of the encoders
 --eccentricity [flag] encoders off their axes
---compliance [none|joints|links|isotropic|uniform =none] what gives way under gravity (default:
-    %(default)s)
---loss [squares|huber|cauchy|tukey =squares] all but the first against outliers (default:
-    %(default)s)
+--compliance [none|joints|links|isotropic|uniform =none] what gives way under gravity
+--loss [squares|huber|cauchy|tukey =squares] all but the first against outliers
 --prior LENGTH ANGLE|none [] standard deviations of the table's lengths (m) and angles (rad) that
     are expected, or none (default: 1e-3 5e-3)
---folds [int =5] largest number of folds: whole places or runs of postures; 0 for none (default:
-    %(default)s)
+--folds [int =5] largest number of folds: whole places or runs of postures; 0 for none
 --held-out SHARE [float =0.2] share of the places or postures that one more fit is tested on, 0 for
-    none (default: %(default)s)
+    none
 --test FILE [+] files of measurements that only test the result
 @output"""
 NOT_REACHED = "the fit has not converged"

@@ -12,8 +12,6 @@ EXAMPLES = """\
 examples:
   robotmodels compile
   robotmodels compile --processes 2"""
-
-
 DESCRIPTION = """\
 Compile all functions that are otherwise compiled when they are first called, and keep them for
 later processes. Needed once after an installation or an update, and never for the results."""

@@ -32,8 +32,6 @@ examples:
 Into the folder of --out go trajectory.csv (or .npz, .yaml: --format), trajectory.json (the
 coefficients and all numbers, what --json prints), trajectory.png (if Matplotlib is installed) and
 summary.txt. Without --out the summary is printed."""
-
-
 DESCRIPTION = """\
 Exciting trajectory: a periodic motion within the limits of a robot on which its base parameters are
 identified best, with analytic gradients from several starts."""
@@ -41,9 +39,9 @@ USAGE = "robotmodels excite --robot ROBOT [options]"
 OPTIONS = """\
 @robot_option
 the motion:
---duration [float =10.0] of one period, s (default: %(default)s)
---kind [fourier|spline =fourier] finite Fourier series or quintic spline (default: %(default)s)
---harmonics [int =5] of the series (default: %(default)s)
+--duration [float =10.0] of one period, s
+--kind [fourier|spline =fourier] finite Fourier series or quintic spline
+--harmonics [int =5] of the series
 --points [int] of the spline (default: twice the harmonics)
 --drive KIND [* Ia|Fv|Fc|offset =Ia Fv Fc] drive parameters to be identified: Ia Fv Fc offset, or
     none (default: Ia Fv Fc)
@@ -57,13 +55,13 @@ the limits:
 --keep-out NUMBERS [repeated] box that the tool keeps out of: lower x y z, upper x y z, m; inf for
     no face; may be repeated
 the search:
---criterion [condition|log-det =condition] criterion that is minimised (default: %(default)s)
+--criterion [condition|log-det =condition] criterion that is minimised
 --sigma NUMBERS [] standard deviations of the torques, N m or N: one, or one for each joint
 --starts [int] motions that are improved (default: 8, or as many as the budget has)
 --random COUNT [int] random motions, of which the best are improved (default: 100, or as many as the
     budget has)
 --iterations [int] largest number for each stage of a start (default: what the budget has)
---seed [int =0] of the random generator (default: %(default)s)
+--seed [int =0] of the random generator
 @output
 --rate [float] with --out: samples per second in the file (default: 1000)
 --format [csv|npz|yaml] with --out: of the samples; yaml: ROS JointTrajectory (default: csv)

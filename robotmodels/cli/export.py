@@ -11,8 +11,6 @@ examples:
   robotmodels export rx90 idm --parameters base --out rx90_idm.c
   robotmodels export rx90 igm --language matlab
   robotmodels export arm.urdf torque_regressor --language numpy --out arm.py"""
-
-
 DESCRIPTION = """\
 Write a model of a robot as one self-contained file of straight-line code, and print its operations;
 without --out, print the code."""
@@ -21,9 +19,8 @@ OPTIONS = """\
 model [] dgm, jacobian, igm, idm, ddm, mass_matrix, bias, gravity_torque, torque_regressor or
     base_regressor
 --language [] c, python, numpy, casadi or matlab (default: by the name of the file, else c)
---parameters [=numbers] dynamic parameters: numbers of the model, symbols or base symbols (default:
-    %(default)s)
---geometry [=numbers] geometric parameters: numbers or symbols (default: %(default)s)
+--parameters [=numbers] dynamic parameters: numbers of the model, symbols or base symbols
+--geometry [=numbers] geometric parameters: numbers or symbols
 --no-drive [flag] leave rotors, friction and offsets out
 --wrench [flag] idm, bias, ddm: with a wrench of the tool as an input
 --frame [] dgm, jacobian: name or number of a frame (default: the tool)

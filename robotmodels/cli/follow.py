@@ -38,7 +38,7 @@ poses [path] file with one pose in each row
 --no-limits [flag] leave the joint limits out
 --mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met
 --through-singular [flag] allow motions through singular positions
---cost [length|conditioning =length] what the best motion minimises (default: %(default)s)
+--cost [length|conditioning =length] what the best motion minimises
 --motion FILE [path] write the best joint motion as CSV
 --picture FILE [path] draw the graph of all postures (.png, .pdf, .svg)
 @json"""

@@ -35,8 +35,6 @@ examples:
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
 result.json (what --json prints: parameters, covariance, all options, hashes of the data) and
 identified.urdf (a physically consistent robot). Without --out the report is printed."""
-
-
 DESCRIPTION = """\
 Dynamic identification: base parameters, frictions and rotor inertias from positions and torques,
 with their standard errors, and the errors on held-out motion."""
@@ -71,8 +69,8 @@ held-out motion, one of:
 the fit:
 --method METHOD[:OPTION=VALUE,...] [=wls] method with its options: ols, wls, irls, robust, tls,
     ridge, iv, didim, cloe, sequential, recursive, such as robust:loss=tukey, ridge:strength=10,
-    recursive:forgetting=0.99 or wls:essential=30 (default: %(default)s)
---form [torque|filtered|power|energy =torque] balanced quantity (default: %(default)s)
+    recursive:forgetting=0.99 or wls:essential=30
+--form [torque|filtered|power|energy =torque] balanced quantity
 --drive KIND [* Ia|Fv|Fc|offset =Ia Fv Fc offset] drive parameters that are identified (default: Ia
     Fv Fc offset)
 --cutoff HZ [float] -3 dB of the positions' low-pass; default: chosen for prediction, see the notes

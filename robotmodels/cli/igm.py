@@ -28,8 +28,6 @@ examples:
   robotmodels igm arm.urdf --matrix 0 0 -1 0.4  0 1 0 0.1  1 0 0 0.6  0 0 0 1
   robotmodels igm erd:ur5 --q 0.3 -0.9 1.2 0.4 0.8 -0.2 --limits
   robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20"""
-
-
 DESCRIPTION = """\
 Inverse geometric model: print every posture that brings the robot's tool to a pose, with its
 branch, what it misses and whether it is inside the joint limits; or why there is none. Lengths are
@@ -50,7 +48,7 @@ what is asked for:
     values (default 0)
 --mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words
     position, xyz (the same) and orientation
---mask-axes [world|tool =world] axes of the mask (default: %(default)s)
+--mask-axes [world|tool =world] axes of the mask
 --lock JOINT=VALUE [repeated] a joint, by name or number from 1, that keeps a value; may be repeated
 --arm-angle ANGLE [] seven-joint arms: angle of the elbow about the line from shoulder to wrist
 --tolerance NUMBERS [] how much may be missing: metres and radians, or one number for both (default

@@ -21,8 +21,6 @@ examples:
   robotmodels info rx90
   robotmodels info erd:ur5 --json
   robotmodels info arm.urdf --tip-link link_5"""
-
-
 DESCRIPTION = """\
 Print the geometric table of a robot, its base and tool, joint limits, inertial parameters with
 their physical consistency, frames and notes."""

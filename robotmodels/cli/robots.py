@@ -18,8 +18,6 @@ examples:
   robotmodels robots --json
 
 Names that begin with erd: come from the files of example-robot-data."""
-
-
 DESCRIPTION = """\
 List the robots that `load` and the other commands know by name."""
 OPTIONS = """\

@@ -20,15 +20,13 @@ examples:
   robotmodels workspace planar_2r --no-limits
   robotmodels workspace puma560 --resolution 120 --picture section.png
   robotmodels workspace planar_3r --kind primary --mask 1 1 0 0 0 0 --json"""
-
-
 DESCRIPTION = """\
 Workspace of a robot: area or volume by the number of postures, in a section where the first joint
 turns freely, else in space. Lengths are in m."""
 OPTIONS = """\
 @robot
 --kind [positions|primary|secondary =positions] positions in any orientation, in every one, or in
-    some but not every one (default: %(default)s)
+    some but not every one
 --section [auto|plane|space =auto] half a plane through the first axis, or space (default: the plane
     where it stands for all)
 --no-limits [flag] leave the joint limits out
