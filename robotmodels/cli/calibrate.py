@@ -13,11 +13,10 @@ from ..errors import InvalidValueError
 from ..model import RobotModel
 from .arguments import column, columns, numbers, robot_of
 from .option_words import in_options
-from .output import Report, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus
+from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
-    from ..calibration import CalibrationResult, Measurement, ParameterPrior
+    from ..calibration import Measurement, ParameterPrior
 
 EXAMPLES = """\
 examples:
@@ -77,9 +76,11 @@ the fit:
 NOT_REACHED = "the fit has not converged"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: read, fit, and print or write."""
     from ..calibration import KnownDistance, ParameterPrior, fit
+    from ..calibration.report import files_sentence, report
+    from ..calibration.write import result_data, write_result
 
     check_output(arguments)
     model = robot_of(arguments)
@@ -113,8 +114,23 @@ def run(arguments: argparse.Namespace) -> int:
     options = arguments.options()
     notes = [in_options(_with_labels(note, measured), options) for note in result.notes]
     result = replace(result, notes=tuple(notes))
-    hand_over(_report(result, aside), arguments)
-    return ExitStatus.DONE if result.solution.fit.converged else ExitStatus.NOT_REACHED
+    tested = "" if isinstance(aside, float | int) else f"\n{files_sentence(aside)}\n"
+    text = report(result) + tested
+
+    def write(folder: Path) -> list[str]:
+        from ..viz import html_report
+
+        names, page = ["report.txt", "result.json", "calibrated.urdf"], folder / "report.html"
+        (folder / "report.txt").write_text(text, encoding="utf-8")
+        write_result(result, folder / "result.json")
+        write_result(result, folder / "calibrated.urdf")
+        return names + with_extra(page, lambda: html_report(result, page))
+
+    head = text.split("\nMeasurements\n", 1)[0]
+    head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
+    is_converged = result.solution.fit.converged
+    head = (head + tested).rstrip()
+    return Report(text.rstrip(), lambda: result_data(result), is_converged, head, write)
 
 
 def read(
@@ -133,28 +149,6 @@ def read(
         delimiter=arguments.delimiter, sigma=_sigma(arguments.sigma), frame=arguments.frame,
         name=name,
     )  # fmt: skip
-
-
-def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
-    from ..calibration.report import files_sentence, report
-    from ..calibration.write import result_data, write_result
-
-    tested = "" if isinstance(aside, float | int) else f"\n{files_sentence(aside)}\n"
-    text = report(result) + tested
-
-    def write(folder: Path) -> list[str]:
-        from ..viz import html_report
-
-        names, page = ["report.txt", "result.json", "calibrated.urdf"], folder / "report.html"
-        (folder / "report.txt").write_text(text, encoding="utf-8")
-        write_result(result, folder / "result.json")
-        write_result(result, folder / "calibrated.urdf")
-        return names + with_extra(page, lambda: html_report(result, page))
-
-    head = text.split("\nMeasurements\n", 1)[0]
-    head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
-    head += tested
-    return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)
 
 
 def _with_labels(message: str, measured: Measurement) -> str:

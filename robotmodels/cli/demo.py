@@ -255,7 +255,8 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     if robot is not None:
         increase = f"{robot.residual_increase:.2f} % above least squares"
         print(f"Physical bodies and drives: residuals {increase}")
-    for name in report(trained, last, robot).write(folder):
+    write = report(trained, last, robot).write
+    for name in write(folder) if write is not None else ():
         print(f"wrote {folder.resolve() / name}")
 
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
 from .arguments import joint_numbers, robot_of
-from .output import Report, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus
+from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
-    from ..identification.excitation import ExcitingTrajectory
     from ..obstacles import Box
-    from ..trajectories import MotionLimits
 
 _RATE = 1000.0
 """Default sampling rate of a file, Hz."""
@@ -69,9 +67,11 @@ the search:
 NOT_REACHED = "no motion within all limits was found"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: search, and print or write."""
-    from ..identification.excitation import exciting_trajectory
+    from ..identification.excitation import exciting_trajectory, write_trajectory
+    from ..identification.excitation.files import excitation_data
+    from ..trajectories import MotionLimits
 
     check_output(arguments)
     model = robot_of(arguments)
@@ -79,39 +79,22 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
     _check_file(arguments)
+    limits = MotionLimits.of_model(model)
+    for name in ("velocity", "acceleration"):
+        given = _each(getattr(arguments, name), n, f"--{name}")
+        if given is not None:
+            limits = replace(limits, **{name: given, f"{name}_lower": -given})
     with progress(arguments, "stages of the search") as bar:
         found = exciting_trajectory(
             model, duration=arguments.duration, harmonics=arguments.harmonics,
             points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
-            drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
+            drive=tuple(arguments.drive) or False, limits=limits,
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
             sigma=_each(arguments.sigma, n, "--sigma"), workspace=_workspace(arguments),
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
             starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
             rng=arguments.seed, progress=False if bar is None else bar.steps,
         )  # fmt: skip
-    hand_over(_report(found, arguments), arguments)
-    infeasible = found.status.name == "INFEASIBLE"
-    return ExitStatus.NOT_REACHED if infeasible else ExitStatus.DONE
-
-
-def _check_file(arguments: argparse.Namespace) -> None:
-    """Raise for options that the sample file does not support."""
-    for option in ("rate", "format", "degrees"):
-        if arguments.out is None and getattr(arguments, option) not in (None, False):
-            raise InvalidValueError(
-                f"--{option}: describes the file of --out; give --out, or leave it out."
-            )
-    if arguments.degrees and arguments.format == "yaml":
-        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
-    if arguments.rate is not None and not 0.0 < arguments.rate < np.inf:
-        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
-
-
-def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
-    from ..identification.excitation import write_trajectory
-    from ..identification.excitation.files import excitation_data
-
     text = str(found)
 
     def write(folder: Path) -> list[str]:
@@ -125,21 +108,21 @@ def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
         picture = folder / "trajectory.png"
         return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
 
-    return Report(text, text, lambda: excitation_data(found), write)
+    is_feasible = found.status.name != "INFEASIBLE"
+    return Report(text, lambda: excitation_data(found), is_feasible, text, write)
 
 
-def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
-    """Limits of the table, replaced by those of the options."""
-    from dataclasses import replace
-
-    from ..trajectories import MotionLimits
-
-    limits = MotionLimits.of_model(model)
-    for name in ("velocity", "acceleration"):
-        given = _each(getattr(arguments, name), model.n, f"--{name}")
-        if given is not None:
-            limits = replace(limits, **{name: given, f"{name}_lower": -given})
-    return limits
+def _check_file(arguments: argparse.Namespace) -> None:
+    """Raise for options that the sample file does not support."""
+    for option in ("rate", "format", "degrees"):
+        if arguments.out is None and getattr(arguments, option) not in (None, False):
+            raise InvalidValueError(
+                f"--{option}: describes the file of --out; give --out, or leave it out."
+            )
+    if arguments.degrees and arguments.format == "yaml":
+        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
+    if arguments.rate is not None and not 0.0 < arguments.rate < np.inf:
+        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
 
 
 def _each(text: str | None, n: int, option: str) -> Array | None:
@@ -168,13 +151,10 @@ def _boxes(given: list[str], option: str) -> list[Box]:
     boxes = []
     for text in given:
         try:  # infinity means that there is no face
-            corners = np.array([float(word) for word in text.replace(",", " ").split()])
-        except ValueError:
-            corners = np.array([])
-        if len(corners) != 6:
-            raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
-        try:
-            boxes.append(Box(corners[:3], corners[3:]))
+            corners = np.array(list(map(float, text.replace(",", " ").split())))
+            boxes.append(Box(*corners.reshape(2, 3)))
         except InvalidValueError as error:
             raise InvalidValueError(f"{option}: {error}") from error
+        except ValueError:
+            raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.") from None
     return boxes

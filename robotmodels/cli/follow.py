@@ -14,8 +14,7 @@ from ..performance import FeasiblePath, feasible_path
 from ..se3 import from_rpy, translation
 from .arguments import revolute, robot_of
 from .igm import mask_of
-from .output import print_json
-from .terminal import ExitStatus
+from .output import Report
 
 EXAMPLES = """\
 examples:
@@ -45,7 +44,7 @@ poses [path] file with one pose in each row
 NOT_REACHED = "no posture follows the path to its end"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: follow, write and print."""
     model = robot_of(arguments)
     poses = read_poses(arguments.poses, arguments.degrees)
@@ -61,15 +60,12 @@ def run(arguments: argparse.Namespace) -> int:
         from ..viz import plot_feasible_path
 
         plot_feasible_path(found).savefig(arguments.picture)
-    if arguments.json:
-        print_json({
-            "robot": model.name, "status": found.status.name, "reason": found.reason(),
-            "reached": found.reached, "breaks": found.breaks, "q": found.q * scale,
-            "start": found.postures[0] * scale if len(poses) else [],
-        })  # fmt: skip
-    else:
-        print(as_text(found, scale))
-    return ExitStatus.DONE if found.reached.any() else ExitStatus.NOT_REACHED
+    data = {
+        "robot": model.name, "status": found.status.name, "reason": found.reason(),
+        "reached": found.reached, "breaks": found.breaks, "q": found.q * scale,
+        "start": found.postures[0] * scale if len(poses) else [],
+    }  # fmt: skip
+    return Report(as_text(found, scale), data, bool(found.reached.any()))
 
 
 def as_text(found: FeasiblePath, scale: Array | float) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InvalidValueError, RobotModelsError
 from ..model import RobotModel
 from .arguments import column, columns, joint_numbers, numbers, robot_of
-from .output import Report, check_output, hand_over, progress, with_extra
+from .output import Report, check_output, progress, with_extra
 from .terminal import ExitStatus, say
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ the fit:
 NOT_REACHED = "the method has not converged, or predicts poorly"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report | ExitStatus:
     """Run the command: read, fit, and print or write."""
     from ..estimation.estimate import EstimateStatus
     from ..identification import fit
@@ -122,9 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
     robot = None
     if arguments.consistent or arguments.out is not None:
         robot = real_bodies(result, bodies, asked=arguments.consistent)
-    hand_over(report(result, test, robot), arguments)
-    solved = result.status is EstimateStatus.SOLVED
-    return ExitStatus.DONE if solved else ExitStatus.NOT_REACHED
+    return report(result, test, robot)
 
 
 _MOST = 64
@@ -193,6 +191,7 @@ def report(
     result: IdentificationResult, test: Log | None, robot: StandardParameters | None
 ) -> Report:
     """An identification in every form."""
+    from ..estimation.estimate import EstimateStatus
     from ..identification import report as text_of
     from ..identification import write_result
     from ..identification.result_file import result_data
@@ -212,7 +211,10 @@ def report(
         return names + with_extra(page, lambda: identification_html(result, page, test, robot))
 
     head = text.split("\n\nData\n", 1)[0]
-    return Report(text.rstrip(), head.rstrip(), lambda: result_data(result, robot), write)
+    is_solved = result.status is EstimateStatus.SOLVED
+    return Report(
+        text.rstrip(), lambda: result_data(result, robot), is_solved, head.rstrip(), write
+    )
 
 
 def real_bodies(

@@ -18,8 +18,7 @@ from ..model import RobotModel
 from ..table_text import boxed
 from .arguments import numbers, posture, revolute, robot_of
 from .info import pose_text
-from .output import print_json
-from .terminal import ExitStatus
+from .output import Report
 
 EXAMPLES = """\
 examples:
@@ -56,7 +55,7 @@ what is asked for:
 NOT_REACHED = "the pose is not reached"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: solve and print."""
     model = robot_of(arguments)
     mask = mask_of(arguments.mask)
@@ -74,11 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
         arm_angle=angle_of(arguments.arm_angle, degrees),
         position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
     )  # fmt: skip
-    if arguments.json:
-        print_json(as_json(model, T, found, degrees))
-    else:
-        print(as_text(model, T, found, arguments.mask_axes, degrees))
-    return ExitStatus.DONE if found.count else ExitStatus.NOT_REACHED
+    text = as_text(model, T, found, arguments.mask_axes, degrees)
+    return Report(text, as_json(model, T, found, degrees), bool(found.count))
 
 
 def mask_of(text: str | None) -> Array | None:

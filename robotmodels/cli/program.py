@@ -16,6 +16,7 @@ from .. import __version__, show_versions
 from ..errors import RobotModelsError, nearest_names
 from .arguments import add_options, joined
 from .option_words import in_options
+from .output import Report, hand_over
 from .terminal import ExitStatus, ending, give_up_output, noticed, prepared, say, statuses
 
 _WIDEST = 100  # columns
@@ -157,7 +158,8 @@ def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
             arguments, rest = parser.parse_known_args(joined(words))
             if rest:
                 own.refuse(rest)
-            code = arguments.run(arguments)
+            result = arguments.run(arguments)
+            code = hand_over(result, arguments) if isinstance(result, Report) else result
         elif command is None and "--version" in words and {"-v", "--verbose"} & {*words}:
             print(show_versions())
         elif command is None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .arguments import posture, robot_of
-from .output import print_json
+from .output import Report
 
 EXAMPLES = """\
 examples:
@@ -39,7 +39,7 @@ OPTIONS = """\
 @json"""
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: draw, save and open."""
     from ..viz import jog
     from ..viz.meshes import with_stand_ins
@@ -53,19 +53,18 @@ def run(arguments: argparse.Namespace) -> None:
     path = scene.save(arguments.out or _temporary(model.name)).absolute()
     opened = not arguments.no_open and _open(path)
     start = scene.sliders.q if scene.sliders is not None else model.configurations["zero"]
-    if arguments.json:
-        print_json({
-            "robot": model.name, "joints": model.table.joint_names, "q": start,
-            "page": str(path), "opened": opened, "missing_meshes": missing,
-        })  # fmt: skip
-        return
+    data = {
+        "robot": model.name, "joints": model.table.joint_names, "q": start,
+        "page": str(path), "opened": opened, "missing_meshes": missing,
+    }  # fmt: skip
     text = np.array2string(start, precision=4, suppress_small=True, max_line_width=10_000)
-    print(f"Scene of {model.name} at q = {text} written to {path}")
+    lines = [f"Scene of {model.name} at q = {text} written to {path}"]
     if missing:
-        print(f"Mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. Give "
-              "their folder with --package-dir.")  # fmt: skip
+        lines.append(f"Mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. "
+                     "Give their folder with --package-dir.")  # fmt: skip
     if not opened and not arguments.no_open:
-        print("There is no display or no browser here: open the page in one yourself.")
+        lines.append("There is no display or no browser here: open the page in one yourself.")
+    return Report("\n".join(lines), data)
 
 
 def _temporary(name: str) -> Path:

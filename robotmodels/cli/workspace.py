@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,7 @@ from ..performance import Workspace, cusps
 from ..performance import workspace as reached
 from .arguments import robot_of
 from .igm import mask_of
-from .output import print_json
-from .terminal import ExitStatus
+from .output import Report
 
 EXAMPLES = """\
 examples:
@@ -38,7 +36,7 @@ OPTIONS = """\
 NOT_REACHED = "nothing is reached"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: compute, draw and print."""
     model = robot_of(arguments)
     found = reached(
@@ -46,15 +44,17 @@ def run(arguments: argparse.Namespace) -> int:
         resolution=arguments.resolution, mask=mask_of(arguments.mask),
     )  # fmt: skip
     if arguments.picture is not None:
-        draw(found, arguments.picture)
+        from ..viz import plot_workspace, show_workspace
+
+        path = arguments.picture
+        if path.suffix.lower() in (".html", ".htm"):
+            show_workspace(found).save(path)
+        else:
+            plot_workspace(found).savefig(path)
     data = numbers_of(found)
-    if arguments.json:
-        print_json(data)
-    else:
-        print(as_text(data))
-        if arguments.picture is not None:
-            print(f"Written: {arguments.picture}")
-    return ExitStatus.DONE if found.count.any() else ExitStatus.NOT_REACHED
+    text = as_text(data)
+    text += "" if arguments.picture is None else f"\nWritten: {arguments.picture}"
+    return Report(text, data, bool(found.count.any()))
 
 
 def numbers_of(w: Workspace) -> dict[str, Any]:
@@ -101,13 +101,3 @@ def as_text(data: dict[str, Any]) -> str:
     for u, v in np.asarray(data["cusps"]).reshape(-1, 2):
         lines.append(f"Cusp at {u:.6f}, {v:.6f} m.")
     return "\n".join(lines)
-
-
-def draw(w: Workspace, path: Path) -> None:
-    """Write a figure, or a page."""
-    from ..viz import plot_workspace, show_workspace
-
-    if path.suffix.lower() in (".html", ".htm"):
-        show_workspace(w).save(path)
-    else:
-        plot_workspace(w).savefig(path)
