@@ -217,6 +217,11 @@ def column(word: str) -> int | str:
     return int(word) if word.lstrip("-").isdecimal() else word
 
 
+def given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Some of the arguments by their names, as they are."""
+    return {name: getattr(arguments, name) for name in names}
+
+
 def columns(words: list[str] | None) -> list[int | str] | None:
     """Columns of an option that may be missing."""
     return None if words is None else [column(word) for word in words]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .arguments import column, columns, numbers, robot_of
+from .arguments import column, columns, given, numbers, robot_of
 from .option_words import in_options
 from .output import Report, check_output, progress, with_extra
 
@@ -102,12 +102,11 @@ def run(arguments: argparse.Namespace) -> Report:
     try:
         with progress(arguments, "fits") as bar:
             result = fit(
-                model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
-                known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
-                tool=not arguments.fixed_tool, gains=arguments.gains,
-                eccentricity=arguments.eccentricity, compliance=arguments.compliance,
-                loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
+                model, [measured, *known], base=not arguments.fixed_base,
+                tool=not arguments.fixed_tool, prior=prior, held_out=aside,
                 progress=bar and bar.steps,
+                **given(arguments, "parameters", "known", "known_lengths", "gains",
+                        "eccentricity", "compliance", "loss", "folds"),
             )  # fmt: skip
     except InvalidValueError as error:
         raise InvalidValueError(_with_labels(str(error), measured)) from error
@@ -144,10 +143,9 @@ def read(
         joints=columns(arguments.joints), columns=columns(arguments.columns),
         other_joints=columns(arguments.other_joints),
         label=None if arguments.label is None else column(arguments.label),
-        lengths=arguments.lengths, angles=arguments.angles, joint_angles=arguments.joint_angles,
-        orientation=arguments.orientation, pattern=arguments.pattern,
-        delimiter=arguments.delimiter, sigma=_sigma(arguments.sigma), frame=arguments.frame,
-        name=name,
+        sigma=_sigma(arguments.sigma), name=name,
+        **given(arguments, "lengths", "angles", "joint_angles", "orientation", "pattern",
+                "delimiter", "frame"),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from ..kinematics import dgm, dkm, jacobian
 from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
-from .igm import as_text
+from .igm import as_json, as_text
 from .info import pose_text
 from .output import check_output, progress
 
@@ -183,7 +183,7 @@ def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
     print("Preparing (compiles the first time on this machine only) ...", flush=True)
     seconds, found = _timed(lambda: igm(model, T))
     print(f"  ready after {seconds:.1f} s")
-    print(as_text(model, T, found, "world", degrees=True))
+    print(as_text(as_json(model, T, found, degrees=True)))
     path = folder / f"{model.name}-postures.html"
     words = [f"{k + 1}: {branch}" for k, branch in enumerate(found.branch)]
     show(model, found.q, columns=4, frames=True, legend=words).save(path)

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .arguments import joint_numbers, robot_of
+from .arguments import given, joint_numbers, robot_of
 from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
@@ -81,19 +81,19 @@ def run(arguments: argparse.Namespace) -> Report:
     _check_file(arguments)
     limits = MotionLimits.of_model(model)
     for name in ("velocity", "acceleration"):
-        given = _each(getattr(arguments, name), n, f"--{name}")
-        if given is not None:
-            limits = replace(limits, **{name: given, f"{name}_lower": -given})
+        most = _each(getattr(arguments, name), n, f"--{name}")
+        if most is not None:
+            limits = replace(limits, **{name: most, f"{name}_lower": -most})
     with progress(arguments, "stages of the search") as bar:
         found = exciting_trajectory(
-            model, duration=arguments.duration, harmonics=arguments.harmonics,
-            points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
-            drive=tuple(arguments.drive) or False, limits=limits,
+            model, drive=tuple(arguments.drive) or False, limits=limits,
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
             sigma=_each(arguments.sigma, n, "--sigma"), workspace=_workspace(arguments),
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
-            starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
-            rng=arguments.seed, progress=False if bar is None else bar.steps,
+            baseline=arguments.random, rng=arguments.seed,
+            progress=False if bar is None else bar.steps,
+            **given(arguments, "duration", "harmonics", "points", "kind", "criterion", "starts",
+                    "iterations"),
         )  # fmt: skip
     text = str(found)
 

@@ -11,7 +11,6 @@ from .._arrays import Array
 from ..csv_table import is_number
 from ..errors import InvalidValueError
 from ..performance import FeasiblePath, feasible_path
-from ..se3 import from_rpy, translation
 from .arguments import revolute, robot_of
 from .igm import mask_of
 from .output import Report
@@ -82,6 +81,8 @@ def as_text(found: FeasiblePath, scale: Array | float) -> str:
 
 def read_poses(path: Path, degrees: bool) -> Array:
     """Poses (N, 4, 4) of a file."""
+    from scipy.spatial.transform import Rotation
+
     text = path.read_text(encoding="utf-8-sig").replace(";", ",")
     rows = [line.replace(",", " ").split() for line in text.splitlines() if line.strip()]
     if rows and not all(map(is_number, rows[0])):
@@ -98,21 +99,16 @@ def read_poses(path: Path, degrees: bool) -> Array:
     values = np.array(rows, dtype=np.float64)
     if width == 16:
         return values.reshape(-1, 4, 4)
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    T[:, :3, 3], turns = values[:, :3], values[:, 3:]
     if width == 7:
-        return np.array([_of_quaternion(row) for row in values])
-    if width == 6:
-        angles = np.deg2rad(values[:, 3:]) if degrees else values[:, 3:]
-        return np.array([from_rpy(a, p) for a, p in zip(angles, values[:, :3], strict=True)])
-    return np.array([translation(*row) for row in values])
-
-
-def _of_quaternion(row: Array) -> Array:
-    """Pose of a position and a unit quaternion x y z w."""
-    from scipy.spatial.transform import Rotation
-
-    length = float(np.linalg.norm(row[3:]))
-    if abs(length - 1.0) > 1e-3:
-        raise InvalidValueError(f"expected unit quaternions qx qy qz qw, got one of {length:.4g}.")
-    T = translation(*row[:3])
-    T[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
+        lengths = np.linalg.norm(turns, axis=1)
+        if np.abs(lengths - 1.0).max() > 1e-3:
+            wrong = lengths[np.abs(lengths - 1.0).argmax()]
+            raise InvalidValueError(
+                f"expected unit quaternions qx qy qz qw, got one of {wrong:.4g}."
+            )
+        T[:, :3, :3] = Rotation.from_quat(turns).as_matrix()
+    elif width == 6:  # roll, pitch, yaw about fixed axes
+        T[:, :3, :3] = Rotation.from_euler("xyz", turns, degrees=degrees).as_matrix()
     return T

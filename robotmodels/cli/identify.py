@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidValueError, RobotModelsError
 from ..model import RobotModel
-from .arguments import column, columns, joint_numbers, numbers, robot_of
+from .arguments import column, columns, given, joint_numbers, numbers, robot_of
 from .output import Report, check_output, progress, with_extra
 from .terminal import ExitStatus, say
 
@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> Report | ExitStatus:
     log, test = logs(arguments, model)
     drive = tuple(dict.fromkeys(arguments.drive)) or False
     bodies = prior(arguments, model)
-    choices = {name: getattr(arguments, name) for name in ("cutoff", "decimation", "edges")}
+    choices = given(arguments, "cutoff", "decimation", "edges")
     choices["dead_band"] = joint_numbers(arguments.dead_band, model.n, "--dead-band")
     with workers(arguments.workers) as executor, progress(arguments, "reducing the log") as bar:
         result = fit(
@@ -330,18 +330,20 @@ def _read(
         raise InvalidValueError(
             f"--motor-side: {model.name!r} has no transmission; give the ratios by --gears."
         )
+    each = {
+        name: joint_numbers(getattr(arguments, name), model.n, "--" + name.replace("_", "-"))
+        for name in ("signs", "gears", "drive_gains", "offsets")
+    }
+    measured = {
+        name: _or_none(getattr(arguments, name))
+        for name in ("velocities", "accelerations", "references")
+    }
+    measured["position_references"] = measured.pop("references")
     return read_log(
         files, torques_from=torques, positions=_columns(arguments.positions),
-        torques=_columns(arguments.torques), velocities=_or_none(arguments.velocities),
-        accelerations=_or_none(arguments.accelerations),
-        position_references=_or_none(arguments.references), time=time, dt=arguments.dt,
-        times=arguments.times, angles=arguments.angles, lengths=arguments.lengths,
-        signs=joint_numbers(arguments.signs, model.n, "--signs"),
-        gears=joint_numbers(arguments.gears, model.n, "--gears"),
-        transmission=model.transmission if arguments.motor_side else None,
-        drive_gains=joint_numbers(arguments.drive_gains, model.n, "--drive-gains"),
-        offsets=joint_numbers(arguments.offsets, model.n, "--offsets"), model=model,
-        delimiter=arguments.delimiter,
+        torques=_columns(arguments.torques), time=time, model=model,
+        transmission=model.transmission if arguments.motor_side else None, **each, **measured,
+        **given(arguments, "dt", "times", "angles", "lengths", "delimiter"),
     )  # fmt: skip
 
 

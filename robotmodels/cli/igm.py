@@ -64,17 +64,20 @@ def run(arguments: argparse.Namespace) -> Report:
         arguments.tolerance, (1, 2), "--tolerance"
     )  # fmt: skip
     degrees = bool(arguments.degrees)
-    q_ref = arguments.q_ref
+    q_ref, arm_angle = arguments.q_ref, None
+    if arguments.arm_angle is not None:
+        arm_angle = float(numbers(arguments.arm_angle, 1, "--arm-angle")[0])
+        arm_angle = float(np.deg2rad(arm_angle)) if degrees else arm_angle
     found = inverse_model(
         model, T,
         q_ref=None if q_ref is None else posture(q_ref, model, "--q-ref", degrees),
         mask=mask, mask_axes=arguments.mask_axes, limits=arguments.limits,
         lock=locks_of(arguments.lock, model, degrees),
-        arm_angle=angle_of(arguments.arm_angle, degrees),
+        arm_angle=arm_angle,
         position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
     )  # fmt: skip
-    text = as_text(model, T, found, arguments.mask_axes, degrees)
-    return Report(text, as_json(model, T, found, degrees), bool(found.count))
+    data = as_json(model, T, found, degrees)
+    return Report(as_text(data, arguments.mask_axes), data, bool(found.count))
 
 
 def mask_of(text: str | None) -> Array | None:
@@ -134,60 +137,16 @@ def locks_of(
     return locks or None
 
 
-def angle_of(text: str | None, degrees: bool) -> float | None:
-    """The arm angle in radians."""
-    if text is None:
-        return None
-    angle = float(numbers(text, 1, "--arm-angle")[0])
-    return float(np.deg2rad(angle)) if degrees else angle
-
-
 _COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-
-
-def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, degrees: bool) -> str:
-    """The solutions of one pose as text."""
-    names = model.table.joint_names
-    count = int(found.count)
-    lines = [
-        f"{model.name}: {count} posture{'s' * (count != 1)}. {found.reason()}",
-        f"method: {found.method}",
-        f"pose of the tool (m):\n{pose_text(T)}",
-    ]
-    if not found.mask.all():
-        asked = " ".join(c for c, m in zip(_COMPONENTS, found.mask, strict=True) if m)
-        lines.append(f"asked for: {asked} in {mask_axes} axes")
-    units = _units(model, degrees)
-    if count:
-        q = _shown(model, found.q[:count], degrees)
-        columns = [("", [str(k + 1) for k in range(count)]), ("branch", list(found.branch[:count]))]
-        columns += [
-            (f"q{j + 1} [{unit}]", [_number(v, unit) for v in q[:, j]])
-            for j, unit in enumerate(units)
-        ]
-        columns.append(("residual", [f"{r:.1e}" for r in found.residual[:count]]))
-        inside = ["inside" if w else "outside" for w in found.within_limits[:count]]
-        columns.append(("limits", inside))
-        if found.double.any():
-            columns.append(("root", ["double" if d else "" for d in found.double[:count]]))
-        lines += [f"q: {', '.join(names)}", boxed(columns)]
-    lines += _family_lines(names, found)
-    if not count and found.closest is not None and np.isfinite(found.closest).all():
-        q = _shown(model, found.closest, degrees)
-        each = zip(names, q, units, strict=True)
-        lines.append(
-            "closest posture: " + ", ".join(f"{n} {_number(v, u)} {u}" for n, v, u in each)
-        )
-    return "\n".join(lines)
 
 
 def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
     """Solutions of one pose as JSON data."""
-    names = np.array(model.table.joint_names)
-    q = _shown(model, found.q, degrees)
+    names, turns = np.array(model.table.joint_names), revolute(model)
+    scale = np.where(turns, 180.0 / np.pi, 1.0) if degrees else 1.0
     postures = [
         {
-            "q": q[s].tolist(),
+            "q": (found.q[s] * scale).tolist(),
             "branch": str(found.branch[s]),
             "residual": float(found.residual[s]),
             "within_limits": bool(found.within_limits[s]),
@@ -199,11 +158,11 @@ def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> 
     ]
     closest = None
     if not postures and found.closest is not None and np.isfinite(found.closest).all():
-        closest = _shown(model, found.closest, degrees).tolist()
+        closest = (found.closest * scale).tolist()
     return {
         "robot": model.name,
         "joints": names.tolist(),
-        "units": _units(model, degrees),
+        "units": np.where(turns, "deg" if degrees else "rad", "m").tolist(),
         "pose": T.tolist(),
         "reached": bool(postures),
         "status": IGMStatus(int(found.status)).name,
@@ -215,31 +174,44 @@ def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> 
     }
 
 
-def _family_lines(names: tuple[str, ...], found: IGMSolutions) -> list[str]:
-    """Which joints took the reference, each set once with the postures it holds for."""
-    groups: dict[tuple[bytes, bytes], list[int]] = {}
-    for s in np.flatnonzero(found.valid):
-        free, family = found.free_joints[s], found.family_joints[s]
-        if free.any() or family.any():
-            groups.setdefault((free.tobytes(), family.tobytes()), []).append(int(s))
-    lines = []
-    for rows in groups.values():
-        free, family = found.free_joints[rows[0]], found.family_joints[rows[0]]
-        which = ", ".join(str(s + 1) for s in rows)
-        taken = ", ".join(n for n, f in zip(names, free, strict=True) if f)
-        others = ", ".join(n for n, f in zip(names, family, strict=True) if f)
-        text = f"infinite family through posture {which}:"
-        text += f" {taken} took the reference;" if taken else ""
-        lines.append(f"{text} {others or 'no other joint'} moves with it.")
-    return lines
-
-
-def _units(model: RobotModel, degrees: bool) -> list[str]:
-    return [("deg" if degrees else "rad") if turns else "m" for turns in revolute(model)]
-
-
-def _shown(model: RobotModel, q: Array, degrees: bool) -> Array:
-    return np.where(revolute(model), np.rad2deg(q), q) if degrees else q
+def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
+    """The same for people."""
+    names, units, rows = data["joints"], data["units"], data["postures"]
+    lines = [
+        f"{data['robot']}: {len(rows)} posture{'s' * (len(rows) != 1)}. {data['reason']}",
+        f"method: {data['method']}",
+        f"pose of the tool (m):\n{pose_text(np.array(data['pose']))}",
+    ]
+    if not all(data["mask"]):
+        asked = " ".join(c for c, m in zip(_COMPONENTS, data["mask"], strict=True) if m)
+        lines.append(f"asked for: {asked} in {mask_axes} axes")
+    if rows:
+        columns = [("", [str(k + 1) for k in range(len(rows))])]
+        columns.append(("branch", [row["branch"] for row in rows]))
+        columns += [
+            (f"q{j + 1} [{unit}]", [_number(row["q"][j], unit) for row in rows])
+            for j, unit in enumerate(units)
+        ]
+        columns.append(("residual", [f"{row['residual']:.1e}" for row in rows]))
+        inside = ["inside" if row["within_limits"] else "outside" for row in rows]
+        columns.append(("limits", inside))
+        if any(row["double"] for row in rows):
+            columns.append(("root", ["double" if row["double"] else "" for row in rows]))
+        lines += [f"q: {', '.join(names)}", boxed(columns)]
+    families: dict[tuple[str, str], list[str]] = {}  # of postures with the same free joints
+    for k, row in enumerate(rows, start=1):
+        free, others = ", ".join(row["free_joints"]), ", ".join(row["family_joints"])
+        if free or others:
+            families.setdefault((free, others), []).append(str(k))
+    for (free, others), which in families.items():
+        text = f" {free} took the reference;" if free else ""
+        text += f" {others or 'no other joint'} moves with it."
+        lines.append(f"infinite family through posture {', '.join(which)}:{text}")
+    if data["closest"] is not None:
+        each = zip(names, data["closest"], units, strict=True)
+        closest = ", ".join(f"{name} {_number(v, unit)} {unit}" for name, v, unit in each)
+        lines.append(f"closest posture: {closest}")
+    return "\n".join(lines)
 
 
 def _number(value: float, unit: str) -> str:
