@@ -259,17 +259,6 @@ def test_what_argparse_refuses_has_the_same_status(run):
         assert err.count("\n") == 1
 
 
-def test_help_shows_an_example_that_works(run):
-    code, out, _ = run("igm", "--help")
-    assert code == 0
-    examples = re.findall(r"^  robotmodels (igm .*)$", out, re.MULTILINE)
-    assert len(examples) >= 3
-    for example in examples:
-        words = example.split()
-        if not words[1].endswith(".urdf"):
-            assert run(*words)[0] == 0, example
-
-
 def test_a_closed_pipe_keeps_the_status():
     """``robotmodels igm ... | head -1``: no traceback."""
     code = "import sys; from robotmodels.cli import main; sys.exit(main())"
@@ -466,12 +455,6 @@ def test_wrong_arguments_of_calibrate(run, tracker, words, message):
     assert err.count("\n") == 1
 
 
-def test_help_of_calibrate_shows_examples(run):
-    code, out, _ = run("calibrate", "--help")
-    assert code == 0
-    assert out.count("robotmodels calibrate --robot") >= 3
-
-
 # --- identify -------------------------------------------------------------------------------------
 
 
@@ -555,10 +538,12 @@ def test_identify_takes_choices_and_files_that_only_test(run, motion):
     assert data["errors"]["held_out"]["samples"] == 7998 - 200
 
 
-def test_identify_takes_the_rule_of_essential_parameters_by_name(run, motion):
-    code, out, _ = run(*identify(motion[0]), "--method", "wls:essential=aic", "--json")
-    assert code == 0
-    assert json.loads(out)["method"]["essential"] == "aic"
+def test_the_default_of_an_option_has_its_type():
+    own = parser_of("identify")[1]
+    assert own.get_default("workers") == 1
+    assert own.get_default("drive") == ["Ia", "Fv", "Fc", "offset"]
+    assert parser_of("excite")[1].get_default("duration") == 10.0
+    assert parser_of("calibrate")[1].get_default("known") == []
 
 
 def test_choices_are_those_of_the_package():
@@ -666,9 +651,3 @@ def test_delays_that_are_not_found_are_not_taken_out(run, motion, tmp_path):
     code, out, err = run(*words, "--delay", "auto")
     assert (code, out) == (2, "")
     assert "--delay auto: the torques fit best at an end of the delays" in err
-
-
-def test_help_of_identify_shows_examples(run):
-    code, out, _ = run("identify", "--help")
-    assert code == 0
-    assert out.count("robotmodels identify --robot") >= 3
