@@ -102,6 +102,13 @@ def test_frames():
         close(J(*inputs_of(J, q=q)), rm.jacobian(model, q, frame))
 
 
+def test_a_body_without_joints():
+    model = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[2], d=[0.3]))
+    shapes = {kind: export.program(model, kind).outputs[0].shape for kind in KINDS}
+    assert (shapes["idm"], shapes["jacobian"], shapes["mass_matrix"]) == ((0,), (6, 0), (0, 0))
+    np.testing.assert_array_equal(export.program(model, "dgm")([]), rm.dgm(model, []))
+
+
 def test_kinds_of_drives():
     model = rm.load("tx40")
     q, v, a = random_state(model, np.random.default_rng(0))

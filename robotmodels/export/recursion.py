@@ -269,7 +269,8 @@ def mass_matrix(model: RobotModel, links: Sequence[Link], parameters: Parameters
     """Joint-space inertia matrix by composite bodies, with rotors."""
     zero, rotors = [0.0] * model.n, {k: x for k, x in parameters.items() if k.startswith("Ia")}
     units = np.eye(model.n).tolist()
-    M = np.array([torques_of_drives(model, rotors, zero, unit) for unit in units], dtype=object)
+    rows = [torques_of_drives(model, rotors, zero, unit) for unit in units]
+    M = np.array(rows, dtype=object).reshape(model.n, model.n)
     composite = [vector(*(0.0,) * 10)]
     composite += [_ten(parameters, k, link) for k, link in enumerate(links, start=1)]
     for number in range(len(links), 0, -1):
