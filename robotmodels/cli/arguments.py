@@ -166,12 +166,12 @@ def numbers(text: str, count: int | Sequence[int], option: str, positive: bool =
 
 
 def joint_numbers(
-    text: str | None, n: int, option: str, positive: bool = False
+    text: str | None, n: int | Sequence[int], option: str, positive: bool = False
 ) -> Array | float | None:
-    """One number for all joints, or one for each."""
+    """One number for all joints, or one for each (or another count of numbers)."""
     if text is None:
         return None
-    values = numbers(text, sorted({1, n}), option, positive)
+    values = numbers(text, sorted({1, n}) if isinstance(n, int) else n, option, positive)
     return float(values[0]) if len(values) == 1 else values
 
 

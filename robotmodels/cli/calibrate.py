@@ -8,10 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .arguments import column, columns, given, numbers, robot_of
+from .arguments import column, columns, given, joint_numbers, numbers, robot_of
 from .option_words import in_options
 from .output import Report, check_output, progress, with_extra
 
@@ -143,7 +142,7 @@ def read(
         joints=columns(arguments.joints), columns=columns(arguments.columns),
         other_joints=columns(arguments.other_joints),
         label=None if arguments.label is None else column(arguments.label),
-        sigma=_sigma(arguments.sigma), name=name,
+        sigma=joint_numbers(arguments.sigma, range(1, 7), "--sigma", True), name=name,
         **given(arguments, "lengths", "angles", "joint_angles", "orientation", "pattern",
                 "delimiter", "frame"),
     )  # fmt: skip
@@ -167,11 +166,3 @@ def _prior(text: str) -> ParameterPrior | None:
             f"--prior: expected two positive numbers (m, rad) or none, got {text!r}."
         ) from None
     return ParameterPrior(length=float(length), angle=float(angle))
-
-
-def _sigma(text: str | None) -> float | Array | None:
-    """One deviation, or one for each coordinate of a measurement."""
-    if text is None:
-        return None
-    values = numbers(text, range(1, 7), "--sigma", positive=True)
-    return float(values[0]) if len(values) == 1 else values

@@ -71,6 +71,7 @@ def run(arguments: argparse.Namespace) -> Report:
     """Run the command: search, and print or write."""
     from ..identification.excitation import exciting_trajectory, write_trajectory
     from ..identification.excitation.files import excitation_data
+    from ..obstacles import Box
     from ..trajectories import MotionLimits
 
     check_output(arguments)
@@ -79,6 +80,13 @@ def run(arguments: argparse.Namespace) -> Report:
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
     _check_file(arguments)
+    boxes, workspace = _boxes(arguments.box, "--box"), None
+    if boxes:  # what is inside of all
+        lower = np.max([box.lower for box in boxes], axis=0)
+        upper = np.min([box.upper for box in boxes], axis=0)
+        if not (lower < upper).all():
+            raise InvalidValueError("--box: the boxes have no common point.")
+        workspace = Box(lower, upper)
     limits = MotionLimits.of_model(model)
     for name in ("velocity", "acceleration"):
         most = _each(getattr(arguments, name), n, f"--{name}")
@@ -88,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Report:
         found = exciting_trajectory(
             model, drive=tuple(arguments.drive) or False, limits=limits,
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
-            sigma=_each(arguments.sigma, n, "--sigma"), workspace=_workspace(arguments),
+            sigma=_each(arguments.sigma, n, "--sigma"), workspace=workspace,
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
             baseline=arguments.random, rng=arguments.seed,
             progress=False if bar is None else bar.steps,
@@ -129,20 +137,6 @@ def _each(text: str | None, n: int, option: str) -> Array | None:
     """Positive numbers, one for each joint."""
     values = joint_numbers(text, n, option, positive=True)
     return None if values is None else np.full(n, values)
-
-
-def _workspace(arguments: argparse.Namespace) -> Box | None:
-    """Intersection of the boxes of --box."""
-    from ..obstacles import Box
-
-    boxes = _boxes(arguments.box, "--box")
-    if len(boxes) < 2:
-        return boxes[0] if boxes else None
-    lower = np.max([box.lower for box in boxes], axis=0)
-    upper = np.min([box.upper for box in boxes], axis=0)
-    if not (lower < upper).all():
-        raise InvalidValueError("--box: the boxes have no common point.")
-    return Box(lower, upper)
 
 
 def _boxes(given: list[str], option: str) -> list[Box]:

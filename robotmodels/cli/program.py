@@ -195,7 +195,9 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
     if isinstance(error, OSError):
         if error.filename is None:
             give_up_output()  # perhaps a full disk behind standard output
-        return _of_system(error), ExitStatus.WRONG_INPUT
+        text = error.strerror or str(error) or type(error).__name__
+        file = f": {error.filename}" if error.filename is not None else "."
+        return text + file, ExitStatus.WRONG_INPUT
     if isinstance(error, MemoryError):
         return "there is not enough memory for this.", ExitStatus.WRONG_INPUT
     said = (
@@ -203,9 +205,3 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
         "repository of robotmodels, with what the same command prints with --traceback."
     )
     return said, ExitStatus.BUG
-
-
-def _of_system(error: OSError) -> str:
-    """What the operating system says, with the file if there is one."""
-    text = error.strerror or str(error) or type(error).__name__
-    return f"{text}: {error.filename}" if error.filename is not None else f"{text}."
