@@ -16,7 +16,7 @@ from robotmodels import export
 from robotmodels.cli.program import main
 from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
 from robotmodels.export.inverse import _SOLVERS, Limits
-from robotmodels.export.tape import Tape, function, operation_count
+from robotmodels.export.tape import Tape, function
 from robotmodels.igm.paul import layout
 
 KINDS = (
@@ -217,7 +217,7 @@ def test_the_tape_shares_and_folds():
     assert (1.0 * x).number == (x + 0.0).number == x.number
     result = (x * y + 2.0) / (x - y)
     frozen = tape.frozen([[result, -x]])
-    assert operation_count(frozen[0]) == (1, 2, 0, 1)
+    assert frozen.count() == (1, 2, 0, 1)
 
 
 # --- languages -----------------------------------------------------------------------------------

@@ -50,12 +50,10 @@ _OPTION = re.compile(r"(\S+)(?: (.+?))? \[(.*?)\] (.+)")
 
 
 def add_options(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add arguments of a text: ``--name METAVAR [traits] help``; indented lines go on.
-
-    Traits are flag, required, repeated, the number of words (an integer, + or *), int, float, path,
-    character, choices (``a|b``), and the default (``=a``) at last. A line that ends with a colon
-    begins a group, ``@name`` stands for options of `SHARED`.
-    """
+    """Add arguments of a text: ``--name METAVAR [traits] help``; indented lines go on."""
+    # Traits: flag, required, repeated, a number of words (an integer, + or *), int, float, path,
+    # character, choices (a|b), and at last the default (=a). A line that ends with a colon begins
+    # a group, @name stands for options of SHARED.
     group: Any = parser
     while "@" in text:
         text = re.sub(r"^@(\w+)$", lambda match: SHARED[match[1]].strip(), text, flags=re.MULTILINE)

@@ -18,7 +18,7 @@ from ..regressors import parameter_names
 from . import inputs, recursion
 from .inputs import Draft, comment
 from .source import Program, check_choice
-from .tape import Number, Port, operation_count
+from .tape import Number, Port
 
 ModelName = Literal[
     "dgm", "jacobian", "idm", "mass_matrix", "bias", "gravity_torque", "torque_regressor",
@@ -240,8 +240,8 @@ def _finished(
     """The program with its header."""
     model, row = draft.model, _KINDS[kind]
     name = f"{inputs.identifier(model.name)}_{kind}"
-    nodes, places = draft.tape.frozen(results)
-    counts = ", ".join(f"{k} {word}" for word, k in operation_count(nodes)._asdict().items())
+    operations = draft.tape.frozen(results)
+    counts = ", ".join(f"{k} {word}" for word, k in operations.count()._asdict().items())
     notes = [
         f"{name}: {row.title} of {comment(model.name)}",
         f"Written by robotmodels {version('robotmodels')}. {counts}.",
@@ -260,8 +260,8 @@ def _finished(
     units = np.where(model.table.sigma[model.table.joint_rows] == PRISMATIC, "m", "rad")
     joints = enumerate(zip(model.table.joint_names, units, strict=True))
     notes.append(f"Joints: {', '.join(f'{k} {comment(x)} [{unit}]' for k, (x, unit) in joints)}")
-    if any(node[0] == "sign" for node in nodes):
+    if any(node[0] == "sign" for node in operations.nodes):
         notes.append("sign(0) = 0; in CasADi, smooth > 0 replaces sign(v) by tanh(v / smooth).")
     elements, values = tuple(draft.elements), tuple(draft.values)
-    ports = tuple(draft.inputs), outputs
-    return Program(name, kind, *ports, elements, values, tuple(notes), nodes, places)
+    of_inputs = tuple(draft.inputs), elements, values
+    return Program(name, kind, *of_inputs, outputs, tuple(notes), operations)

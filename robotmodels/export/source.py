@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, batch_shape
 from ..errors import InvalidValueError, nearest_names
-from .tape import RUN, Nodes, OperationCount, Port, Results, operation_count
+from .tape import RUN, OperationCount, Operations, Port
 
 _WIDEST = 60  # columns of what is written into another line
 _LEVEL = {"add": 1, "sub": 1, "mul": 2, "div": 2}
@@ -33,14 +33,16 @@ class Program:
         Name of the function in generated code.
     kind : str
         The model, such as ``"idm"``.
-    inputs, outputs : tuple of (name, shape)
-        In the order of the arguments and results.
+    inputs : tuple of (name, shape)
+        In the order of the arguments.
     elements, values : tuple of tuple
         Names of the elements of inputs that are parameters, and their values in the model.
+    outputs : tuple of (name, shape)
+        In the order of the results.
     notes : tuple of str
         The header: conventions, units, identifiers that differ from the names given.
-    nodes, results : tuple
-        The tape: operations, and the numbers of the elements of each output.
+    operations : Operations
+        The tape.
 
     Examples
     --------
@@ -56,17 +58,16 @@ class Program:
     name: str
     kind: str
     inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
     elements: tuple[tuple[str, ...], ...]
     values: tuple[tuple[float, ...], ...]
+    outputs: tuple[Port, ...]
     notes: tuple[str, ...]
-    nodes: Nodes
-    results: Results
+    operations: Operations
 
     @property
     def count(self) -> OperationCount:
         """Numbers of operations in the way of the book: signs and comparisons are free."""
-        return operation_count(self.nodes)
+        return self.operations.count()
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -98,7 +99,7 @@ class Program:
         batch = batch_shape(tuple(flat), tuple(port.name for port in self.inputs))
         values: list[Any] = [np.zeros(())]
         with np.errstate(all="ignore"):
-            for operation, operands, constant in self.nodes:
+            for operation, operands, constant in self.operations.nodes:
                 if operation == "input":
                     values.append(flat[operands[0]][..., operands[1]])
                 elif operation == "constant":
@@ -107,7 +108,7 @@ class Program:
                     x = (values[k] if k > 0 else -values[-k] for k in operands)
                     values.append(RUN[operation](*x))
         out = []
-        for port, row in zip(self.outputs, self.results, strict=True):
+        for port, row in zip(self.outputs, self.operations.results, strict=True):
             result = np.empty((*batch, port.size))
             for i, k in enumerate(row):
                 result[..., i] = values[k] if k > 0 else -values[-k]
@@ -271,13 +272,13 @@ def _file(program: Program, language: str) -> str:
         port._replace(name=f"{port.name}_out" if port.name in inputs else port.name)
         for port in program.outputs
     ]
-    operations, (helper, text) = {node[0] for node in program.nodes}, of.helper
+    operations, (helper, text) = {node[0] for node in program.operations.nodes}, of.helper
     text = text if helper in operations else ""
     body, results = _lines(program, of)
     arguments, names = inputs, [port.name for port in outputs]
     if language == "c":
         arguments = [*(f"const double *{x}" for x in inputs), *(f"double *{x}" for x in names)]
-        used = {node[1][0] for node in program.nodes if node[0] == "input"}
+        used = {node[1][0] for node in program.operations.nodes if node[0] == "input"}
         unused = [x for k, x in enumerate(inputs) if k not in used]
         unused += [port.name for port in outputs if not port.size]
         body = [*(f"(void){name};" for name in unused), *body]
@@ -299,7 +300,7 @@ def _file(program: Program, language: str) -> str:
 
 def _lines(program: Program, language: Language) -> tuple[list[str], list[list[str]]]:
     """Assignments, and the elements of the results."""
-    nodes, results = program.nodes, program.results
+    nodes, results = program.operations
     uses = [0] * (len(nodes) + 1)
     operands_of = (operands for operation, operands, _ in nodes if operation != "input")
     for k in (k for row in (*operands_of, *results) for k in row):

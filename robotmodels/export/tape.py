@@ -15,9 +15,6 @@ import numpy as np
 
 Node = tuple[str, tuple[int, ...], float]
 """An operation, its operands (node numbers from 1, negative for the opposite), a constant."""
-Nodes = tuple[Node, ...]
-Results = tuple[tuple[int, ...], ...]
-"""Signed numbers of the elements of each result."""
 Number = Union[float, "Scalar"]
 
 RUN: dict[str, Callable[..., Any]] = {
@@ -50,10 +47,16 @@ class OperationCount(NamedTuple):
     divisions: int
 
 
-def operation_count(nodes: Nodes) -> OperationCount:
-    """Numbers of operations."""
-    n = [node[0] for node in nodes].count
-    return OperationCount(n("mul"), n("add") + n("sub"), sum(map(n, _FUNCTIONS)), n("div"))
+class Operations(NamedTuple):
+    """A frozen tape: its nodes, and the signed numbers of the elements of each result."""
+
+    nodes: tuple[Node, ...]
+    results: tuple[tuple[int, ...], ...]
+
+    def count(self) -> OperationCount:
+        """Numbers of operations."""
+        n = [node[0] for node in self.nodes].count
+        return OperationCount(n("mul"), n("add") + n("sub"), sum(map(n, _FUNCTIONS)), n("div"))
 
 
 class Port(NamedTuple):
@@ -146,7 +149,7 @@ class Tape:
         node = self.add("constant", value=abs(float(x)))
         return node if x >= 0.0 else -node
 
-    def frozen(self, results: Iterable[Iterable[Number]]) -> tuple[Nodes, Results]:
+    def frozen(self, results: Iterable[Iterable[Number]]) -> Operations:
         """The operations that the results need, renumbered, and the results."""
         wanted = [[self.number(x) for x in row] for row in results]
         needed = {abs(k) for row in wanted for k in row}
@@ -159,7 +162,7 @@ class Tape:
             place[old], place[-old] = new, -new
         kept = (self.nodes[k - 1] for k in sorted(needed))
         nodes = ((o, x if o == "input" else tuple(place[k] for k in x), c) for o, x, c in kept)
-        return tuple(nodes), tuple(tuple(place[k] for k in row) for row in wanted)
+        return Operations(tuple(nodes), tuple(tuple(place[k] for k in row) for row in wanted))
 
 
 def function(name: str, *x: Number) -> Number:
