@@ -1,8 +1,9 @@
-"""Arguments that commands share: the robot, numbers and postures, columns and units of files."""
+"""Options as text, and arguments that commands share: the robot, numbers, postures, columns."""
 
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,23 +17,84 @@ from ..model import RobotModel
 from ..robots import load
 from ..symoro import read_par
 
+SHARED = {
+    "robot": """
+robot [] a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file
+@urdf""",
+    "robot_option": """
+--robot [required] a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file
+@urdf""",
+    "urdf": """
+--base-link [] URDF only: link whose frame is the world
+--tip-link [] URDF only: link whose frame is the tool
+--package-dir FOLDER [repeated] URDF only: folder that holds packages with meshes; may be repeated
+--mimic [flag] URDF only: mimic joints follow the joint they mimic; without it they are
+    independent""",
+    "units": """
+--angles [rad|deg =rad] unit of angles in the files
+--lengths [m|mm =m] unit of lengths, also of prismatic joints, in the files""",
+    "delimiter": r"""
+--delimiter CHARACTER [character] between cells, \t for a tab (default: ; tab or , as found)""",
+    "output": """
+what is handed over:
+--out FOLDER [path] write files into this folder (made if it is not there)
+@json
+@quiet""",
+    "json": """
+--json [flag] print JSON in place of text; null is what is not finite or not known""",
+    "quiet": """
+--quiet [flag] no progress bar (there is none either where standard error is not a terminal)""",
+}
+"""Options of several commands."""
+_OPTION = re.compile(r"(\S+)(?: (.+?))? \[(.*?)\] (.+)")
 
-def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
-    """Add the argument that names a robot, and the options for URDF files."""
-    text = "a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
-    if option:
-        parser.add_argument("--robot", required=True, help=text)
-    else:
-        parser.add_argument("robot", help=text)
-    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
-    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
-    parser.add_argument(
-        "--package-dir", action="append", default=[], metavar="FOLDER",
-        help="URDF only: folder that holds packages with meshes; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--mimic", action="store_true",
-                        help="URDF only: mimic joints follow the joint they mimic; without it they "
-                        "are independent")  # fmt: skip
+
+def add_options(parser: argparse.ArgumentParser, text: str) -> None:
+    """Add arguments of a text: ``--name METAVAR [traits] help``; indented lines go on."""
+    # Traits: flag, required, repeated, a number of words (an integer, + or *), int, float, path,
+    # character, choices (a|b), and at last the default (=a). A line that ends with a colon begins
+    # a group, @name stands for options of SHARED.
+    group: Any = parser
+    while "@" in text:
+        text = re.sub(r"^@(\w+)$", lambda match: SHARED[match[1]].strip(), text, flags=re.MULTILINE)
+    for lines in re.split(r"\n(?! )", text.strip()):
+        entry = " ".join(lines.split())
+        if entry.endswith(":"):
+            group = parser.add_argument_group(entry[:-1])
+            continue
+        found = _OPTION.fullmatch(entry)
+        assert found is not None, entry
+        name, metavar, traits, words = found.groups()
+        if not traits.endswith("=") and "=" in traits and "default" not in words:
+            words += " (default: %(default)s)"
+        group.add_argument(name, help=words, **_settings(metavar, traits))
+
+
+def _settings(metavar: str | None, traits: str) -> dict[str, Any]:
+    """Settings of an argument."""
+    types: dict[str, Any] = {"int": int, "float": float, "path": Path, "character": _character}
+    words, equals, default = traits.partition("=")
+    settings: dict[str, Any] = {}
+    for word in words.split():
+        if word == "flag":
+            settings["action"] = "store_true"
+        elif word == "repeated":
+            settings |= {"action": "append", "default": []}
+        elif word == "required":
+            settings["required"] = True
+        elif word in types:
+            settings["type"] = types[word]
+        elif "|" in word:
+            settings["choices"] = [settings.get("type", str)(x) for x in word.split("|")]
+        else:
+            settings["nargs"] = int(word) if word.isdecimal() else word
+    if equals:
+        many = "nargs" in settings
+        settings["default"] = default.split() if many else settings.get("type", str)(default)
+    if metavar is not None:
+        many = isinstance(settings.get("nargs"), int)
+        settings["metavar"] = tuple(metavar.split()) if many else metavar
+    return settings
 
 
 def robot_of(arguments: argparse.Namespace) -> RobotModel:
@@ -102,12 +164,12 @@ def numbers(text: str, count: int | Sequence[int], option: str, positive: bool =
 
 
 def joint_numbers(
-    text: str | None, n: int, option: str, positive: bool = False
+    text: str | None, n: int | Sequence[int], option: str, positive: bool = False
 ) -> Array | float | None:
-    """One number for all joints, or one for each."""
+    """One number for all joints, or one for each (or another count of numbers)."""
     if text is None:
         return None
-    values = numbers(text, sorted({1, n}), option, positive)
+    values = numbers(text, sorted({1, n}) if isinstance(n, int) else n, option, positive)
     return float(values[0]) if len(values) == 1 else values
 
 
@@ -153,26 +215,14 @@ def column(word: str) -> int | str:
     return int(word) if word.lstrip("-").isdecimal() else word
 
 
+def given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Some of the arguments by their names, as they are."""
+    return {name: getattr(arguments, name) for name in names}
+
+
 def columns(words: list[str] | None) -> list[int | str] | None:
     """Columns of an option that may be missing."""
     return None if words is None else [column(word) for word in words]
-
-
-def add_units(files: Any) -> None:
-    """Add the options for the units of angles and lengths."""
-    for option, units, of in (
-        ("--angles", ("rad", "deg"), "angles"),
-        ("--lengths", ("m", "mm"), "lengths, also of prismatic joints,"),
-    ):
-        files.add_argument(option, choices=units, default=units[0],
-                           help=f"unit of {of} in the files (default: %(default)s)")  # fmt: skip
-
-
-def add_delimiter(files: Any) -> None:
-    """Add the option of the delimiter."""
-    files.add_argument("--delimiter", type=_character, metavar="CHARACTER",
-                       help=r"between cells, \t for a tab (default: ; tab or , as "
-                       "found)")  # fmt: skip
 
 
 def _character(text: str) -> str:

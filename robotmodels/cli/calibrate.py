@@ -6,26 +6,18 @@ import argparse
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .arguments import add_delimiter, add_source, add_units, column, columns, numbers, robot_of
+from .arguments import column, columns, given, joint_numbers, numbers, robot_of
 from .option_words import in_options
-from .output import Report, add_output, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus, ending
+from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
-    from ..calibration import CalibrationResult, Measurement, ParameterPrior
+    from ..calibration import Measurement, ParameterPrior
 
-_KINDS = (
-    "position", "pose", "orientation", "distance", "relative-pose", "point-contact",
-    "frame-contact", "plane-contact",
-)  # fmt: skip
-_LOSSES = ("squares", "huber", "cauchy", "tukey")
-_COMPLIANCES = ("none", "joints", "links", "isotropic", "uniform")
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels calibrate --robot arm.urdf --measurements tracker.csv --kind position \\
       --lengths mm --angles deg --out report/
@@ -37,101 +29,57 @@ examples:
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
 result.json (what --json prints) and calibrated.urdf (a robot read from a URDF keeps its own, with
 other origins of joints). Without --out the report is printed."""
+DESCRIPTION = """\
+Geometric calibration: estimate the parameters that measurements determine, with their standard
+errors; errors before and after, and on held-out measurements."""
+USAGE = "robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND [options]"
+OPTIONS = """\
+@robot_option
+the measurements:
+--measurements FILE [required +] CSV files, or one folder
+--kind KIND [required
+    position|pose|orientation|distance|relative-pose|point-contact|frame-contact|plane-contact] what
+    was measured: %(choices)s
+--pattern [=*.csv] of the files in a folder
+@units
+--joint-angles [rad|deg] unit of the readings of joints, if another
+--orientation KIND [] how orientations are written: rpy_urdf, rpy, quaternion (scalar first),
+    angle_axis, euler, ...
+--joints COLUMN [+] columns of the readings of the joints, by name or number from 0
+--other-joints COLUMN [+] columns of the readings at the other end of a distance
+--columns COLUMN [+] columns of what was measured (x y z, then the orientation)
+--label COLUMN [] column that says which point or plane is touched; default: the names of the files
+@delimiter
+--frame [] measured end: a frame of the robot (default: the tool)
+--sigma NUMBERS [] standard deviations of a measurement in m and rad: one, or one for each
+    coordinate; default: estimated
+--known-distance A B LENGTH [repeated 3] point contacts: distance of two touched points, in the unit
+    of --lengths; may be repeated
+the fit:
+--parameters NAME [+] candidates, such as theta2 d3 (default: all)
+--known NAME [+ =] parameters that stay as they are
+--known-lengths NAME [+ =] the same, for lengths that give the scale
+--fixed-base [flag] the robot stands as given
+--fixed-tool [flag] the tool is as given
+--gains [flag] errors of gain of the encoders
+--eccentricity [flag] encoders off their axes
+--compliance [none|joints|links|isotropic|uniform =none] what gives way under gravity
+--loss [squares|huber|cauchy|tukey =squares] all but the first against outliers
+--prior LENGTH ANGLE|none [] standard deviations of the table's lengths (m) and angles (rad) that
+    are expected, or none (default: 1e-3 5e-3)
+--folds [int =5] largest number of folds: whole places or runs of postures; 0 for none
+--held-out SHARE [float =0.2] share of the places or postures that one more fit is tested on, 0 for
+    none
+--test FILE [+] files of measurements that only test the result
+@output"""
+NOT_REACHED = "the fit has not converged"
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "calibrate",
-        usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
-        "[options]",
-        description="Geometric calibration: estimate the parameters that measurements determine, "
-        "with their standard errors; errors before and after, and on held-out measurements.",
-        epilog=ending(_EXAMPLES, "the fit has not converged"),
-    )
-    add_source(parser, option=True)
-    _add_files(parser.add_argument_group("the measurements"))
-    _add_fit(parser.add_argument_group("the fit"))
-    add_output(parser)
-    parser.set_defaults(run=run, options=parser.options)
-
-
-def _add_files(files: Any) -> None:
-    files.add_argument("--measurements", required=True, nargs="+", metavar="FILE",
-                       help="CSV files, or one folder")  # fmt: skip
-    files.add_argument(
-        "--kind",
-        required=True,
-        choices=_KINDS,
-        metavar="KIND",
-        help=f"what was measured: {', '.join(_KINDS)}",
-    )
-    files.add_argument("--pattern", default="*.csv",
-                       help="of the files in a folder (default: %(default)s)")  # fmt: skip
-    add_units(files)
-    files.add_argument("--joint-angles", choices=("rad", "deg"),
-                       help="unit of the readings of joints, if another")  # fmt: skip
-    files.add_argument(
-        "--orientation", metavar="KIND",
-        help="how orientations are written: rpy_urdf, rpy, quaternion (scalar first), angle_axis, "
-        "euler, ...",
-    )  # fmt: skip
-    for option, what in (
-        ("--joints", "columns of the readings of the joints, by name or number from 0"),
-        ("--other-joints", "columns of the readings at the other end of a distance"),
-        ("--columns", "columns of what was measured (x y z, then the orientation)"),
-    ):
-        files.add_argument(option, nargs="+", metavar="COLUMN", help=what)
-    files.add_argument("--label", metavar="COLUMN",
-                       help="column that says which point or plane is touched; default: the names "
-                       "of the files")  # fmt: skip
-    add_delimiter(files)
-    files.add_argument("--frame", help="measured end: a frame of the robot (default: the tool)")
-    files.add_argument("--sigma", metavar="NUMBERS",
-                       help="standard deviations of a measurement in m and rad: one, or one for "
-                       "each coordinate; default: estimated")  # fmt: skip
-    files.add_argument(
-        "--known-distance", nargs=3, action="append", default=[], metavar=("A", "B", "LENGTH"),
-        help="point contacts: distance of two touched points, in the unit of --lengths; may be "
-        "repeated",
-    )  # fmt: skip
-
-
-def _add_fit(fitted: Any) -> None:
-    fitted.add_argument("--parameters", nargs="+", metavar="NAME",
-                        help="candidates, such as theta2 d3 (default: all)")  # fmt: skip
-    fitted.add_argument("--known", nargs="+", default=[], metavar="NAME",
-                        help="parameters that stay as they are")  # fmt: skip
-    fitted.add_argument("--known-lengths", nargs="+", default=[], metavar="NAME",
-                        help="the same, for lengths that give the scale")  # fmt: skip
-    fitted.add_argument("--fixed-base", action="store_true", help="the robot stands as given")
-    fitted.add_argument("--fixed-tool", action="store_true", help="the tool is as given")
-    fitted.add_argument("--gains", action="store_true", help="errors of gain of the encoders")
-    fitted.add_argument("--eccentricity", action="store_true", help="encoders off their axes")
-    fitted.add_argument("--compliance", choices=_COMPLIANCES, default="none",
-                        help="what gives way under gravity (default: %(default)s)")  # fmt: skip
-    fitted.add_argument(
-        "--loss", choices=_LOSSES, default="squares",
-        help="all but the first against outliers (default: %(default)s)",
-    )  # fmt: skip
-    fitted.add_argument("--prior", metavar="LENGTH ANGLE|none",
-                        help="standard deviations of the table's lengths (m) and angles (rad) that "
-                        "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
-    fitted.add_argument(
-        "--folds", type=int, default=5,
-        help="largest number of folds: whole places or runs of postures; 0 for none "
-        "(default: %(default)s)",
-    )  # fmt: skip
-    fitted.add_argument("--held-out", type=float, default=0.2, metavar="SHARE",
-                        help="share of the places or postures that one more fit is tested on, 0 "
-                        "for none (default: %(default)s)")  # fmt: skip
-    fitted.add_argument("--test", nargs="+", metavar="FILE",
-                        help="files of measurements that only test the result")  # fmt: skip
-
-
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: read, fit, and print or write."""
     from ..calibration import KnownDistance, ParameterPrior, fit
+    from ..calibration.report import files_sentence, report
+    from ..calibration.write import result_data, write_result
 
     check_output(arguments)
     model = robot_of(arguments)
@@ -153,44 +101,17 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with progress(arguments, "fits") as bar:
             result = fit(
-                model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
-                known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
-                tool=not arguments.fixed_tool, gains=arguments.gains,
-                eccentricity=arguments.eccentricity, compliance=arguments.compliance,
-                loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
+                model, [measured, *known], base=not arguments.fixed_base,
+                tool=not arguments.fixed_tool, prior=prior, held_out=aside,
                 progress=bar and bar.steps,
+                **given(arguments, "parameters", "known", "known_lengths", "gains",
+                        "eccentricity", "compliance", "loss", "folds"),
             )  # fmt: skip
     except InvalidValueError as error:
         raise InvalidValueError(_with_labels(str(error), measured)) from error
     options = arguments.options()
     notes = [in_options(_with_labels(note, measured), options) for note in result.notes]
     result = replace(result, notes=tuple(notes))
-    hand_over(_report(result, aside), arguments)
-    return ExitStatus.DONE if result.solution.fit.converged else ExitStatus.NOT_REACHED
-
-
-def read(
-    arguments: argparse.Namespace, model: RobotModel, files: list[str], name: str | None = None
-) -> Measurement:
-    """The measurements of some files."""
-    from ..calibration.read import read_measurements
-
-    return read_measurements(
-        files[0] if len(files) == 1 else files, arguments.kind, model,
-        joints=columns(arguments.joints), columns=columns(arguments.columns),
-        other_joints=columns(arguments.other_joints),
-        label=None if arguments.label is None else column(arguments.label),
-        lengths=arguments.lengths, angles=arguments.angles, joint_angles=arguments.joint_angles,
-        orientation=arguments.orientation, pattern=arguments.pattern,
-        delimiter=arguments.delimiter, sigma=_sigma(arguments.sigma), frame=arguments.frame,
-        name=name,
-    )  # fmt: skip
-
-
-def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
-    from ..calibration.report import files_sentence, report
-    from ..calibration.write import result_data, write_result
-
     tested = "" if isinstance(aside, float | int) else f"\n{files_sentence(aside)}\n"
     text = report(result) + tested
 
@@ -205,8 +126,26 @@ def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
 
     head = text.split("\nMeasurements\n", 1)[0]
     head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
-    head += tested
-    return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)
+    is_converged = result.solution.fit.converged
+    head = (head + tested).rstrip()
+    return Report(text.rstrip(), lambda: result_data(result), is_converged, head, write)
+
+
+def read(
+    arguments: argparse.Namespace, model: RobotModel, files: list[str], name: str | None = None
+) -> Measurement:
+    """The measurements of some files."""
+    from ..calibration.read import read_measurements
+
+    return read_measurements(
+        files[0] if len(files) == 1 else files, arguments.kind, model,
+        joints=columns(arguments.joints), columns=columns(arguments.columns),
+        other_joints=columns(arguments.other_joints),
+        label=None if arguments.label is None else column(arguments.label),
+        sigma=joint_numbers(arguments.sigma, range(1, 7), "--sigma", True), name=name,
+        **given(arguments, "lengths", "angles", "joint_angles", "orientation", "pattern",
+                "delimiter", "frame"),
+    )  # fmt: skip
 
 
 def _with_labels(message: str, measured: Measurement) -> str:
@@ -227,11 +166,3 @@ def _prior(text: str) -> ParameterPrior | None:
             f"--prior: expected two positive numbers (m, rad) or none, got {text!r}."
         ) from None
     return ParameterPrior(length=float(length), angle=float(angle))
-
-
-def _sigma(text: str | None) -> float | Array | None:
-    """One deviation, or one for each coordinate of a measurement."""
-    if text is None:
-        return None
-    values = numbers(text, range(1, 7), "--sigma", positive=True)
-    return float(values[0]) if len(values) == 1 else values

@@ -6,9 +6,9 @@ import argparse
 import sys
 import textwrap
 import time
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +20,15 @@ from ..kinematics import dgm, dkm, jacobian
 from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
-from .igm import as_text
+from .igm import as_json, as_text
 from .info import pose_text
-from .output import add_quiet, check_output, progress
-from .terminal import ending
+from .output import check_output, progress
 
-_EXAMPLES = """\
+if TYPE_CHECKING:
+    from ..datasets import Tx40Log
+    from ..identification import IdentificationResult
+
+EXAMPLES = """\
 examples:
   robotmodels demo
   robotmodels demo --real --out tx40/
@@ -37,33 +40,21 @@ _INVERSE_BATCH = 10_000
 # stated configurations, away from singular positions
 _RX90_POSTURE = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
 _UR5_POSTURE = np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])
+_PUBLISHED_RMSE = (6.40, 8.21, 4.13, 1.72, 2.65, 1.72)
+"""N m: errors of the best published fit for each joint of the TX40, on the held-out rows."""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "demo",
-        description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
-        "from its URDF to its table; print every direct model of both and every posture that "
-        "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead; "
-        "with --chapter, run an example of another chapter of the book.",
-        epilog=ending(_EXAMPLES),
-    )
-    parser.add_argument(
-        "--real", action="store_true",
-        help="identify the dynamic parameters of a real TX40 from the log that is shipped, beside "
-        "published values",
-    )  # fmt: skip
-    parser.add_argument(
-        "--chapter", type=int, choices=range(1, 8), metavar="N",
-        help="chapter 1 (this demonstration) to 7 of the book",
-    )  # fmt: skip
-    parser.add_argument(
-        "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
-        help="where the files go (default: %(default)s)",
-    )  # fmt: skip
-    add_quiet(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 from its URDF to its table;
+print every direct model of both and every posture that reaches a pose, and draw them. With --real,
+identify a Staubli TX40 from its log instead; with --chapter, run an example of another chapter of
+the book."""
+OPTIONS = """\
+--real [flag] identify the dynamic parameters of a real TX40 from the log that is shipped, beside
+    published values
+--chapter N [int 1|2|3|4|5|6|7] chapter 1 (this demonstration) to 7 of the book
+--out FOLDER [path =robotmodels-demo] where the files go
+@quiet"""
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -73,19 +64,20 @@ def run(arguments: argparse.Namespace) -> None:
     folder: Path = arguments.out
     folder.mkdir(parents=True, exist_ok=True)
     if arguments.real:
-        from .demo_identification import identify_tx40
-
         _say("Staubli TX40: from a log of its motion to a robot that predicts its torques")
-        identify_tx40(folder, partial(progress, arguments))
-        print(f"\nDone in {time.perf_counter() - started:.1f} s.")
-        return
-    if arguments.chapter not in (None, 1):
+        _identify_tx40(folder, arguments)
+    elif arguments.chapter not in (None, 1):
         from .demo_chapters import CHAPTERS, show_chapter
 
         _say(f"Chapter {arguments.chapter}: {CHAPTERS[arguments.chapter][0]}")
         show_chapter(arguments.chapter, folder)
-        print(f"\nDone in {time.perf_counter() - started:.1f} s.")
-        return
+    else:
+        _show_arms(folder)
+    print(f"\nDone in {time.perf_counter() - started:.1f} s.")
+
+
+def _show_arms(folder: Path) -> None:
+    """Every model of the RX-90 and the UR5."""
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
     rx90 = load("rx90")
     _show_models(rx90, _RX90_POSTURE, folder)
@@ -107,7 +99,6 @@ def run(arguments: argparse.Namespace) -> None:
     beside[1, 3] = 1.0
     show([rx90, ur5.with_base(beside @ ur5.base)], [_RX90_POSTURE, _UR5_POSTURE]).save(scene)
     print(f"Offline scene of both arms: {scene.resolve()} (open it in a browser)")
-    print(f"\nDone in {time.perf_counter() - started:.1f} s.")
     print("robotmodels demo --real identifies a real TX40 from nine seconds of its motion.")
 
 
@@ -177,17 +168,12 @@ def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
           f"  over {_SAMPLES} random configurations: {difference:.1e}")  # fmt: skip
     if "robotmodels.kernels.poses" not in sys.modules:
         print("Compiling the batch kernel (the first time on this machine only) ...", flush=True)
-        started = time.perf_counter()
-        dgm(model, Q)
-        print(f"  ready after {time.perf_counter() - started:.1f} s")
+        print(f"  ready after {_timed(lambda: dgm(model, Q))[0]:.1f} s")
     Q = np.random.default_rng(1).uniform(-np.pi, np.pi, (_BATCH, model.n))
-    times = []
-    for _ in range(5):
-        started = time.perf_counter()
-        dgm(model, Q)
-        times.append(time.perf_counter() - started)
-    print(f"Poses in batch: {np.median(times) / _BATCH * 1e6:.2f} us each ({_BATCH} poses, median "
-          "of 5 runs)")  # fmt: skip
+    seconds, _ = _timed(lambda: dgm(model, Q), 5)
+    print(
+        f"Poses in batch: {1e6 * seconds / _BATCH:.2f} us each ({_BATCH} poses, median of 5 runs)"
+    )
 
 
 def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
@@ -195,26 +181,31 @@ def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
 
     T = dgm(model, q)
     print("Preparing (compiles the first time on this machine only) ...", flush=True)
-    started = time.perf_counter()
-    found = igm(model, T)
-    print(f"  ready after {time.perf_counter() - started:.1f} s")
-    print(as_text(model, T, found, "world", degrees=True))
+    seconds, found = _timed(lambda: igm(model, T))
+    print(f"  ready after {seconds:.1f} s")
+    print(as_text(as_json(model, T, found, degrees=True)))
     path = folder / f"{model.name}-postures.html"
     words = [f"{k + 1}: {branch}" for k, branch in enumerate(found.branch)]
     show(model, found.q, columns=4, frames=True, legend=words).save(path)
     print(f"Offline scene of the {found.count} postures: {path.resolve()}")
     Q = np.random.default_rng(2).uniform(-np.pi, np.pi, (_INVERSE_BATCH, model.n))
     T = dgm(model, Q)
-    times = []
-    for _ in range(3):
-        started = time.perf_counter()
-        found = igm(model, T)
-        times.append(time.perf_counter() - started)
+    seconds, found = _timed(lambda: igm(model, T), 3)
     off = np.abs(np.angle(np.exp(1j * (found.nearest(Q) - Q)))).max()
     print(f"{_INVERSE_BATCH} random poses: {found.valid.sum()} postures, "
-          f"{np.median(times) / _INVERSE_BATCH * 1e6:.1f} us a pose (median of 3 runs),\n  largest "
+          f"{1e6 * seconds / _INVERSE_BATCH:.1f} us a pose (median of 3 runs),\n  largest "
           f"residual {np.nanmax(found.residual):.1e}; the joint variables that made each pose are\n"
           f"  among its postures to {off:.1e} rad")  # fmt: skip
+
+
+def _timed(call: Callable[[], Any], runs: int = 1) -> tuple[float, Any]:
+    """Median time of some calls, and what the last one returns."""
+    times, result = [], None
+    for _ in range(runs):
+        started = time.perf_counter()
+        result = call()
+        times.append(time.perf_counter() - started)
+    return float(np.median(times)), result
 
 
 def _row(values: Array) -> str:
@@ -223,3 +214,73 @@ def _row(values: Array) -> str:
 
 def _say(text: str) -> None:
     print(f"\n{'=' * 88}\n{text}\n{'=' * 88}", flush=True)
+
+
+def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
+    """Identify the Staubli TX40 from its log (seed book sections 1.6.2 and 1.6.5)."""
+    from ..datasets import load_tx40
+    from ..identification import check_log, fit, synchronisation
+    from ..identification.checks import check_joints
+    from ..identification.report import report_sections
+    from .identify import real_bodies, report
+
+    data = load_tx40()
+    model, log = data.model, data.log
+    print(log)
+    print(_narrow(f"{data.source}; {data.licence}"))
+    print("Checking it (compiles the first time on this machine only) ...", flush=True)
+    started = time.perf_counter()
+    findings = (*check_log(log, model), *check_joints(log, model))
+    print(_narrow("\n".join(map(str, findings)) or "The checks of the log found nothing."))
+    print(_narrow(str(synchronisation(log, model))))
+    with progress(arguments, "the whole log") as bar:
+        whole = fit(model, log, progress=bar and bar.fraction)
+    print(f"  identified after {time.perf_counter() - started:.1f} s\n")
+    print(comparison(data, whole))
+    first = log.rows(data.training.start, data.training.stop)
+    last = log.rows(data.held_out.start, data.held_out.stop)
+    with progress(arguments, "without the rows that test") as bar:
+        seconds, trained = _timed(
+            lambda: fit(model, first, test=last, progress=bar and bar.fraction)
+        )
+    print(f"\nFitted on samples {data.training.start} to {data.training.stop} ({seconds:.1f} s, "
+          f"with all checks); torques of samples {data.held_out.start}\nto {data.held_out.stop} as "
+          "predicted, root mean square error in N m, unfiltered:")  # fmt: skip
+    for word, row in (
+        ("here", trained.validation.held_out.rmse), ("published, best", _PUBLISHED_RMSE)
+    ):  # fmt: skip
+        print(f"  {word:16s}" + "".join(f"{error:8.2f}" for error in row))
+    print(f"\n{report_sections(trained)[0].text()}\n")
+    robot = real_bodies(trained, None, asked=False)
+    if robot is not None:
+        increase = f"{robot.residual_increase:.2f} % above least squares"
+        print(f"Physical bodies and drives: residuals {increase}")
+    write = report(trained, last, robot).write
+    for name in write(folder) if write is not None else ():
+        print(f"wrote {folder.resolve() / name}")
+
+
+def comparison(data: Tx40Log, result: IdentificationResult) -> str:
+    """Identified and published values side by side, and how many agree."""
+    from ..identification.weak_parameters import weak_parameters
+
+    both = [one for one in data.published if one.name in result.names]
+    weak = weak_parameters(result.estimate)
+    lines = ["Weighted least squares, SI units, with standard errors: here they hold for",
+             "residuals that are correlated in time, the published ones for white residuals.",
+             f"{'':10s}{'here':>10s}{'':10s}{'published':>12s}"]  # fmt: skip
+    for one in both:
+        if one.name not in weak:
+            x, s = result.value(one.name), result.standard_error(one.name)
+            lines.append(f"  {one.name:8s}{x:10.4f} +-{s:7.4f}{one.wls:12.4f} "
+                         f"+-{one.wls_deviation:7.4f}")  # fmt: skip
+    off: Array = np.array([abs(result.value(one.name) - one.wls) for one in both])
+    estimated: Array = np.array([result.standard_error(one.name) for one in both])
+    published: Array = np.array([one.wls_deviation for one in both])
+    unlisted = sum(one.name in weak for one in both)
+    return "\n".join([
+        *lines,
+        f"  and {unlisted} whose relative standard error is above 30 %.",
+        f"{np.sum(off <= 2.0 * estimated)} of {len(both)} are within two of our standard errors.",
+        f"{np.sum(off <= 2.0 * published)} of {len(both)} are within two published ones.",
+    ])  # fmt: skip

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .arguments import add_source, joint_numbers, robot_of
-from .output import Report, add_output, check_output, hand_over, progress, with_extra
-from .terminal import ExitStatus, ending
+from .arguments import given, joint_numbers, robot_of
+from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
-    from ..identification.excitation import ExcitingTrajectory
     from ..obstacles import Box
-    from ..trajectories import MotionLimits
 
 _RATE = 1000.0
 """Default sampling rate of a file, Hz."""
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels excite --robot planar_2r --duration 10 --harmonics 3 --starts 1 --out motion/
   robotmodels excite --robot ur10e --acceleration 4 --box -inf -inf 0.1 inf inf inf \\
@@ -32,88 +30,49 @@ examples:
 Into the folder of --out go trajectory.csv (or .npz, .yaml: --format), trajectory.json (the
 coefficients and all numbers, what --json prints), trajectory.png (if Matplotlib is installed) and
 summary.txt. Without --out the summary is printed."""
+DESCRIPTION = """\
+Exciting trajectory: a periodic motion within the limits of a robot on which its base parameters are
+identified best, with analytic gradients from several starts."""
+USAGE = "robotmodels excite --robot ROBOT [options]"
+OPTIONS = """\
+@robot_option
+the motion:
+--duration [float =10.0] of one period, s
+--kind [fourier|spline =fourier] finite Fourier series or quintic spline
+--harmonics [int =5] of the series
+--points [int] of the spline (default: twice the harmonics)
+--drive KIND [* Ia|Fv|Fc|offset =Ia Fv Fc] drive parameters to be identified: Ia Fv Fc offset, or
+    none (default: Ia Fv Fc)
+the limits:
+--velocity NUMBERS [] greatest velocity, rad/s or m/s: one, or one for each joint
+--acceleration NUMBERS [] greatest acceleration, rad/s^2 or m/s^2: one, or one for each joint
+--torque-limits NUMBERS [] greatest torques, N m or N: one, or one for each joint (default: those of
+    the robot)
+--box NUMBERS [repeated] box that the tool stays in: lower x y z, upper x y z, m; inf for no face;
+    may be repeated
+--keep-out NUMBERS [repeated] box that the tool keeps out of: lower x y z, upper x y z, m; inf for
+    no face; may be repeated
+the search:
+--criterion [condition|log-det =condition] criterion that is minimised
+--sigma NUMBERS [] standard deviations of the torques, N m or N: one, or one for each joint
+--starts [int] motions that are improved (default: 8, or as many as the budget has)
+--random COUNT [int] random motions, of which the best are improved (default: 100, or as many as the
+    budget has)
+--iterations [int] largest number for each stage of a start (default: what the budget has)
+--seed [int =0] of the random generator
+@output
+--rate [float] with --out: samples per second in the file (default: 1000)
+--format [csv|npz|yaml] with --out: of the samples; yaml: ROS JointTrajectory (default: csv)
+--degrees [flag] with --out: revolute joints in degrees in the file; --json stays in radians"""
+NOT_REACHED = "no motion within all limits was found"
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "excite",
-        usage="robotmodels excite --robot ROBOT [options]",
-        description="Exciting trajectory: a periodic motion within the limits of a robot on which "
-        "its base parameters are identified best, with analytic gradients from several starts.",
-        epilog=ending(_EXAMPLES, "no motion within all limits was found"),
-    )
-    add_source(parser, option=True)
-    _add_motion(parser.add_argument_group("the motion"))
-    _add_limits(parser.add_argument_group("the limits"))
-    _add_search(parser.add_argument_group("the search"))
-    files = add_output(parser)
-    files.add_argument(
-        "--rate",
-        type=float,
-        help=f"with --out: samples per second in the file (default: {_RATE:g})",
-    )
-    files.add_argument("--format", choices=("csv", "npz", "yaml"),
-                       help="with --out: of the samples; yaml: ROS JointTrajectory "
-                       "(default: csv)")  # fmt: skip
-    files.add_argument("--degrees", action="store_true",
-                       help="with --out: revolute joints in degrees in the file; --json stays "
-                       "in radians")  # fmt: skip
-    parser.set_defaults(run=run)
-
-
-def _add_motion(motion: Any) -> None:
-    motion.add_argument("--duration", type=float, default=10.0,
-                        help="of one period, s (default: %(default)s)")  # fmt: skip
-    motion.add_argument("--kind", choices=("fourier", "spline"), default="fourier",
-                        help="finite Fourier series or quintic spline "
-                        "(default: %(default)s)")  # fmt: skip
-    motion.add_argument("--harmonics", type=int, default=5,
-                        help="of the series (default: %(default)s)")  # fmt: skip
-    motion.add_argument("--points", type=int,
-                        help="of the spline (default: twice the harmonics)")  # fmt: skip
-    motion.add_argument("--drive", nargs="*", default=["Ia", "Fv", "Fc"],
-                        choices=("Ia", "Fv", "Fc", "offset"), metavar="KIND",
-                        help="drive parameters to be identified: Ia Fv Fc offset, or none "
-                        "(default: Ia Fv Fc)")  # fmt: skip
-
-
-def _add_limits(limits: Any) -> None:
-    for name, unit in (("velocity", "rad/s or m/s"), ("acceleration", "rad/s^2 or m/s^2")):
-        limits.add_argument(f"--{name}", metavar="NUMBERS",
-                            help=f"greatest {name}, {unit}: one, or one for each "
-                            "joint")  # fmt: skip
-    limits.add_argument("--torque-limits", metavar="NUMBERS",
-                        help="greatest torques, N m or N: one, or one for each joint "
-                        "(default: those of the robot)")  # fmt: skip
-    for name, what in (("--box", "stays in"), ("--keep-out", "keeps out of")):
-        limits.add_argument(name, action="append", default=[], metavar="NUMBERS",
-                            help=f"box that the tool {what}: lower x y z, upper x y z, m; inf "
-                            "for no face; may be repeated")  # fmt: skip
-
-
-def _add_search(search: Any) -> None:
-    search.add_argument("--criterion", choices=("condition", "log-det"), default="condition",
-                        help="criterion that is minimised (default: %(default)s)")  # fmt: skip
-    search.add_argument("--sigma", metavar="NUMBERS",
-                        help="standard deviations of the torques, N m or N: one, or one for each "
-                        "joint")  # fmt: skip
-    search.add_argument("--starts", type=int,
-                        help="motions that are improved "
-                        "(default: 8, or as many as the budget has)")  # fmt: skip
-    search.add_argument("--random", type=int, metavar="COUNT",
-                        help="random motions, of which the best are improved "
-                        "(default: 100, or as many as the budget has)")  # fmt: skip
-    search.add_argument("--iterations", type=int,
-                        help="largest number for each stage of a start "
-                        "(default: what the budget has)")  # fmt: skip
-    search.add_argument("--seed", type=int, default=0,
-                        help="of the random generator (default: %(default)s)")  # fmt: skip
-
-
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: search, and print or write."""
-    from ..identification.excitation import exciting_trajectory
+    from ..identification.excitation import exciting_trajectory, write_trajectory
+    from ..identification.excitation.files import excitation_data
+    from ..obstacles import Box
+    from ..trajectories import MotionLimits
 
     check_output(arguments)
     model = robot_of(arguments)
@@ -121,20 +80,44 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
     _check_file(arguments)
+    boxes, workspace = _boxes(arguments.box, "--box"), None
+    if boxes:  # what is inside of all
+        lower = np.max([box.lower for box in boxes], axis=0)
+        upper = np.min([box.upper for box in boxes], axis=0)
+        if not (lower < upper).all():
+            raise InvalidValueError("--box: the boxes have no common point.")
+        workspace = Box(lower, upper)
+    limits = MotionLimits.of_model(model)
+    for name in ("velocity", "acceleration"):
+        most = _each(getattr(arguments, name), n, f"--{name}")
+        if most is not None:
+            limits = replace(limits, **{name: most, f"{name}_lower": -most})
     with progress(arguments, "stages of the search") as bar:
         found = exciting_trajectory(
-            model, duration=arguments.duration, harmonics=arguments.harmonics,
-            points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
-            drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
+            model, drive=tuple(arguments.drive) or False, limits=limits,
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
-            sigma=_each(arguments.sigma, n, "--sigma"), workspace=_workspace(arguments),
+            sigma=_each(arguments.sigma, n, "--sigma"), workspace=workspace,
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
-            starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
-            rng=arguments.seed, progress=False if bar is None else bar.steps,
+            baseline=arguments.random, rng=arguments.seed,
+            progress=False if bar is None else bar.steps,
+            **given(arguments, "duration", "harmonics", "points", "kind", "criterion", "starts",
+                    "iterations"),
         )  # fmt: skip
-    hand_over(_report(found, arguments), arguments)
-    infeasible = found.status.name == "INFEASIBLE"
-    return ExitStatus.NOT_REACHED if infeasible else ExitStatus.DONE
+    text = str(found)
+
+    def write(folder: Path) -> list[str]:
+        from ..viz import plot_excitation
+
+        names = [f"trajectory.{arguments.format or 'csv'}", "trajectory.json", "summary.txt"]
+        rate = _RATE if arguments.rate is None else arguments.rate
+        write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
+        write_trajectory(found, folder / "trajectory.json")
+        (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
+        picture = folder / "trajectory.png"
+        return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
+
+    is_feasible = found.status.name != "INFEASIBLE"
+    return Report(text, lambda: excitation_data(found), is_feasible, text, write)
 
 
 def _check_file(arguments: argparse.Namespace) -> None:
@@ -150,58 +133,10 @@ def _check_file(arguments: argparse.Namespace) -> None:
         raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
 
 
-def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
-    from ..identification.excitation import write_trajectory
-    from ..identification.excitation.files import excitation_data
-
-    text = str(found)
-
-    def write(folder: Path) -> list[str]:
-        from ..viz import plot_excitation
-
-        names = [f"trajectory.{arguments.format or 'csv'}", "trajectory.json", "summary.txt"]
-        rate = _RATE if arguments.rate is None else arguments.rate
-        write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
-        write_trajectory(found, folder / "trajectory.json")
-        (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
-        picture = folder / "trajectory.png"
-        return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
-
-    return Report(text, text, lambda: excitation_data(found), write)
-
-
-def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
-    """Limits of the table, replaced by those of the options."""
-    from dataclasses import replace
-
-    from ..trajectories import MotionLimits
-
-    limits = MotionLimits.of_model(model)
-    for name in ("velocity", "acceleration"):
-        given = _each(getattr(arguments, name), model.n, f"--{name}")
-        if given is not None:
-            limits = replace(limits, **{name: given, f"{name}_lower": -given})
-    return limits
-
-
 def _each(text: str | None, n: int, option: str) -> Array | None:
     """Positive numbers, one for each joint."""
     values = joint_numbers(text, n, option, positive=True)
     return None if values is None else np.full(n, values)
-
-
-def _workspace(arguments: argparse.Namespace) -> Box | None:
-    """Intersection of the boxes of --box."""
-    from ..obstacles import Box
-
-    boxes = _boxes(arguments.box, "--box")
-    if len(boxes) < 2:
-        return boxes[0] if boxes else None
-    lower = np.max([box.lower for box in boxes], axis=0)
-    upper = np.min([box.upper for box in boxes], axis=0)
-    if not (lower < upper).all():
-        raise InvalidValueError("--box: the boxes have no common point.")
-    return Box(lower, upper)
 
 
 def _boxes(given: list[str], option: str) -> list[Box]:
@@ -210,13 +145,10 @@ def _boxes(given: list[str], option: str) -> list[Box]:
     boxes = []
     for text in given:
         try:  # infinity means that there is no face
-            corners = np.array([float(word) for word in text.replace(",", " ").split()])
-        except ValueError:
-            corners = np.array([])
-        if len(corners) != 6:
-            raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
-        try:
-            boxes.append(Box(corners[:3], corners[3:]))
+            corners = np.array(list(map(float, text.replace(",", " ").split())))
+            boxes.append(Box(*corners.reshape(2, 3)))
         except InvalidValueError as error:
             raise InvalidValueError(f"{option}: {error}") from error
+        except ValueError:
+            raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.") from None
     return boxes

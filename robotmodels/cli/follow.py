@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,11 @@ from .._arrays import Array
 from ..csv_table import is_number
 from ..errors import InvalidValueError
 from ..performance import FeasiblePath, feasible_path
-from ..se3 import from_rpy, translation
-from .arguments import add_source, revolute, robot_of
+from .arguments import revolute, robot_of
 from .igm import mask_of
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import Report
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels follow rx90 poses.csv --degrees
   robotmodels follow crx10ia weld.csv --through-singular --motion joints.csv
@@ -29,34 +26,24 @@ quaternion qx qy qz qw; or the 16 numbers of the 4x4 matrix. A row of names may 
 _WIDTHS = (3, 6, 7, 16)
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "follow",
-        description="Follow a path of poses from every posture of its first pose: from which ones "
-        "it reaches the end without a jump, and where it breaks for the others.",
-        epilog=ending(_EXAMPLES, "no posture follows the path to its end"),
-    )
-    add_source(parser)
-    parser.add_argument("poses", type=Path, help="file with one pose in each row")
-    parser.add_argument("--degrees", action="store_true",
-                        help="angles in degrees, those given and those printed")  # fmt: skip
-    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
-    parser.add_argument("--mask", metavar="NUMBERS",
-                        help="1 or 0 for each of x y z rx ry rz: what has to be met")  # fmt: skip
-    parser.add_argument("--through-singular", action="store_true",
-                        help="allow motions through singular positions")  # fmt: skip
-    parser.add_argument("--cost", choices=("length", "conditioning"), default="length",
-                        help="what the best motion minimises (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--motion", type=Path, metavar="FILE",
-                        help="write the best joint motion as CSV")  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE",
-                        help="draw the graph of all postures (.png, .pdf, .svg)")  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Follow a path of poses from every posture of its first pose: from which ones it reaches the end
+without a jump, and where it breaks for the others."""
+OPTIONS = """\
+@robot
+poses [path] file with one pose in each row
+--degrees [flag] angles in degrees, those given and those printed
+--no-limits [flag] leave the joint limits out
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met
+--through-singular [flag] allow motions through singular positions
+--cost [length|conditioning =length] what the best motion minimises
+--motion FILE [path] write the best joint motion as CSV
+--picture FILE [path] draw the graph of all postures (.png, .pdf, .svg)
+@json"""
+NOT_REACHED = "no posture follows the path to its end"
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: follow, write and print."""
     model = robot_of(arguments)
     poses = read_poses(arguments.poses, arguments.degrees)
@@ -72,15 +59,12 @@ def run(arguments: argparse.Namespace) -> int:
         from ..viz import plot_feasible_path
 
         plot_feasible_path(found).savefig(arguments.picture)
-    if arguments.json:
-        print_json({
-            "robot": model.name, "status": found.status.name, "reason": found.reason(),
-            "reached": found.reached, "breaks": found.breaks, "q": found.q * scale,
-            "start": found.postures[0] * scale if len(poses) else [],
-        })  # fmt: skip
-    else:
-        print(as_text(found, scale))
-    return ExitStatus.DONE if found.reached.any() else ExitStatus.NOT_REACHED
+    data = {
+        "robot": model.name, "status": found.status.name, "reason": found.reason(),
+        "reached": found.reached, "breaks": found.breaks, "q": found.q * scale,
+        "start": found.postures[0] * scale if len(poses) else [],
+    }  # fmt: skip
+    return Report(as_text(found, scale), data, bool(found.reached.any()))
 
 
 def as_text(found: FeasiblePath, scale: Array | float) -> str:
@@ -97,6 +81,8 @@ def as_text(found: FeasiblePath, scale: Array | float) -> str:
 
 def read_poses(path: Path, degrees: bool) -> Array:
     """Poses (N, 4, 4) of a file."""
+    from scipy.spatial.transform import Rotation
+
     text = path.read_text(encoding="utf-8-sig").replace(";", ",")
     rows = [line.replace(",", " ").split() for line in text.splitlines() if line.strip()]
     if rows and not all(map(is_number, rows[0])):
@@ -113,21 +99,16 @@ def read_poses(path: Path, degrees: bool) -> Array:
     values = np.array(rows, dtype=np.float64)
     if width == 16:
         return values.reshape(-1, 4, 4)
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    T[:, :3, 3], turns = values[:, :3], values[:, 3:]
     if width == 7:
-        return np.array([_of_quaternion(row) for row in values])
-    if width == 6:
-        angles = np.deg2rad(values[:, 3:]) if degrees else values[:, 3:]
-        return np.array([from_rpy(a, p) for a, p in zip(angles, values[:, :3], strict=True)])
-    return np.array([translation(*row) for row in values])
-
-
-def _of_quaternion(row: Array) -> Array:
-    """Pose of a position and a unit quaternion x y z w."""
-    from scipy.spatial.transform import Rotation
-
-    length = float(np.linalg.norm(row[3:]))
-    if abs(length - 1.0) > 1e-3:
-        raise InvalidValueError(f"expected unit quaternions qx qy qz qw, got one of {length:.4g}.")
-    T = translation(*row[:3])
-    T[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
+        lengths = np.linalg.norm(turns, axis=1)
+        if np.abs(lengths - 1.0).max() > 1e-3:
+            wrong = lengths[np.abs(lengths - 1.0).argmax()]
+            raise InvalidValueError(
+                f"expected unit quaternions qx qy qz qw, got one of {wrong:.4g}."
+            )
+        T[:, :3, :3] = Rotation.from_quat(turns).as_matrix()
+    elif width == 6:  # roll, pitch, yaw about fixed axes
+        T[:, :3, :3] = Rotation.from_euler("xyz", turns, degrees=degrees).as_matrix()
     return T

@@ -16,76 +16,46 @@ from ..igm import igm as inverse_model
 from ..kinematics import dgm
 from ..model import RobotModel
 from ..table_text import boxed
-from .arguments import add_source, numbers, posture, revolute, robot_of
+from .arguments import numbers, posture, revolute, robot_of
 from .info import pose_text
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import Report
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels igm rx90 --xyz 0.3 0.2 0.5 --rpy 0 90 45 --degrees
   robotmodels igm lab_trr --xyz 0.4 0.2 0.5 --mask 1 1 1 0 0 0
   robotmodels igm arm.urdf --matrix 0 0 -1 0.4  0 1 0 0.1  1 0 0 0.6  0 0 0 1
   robotmodels igm erd:ur5 --q 0.3 -0.9 1.2 0.4 0.8 -0.2 --limits
   robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20"""
+DESCRIPTION = """\
+Inverse geometric model: print every posture that brings the robot's tool to a pose, with its
+branch, what it misses and whether it is inside the joint limits; or why there is none. Lengths are
+in m, angles in rad unless --degrees is given."""
+OPTIONS = """\
+@robot
+@json
+the pose of the tool, in one of three ways:
+--xyz X Y Z [] position in world axes
+--rpy R P Y [] with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may
+    be left out if --mask asks for no rotation
+--matrix NUMBERS [] 16 numbers of the 4x4 pose, row by row
+--q NUMBERS [] the pose that these joint variables (or a named configuration) lead to
+what is asked for:
+--degrees [flag] angles in degrees, those given and those printed
+--limits [flag] only postures inside the joint limits
+--q-ref NUMBERS [] order by the distance to this posture; joints that the pose leaves free take its
+    values (default 0)
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words
+    position, xyz (the same) and orientation
+--mask-axes [world|tool =world] axes of the mask
+--lock JOINT=VALUE [repeated] a joint, by name or number from 1, that keeps a value; may be repeated
+--arm-angle ANGLE [] seven-joint arms: angle of the elbow about the line from shoulder to wrist
+--tolerance NUMBERS [] how much may be missing: metres and radians, or one number for both (default
+    1e-9); poses given with few digits need more"""
+NOT_REACHED = "the pose is not reached"
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "igm",
-        description="Inverse geometric model: print every posture that brings the robot's tool to "
-        "a pose, with its branch, what it misses and whether it is inside the joint limits; or why "
-        "there is none. Lengths are in m, angles in rad unless --degrees is given.",
-        epilog=ending(_EXAMPLES, "the pose is not reached"),
-    )
-    add_source(parser)
-    pose = parser.add_argument_group("the pose of the tool, in one of three ways")
-    pose.add_argument("--xyz", metavar="X Y Z", help="position in world axes")
-    pose.add_argument(
-        "--rpy", metavar="R P Y",
-        help="with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may "
-        "be left out if --mask asks for no rotation",
-    )  # fmt: skip
-    pose.add_argument("--matrix", metavar="NUMBERS", help="16 numbers of the 4x4 pose, row by row")
-    pose.add_argument(
-        "--q", metavar="NUMBERS",
-        help="the pose that these joint variables (or a named configuration) lead to",
-    )  # fmt: skip
-    asked = parser.add_argument_group("what is asked for")
-    asked.add_argument("--degrees", action="store_true",
-                       help="angles in degrees, those given and those printed")  # fmt: skip
-    asked.add_argument("--limits", action="store_true",
-                       help="only postures inside the joint limits")  # fmt: skip
-    asked.add_argument(
-        "--q-ref", metavar="NUMBERS",
-        help="order by the distance to this posture; joints that the pose leaves free take its "
-        "values (default 0)",
-    )  # fmt: skip
-    asked.add_argument(
-        "--mask", metavar="NUMBERS",
-        help="1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words position, "
-        "xyz (the same) and orientation",
-    )  # fmt: skip
-    asked.add_argument("--mask-axes", choices=("world", "tool"), default="world",
-                       help="axes of the mask (default: %(default)s)")  # fmt: skip
-    asked.add_argument(
-        "--lock", action="append", default=[], metavar="JOINT=VALUE",
-        help="a joint, by name or number from 1, that keeps a value; may be repeated",
-    )  # fmt: skip
-    asked.add_argument("--arm-angle", metavar="ANGLE",
-                       help="seven-joint arms: angle of the elbow about the line from shoulder "
-                       "to wrist")  # fmt: skip
-    asked.add_argument(
-        "--tolerance", metavar="NUMBERS",
-        help="how much may be missing: metres and radians, or one number for both (default 1e-9); "
-        "poses given with few digits need more",
-    )  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: solve and print."""
     model = robot_of(arguments)
     mask = mask_of(arguments.mask)
@@ -94,20 +64,20 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.tolerance, (1, 2), "--tolerance"
     )  # fmt: skip
     degrees = bool(arguments.degrees)
-    q_ref = arguments.q_ref
+    q_ref, arm_angle = arguments.q_ref, None
+    if arguments.arm_angle is not None:
+        arm_angle = float(numbers(arguments.arm_angle, 1, "--arm-angle")[0])
+        arm_angle = float(np.deg2rad(arm_angle)) if degrees else arm_angle
     found = inverse_model(
         model, T,
         q_ref=None if q_ref is None else posture(q_ref, model, "--q-ref", degrees),
         mask=mask, mask_axes=arguments.mask_axes, limits=arguments.limits,
         lock=locks_of(arguments.lock, model, degrees),
-        arm_angle=angle_of(arguments.arm_angle, degrees),
+        arm_angle=arm_angle,
         position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
     )  # fmt: skip
-    if arguments.json:
-        print_json(as_json(model, T, found, degrees))
-    else:
-        print(as_text(model, T, found, arguments.mask_axes, degrees))
-    return ExitStatus.DONE if found.count else ExitStatus.NOT_REACHED
+    data = as_json(model, T, found, degrees)
+    return Report(as_text(data, arguments.mask_axes), data, bool(found.count))
 
 
 def mask_of(text: str | None) -> Array | None:
@@ -167,60 +137,16 @@ def locks_of(
     return locks or None
 
 
-def angle_of(text: str | None, degrees: bool) -> float | None:
-    """The arm angle in radians."""
-    if text is None:
-        return None
-    angle = float(numbers(text, 1, "--arm-angle")[0])
-    return float(np.deg2rad(angle)) if degrees else angle
-
-
 _COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-
-
-def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, degrees: bool) -> str:
-    """The solutions of one pose as text."""
-    names = model.table.joint_names
-    count = int(found.count)
-    lines = [
-        f"{model.name}: {count} posture{'s' * (count != 1)}. {found.reason()}",
-        f"method: {found.method}",
-        f"pose of the tool (m):\n{pose_text(T)}",
-    ]
-    if not found.mask.all():
-        asked = " ".join(c for c, m in zip(_COMPONENTS, found.mask, strict=True) if m)
-        lines.append(f"asked for: {asked} in {mask_axes} axes")
-    units = _units(model, degrees)
-    if count:
-        q = _shown(model, found.q[:count], degrees)
-        columns = [("", [str(k + 1) for k in range(count)]), ("branch", list(found.branch[:count]))]
-        columns += [
-            (f"q{j + 1} [{unit}]", [_number(v, unit) for v in q[:, j]])
-            for j, unit in enumerate(units)
-        ]
-        columns.append(("residual", [f"{r:.1e}" for r in found.residual[:count]]))
-        inside = ["inside" if w else "outside" for w in found.within_limits[:count]]
-        columns.append(("limits", inside))
-        if found.double.any():
-            columns.append(("root", ["double" if d else "" for d in found.double[:count]]))
-        lines += [f"q: {', '.join(names)}", boxed(columns)]
-    lines += _family_lines(names, found)
-    if not count and found.closest is not None and np.isfinite(found.closest).all():
-        q = _shown(model, found.closest, degrees)
-        each = zip(names, q, units, strict=True)
-        lines.append(
-            "closest posture: " + ", ".join(f"{n} {_number(v, u)} {u}" for n, v, u in each)
-        )
-    return "\n".join(lines)
 
 
 def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
     """Solutions of one pose as JSON data."""
-    names = np.array(model.table.joint_names)
-    q = _shown(model, found.q, degrees)
+    names, turns = np.array(model.table.joint_names), revolute(model)
+    scale = np.where(turns, 180.0 / np.pi, 1.0) if degrees else 1.0
     postures = [
         {
-            "q": q[s].tolist(),
+            "q": (found.q[s] * scale).tolist(),
             "branch": str(found.branch[s]),
             "residual": float(found.residual[s]),
             "within_limits": bool(found.within_limits[s]),
@@ -232,11 +158,11 @@ def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> 
     ]
     closest = None
     if not postures and found.closest is not None and np.isfinite(found.closest).all():
-        closest = _shown(model, found.closest, degrees).tolist()
+        closest = (found.closest * scale).tolist()
     return {
         "robot": model.name,
         "joints": names.tolist(),
-        "units": _units(model, degrees),
+        "units": np.where(turns, "deg" if degrees else "rad", "m").tolist(),
         "pose": T.tolist(),
         "reached": bool(postures),
         "status": IGMStatus(int(found.status)).name,
@@ -248,31 +174,44 @@ def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> 
     }
 
 
-def _family_lines(names: tuple[str, ...], found: IGMSolutions) -> list[str]:
-    """Which joints took the reference, each set once with the postures it holds for."""
-    groups: dict[tuple[bytes, bytes], list[int]] = {}
-    for s in np.flatnonzero(found.valid):
-        free, family = found.free_joints[s], found.family_joints[s]
-        if free.any() or family.any():
-            groups.setdefault((free.tobytes(), family.tobytes()), []).append(int(s))
-    lines = []
-    for rows in groups.values():
-        free, family = found.free_joints[rows[0]], found.family_joints[rows[0]]
-        which = ", ".join(str(s + 1) for s in rows)
-        taken = ", ".join(n for n, f in zip(names, free, strict=True) if f)
-        others = ", ".join(n for n, f in zip(names, family, strict=True) if f)
-        text = f"infinite family through posture {which}:"
-        text += f" {taken} took the reference;" if taken else ""
-        lines.append(f"{text} {others or 'no other joint'} moves with it.")
-    return lines
-
-
-def _units(model: RobotModel, degrees: bool) -> list[str]:
-    return [("deg" if degrees else "rad") if turns else "m" for turns in revolute(model)]
-
-
-def _shown(model: RobotModel, q: Array, degrees: bool) -> Array:
-    return np.where(revolute(model), np.rad2deg(q), q) if degrees else q
+def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
+    """The same for people."""
+    names, units, rows = data["joints"], data["units"], data["postures"]
+    lines = [
+        f"{data['robot']}: {len(rows)} posture{'s' * (len(rows) != 1)}. {data['reason']}",
+        f"method: {data['method']}",
+        f"pose of the tool (m):\n{pose_text(np.array(data['pose']))}",
+    ]
+    if not all(data["mask"]):
+        asked = " ".join(c for c, m in zip(_COMPONENTS, data["mask"], strict=True) if m)
+        lines.append(f"asked for: {asked} in {mask_axes} axes")
+    if rows:
+        columns = [("", [str(k + 1) for k in range(len(rows))])]
+        columns.append(("branch", [row["branch"] for row in rows]))
+        columns += [
+            (f"q{j + 1} [{unit}]", [_number(row["q"][j], unit) for row in rows])
+            for j, unit in enumerate(units)
+        ]
+        columns.append(("residual", [f"{row['residual']:.1e}" for row in rows]))
+        inside = ["inside" if row["within_limits"] else "outside" for row in rows]
+        columns.append(("limits", inside))
+        if any(row["double"] for row in rows):
+            columns.append(("root", ["double" if row["double"] else "" for row in rows]))
+        lines += [f"q: {', '.join(names)}", boxed(columns)]
+    families: dict[tuple[str, str], list[str]] = {}  # of postures with the same free joints
+    for k, row in enumerate(rows, start=1):
+        free, others = ", ".join(row["free_joints"]), ", ".join(row["family_joints"])
+        if free or others:
+            families.setdefault((free, others), []).append(str(k))
+    for (free, others), which in families.items():
+        text = f" {free} took the reference;" if free else ""
+        text += f" {others or 'no other joint'} moves with it."
+        lines.append(f"infinite family through posture {', '.join(which)}:{text}")
+    if data["closest"] is not None:
+        each = zip(names, data["closest"], units, strict=True)
+        closest = ", ".join(f"{name} {_number(v, unit)} {unit}" for name, v, unit in each)
+        lines.append(f"closest posture: {closest}")
+    return "\n".join(lines)
 
 
 def _number(value: float, unit: str) -> str:

@@ -12,29 +12,22 @@ from ..geometry import PRISMATIC
 from ..inertia import PARAMETERS
 from ..model import RobotModel
 from ..table_text import boxed, length_text
-from .arguments import add_source, robot_of
-from .output import add_json, print_json
-from .terminal import ending
+from .arguments import robot_of
+from .output import print_json
 
 _WIDTH = 88  # columns
-_EXAMPLES = """\
+_LIMITS, _DRIVES = ("lower", "upper", "velocity", "effort"), ("Ia", "Fv", "Fc", "offset")
+EXAMPLES = """\
 examples:
   robotmodels info rx90
   robotmodels info erd:ur5 --json
   robotmodels info arm.urdf --tip-link link_5"""
-
-
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "info",
-        description="Print the geometric table of a robot, its base and tool, joint limits, "
-        "inertial parameters with their physical consistency, frames and notes.",
-        epilog=ending(_EXAMPLES),
-    )
-    add_source(parser)
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+Print the geometric table of a robot, its base and tool, joint limits, inertial parameters with
+their physical consistency, frames and notes."""
+OPTIONS = """\
+@robot
+@json"""
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -88,8 +81,8 @@ def as_json(model: RobotModel) -> dict[str, Any]:
         "gravity": model.gravity,
         "joints": [
             {"name": name, "unit": unit}
-            | {word: getattr(table, word)[k] for word in ("lower", "upper", "velocity", "effort")}
-            | {word: getattr(drive, word)[k] for word in ("Ia", "Fv", "Fc", "offset")}
+            | {word: getattr(table, word)[k] for word in _LIMITS}
+            | {word: getattr(drive, word)[k] for word in _DRIVES}
             for k, (name, unit) in enumerate(zip(table.joint_names, _units(model), strict=True))
         ],
         "transmission": None
@@ -116,18 +109,10 @@ def pose_text(pose: np.ndarray) -> str:
 def joint_table(model: RobotModel) -> str:
     """Joint limits in a box."""
     table = model.table
-    return boxed([
-        ("joint", list(table.joint_names)),
-        ("unit", _units(model)),
-        ("lower", [length_text(v) for v in table.lower]),
-        ("upper", [length_text(v) for v in table.upper]),
-        ("velocity", [length_text(v) for v in table.velocity]),
-        ("effort", [length_text(v) for v in table.effort]),
-        ("Ia", [length_text(v) for v in model.drive.Ia]),
-        ("Fv", [length_text(v) for v in model.drive.Fv]),
-        ("Fc", [length_text(v) for v in model.drive.Fc]),
-        ("offset", [length_text(v) for v in model.drive.offset]),
-    ])  # fmt: skip
+    limits = {word: getattr(table, word) for word in _LIMITS}
+    drives = {word: getattr(model.drive, word) for word in _DRIVES}
+    columns = [(word, [length_text(v) for v in x]) for word, x in (limits | drives).items()]
+    return boxed([("joint", list(table.joint_names)), ("unit", _units(model)), *columns])
 
 
 def inertia_table(model: RobotModel) -> str:

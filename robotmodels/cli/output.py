@@ -16,49 +16,34 @@ from typing import Any, TextIO
 
 from .._json_data import json_data
 from ..errors import InvalidValueError, MissingExtraError
-from .terminal import say
+from .terminal import ExitStatus, say
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Result of a command as text, JSON and files."""
+    """Result of a command as text, JSON and files; ``head`` is what is printed beside files."""
 
     text: str
-    head: str
-    data: Callable[[], Any]
-    write: Callable[[Path], Sequence[str]]
+    data: Any
+    is_reached: bool = True
+    head: str = ""
+    write: Callable[[Path], Sequence[str]] | None = None
 
 
-def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add the option for JSON."""
-    parser.add_argument("--json", action="store_true",
-                        help="print JSON in place of text; null is what is not finite or not "
-                        "known")  # fmt: skip
-
-
-def add_output(parser: argparse.ArgumentParser) -> Any:
-    """Add the options of commands that work long and write files."""
-    group: Any = parser.add_argument_group("what is handed over")
-    group.add_argument("--out", type=Path, metavar="FOLDER",
-                       help="write files into this folder (made if it is not there)")  # fmt: skip
-    add_json(group)
-    add_quiet(group)
-    return group
-
-
-def hand_over(report: Report, arguments: argparse.Namespace) -> None:
+def hand_over(report: Report, arguments: argparse.Namespace) -> ExitStatus:
     """Write the requested files, and print."""
     written: list[Path] = []
-    if arguments.out is not None:
+    if report.write is not None and arguments.out is not None:
         folder = arguments.out
         folder.mkdir(parents=True, exist_ok=True)
         written = [folder / name for name in report.write(folder)]
     if arguments.json:
-        print_json(report.data())
-        return
-    print(report.head if written else report.text)
-    for path in written:
-        print(f"wrote {path}")
+        print_json(report.data() if callable(report.data) else report.data)
+    else:
+        print(
+            "\n".join([report.head if written else report.text, *(f"wrote {p}" for p in written)])
+        )
+    return ExitStatus.DONE if report.is_reached else ExitStatus.NOT_REACHED
 
 
 def check_output(arguments: argparse.Namespace) -> None:
@@ -142,13 +127,6 @@ class Bar:
         line = f"[{'#' * full}{'.' * (_CELLS - full)}] {count} {seconds}  {doing}"
         self.stream.write("\r" + line[:_WIDTH].ljust(_WIDTH))
         self.stream.flush()
-
-
-def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Add the option that turns the progress bar off."""
-    parser.add_argument("--quiet", action="store_true",
-                        help="no progress bar (there is none either where standard error is not "
-                        "a terminal)")  # fmt: skip
 
 
 @contextlib.contextmanager

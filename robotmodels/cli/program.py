@@ -14,9 +14,10 @@ from typing import Any, NoReturn
 
 from .. import __version__, show_versions
 from ..errors import RobotModelsError, nearest_names
-from .arguments import joined
+from .arguments import add_options, joined
 from .option_words import in_options
-from .terminal import ExitStatus, give_up_output, noticed, prepared, say, statuses
+from .output import Report, hand_over
+from .terminal import ExitStatus, ending, give_up_output, noticed, prepared, say, statuses
 
 _WIDEST = 100  # columns
 
@@ -121,14 +122,22 @@ def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
                         "of Python and the libraries too")  # fmt: skip
     _add_traceback(parser)
     commands: Any = parser.add_subparsers(dest="command", metavar="COMMAND")
+    own: Parser | None = None
     for name, summary in COMMANDS.items():
         if name == command:
-            importlib.import_module(f".{name}", __package__).add_command(commands)
+            module: Any = importlib.import_module(f".{name}", __package__)
+            texts = {
+                "usage": getattr(module, "USAGE", None),
+                "description": module.DESCRIPTION,
+                "epilog": ending(module.EXAMPLES, getattr(module, "NOT_REACHED", None)),
+            }
+            own = commands.add_parser(name, help=summary, **texts)
+            assert own is not None
+            add_options(own, module.OPTIONS)
+            own.set_defaults(run=module.run, options=own.options)
+            _add_traceback(own)
         else:
             commands.add_parser(name, help=summary)
-    own = commands.choices[command] if command in COMMANDS else None
-    if own is not None:
-        _add_traceback(own)
     return parser, own
 
 
@@ -149,7 +158,8 @@ def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
             arguments, rest = parser.parse_known_args(joined(words))
             if rest:
                 own.refuse(rest)
-            code = arguments.run(arguments)
+            result = arguments.run(arguments)
+            code = hand_over(result, arguments) if isinstance(result, Report) else result
         elif command is None and "--version" in words and {"-v", "--verbose"} & {*words}:
             print(show_versions())
         elif command is None:
@@ -185,7 +195,9 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
     if isinstance(error, OSError):
         if error.filename is None:
             give_up_output()  # perhaps a full disk behind standard output
-        return _of_system(error), ExitStatus.WRONG_INPUT
+        text = error.strerror or str(error) or type(error).__name__
+        file = f": {error.filename}" if error.filename is not None else "."
+        return text + file, ExitStatus.WRONG_INPUT
     if isinstance(error, MemoryError):
         return "there is not enough memory for this.", ExitStatus.WRONG_INPUT
     said = (
@@ -193,9 +205,3 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
         "repository of robotmodels, with what the same command prints with --traceback."
     )
     return said, ExitStatus.BUG
-
-
-def _of_system(error: OSError) -> str:
-    """What the operating system says, with the file if there is one."""
-    text = error.strerror or str(error) or type(error).__name__
-    return f"{text}: {error.filename}" if error.filename is not None else f"{text}."

@@ -6,31 +6,22 @@ import argparse
 import shutil
 import sys
 import textwrap
-from typing import Any
 
 from ..robots import robots, title
-from .output import add_json, print_json
-from .terminal import ending
+from .output import print_json
 
 _ANY = 10_000  # columns
 _PREFIX = "example-robot-data: "  # which the names say
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels robots
   robotmodels robots --json
 
 Names that begin with erd: come from the files of example-robot-data."""
-
-
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "robots",
-        description="List the robots that `load` and the other commands know by name.",
-        epilog=ending(_EXAMPLES),
-    )
-    add_json(parser)
-    parser.set_defaults(run=run)
+DESCRIPTION = """\
+List the robots that `load` and the other commands know by name."""
+OPTIONS = """\
+@json"""
 
 
 def run(arguments: argparse.Namespace) -> None:

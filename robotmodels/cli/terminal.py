@@ -17,28 +17,27 @@ from ..errors import RobotModelsWarning
 
 
 class ExitStatus(IntEnum):
-    """The number that a command returns to the shell."""
+    """The number that a command returns to the shell, and its meaning as a sentence."""
 
-    DONE = 0
-    NOT_REACHED = 1
-    WRONG_INPUT = 2
-    BUG = 70
-    INTERRUPTED = 130
+    sentence: str
 
-    @property
-    def sentence(self) -> str:
-        """What the number means, in words."""
-        return _SENTENCES[self]
+    DONE = 0, "done"
+    NOT_REACHED = (
+        1,
+        (
+            "no solution: a pose out of reach, a fit that has not converged or predicts badly, no "
+            "motion within the limits"
+        ),
+    )
+    WRONG_INPUT = 2, "an argument or a file is wrong, or an optional package is missing"
+    BUG = 70, "an error inside robotmodels; --traceback shows where"
+    INTERRUPTED = 130, "interrupted (Ctrl-C)"
 
-
-_SENTENCES = {
-    ExitStatus.DONE: "done",
-    ExitStatus.NOT_REACHED: "the mathematics has no answer: a pose out of reach, a fit that has "
-    "not converged or predicts badly, no motion within the limits",
-    ExitStatus.WRONG_INPUT: "an argument or a file is wrong, or an optional package is missing",
-    ExitStatus.BUG: "an error inside robotmodels; --traceback shows where",
-    ExitStatus.INTERRUPTED: "interrupted (Ctrl-C)",
-}
+    def __new__(cls, value: int, sentence: str) -> ExitStatus:
+        """Attach the sentence."""
+        one = int.__new__(cls, value)
+        one._value_, one.sentence = value, sentence
+        return one
 
 
 def statuses() -> str:

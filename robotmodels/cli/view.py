@@ -9,15 +9,13 @@ import sys
 import tempfile
 import webbrowser
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from .arguments import add_source, posture, robot_of
-from .output import add_json, print_json
-from .terminal import ending
+from .arguments import posture, robot_of
+from .output import Report
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels view rx90
   robotmodels view erd:panda --q default
@@ -26,36 +24,22 @@ examples:
 
 The page needs neither a network nor this program any more. Its address may hold a posture, in the
 order and the units of the sliders: ur5.html#q=0,-90,90,0,90,0"""
+DESCRIPTION = """\
+Draw a robot with a slider for each joint and the pose of its tool, write it as one HTML file and
+open it in the browser."""
+OPTIONS = """\
+@robot
+--q NUMBERS [] where the robot is at first: joint variables in rad and m, or the name of a
+    configuration; default zero
+--degrees [flag] revolute joints of --q in degrees
+--skeleton [flag] rods and cylinders sized from the table instead of the URDF's shapes
+--frames [flag] the axes and the names of all frames
+--out FILE [path] page to write; default a new file in the folder for temporary files
+--no-open [flag] only write the page
+@json"""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "view",
-        help="open a robot with joint sliders in the browser",
-        description="Draw a robot with a slider for each joint and the pose of its tool, write it "
-        "as one HTML file and open it in the browser.",
-        epilog=ending(_EXAMPLES),
-    )
-    add_source(parser)
-    parser.add_argument("--q", metavar="NUMBERS", help="where the robot is at first: joint "
-                        "variables in rad and m, or the name of a configuration; default "
-                        "zero")  # fmt: skip
-    parser.add_argument("--degrees", action="store_true", help="revolute joints of --q in degrees")
-    parser.add_argument("--skeleton", action="store_true",
-                        help="rods and cylinders sized from the table instead of the URDF's "
-                        "shapes")  # fmt: skip
-    parser.add_argument("--frames", action="store_true",
-                        help="the axes and the names of all frames")  # fmt: skip
-    parser.add_argument("--out", type=Path, metavar="FILE",
-                        help="page to write; default a new file in the folder for temporary "
-                        "files")  # fmt: skip
-    parser.add_argument("--no-open", action="store_true", help="only write the page")
-    add_json(parser)
-    parser.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: draw, save and open."""
     from ..viz import jog
     from ..viz.meshes import with_stand_ins
@@ -69,19 +53,18 @@ def run(arguments: argparse.Namespace) -> None:
     path = scene.save(arguments.out or _temporary(model.name)).absolute()
     opened = not arguments.no_open and _open(path)
     start = scene.sliders.q if scene.sliders is not None else model.configurations["zero"]
-    if arguments.json:
-        print_json({
-            "robot": model.name, "joints": model.table.joint_names, "q": start,
-            "page": str(path), "opened": opened, "missing_meshes": missing,
-        })  # fmt: skip
-        return
+    data = {
+        "robot": model.name, "joints": model.table.joint_names, "q": start,
+        "page": str(path), "opened": opened, "missing_meshes": missing,
+    }  # fmt: skip
     text = np.array2string(start, precision=4, suppress_small=True, max_line_width=10_000)
-    print(f"Scene of {model.name} at q = {text} written to {path}")
+    lines = [f"Scene of {model.name} at q = {text} written to {path}"]
     if missing:
-        print(f"Mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. Give "
-              "their folder with --package-dir.")  # fmt: skip
+        lines.append(f"Mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. "
+                     "Give their folder with --package-dir.")  # fmt: skip
     if not opened and not arguments.no_open:
-        print("There is no display or no browser here: open the page in one yourself.")
+        lines.append("There is no display or no browser here: open the page in one yourself.")
+    return Report("\n".join(lines), data)
 
 
 def _temporary(name: str) -> Path:

@@ -3,54 +3,40 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..performance import Workspace, cusps
 from ..performance import workspace as reached
-from .arguments import add_source, robot_of
+from .arguments import robot_of
 from .igm import mask_of
-from .output import add_json, print_json
-from .terminal import ExitStatus, ending
+from .output import Report
 
-_EXAMPLES = """\
+EXAMPLES = """\
 examples:
   robotmodels workspace planar_2r --no-limits
   robotmodels workspace puma560 --resolution 120 --picture section.png
   robotmodels workspace planar_3r --kind primary --mask 1 1 0 0 0 0 --json"""
+DESCRIPTION = """\
+Workspace of a robot: area or volume by the number of postures, in a section where the first joint
+turns freely, else in space. Lengths are in m."""
+OPTIONS = """\
+@robot
+--kind [positions|primary|secondary =positions] positions in any orientation, in every one, or in
+    some but not every one
+--section [auto|plane|space =auto] half a plane through the first axis, or space (default: the plane
+    where it stands for all)
+--no-limits [flag] leave the joint limits out
+--resolution CELLS [int] cells along each coordinate
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what is asked for
+--picture FILE [path] draw the section or two views (.png, .pdf, .svg), or write a page with the
+    robot (.html)
+@json"""
+NOT_REACHED = "nothing is reached"
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "workspace",
-        description="Workspace of a robot: area or volume by the number of postures, in a section "
-        "where the first joint turns freely, else in space. Lengths are in m.",
-        epilog=ending(_EXAMPLES, "nothing is reached"),
-    )
-    add_source(parser)
-    parser.add_argument("--kind", choices=("positions", "primary", "secondary"),
-                        default="positions",
-                        help="positions in any orientation, in every one, or in some but not "
-                        "every one (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--section", choices=("auto", "plane", "space"), default="auto",
-                        help="half a plane through the first axis, or space (default: the plane "
-                        "where it stands for all)")  # fmt: skip
-    parser.add_argument("--no-limits", action="store_true", help="leave the joint limits out")
-    parser.add_argument("--resolution", type=int, metavar="CELLS",
-                        help="cells along each coordinate")  # fmt: skip
-    parser.add_argument("--mask", metavar="NUMBERS",
-                        help="1 or 0 for each of x y z rx ry rz: what is asked for")  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE",
-                        help="draw the section or two views (.png, .pdf, .svg), or write a page "
-                        "with the robot (.html)")  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> Report:
     """Run the command: compute, draw and print."""
     model = robot_of(arguments)
     found = reached(
@@ -58,15 +44,17 @@ def run(arguments: argparse.Namespace) -> int:
         resolution=arguments.resolution, mask=mask_of(arguments.mask),
     )  # fmt: skip
     if arguments.picture is not None:
-        draw(found, arguments.picture)
+        from ..viz import plot_workspace, show_workspace
+
+        path = arguments.picture
+        if path.suffix.lower() in (".html", ".htm"):
+            show_workspace(found).save(path)
+        else:
+            plot_workspace(found).savefig(path)
     data = numbers_of(found)
-    if arguments.json:
-        print_json(data)
-    else:
-        print(as_text(data))
-        if arguments.picture is not None:
-            print(f"Written: {arguments.picture}")
-    return ExitStatus.DONE if found.count.any() else ExitStatus.NOT_REACHED
+    text = as_text(data)
+    text += "" if arguments.picture is None else f"\nWritten: {arguments.picture}"
+    return Report(text, data, bool(found.count.any()))
 
 
 def numbers_of(w: Workspace) -> dict[str, Any]:
@@ -113,13 +101,3 @@ def as_text(data: dict[str, Any]) -> str:
     for u, v in np.asarray(data["cusps"]).reshape(-1, 2):
         lines.append(f"Cusp at {u:.6f}, {v:.6f} m.")
     return "\n".join(lines)
-
-
-def draw(w: Workspace, path: Path) -> None:
-    """Write a figure, or a page."""
-    from ..viz import plot_workspace, show_workspace
-
-    if path.suffix.lower() in (".html", ".htm"):
-        show_workspace(w).save(path)
-    else:
-        plot_workspace(w).savefig(path)

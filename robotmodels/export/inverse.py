@@ -2,7 +2,8 @@
 
 The plan that `explain_igm` prints and that the package's kernel runs is unrolled: every step is
 solved for each of its solutions, and a flag goes along that says whether they exist. At a singular
-pose an undetermined joint is 0, and the status of the pose says so.
+pose an undetermined joint is 0, and the status of the pose says so. Each solver takes the
+coefficients of its type of equation and returns its solutions.
 
 References
 ----------
@@ -13,6 +14,7 @@ section 4.4 and appendix 1, for the types of equations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import cos, pi, sin
 from typing import NamedTuple
 
@@ -28,7 +30,7 @@ from ..igm.paul import explain_igm, layout
 from ..igm.paul.program import ACCEPTED, SLACK, SMALL_AMPLITUDE, ZERO_AMPLITUDE
 from ..igm.request import Task
 from ..model import RobotModel
-from .dynamics import dot
+from .recursion import Vector, vector
 from .tape import Number, Scalar, Tape, function, pick
 
 _NEAR = 1e-12  # of the squared amplitude: discriminants of solutions that are nearly one
@@ -36,14 +38,8 @@ _BEYOND = 1e-6  # of the amplitude: overshoot that tolerances of a pose may caus
 _LEAST = 1e-14  # of the largest coefficient: slopes that are zero
 _FREE, _DOUBTFUL = 9.0, float(IGMStatus.INCOMPLETE)
 """Statuses while the branches are compared: the largest holds, and a family is the worst."""
-
-
-class Unknown(NamedTuple):
-    """Value, cosine and sine of an unknown; a length has its value alone."""
-
-    value: Number
-    cosine: Number = 1.0
-    sine: Number = 0.0
+Unknown = tuple[Number, Number, Number]
+"""Value, cosine and sine of an unknown; of a length the value alone counts."""
 
 
 class Solution(NamedTuple):
@@ -62,7 +58,7 @@ class Limits(NamedTuple):
     wanted: tuple[float, ...]
 
 
-class _Plan:
+class _Tree:
     """A plan as the kernel reads it (`igm.paul.layout`), and the postures that it gives."""
 
     def __init__(self, model: RobotModel) -> None:
@@ -75,49 +71,78 @@ class _Plan:
                 f"model: Paul's equations, of which code is written, do not solve {model.name!r} "
                 f"alone; in this package it is solved by {other}."
             )
-        rare = [s.type.formula for s in solver.plan.steps if s.type.kernel not in _SOLVERS]
-        if rare:
-            raise InvalidValueError(
-                f"model: the plan of {model.name!r} contains {rare[0]}, for which no code is "
-                "written; `igm` of this package solves it."
-            )
         at = solver.program.adapted(se3.inverse(model.base), np.zeros((3, chain.k)))
         self.columns: list[int] = chain.columns.tolist()
         self.code: list[int] = solver.program.plan.tolist()
         self.numbers: list[float] = at.tolist()
-        self.found: list[tuple[list[Number], Solution]] = []
+        self.found: list[tuple[list[Number], Number, Number]] = []
 
-    def part(self, which: int, first: int, count: int) -> list[float]:
+    def part(self, which: int, first: int, count: int) -> Vector:
         """Some of the numbers of a part."""
         at = self.code[which] + first
-        return self.numbers[at : at + count]
+        return vector(*self.numbers[at : at + count])
+
+    def solve(self, level: int, x: list[Number], valid: Number, status: Number) -> None:
+        """The rest of the tree of solutions behind a branch with the registers ``x``."""
+        code, x, k = self.code, list(x), self.code[layout.JOINTS]
+        for i in range(*(code[code[layout.STARTS] + level + m] for m in range(2))):
+            at = code[layout.OPERATIONS] + 5 * i
+            d, a, b, c, e = code[at : at + 5]
+            f, g = self.numbers[2 * i : 2 * i + 2]
+            x[d] = f * (x[a] * x[b]) + g * (x[c] * x[e])
+        if level == code[layout.STEPS]:
+            self.keep(x, valid, status)
+            return
+        at = code[layout.STEP_TABLE] + layout.STEP * level
+        step = code[at : at + layout.STEP]
+        free = (step[layout.REFERENCE + i] * (k + 1) + k for i in (0, 1))
+        wanted = tuple(self.part(layout.REFERENCES, at, 1)[0] for at in free)
+        scale = self.part(layout.SCALES, level, 1)[0]
+        limits = Limits(ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale, wanted)
+        coefficients = [x[i] for i in step[layout.COEFFICIENTS :]]
+        for solution in _SOLVERS[step[layout.CODE]](coefficients, limits):
+            own = list(x)
+            for place, unknown in zip(step[layout.FIRST :], solution.unknowns, strict=False):
+                if place > 12:
+                    own[place : place + 3] = unknown
+            there = pick(valid, 0.5, solution.valid, 0.0)
+            self.solve(level + 1, own, there, _larger(status, solution.status))
+
+    def keep(self, x: list[Number], valid: Number, status: Number) -> None:
+        """Check both sides of the pose; joint variables in (-pi, pi]."""
+        code, k = self.code, self.code[layout.JOINTS]
+        results, sigma = code[layout.RESULTS], code[layout.SIGMA]
+        sides = vector(*(x[i] for i in code[results + k : results + k + 24])).reshape(2, 4, 3)
+        d = sides[0] - sides[1]
+        off, turn = d[3] + self.part(layout.LEVER, 0, 3) @ d[:3], d[:3].ravel()
+        met = _below(_larger(off @ off, 0.5 * (turn @ turn)), ACCEPTED**2)
+        values = [x[code[results + j]] for j in range(k)]
+        for j, value in enumerate(values):
+            if code[sigma + j] == 0 and isinstance(value, Scalar):
+                values[j] = value + 2.0 * pi * function("floor", (pi - value) * (0.5 / pi))
+        self.found.append((values, pick(valid, 0.5, met, 0.0), status))
 
 
 def inverse_model(model: RobotModel, tape: Tape, T: Sequence[Number]) -> tuple[list[Number], ...]:
     """Joint variables (S n,), flags (S,) and status of a world pose (16,), row by row."""
-    plan = _Plan(model)
-    x: list[Number] = [*plan.part(layout.INITIAL, 0, plan.code[layout.REGISTERS])]
-    before, after = plan.part(layout.SIDES, 0, 12), plan.part(layout.SIDES, 12, 16)
-    for i in range(3):  # U0 = before T after, column by column
-        row = before[4 * i : 4 * i + 4]
-        turned = [dot(row[:3], T[j:12:4]) for j in range(4)]
-        turned[3] = turned[3] + row[3]
-        for j in range(4):
-            x[1 + 3 * j + i] = dot(turned, after[j::4])
-    _solve(plan, 0, x, 1.0, 0.0)
+    tree = _Tree(model)
+    before, after = tree.part(layout.SIDES, 0, 12), tree.part(layout.SIDES, 12, 16)
+    pose = np.vstack([vector(*T[:12]).reshape(3, 4), (0.0, 0.0, 0.0, 1.0)])
+    x: list[Number] = tree.part(layout.INITIAL, 0, tree.code[layout.REGISTERS]).tolist()
+    x[1:13] = (before.reshape(3, 4) @ pose @ after.reshape(4, 4)).T.ravel()
+    tree.solve(0, x, 1.0, 0.0)
     q: list[Number] = []
     status: Number = float(IGMStatus.NOT_CONVERGED)
     reached: Number = 0.0
-    for values, solution in plan.found:
-        row = [0.0] * model.n
-        for column, value in zip(plan.columns, values, strict=True):
-            row[column] = value  # type: ignore[call-overload]
-        q += [pick(solution.valid, 0.5, x, Scalar(tape, tape.add("nan"))) for x in row]
-        worse = pick(reached, 0.5, _larger(status, solution.status), solution.status)
-        status = pick(solution.valid, 0.5, worse, status)
-        reached = pick(solution.valid, 0.5, 1.0, reached)
+    for values, valid, own in tree.found:
+        row: list[Number] = [0.0] * model.n
+        for column, value in zip(tree.columns, values, strict=True):
+            row[column] = value
+        q += [pick(valid, 0.5, x, tape.scalar("nan")) for x in row]
+        worse = pick(reached, 0.5, _larger(status, own), own)
+        status, reached = pick(valid, 0.5, worse, status), _larger(valid, reached)
     status = pick(status, 8.5, float(IGMStatus.REACHED_FAMILY), status)
-    return q, [solution.valid for _, solution in plan.found], [status]
+    return q, [valid for _, valid, _ in tree.found], [status]
 
 
 def status_notes() -> list[str]:
@@ -125,53 +150,6 @@ def status_notes() -> list[str]:
     more = {1: " Joints that are free are 0.", 7: " The pose is nearly singular."}
     codes = (IGMStatus(k) for k in (0, 1, 6, 7))
     return [f"  status {int(code)}: {code.sentence}{more.get(int(code), '')}" for code in codes]
-
-
-def _solve(plan: _Plan, level: int, x: list[Number], valid: Number, status: Number) -> None:
-    """The rest of the tree of solutions behind a branch with the registers ``x``."""
-    code, x = plan.code, list(x)
-    for i in range(*(code[code[layout.STARTS] + level + k] for k in range(2))):
-        at = code[layout.OPERATIONS] + 5 * i
-        d, a, b, c, e = code[at : at + 5]
-        f, g = plan.numbers[2 * i : 2 * i + 2]
-        x[d] = f * (x[a] * x[b]) + g * (x[c] * x[e])
-    if level == code[layout.STEPS]:
-        _keep(plan, x, valid, status)
-        return
-    at = code[layout.STEP_TABLE] + layout.STEP * level
-    step = code[at : at + layout.STEP]
-    k = code[layout.JOINTS]
-    free = (step[layout.REFERENCE + i] * (k + 1) + k for i in (0, 1))
-    wanted = tuple(plan.part(layout.REFERENCES, at, 1)[0] for at in free)
-    (scale,) = plan.part(layout.SCALES, level, 1)
-    limits = Limits(ZERO_AMPLITUDE * scale, SMALL_AMPLITUDE * scale, wanted)
-    coefficients = [x[k] for k in step[layout.COEFFICIENTS :]]
-    for solution in _SOLVERS[step[layout.CODE]](coefficients, limits):
-        own = list(x)
-        for place, unknown in zip(step[layout.FIRST :], solution.unknowns, strict=False):
-            if place > 12:
-                own[place : place + 3] = unknown
-        there = pick(valid, 0.5, solution.valid, 0.0)
-        _solve(plan, level + 1, own, there, _larger(status, solution.status))
-
-
-def _keep(plan: _Plan, x: list[Number], valid: Number, status: Number) -> None:
-    """Check both sides of the pose; joint variables in (-pi, pi]."""
-    code, k = plan.code, plan.code[layout.JOINTS]
-    results, sigma = code[layout.RESULTS], code[layout.SIGMA]
-    turn: Number = 0.0
-    far: Number = 0.0
-    for i in range(3):
-        at = results + k + i
-        d = [x[code[at + 3 * j]] - x[code[at + 3 * j + 12]] for j in range(4)]
-        off = d[3] + dot(plan.part(layout.LEVER, 0, 3), d[:3])
-        turn, far = turn + dot(d[:3], d[:3]), far + off * off
-    met = _below(_larger(far, 0.5 * turn), ACCEPTED**2)
-    values = [x[code[results + j]] for j in range(k)]
-    for j, value in enumerate(values):
-        if code[sigma + j] == 0 and isinstance(value, Scalar):
-            values[j] = value + 2.0 * pi * function("floor", (pi - value) * (0.5 / pi))
-    plan.found.append((values, Solution((), pick(valid, 0.5, met, 0.0), status)))
 
 
 def _larger(a: Number, b: Number) -> Number:
@@ -195,22 +173,19 @@ def _angle(sine: Number, cosine: Number, amplitude: Number, zero: float, other: 
     """An angle by multiples of its sine and cosine; the other value where both are zero."""
     scale = 1.0 / pick(amplitude, zero, amplitude, 1.0)
     three = function("atan2", sine, cosine), cosine * scale, sine * scale
-    free = other, cos(other), sin(other)
-    return Unknown(*(pick(amplitude, zero, x, y) for x, y in zip(three, free, strict=True)))
-
-
-def direct_angle(g: Sequence[Number], limits: Limits) -> list[Solution]:
-    """``X S = g0, X C = g1`` with X > 0."""
-    rho = function("sqrt", g[0] * g[0] + g[1] * g[1])
-    angle = _angle(g[0], g[1], rho, limits.zero, limits.wanted[0])
-    return [Solution((angle,), 1.0, _status(rho, limits.zero, limits.small))]
+    a, C, S = zip(three, (other, cos(other), sin(other)), strict=True)
+    return pick(amplitude, zero, *a), pick(amplitude, zero, *C), pick(amplitude, zero, *S)
 
 
 def opposite_angles(g: Sequence[Number], limits: Limits) -> list[Solution]:
-    """``X S = g0, X C = g1`` with X of any sign: an angle and the opposite one."""
-    (first,), (second,) = direct_angle(g, limits), direct_angle([-g[0], -g[1]], limits)
-    is_free = pick(first.status, 8.5, 1.0, 0.0)
-    return [first, second._replace(valid=_below(is_free, 0.5))]
+    """``X S = g0, X C = g1`` with X of any sign: the angle for X > 0, and the opposite one."""
+    rho = function("sqrt", g[0] * g[0] + g[1] * g[1])
+    status = _status(rho, limits.zero, limits.small)
+    one, two = (
+        _angle(sign * g[0], sign * g[1], rho, limits.zero, limits.wanted[0]) for sign in (1.0, -1.0)
+    )
+    is_free = pick(status, 8.5, 1.0, 0.0)
+    return [Solution((one,), 1.0, status), Solution((two,), _below(is_free, 0.5), status)]
 
 
 def angle_of_one(g: Sequence[Number], limits: Limits) -> list[Solution]:
@@ -273,7 +248,49 @@ def length(g: Sequence[Number], limits: Limits) -> list[Solution]:
     size = _size(g[0])
     r = g[1] / pick(size, limits.zero, g[0], 1.0)
     value = pick(size, limits.zero, r, limits.wanted[0])
-    return [Solution((Unknown(value),), 1.0, _status(size, limits.zero, limits.small))]
+    return [Solution(((value, 1.0, 0.0),), 1.0, _status(size, limits.zero, limits.small))]
+
+
+def length_and_angle(g: Sequence[Number], limits: Limits, is_product: bool) -> list[Solution]:
+    """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r`` or ``X1 r S = Y1, X2 r C = Y2``.
+
+    An equation without r gives the angle, both equations then the length.
+    """
+    others, out = limits._replace(wanted=limits.wanted[::-1]), []
+    if is_product:
+        X1, Y1, X2, Y2, Z1, Z2 = *g[:4], 0.0, 0.0
+        angles = opposite_angles([X2 * Y1, X1 * Y2], others)
+    else:
+        X1, Y1, Z1, X2, Y2, Z2 = g[:6]
+        angles = angle_of_one([X1 * Z2, -(X2 * Z1), Y1 * Z2 - Y2 * Z1], others)
+    for angle in angles:
+        _, C, S = angle.unknowns[0]
+        A, B = (X1 * S, X2 * C), (Y1, Y2)
+        A, B = (A, B) if is_product else ((Z1, Z2), (A[0] - Y1, A[1] - Y2))
+        square = A[0] * A[0] + A[1] * A[1]
+        r = (A[0] * B[0] + A[1] * B[1]) / pick(square, limits.zero**2, square, 1.0)
+        near = pick(square, limits.small**2, 0.0, _DOUBTFUL)
+        both = (r, 1.0, 0.0), *angle.unknowns
+        out.append(Solution(both, angle.valid, _larger(angle.status, near)))
+    return out
+
+
+def polynomial(g: Sequence[Number], limits: Limits) -> list[Solution]:
+    """``g0 + g1 r + ... + g4 r^4 = 0``, an equation of the angle x with ``r = tan(x / 2)``."""
+    g0, g1, g2, g3, g4 = g[:5]
+    if g3 == g4 == 0.0:
+        found = angle_of_one([g1, g0 - g2, -(g0 + g2)], limits)
+    else:
+        trigonometric = [3.0 * (g0 + g4) + g2, 4.0 * (g0 - g4), 2.0 * (g1 + g3)]
+        found = quartic([*trigonometric, g0 - g2 + g4, g1 - g3], limits)
+    out = []
+    for solution in found:
+        _, C, S = solution.unknowns[0]
+        r = S / pick(1.0 + C, _NEAR, 1.0 + C, 1.0)
+        r = pick(solution.status, 8.5, limits.wanted[0], r)
+        valid = pick(1.0 + C, _NEAR, solution.valid, 0.0)  # not at infinity
+        out.append(Solution(((r, 1.0, 0.0),), valid, solution.status))
+    return out
 
 
 def quartic(g: Sequence[Number], limits: Limits) -> list[Solution]:
@@ -314,7 +331,7 @@ def quartic(g: Sequence[Number], limits: Limits) -> list[Solution]:
                 slope = a2 * C - a1 * S - 4.0 * a3 * (S * C) + 2.0 * a4 * (C * C - S * S)
                 x = x - f / pick(_size(slope), _LEAST * size, slope, 1.0)
             x = pick(free, 0.5, limits.wanted[0], x + start)
-            angle = Unknown(x, function("cos", x), function("sin", x))
+            angle = x, function("cos", x), function("sin", x)
             valid = pick(free, 0.5, float(not out), _below(-room, _BEYOND * scale))
             out.append(Solution((angle,), valid, pick(free, 0.5, _FREE, near)))
     return out
@@ -333,11 +350,14 @@ def _largest_root(a: Number, b: Number, c: Number) -> Number:
 
 
 _SOLVERS: dict[int, Callable[[Sequence[Number], Limits], list[Solution]]] = {
-    layout.ANGLE: direct_angle,
+    layout.ANGLE: lambda g, limits: opposite_angles(g, limits)[:1],
     layout.OPPOSITE_ANGLES: opposite_angles,
     layout.ONE_EQUATION: angle_of_one,
     layout.TWO_EQUATIONS: angle_of_two,
     layout.TWO_ANGLES: pair_of_angles,
     layout.LENGTH: length,
+    layout.LENGTH_TIMES_ANGLE: partial(length_and_angle, is_product=True),
+    layout.LENGTH_AND_ANGLE: partial(length_and_angle, is_product=False),
+    layout.POLYNOMIAL: polynomial,
     layout.QUARTIC: quartic,
 }

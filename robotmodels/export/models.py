@@ -11,15 +11,13 @@ import numpy as np
 from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
-from ..errors import InvalidValueError, SingularMassMatrixError, nearest_names
+from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names
-from . import dynamics
-from .dynamics import Parameters, dot
-from .geometry import Constant, Link, jacobian, links_of, lowered, point_of, poses, world_pose
-from .inputs import Draft, comment, dynamic_parameters, geometric_parameters, identifier
-from .source import Program
+from . import inputs, recursion
+from .inputs import Draft, comment
+from .source import Program, check_choice
 from .tape import Number, Port
 
 ModelName = Literal[
@@ -63,7 +61,6 @@ _UNITS = {
     "wrench": "force [N] and moment [N m] of the tool on its environment, at the tool, world axes",
     "geometry": "[m] or [rad]", "parameters": "SI units",
 }  # fmt: skip
-_STATES, _ROUNDING = 10, 1e-13
 
 
 def program(
@@ -144,8 +141,7 @@ def program(
         return T
     """
     check_model(model)
-    given = {"parameters": parameters, "geometry": geometry, "wrench": wrench, "frame": frame}
-    _check(kind, given)
+    _check(kind, {"parameters": parameters, "geometry": geometry, "wrench": wrench, "frame": frame})
     draft = Draft(model, drive_kinds(drive))
     for name in (*_KINDS[kind].inputs, *("wrench",) * bool(wrench)):
         draft.input(name, {"T": (4, 4), "wrench": (6,)}.get(name, (model.n,)))
@@ -153,44 +149,26 @@ def program(
         from .inverse import inverse_model, status_notes  # opens the inverse models of the package
 
         results = inverse_model(model, draft.tape, draft.scalars["T"])
-        S = len(results[1])
         draft.notes += status_notes()
+        S = len(results[1])
         ports = Port("q", (S, model.n)), Port("valid", (S,)), Port("status", ())
         return _finished(draft, kind, ports, results)
-    constant = geometric_parameters(draft) if geometry == "symbols" else _numbers(model)
-    links, own = links_of(model, draft.scalars["q"], constant), {}
-    if "parameters" in _KINDS[kind].accepts:
-        own, simpler = dynamic_parameters(draft, parameters, geometry == "symbols")
-        if simpler is not None and _same_torques(model, own, simpler):
-            own = simpler
-    if kind == "ddm" and parameters == "numbers":
-        _check_mass_matrix(model, DriveKind.IA in draft.kinds)
+    numbers = inputs.table_numbers(model)
+    constant = (
+        inputs.geometric_parameters(draft) if geometry == "symbols" else lambda *key: numbers[key]
+    )
     if kind in ("dgm", "jacobian"):
-        rows = _geometric(draft, kind, links, frame)
-    elif "regressor" in kind:
-        rows = _regressor(draft, kind, lowered(links))
-    elif kind == "mass_matrix":
-        rows = dynamics.mass_matrix(model, lowered(links), own)
+        out = _geometric(draft, kind, constant, frame)
     else:
-        rows = [_torques(draft, kind, lowered(links), own)]
-    is_vector = kind in ("idm", "bias", "gravity_torque", "ddm")
-    shape = (model.n,) if is_vector else (len(rows), len(rows[0]) if rows else model.n)
-    elements = [x for row in rows for x in row]
-    return _finished(draft, kind, (Port(_KINDS[kind].output, shape),), (elements,))
+        out = _dynamic(draft, kind, constant, parameters, geometry == "symbols")
+    return _finished(draft, kind, (Port(_KINDS[kind].output, out.shape),), (out.ravel().tolist(),))
 
 
 def _check(kind: str, given: dict[str, Any]) -> None:
     """Refuse unknown models and choices, and arguments that a model does not have."""
-    if not isinstance(kind, str) or kind not in _KINDS:
-        near = nearest_names(str(kind), _KINDS)
-        meant = f" Did you mean {near[0]!r}?" if near else ""
-        listed = ", ".join(map(repr, _KINDS))
-        raise InvalidValueError(f"kind: expected one of {listed}, got {kind!r:.60}.{meant}")
-    words = ("numbers", "symbols", "base")
-    for name, allowed in (("parameters", words), ("geometry", words[:2])):
-        if not isinstance(given[name], str) or given[name] not in allowed:
-            listed = ", ".join(map(repr, allowed))
-            raise InvalidValueError(f"{name}: expected one of {listed}, got {given[name]!r:.60}.")
+    check_choice(kind, _KINDS, "kind")
+    check_choice(given["parameters"], ("numbers", "symbols", "base"), "parameters")
+    check_choice(given["geometry"], ("numbers", "symbols"), "geometry")
     if not isinstance(given["wrench"], (bool, np.bool_)):
         raise InvalidValueError(f"wrench: expected True or False, got {given['wrench']!r:.60}.")
     for name, value in given.items():
@@ -202,94 +180,58 @@ def _check(kind: str, given: dict[str, Any]) -> None:
             )
 
 
-def _check_mass_matrix(model: RobotModel, drive: bool) -> None:
-    """Refuse robots whose mass matrix is singular in every one of some random configurations."""
-    still, K = np.zeros(model.n), model.transmission
-    G = None if K is None else free_motion(K)
-    for k, x in enumerate(np.random.default_rng(0).normal(size=(_STATES, model.n))):
-        q = x if G is None or K is None else K.offset + G @ x[: G.shape[1]]
-        try:
-            ddm(model, q, still, still, drive=drive)
-        except SingularMassMatrixError:
-            if k == _STATES - 1:
-                raise
-        else:
-            return
-
-
-def _numbers(model: RobotModel) -> Constant:
-    """Geometric parameters as they are in the table."""
-    return lambda column, row: float(getattr(model.table, column)[row - 1])
-
-
-def _same_torques(model: RobotModel, own: Parameters, other: Parameters) -> bool:
-    """Whether two sets of parameters have the same torques, to rounding."""
-    draft = Draft(model, ())
-    q, v, a = (draft.input(name, (model.n,)) for name in "qva")
-    links = lowered(links_of(model, q, _numbers(model)))
-    moved = dynamics.motions(model, links, v, a)
-    both = [dynamics.inverse_dynamics(model, links, moved, x, v, a, {}) for x in (own, other)]
-    states = np.random.default_rng(0).normal(size=(3, model.n, _STATES))
-    torques = draft.tape.frozen(both).run(list(states))
-    first, second = (np.array([np.broadcast_to(x, _STATES) for x in row]) for row in torques)
-    off, size = (np.abs(x).max(initial=0.0) for x in (first - second, first))
-    return bool(off <= _ROUNDING * size)
-
-
 def _geometric(
-    draft: Draft, kind: str, links: Sequence[Link], frame: str | int | None
-) -> list[Sequence[Number]]:
-    """Rows of a pose or a Jacobian."""
-    number, point = point_of(draft.model, frame)
+    draft: Draft, kind: str, constant: recursion.Constant, frame: str | int | None
+) -> recursion.Vector:
+    """A pose or a Jacobian."""
+    model = draft.model
+    links = recursion.links_of(model, draft.scalars["q"], constant, is_lowered=False)
+    number, E, e = recursion.point_of(model, frame)
     draft.notes.append(f"Frame: {comment(str('tool' if frame is None else frame))}")
     if kind == "jacobian":
-        return [*jacobian(draft.model, links, number, point)]
-    R, p = world_pose(poses(draft.model, links), number, point)
-    return [*((*row, x) for row, x in zip(R, p, strict=True)), (0.0, 0.0, 0.0, 1.0)]
+        return recursion.jacobian(model, links, number, e)
+    R, p = recursion.poses(model, links)[number]
+    return np.vstack([np.column_stack([R @ E, p + R @ e]), (0.0, 0.0, 0.0, 1.0)])
 
 
-def _regressor(draft: Draft, kind: str, links: Sequence[Link]) -> list[list[Number]]:
-    """Rows of torques per unit of each parameter."""
-    model, (v, a) = draft.model, (draft.scalars[name] for name in "va")
-    is_base = kind == "base_regressor"
-    names = draft.base().names if is_base else parameter_names(model, draft.kinds)
-    draft.notes.append(f"Columns: {', '.join(names)}")
-    moved = dynamics.motions(model, links, v, a)
-    columns = [
-        dynamics.inverse_dynamics(model, links, moved, {name: 1.0}, v, a, {}) for name in names
-    ]
-    return [[column[i] for column in columns] for i in range(model.n)]
-
-
-def _torques(draft: Draft, kind: str, links: Sequence[Link], own: Parameters) -> list[Number]:
-    """Torques of a motion, or accelerations under torques."""
+def _dynamic(
+    draft: Draft, kind: str, constant: recursion.Constant, parameters: str, is_general: bool
+) -> recursion.Vector:
+    """Torques, their regressors, the mass matrix, or accelerations under torques."""
     model, scalars, zero = draft.model, draft.scalars, [0.0] * draft.model.n
+    links = recursion.links_of(model, scalars["q"], constant)
     v, a = scalars.get("v", zero), scalars.get("a", zero)
+    moved = recursion.motions(model, links, v, a)
+    if "regressor" in kind:
+        is_base = kind == "base_regressor"
+        names = draft.base().names if is_base else parameter_names(model, draft.kinds)
+        draft.notes.append(f"Columns: {', '.join(names)}")
+        units = ({name: 1.0} for name in names)
+        columns = [
+            recursion.inverse_dynamics(model, links, moved, unit, v, a, {}) for unit in units
+        ]
+        return np.array(columns, dtype=object).reshape(len(names), model.n).T
+    own = inputs.dynamic_parameters(draft, parameters, is_general)
+    if kind == "mass_matrix":
+        return recursion.mass_matrix(model, links, own)
     if kind == "gravity_torque":
-        own = {name: x for name, x in own.items() if not name.startswith(dynamics.DRIVE_TERMS)}
-    tool: dict[int, dynamics.Wrench] = {}
-    if "wrench" in scalars:
-        tool = dynamics.tool_wrench(model, links, point_of(model, None), scalars["wrench"])
-    moved = dynamics.motions(model, links, v, a)
-    tau = dynamics.inverse_dynamics(model, links, moved, own, v, a, tool)
+        own = {name: x for name, x in own.items() if not name.startswith(recursion.DRIVE_TERMS)}
+    wrench = recursion.vector(*scalars.get("wrench", ()))
+    tool = recursion.tool_wrench(model, links, wrench) if wrench.size else {}
+    tau = recursion.inverse_dynamics(model, links, moved, own, v, a, tool)
     if kind != "ddm":
         return tau
-    rest = [x - y for x, y in zip(scalars["tau"], tau, strict=True)]
-    return _accelerations(draft, dynamics.mass_matrix(model, links, own), rest)
-
-
-def _accelerations(draft: Draft, M: list[list[Number]], torques: list[Number]) -> list[Number]:
-    """Accelerations under torques; joints that mimic others follow them."""
-    K = draft.model.transmission
-    G = None if K is None else free_motion(K)
-    if G is None:
-        return dynamics.solved(M, torques)
-    draft.notes.append("Joints that mimic others follow them; q and v must do so, too.")
-    free = G.T.tolist()
-    MG = [[dot(row, column) for column in free] for row in M]
-    own = [[dot(row, column) for column in zip(*MG, strict=True)] for row in free]
-    solution = dynamics.solved(own, [dot(row, torques) for row in free])
-    return [dot(row, solution) for row in G.tolist()]
+    K = model.transmission
+    free = None if K is None else free_motion(K)
+    G = np.eye(model.n) if free is None else free
+    if parameters == "numbers":  # refuse a mass matrix that is singular in every configuration
+        x = np.random.default_rng(0).normal(size=G.shape[1])
+        q = x if free is None or K is None else K.offset + G @ x
+        ddm(model, q, zero, zero, drive=DriveKind.IA in draft.kinds)
+    if free is not None:
+        draft.notes.append("Joints that mimic others follow them; q and v must do so, too.")
+    G, M = G.astype(object), recursion.mass_matrix(model, links, own)
+    return G @ recursion.solved(G.T @ M @ G, G.T @ (recursion.vector(*scalars["tau"]) - tau))
 
 
 def _finished(
@@ -297,7 +239,7 @@ def _finished(
 ) -> Program:
     """The program with its header."""
     model, row = draft.model, _KINDS[kind]
-    name = f"{identifier(model.name)}_{kind}"
+    name = f"{inputs.identifier(model.name)}_{kind}"
     operations = draft.tape.frozen(results)
     counts = ", ".join(f"{k} {word}" for word, k in operations.count()._asdict().items())
     notes = [
@@ -309,17 +251,17 @@ def _finished(
         notes.append(f"Input {port.name} {port.shape}: {_UNITS[port.name]}")
         pairs = zip(names, values, strict=True)
         notes += [f"  {k} {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
-    notes += [f"Output {port.name} {port.shape}: {row.unit}" for port in outputs[:1]]
-    words = {"valid": "1 where the row is a posture, else 0", "status": "see below"}
-    notes += [f"Output {port.name} {port.shape}: {words[port.name]}" for port in outputs[1:]]
+    words = row.unit, "1 where the row is a posture, else 0", "see below"
+    notes += [
+        f"Output {port.name} {port.shape}: {word}"
+        for port, word in zip(outputs, words, strict=False)
+    ]
     notes += draft.notes
-    sigma = model.table.sigma[model.table.joint_rows]
-    joints = zip(model.table.joint_names, np.where(sigma == PRISMATIC, "m", "rad"), strict=True)
-    named = (f"{k} {comment(name)} [{unit}]" for k, (name, unit) in enumerate(joints))
-    notes.append(f"Joints: {', '.join(named)}")
+    units = np.where(model.table.sigma[model.table.joint_rows] == PRISMATIC, "m", "rad")
+    joints = enumerate(zip(model.table.joint_names, units, strict=True))
+    notes.append(f"Joints: {', '.join(f'{k} {comment(x)} [{unit}]' for k, (x, unit) in joints)}")
     if any(node[0] == "sign" for node in operations.nodes):
         notes.append("sign(0) = 0; in CasADi, smooth > 0 replaces sign(v) by tanh(v / smooth).")
     elements, values = tuple(draft.elements), tuple(draft.values)
-    return Program(
-        name, kind, tuple(draft.inputs), elements, values, outputs, tuple(notes), operations
-    )
+    of_inputs = tuple(draft.inputs), elements, values
+    return Program(name, kind, *of_inputs, outputs, tuple(notes), operations)

@@ -1,22 +1,22 @@
-"""A program, a model of a robot as straight-line code, and its printers.
+"""A program, a model of a robot as straight-line code, and its printer.
 
-A `Language` holds the syntax; the list of assignments is the same for all languages. Products and
-sums that are used once are written into the line that uses them.
+A `Language` holds the syntax; assignments are the same for all languages. Products and sums that
+are used once are written into the line that uses them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, batch_shape
 from ..errors import InvalidValueError, nearest_names
-from .tape import OperationCount, Operations, Port
+from .tape import RUN, OperationCount, Operations, Port
 
 _WIDEST = 60  # columns of what is written into another line
 _LEVEL = {"add": 1, "sub": 1, "mul": 2, "div": 2}
@@ -72,7 +72,7 @@ class Program:
     @property
     def lines(self) -> tuple[str, ...]:
         """The assignments, one by one, in Python."""
-        return tuple(lines_of(self, LANGUAGES["python"])[0])
+        return tuple(_lines(self, LANGUAGES["python"])[0])
 
     def __call__(self, *inputs: ArrayLike) -> Array | tuple[Array, ...]:
         """Run the tape, for checks; leading axes of the inputs are batch axes.
@@ -97,13 +97,21 @@ class Program:
             x = as_core(value, port.shape, port.name)
             flat.append(x.reshape((*x.shape[: x.ndim - len(port.shape)], port.size)))
         batch = batch_shape(tuple(flat), tuple(port.name for port in self.inputs))
+        values: list[Any] = [np.zeros(())]
         with np.errstate(all="ignore"):
-            rows = self.operations.run([np.moveaxis(x, -1, 0) for x in flat])
+            for operation, operands, constant in self.operations.nodes:
+                if operation == "input":
+                    values.append(flat[operands[0]][..., operands[1]])
+                elif operation == "constant":
+                    values.append(np.float64(constant))
+                else:
+                    x = (values[k] if k > 0 else -values[-k] for k in operands)
+                    values.append(RUN[operation](*x))
         out = []
-        for port, row in zip(self.outputs, rows, strict=True):
+        for port, row in zip(self.outputs, self.operations.results, strict=True):
             result = np.empty((*batch, port.size))
-            for k, x in enumerate(row):
-                result[..., k] = x
+            for i, k in enumerate(row):
+                result[..., i] = values[k] if k > 0 else -values[-k]
             out.append(result.reshape((*batch, *port.shape)))
         return out[0] if len(out) == 1 else tuple(out)
 
@@ -120,7 +128,7 @@ class Program:
         str
             One function, self-contained, the same text every time.
         """
-        return file_text(self, language)
+        return _file(self, check_choice(str(language).lower(), LANGUAGES, "language"))
 
     def __repr__(self) -> str:
         ports = [", ".join(f"{p.name} {p.shape}" for p in of) for of in (self.inputs, self.outputs)]
@@ -153,10 +161,10 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
     >>> with TemporaryDirectory() as folder:
     ...     write(program(load("planar_2r"), "dgm"), Path(folder) / "planar.c")
     """
-    if not isinstance(program, Program):
-        raise InvalidValueError(f"program: expected a Program, got {type(program).__name__}.")
-    if not isinstance(path, (str, Path)):
-        raise InvalidValueError(f"path: expected a str or Path, got {type(path).__name__}.")
+    for value, kinds, name in ((program, (Program,), "program"), (path, (str, Path), "path")):
+        if not isinstance(value, kinds):
+            wanted = " or ".join(kind.__name__ for kind in kinds)
+            raise InvalidValueError(f"{name}: expected a {wanted}, got {type(value).__name__}.")
     path = Path(path)
     suffixes = {kind.suffix: name for name, kind in reversed(LANGUAGES.items())} | {".py": "python"}
     if language is None and path.suffix.lower() not in suffixes:
@@ -173,73 +181,124 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
 
 
 class Language(NamedTuple):
-    """How a language writes elements ``name(i, j)``, assignments, functions and comments."""
+    """How a language writes elements ``name(i, j)``, assignments, functions, results and a file."""
 
-    name: str
     suffix: str
     comment: str
     brackets: tuple[str, str, str]
     first: int  # index
-    assignment: str
+    local: str  # assignment
+    end: str  # of an assignment to an element
     functions: str
     sign: str
     pick: str
     nan: str
+    file: str
+    made: str = ""  # a result, before its elements are assigned one by one
+    shaped: tuple[str, str, str] = ("", "", "")  # a scalar, vector, matrix of these elements
+    helper: tuple[str, str] = ("", "")  # operation that needs it, and its text
 
     def element(self, port: Port, k: int) -> str:
         """Element k of an input, counted row by row; in C all are in one row."""
-        flat = len(port.shape) == 1 or self.name == "c"
-        indices = (k,) if flat else divmod(k, port.shape[-1])
         opening, between, closing = self.brackets
+        indices = divmod(k, port.shape[-1]) if len(port.shape) > 1 and between else (k,)
         return port.name + opening + between.join(str(i + self.first) for i in indices) + closing
 
+    def result(self, port: Port, values: Sequence[str]) -> list[str]:
+        """Lines that make a result of its elements, row by row."""
+        one, (rows, columns) = Port(port.name, (port.size,)), (*port.shape, 1, 1)[:2]
+        lines = [f"{self.element(one, k)} = {x}{self.end}" for k, x in enumerate(values)]
+        before, after = (
+            text.format(port.name, rows, columns, port.size)
+            for text in (self.made, self.shaped[len(port.shape)])
+        )
+        return [line for line in (before, *lines, after) if line]
 
+
+_PYTHON = "import {}\n\n\n{{helper}}def {{name}}({{arguments}}):\n{{body}}\n"
 LANGUAGES = {
-    language.name: language
-    for language in (
-        Language(
-            "c", ".c", "//", ("[", "", "]"), 0, "const double {} = {};", "",
-            "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
-        ),
-        Language(
-            "python", ".py", "#", ("[", "][", "]"), 0, "{} = {}", "math.",
-            "float(({0} > 0.0) - ({0} < 0.0))", "({2} if {0} > {1} else {3})", "math.nan",
-        ),
-        Language(
-            "numpy", ".py", "#", ("[..., ", ", ", "]"), 0, "{} = {}", "np.",
-            "np.sign({})", "np.where({} > {}, {}, {})", "np.nan",
-        ),
-        Language(
-            "casadi", ".py", "#", ("[", ", ", "]"), 0, "{} = {}", "casadi.",
-            "_sign({}, smooth)", "casadi.if_else({} > {}, {}, {})", 'float("nan")',
-        ),
-        Language(
-            "matlab", ".m", "%", ("(", ", ", ")"), 1, "{} = {};", "",
-            "sign({})", "select_({} > {}, {}, {})", "NaN",
-        ),
-    )
+    "c": Language(
+        ".c", "//", ("[", "", "]"), 0, "const double {} = {};", ";", "",
+        "(double)(({0} > 0.0) - ({0} < 0.0))", "({} > {} ? {} : {})", "NAN",
+        "#include <math.h>\n\nvoid {name}({arguments})\n{{\n{body}\n}}\n",
+    ),
+    "python": Language(
+        ".py", "#", ("[", "][", "]"), 0, "{} = {}", "", "math.",
+        "float(({0} > 0.0) - ({0} < 0.0))", "({2} if {0} > {1} else {3})", "math.nan",
+        _PYTHON.format("math"), "{0} = [0.0] * {3}",
+        ("{0} = {0}[0]", "", "{0} = [{0}[{2} * i : {2} * i + {2}] for i in range({1})]"),
+    ),
+    "numpy": Language(
+        ".py", "#", ("[..., ", ", ", "]"), 0, "{} = {}", "", "np.",
+        "np.sign({})", "np.where({} > {}, {}, {})", "np.nan",
+        _PYTHON.format("numpy as np"), "{0} = np.zeros((*batch, {3}))",
+        ("{0} = {0}[..., 0]", "", "{0} = {0}.reshape((*batch, {1}, {2}))"),
+    ),
+    "casadi": Language(
+        ".py", "#", ("[", ", ", "]"), 0, "{} = {}", "", "casadi.",
+        "_sign({}, smooth)", "casadi.if_else({} > {}, {}, {})", 'float("nan")',
+        _PYTHON.format("casadi"), "{0} = [0.0] * {3}",
+        ("{0} = {0}[0]", "{0} = casadi.vertcat(*{0})",
+         "{0} = casadi.vertcat(*{0}).reshape(({2}, {1})).T"),
+        ("sign", "def _sign(x, smooth):\n    return casadi.tanh(x / smooth) if smooth else "
+         "casadi.sign(x)\n\n\n"),
+    ),
+    "matlab": Language(
+        ".m", "%", ("(", ", ", ")"), 1, "{} = {};", ";", "",
+        "sign({})", "select_({} > {}, {}, {})", "NaN",
+        "function [{results}] = {name}({arguments})\n{body}\nend\n{helper}",
+        "{0} = zeros({3}, 1);", ("", "", "{0} = reshape({0}, {2}, {1}).';"),
+        ("pick", "\nfunction z = select_(condition, x, y)\n    z = y;\n    if condition\n"
+         "        z = x;\n    end\nend\n"),
+    ),
 }  # fmt: skip
 """By name, in the order of the documentation."""
 
 
-def file_text(program: Program, language: str) -> str:
+def check_choice(value: Any, allowed: Collection[str], name: str) -> str:
+    """Refuse what is none of some words."""
+    if not isinstance(value, str) or value not in allowed:
+        near = nearest_names(str(value), allowed)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        listed = ", ".join(map(repr, allowed))
+        raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.{hint}")
+    return value
+
+
+def _file(program: Program, language: str) -> str:
     """A whole file."""
-    of = LANGUAGES.get(str(language).lower())
-    if of is None:
-        near = nearest_names(str(language), LANGUAGES)
-        meant = f" Did you mean {near[0]!r}?" if near else ""
-        words = ", ".join(map(repr, LANGUAGES))
-        raise InvalidValueError(f"language: expected one of {words}, got {language!r:.60}.{meant}")
-    inputs, outputs = [port.name for port in program.inputs], []
-    lines, results = lines_of(program, of)
-    for port, elements in zip(program.outputs, results, strict=True):
-        outputs.append(f"{port.name}_out" if port.name in inputs else port.name)
-        lines += _result(of, outputs[-1], port.shape, elements)
-    head = [f"{of.comment} {note}" for note in program.notes]
-    return "\n".join([*head, *_framed(program, of, inputs, outputs, lines), ""])
+    of, inputs = LANGUAGES[language], [port.name for port in program.inputs]
+    outputs = [
+        port._replace(name=f"{port.name}_out" if port.name in inputs else port.name)
+        for port in program.outputs
+    ]
+    operations, (helper, text) = {node[0] for node in program.operations.nodes}, of.helper
+    text = text if helper in operations else ""
+    body, results = _lines(program, of)
+    arguments, names = inputs, [port.name for port in outputs]
+    if language == "c":
+        arguments = [*(f"const double *{x}" for x in inputs), *(f"double *{x}" for x in names)]
+        used = {node[1][0] for node in program.operations.nodes if node[0] == "input"}
+        unused = [x for k, x in enumerate(inputs) if k not in used]
+        unused += [port.name for port in outputs if not port.size]
+        body = [*(f"(void){name};" for name in unused), *body]
+    elif language == "numpy":
+        shapes = (f"{port.name}.shape[:-{len(port.shape)}]" for port in program.inputs)
+        before = [f"{name} = np.asarray({name}, dtype=np.float64)" for name in inputs]
+        body = [*before, f"batch = np.broadcast_shapes({', '.join(shapes)})", *body]
+    elif language == "casadi" and text:
+        arguments = [*inputs, "smooth=0.0"]
+    for port, values in zip(outputs, results, strict=True):
+        body += of.result(port, values)
+    body += [f"return {', '.join(names)}"] * (of.suffix == ".py")
+    head = "".join(f"{of.comment} {note}\n" for note in program.notes)
+    return head + of.file.format(
+        name=program.name, arguments=", ".join(arguments), results=", ".join(names), helper=text,
+        body="\n".join(f"    {line}" for line in body),
+    )  # fmt: skip
 
 
-def lines_of(program: Program, language: Language) -> tuple[list[str], list[list[str]]]:
+def _lines(program: Program, language: Language) -> tuple[list[str], list[list[str]]]:
     """Assignments, and the elements of the results."""
     nodes, results = program.operations
     uses = [0] * (len(nodes) + 1)
@@ -279,80 +338,14 @@ def lines_of(program: Program, language: Language) -> tuple[list[str], list[list
             arguments = ", ".join(operand(k, 0) for k in operands)
             expression = f"{language.functions}{operation}({arguments})"
             of, place, _ = nodes[abs(operands[0]) - 1]
-            if (
-                operation in ("sin", "cos")
-                and of == "input"
-                and program.inputs[place[0]].name == "q"
-            ):
+            is_joint = of == "input" and program.inputs[place[0]].name == "q"
+            if operation in ("sin", "cos") and is_joint:
                 name = f"{operation[0].upper()}{place[1] + 1}"
         if is_short:
             known.append((expression, level))
             continue
         count += not name
         name = name or f"t{count}"
-        lines.append(language.assignment.format(name, expression))
+        lines.append(language.local.format(name, expression))
         known.append((name, 3))
     return lines, [[operand(k, 0) for k in row] for row in results]
-
-
-def _result(of: Language, name: str, shape: tuple[int, ...], elements: Sequence[str]) -> list[str]:
-    """Lines that put the elements of a result together."""
-    rows, columns = (shape * 2)[:2] if shape else (1, 1)
-    is_matrix, after = len(shape) == 2, []
-    if of.name == "c":
-        return [f"{name}[{k}] = {x};" for k, x in enumerate(elements)]
-    opening, mark, closing = "[", ",", "]"
-    if of.name == "python":
-        if not shape:
-            return [f"{name} = {elements[0]}"]
-        if is_matrix:
-            at = [k * columns for k in range(rows)]
-            elements = [f"[{', '.join(elements[k : k + columns])}]" for k in at]
-    elif of.name == "numpy":
-        opening, closing = "np.array([", "])"
-        elements = [f"batch + ({x})" for x in elements]
-        after = [f"{name} = np.moveaxis({name}, 0, -1).reshape(batch.shape + {shape})"]
-    elif of.name == "casadi":
-        opening, closing = "casadi.vertcat(", ")"
-        after = [f"{name} = {name}.reshape(({columns}, {rows})).T"] * is_matrix
-    else:
-        mark, closing = "", "];"
-        after = [f"{name} = reshape({name}, {columns}, {rows}).';"] * is_matrix
-    return [f"{name} = {opening}", *(f"    {x}{mark}" for x in elements), closing, *after]
-
-
-def _framed(
-    program: Program, of: Language, inputs: list[str], outputs: list[str], lines: list[str]
-) -> list[str]:
-    """The function around the lines."""
-    operations = {node[0] for node in program.operations.nodes}
-    used = {node[1][0] for node in program.operations.nodes if node[0] == "input"}
-    before, after, arguments = [], [], [*inputs]
-    if of.name == "c":
-        unused = [name for k, name in enumerate(inputs) if k not in used]
-        unused += [
-            name for name, port in zip(outputs, program.outputs, strict=True) if not port.size
-        ]
-        lines = [*(f"(void){name};" for name in unused), *lines]
-        given = [*(f"const double *{x}" for x in inputs), *(f"double *{x}" for x in outputs)]
-        head = ["#include <math.h>", "", f"void {program.name}({', '.join(given)})", "{"]
-        return [*head, *(f"    {line}" for line in lines), "}"]
-    if of.name == "matlab":
-        head = [f"function [{', '.join(outputs)}] = {program.name}({', '.join(inputs)})"]
-        choice = ["", "function z = select_(condition, x, y)"]
-        choice += ["    z = y;", "    if condition", "        z = x;", "    end", "end"]
-        after = choice if "pick" in operations else []
-        return [*head, *(f"    {line}" for line in lines), "end", *after]
-    if of.name == "numpy":
-        before = [f"{name} = np.asarray({name}, dtype=np.float64)" for name in inputs]
-        shapes = (f"{port.name}.shape[:-{len(port.shape)}]" for port in program.inputs)
-        before.append(f"batch = np.zeros(np.broadcast_shapes({', '.join(shapes)}))")
-    library = {"python": "math", "numpy": "numpy as np", "casadi": "casadi"}[of.name]
-    head = [f"import {library}", "", ""]
-    if of.name == "casadi" and "sign" in operations:
-        arguments.append("smooth=0.0")
-        smooth = "    return casadi.tanh(x / smooth) if smooth else casadi.sign(x)"
-        head += ["def _sign(x, smooth):", smooth, "", ""]
-    body = [*before, *lines, f"return {', '.join(outputs)}"]
-    head.append(f"def {program.name}({', '.join(arguments)}):")
-    return [*head, *(f"    {line}" for line in body)]

@@ -1,4 +1,4 @@
-"""A tape of scalar operations, written by ordinary arithmetic.
+"""A tape of scalar operations, written by ordinary arithmetic on arrays of numbers and scalars.
 
 Equal operations share one line (value numbering), operations on constants are done at once, zeros
 and ones disappear, signs are carried along (``-x`` costs nothing), and lines that no result needs
@@ -7,18 +7,15 @@ are dropped when the tape is frozen. Constants are plain floats.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from math import prod
 from typing import Any, NamedTuple, Union
 
 import numpy as np
 
-from .._arrays import Array
-
 Node = tuple[str, tuple[int, ...], float]
 """An operation, its operands (node numbers from 1, negative for the opposite), a constant."""
 Number = Union[float, "Scalar"]
-Vector = tuple[Number, ...]
 
 RUN: dict[str, Callable[..., Any]] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide,
@@ -50,6 +47,18 @@ class OperationCount(NamedTuple):
     divisions: int
 
 
+class Operations(NamedTuple):
+    """A frozen tape: its nodes, and the signed numbers of the elements of each result."""
+
+    nodes: tuple[Node, ...]
+    results: tuple[tuple[int, ...], ...]
+
+    def count(self) -> OperationCount:
+        """Numbers of operations."""
+        n = [node[0] for node in self.nodes].count
+        return OperationCount(n("mul"), n("add") + n("sub"), sum(map(n, _FUNCTIONS)), n("div"))
+
+
 class Port(NamedTuple):
     """An input or output of a program: its name and shape."""
 
@@ -63,9 +72,8 @@ class Port(NamedTuple):
 
 
 class Scalar:
-    """A value on a tape that is not a constant."""
+    """A value on a tape that is not a constant; arrays of them stand on the left of an operator."""
 
-    __array_ufunc__ = None  # NumPy's numbers leave the arithmetic to this class
     __slots__ = ("number", "tape")
 
     def __init__(self, tape: Tape, number: int) -> None:
@@ -77,35 +85,30 @@ class Scalar:
     def __add__(self, other: Number) -> Number:
         if not isinstance(other, Scalar) and other == 0.0:
             return self
-        a, b = self.number, self.tape.number(other)
-        if a == -b:
+        low, high = sorted((self.number, self.tape.number(other)), key=abs)
+        if low == -high:
             return 0.0
         # one sign for both terms, or the difference of an ordered pair
-        operation, first = ("add", a) if (a < 0) == (b < 0) else ("sub", min(a, b, key=abs))
-        low, high = sorted((abs(a), abs(b)))
-        return Scalar(self.tape, (1 if first > 0 else -1) * self.tape.add(operation, (low, high)))
+        operation = "add" if (low < 0) == (high < 0) else "sub"
+        return self.tape.scalar(operation, abs(low), abs(high), is_negative=low < 0)
 
     def __mul__(self, other: Number) -> Number:
-        if not isinstance(other, Scalar) and other in (0.0, 1.0, -1.0):
-            return 0.0 if other == 0.0 else (self if other > 0.0 else -self)
-        if not isinstance(other, Scalar):  # a constant times a constant times x
+        if not isinstance(other, Scalar):
+            if other in (0.0, 1.0, -1.0):
+                return 0.0 if other == 0.0 else (self if other > 0.0 else -self)
             operation, operands, _ = self.tape.nodes[abs(self.number) - 1]
             for k, x in zip(operands, operands[::-1], strict=True) if operation == "mul" else ():
-                factor = self.tape.nodes[k - 1]
-                if factor[0] == "constant":
-                    return Scalar(self.tape, x) * (
-                        (other if self.number > 0 else -other) * factor[2]
-                    )
-        a, b = self.number, self.tape.number(other)
-        node = self.tape.add("mul", tuple(sorted((abs(a), abs(b)))))
-        return Scalar(self.tape, node if (a < 0) == (b < 0) else -node)
+                if self.tape.nodes[k - 1][0] == "constant":  # a constant times a constant times x
+                    factor = self.tape.nodes[k - 1][2]
+                    return Scalar(self.tape, x) * (factor * (other if self.number > 0 else -other))
+        a, b = sorted((self.number, self.tape.number(other)), key=abs)
+        return self.tape.scalar("mul", abs(a), abs(b), is_negative=(a < 0) != (b < 0))
 
     def __truediv__(self, other: Number) -> Number:
         if not isinstance(other, Scalar):
             return self * (1.0 / other)
         a, b = self.number, other.number
-        node = self.tape.add("div", (abs(a), abs(b)))
-        return Scalar(self.tape, node if (a < 0) == (b < 0) else -node)
+        return self.tape.scalar("div", abs(a), abs(b), is_negative=(a < 0) != (b < 0))
 
     def __rtruediv__(self, other: float) -> Number:
         return other if other == 0.0 else Scalar(self.tape, self.tape.number(other)) / self
@@ -134,6 +137,11 @@ class Tape:
             self._numbers[node] = len(self.nodes)
         return self._numbers[node]
 
+    def scalar(self, operation: str, *operands: int, is_negative: bool = False) -> Scalar:
+        """The result of an operation, or its opposite."""
+        node = self.add(operation, operands)
+        return Scalar(self, -node if is_negative else node)
+
     def number(self, x: Number) -> int:
         """Signed number of an operand."""
         if isinstance(x, Scalar):
@@ -141,53 +149,20 @@ class Tape:
         node = self.add("constant", value=abs(float(x)))
         return node if x >= 0.0 else -node
 
-    def inputs(self, port: int, size: int) -> list[Number]:
-        """The elements of an input."""
-        return [Scalar(self, self.add("input", (port, k))) for k in range(size)]
-
     def frozen(self, results: Iterable[Iterable[Number]]) -> Operations:
-        """Only what the results need, renumbered."""
+        """The operations that the results need, renumbered, and the results."""
         wanted = [[self.number(x) for x in row] for row in results]
-        needed = [False] * (len(self.nodes) + 1)
-        for number in (k for row in wanted for k in row):
-            needed[abs(number)] = True
+        needed = {abs(k) for row in wanted for k in row}
         for number in range(len(self.nodes), 0, -1):
             operation, operands, _ = self.nodes[number - 1]
-            for k in operands if needed[number] and operation != "input" else ():
-                needed[abs(k)] = True
-        place = np.cumsum(needed).tolist()
-
-        def moved(numbers: Sequence[int]) -> tuple[int, ...]:
-            return tuple(place[k] if k > 0 else -place[-k] for k in numbers)
-
-        kept = [node for node, need in zip(self.nodes, needed[1:], strict=True) if need]
-        nodes = ((o, k if o == "input" else moved(k), value) for o, k, value in kept)
-        return Operations(tuple(nodes), tuple(map(moved, wanted)))
-
-
-class Operations(NamedTuple):
-    """A frozen tape: its nodes, and the signed numbers of the elements of each result."""
-
-    nodes: tuple[Node, ...]
-    results: tuple[tuple[int, ...], ...]
-
-    def count(self) -> OperationCount:
-        """Numbers of operations."""
-        n = [node[0] for node in self.nodes].count
-        return OperationCount(n("mul"), n("add") + n("sub"), sum(map(n, _FUNCTIONS)), n("div"))
-
-    def run(self, inputs: Sequence[Array]) -> list[list[Array]]:
-        """Elements of the results for the elements of the inputs, arrays (k, ...) each."""
-        values: list[Any] = [np.zeros(())]
-        for operation, operands, value in self.nodes:
-            if operation == "input":
-                values.append(inputs[operands[0]][operands[1]])
-            elif operation == "constant":
-                values.append(np.float64(value))
-            else:
-                x = (values[k] if k > 0 else -values[-k] for k in operands)
-                values.append(RUN[operation](*x))
-        return [[values[k] if k > 0 else -values[-k] for k in row] for row in self.results]
+            if number in needed and operation != "input":
+                needed.update(map(abs, operands))
+        place: dict[int, int] = {}
+        for new, old in enumerate(sorted(needed), start=1):
+            place[old], place[-old] = new, -new
+        kept = (self.nodes[k - 1] for k in sorted(needed))
+        nodes = ((o, x if o == "input" else tuple(place[k] for k in x), c) for o, x, c in kept)
+        return Operations(tuple(nodes), tuple(tuple(place[k] for k in row) for row in wanted))
 
 
 def function(name: str, *x: Number) -> Number:
@@ -197,9 +172,8 @@ def function(name: str, *x: Number) -> Number:
         return float(RUN[name](*x))
     numbers = tuple(map(tape.number, x))
     if name not in ("sin", "cos", "sign"):
-        return Scalar(tape, tape.add(name, numbers))
-    node = tape.add(name, (abs(numbers[0]),))
-    return Scalar(tape, -node if numbers[0] < 0 and name != "cos" else node)
+        return tape.scalar(name, *numbers)
+    return tape.scalar(name, abs(numbers[0]), is_negative=numbers[0] < 0 and name != "cos")
 
 
 def pick(a: Number, b: Number, x: Number, y: Number) -> Number:
@@ -208,19 +182,4 @@ def pick(a: Number, b: Number, x: Number, y: Number) -> Number:
     if tape is None:
         return x if a > b else y  # type: ignore[operator]
     four = tuple(map(tape.number, (a, b, x, y)))
-    return x if four[2] == four[3] else Scalar(tape, tape.add("pick", four))
-
-
-def cross(x: Vector, y: Vector) -> Vector:
-    """Vector product."""
-    return tuple(x[i] * y[j] - x[j] * y[i] for i, j in ((1, 2), (2, 0), (0, 1)))
-
-
-def plus(a: Vector, b: Vector) -> Vector:
-    """Sum of vectors."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def times(M: Sequence[Vector], a: Vector) -> Vector:
-    """Matrix, given by its rows, times a vector."""
-    return tuple(r[0] * a[0] + r[1] * a[1] + r[2] * a[2] for r in M)
+    return x if four[2] == four[3] else tape.scalar("pick", *four)
