@@ -19,7 +19,7 @@ from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
 from benchmarks.measure import Contestant, in_turns
 from robotmodels import flexible
-from robotmodels.flexible.models import generalized_forces
+from robotmodels.flexible.models import forces
 
 LINKS, GOAL = (3, 6, 12, 30), 60.0  # number of links; us for six
 OURS = "robotmodels"
@@ -42,8 +42,8 @@ def direct(n: int) -> list[Contestant]:
     many = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]
 
     def dense() -> np.ndarray:
-        M, rows = flexible.mass_matrix(arm, q, e), [x[None] for x in (q, e, v, ev)]
-        rest = np.hstack(generalized_forces(arm, *rows, 0.0 * rows[0], 0.0 * rows[1]))[0]
+        M, x, dx = flexible.mass_matrix(arm, q, e), np.append(q, e)[None], np.append(v, ev)[None]
+        rest = forces(arm, x, dx, 0.0 * dx)[0][0]
         return np.linalg.solve(M, np.append(tau, np.zeros(arm.m)) - rest)
 
     found = np.concatenate(flexible.ddm(arm, q, e, v, ev, tau))

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
-from .linear import DeflectionStatus, scales, static_deflection, stiffness_matrix
-from .models import INVERSE, idm, mass_matrix, solved
+from .linear import DeflectionStatus, scales, static_deflection
+from .models import idm, mass_matrix, solved
 from .robot import FlexibleRobot, check_arm
 
 Law = Callable[[float, Array, Array, Array, Array], Array]
@@ -322,9 +322,10 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         spans = np.concatenate([span, factors], axis=2)
 
         def rate(t: float, y: Array) -> Array:
-            e, e_v = (np.ascontiguousarray(x) for x in y.reshape(P, 2, m).swapaxes(0, 1))
+            e, e_v = y.reshape(P, 2, m).swapaxes(0, 1)
             q, v, a = (spans @ _basis(min(t / T, 1.0), K, order) / T**order for order in range(3))
-            e_a = solved(arm, INVERSE, ends[0] + q, e, v, e_v, a)[1]
+            x, dx = np.hstack([ends[0] + q, e]), np.hstack([v, e_v])
+            e_a = solved(arm, False, x, dx, a)[0][:, n:]
             return np.stack([e_v, e_a], axis=1).ravel()
 
         y0 = np.tile(start, P)
@@ -333,8 +334,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         )
 
     floor = _NEGLIGIBLE * scales(arm)[n:]
-    stiff, mass = np.diag(stiffness_matrix(arm))[n:], np.diag(mass_matrix(arm, ends[0]))[n:]
-    rates = np.sqrt(stiff / mass)
+    rates = np.sqrt(np.diag(arm.parts.K)[n:] / np.diag(mass_matrix(arm, ends[0]))[n:])
 
     def sizes(y: Array) -> Array:
         """Largest elastic coordinates (m,), and velocities (m,) of vibrations as large as these."""

@@ -103,7 +103,7 @@ def _tube(path: str, line: Array, size: float, color: Color) -> list[Node]:
 
 def _axis(arm: FlexibleRobot, row: int, e: Array) -> Array:
     """Bent axis of a link in its frame. Shapes: e (m,) -> (N, 3)."""
-    start = arm.arrays.start
+    start = arm.parts.chain.start
     link = arm.links[row]
     return link.nodes + link.shapes @ e[start[row - 1] : start[row]]
 
