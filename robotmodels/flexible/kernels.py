@@ -179,18 +179,19 @@ def workspace(arm: Arm) -> Work:
 @compiled()
 def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
     """Write inertial parameters, tip and rows of now of deformed body k."""
-    work.body[k], work.P[k + 1] = arm.pi[k], arm.tip[k]
+    put_vector(work.P, k + 1, vector(arm.tip, k))
+    for x in range(10):
+        work.body[k, x] = arm.pi[k, x]
     for c in range(arm.start[k], arm.start[k + 1]):
         for x in range(15):
             value = arm.first[c, x]
             for n in range(arm.start[k + 1] - arm.start[k]):
                 value += arm.second[c, 18 * n + x] * e[arm.start[k] + n]
             work.now[c, x] = value
-            change = 0.5 * e[c] * (arm.first[c, x] + value)
-            if x < 9:
-                work.body[k, x] += change
-            elif x >= 12:
-                work.P[k + 1, x - 12] += change
+        for x in range(9):
+            work.body[k, x] += 0.5 * e[c] * (arm.first[c, x] + work.now[c, x])
+        for x in range(3):
+            work.P[k + 1, x] += 0.5 * e[c] * (arm.first[c, x + 12] + work.now[c, x + 12])
 
 
 @compiled()

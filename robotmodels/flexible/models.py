@@ -298,7 +298,7 @@ def states(arm: FlexibleRobot, x: Array, dx: Array) -> tuple[Array, Array, Array
 def in_world(pose: Array, load: Array) -> Array:
     """Forces and moments (..., 6) in axes of poses (..., 4, 4), about the origin of the world."""
     R, p = pose[..., :3, :3], pose[..., :3, 3]
-    force, moment = ((R @ x[..., None])[..., 0] for x in (load[..., :3], load[..., 3:]))
+    force, moment = np.matvec(R, load[..., :3]), np.matvec(R, load[..., 3:])
     return np.concatenate([force, moment + cross(p, force)], axis=-1)
 
 

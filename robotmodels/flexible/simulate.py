@@ -176,40 +176,37 @@ def simulate(
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
     ddm(arm, *start, np.zeros(n))  # its errors name what is singular
     k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
-    weight = float(arm.parts.chain.pi[:, 9].sum()) * model.gravity
 
     def rate(time: float, y: Array) -> Array:
-        x, dx = y[None, :k].copy(), y[None, k : 2 * k].copy()
-        parts = np.split(y[: 2 * k], (n, k, k + n))
-        (q, e, v, ev), tau, w = parts, law(time, *parts), push(time, *parts)
-        ddx, base = solved(arm, True, x, dx, tau[None], w[None])
+        q, e, v, ev = parts = y[:n], y[n:k], y[k : k + n], y[k + n : 2 * k]
+        tau, w, dx = law(time, *parts), push(time, *parts), y[k : 2 * k]
+        ddx, base = solved(arm, True, y[None, :k], dx[None], tau[None], w[None])
         softened[0] = softened[0] or base[0, 9] > 0.0
         power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
-        load = in_world(model.base, base[0, :6])
-        load += (*weight, *cross(base[0, 6:9], model.gravity))
-        if w.any():
-            power -= w @ jacobian(arm, q, e) @ dx[0]
+        loads = [base[0, :9]]
+        if wrench is not None:
+            power -= w @ jacobian(arm, q, e) @ dx
             tool = np.eye(4)
             tool[:3, 3] = dgm(arm, q, e)[:3, 3]
-            load -= in_world(tool, w)
-        return np.concatenate([dx[0], ddx[0], [power], load])
+            loads.append(in_world(tool, w))
+        return np.concatenate([dx, ddx[0], [power], *loads])
 
-    y0 = np.concatenate([*start, np.zeros(7)])
+    y0 = np.concatenate([*start, np.zeros(10 if wrench is None else 16)])
     options = (chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress)
     largest = _LARGEST * scales(arm)[n:]
     times, Y, status, count = _followed(
         rate, y0, t, *options, lambda y: bool((np.abs(y[n:k]) > largest).any())
     )
-    states_of = np.split(Y, (n, k, k + n, 2 * k), axis=1)
-    q, e, v, ev, rest = states_of
-    tau = np.array([law(t, *row) for t, *row in zip(times, *states_of[:4], strict=True)])
+    q, e, v, ev, work, load, first, pull = np.split(Y, np.cumsum([n, m, n, m, 1, 6, 3]), axis=1)
+    tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
+    weight = arm.parts.chain.pi[:, 9].sum() * np.outer(times - times[0], model.gravity)
+    impulse = in_world(model.base, load) + np.hstack([weight, cross(first, model.gravity)])
+    impulse -= 0.0 if wrench is None else pull
     if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
         status = FlexibleMotionStatus.SOFTENED
-    return FlexibleMotion(
-        arm, times, q, v, tau, e, ev, kinetic, potential, rest[:, 0], momentum, rest[:, 1:], status,
-        count,
-    )  # fmt: skip
+    energies = kinetic, potential, work[:, 0]
+    return FlexibleMotion(arm, times, q, v, tau, e, ev, *energies, momentum, impulse, status, count)
 
 
 def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
