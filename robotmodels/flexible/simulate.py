@@ -398,17 +398,17 @@ def free_body(
     table = DHTable(antecedent=[0], sigma=[2])
     parts = FlexibleRobot(RobotModel.from_table(table, gravity=(0, 0, 0)), {1: link}).parts
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
+    none, outer = np.zeros((1, m)), np.zeros((1, 12))
 
     def rate(t: float, y: Array) -> Array:
-        e, ev, twist, turn, _ = np.split(y, cuts)
-        y2 = np.append(twist, np.zeros(6))[None]
-        e_a, base, *_ = recursion(
-            parts.chain, e[None].copy(), ev[None].copy(), np.zeros((1, m)), loose, None, y2
-        )
-        v, w, u, s = twist[:3], twist[3:], turn[:3], turn[3]
-        moved = v + 2.0 * cross(u, s * v + cross(u, v))
-        turned = 0.5 * np.append(s * w + cross(u, w), -u @ w)
-        return np.concatenate([ev, e_a[0], base[0, :6], turned, moved])
+        ev, v, w = y[m : 2 * m], y[2 * m : 2 * m + 3], y[2 * m + 3 : 2 * m + 6]
+        outer[0, :6] = y[2 * m : 2 * m + 6]
+        e_a, base, *_ = recursion(parts.chain, y[None, :m], ev[None], none, loose, None, outer)
+        u = y[2 * m + 6 : 2 * m + 9]
+        (x, y, z), s = u, y[2 * m + 9]
+        W = np.array([[s, -z, y], [z, s, -x], [-y, x, s], [-x, -y, -z]])  # quaternion's rate
+        moved = W[:3] @ (W[:3] @ v) + u * (u @ v)
+        return np.concatenate([ev, e_a[0], base[0, :6], 0.5 * W @ w, moved])
 
     y0 = np.concatenate([*start, [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
     times, Y, status, _ = _followed(rate, y0, t, Integrator.DOP853, rtol, atol, max_evaluations)
