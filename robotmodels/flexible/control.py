@@ -43,6 +43,7 @@ from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .linear import DeflectionStatus, scales, static_deflection
+from .link import Result
 from .models import idm, mass_matrix, solved
 from .robot import FlexibleRobot, check_arm
 
@@ -195,7 +196,7 @@ class JointPolynomial(Frozen, Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RestToRest(Frozen, Value):
+class RestToRest(Result):
     """Motion from rest to rest in a fixed time.
 
     Parameters
@@ -232,10 +233,6 @@ class RestToRest(Frozen, Value):
         e, e_v = self.elastic(t)
         path = self.trajectory
         return idm(self.arm, path.q(t), e, path.v(t), e_v, path.a(t))[0]
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
 
     def __repr__(self) -> str:
         return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"

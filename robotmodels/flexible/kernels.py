@@ -15,11 +15,11 @@ elimination of the modes and of the joint of each body; forward, the acceleratio
 O(f + sum m_j^3). Vectors of six are linear, then angular. Of a row of coordinates y (n + m) the
 first n are those of the joints, the others the modes.
 
-Shapes of `loads`: y, dy, given, out (N, n + m), wrench (N, 6), twist and acceleration of the base
-(N, 12), free (n + 2,): of the joints, of all modes, of the base; if it is empty, only poses are
-found -> base (N, 10): its load (acceleration if free), first moment of the arm, 1 if a link is
-softened; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first sample in which
-a free joint moves no inertia, or -1.
+Shapes of `loads`: y, dy, given, out (N, n + m), outer (N, 18): wrench of the tool, twist and
+acceleration of the base, free (n + 2,): of the joints, of all modes, of the base; if it is empty,
+only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, 1 if
+a link is softened; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
+sample in which a free joint moves no inertia, or -1.
 """
 
 from math import sqrt
@@ -28,7 +28,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from ..kernels import Chain
 from ..kernels._compile import (
     CHAIN,
     INT,
@@ -61,29 +60,10 @@ from ..kernels._vectors import (
     whole_matrix,
     whole_vector,
 )
+from .robot import Arm
 
 ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
-
-
-class Arm(NamedTuple):
-    """An elastic chain in arrays; body k has the modes ``start[k]`` to ``start[k + 1]``.
-
-    Shapes: pi (f, 10), start (f + 1,), tip (f, 3), first (m, 18) with the columns J_k, a, b, Phi
-    and Psi of the tip, second (m, 18 most) with 18 for each other mode of its body: J_kl, A, B,
-    Gamma of the tip, m_kl, K_kl, D_kl.
-    """
-
-    chain: Chain  # positions from the undeformed tips of the antecedents
-    pi: Floats
-    start: Ints
-    tip: Floats
-    first: Floats
-    second: Floats
-    rotor: Floats
-    tool: Floats  # (3,), from the undeformed tip of row `end`
-    gravity: Floats
-    end: int
 
 
 class Work(NamedTuple):
@@ -144,13 +124,6 @@ def put_pose(poses: Floats, i: int, k: int, R: Matrix, P: Vector) -> None:
 
 
 @compiled()
-def put_pair(out: Floats, i: int, a: Vector, b: Vector) -> None:
-    """Write two vectors into row i."""
-    for x in range(3):
-        out[i, x], out[i, x + 3] = a[x], b[x]
-
-
-@compiled()
 def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int) -> None:
     """Write matrix j of T times row b of a into row j."""
     for x in range(6):
@@ -162,9 +135,8 @@ def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int) -> None:
 @compiled()
 def workspace(arm: Arm) -> Work:
     """Work arrays with the pose of the base in row 0."""
-    f, m, most = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18
+    f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
     pose, row, square = (f, 3, 3), (f, 3), (f, 6, 6)
-    z = np.zeros
     work = Work(
         *(z(pose), z(row), z(pose), z(row), z(row), z(row), z(row)),
         *(z(square), z(square), z(square), z(square), z((f, 6)), z((f, 6)), z((f, 8)), z((f, 10))),
@@ -261,33 +233,32 @@ def add_back(I: Floats, p: Floats, b: int, J: Floats, h: Floats, j: int, X: Floa
 
 
 @compiled()
-def factor(a: Floats, s: int, m: int) -> bool:
-    """Cholesky factor of the matrix in rows s to s + m, in place; False if not positive."""
+def solve(a: Floats, s: int, m: int, x: Floats, columns: int) -> bool:
+    """Solutions in place of columns of x, by Cholesky's factor in place of rows s to s + m of a.
+
+    False if the matrix is not positive.
+    """
     for i in range(m):
         for j in range(i + 1):
-            x = a[s + i, j]
+            y = a[s + i, j]
             for k in range(j):
-                x -= a[s + i, k] * a[s + j, k]
+                y -= a[s + i, k] * a[s + j, k]
             if i > j:
-                a[s + i, j] = x / a[s + j, j]
-            elif x > 0.0:
-                a[s + i, i] = sqrt(x)
+                a[s + i, j] = y / a[s + j, j]
+            elif y > 0.0:
+                a[s + i, i] = sqrt(y)
             else:
                 return False
+    for c in range(columns):
+        for i in range(m):
+            for k in range(i):
+                x[s + i, c] -= a[s + i, k] * x[s + k, c]
+            x[s + i, c] /= a[s + i, i]
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                x[s + i, c] -= a[s + k, i] * x[s + k, c]
+            x[s + i, c] /= a[s + i, i]
     return True
-
-
-@compiled()
-def solve(a: Floats, s: int, m: int, x: Floats, c: int) -> None:
-    """Solution in place of column c of x, with the factor in rows s to s + m of a."""
-    for i in range(m):
-        for k in range(i):
-            x[s + i, c] -= a[s + i, k] * x[s + k, c]
-        x[s + i, c] /= a[s + i, i]
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            x[s + i, c] -= a[s + k, i] * x[s + k, c]
-        x[s + i, c] /= a[s + i, i]
 
 
 @compiled()
@@ -304,8 +275,7 @@ def load_body(
     U = rotation_acceleration(w, dw)
     F = add(scale(M, u), times(U, MS))
     N = add(add(cross(MS, u), inertia_times(J, dw)), cross(w, inertia_times(J, w)))
-    tip = vector(work.P, j)
-    ut = add(u, times(U, tip))
+    ut = add(u, times(U, vector(work.P, j)))
     for c in range(s, s + m):
         a, b, turn = part(now, c, 6), part(now, c, 9), moments_times(now, c, 0, w)
         force = dot(a, u) + dot(b, dw) - 0.5 * dot(w, turn)
@@ -323,7 +293,8 @@ def load_body(
         F, N = add(F, scale(ev[c], A)), add(N, scale(ev[c], B))
         ut = add(ut, scale(ev[c], G))
         work.E[c, 6] = force
-    put_pair(work.h, j, F, N)
+    h = work.h
+    h[j, 0], h[j, 1], h[j, 2], h[j, 3], h[j, 4], h[j, 5] = F + N
     put_vector(work.u, j, ut)
     put_vector(work.w, j, add(w, spin))
     put_vector(work.dw, j, add(dw, add(cross(w, spin), rest)))
@@ -334,8 +305,8 @@ def load_body(
             work.H[j, y, x] = M * unit[y]
             work.H[j, y, x + 3] = work.H[j, x + 3, y] = lever[y]
             work.H[j, y + 3, x + 3] = column[y]
-    transform(work.T, j, ONE, tip)
-    return factor(work.mass, s, m)
+    transform(work.T, j, ONE, vector(work.P, j))
+    return solve(work.mass, s, m, work.G, 0)
 
 
 @compiled()
@@ -363,13 +334,11 @@ def eliminate(arm: Arm, k: int, free: Ints, given: Floats, work: Work) -> None:
             for x in range(6):
                 work.mass[c, i] += G[c, x] * work.now[s + i, x + 12]
     add_back(H, h, j, work.I, work.p, j, work.T)
-    if free[n]:
-        factor(work.mass, s, m)
-    for x in range(7):
-        for c in range(s, s + m):
+    for c in range(s, s + m):
+        for x in range(7):
             G[c, x] = E[c, x] - (given[n + c] if x == 6 else 0.0)
-        if free[n]:
-            solve(work.mass, s, m, G, x)
+    if free[n]:
+        solve(work.mass, s, m, G, 7)
     for c in range(s, s + m):
         for x in range(6):
             h[j, x] += E[c, x] * (-G[c, 6] if free[n] else given[n + c])
@@ -421,29 +390,21 @@ def accelerate(arm: Arm, k: int, free: Ints, given: Floats, work: Work, out: Flo
     return column < 0 or not free[column] or U[j, 6] > 0.0
 
 
-@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, INTS, OUT2, OUT2, OUT4))
+@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, INTS, OUT2, OUT2, OUT4))
 def loads(
-    arm: Arm,
-    y: Floats,
-    dy: Floats,
-    given: Floats,
-    wrench: Floats,
-    moved: Floats,
-    free: Ints,
-    out: Floats,
-    base: Floats,
-    poses: Floats,
-) -> int:
+    arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, free: Ints, out: Floats,
+    base: Floats, poses: Floats,
+) -> int:  # fmt: skip
     """Accelerations of free coordinates under given loads, and loads of given accelerations."""
     f, n, t, work = arm.pi.shape[0], arm.rotor.shape[0], arm.end, workspace(arm)
     g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
     root, failed = np.zeros((6, 1)), -1
     for i in range(y.shape[0]):
         e, ev, value = y[i, n:], dy[i, n:], given[i]
-        w, MS, base[i, 9] = part(moved, i, 3), ZERO, 0.0
+        w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
         put_vector(work.w, 0, w)
-        put_vector(work.dw, 0, part(moved, i, 9))
-        u = add(cross(w, part(moved, i, 0)), part(moved, i, 6))
+        put_vector(work.dw, 0, part(outer, i, 15))
+        u = add(cross(w, part(outer, i, 6)), part(outer, i, 12))
         put_vector(work.u, 0, subtract(u, g))
         for k in range(f):
             j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
@@ -475,14 +436,14 @@ def loads(
         if not len(free):
             continue
         work.p[:], work.I[:] = 0.0, 0.0
-        F, N = transpose_times(W, part(wrench, i, 0)), transpose_times(W, part(wrench, i, 3))
-        put_pair(work.p, t, F, add(N, cross(lever, F)))
+        F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
+        N, p = add(N, cross(lever, F)), work.p
+        p[t, 0], p[t, 1], p[t, 2], p[t, 3], p[t, 4], p[t, 5] = F + N
         for k in range(f - 1, -1, -1):
             eliminate(arm, k, free, value, work)
         if free[n + 1]:
             root[:, 0] = -work.p[0]
-            factor(work.I[0], 0, 6)
-            solve(work.I[0], 0, 6, root, 0)
+            solve(work.I[0], 0, 6, root, 1)
         for z in range(6):
             base[i, z] = root[z, 0] if free[n + 1] else work.p[0, z]
             work.p[0, z] = root[z, 0]

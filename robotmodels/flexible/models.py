@@ -32,7 +32,7 @@ of flexible manipulator inverse dynamics", Int. J. Robotics Research 17 (1998).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,10 +40,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_vector, batch_rows, read_only
 from .._outcomes import Outcome
 from ..errors import SingularMassMatrixError
-from .robot import FlexibleRobot, check_arm
-
-if TYPE_CHECKING:
-    from .kernels import Arm
+from .robot import Arm, FlexibleRobot, check_arm
 
 _NO_FLAGS = np.zeros(0, np.int64)
 
@@ -263,9 +260,10 @@ def recursion(
     N = len(y)
     out, base = np.empty((N, y.shape[1])), np.empty((N, 10))
     poses = np.empty((N, len(chain.pi) + 1, 3, 4))
-    wrench = np.zeros((N, 6)) if wrench is None else wrench
-    moved = np.zeros((N, 12)) if moved is None else moved
-    failed = loads(chain, y, dy, given, wrench, moved, free, out, base, poses)
+    outer = np.zeros((N, 18))
+    outer[:, :6] = 0.0 if wrench is None else wrench
+    outer[:, 6:] = 0.0 if moved is None else moved
+    failed = loads(chain, y, dy, given, outer, free, out, base, poses)
     return out, base, poses, failed
 
 

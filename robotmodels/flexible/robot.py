@@ -5,18 +5,36 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..kernels import Chain
 from ..model import RobotModel, check_model
 from .link import FlexibleLink
 
-if TYPE_CHECKING:
-    from .kernels import Arm
+
+class Arm(NamedTuple):
+    """An elastic chain in arrays; body k has the modes ``start[k]`` to ``start[k + 1]``.
+
+    Shapes: pi (f, 10), start (f + 1,), tip (f, 3), first (m, 18) with the columns J_k, a, b, Phi
+    and Psi of the tip, second (m, 18 most) with 18 for each other mode of its body: J_kl, A, B,
+    Gamma of the tip, m_kl, K_kl, D_kl.
+    """
+
+    chain: Chain  # positions from the undeformed tips of the antecedents
+    pi: Array
+    start: NDArray[np.int64]
+    tip: Array
+    first: Array
+    second: Array
+    rotor: Array
+    tool: Array  # (3,), from the undeformed tip of row `end`
+    gravity: Array
+    end: int
 
 
 class Parts(NamedTuple):
@@ -207,8 +225,6 @@ def _of(value: ArrayLike | None, count: int, name: str, default: float) -> Array
 
 def _parts_of(arm: FlexibleRobot) -> Parts:
     """Chain from tip to root, inertia and elasticity of all bodies in packed arrays."""
-    from .kernels import Arm
-
     model, f, n = arm.model, arm.model.f, arm.n
     counts = [arm.links[row].m if row in arm.links else 0 for row in range(1, f + 1)]
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

@@ -1,4 +1,40 @@
-"""Simulation of flexible arms and of free elastic bodies, with their energies and momenta."""
+"""Simulation of flexible arms and of free elastic bodies, with their energies and momenta.
+
+Energy and momenta are integrated along, or constant: their drift measures the error of the
+integration. Dry friction is taken with the sign of the velocity, without sticking.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints and m elastic coordinates.
+link : FlexibleLink
+    A free body. A line without inertia about its axis, such as a beam without gyration, gets that
+    of a radius of length / 10.
+q0, v0 : array_like, shape (n,)
+    Angles and velocities of the motors at the start; default at rest. Of a free body v0 (6,) is the
+    velocity [v; w] of the root, whose axes are those of the world at the start.
+e0, e_v0 : array_like, shape (m,), optional
+    Elastic coordinates and velocities at the start; default zero.
+control : callable or array_like of shape (n,), optional
+    Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none.
+wrench : callable or array_like of shape (6,), optional
+    Of the tool on the environment, in world axes, given as ``control``.
+t : array_like
+    A duration, with samples at the steps of the integrator, or ascending times (N,), s.
+method : Integrator or str
+    As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
+rtol, atol : float
+    Tolerances of a step.
+max_evaluations : int, optional
+    Default 60 000 for each second and as many more.
+progress : callable, optional
+    A function of the fraction done.
+
+Raises
+------
+ShapeError, InvalidValueError, SingularMassMatrixError
+    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +46,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_number
+from .._arrays import Array, as_exact, as_number
 from .._choices import chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, SingularMassMatrixError
@@ -19,7 +55,7 @@ from ..model import RobotModel
 from ..simulation import Integrator
 from ..simulation.simulate import times_of
 from .linear import scales
-from .link import FlexibleLink
+from .link import FlexibleLink, Result
 from .models import SpinStatus, cross, ddm, dgm, in_world, jacobian, recursion, solved, states
 from .robot import FlexibleRobot, check_arm
 
@@ -38,7 +74,7 @@ class FlexibleMotionStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FlexibleMotion(Frozen, Value):
+class FlexibleMotion(Result):
     """Simulated motion of a flexible arm.
 
     Parameters
@@ -96,10 +132,6 @@ class FlexibleMotion(Frozen, Value):
             self.momentum - self.momentum[0] - self.impulse, self.momentum, self.impulse
         )
 
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
-
     def __repr__(self) -> str:
         return (
             f"<FlexibleMotion: {self.t[-1] - self.t[0]:.6g} s, {len(self.t)} samples, energy drift "
@@ -125,41 +157,10 @@ def simulate(
 ) -> FlexibleMotion:
     """Simulate a flexible arm under torques.
 
-    Energy and momenta are integrated along: their drift measures the error of the integration.
-    Dry friction is taken with the sign of the velocity, without sticking.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q0, v0 : array_like, shape (n,)
-        Angles and velocities of the motors at the start; default at rest.
-    control : callable or array_like of shape (n,), optional
-        Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none.
-    t : array_like
-        A duration, with samples at the steps of the integrator, or ascending times (N,).
-    wrench : callable or array_like of shape (6,), optional
-        Of the tool on the environment, in world axes, given as ``control``.
-    e0, e_v0 : array_like, shape (m,), optional
-        Elastic coordinates and velocities at the start; default zero.
-    method : Integrator or str
-        As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
-    rtol, atol : float
-        Tolerances of a step.
-    max_evaluations : int, optional
-        Default 60 000 for each second and as many more.
-    progress : callable, optional
-        A function of the fraction done.
-
     Returns
     -------
     FlexibleMotion
         The motion, its energies and momenta, and the status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, SingularMassMatrixError
-        Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
 
     Examples
     --------
@@ -291,25 +292,11 @@ def _relative(error: Array, *sizes: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeBodyMotion(Frozen, Value):
+class FreeBodyMotion(Result):
     """Motion of an elastic body without loads (section 7.2.2).
 
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Times, s.
-    pose : ndarray, shape (N, 4, 4)
-        Of the frame at the root, in the world.
-    twist : ndarray, shape (N, 6)
-        Its velocity [v; w] in its own axes.
-    e, e_v : ndarray, shape (N, m)
-        Elastic coordinates and velocities.
-    energy : ndarray, shape (N,)
-        Kinetic and elastic energy, J.
-    momentum : ndarray, shape (N, 6)
-        Linear and angular momentum about the origin of the world.
-    status : FlexibleMotionStatus
-        Why it ended.
+    Pose (N, 4, 4) and twist (N, 6) are those of the root, the twist in its own axes; energy (N,)
+    and momentum (N, 6) about the origin of the world are constant.
     """
 
     t: Array
@@ -331,10 +318,6 @@ class FreeBodyMotion(Frozen, Value):
         """Largest change of the momenta, relative to them."""
         return _relative(self.momentum - self.momentum[0], self.momentum)
 
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
-
     def __repr__(self) -> str:
         return f"<FreeBodyMotion: {self.t[-1]:.6g} s, energy drift {self.energy_drift:.1g}>"
 
@@ -352,29 +335,10 @@ def free_body(
 ) -> FreeBodyMotion:
     """Motion of an elastic body that floats without loads (section 7.2.2).
 
-    Parameters
-    ----------
-    link : FlexibleLink
-        The body, m modes. A line without inertia about its axis, such as a beam without gyration,
-        gets that of a radius of length / 10.
-    e0, e_v0 : array_like, shape (m,)
-        Elastic coordinates and velocities at the start.
-    v0 : array_like, shape (6,)
-        Velocity [v; w] of the root at the start, where its axes are those of the world.
-    t : array_like
-        A duration or ascending times (N,), s.
-    rtol, atol, max_evaluations
-        As for `simulate`.
-
     Returns
     -------
     FreeBodyMotion
         The motion with its energy and momenta.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity.
 
     Examples
     --------

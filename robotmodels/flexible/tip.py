@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_floats, as_number
+from .._arrays import Array, as_floats, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
 from .linear import linearize, scales, tip_inverse
+from .link import Result
 from .models import cross, dgm, forces, jacobian, mass_matrix
 from .robot import FlexibleRobot, check_arm
 
@@ -41,7 +42,7 @@ class TipStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipTracking(Frozen, Value):
+class TipTracking(Result):
     """Motion of the joints that moves the tip of a flexible arm along a reference.
 
     Parameters
@@ -103,10 +104,6 @@ class TipTracking(Frozen, Value):
             raise InvalidValueError(f"There are no torques. {self.reason()}")
         times = np.clip(as_floats(t, "t"), self.t[0], self.t[-1])
         return np.split(self._spline(times), 3, axis=-1)
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
 
     def __repr__(self) -> str:
         return f"<TipTracking: {self.status.name}, preview {self.preview:.4g} s>"
