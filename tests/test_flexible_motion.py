@@ -41,6 +41,7 @@ def test_elastica_of_bisshopp_and_drucker(load, y):
 def test_a_moment_bends_a_beam_to_a_circle():
     found = flexible.elastica(2.0, 3.0, moment=2 * np.pi * 3.0 / 2.0)
     np.testing.assert_allclose(found.tip, np.eye(4), atol=1e-9)
+    assert found.angle[-1] == pytest.approx(2 * np.pi)
     mirrored = flexible.elastica(1.0, 1.0, force=-2.0, moment=0.5)
     np.testing.assert_allclose(flexible.elastica(1, 1, 2.0, -0.5).tip[1, 3], -mirrored.tip[1, 3])
 
