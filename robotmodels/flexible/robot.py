@@ -20,9 +20,8 @@ from .link import FlexibleLink
 class Arm(NamedTuple):
     """An elastic chain in arrays; body k has the modes ``start[k]`` to ``start[k + 1]``.
 
-    Shapes: pi (f, 10), start (f + 1,), tip (f, 3), first (m, 18) with the columns J_k, a, b, Phi
-    and Psi of the tip, second (m, 18 most) with 18 for each other mode of its body: J_kl, A, B,
-    Gamma of the tip, m_kl, K_kl, D_kl.
+    pi (f, 10), first (m, 18): J_k, a, b, tip's Phi, Psi; second (m, 18 most), 18 for each other
+    mode of its body: J_kl, A, B, Gamma of the tip, m_kl, K_kl, D_kl.
     """
 
     chain: Chain  # positions from the undeformed tips of the antecedents
