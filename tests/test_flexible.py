@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import robotmodels as rm
 from robotmodels import DHTable, DriveParameters, InertialParameters, RobotModel, flexible, se3
 from robotmodels.errors import InertiaError, InvalidValueError, ShapeError, SingularMassMatrixError
-from robotmodels.flexible.models import generalized_forces
+from robotmodels.flexible.models import forces
 
 INF = np.inf
 PIVOT = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), gravity=(0, 0, 0))
@@ -84,7 +84,7 @@ def test_first_modes_of_a_heavy_tip_on_a_light_beam():
     )
     np.testing.assert_allclose(bar.frequencies[0], np.sqrt(50.0 / 0.5 / 0.005), rtol=1e-4)
     with pytest.raises(InvalidValueError, match="too light"):
-        flexible.beam(1.0, EI=(INF, 1.0), density=1e-24, tip=1.0, modes=1)
+        flexible.beam(1.0, EI=(INF, 1.0), density=1e-12, tip=1.0, modes=2)
 
 
 def test_modes_of_a_tip_off_the_axis_are_those_of_finite_elements():
@@ -195,9 +195,9 @@ def test_stiff_beams_move_as_rigid_ones(rng):
     arm = flexible.FlexibleRobot(model, {1: stiff, 2: stiff, 3: stiff})
     q, v, a = rng.normal(size=(3, 1, 3))
     none = np.zeros((1, arm.m))
-    load = generalized_forces(arm, q, none, v, none, a, none)[1]
+    load = forces(arm, *(np.hstack([x, none]) for x in (q, v, a)))[0][0, 3:]
     K = np.kron(np.eye(3), inv.modal_stiffness)
-    e = -np.linalg.solve(K, load[0])[None]
+    e = -np.linalg.solve(K, load)[None]
     tau = flexible.idm(arm, q, e, v, None, a)[0]
     close(tau, rm.idm(model, q, v, a), 1e-8)
     close(flexible.ddm(arm, q, e, v, None, tau)[0], a, 1e-8)
@@ -219,7 +219,8 @@ def test_inverse_and_direct_models_are_inverse(rng, joints):
         close(back[0], a, 1e-9)
         close(back[1], ea, 1e-9)
         # the forces of all accelerations: those of the modes vanish in free motion
-        Q, Qe = generalized_forces(arm, q, e, v, ev, a, ea, w)
+        rows = (np.hstack(pair) for pair in ((q, e), (v, ev), (a, ea)))
+        Q, Qe = np.split(forces(arm, *rows, w)[0], [arm.n], axis=1)
         close(Q + arm.model.drive_matrices.torque(v, None), tau, 1e-10)
         assert np.abs(Qe).max() < 1e-9 * np.abs(tau).max()
         M = flexible.mass_matrix(arm, q, e)

@@ -2,7 +2,6 @@
 
 from .beams import beam
 from .control import RestStatus, RestToRest, joint_tracking, regulator, rest_to_rest
-from .floating import FreeBodyMotion, free_body
 from .linear import (
     Deflection,
     DeflectionStatus,
@@ -27,7 +26,13 @@ from .modes import ReducedModel, craig_bampton, from_modes
 from .references import Elastica, elastica, lumped
 from .robot import FlexibleRobot
 from .shaper import Shaper, input_shaper
-from .simulate import FlexibleMotion, FlexibleMotionStatus, simulate
+from .simulate import (
+    FlexibleMotion,
+    FlexibleMotionStatus,
+    FreeBodyMotion,
+    free_body,
+    simulate,
+)
 from .tip import TipStatus, TipTracking, tip_tracking
 
 __all__ = [

@@ -1,12 +1,12 @@
-"""Uniform Euler-Bernoulli beams as flexible links: exact mode shapes of bending and torsion."""
+"""Uniform Euler-Bernoulli beams as flexible links: modes of bending and torsion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss, legint, legval
 from numpy.typing import ArrayLike
 
 from .. import se3
@@ -16,20 +16,21 @@ from .link import BeamData, FlexibleLink, Section, integrals
 
 _ENDS = ("clamped-free", "pinned-hub")
 _SLENDER = 0.02  # default radius of gyration of the section, relative to the length
-_LEAST = 1e-4  # least wave number of a mode of a beam of length 1
+_LIGHT = 1e-10  # least mass of a mode, relative to the first
 _DRAWN = 41  # nodes of a beam
 _X, _Y, _Z = np.eye(3)
-Shape = Callable[[Array, int], Array]
-"""Derivative of an order of a mode of a beam of length 1 at places (N,)."""
 
 
 class Mode(NamedTuple):
-    """Bending about an axis (1: y, 2: z) or torsion (0) of a beam."""
+    """Bending about an axis (1: y, 2: z) or torsion (0) of a beam.
+
+    Shapes: Legendre series (N,) of the displacement on a beam of length 1, and its derivatives.
+    """
 
     axis: int
     stiffness: float
     frequency: float
-    shape: Shape
+    series: list[Array]
 
 
 def beam(
@@ -49,7 +50,7 @@ def beam(
 ) -> FlexibleLink:
     """Flexible link from a uniform Euler-Bernoulli beam along the x axis of its frame.
 
-    Its modes are the exact ones of the beam with what it carries, in the order: bending about y
+    Its modes are those of the beam with what it carries, in the order: bending about y
     (displacement along z), bending about z (along y), torsion. The largest displacement of each is
     1, so that elastic coordinates are metres, of torsion radians at the tip.
 
@@ -131,23 +132,19 @@ def beam(
         raise InvalidValueError("gyration: torsion needs a positive radius of gyration, got 0.")
     T = np.eye(4) if pose is None else se3.as_single_pose(pose, "pose")
 
-    more, lever, spin = _tip_body(carried)
-    kinds, all_mass = list[Mode](), mass + more
-    place = (mass * com[0] + more * lever[0]) / all_mass if all_mass else 0.0
-    for axis in (1, 2):
-        if np.isfinite(EI_p := float(stiff[axis - 1])):
-            about = J[axis, axis] + spin[axis, axis]
-            about += mass * (com[0] - place) ** 2 + more * (lever[0] - place) ** 2
-            about += mass * com[3 - axis] ** 2 + more * lever[3 - axis] ** 2
-            loads = (all_mass / (rho * L), place / L, about / (rho * L**3))
-            root = h / (rho * L**3) if ends == "pinned-hub" and axis == 2 else None
-            for b, shape in bending_modes(int(modes), loads, root):
-                kinds.append(Mode(axis, EI_p, (b / L) ** 2 * np.sqrt(EI_p / rho), shape))
-    if np.isfinite(torsion):
-        polar = J[0, 0] + spin[0, 0] + mass * float(com[1:] @ com[1:])
-        polar += more * float(lever[1:] @ lever[1:])
-        for b, shape in torsion_modes(int(modes), polar / (rho * L * k * k)):
-            kinds.append(Mode(0, torsion, b / L * np.sqrt(torsion / (rho * k * k)), shape))
+    kinds, bodies = list[Mode](), [(mass, com, J), _tip_body(carried)]
+    for axis, value in ((1, float(stiff[0])), (2, float(stiff[1])), (0, torsion)):
+        loads, across = [], 3 - axis
+        for m, c, I in bodies:  # noqa: E741
+            if axis:
+                spin = (I[axis, axis] + m * c[across] ** 2) / L**2
+                loads += [(m, 1.0, c[0] / L), (spin, 0.0, 1.0)]
+            else:
+                loads.append((I[0, 0] + m * float(c[1:] @ c[1:]), 1.0, 0.0))
+        if np.isfinite(value):
+            free = h / L**2 if ends == "pinned-hub" and axis == 2 else None
+            own = rho * L * (1.0 if axis else k * k)
+            kinds += _modes(int(modes), axis, value / L ** (3 if axis else 1), own, loads, free)
     body = BeamData(
         length=L,
         EI=(float(stiff[0]), float(stiff[1])),
@@ -166,7 +163,7 @@ def beam(
 def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> FlexibleLink:
     """Flexible link of modes; integrals by Gauss quadrature with so many points."""
     L, m, T = body.length, len(kinds), np.array(body.pose).reshape(4, 4)
-    points, weights = np.polynomial.legendre.leggauss(count)
+    points, weights = leggauss(count)
     points, weights = 0.5 + 0.5 * points, 0.5 * weights
 
     def shortened(x: Array) -> Array:
@@ -194,9 +191,9 @@ def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> Fl
         cloud.append((np.array([mass]), (L * _X + r)[None], (tip + spun)[None], bent[None]))
     W, X, Phi, Gamma = (np.concatenate(parts) for parts in zip(*cloud, strict=True))
     R, p = T[:3, :3], T[:3, 3]
-    stiffness = np.array([[_bent(a, b, L, points, weights) for b in kinds] for a in kinds])
+    stiffness = np.diag([mode.stiffness for mode in kinds]).reshape(m, m)
     Phi, Gamma = np.einsum("ij,njk->nik", R, Phi), np.einsum("ij,njkl->nikl", R, Gamma)
-    found = integrals(W, X @ R.T + p, Phi, Gamma, stiffness.reshape(m, m))
+    found = integrals(W, X @ R.T + p, Phi, Gamma, stiffness)
     found = replace(found, inertia=found.inertia + np.diag([0.0, 0.0, body.hub]))
     curved = np.moveaxis(np.tensordot(R, tip_short, 1), 0, -1)
     section = Section(*map(read_only, (L * R[:, 0] + p, (R @ tip).T, (R @ tip_turn).T, curved)))
@@ -209,27 +206,20 @@ def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> Fl
 def _fields(kinds: list[Mode], L: float, x: Array) -> tuple[Array, Array]:
     """Displacements and rotations of the axis by modes. Shapes: (N,) -> (N, 3, m), (N, 3, m)."""
     Phi, turn = np.zeros((2, len(x), 3, len(kinds)))
-    for c, (axis, _, _, shape) in enumerate(kinds):
-        if axis == 0:
-            turn[:, 0, c] = shape(x / L, 0)
+    u = 2.0 * x / L - 1.0
+    for c, mode in enumerate(kinds):
+        if mode.axis == 0:
+            turn[:, 0, c] = legval(u, mode.series[0])
         else:
-            Phi[:, 3 - axis, c] = shape(x / L, 0)
-            turn[:, axis, c] = shape(x / L, 1) / L * (1.0 if axis == 2 else -1.0)
+            Phi[:, 3 - mode.axis, c] = legval(u, mode.series[0])
+            slope = legval(u, mode.series[1]) / L
+            turn[:, mode.axis, c] = slope if mode.axis == 2 else -slope
     return Phi, turn
 
 
 def _turned(turn: Array, r: Array) -> Array:
     """Displacements (..., 3, m) of a point at r by rotations (..., 3, m)."""
     return np.cross(turn, r, axisa=-2, axisb=0, axisc=-2)
-
-
-def _bent(a: Mode, b: Mode, L: float, points: Array, weights: Array) -> float:
-    """Second derivative of the elastic energy by two modes."""
-    if a.axis != b.axis:
-        return 0.0
-    order = 2 if a.axis else 1
-    bent = a.shape(points, order) * b.shape(points, order)
-    return a.stiffness * L ** (1 - 2 * order) * float(weights @ bent)
 
 
 def _tip_body(tip: Any) -> tuple[float, Array, Array]:
@@ -263,85 +253,42 @@ def _points_of(body: BeamData) -> list[tuple[float, Array]]:
     return [(body.tip_mass / 6.0, com + s * r) for r in arms for s in (1.0, -1.0)]
 
 
-# --- exact shapes of a beam of length, mass and stiffness 1 --------------------------------------
+def _modes(
+    count: int,
+    axis: int,
+    stiffness: float,
+    mass: float,
+    loads: list[tuple[float, float, float]],
+    hub: float | None,
+) -> list[Mode]:
+    """First modes of a clamped beam, or with a free root and a hub on it, by Galerkin's method.
 
-
-def _basis(b: Array | float, x: Array | float, order: int) -> Array:
-    """Solutions of d4w/dx4 = b^4 w, derivatives divided by b^order. Shapes: (...) -> (..., 4)."""
-    c, s = np.cos(b * np.asarray(x)), np.sin(b * np.asarray(x))
-    waves = ((c, s), (-s, c), (-c, -s), (s, -c))[order % 4]
-    near, far = np.exp(-b * np.asarray(x)), np.exp(-b * (1.0 - np.asarray(x)))
-    return np.stack([*waves, (-1.0) ** order * near, far], axis=-1)
-
-
-def _conditions(b: Array, loads: tuple[float, float, float], hub: float | None) -> Array:
-    """Conditions on the coefficients of a mode: root, then tip. Shapes: (N,) -> (N, 4, 4)."""
-    mass, com, J = loads
-    root = [_basis(b, 0.0 * b, order) for order in range(3)]
-    tip = [_basis(b, 1.0 + 0.0 * b, order) for order in range(4)]
-    b = b[:, None]
-    push = mass * (tip[0] + com * b * tip[1])
-    rows = (
-        root[0],
-        root[1] if hub is None else root[2] + b**3 * hub * root[1],
-        tip[2] - b**2 * com * push - b**3 * J * tip[1],
-        tip[3] + b * push,
-    )
-    stack = np.stack(rows, axis=1)
-    return stack / np.linalg.norm(stack, axis=-1, keepdims=True)
-
-
-def bending_modes(
-    count: int, loads: tuple[float, float, float], hub: float | None
-) -> list[tuple[float, Shape]]:
-    """The first roots b and shapes of a beam with a tip body; clamped, or pinned with a hub."""
-
-    def shape_of(b: float) -> Shape:
-        c = np.linalg.svd(_conditions(np.array([b]), loads, hub)[0])[2][-1]
-        slope = 0.0 if hub is None else b * float(_basis(b, 0.0, 1) @ c)
-
-        def shape(x: Array, order: int) -> Array:
-            tangent = (slope * x, slope, 0.0)[order]
-            return (b**order * (_basis(b, x, order) @ c) - tangent) / size
-
-        size = 1.0
-        w = shape(np.linspace(0.0, 1.0, 201), 0)
-        size = float(w[np.argmax(np.abs(w))])
-        return shape
-
-    bare = _conditions(np.array([_LEAST]), (0.0, 0.0, 0.0), None if hub is None else 0.0)
-    before = float(np.linalg.det(bare)[0])
-    roots = _roots(lambda b: np.linalg.det(_conditions(b, loads, hub)), count, before)
-    return [(b, shape_of(b)) for b in roots]
-
-
-def torsion_modes(count: int, J: float) -> list[tuple[float, Shape]]:
-    """The first roots and shapes of a clamped bar with a polar inertia J at its tip."""
-
-    def shape_of(b: float) -> Shape:
-        return lambda x, order: b**order * (np.cos(b * x) if order else np.sin(b * x)) / np.sin(b)
-
-    return [
-        (b, shape_of(b)) for b in _roots(lambda b: np.cos(b) - J * b * np.sin(b), count, 1.0, 1e-9)
-    ]
-
-
-def _roots(
-    function: Callable[[Array], Array], count: int, before: float, least: float = _LEAST
-) -> list[float]:
-    """The first positive roots of a function of b, which has the sign of ``before`` before them."""
-    from scipy.optimize import brentq
-
-    b = np.concatenate([np.geomspace(least, 0.5, 200), np.arange(0.51, np.pi * (count + 2), 0.01)])
-    signs = np.sign(function(b))
-
-    def at(x: float) -> float:
-        return float(function(np.array([x]))[0])
-
-    changes = np.flatnonzero(signs[1:] != signs[:-1])[:count]
-    if count and (len(changes) < count or signs[0] != np.sign(before)):
+    The basis are polynomials whose second derivatives (first ones of torsion) are orthonormal.
+    Each load is the inertia of a combination of displacement and slope of the tip.
+    """
+    N, order = 2 * count + 16, 2 if axis else 1
+    series = [np.diag(np.sqrt(2.0 * np.arange(N) + 1.0))]
+    for _ in range(order):
+        series.insert(0, legint(series[0], lbnd=-1, scl=0.5))
+    u, weights = leggauss(N + 2)
+    # with the rigid rotation as the first function
+    w = np.vstack([0.5 + 0.5 * u, legval(u, series[0])])
+    tip, slope = (np.append(1.0, legval(1.0, c)) for c in series[:2])
+    M = 0.5 * mass * (w * weights) @ w.T
+    for inertia, a, b in loads:
+        M += inertia * np.outer(a * tip + b * slope, a * tip + b * slope)
+    free = 0.0 if hub is None else np.outer(M[1:, 0], M[0, 1:]) / (M[0, 0] + hub)
+    values, V = np.linalg.eigh(M[1:, 1:] - free)
+    values, V = values[::-1][:count], V[:, ::-1]
+    if count and values[-1] < _LIGHT * values[0]:
         raise InvalidValueError(
             "tip, hub, density: not all modes were found, because the beam is too light for its "
-            "loads. Take a greater density or radius of gyration."
+            "loads. Take a greater density or radius of gyration, or fewer modes."
         )
-    return [float(brentq(at, b[i], b[i + 1], xtol=1e-20)) for i in changes]  # type: ignore[arg-type]
+    found = []
+    for c, value in enumerate(values):
+        shape = legval(np.linspace(-1.0, 1.0, 201), series[0] @ V[:, c])
+        size = shape[np.abs(shape).argmax() if axis else -1]
+        rows = [row @ V[:, c] / size for row in series]
+        found.append(Mode(axis, stiffness / size**2, np.sqrt(stiffness / value), rows))
+    return found

@@ -1,13 +1,39 @@
 """Control of flexible robots: regulation, motion in fixed time, tracking of joints (7.3.3.1 to 3).
 
 A law is a function of (t, q, v, e, e_v) that `simulate` takes as its ``control``.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints and m elastic coordinates.
+kp, kd : array_like, shape () or (n,)
+    Positive gains: N m/rad and N m s/rad of `regulator`, 1/s^2 and 1/s of `joint_tracking`, whose
+    errors decay with ``s^2 + kd s + kp``.
+q_goal, q0, q1 : array_like, shape (n,)
+    Goal (default zero), start and end of the motors, rad or m.
+reference : Trajectory, RestToRest, or callable
+    Motion of the motors, or a function of t that returns (q, v, a).
+duration : float
+    Time, s.
+
+Raises
+------
+InvalidValueError, ShapeError
+    Gains or durations that are not positive; goals without equilibrium; a reference of another
+    kind; vectors of another length.
+
+References
+----------
+Seed book section 7.3.3; A. De Luca and B. Siciliano, "Regulation of flexible arms under gravity",
+IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, "Joint trajectory tracking
+for planar multi-link flexible manipulator", ICRA 2002.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -16,8 +42,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
-from .linear import DeflectionStatus, scales, static_deflection, stiffness_matrix
-from .models import INVERSE, idm, mass_matrix, solved
+from .linear import DeflectionStatus, scales, static_deflection
+from .link import Result
+from .models import idm, mass_matrix, solved
 from .robot import FlexibleRobot, check_arm
 
 Law = Callable[[float, Array, Array, Array, Array], Array]
@@ -40,29 +67,10 @@ def regulator(
 ) -> Law:
     """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints.
-    kp, kd : array_like, shape () or (n,)
-        Positive gains, N m/rad and N m s/rad.
-    q_goal : array_like, shape (n,), optional
-        Goal of the motors; default zero.
-
     Returns
     -------
     callable
         The law.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Gains that are not positive; a goal without equilibrium.
-
-    References
-    ----------
-    Seed book section 7.3.3.1; A. De Luca and B. Siciliano, "Regulation of flexible arms under
-    gravity", IEEE Trans. Robotics and Automation 9 (1993).
 
     Examples
     --------
@@ -75,8 +83,7 @@ def regulator(
     """
     n = check_arm(arm).n
     goal = np.zeros(n) if q_goal is None else as_exact(q_goal, (n,), "q_goal").copy()
-    P, D = _gains(kp, n, "kp"), _gains(kd, n, "kd")
-    found = static_deflection(arm, goal)
+    P, D, found = _gains(kp, n, "kp"), _gains(kd, n, "kd"), static_deflection(arm, goal)
     if np.isnan(found.tau).any():
         raise InvalidValueError(f"q_goal: the arm has no equilibrium there. {found.reason()}")
     hold = found.tau
@@ -84,26 +91,12 @@ def regulator(
 
 
 def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
-    """Tracking of joint motions: the inverse model with the errors of the motors (section 7.3.3.3).
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints.
-    reference : Trajectory, RestToRest, or callable
-        Motion of the motors, or a function of t that returns (q, v, a).
-    kp, kd : array_like, shape () or (n,)
-        Positive gains, 1/s^2 and 1/s: the errors decay with ``s^2 + kd s + kp``.
+    """Tracking of joint motions: the inverse model with the errors of the motors.
 
     Returns
     -------
     callable
         The law, which uses e and e_v.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Gains that are not positive, a reference of another kind.
 
     Examples
     --------
@@ -124,27 +117,24 @@ def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayL
     return law
 
 
-def motion_of(reference: Any, n: int) -> Callable[[float], tuple[Array, Array, Array]]:
+def motion_of(reference: Any, n: int) -> Callable[[float], list[Array]]:
     """Function of t that returns (q, v, a), of a trajectory or of such a function, n joints."""
     motion = getattr(reference, "trajectory", reference)
-    if all(callable(getattr(motion, name, None)) for name in "qva"):
-        as_exact(motion.q(0.0), (n,), "reference at t = 0 s")
-        return lambda t: (motion.q(t), motion.v(t), motion.a(t))
-    if callable(motion):
+    trajectory = all(callable(getattr(motion, name, None)) for name in "qva")
+    if not trajectory and not callable(motion):
+        raise InvalidValueError(
+            "reference: expected a trajectory, or a function of t that returns (q, v, a), got "
+            f"{type(reference).__name__}."
+        )
 
-        def at(t: float) -> tuple[Array, Array, Array]:
-            given: Any = motion(t)
-            if not isinstance(given, tuple | list | np.ndarray) or len(given) != 3:
-                raise InvalidValueError(f"reference: expected (q, v, a) at t = {t:.6g} s.")
-            q, v, a = (as_exact(x, (n,), f"reference at t = {t:.6g} s") for x in given)
-            return q, v, a
+    def at(t: float) -> list[Array]:
+        given: Any = [getattr(motion, name)(t) for name in "qva"] if trajectory else motion(t)
+        if not isinstance(given, tuple | list | np.ndarray) or len(given) != 3:
+            raise InvalidValueError(f"reference: expected (q, v, a) at t = {t:.6g} s.")
+        return [as_exact(x, (n,), f"reference at t = {t:.6g} s") for x in given]
 
-        at(0.0)
-        return at
-    raise InvalidValueError(
-        "reference: expected a trajectory, or a function of t that returns (q, v, a), got "
-        f"{type(reference).__name__}."
-    )
+    at(0.0)
+    return at
 
 
 def _gains(value: ArrayLike, n: int, name: str) -> Array:
@@ -161,24 +151,36 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPolynomial(Frozen, Value):
-    """Motion of the joints from rest to rest: ``q0 + (q1 - q0) p(s) + c_k p_k(s)``, s = t / T.
+    """Motion of the joints from rest to rest: a polynomial by its Bernstein coefficients.
 
-    Shapes: q0, q1 (n,), factors c (n, K).
+    Shapes: coefficients (degree + 1, ..., n).
     """
 
-    q0: Array
-    q1: Array
     duration: float
-    factors: Array
+    coefficients: Array
+    _weighted: Any = field(default=(), init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        Frozen.__post_init__(self)
+        rows, weighted = self.coefficients, []
+        for _ in range(3):  # derivatives have the differences as coefficients
+            d = len(rows) - 1
+            weights = np.array([[comb(d, k)] for k in range(d + 1)], np.float64)
+            weighted.append((np.arange(d + 1), weights * rows.reshape(d + 1, -1)))
+            rows = np.diff(rows, axis=0) * (d / self.duration)
+        object.__setattr__(self, "_weighted", weighted)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return self.duration, self.coefficients
 
     def _at(self, t: ArrayLike, order: int) -> Array:
-        s = np.asarray(t, np.float64) / self.duration
-        basis = _basis(np.clip(s, 0.0, 1.0), self.factors.shape[-1], order) / self.duration**order
-        if order:
-            basis = basis * ((s >= 0.0) & (s <= 1.0))[..., None]
-        return (order == 0) * self.q0 + basis @ np.hstack(
-            [(self.q1 - self.q0)[:, None], self.factors]
-        ).T
+        powers, weighted = self._weighted[order]
+        s = np.asarray(t, np.float64)[..., None] / self.duration
+        x = np.minimum(np.maximum(s, 0.0), 1.0)
+        found = (x**powers * (1.0 - x) ** powers[::-1]) @ weighted
+        found = found if order == 0 else found * (x == s)
+        return found.reshape(*s.shape[:-1], *self.coefficients.shape[1:])
 
     def q(self, t: ArrayLike) -> Array:
         """Positions (..., n) at times (...), constant before and after the motion."""
@@ -193,32 +195,8 @@ class JointPolynomial(Frozen, Value):
         return self._at(t, 2)
 
 
-@lru_cache(maxsize=32)
-def _coefficients(K: int, order: int) -> Array:
-    """Of 1 + K polynomials in x = 2 s - 1: a step of order 9, and bumps that vanish at the ends.
-
-    Shapes: -> (degree + 1, 1 + K), ascending powers.
-    """
-    P, L = np.polynomial.Polynomial, np.polynomial.Legendre
-    bump = P((1.0, 0.0, -1.0)) ** 4
-    step = bump.integ(lbnd=-1)
-    rows = [step / step(1.0), *(bump * L.basis(k).convert(kind=P) for k in range(K))]
-    out = np.zeros((10 + K, 1 + K))
-    for k, row in enumerate(rows):
-        coef = (row.deriv(order) if order else row).coef * 2.0**order
-        out[: len(coef), k] = coef
-    return out
-
-
-def _basis(s: ArrayLike, K: int, order: int) -> Array:
-    """Derivatives by s of the polynomials. Shapes: s (...) -> (..., 1 + K)."""
-    coefficients = _coefficients(K, order)
-    x = 2.0 * np.asarray(s, np.float64)[..., None] - 1.0
-    return x ** np.arange(len(coefficients)) @ coefficients
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class RestToRest(Frozen, Value):
+class RestToRest(Result):
     """Motion from rest to rest in a fixed time.
 
     Parameters
@@ -256,43 +234,20 @@ class RestToRest(Frozen, Value):
         path = self.trajectory
         return idm(self.arm, path.q(t), e, path.v(t), e_v, path.a(t))[0]
 
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
-
     def __repr__(self) -> str:
         return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
 
 
 def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: float) -> RestToRest:
-    """Motion between equilibria in a fixed time, without vibration at the end (section 7.3.3.2).
+    """Motion between equilibria in a fixed time, without vibration at the end.
 
-    The motion of the motors is a polynomial with free coefficients, of least size, with which the
+    The motion of the motors is a polynomial with free coefficients, of least change, with which the
     elastic coordinates, integrated by the inverse model, begin and end at rest.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q0, q1 : array_like, shape (n,)
-        Start and end of the motors, rad or m.
-    duration : float
-        Time, s.
 
     Returns
     -------
     RestToRest
         The motion, its torques and its status.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        A duration that is not positive; ends of another length or without equilibrium.
-
-    References
-    ----------
-    Seed book section 7.3.3.2; M. Benosman and G. Le Vey, "Joint trajectory tracking for planar
-    multi-link flexible manipulator", ICRA 2002.
 
     Examples
     --------
@@ -306,35 +261,42 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
     from scipy.integrate import solve_ivp
 
     n, m, T = check_arm(arm).n, arm.m, as_number(duration, "duration", above=0.0)
-    ends = [as_exact(q, (n,), name) for q, name in ((q0, "q0"), (q1, "q1"))]
-    rest = [static_deflection(arm, q) for q in ends]
-    if any(found.status > DeflectionStatus.LARGE for found in rest):
+    ends = np.array([as_exact(q, (n,), name) for q, name in ((q0, "q0"), (q1, "q1"))])
+    rest = static_deflection(arm, ends)
+    if (rest.status > DeflectionStatus.LARGE).any():
         raise InvalidValueError(
             "q0, q1: expected postures in which the arm has a stable equilibrium."
         )
-    start, goal = (np.concatenate([found.e, np.zeros(m)]) for found in rest)
-    K = -(-_FACTORS * 2 * m // n) if m else 0
+    start, goal = np.hstack([rest.e, 0.0 * rest.e])
+    K = -(-_FACTORS * 2 * m // n) if m else 2
+    d = K + 7  # the first and last four coefficients are those of the ends
+    # the step with four derivatives that vanish at both ends, of a higher degree
+    step = [sum(comb(k, j) * comb(d - k, 9 - j) for j in range(5, 10)) for k in range(d + 1)]
+    base = ends[0] + np.outer(np.array(step) / comb(d, 9), ends[1] - ends[0])
+
+    def path(factors: Array) -> JointPolynomial:
+        """Motions with other free coefficients, factors (..., K, n)."""
+        moved = np.moveaxis(factors, -2, 0)
+        none = np.zeros((4, *moved.shape[1:]))
+        wide = base.reshape(d + 1, *[1] * (factors.ndim - 2), n)
+        return JointPolynomial(T, wide + np.concatenate([none, moved, none]))
 
     def elastic(factors: Array, rtol: float, dense: bool = False) -> Any:
-        """Solutions for several motions, factors (P, n, K)."""
-        P = len(factors)
-        span = np.broadcast_to((ends[1] - ends[0])[:, None], (P, n, 1))
-        spans = np.concatenate([span, factors], axis=2)
+        """Solutions for several motions, factors (P, K, n)."""
+        P, motion = len(factors), path(factors)
 
         def rate(t: float, y: Array) -> Array:
-            e, e_v = (np.ascontiguousarray(x) for x in y.reshape(P, 2, m).swapaxes(0, 1))
-            q, v, a = (spans @ _basis(min(t / T, 1.0), K, order) / T**order for order in range(3))
-            e_a = solved(arm, INVERSE, ends[0] + q, e, v, e_v, a)[1]
+            e, e_v = y.reshape(P, 2, m).swapaxes(0, 1)
+            x, dx = np.hstack([motion.q(t), e]), np.hstack([motion.v(t), e_v])
+            e_a = solved(arm, False, x, dx, motion.a(t))[0][:, n:]
             return np.stack([e_v, e_a], axis=1).ravel()
 
+        tolerances = {"rtol": rtol, "atol": 1e-3 * rtol}
         y0 = np.tile(start, P)
-        return solve_ivp(
-            rate, (0.0, T), y0, "DOP853", rtol=rtol, atol=1e-3 * rtol, dense_output=dense
-        )
+        return solve_ivp(rate, (0.0, T), y0, "DOP853", dense_output=dense, **tolerances)
 
     floor = _NEGLIGIBLE * scales(arm)[n:]
-    stiff, mass = np.diag(stiffness_matrix(arm))[n:], np.diag(mass_matrix(arm, ends[0]))[n:]
-    rates = np.sqrt(stiff / mass)
+    rates = np.sqrt(np.diag(arm.parts.K)[n:] / np.diag(mass_matrix(arm, ends[0]))[n:])
 
     def sizes(y: Array) -> Array:
         """Largest elastic coordinates (m,), and velocities (m,) of vibrations as large as these."""
@@ -342,7 +304,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         most[:m] = np.maximum(most[:m], floor)
         return np.concatenate([most[:m], np.maximum(most[m:], rates * most[:m])])
 
-    c, slope, before = np.zeros((n, K)), None, np.inf
+    c, slope, before = np.zeros((K, n)), None, np.inf
     for _ in range(_NEWTON if m else 0):
         found = elastic(c[None], _FINE)
         size = sizes(found.y)
@@ -351,13 +313,14 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         if error < _STILL:
             break
         if slope is None or error > 0.2 * before:  # else the last slope serves
-            moved = elastic(c + _STEP * np.eye(n * K).reshape(-1, n, K), _COARSE)
-            base = elastic(c[None], _COARSE).y[:, -1]
-            slope = (moved.y[:, -1].reshape(-1, 2 * m) - base).T / _STEP
+            unit = np.eye(K * n).reshape(-1, K, n)
+            moved = elastic(np.concatenate([c[None], c + _STEP * unit]), _COARSE)
+            last = moved.y[:, -1].reshape(-1, 2 * m)
+            slope = (last[1:] - last[0]).T / _STEP
         before = error
-        c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(n, K)
-    path, found = JointPolynomial(ends[0], ends[1], T, c), elastic(c[None], _FINE, dense=True)
+        c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(K, n)
+    found = elastic(c[None], _FINE, dense=True)
     end = (found.y[:, -1] - goal) / sizes(found.y)
     still = (np.abs(end) < 10.0 * _STILL).all()
     status = RestStatus.AT_REST if still else RestStatus.VIBRATES
-    return RestToRest(arm, path, end, status, found.sol)
+    return RestToRest(arm, path(c), end, status, found.sol)

@@ -1,4 +1,27 @@
-"""Static deflection, natural frequencies and linear models about an equilibrium."""
+"""Static deflection, natural frequencies and linear models about an equilibrium.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints and m elastic coordinates.
+q : array_like, shape (..., n)
+    Angles of the motors; of `linearize` shape (n,).
+wrench : array_like, shape (..., 6), optional
+    Of the tool on the environment, in world axes.
+joints : str
+    ``"locked"``: motors held; ``"free"``: motors without torque.
+output : str
+    ``"joint"`` or ``"tip"``.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Arguments of the wrong length, or with NaN or infinity; unknown words.
+
+References
+----------
+Seed book sections 7.2.5, at rest, 7.3.3.3 and 7.3.3.4.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +34,11 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Frozen, Value, as_exact
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, SingularMassMatrixError
-from .models import checked_rows, generalized_forces, jacobian, mass_matrix
-from .robot import FlexibleRobot, check_arm, damping_matrix
+from .models import checked_rows, forces, jacobian, mass_matrix
+from .robot import FlexibleRobot, check_arm
 
 _LARGE = 0.1  # of the length: deflections for which linear modes are within 1 %
 _ITERATIONS = 50
-_STEPS = ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0))  # central differences of order 6
 _SINGULAR = 1e-9
 _SOFT = 1e-12  # least stiffness of a stable equilibrium, relative to the greatest
 
@@ -72,28 +94,10 @@ def static_deflection(
 ) -> Deflection:
     """Deflection of an arm at rest under gravity and a wrench, joints held.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q : array_like, shape (..., n)
-        Angles of the motors.
-    wrench : array_like, shape (..., 6), optional
-        Of the tool on the environment, in world axes.
-
     Returns
     -------
     Deflection
         Elastic coordinates and status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity.
-
-    References
-    ----------
-    Seed book section 7.2.5, at rest.
 
     Examples
     --------
@@ -104,68 +108,45 @@ def static_deflection(
     >>> bool(abs(found.deflection - 0.01) < 2e-5), found.reason()[:20]
     (True, 'The deflection of ev')
     """
-    batch, (q, w) = checked_rows(arm, q=q, wrench=wrench)
-    N, m, rest = len(q), arm.m, np.zeros((1, arm.n))
-    e, scale = np.zeros((N, m)), scales(arm)[arm.n :]
-    status = np.full(N, DeflectionStatus.NOT_FOUND, np.int8)
-
-    def forces(rows: Any, e: Array, tile: int = 1) -> tuple[Array, Array]:
-        many = [np.repeat(x[rows], tile, axis=0) for x in (q, w)]
-        still = np.repeat(rest, len(e), axis=0)
-        none = np.zeros_like(e)
-        return generalized_forces(arm, many[0], e, still, none, still, none, many[1])
-
-    todo = np.arange(N)
+    batch, (x, wrench) = checked_rows(arm, (q, None), wrench=wrench)
+    n, m, size = arm.n, arm.m, scales(arm)[arm.n :]
+    status = np.full(len(x), DeflectionStatus.NOT_FOUND, np.int8)
+    todo = np.arange(len(x))
     for _ in range(_ITERATIONS):
         if not todo.size:
             break
-        h = 1e-4 * scale
-        moved = np.concatenate([np.diag(h), -np.diag(h)])
-        steps = (e[todo, None] + moved).reshape(-1, m)
-        F = forces(todo, steps, 2 * m)[1].reshape(len(todo), 2, m, m)
-        K = (F[:, 0] - F[:, 1]) / (2.0 * h[:, None])
-        K, left = K.swapaxes(1, 2), forces(todo, e[todo])[1][..., None]
+        y = x[todo]
+        K = tangent(arm, y, wrench[todo], 1)[:, n:, n:]
+        left = forces(arm, y, 0.0 * y, 0.0 * y, wrench[todo])[0][:, n:, None]
         try:
             step = np.linalg.solve(K, left)[..., 0]
         except np.linalg.LinAlgError:  # exactly at the load of buckling
             step = (np.linalg.pinv(K) @ left)[..., 0]
-        size = np.abs(step / scale).max(axis=1, initial=0.0)
-        e[todo] -= step / np.maximum(2.0 * size, 1.0)[:, None]
-        done = size < 1e-11 * (1.0 + np.abs(e[todo] / scale).max(axis=1, initial=0.0))
-        K = scale[:, None] * (K + K.swapaxes(1, 2)) * scale
-        stiff = np.linalg.eigvalsh(K)
+        length = np.abs(step / size).max(axis=1, initial=0.0)
+        x[todo, n:] -= step / np.maximum(2.0 * length, 1.0)[:, None]
+        bent = np.abs(x[todo, n:] / size).max(axis=1, initial=0.0)
+        done = length < 1e-11 * (1.0 + bent)
+        stiff = np.linalg.eigvalsh(size[:, None] * (K + K.swapaxes(1, 2)) * size)
         stable = (stiff > _SOFT * np.abs(stiff).max(axis=1, initial=0.0)[:, None]).all(axis=1)
-        status[todo[done]] = np.where(
-            stable[done], DeflectionStatus.SMALL, DeflectionStatus.UNSTABLE
-        )
-        todo = todo[~done & (np.abs(e[todo] / scale).max(axis=1, initial=0.0) < 10.0)]
-    tau, drives = forces(np.arange(N), e)[0], arm.model.drive_matrices
-    tau += 0.0 if drives is None else drives.offset
-    deflection = np.zeros(N)
+        kinds = np.where(stable, DeflectionStatus.SMALL, DeflectionStatus.UNSTABLE)
+        status[todo[done]] = kinds[done]
+        todo = todo[~done & (bent < 10.0)]
+    tau, drives = forces(arm, x, 0.0 * x, 0.0 * x, wrench)[0][:, :n], arm.model.drive_matrices
+    tau = tau + (0.0 if drives is None else drives.offset)
+    e, deflection = x[:, n:], np.zeros(len(x))
     for row, link in arm.links.items():
-        here = slice(arm.arrays.start[row - 1], arm.arrays.start[row])
+        here = slice(*arm.parts.chain.start[row - 1 : row + 1])
         moved = np.linalg.norm(e[:, here] @ link.tip.Phi, axis=1) / link.length
         deflection = np.maximum(deflection, moved)
-    found = status != DeflectionStatus.NOT_FOUND
     status[(status == DeflectionStatus.SMALL) & (deflection > _LARGE)] = DeflectionStatus.LARGE
-    e, tau = (np.where(found[:, None], x, np.nan) for x in (e, tau))
-    return Deflection(
-        e.reshape(*batch, m), tau.reshape(*batch, arm.n),
-        np.where(found, deflection, np.nan).reshape(batch), status.reshape(batch),
-    )  # fmt: skip
+    found = np.hstack([e, tau, deflection[:, None]])
+    found[status == DeflectionStatus.NOT_FOUND] = np.nan
+    e, tau, deflection = np.split(found.reshape(*batch, -1), [m, m + n], axis=-1)
+    return Deflection(e, tau, deflection[..., 0], status.reshape(batch))
 
 
 def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked") -> Array:
     """Natural frequencies of the undeformed arm at rest, without gravity.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q : array_like, shape (..., n)
-        Angles of the motors.
-    joints : str
-        ``"locked"``: motors held; ``"free"``: motors without torque.
 
     Returns
     -------
@@ -174,8 +155,8 @@ def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked"
 
     Raises
     ------
-    InvalidValueError, ShapeError, SingularMassMatrixError
-        Unknown ``joints``; vectors of another length; a motor that moves no inertia.
+    SingularMassMatrixError
+        A motor that moves no inertia.
 
     Examples
     --------
@@ -187,34 +168,20 @@ def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked"
     """
     if joints not in ("locked", "free"):
         raise InvalidValueError(f"joints: expected 'locked' or 'free', got {joints!r:.40}.")
-    from scipy.linalg import LinAlgError, eigh
-
-    batch, (q,) = checked_rows(arm, q=q)
+    batch, (x,) = checked_rows(arm, (q, None))
     first = arm.n if joints == "locked" else 0
-    K = stiffness_matrix(arm)[first:, first:]
-    found = np.empty((len(q), len(K)))
-    for i, M in enumerate(mass_matrix(arm, q)[:, first:, first:]):
-        try:
-            values = eigh(K, M, eigvals_only=True) if len(K) else np.zeros(0)
-        except LinAlgError:
-            raise SingularMassMatrixError(
-                f"{arm.model.name!r}: a coordinate moves no inertia in sample {i}. Give inertial "
-                "parameters with model.with_inertia(...) or Ia with model.with_drive(...)."
-            ) from None
-        found[i] = np.sqrt(np.maximum(values, 0.0))
-        if not first:
-            found[i, : arm.n] = 0.0
+    M, K = mass_matrix(arm, x[:, : arm.n])[:, first:, first:], arm.parts.K[first:, first:]
+    try:
+        L = np.linalg.inv(np.linalg.cholesky(M))
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError(
+            f"{arm.model.name!r}: a coordinate moves no inertia. Give inertial parameters with "
+            "model.with_inertia(...) or Ia with model.with_drive(...)."
+        ) from None
+    found = np.sqrt(np.maximum(np.linalg.eigvalsh(L @ K @ L.swapaxes(1, 2)), 0.0))
+    if not first:
+        found[:, : arm.n] = 0.0
     return found.reshape(*batch, len(K))
-
-
-def stiffness_matrix(arm: FlexibleRobot) -> Array:
-    """Elastic stiffness of (q, e), zero for q. Shapes: -> (n + m, n + m)."""
-    K, s = np.zeros((arm.n + arm.m,) * 2), arm.n
-    for link in arm.links.values():
-        here = slice(s, s + link.m)
-        K[here, here], s = link.invariants.modal_stiffness, s + link.m
-    K[s:, s:] = np.diag(arm.joint_stiffness[arm.joints])  # type: ignore[index]
-    return K
 
 
 def scales(arm: FlexibleRobot) -> Array:
@@ -258,15 +225,6 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     rigid arm as the flexible one moves: ``q + J_q^+ J_e e``, of positions where they determine it,
     else of poses. Its zeros on the right side are the reason why a tip is not tracked causally.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q : array_like, shape (n,)
-        Angles of the motors.
-    output : str
-        ``"joint"`` or ``"tip"``.
-
     Returns
     -------
     LinearModel
@@ -274,12 +232,8 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
 
     Raises
     ------
-    InvalidValueError, ShapeError
-        No equilibrium at q, an unknown output, a singular posture for the tip.
-
-    References
-    ----------
-    Seed book sections 7.3.3.3 and 7.3.3.4.
+    InvalidValueError
+        No equilibrium at q, a singular posture for the tip.
 
     Examples
     --------
@@ -299,8 +253,10 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     if found.status == DeflectionStatus.NOT_FOUND:
         raise InvalidValueError(f"q: there is no equilibrium to linearise about. {found.reason()}")
     e = found.e
-    M, K, D = mass_matrix(arm, q, e), tangent(arm, np.concatenate([q, e])), damping_matrix(arm)
-    H = np.zeros((n, arm.m)) if output == "joint" else tip_gain(jacobian(arm, q, e), n)
+    M, D = mass_matrix(arm, q, e), arm.parts.D
+    K = tangent(arm, np.concatenate([q, e])[None], None)[0]
+    J = jacobian(arm, q, e)
+    H = np.zeros((n, arm.m)) if output == "joint" else tip_inverse(J, n) @ J[:, n:]
     inverse: Any = np.linalg.inv(M)
     zero, one = np.zeros((k, k)), np.eye(k)
     A = np.block([[zero, one], [-inverse @ K, -inverse @ D]])
@@ -316,28 +272,30 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     )
 
 
-def tip_gain(J: Array, n: int) -> Array:
-    """J_q^+ J_e of Jacobians (..., 6, n + m). Shapes: -> (..., n, m)."""
+def tip_inverse(J: Array, n: int) -> Array:
+    """J_q^+ of Jacobians (..., 6, n + m), with zeros for rotations if positions determine it."""
     for rows in (3, 6):
         values = np.linalg.svd(J[..., :rows, :n], compute_uv=False)
         if n <= rows and (values[..., -1] > _SINGULAR * values[..., 0]).all():
-            return np.linalg.pinv(J[..., :rows, :n]) @ J[..., :rows, n:]
+            return np.linalg.pinv(J[..., :n] * (np.arange(6) < rows)[:, None])
     raise InvalidValueError(
         "q: the joints do not determine the pose of the tool here: a singular posture, or more "
         "joints than six. Take output='joint', or another posture."
     )
 
 
-def tangent(arm: FlexibleRobot, x: Array) -> Array:
-    """Derivative of the forces at rest by (q, e). Shapes: x (n + m,) -> (n + m, n + m)."""
-    n, k, h = arm.n, len(x), 0.01 * scales(arm)
-    still = np.zeros((k, n)), np.zeros((k, arm.m))
+def tangent(arm: FlexibleRobot, x: Array, wrench: Array | None, order: int = 3) -> Array:
+    """Derivatives (N, k, k) of the forces at rest by rows of (q, e), by central differences."""
+    k, h = x.shape[1], (1e-4 if order == 1 else 1e-2) * scales(arm)
+    load = None if wrench is None else np.repeat(wrench, k, axis=0)
 
-    def forces(c: int) -> Array:
-        y = x + c * np.diag(h)
-        return np.hstack(generalized_forces(arm, y[:, :n], y[:, n:], *still, *still))
+    def at(c: int) -> Array:
+        y = (x[:, None] + c * np.diag(h)).reshape(-1, k)
+        return forces(arm, y, 0.0 * y, 0.0 * y, load)[0].reshape(-1, k, k)
 
-    return (sum(w * (forces(c) - forces(-c)) for c, w in _STEPS) / h[:, None]).T
+    weights = (0.5,) if order == 1 else (0.75, -0.15, 1.0 / 60.0)
+    moved = [w * (at(c) - at(-c)) for c, w in enumerate(weights, 1)]
+    return (sum(moved) / h[:, None]).swapaxes(1, 2)
 
 
 def _roots(M: Array, D: Array, K: Array) -> NDArray[np.complex128]:

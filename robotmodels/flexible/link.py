@@ -14,6 +14,16 @@ import numpy as np
 from .._arrays import Array, Frozen, Value
 
 
+class Result(Frozen, Value):
+    """Base of results with a status."""
+
+    __slots__ = ()
+
+    def reason(self) -> str:
+        """The sentence of the status."""
+        return self.status.sentence  # type: ignore[attr-defined]
+
+
 class Section(NamedTuple):
     """Undeformed position of the tip section, displacement and rotation of it by the modes.
 
@@ -88,7 +98,7 @@ class Invariants(Frozen, Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlexibleLink(Frozen, Value):
-    """An elastic body clamped to the frame at its root, made by `beam` or `from_modes`.
+    """An elastic body clamped to the frame at its root (7.2.2.12), made by `beam` or `from_modes`.
 
     Parameters
     ----------
@@ -106,10 +116,6 @@ class FlexibleLink(Frozen, Value):
         Whether foreshortening is part of the model.
     source : BeamData or None
         The uniform beam.
-
-    References
-    ----------
-    Seed book sections 7.2.2.3 and 7.2.2.12.
 
     Examples
     --------

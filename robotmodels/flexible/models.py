@@ -1,4 +1,4 @@
-"""Geometric, kinematic and dynamic models of flexible robots, by compiled recursions (7.2).
+"""Geometric, kinematic and dynamic models of flexible robots, by a compiled recursion (7.2).
 
 Vectors may have leading batch axes, which broadcast; an empty batch gives an empty result.
 
@@ -23,6 +23,11 @@ ShapeError, InvalidValueError
     Arguments of the wrong length, or with NaN or infinity.
 SingularMassMatrixError
     A coordinate that moves no inertia, such as a flexible joint without rotor inertia.
+
+References
+----------
+Seed book sections 7.2.3, 7.2.5, 7.2.7 and 7.2.8; F. Boyer and W. Khalil, "An efficient calculation
+of flexible manipulator inverse dynamics", Int. J. Robotics Research 17 (1998).
 """
 
 from __future__ import annotations
@@ -35,10 +40,9 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_vector, batch_rows, read_only
 from .._outcomes import Outcome
 from ..errors import SingularMassMatrixError
-from .robot import FlexibleRobot, check_arm
+from .robot import Arm, FlexibleRobot, check_arm
 
-INVERSE, DIRECT = range(2)
-_NO_WRENCH = np.zeros((1, 6))
+_NO_FLAGS = np.zeros(0, np.int64)
 
 
 class SpinStatus(Outcome):
@@ -53,12 +57,12 @@ class SpinStatus(Outcome):
 
 
 class Accelerations(tuple[Array, Array]):
-    """Accelerations (a, e_a) of a direct dynamic model, with a status.
+    """Accelerations (a, e_a), shapes (..., n) and (..., m), with a status.
 
     Parameters
     ----------
-    pair : tuple of ndarray, shapes (..., n) and (..., m)
-        Accelerations of the motors and of the elastic coordinates.
+    pair : tuple of ndarray
+        The accelerations.
     status : ndarray of int8, shape (...)
         Codes of `SpinStatus`.
     """
@@ -92,7 +96,7 @@ class Accelerations(tuple[Array, Array]):
 
 
 def dgm(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Direct geometric model: world pose (..., 4, 4) of the tool (section 7.2.7).
+    """Direct geometric model: world pose of the tool.
 
     Returns
     -------
@@ -122,19 +126,16 @@ def link_poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> 
 
 
 def jacobian(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Jacobian of the tool by (q, e), rows [v; w] at the tool point in world axes (section 7.2.3).
+    """Jacobian of the tool by (q, e), rows [v; w] at the tool point in world axes.
 
     Returns
     -------
     ndarray, shape (..., 6, n + m)
         The columns of the joints, then of the elastic coordinates.
     """
-    batch, (q, e) = checked_rows(arm, q=q, e=e)
-    n, size = arm.n, arm.n + arm.m
-    unit = np.tile(np.eye(size), (len(q), 1))
-    q, e = (np.repeat(x, size, axis=0) for x in (q, e))
-    _, out = _motions(arm, q, e, unit[:, :n], unit[:, n:])
-    return out[:, 9:].reshape(*batch, size, 6).swapaxes(-1, -2).copy()
+    batch, (x,) = checked_rows(arm, (q, e))
+    unit, x = np.tile(np.eye(6), (len(x), 1)), np.repeat(x, 6, axis=0)
+    return forces(arm, x, 0.0 * x, 0.0 * x, unit, bare=True)[0].reshape(*batch, 6, x.shape[1])
 
 
 def energies(
@@ -144,15 +145,15 @@ def energies(
     v: ArrayLike | None = None,
     e_v: ArrayLike | None = None,
 ) -> tuple[Array, Array]:
-    """Kinetic energy, and potential energy of gravity and deformation (section 7.2.2.7).
+    """Kinetic energy, and potential energy of gravity and deformation, rotors included.
 
     Returns
     -------
     kinetic, potential : ndarray, shape (...)
-        J; rotors included.
+        J.
     """
-    batch, (q, e, v, e_v) = checked_rows(arm, q=q, e=e, v=v, e_v=e_v)
-    kinetic, potential, _ = states(arm, q, e, v, e_v)
+    batch, (x, dx) = checked_rows(arm, (q, e), (v, e_v))
+    kinetic, potential, _ = states(arm, x, dx)
     return kinetic.reshape(batch), potential.reshape(batch)
 
 
@@ -166,7 +167,7 @@ def idm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> tuple[Array, Array]:
-    """Inverse dynamic model: torques of given joint accelerations (section 7.2.8.2).
+    """Inverse dynamic model: torques of given joint accelerations.
 
     The elastic accelerations follow from the state: integrate them along a motion.
 
@@ -176,15 +177,10 @@ def idm(
         Torques, N m or N.
     e_a : ndarray, shape (..., m)
         Elastic accelerations.
-
-    References
-    ----------
-    F. Boyer and W. Khalil, "An efficient calculation of flexible manipulator inverse dynamics",
-    Int. J. Robotics Research 17 (1998).
     """
-    batch, rows = checked_rows(arm, q=q, e=e, v=v, e_v=e_v, a=a, wrench=wrench)
-    tau, e_a, _ = solved(arm, INVERSE, *rows, drive=drive)
-    return tau.reshape(*batch, arm.n), e_a.reshape(*batch, arm.m)
+    batch, rows = checked_rows(arm, (q, e), (v, e_v), a=a, wrench=wrench)
+    found = solved(arm, False, *rows, drive=drive)[0].reshape(*batch, arm.n + arm.m)
+    return found[..., : arm.n].copy(), found[..., arm.n :].copy()
 
 
 def ddm(
@@ -197,7 +193,7 @@ def ddm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> Accelerations:
-    """Direct dynamic model: accelerations under given torques (section 7.2.8.3).
+    """Direct dynamic model: accelerations under given torques.
 
     Returns
     -------
@@ -212,182 +208,158 @@ def ddm(
     >>> a.shape, e_a.shape
     ((6,), (2,))
     """
-    batch, rows = checked_rows(arm, q=q, e=e, v=v, e_v=e_v, tau=tau, wrench=wrench)
-    a, e_a, base = solved(arm, DIRECT, *rows, drive=drive)
-    status = base[:, 9].astype(np.int8).reshape(batch)
-    return Accelerations((a.reshape(*batch, arm.n), e_a.reshape(*batch, arm.m)), status)
+    batch, rows = checked_rows(arm, (q, e), (v, e_v), tau=tau, wrench=wrench)
+    found, base = solved(arm, True, *rows, drive=drive)
+    found, status = found.reshape(*batch, arm.n + arm.m), base[:, 9].astype(np.int8)
+    pair = found[..., : arm.n].copy(), found[..., arm.n :].copy()
+    return Accelerations(pair, status.reshape(batch))
 
 
 def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Mass matrix of (q, e), rotor inertia on it (section 7.2.5).
+    """Mass matrix of (q, e), with rotor inertia.
 
     Returns
     -------
     ndarray, shape (..., n + m, n + m)
         Symmetric.
     """
-    batch, (q, e) = checked_rows(arm, q=q, e=e)
-    n, size = arm.n, arm.n + arm.m
-    bare = arm.arrays.second.copy()
-    bare[..., 16:] = 0.0  # no elastic forces
-    arrays = arm.arrays._replace(second=read_only(bare), gravity=read_only(np.zeros(3)))
-    unit = np.tile(np.eye(size), (len(q), 1))
-    q, e = (np.repeat(x, size, axis=0) for x in (q, e))
-    forces = generalized_forces(
-        arm, q, e, 0.0 * q, 0.0 * e, unit[:, :n], unit[:, n:], arrays=arrays, elastic=False
-    )
-    return np.hstack(forces).reshape(*batch, size, size)
+    batch, (x,) = checked_rows(arm, (q, e))
+    size = x.shape[1]
+    unit, x = np.tile(np.eye(size), (len(x), 1)), np.repeat(x, size, axis=0)
+    return forces(arm, x, 0.0 * x, unit, bare=True)[0].reshape(*batch, size, size)
 
 
-# --- rows of samples, checked ------------------------------------------------------------------
+# --- rows of coordinates x = (q, e), checked ------------------------------------------------------
 
 
-def checked_rows(arm: FlexibleRobot, **given: Any) -> tuple[tuple[int, ...], list[Array]]:
-    """Batch axes and rows (N, k) of vectors; None is zero."""
-    check_arm(arm)
-    lengths = {"e": arm.m, "e_v": arm.m, "wrench": 6}
+def checked_rows(
+    arm: FlexibleRobot, *pairs: tuple[ArrayLike | None, ArrayLike | None], **given: Any
+) -> tuple[tuple[int, ...], list[Array]]:
+    """Batch axes, and rows (N, n + m) of pairs, (N, k) of other vectors; None is zero."""
+    n, m = check_arm(arm).n, arm.m
+    names = (("q", "e"), ("v", "e_v"))[: len(pairs)]
+    named = [*(x for pair in zip(names, pairs, strict=True) for x in zip(*pair, strict=True))]
     vectors = []
-    for name, value in given.items():
-        k = lengths.get(name, arm.n)
+    for name, value in (*named, *given.items()):
+        k = m if name in ("e", "e_v") else 6 if name == "wrench" else n
         vectors.append(np.zeros(k) if value is None else as_vector(value, k, name))
-    if all(vector.ndim == 1 for vector in vectors):
-        return (), [vector.reshape(1, -1) for vector in vectors]
-    return batch_rows(tuple(vectors), tuple(given))
+    batch, k = (), 2 * len(pairs)
+    if any(vector.ndim > 1 for vector in vectors):
+        batch, vectors = batch_rows(tuple(vectors), (*(name for name, _ in named), *given))
+    rows = [np.concatenate(vectors[i : i + 2], axis=-1) for i in range(0, k, 2)] + vectors[k:]
+    return batch, rows if batch else [np.atleast_2d(row) for row in rows]
 
 
-def _of_links(arm: FlexibleRobot, q: Array, e: Array) -> tuple[Array, Array]:
-    """Turns of the links (N, n), and modes (N, modes), of motors and elastic coordinates."""
+def recursion(
+    chain: Arm, y: Array, dy: Array, given: Array, free: NDArray[np.int64],
+    wrench: Array | None = None, moved: Array | None = None,
+) -> tuple[Array, Array, Array, int]:  # fmt: skip
+    """The compiled recursion: loads or accelerations, rows of the base, poses, first failure."""
+    from .kernels import loads
+
+    N = len(y)
+    out, base = np.empty((N, y.shape[1])), np.empty((N, 10))
+    poses = np.empty((N, len(chain.pi) + 1, 3, 4))
+    outer = np.zeros((N, 18))
+    outer[:, :6] = 0.0 if wrench is None else wrench
+    outer[:, 6:] = 0.0 if moved is None else moved
+    failed = loads(chain, y, dy, given, outer, free, out, base, poses)
+    return out, base, poses, failed
+
+
+def _of_links(arm: FlexibleRobot, x: Array) -> Array:
+    """Turns of the links, and modes (N, n + modes), of coordinates."""
     if not len(arm.joints):
-        return np.ascontiguousarray(q), np.ascontiguousarray(e)
-    turns, modes = np.array(q, order="C"), arm.modes
-    turns[:, arm.joints] += e[:, modes:]
-    return turns, np.ascontiguousarray(e[:, :modes])
-
-
-def _motions(arm: FlexibleRobot, q: Array, e: Array, v: Array, ev: Array) -> tuple[Array, Array]:
-    """Poses (N, f + 1, 3, 4), and energies, momenta and the velocity of the tool (N, 15)."""
-    from .kernels import motions
-
-    out, poses = np.empty((len(q), 15)), np.empty((len(q), arm.model.f + 1, 3, 4))
-    turns, rates = _of_links(arm, q, e), _of_links(arm, v, ev)
-    motions(arm.arrays, *turns, *rates, np.zeros((len(q), 6)), poses, out)
-    return poses, out
+        return np.ascontiguousarray(x)
+    y = np.array(x[:, : arm.n + arm.modes], order="C")
+    y[:, arm.joints] += x[:, arm.n + arm.modes :]
+    return y
 
 
 def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
-    batch, (q, e) = checked_rows(arm, q=q, e=e)
-    poses = np.zeros((len(q), arm.model.f + 1, 4, 4))
-    poses[:, :, :3], poses[:, :, 3, 3] = _motions(arm, q, e, 0.0 * q, 0.0 * e)[0], 1.0
+    batch, (x,) = checked_rows(arm, (q, e))
+    y = _of_links(arm, x)
+    poses = np.zeros((len(x), arm.model.f + 1, 4, 4))
+    poses[:, :, :3] = recursion(arm.parts.chain, y, 0.0 * y, 0.0 * y, _NO_FLAGS)[2]
+    poses[:, :, 3, 3] = 1.0
     return poses.reshape(*batch, *poses.shape[1:])
 
 
-def states(
-    arm: FlexibleRobot, q: Array, e: Array, v: Array, ev: Array
-) -> tuple[Array, Array, Array]:
+def states(arm: FlexibleRobot, x: Array, dx: Array) -> tuple[Array, Array, Array]:
     """Kinetic and potential energies (N,), and momenta in the world (N, 6), of rows."""
-    _, out = _motions(arm, q, e, v, ev)
-    drives, deflected = arm.model.drive_matrices, e[:, arm.modes :]
-    rotor = 0.0 if drives is None else 0.5 * (v**2 @ np.diag(drives.rotor))
-    spring = 0.5 * deflected**2 @ arm.joint_stiffness[arm.joints]  # type: ignore[index]
-    return out[:, 0] + rotor, out[:, 1] + out[:, 2] + spring, out[:, 3:9]
+    # the momenta are the loads of accelerations dx at rest
+    Q, base = forces(arm, x, 0.0 * x, dx, bare=True)
+    potential = 0.5 * ((x @ arm.parts.K) * x).sum(axis=1) - base[:, 6:9] @ arm.model.gravity
+    return 0.5 * (Q * dx).sum(axis=1), potential, in_world(arm.model.base, base[:, :6])
+
+
+def in_world(pose: Array, load: Array) -> Array:
+    """Forces and moments (..., 6) in axes of poses (..., 4, 4), about the origin of the world."""
+    R, p = pose[..., :3, :3], pose[..., :3, 3]
+    force, moment = np.matvec(R, load[..., :3]), np.matvec(R, load[..., 3:])
+    return np.concatenate([force, moment + cross(p, force)], axis=-1)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Vector products (..., 3), for few of them quicker than NumPy's."""
+    after, before = [1, 2, 0], [2, 0, 1]
+    return a[..., after] * b[..., before] - a[..., before] * b[..., after]
 
 
 def solved(
-    arm: FlexibleRobot,
-    kind: int,
-    q: Array,
-    e: Array,
-    v: Array,
-    ev: Array,
-    given: Array,
-    wrench: Array = _NO_WRENCH,
-    *,
-    drive: bool = True,
-) -> tuple[Array, Array, Array]:
-    """Inverse or direct model of rows: torques or accelerations (N, n), elastic ones (N, m).
+    arm: FlexibleRobot, direct: bool, x: Array, dx: Array, given: Array,
+    wrench: Array | None = None, *, drive: bool = True,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Direct or inverse model of rows: accelerations, or torques and elastic accelerations.
 
-    Also the rows (N, 10) of the base: its load, first moment of the arm, whether it is softened.
+    Shapes: -> (N, n + m), and rows (N, 10) of the base, see `kernels`.
     """
-    from .kernels_loads import loads
-
-    N, joints, modes = len(q), arm.joints, arm.modes
-    arrays, drives = arm.arrays, arm.model.drive_matrices if drive else None
-    if not drive:
-        arrays = arrays._replace(rotor=read_only(np.zeros(arm.n)))
-    direct = kind == DIRECT
-    rest = 0.0 if drives is None else drives.torque(v, None)
-    value = given - rest if direct and drives is not None else given
-    flags = np.full(arm.n, int(direct))
-    net = spring = np.zeros((N, 0))
-    turns, rates = _of_links(arm, q, e), _of_links(arm, v, ev)
-    if len(joints):
-        k, d = arm.joint_stiffness[joints], arm.joint_damping[joints]  # type: ignore[index]
-        spring = k * e[:, modes:] + d * ev[:, modes:]
-        flags[joints], value = 1, value.copy()
-        net, value[:, joints] = value[:, joints], -spring  # on the motors; on the links
-    out, out_e, base = np.empty((N, arm.n)), np.empty((N, arm.m)), np.empty((N, 10))
-    found_e = out_e if not len(joints) else np.empty((N, modes))
-    none, twist = np.zeros((N, modes)), np.zeros((N, 6))
-    pull = wrench if len(wrench) == N else np.zeros((N, 6))
-    failed = loads(
-        arrays, *turns, *rates, np.ascontiguousarray(value), none, pull, twist, flags, 1, 0,
-        out, found_e, base,
-    )  # fmt: skip
-    if len(joints):
-        rotor = np.zeros(arm.n) if drives is None else np.diag(drives.rotor)
-        if direct and not (rotor[joints] > 0.0).all():
-            raise SingularMassMatrixError(
-                f"{arm.model.name!r}: flexible joint {int(joints[rotor[joints] <= 0.0][0]) + 1} "
-                "has no rotor inertia, so its motor has no acceleration. "
-                + (
-                    "Give Ia with model.with_drive(DriveParameters(Ia=...))."
-                    if drive
-                    else "drive=False leaves out that of the model; take drive=True."
-                )
-            )
-        link = out[:, joints].copy()
-        motor = (net + spring) / rotor[joints] if direct else given[:, joints]
-        out[:, joints] = motor if direct else -spring
-        out_e[:, :modes], out_e[:, modes:] = found_e, link - motor
-        if not direct:
-            out += 0.0 if drives is None else (given * rotor) * np.isin(np.arange(arm.n), joints)
+    n, joints, s, parts = arm.n, arm.joints, arm.n + arm.modes, arm.parts
+    drives = arm.model.drive_matrices if drive else None
+    chain = parts.chain if drive else parts.chain._replace(rotor=read_only(np.zeros(n)))
+    rotor = parts.rotor[joints] if drive else np.zeros(len(joints))
+    rest = 0.0 if drives is None else drives.torque(dx[:, :n], None)
+    value = np.zeros((len(x), s))
+    value[:, :n] = given - rest if direct else given
+    if len(joints):  # torque or acceleration of the motor; the spring drives the link
+        motor, spring = value[:, joints], x @ parts.K[:, s:] + dx @ parts.D[:, s:]
+        value[:, joints] = -spring
+    y, dy = _of_links(arm, x), _of_links(arm, dx)
+    found, base, _, failed = recursion(chain, y, dy, value, parts.free[1 + direct], wrench)
+    if direct and not (rotor > 0.0).all():
+        raise SingularMassMatrixError(
+            f"{arm.model.name!r}: flexible joint {int(joints[rotor <= 0.0][0]) + 1} has no rotor "
+            "inertia, so its motor has no acceleration. Give Ia with "
+            "model.with_drive(DriveParameters(Ia=...)), and take drive=True."
+        )
     if failed >= 0:
         raise SingularMassMatrixError(
-            f"{arm.model.name!r}: a joint moves no inertia (first in sample {failed} of {N}). Give "
-            "inertial parameters with model.with_inertia(...), or rotor inertia with with_drive."
+            f"{arm.model.name!r}: a joint moves no inertia (first in sample {failed} of {len(x)}). "
+            "Give inertial parameters with model.with_inertia(...), or rotor inertia with "
+            "with_drive."
         )
-    return (out if direct else out + rest), out_e, base
-
-
-def generalized_forces(
-    arm: FlexibleRobot,
-    q: Array,
-    e: Array,
-    v: Array,
-    ev: Array,
-    a: Array,
-    ea: Array,
-    wrench: Array = _NO_WRENCH,
-    arrays: Any = None,
-    elastic: bool = True,
-) -> tuple[Array, Array]:
-    """Forces on (q, e) that given accelerations need, rows (N, n) and (N, m), without friction."""
-    from .kernels_loads import loads
-
-    N, joints, modes = len(q), arm.joints, arm.modes
-    turns, rates, given = _of_links(arm, q, e), _of_links(arm, v, ev), _of_links(arm, a, ea)
-    out, found, base = np.empty((N, arm.n)), np.empty((N, modes)), np.empty((N, 10))
-    pull = wrench if len(wrench) == N else np.zeros((N, 6))
-    flags = np.zeros(arm.n, np.int64)
-    loads(
-        arrays or arm.arrays, *turns, *rates, *given, pull, np.zeros((N, 6)), flags, 0, 0,
-        out, found, base,
-    )  # fmt: skip
-    deflection = out[:, joints]
     if len(joints):
-        k, d = arm.joint_stiffness[joints], arm.joint_damping[joints]  # type: ignore[index]
-        deflection = deflection + elastic * (k * e[:, modes:] + d * ev[:, modes:])
-        if arm.model.drive_matrices is not None:
-            rotor = np.diag(arm.model.drive_matrices.rotor)[joints]
-            out[:, joints] += rotor * a[:, joints]
-    return out, np.hstack([found, deflection])
+        moved = (motor + spring) / rotor if direct else motor
+        found = np.hstack([found, found[:, joints] - moved])
+        found[:, joints] = moved if direct else moved * rotor - spring
+    if not direct:
+        found[:, :n] += rest
+    return found, base
+
+
+def forces(
+    arm: FlexibleRobot, x: Array, dx: Array, ddx: Array, wrench: Array | None = None,
+    *, bare: bool = False,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Forces (N, n + m) that given accelerations need, without friction; rows (N, 10) of the base.
+
+    Gravity and elasticity are left out if ``bare``.
+    """
+    joints, s, parts = arm.joints, arm.n + arm.modes, arm.parts
+    rows = (_of_links(arm, row) for row in (x, dx, ddx))
+    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)
+    if len(joints):
+        spring = 0.0 if bare else x @ parts.K[:, s:] + dx @ parts.D[:, s:]
+        Q = np.hstack([Q, Q[:, joints] + spring])
+        Q[:, joints] += parts.rotor[joints] * ddx[:, joints]
+    return Q, base

@@ -5,18 +5,48 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..kernels import Chain
 from ..model import RobotModel, check_model
 from .link import FlexibleLink
 
-if TYPE_CHECKING:
-    from .kernels import Arm
+
+class Arm(NamedTuple):
+    """An elastic chain in arrays; body k has the modes ``start[k]`` to ``start[k + 1]``.
+
+    pi (f, 10), first (m, 18): J_k, a, b, tip's Phi, Psi; second (m, 18 most), 18 for each other
+    mode of its body: J_kl, A, B, Gamma of the tip, m_kl, K_kl, D_kl.
+    """
+
+    chain: Chain  # positions from the undeformed tips of the antecedents
+    pi: Array
+    start: NDArray[np.int64]
+    tip: Array
+    first: Array
+    second: Array
+    rotor: Array
+    tool: Array  # (3,), from the undeformed tip of row `end`
+    gravity: Array
+    end: int
+
+
+class Parts(NamedTuple):
+    """Arrays of an arm; K, D (n + m, n + m) are elastic stiffness and all viscous damping."""
+
+    chain: Arm
+    bare: Arm
+    """The chain without gravity and elasticity."""
+    K: Array
+    D: Array
+    rotor: Array
+    free: NDArray[np.int64]
+    """Rows of flags for loads, the inverse and the direct model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +99,9 @@ class FlexibleRobot(Value):
     modal_damping: Array | None = None
     joints: NDArray[np.int64] = field(init=False)
     """Columns of the flexible joints."""
-    _arm: Any = field(default=None, init=False)
+    modes: int = field(init=False)
+    """Number of modes of the links: the first entries of e."""
+    _parts: Any = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         check_model(self.model)
@@ -77,6 +109,7 @@ class FlexibleRobot(Value):
         set_ = object.__setattr__
         set_(self, "links", MappingProxyType(_checked_links(model, self.links)))
         n, modes = model.n, sum(link.m for link in self.links.values())
+        set_(self, "modes", modes)
         stiffness = _of(self.joint_stiffness, n, "joint_stiffness", np.inf)
         if not (stiffness > 0.0).all():
             raise InvalidValueError(
@@ -111,11 +144,6 @@ class FlexibleRobot(Value):
         return self.model.n
 
     @property
-    def modes(self) -> int:
-        """Number of modes of the links: the first entries of e."""
-        return sum(link.m for link in self.links.values())
-
-    @property
     def m(self) -> int:
         """Number of elastic coordinates: modes and deflections of joints."""
         return self.modes + len(self.joints)
@@ -129,11 +157,11 @@ class FlexibleRobot(Value):
         return (*modes, *(f"joint {column + 1}" for column in self.joints))
 
     @property
-    def arrays(self) -> Arm:
-        """Arrays for the compiled recursions."""
-        if self._arm is None:
-            object.__setattr__(self, "_arm", _arrays_of(self))
-        return self._arm  # type: ignore[return-value]
+    def parts(self) -> Parts:
+        """Arrays for the compiled recursion and the linear models."""
+        if self._parts is None:
+            object.__setattr__(self, "_parts", _parts_of(self))
+        return self._parts  # type: ignore[return-value]
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -194,47 +222,55 @@ def _of(value: ArrayLike | None, count: int, name: str, default: float) -> Array
     return np.broadcast_to(array, (count,)).copy()
 
 
-def _arrays_of(arm: FlexibleRobot) -> Arm:
+def _parts_of(arm: FlexibleRobot) -> Parts:
     """Chain from tip to root, inertia and elasticity of all bodies in packed arrays."""
-    from .kernels import Arm
-
-    model, f = arm.model, arm.model.f
+    model, f, n = arm.model, arm.model.f, arm.n
     counts = [arm.links[row].m if row in arm.links else 0 for row in range(1, f + 1)]
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     m, most = int(start[-1]), max([1, *counts])
     pi, tip = model.inertia.values.copy(), np.zeros((f + 1, 3))
     first, second = np.zeros((m, 18)), np.zeros((m, most, 18))
-    six = np.triu_indices(3)
+    K, D = np.zeros((2, n + arm.m, n + arm.m))
+    rotor, six = np.zeros(n), np.triu_indices(3)
+    if (drives := model.drive_matrices) is not None:
+        rotor, D[:n, :n] = np.diag(drives.rotor), drives.viscous
     for row, link in arm.links.items():
-        inv, k = link.invariants, link.m
+        inv, end, k = link.invariants, link.tip, link.m
         pi[row - 1] = (*inv.inertia[six], *inv.first_moment, inv.mass)
-        tip[row] = link.tip.position
-        here = slice(start[row - 1], start[row])
-        first[here] = np.hstack(
-            [inv.translation, inv.inertia_first[:, *six], inv.rotation, link.tip.Phi, link.tip.Psi]
-        )
-        ratios = arm.modal_damping[here]  # type: ignore[index]
-        pairs = (inv.modal_mass, inv.modal_stiffness, modal_damping_matrix(inv, ratios))
-        second[here, :k] = np.concatenate(
-            [inv.foreshortening, inv.inertia_second[:, :, *six], inv.gyroscopic, link.tip.Gamma,
-             np.stack(pairs, -1)], axis=-1
-        )  # fmt: skip
-    chain = model.chain
-    rotor = np.zeros(arm.n) if model.drive_matrices is None else np.diag(model.drive_matrices.rotor)
-    rotor = np.where(np.isfinite(arm.joint_stiffness), 0.0, rotor)  # type: ignore[arg-type]
+        tip[row] = end.position
+        here, at = slice(start[row - 1], start[row]), slice(n + start[row - 1], n + start[row])
+        K[at, at] = inv.modal_stiffness
+        D[at, at] = modal_damping_matrix(inv, arm.modal_damping[here])  # type: ignore[index]
+        moments = inv.inertia_first[:, *six], inv.inertia_second[:, :, *six]
+        first[here] = np.hstack([moments[0], inv.translation, inv.rotation, end.Phi, end.Psi])
+        matrices = np.stack([inv.modal_mass, K[at, at], D[at, at]], -1)
+        terms = (moments[1], inv.foreshortening, inv.gyroscopic, end.Gamma, matrices)
+        second[here, :k] = np.concatenate(terms, axis=-1)
+    joints, deflections = arm.joints, np.arange(n + m, n + arm.m)
+    K[deflections, deflections] = arm.joint_stiffness[joints]  # type: ignore[index]
+    D[deflections, deflections] = arm.joint_damping[joints]  # type: ignore[index]
     at_end = model.tip in arm.links and np.array_equal(model.tool, np.eye(4))
-    return Arm(
-        chain=chain._replace(position=read_only(chain.position - tip[chain.antecedent])),
+    chain = Arm(
+        chain=model.chain._replace(
+            position=read_only(model.chain.position - tip[model.chain.antecedent])
+        ),
         pi=read_only(pi),
         start=read_only(start, np.int64),
         tip=read_only(tip[1:]),
         first=read_only(first),
-        second=read_only(second),
-        rotor=read_only(rotor),
+        second=read_only(second.reshape(m, 18 * most)),
+        rotor=read_only(np.where(np.isin(np.arange(n), joints), 0.0, rotor)),
         tool=read_only(np.zeros(3) if at_end else model.tool[:3, 3] - tip[model.tip]),
         gravity=model.gravity,
         end=int(model.tip),
     )
+    second[..., 16:] = 0.0
+    bare = chain._replace(
+        second=read_only(second.reshape(m, 18 * most)), gravity=read_only(np.zeros(3))
+    )
+    free = np.zeros((3, n + 2), np.int64)
+    free[1:, joints], free[1:, n], free[2, :n] = 1, 1, 1
+    return Parts(chain, bare, *map(read_only, (K, D, rotor)), read_only(free, np.int64))
 
 
 def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:
@@ -246,16 +282,3 @@ def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:
         return np.zeros_like(M)
     values, V = eigh(K, M)
     return M @ (V * (2.0 * ratios * np.sqrt(np.maximum(values, 0.0)))) @ V.T @ M
-
-
-def damping_matrix(arm: FlexibleRobot) -> Array:
-    """Viscous damping of (q, e): of the drives, the modes and the flexible joints."""
-    n, s, D = arm.n, 0, np.zeros((arm.n + arm.m,) * 2)
-    if arm.model.drive_matrices is not None:
-        D[:n, :n] = arm.model.drive_matrices.viscous
-    for link in arm.links.values():
-        here = slice(s, s + link.m)
-        s, at = s + link.m, slice(n + s, n + s + link.m)
-        D[at, at] = modal_damping_matrix(link.invariants, arm.modal_damping[here])  # type: ignore[index]
-    D[n + s :, n + s :] = np.diag(arm.joint_damping[arm.joints])  # type: ignore[index]
-    return D

@@ -33,18 +33,7 @@ class Shaper(Frozen, Value):
     damping: float
 
     def residual(self, relative_frequency_error: ArrayLike = 0.0) -> Array:
-        """Vibration that is left, relative to one impulse: ``|sum A_i exp(s t_i)|`` at the end.
-
-        Parameters
-        ----------
-        relative_frequency_error : array_like, shape (...)
-            Of the true frequency, relative to the assumed one.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            Ratios of amplitudes.
-        """
+        """Vibration that is left, relative to one impulse: ``|sum A_i exp(s t_i)|`` at the end."""
         w = self.frequency * (1.0 + as_floats(relative_frequency_error, "relative_frequency_error"))
         w, damping = w[..., None], self.damping
         s = w * (damping + 1j * np.sqrt(1.0 - damping**2))
@@ -52,18 +41,7 @@ class Shaper(Frozen, Value):
         return left * np.exp(-damping * w[..., 0] * self.times[-1])
 
     def shaped(self, reference: Callable[[Array], Array]) -> Callable[[ArrayLike], Array]:
-        """Convolution of a function of time, such as ``trajectory.q``, with the impulses.
-
-        Parameters
-        ----------
-        reference : callable
-            Of times, constant before 0 and after its end.
-
-        Returns
-        -------
-        callable
-            The shaped function of time.
-        """
+        """Convolution of a function of time, such as ``trajectory.q``, with the impulses."""
         pairs = list(zip(self.times.tolist(), self.amplitudes.tolist(), strict=True))
         return lambda t: sum(a * reference(np.asarray(t) - delay) for delay, a in pairs)  # type: ignore[return-value]
 

@@ -1,23 +1,63 @@
-"""Simulation of flexible arms and of free elastic bodies, with their energies and momenta."""
+"""Simulation of flexible arms and of free elastic bodies, with their energies and momenta.
+
+Energy and momenta are integrated along, or constant: their drift measures the error of the
+integration. Dry friction is taken with the sign of the velocity, without sticking.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints and m elastic coordinates.
+link : FlexibleLink
+    A free body. A line without inertia about its axis, such as a beam without gyration, gets that
+    of a radius of length / 10.
+q0, v0 : array_like, shape (n,)
+    Angles and velocities of the motors at the start; default at rest. Of a free body v0 (6,) is the
+    velocity [v; w] of the root, whose axes are those of the world at the start.
+e0, e_v0 : array_like, shape (m,), optional
+    Elastic coordinates and velocities at the start; default zero.
+control : callable or array_like of shape (n,), optional
+    Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none.
+wrench : callable or array_like of shape (6,), optional
+    Of the tool on the environment, in world axes, given as ``control``.
+t : array_like
+    A duration, with samples at the steps of the integrator, or ascending times (N,), s.
+method : Integrator or str
+    As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
+rtol, atol : float
+    Tolerances of a step.
+max_evaluations : int, optional
+    Default 60 000 for each second and as many more.
+progress : callable, optional
+    A function of the fraction done.
+
+Raises
+------
+ShapeError, InvalidValueError, SingularMassMatrixError
+    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._arrays import Array, as_exact, as_number
 from .._choices import chosen
 from .._outcomes import Outcome
-from ..errors import ShapeError, SingularMassMatrixError
+from ..errors import InvalidValueError, SingularMassMatrixError
+from ..geometry import DHTable
+from ..model import RobotModel
 from ..simulation import Integrator
+from ..simulation.simulate import times_of
 from .linear import scales
-from .models import DIRECT, SpinStatus, ddm, jacobian, solved, states
-from .robot import FlexibleRobot, check_arm, damping_matrix
+from .link import FlexibleLink, Result
+from .models import SpinStatus, cross, ddm, dgm, in_world, jacobian, recursion, solved, states
+from .robot import FlexibleRobot, check_arm
 
 _LAW = Callable[..., ArrayLike]
 _LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
@@ -34,7 +74,7 @@ class FlexibleMotionStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FlexibleMotion(Frozen, Value):
+class FlexibleMotion(Result):
     """Simulated motion of a flexible arm.
 
     Parameters
@@ -88,13 +128,9 @@ class FlexibleMotion(Frozen, Value):
     @property
     def momentum_drift(self) -> float:
         """Largest error of the momentum balance, relative to the largest momentum and impulse."""
-        return relative(
+        return _relative(
             self.momentum - self.momentum[0] - self.impulse, self.momentum, self.impulse
         )
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
 
     def __repr__(self) -> str:
         return (
@@ -121,41 +157,10 @@ def simulate(
 ) -> FlexibleMotion:
     """Simulate a flexible arm under torques.
 
-    Energy and momenta are integrated along: their drift measures the error of the integration.
-    Dry friction is taken with the sign of the velocity, without sticking.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q0, v0 : array_like, shape (n,)
-        Angles and velocities of the motors at the start; default at rest.
-    control : callable or array_like of shape (n,), optional
-        Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none.
-    t : array_like
-        A duration, with samples at the steps of the integrator, or ascending times (N,).
-    wrench : callable or array_like of shape (6,), optional
-        Of the tool on the environment, in world axes, given as ``control``.
-    e0, e_v0 : array_like, shape (m,), optional
-        Elastic coordinates and velocities at the start; default zero.
-    method : Integrator or str
-        As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
-    rtol, atol : float
-        Tolerances of a step.
-    max_evaluations : int, optional
-        Default 60 000 for each second and as many more.
-    progress : callable, optional
-        A function of the fraction done.
-
     Returns
     -------
     FlexibleMotion
         The motion, its energies and momenta, and the status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, SingularMassMatrixError
-        Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
 
     Examples
     --------
@@ -167,62 +172,42 @@ def simulate(
     (<FlexibleMotionStatus.FINISHED: 0>, True)
     """
     n, m, model = check_arm(arm).n, arm.m, arm.model
-    start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in (
-        ("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))]  # fmt: skip
+    given = (("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))
+    start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
-    ddm(
-        arm, start[0], start[1], start[2], start[3], np.zeros(n)
-    )  # its errors name what is singular
-    drives, D = model.drive_matrices, damping_matrix(arm)[n:, n:]
-    total = float(arm.arrays.pi[:, 9].sum())
-    cuts = np.cumsum([n, m, n, m])
-    Z = model.base
-
-    def at(time: float, y: Array) -> tuple[list[Array], Array, Array]:
-        parts = np.split(y, cuts)[:4]
-        return parts, law(time, *parts), push(time, *parts)
-
-    softened = [False]
+    ddm(arm, *start, np.zeros(n))  # its errors name what is singular
+    k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
 
     def rate(time: float, y: Array) -> Array:
-        (q, e, v, ev), tau, w = at(time, y)
-        rows = [x.reshape(1, -1) for x in (q, e, v, ev, tau, w)]
-        a, ea, base = solved(arm, DIRECT, *rows)
+        q, e, v, ev = parts = y[:n], y[n:k], y[k : k + n], y[k + n : 2 * k]
+        tau, w, dx = law(time, *parts), push(time, *parts), y[k : 2 * k]
+        ddx, base = solved(arm, True, y[None, :k], dx[None], tau[None], w[None])
         softened[0] = softened[0] or base[0, 9] > 0.0
         power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
-        force = Z[:3, :3] @ base[0, :3]
-        moment = Z[:3, :3] @ base[0, 3:6] + cross(Z[:3, 3], force)
-        force, moment = (
-            force + total * model.gravity,
-            moment + cross(base[0, 6:9], model.gravity),
-        )
-        if w.any():
-            power -= w @ jacobian(arm, q, e) @ np.concatenate([v, ev])
-            place = _tool(arm, q, e)
-            force, moment = force - w[:3], moment - w[3:] - cross(place, w[:3])
-        return np.concatenate([v, ev, a[0], ea[0], [power], force, moment])
+        loads = [base[0, :9]]
+        if wrench is not None:
+            power -= w @ jacobian(arm, q, e) @ dx
+            tool = np.eye(4)
+            tool[:3, 3] = dgm(arm, q, e)[:3, 3]
+            loads.append(in_world(tool, w))
+        return np.concatenate([dx, ddx[0], [power], *loads])
 
-    y0 = np.concatenate([*(start[k] for k in (0, 1, 2, 3)), np.zeros(7)])
+    y0 = np.concatenate([*start, np.zeros(10 if wrench is None else 16)])
     options = (chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress)
     largest = _LARGEST * scales(arm)[n:]
-    times, Y, status, count = followed(
-        rate, y0, t, *options, lambda y: bool((np.abs(y[n : n + m]) > largest).any())
+    times, Y, status, count = _followed(
+        rate, y0, t, *options, lambda y: bool((np.abs(y[n:k]) > largest).any())
     )
-    q, e, v, ev, rest = np.split(Y, cuts, axis=1)
-    tau = np.array([law(time, *np.split(y, cuts)[:4]) for time, y in zip(times, Y, strict=True)])
-    kinetic, potential, momentum = states(arm, *(np.ascontiguousarray(x) for x in (q, e, v, ev)))
+    q, e, v, ev, work, load, first, pull = np.split(Y, np.cumsum([n, m, n, m, 1, 6, 3]), axis=1)
+    tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
+    kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
+    weight = arm.parts.chain.pi[:, 9].sum() * np.outer(times - times[0], model.gravity)
+    impulse = in_world(model.base, load) + np.hstack([weight, cross(first, model.gravity)])
+    impulse -= 0.0 if wrench is None else pull
     if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
         status = FlexibleMotionStatus.SOFTENED
-    return FlexibleMotion(
-        arm, times, q, v, tau, e, ev, kinetic, potential, rest[:, 0], momentum, rest[:, 1:], status,
-        count,
-    )  # fmt: skip
-
-
-def _tool(arm: FlexibleRobot, q: Array, e: Array) -> Array:
-    from .models import dgm
-
-    return dgm(arm, q, e)[:3, 3]
+    energies = kinetic, potential, work[:, 0]
+    return FlexibleMotion(arm, times, q, v, tau, e, ev, *energies, momentum, impulse, status, count)
 
 
 def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
@@ -243,7 +228,7 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     return value
 
 
-def followed(
+def _followed(
     rate: Callable[[float, Array], Array],
     y: Array,
     t: ArrayLike,
@@ -251,19 +236,13 @@ def followed(
     rtol: float,
     atol: float,
     budget: int | None,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None] | None = None,
     beyond: Callable[[Array], bool] = lambda y: False,
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """Times, states, status and evaluations of an initial value problem."""
     import scipy.integrate
 
-    times = as_floats(t, "t")
-    if times.ndim == 0 and times > 0.0:
-        start, end, wanted = 0.0, float(times), None
-    elif times.ndim == 1 and times.size > 1 and (np.diff(times) > 0.0).all():
-        start, end, wanted = float(times[0]), float(times[-1]), times
-    else:
-        raise ShapeError(f"t: expected a duration above 0 or ascending times, got {t!r:.60}.")
+    start, end, wanted = times_of(t)
     rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
     most = int(_PER_SECOND * (1.0 + end - start)) if budget is None else budget
     kind: Any = getattr(scipy.integrate, method.value)
@@ -277,7 +256,7 @@ def followed(
     status, found = FlexibleMotionStatus.FINISHED, [(start, y)]
     with np.errstate(over="ignore", invalid="ignore"):
         solver = kind(finite, start, y, end, rtol=max(rtol, 3e-14), atol=atol)
-        while solver.status == "running":
+        while solver.status == "running" and end > start:
             if solver.nfev >= most:
                 status = FlexibleMotionStatus.NOT_CONVERGED
                 break
@@ -291,21 +270,16 @@ def followed(
             if wanted is None:
                 found.append((float(solver.t), solver.y.copy()))
             else:
+                dense = solver.dense_output()
                 inside = wanted[(wanted > found[-1][0]) & (wanted <= solver.t)]
-                if inside.size:
-                    dense = solver.dense_output()
-                    found += [(float(x), dense(x)) for x in inside]
+                found += [(float(x), dense(x)) for x in inside]
             if progress is not None:
                 progress((float(solver.t) - start) / (end - start))
-    return (
-        np.array([x for x, _ in found]),
-        np.array([x for _, x in found]),
-        status,
-        int(solver.nfev),
-    )
+    times, states = (np.array(x) for x in zip(*found, strict=True))
+    return times, states, status, int(solver.nfev)
 
 
-def relative(error: Array, *sizes: Array) -> float:
+def _relative(error: Array, *sizes: Array) -> float:
     """Largest error of linear and of angular momenta (N, 6), relative to their sizes."""
     found = 0.0
     for part in (slice(0, 3), slice(3, 6)):
@@ -314,6 +288,100 @@ def relative(error: Array, *sizes: Array) -> float:
     return found
 
 
-def cross(a: Any, b: Any) -> list[float]:
-    """Vector product of short sequences, quicker than NumPy's."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+# --- one body in space ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeBodyMotion(Result):
+    """Motion of an elastic body without loads (section 7.2.2).
+
+    Pose (N, 4, 4) and twist (N, 6) are those of the root, the twist in its own axes; energy (N,)
+    and momentum (N, 6) about the origin of the world are constant.
+    """
+
+    t: Array
+    pose: Array
+    twist: Array
+    e: Array
+    e_v: Array
+    energy: Array
+    momentum: Array
+    status: FlexibleMotionStatus
+
+    @property
+    def energy_drift(self) -> float:
+        """Largest change of the energy, relative to it."""
+        return float(np.abs(self.energy - self.energy[0]).max() / max(abs(self.energy[0]), 1e-300))
+
+    @property
+    def momentum_drift(self) -> float:
+        """Largest change of the momenta, relative to them."""
+        return _relative(self.momentum - self.momentum[0], self.momentum)
+
+    def __repr__(self) -> str:
+        return f"<FreeBodyMotion: {self.t[-1]:.6g} s, energy drift {self.energy_drift:.1g}>"
+
+
+def free_body(
+    link: FlexibleLink,
+    e0: ArrayLike,
+    v0: ArrayLike,
+    t: ArrayLike,
+    e_v0: ArrayLike | None = None,
+    *,
+    rtol: float = 1e-10,
+    atol: float = 1e-13,
+    max_evaluations: int | None = None,
+) -> FreeBodyMotion:
+    """Motion of an elastic body that floats without loads (section 7.2.2).
+
+    Returns
+    -------
+    FreeBodyMotion
+        The motion with its energy and momenta.
+
+    Examples
+    --------
+    >>> from robotmodels import flexible
+    >>> link = flexible.beam(1.0, EI=(5.0, 8.0), density=1.0, gyration=0.02, modes=1)
+    >>> motion = free_body(link, [0.01, 0.0], [0, 0, 0, 0.1, 0.2, 1.0], 1.0)
+    >>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
+    (True, True)
+    """
+    from scipy.spatial.transform import Rotation
+
+    if not isinstance(link, FlexibleLink):
+        raise InvalidValueError(f"link: expected a FlexibleLink, got {type(link).__name__}.")
+    m, inv = link.m, link.invariants
+    given = (("e0", e0, m), ("e_v0", e_v0, m), ("v0", v0, 6))
+    start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
+    values, axes = np.linalg.eigh(inv.inertia)
+    if values[0] <= 1e-9 * values[-1]:  # no inertia about an axis
+        more = inv.mass * (0.1 * link.length) ** 2 * np.outer(axes[:, 0], axes[:, 0])
+        link = replace(link, invariants=replace(inv, inertia=inv.inertia + more))
+    table = DHTable(antecedent=[0], sigma=[2])
+    parts = FlexibleRobot(RobotModel.from_table(table, gravity=(0, 0, 0)), {1: link}).parts
+    cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
+    none, outer = np.zeros((1, m)), np.zeros((1, 12))
+
+    def rate(t: float, y: Array) -> Array:
+        ev, v, w = y[m : 2 * m], y[2 * m : 2 * m + 3], y[2 * m + 3 : 2 * m + 6]
+        outer[0, :6] = y[2 * m : 2 * m + 6]
+        e_a, base, *_ = recursion(parts.chain, y[None, :m], ev[None], none, loose, None, outer)
+        u = y[2 * m + 6 : 2 * m + 9]
+        (x, y, z), s = u, y[2 * m + 9]
+        W = np.array([[s, -z, y], [z, s, -x], [-y, x, s], [-x, -y, -z]])  # quaternion's rate
+        moved = W[:3] @ (W[:3] @ v) + u * (u @ v)
+        return np.concatenate([ev, e_a[0], base[0, :6], 0.5 * W @ w, moved])
+
+    y0 = np.concatenate([*start, [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
+    times, Y, status, _ = _followed(rate, y0, t, Integrator.DOP853, rtol, atol, max_evaluations)
+    e, ev, twist, quaternion, place = (x.copy() for x in np.split(Y, cuts, axis=1))
+    pose = np.tile(np.eye(4), (len(times), 1, 1))
+    pose[:, :3, :3], pose[:, :3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
+    # momenta: the loads of these velocities as accelerations
+    moved, held = np.hstack([0.0 * twist, twist]), np.zeros(2, np.int64)
+    Q, base, *_ = recursion(parts.bare, e, 0.0 * ev, ev, held, None, moved)
+    energy = 0.5 * ((Q * ev).sum(1) + (base[:, :6] * twist).sum(1) + ((e @ parts.K) * e).sum(1))
+    momentum = in_world(pose, base[:, :6])
+    return FreeBodyMotion(times, pose, twist, e, ev, energy, momentum, status)

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_floats, as_number
+from .._arrays import Array, as_floats, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
-from .linear import linearize, static_deflection, stiffness_matrix, tangent, tip_gain
-from .models import dgm, generalized_forces, idm, jacobian, mass_matrix
-from .robot import FlexibleRobot, check_arm, damping_matrix
+from .linear import linearize, scales, tip_inverse
+from .link import Result
+from .models import cross, dgm, forces, jacobian, mass_matrix
+from .robot import FlexibleRobot, check_arm
 
 _METHODS = ("stable_inversion", "causal")
 _TIME_CONSTANTS = 14.0  # of the slowest unstable zero: default preview
-_CORRECTIONS = 4
-_PART, _EVERY = 400, 8  # samples of each part; those that the problem starts with
-_TOLERANCE, _NODES, _ON_PATH = 1e-6, 5_000, 1e-8  # of the boundary value problem; rad or m
+_SAMPLES, _MOST = 500, 5_000  # during the reference; in all
+_NEWTON, _STEP, _DONE = 15, 1e-6, 1e-10  # iterations; step of differences; last correction
 _UNSTABLE = 1e-6  # least real part of an unstable zero, relative to its size
 
 
@@ -36,11 +34,15 @@ class TipStatus(Outcome):
         "the right half plane make causal torques grow without bound. Take "
         "method='stable_inversion', which starts before the motion.",
     )
-    NOT_FOUND = 2, "The boundary value problem was not solved: the motion is too fast for this arm."
+    NOT_FOUND = (
+        2,
+        "No bounded motion of the joints was found: the reference is too fast for this arm, or "
+        "passes postures between which the number of unstable zeros of the tip grows.",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipTracking(Frozen, Value):
+class TipTracking(Result):
     """Motion of the joints that moves the tip of a flexible arm along a reference.
 
     Parameters
@@ -102,10 +104,6 @@ class TipTracking(Frozen, Value):
             raise InvalidValueError(f"There are no torques. {self.reason()}")
         times = np.clip(as_floats(t, "t"), self.t[0], self.t[-1])
         return np.split(self._spline(times), 3, axis=-1)
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
 
     def __repr__(self) -> str:
         return f"<TipTracking: {self.status.name}, preview {self.preview:.4g} s>"
@@ -174,139 +172,116 @@ def tip_tracking(
     at, motion = motion_of(reference, arm.n), getattr(reference, "trajectory", reference)
     given = getattr(motion, "duration", None) if duration is None else duration
     T = as_number(np.nan if given is None else given, "duration", above=0.0)
-    n, m = arm.n, arm.m
     zeros = linearize(arm, at(0.0)[0], "tip").zeros
-    unstable = zeros[zeros.real > _UNSTABLE * np.abs(zeros)]
-    slowest = float(unstable.real.min()) if unstable.size else np.inf
-    before = _TIME_CONSTANTS / slowest if preview is None else preview
-    before = as_number(before, "preview", least=0.0)
-    nothing: Any = [np.zeros((0, k)) for k in (n, n, n, m, m)]
-    if method == "causal" and unstable.size:
-        refused = TipStatus.NON_MINIMUM_PHASE
-        return TipTracking(arm, np.zeros(0), *nothing, zeros=zeros, preview=0.0, status=refused)
-    after = before if unstable.size else 0.0
-    ends = ((-before, 0.0), (0.0, T), (T, T + after))  # with nodes where the motion has kinks
-    parts = [np.linspace(a, b, _PART, endpoint=False) for a, b in ends if b > a]
-    grid = np.append(np.concatenate(parts), T + after)
-
-    def path(times: Array) -> list[Array]:
-        """Positions, velocities and accelerations (N, n), at rest before and after."""
-        inside = ((times > 0.0) & (times < T))[:, None]
-        if hasattr(motion, "a"):
-            q, v, a = at(np.clip(times, 0.0, T))  # type: ignore[arg-type]
-        else:
-            samples = [at(float(t)) for t in np.clip(times, 0.0, T)]
-            q, v, a = (np.array(x) for x in zip(*samples, strict=True))
-        return [q.reshape(-1, n), v.reshape(-1, n) * inside, a.reshape(-1, n) * inside]
-
-    found: Any = _inverted(arm, grid, path)
+    last = linearize(arm, at(T)[0], "tip").zeros
+    unstable = [x.real[x.real > _UNSTABLE * np.abs(x)] for x in (zeros, last)]
+    margins = [_TIME_CONSTANTS / x.min() if x.size else 0.0 for x in unstable]
+    before = margins[0] if preview is None else as_number(preview, "preview", least=0.0)
+    status, found = TipStatus.NON_MINIMUM_PHASE, None
+    grid, before = np.zeros(0), 0.0 if method == "causal" and unstable[0].size else before
+    if method != "causal" or not unstable[0].size:
+        h = max(T / _SAMPLES, (T + before + margins[1]) / _MOST)
+        h = T / np.ceil(T / h)
+        grid = h * np.arange(-np.ceil(before / h), np.ceil((T + margins[1]) / h) + 1.0)
+        path = np.array([at(t)[0] for t in np.clip(grid, 0.0, T)]).reshape(-1, arm.n)
+        found = _inverted(arm, h, path)
+        status = TipStatus.NOT_FOUND if found is None else TipStatus.FOUND
     if found is None:
-        return TipTracking(
-            arm, np.zeros(0), *nothing, zeros=zeros, preview=before, status=TipStatus.NOT_FOUND
+        grid, found = np.zeros(0), [np.zeros((0, k)) for k in (*[arm.n] * 3, arm.m, arm.m)]
+    return TipTracking(arm, grid, *found, zeros=zeros, preview=before, status=status)
+
+
+def _inverted(arm: FlexibleRobot, h: float, path: Array) -> list[Array] | None:
+    """Motion and torques at times with the step h: Newton refinement of all samples together.
+
+    Unknown are the rows (q, e), central differences their derivatives. The tip is on the path,
+    and the forces on the elastic coordinates vanish. Shapes: path (N, n).
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import splu
+
+    (N, n), m, size = path.shape, arm.m, scales(arm)
+    k, wanted = n + m, dgm(arm, path)
+    inverse = tip_inverse(jacobian(arm, path), n)
+    none = np.zeros((N, k))
+
+    def equations(x: Array, dx: Array, ddx: Array) -> list[Any]:
+        """Residuals (N, k), and their derivatives (N, k, k) by x, dx and ddx."""
+        q, e = x[:, :n], x[:, n:]
+        left, steps = forces(arm, x, dx, ddx)[0], _STEP * size
+        rows = [np.repeat(r, k, axis=0) for r in (x, dx, ddx)]
+        unit = np.tile(np.diag(steps), (N, 1))
+        moved = (
+            forces(arm, rows[0] + unit, *rows[1:]),
+            forces(arm, rows[0], rows[1] + unit, rows[2]),
         )
-    return TipTracking(arm, grid, *found, zeros=zeros, preview=before, status=TipStatus.FOUND)
-
-
-def _inverted(
-    arm: FlexibleRobot, grid: Array, reference: Callable[[Array], list[Array]]
-) -> list[Array] | None:
-    """Motion and torques at times (N,) by a boundary value problem."""
-    from scipy.integrate import solve_bvp
-    from scipy.interpolate import make_interp_spline
-
-    n, m, N, path = arm.n, arm.m, len(grid), reference(grid)[0]
-    gain = tip_gain(jacobian(arm, path, np.zeros((N, m))), n).reshape(N, n * m)
-    gains = make_interp_spline(grid, gain, k=5)
-
-    def motors(t: Array, e: Array, ev: Array) -> tuple[Array, Array, Array, Array]:
-        """Motion of the motors without the share of the elastic accelerations, and the gain."""
-        t = np.atleast_1d(t)
-        H, dH, ddH = (gains(t, order).reshape(-1, n, m) for order in range(3))
-        wanted = reference(t)
-        y, dy, ddy = (x - shift(t, order) for order, x in enumerate(wanted))
-        x, dx = e[..., None], ev[..., None]
-        v, a = dy - (dH @ x + H @ dx)[..., 0], ddy - (ddH @ x + 2.0 * dH @ dx)[..., 0]
-        return y - (H @ x)[..., 0], v, a, H
-
-    def rate(t: Array, z: Array) -> Any:
-        e, ev = z[:m].T, z[m:].T
-        q, v, a, H = motors(t, e, ev)
+        K, C = (
+            ((Q.reshape(N, k, k) - left[:, None]) / steps[:, None]).swapaxes(1, 2) for Q, _ in moved
+        )
         M = mass_matrix(arm, q, e)
-        force = generalized_forces(arm, q, e, v, ev, a, 0.0 * e)[1]
-        return np.vstack([ev.T, np.linalg.solve(zero_mass(M, H), -force[..., None])[..., 0].T])
+        T = dgm(arm, q, e)
+        R, W = T[:, :3, :3], wanted[:, :3, :3]
+        turn = 0.5 * sum(cross(W[:, :, i], R[:, :, i]) for i in range(3))
+        away = np.hstack([T[:, :3, 3] - wanted[:, :3, 3], turn])
+        left[:, :n] = (inverse @ away[..., None])[..., 0]
+        K[:, :n], C[:, :n], M[:, :n] = inverse @ jacobian(arm, q, e), 0.0, 0.0
+        return [left, K, C, M]
 
-    def zero_mass(M: Array, H: Array) -> Any:
-        return M[..., n:, n:] - M[..., n:, :n] @ H
-
-    def rest(t: float) -> tuple[Any, Any]:
-        """Equilibrium with the tip on the path, and matrix of the zero dynamics about it."""
-        e = np.zeros((1, m))
-        for _ in range(_CORRECTIONS):
-            q = motors(np.array([t]), e, 0.0 * e)[0]
-            e = static_deflection(arm, q).e
-        H, M = gains(t).reshape(n, m), mass_matrix(arm, q, e)[0]
-        K, D = tangent(arm, np.concatenate([q[0], e[0]])), damping_matrix(arm)
-        stiff = np.hstack([K[n:, n:] - K[n:, :n] @ H, D[n:, n:]])
-        upper = np.hstack([np.zeros((m, m)), np.eye(m)])
-        return np.append(e, np.zeros(m)), np.vstack(
-            [upper, -np.linalg.solve(zero_mass(M, H), stiff)]
-        )
-
-    correction, nodes = np.zeros_like(path), grid[::_EVERY]
-    guess, stiffness = np.zeros((2 * m, len(nodes))), stiffness_matrix(arm)[n:, n:]
-    for k in range(_CORRECTIONS):
-        shift = make_interp_spline(grid, correction, k=5)
-        for _ in range(0 if k else _CORRECTIONS):  # deflection by the loads of the slow motion
-            e, ev = guess[:m].T, guess[m:].T
-            q, v, a, H = motors(nodes, e, ev)
-            force = generalized_forces(arm, q, e, v, ev, a, 0.0 * e)[1]
-            guess[:m] = (e - np.linalg.solve(stiffness, force.T).T).T
-            guess[m:] = np.gradient(guess[:m], nodes, axis=1)
-        (start, A), (end, B) = rest(grid[0]), rest(grid[-1])
-        kept = _left_space(A, False)
-        left = _left_space(B, True, 2 * m - len(kept))
-        rows = np.hstack([np.vstack([kept, 0.0 * left]), np.vstack([0.0 * kept, left])])
-        ends = np.concatenate([start, end])
-        found = solve_bvp(
-            rate, partial(_boundary, rows, ends), nodes, guess, tol=_TOLERANCE, max_nodes=_NODES
-        )
-        if found.status or not np.isfinite(found.y).all():
-            return None
-        nodes, guess = found.x, found.y
-        z = found.sol(grid)
-        e, ev, e_a = z[:m].T, z[m:].T, rate(grid, z)[m:].T
-        q, v, a, H = motors(grid, e, ev)
-        away = _from_path(arm, q, e, path)
-        correction = correction + away
-        if np.abs(away).max() < _ON_PATH:
+    x = np.hstack([path, np.zeros((N, m))])
+    for _ in range(_NEWTON):  # without accelerations
+        left, K, C, M = equations(x, none, none)
+        step = np.linalg.solve(K, left[..., None])[..., 0]
+        x -= step
+        if np.abs(step / size).max() < _DONE:
             break
-    a = a - (H @ e_a[..., None])[..., 0]
-    return [q, v, idm(arm, q, e, v, ev, a)[0], e, ev]
+    # at the start no share of zeros that are not unstable, at the end none of unstable ones
+    first, last = (_left_space(M[i], C[i], K[i], n, i == 0) for i in (0, -1))
+    if len(first[0]) + len(last[1]) > 2 * m:
+        return None
+    G = np.zeros((2 * m, N, k))
+    for rows, i, beside in ((first[0], 0, 1), (np.vstack(last)[len(first[0]) - 2 * m :], -1, -2)):
+        here, sign = G[len(G) - len(rows) :] if i else G[: len(rows)], 2 * i + 1
+        here[:, i, n:] = rows[:, :m] - sign * rows[:, m:] / h
+        here[:, beside, n:] = sign * rows[:, m:] / h
+    G, slow, ddx = G.reshape(2 * m, N * k), x.copy(), none.copy()
+    for _ in range(_NEWTON):
+        dx, ddx[1:-1] = np.gradient(x, h, axis=0), (x[2:] - 2.0 * x[1:-1] + x[:-2]) / h**2
+        left, K, C, M = equations(x, dx, ddx)
+        blocks = np.stack([M / h**2 - 0.5 * C / h, K - 2.0 * M / h**2, M / h**2 + 0.5 * C / h], 1)
+        blocks[[0, -1], :, n:], blocks[0, 0], blocks[-1, 2] = 0.0, 0.0, 0.0
+        i, o, r, c = np.nonzero(blocks)
+        j, column = np.nonzero(G)
+        free = np.concatenate([np.arange(n, k), (N - 1) * k + np.arange(n, k)])
+        left.ravel()[free] = G @ (x - slow).ravel()
+        values = np.append(blocks[i, o, r, c], G[j, column])
+        at = np.append(i * k + r, free[j]), np.append((i + o - 1) * k + c, column)
+        step = splu(coo_array((values, at), (N * k, N * k)).tocsc()).solve(left.ravel())
+        x -= step.reshape(N, k)
+        moved = np.abs(step.reshape(N, k) / size).max()
+        if not moved < 10.0:
+            return None
+        if moved < _DONE:
+            drives = arm.model.drive_matrices
+            v, tau = dx[:, :n], forces(arm, x, dx, ddx)[0][:, :n]
+            tau = tau + (0.0 if drives is None else drives.torque(v.copy(), None))
+            return [x[:, :n], v, tau, x[:, n:], dx[:, n:]]
+    return None
 
 
-def _boundary(rows: Array, ends: Array, a: Array, b: Array) -> Array:
-    """Conditions on the states at both ends."""
-    return rows @ (np.concatenate([a, b]) - ends)
+def _left_space(M: Array, C: Array, K: Array, n: int, stable: bool) -> tuple[Array, Array]:
+    """Rows of left eigenvectors of the zeros: of those that are not unstable, and of the others.
 
-
-def _left_space(A: Array, unstable: bool, count: int | None = None) -> Array:
-    """Rows that span the left eigenvectors of the unstable, or of all other, eigenvalues."""
+    Shapes: mass, damping and stiffness (n + m, n + m), whose first n rows are the path of the tip.
+    """
     from scipy.linalg import schur
 
+    m = len(M) - n
+    H = np.vstack([-np.linalg.solve(K[:n, :n], K[:n, n:]), np.eye(m)])
+    M, C, K = (B[n:] @ H for B in (M, C, K))
+    A = np.block([[np.zeros((m, m)), np.eye(m)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+
     def chosen(re: float, im: float) -> bool:
-        return (re > _UNSTABLE * abs(complex(re, im))) == unstable
+        return (re > _UNSTABLE * abs(complex(re, im))) != stable
 
-    _, Z, k = schur(A.T, sort=chosen)
-    return Z[:, : k if count is None else count].T
-
-
-def _from_path(arm: FlexibleRobot, q: Array, e: Array, path: Array) -> Array:
-    """Motion of the joints (N, n) between the tip and where the rigid arm has it."""
-    T, at = dgm(arm, q, e), dgm(arm, path)
-    J = jacobian(arm, path)[..., : arm.n]
-    R = T[:, :3, :3] @ at[:, :3, :3].swapaxes(1, 2)
-    turn = 0.5 * np.stack(
-        [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], -1
-    )
-    moved = np.hstack([T[:, :3, 3] - at[:, :3, 3], turn])
-    return (tip_gain(np.concatenate([J, moved[..., None]], axis=-1), arm.n))[..., 0]
+    _, Z, count = schur(A.T, sort=chosen)
+    return (Z[:, :count].T, Z[:, count:].T) if stable else (Z[:, count:].T, Z[:, :count].T)

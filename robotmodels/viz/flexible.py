@@ -1,4 +1,36 @@
-"""Pictures of flexible robots: bent links, modes, frequencies over the workspace."""
+"""Pictures of flexible robots: bent links, modes, frequencies over the workspace.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints and m elastic coordinates.
+link : FlexibleLink
+    A link, m modes.
+q, e : array_like, shape (..., n) and (..., m), optional
+    Configurations, drawn over each other; default zero. Of `plot_frequencies` the other joints.
+scale : float
+    Factor by which deflections are exaggerated.
+grid : bool
+    Whether the floor and the axes of the world are drawn.
+height : int
+    Of the picture in a notebook, pixels.
+joint : int
+    Which joint moves, from 0.
+span : array_like, shape (2,)
+    Its range, rad or m.
+joints : str
+    ``"locked"`` or ``"free"``, see `robotmodels.flexible.natural_frequencies`.
+title : str, optional
+    Text over the figure.
+size : array_like, shape (2,), optional
+    Width and height, inches.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Vectors of another length; a scale that is not positive; a joint that does not exist; something
+    that is no flexible robot or link, or a link without modes that move its axis.
+"""
 
 from __future__ import annotations
 
@@ -35,28 +67,10 @@ def show_flexible(
 ) -> Scene:
     """Draw a flexible robot: bent links as swept tubes in colour, rigid ones grey.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
-    q, e : array_like, shape (..., n) and (..., m), optional
-        Configurations, drawn over each other; default zero.
-    scale : float
-        Factor by which deflections are exaggerated.
-    grid : bool
-        Whether the floor and the axes of the world are drawn.
-    height : int
-        Of the picture in a notebook, pixels.
-
     Returns
     -------
     Scene
         The picture.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors of another length; a scale that is not positive.
 
     Examples
     --------
@@ -73,39 +87,28 @@ def show_flexible(
     q, e = (np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, e))
     size = characteristic_length(arm.model.table, arm.model.tool)
     nodes, points = list[Node](), [np.zeros((1, 3))]
+
+    def tube(path: str, line: Array, color: Color = _RIGID) -> None:
+        """A tube along a line, unless it has no length."""
+        points.append(line)
+        drawn = path_tube(line, (1.0 if color is _RIGID else 1.2) * _THICK * size)
+        nodes.extend([] if drawn is None else [Node(path, np.eye(4), drawn, color)])
+
     for k, (frames, tool) in enumerate(zip(link_poses(arm, q, e), dgm(arm, q, e), strict=True)):
-        ends = [arm.model.base, *frames]
-        for row in range(1, arm.model.f + 1):
-            before = int(arm.model.table.antecedent[row - 1])
+        ends, name = [arm.model.base, *frames], f"configuration_{k + 1}"
+        for row, before in enumerate(arm.model.table.antecedent.tolist(), 1):
             if before not in arm.links:  # from the frame before to this one
                 line = np.stack([ends[before][:3, 3], ends[row][:3, 3]])
-                nodes += _tube(f"configuration_{k + 1}/row_{row}", line, size, _RIGID)
-                points.append(line)
-            if row in arm.links:
-                bent = apply(ends[row], _axis(arm, row, e[k]))
-                color = PALETTE[k % len(PALETTE)]
-                nodes += _tube(f"configuration_{k + 1}/link_{row}", bent, 1.2 * size, color)
-                points.append(bent)
+                tube(f"{name}/row_{row}", line)
+            if link := arm.links.get(row):
+                here = slice(*arm.parts.chain.start[row - 1 : row + 1])
+                axis = apply(ends[row], link.nodes + link.shapes @ e[k, here])
+                tube(f"{name}/link_{row}", axis, PALETTE[k % len(PALETTE)])
         if arm.model.tip not in arm.links:
-            line = np.stack([ends[arm.model.tip][:3, 3], tool[:3, 3]])
-            nodes += _tube(f"configuration_{k + 1}/tool", line, size, _RIGID)
-            points.append(line)
+            tube(f"{name}/tool", np.stack([ends[arm.model.tip][:3, 3], tool[:3, 3]]))
     cloud = np.concatenate(points)
     nodes += floor_grid(cloud, False) if grid else []
     return Scene(f"{arm.model.name}, flexible", tuple(nodes), framed(cloud), height=height)
-
-
-def _tube(path: str, line: Array, size: float, color: Color) -> list[Node]:
-    """A tube along a line, or nothing where it has no length."""
-    tube = path_tube(line, _THICK * size)
-    return [] if tube is None else [Node(path, np.eye(4), tube, color)]
-
-
-def _axis(arm: FlexibleRobot, row: int, e: Array) -> Array:
-    """Bent axis of a link in its frame. Shapes: e (m,) -> (N, 3)."""
-    start = arm.arrays.start
-    link = arm.links[row]
-    return link.nodes + link.shapes @ e[start[row - 1] : start[row]]
 
 
 @style.plot
@@ -114,24 +117,10 @@ def plot_modes(
 ) -> Figure:
     """Mode shapes of a link: displacements along its axis, with their frequencies.
 
-    Parameters
-    ----------
-    link : FlexibleLink
-        The link, m modes.
-    title : str, optional
-        Text over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
-
     Returns
     -------
     matplotlib.figure.Figure
         The figure.
-
-    Raises
-    ------
-    InvalidValueError
-        Not a link, or one without modes that move its axis.
     """
     as_instance(link, FlexibleLink, "link", "robotmodels.flexible")
     along = np.linalg.norm(link.nodes - link.nodes[0], axis=1)
@@ -162,32 +151,10 @@ def plot_frequencies(
 ) -> Figure:
     """Natural frequencies of an arm over the range of a joint.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints.
-    joint : int
-        Which joint moves, from 0.
-    span : array_like, shape (2,)
-        Its range, rad or m.
-    q : array_like, shape (n,), optional
-        The other joints; default zero.
-    joints : str
-        ``"locked"`` or ``"free"``, see `robotmodels.flexible.natural_frequencies`.
-    title : str, optional
-        Text over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
-
     Returns
     -------
     matplotlib.figure.Figure
         The figure.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        A joint that does not exist; vectors of another length.
     """
     as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
     (column,) = style.as_choice([joint], arm.n, "joint", "a number")
