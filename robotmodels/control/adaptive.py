@@ -121,6 +121,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
     model: RobotModel = None  # type: ignore[assignment]
     drive: Drives = True
     names: tuple[str, ...] = field(init=False)
+    state0: Array = field(init=False)
     base: BaseParameters | None = field(init=False)
     _chosen: ChosenColumns = field(init=False)
 
@@ -130,37 +131,29 @@ class AdaptiveSlotineLi(SurfaceLaw):
         as_word(self.parameters, ("base", "standard"), "parameters")
         base = base_parameters(self.model, drive=self.drive) if self.parameters == "base" else None
         names = tuple(base.names if base else parameter_names(self.model, self.drive))
-        blocks = standard_blocks(self.model, self.drive, None)
-        self._set(base=base, names=names, _chosen=chosen_columns(blocks, names, self.model))
-        p = len(names)
-        self._set(adaptation=as_gains(self.adaptation, "adaptation", p))
+        blocks, p = standard_blocks(self.model, self.drive, None), len(names)
         start = np.zeros(p) if self.start is None else as_exact(self.start, (p,), "start")
-        self._set(start=start)
-
-    @property
-    def state0(self) -> Array:
-        """Estimates at the start, shape (p,)."""
-        return np.array(self.start, dtype=np.float64)
+        self._set(adaptation=as_gains(self.adaptation, "adaptation", p), start=start, state0=start)
+        self._set(base=base, names=names, _chosen=chosen_columns(blocks, names, self.model))
 
     def true_values(self, plant: RobotModel) -> Array:
         """Parameters (p,) of a robot of the same structure, to which the estimates converge."""
         return self.base.values(plant) if self.base else parameter_vector(plant, self.drive)
 
-    def command(self, t: float, q: Any, v: Any, x: Any, wrench: Any = None) -> Array:
-        """Torques, shape (n,), with the estimates x (p,)."""
-        Y, s = self.regressor(t, q, v)
-        return Y @ as_vector(x, len(self.names), "x") + self.gain * s
-
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Rates of the estimates, shape (p,)."""
-        Y, s = self.regressor(t, q, v)
-        return self.adaptation * (s @ Y)
-
     def regressor(self, t: float, q: Any, v: Any) -> tuple[Array, Array]:
         """Y, shape (n, p), and s, shape (n,)."""
-        q, v, v_r, a_r = self._rates(t, q, v)
+        q, v, *_ = self._measured(q, v, self.state0, None)
+        v_r, a_r = self._rates(t, q, v)
         rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
         return _regressors(self.model, self._chosen, *rows)[0], v_r - v
+
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return Y @ x + self.gain * s
+
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return self.adaptation * (s @ Y)
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``(s^T A s + sum of squared errors of the estimates / adaptation) / 2``."""

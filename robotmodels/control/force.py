@@ -70,31 +70,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, as_floats, as_mask, as_vector
+from .._arrays import Array, as_floats, as_mask
 from ..dynamics import mass_matrix
-from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
-from .law import Law, as_gains, as_word, model_torques
-from .reference import Desired, as_reference, wrench_reference
-from .task import (
-    RANK,
-    accelerations,
-    frozen_mask,
-    row_gains,
-    singular_notes,
-    task_error,
-    task_rows,
-    tool_motion,
-)
-from .task_laws import ComputedTorque, Impedance
+from .law import NO_WRENCH, WRENCH, as_gains, as_reference, as_word, desired_of, model_torques
+from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, frozen_mask, row_gains
 
-_ALL = np.arange(6)
+_NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
+_NEAR = 1e-4  # as NEAR, of Jacobians weighted by masses, whose rows differ more
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ForceTracking(Law):
+class ForceTracking(TaskLaw):
     """Force control of a mass against a spring, in the directions of the mask.
 
     ``x'' = (f_d'' + kv (f_d' - ke x') + kp (f_d - f)) / ke`` with the operational mass of the
@@ -109,48 +99,43 @@ class ForceTracking(Law):
     reference: Any = None
     model: RobotModel = None  # type: ignore[assignment]
     mask: Any = "position"
-    rows: NDArray[np.int64] = field(init=False)
-    _desired: Desired = field(init=False)
 
     def __post_init__(self) -> None:
         check_model(self.model)
         as_word(self.feedforward, ("desired", "measured"), "feedforward")
         for name in ("kp", "kv", "ke"):
             self._set(**{name: np.full(6, as_gains(getattr(self, name), name, 6))})
-        self._set(rows=np.flatnonzero(as_mask(self.mask)), reference=as_reference(self.reference))
-        self._set(_desired=wrench_reference(self.reference), mask=frozen_mask(self.mask))
+        rows = np.flatnonzero(as_mask(self.mask))
+        self._set(rows=rows, _axes=np.eye(6)[rows], _free=float(np.max(self.kv)))
+        self._set(_desired=desired_of(self.reference, WRENCH, "force reference"))
+        self._set(mask=frozen_mask(self.mask), reference=as_reference(self.reference))
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        (q, v, f), rows, ahead = self._measured(q, v, wrench), self.rows, np.zeros(6)
-        tool, desired = tool_motion(self.model, q, v), self._desired(t)
-        wanted = self.wanted(desired, tool.twist, f) - tool.drift
-        a = accelerations(tool.J[rows], wanted[rows], v, self.kv)
-        ahead[rows] = (desired[0] if self.feedforward == "desired" else f)[rows]
-        return model_torques(self.model, q, v, a, ahead)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        out, J = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
+        twist, bias, now, f_d, rate, second = out[4:]
+        rows = self.rows
+        gains = self.kp[rows], self.kv[rows], self.ke[rows]
+        wanted = pushed(gains, twist, now, f_d, rate, second) - bias
+        ahead = np.zeros(6)
+        ahead[rows] = f_d if self.feedforward == "desired" else now
+        return model_torques(self.model, q, v, self._resolved(J[0], wanted, v), ahead)
 
-    def wanted(self, desired: tuple[Array, ...], twist: Array, f: Array) -> Array:
-        """Acceleration of the tool, shape (6,)."""
-        f_d, rate, second = desired
-        return (second + self.kv * (rate - self.ke * twist) + self.kp * (f_d - f)) / self.ke
+    def _error(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return (self._desired(t)[0] - f)[self.rows]
 
-    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """A sentence for singular postures of a motion (N, n)."""
-        return singular_notes(self.model, t, q, self.rows)
 
-    def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the wrench, shape (m,)."""
-        return (self._desired(t)[0] - self._measured(q, v, wrench)[2])[self.rows]
+def pushed(gains: Any, twist: Array, f: Array, f_d: Array, rate: Array, second: Array) -> Array:
+    """Acceleration of the tool for a force, in components of a task."""
+    kp, kv, ke = gains
+    return (second + kv * (rate - ke * twist) + kp * (f_d - f)) / ke
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class _Split(Law):
+class _Split(TaskLaw):
     """Position in some directions of a task, force in the others."""
 
-    rows: NDArray[np.int64] = field(init=False)
     _forced: NDArray[np.bool_] = field(init=False)
-    _turn: Array = field(init=False)
-    _gains: tuple[Array, Array] = field(init=False)
+    _gains: Array = field(init=False)
 
     def _prepare(self: Any, frame: str) -> None:
         check_model(self.model)
@@ -160,10 +145,9 @@ class _Split(Law):
             raise ShapeError(f"{frame}: expected shape (4, 4) or (3, 3), got {given.shape}.")
         T = np.eye(4)
         T[:3, :3] = given[:3, :3]
-        turn: Any = np.kron(np.eye(2), as_single_pose(T, frame)[:3, :3].T)
         selection = as_mask(self.selection, name="selection")
-        rows = task_rows(self.model, self.mask, turn=turn)
-        if not selection[rows].any():
+        self._set_rows(np.kron(np.eye(2), as_single_pose(T, frame)[:3, :3].T))
+        if not selection[self.rows].any():
             raise InvalidValueError(
                 "selection: expected a force-controlled component of the task, got none."
             )
@@ -174,36 +158,28 @@ class _Split(Law):
             raise InvalidValueError("position: expected a law in task space, space='task'.")
         if not isinstance(force, ForceTracking):
             force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
-        self._set(position=position, force=force, rows=rows, _forced=selection[rows], _turn=turn)
         w = np.full(6, np.max(position.omega))
         damping = 2.0 * w * np.max(position.zeta)
         w[position.rows] = position.omega
         damping[position.rows] = 2.0 * position.zeta * position.omega
-        self._set(selection=selection.astype(float), _gains=(w, damping), **{frame: given})
-        self._set(mask=frozen_mask(self.mask))
+        gains = np.stack([w * w, damping, force.kp, force.kv, force.ke])[:, self.rows]
+        self._set(position=position, force=force, _forced=selection[self.rows], _gains=gains)
+        self._set(selection=selection.astype(float), _free=2.0 * np.max(position.omega))
+        self._set(**{frame: given})
 
-    def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """A sentence for singular postures of a motion (N, n)."""
-        return singular_notes(self.model, t, q, self.rows)
+    def _aims(self: Any, t: float, q: Array, v: Array, f: Array) -> tuple[Array, ...]:
+        """Jacobian (m, n) of the task's motions, wanted ``J a``, errors and forces, each (m,)."""
+        pose, force = self.position._desired(t), self.force._desired(t)
+        out, J = self._tool(q, v, pose, NO_WRENCH, f, *force)
+        e, de, drift, _, twist, bias, now, *desired = out
+        w, damping, *gains = self._gains
+        push = pushed(gains, twist, now, *desired) - bias
+        wanted = np.where(self._forced, push, w * e + damping * de + drift)
+        moved = np.where(self._forced[:, None], J[0], -J[1])
+        return moved, wanted, np.where(self._forced, desired[0] - now, e), desired[0]
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Errors of position and force in the axes of the task, shape (m,)."""
-        q, v, f = self._measured(q, v, wrench)
-        at = task_error(tool_motion(self.model, q, v), self.position._desired(t), _ALL)
-        missing = self.force._desired(t)[0] - f
-        return np.where(self._forced, *(self._turn[self.rows] @ x for x in (missing, at.e)))
-
-    def _aims(self: Any, t: float, q: Array, v: Array, f: Array) -> tuple[Array, Array]:
-        """Jacobian (m, n) of the task's motions, and ``J a`` (m,) that is wanted."""
-        turn, rows, tool = self._turn, self.rows, tool_motion(self.model, q, v)
-        e, de, J, drift, _ = task_error(tool, self.position._desired(t), _ALL)
-        w, damping = self._gains
-        place = (turn @ (w * w * e + damping * de + drift))[rows]
-        desired = tuple(turn @ x for x in self.force._desired(t))
-        push = self.force.wanted(desired, turn @ tool.twist, turn @ f) - turn @ tool.drift
-        forced = self._forced
-        moved = np.where(forced[:, None], (turn @ tool.J)[rows], -(turn @ J)[rows])
-        return moved, np.where(forced, push[rows], place)
+    def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._aims(t, q, v, f)[2]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -227,20 +203,17 @@ class ParallelHybrid(_Split):
                 f"{len(self.rows)}."
             )
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        q, v, f = self._measured(q, v, wrench)
-        J, wanted = self._aims(t, q, v, f)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        J, wanted, _, f_d = self._aims(t, q, v, f)
         forced, M = self._forced, mass_matrix(self.model, q)
         if self.inverse == "consistent":
-            tasks = [(J[k], wanted[k]) for k in (~forced, forced)]
-            a = prioritised(M, tasks, -2.0 * np.max(self.position.omega) * v)
+            order = forced.astype(np.int64)
+            a = accelerations(J, wanted, -self._free * v, order, M, _NEAR)
             return model_torques(self.model, q, v, a, f)
-        servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), v, 0.0)
-        mass = np.linalg.pinv(J[forced] @ _inverse(M) @ J[forced].T, RANK)
-        f_d = (self._turn @ self.force._desired(t)[0])[self.rows][forced]
-        push = J[forced].T @ (mass @ wanted[forced] + f_d)
-        return servo + push + model_torques(self.model, q, v, np.zeros(self.n))
+        rest, J_f = np.zeros(self.n), J[forced]
+        servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)
+        push = M @ accelerations(J_f, wanted[forced], rest, M=M, least=_NEAR)
+        return servo + push + J_f.T @ f_d[forced] + model_torques(self.model, q, v, rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -261,15 +234,13 @@ class ConstrainedDecoupling(_Split):
     def __post_init__(self) -> None:
         self._prepare("contact_frame")
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        q, v, f = self._measured(q, v, wrench)
-        a = accelerations(*self._aims(t, q, v, f), v, 2.0 * self.position.omega)
-        return model_torques(self.model, q, v, a, f)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        J, wanted, *_ = self._aims(t, q, v, f)
+        return model_torques(self.model, q, v, self._resolved(J, wanted, v), f)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ExternalForceLoop(Law):
+class ExternalForceLoop(TaskLaw):
     """Force control by an external loop, which moves the reference of a position control.
 
     The reference moves by the force error over the stiffness, and by gain times the integral of
@@ -284,71 +255,34 @@ class ExternalForceLoop(Law):
     gain: Any
     force: Any = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     mask: Any = None
+    model: RobotModel = field(init=False)
+    state0: Array = field(init=False)
     _active: Array = field(init=False)
-    _desired: Desired = field(init=False)
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.inner, Impedance) or getattr(self.inner, "space", "") == "task"):
+        inner: Any = self.inner
+        if not (isinstance(inner, Impedance) or getattr(inner, "space", "") == "task"):
             raise InvalidValueError(
                 "inner: expected a law in task space (ComputedTorque with space='task', "
-                f"Impedance), got {self.inner!r:.80}."
+                f"Impedance), got {inner!r:.80}."
             )
-        rows = self.inner.rows
+        rows = inner.rows
         for name in ("stiffness", "gain"):
-            self._set(**{name: row_gains(as_gains(getattr(self, name), name), rows, name)})
-        self._set(_desired=wrench_reference(self.force), force=as_reference(self.force))
+            self._set(**{name: row_gains(getattr(self, name), rows, name)})
+        self._set(_desired=desired_of(self.force, WRENCH, "force"), force=as_reference(self.force))
         self._set(_active=as_mask(self.mask)[rows].astype(float), mask=frozen_mask(self.mask))
+        self._set(model=inner.model, rows=rows, state0=np.zeros(len(rows)))
 
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.inner.n
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        speed = self._rate(t, q, v, x, f)
+        return self.inner.shifted(t, q, v, x + speed / self.gain, speed, f)
 
-    @property
-    def state0(self) -> Array:
-        """Shift of the reference at the start, zero, shape (m,)."""
-        return np.zeros(len(self.inner.rows))
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.gain / self.stiffness * self._error(t, q, v, x, f)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        x, speed = as_vector(x, len(self.inner.rows), "x"), self.rate(t, q, v, x, wrench)
-        return self.inner.shifted(t, q, v, x + speed / self.gain, speed, wrench)
-
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Velocity of the shift, shape (m,)."""
-        return self.gain / self.stiffness * self.error(t, q, v, wrench)
+    def _error(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._active * (self._desired(t)[0] - f)[self.rows]
 
     def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """A sentence for singular postures of a motion (N, n)."""
+        """Those of the inner law."""
         return self.inner.notes(t, q, v)
-
-    def error(self, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the wrench, shape (m,)."""
-        missing = self._desired(t)[0] - self._measured(q, v, wrench)[2]
-        return self._active * missing[self.inner.rows]
-
-
-def _inverse(M: Array) -> Array:
-    """Inverse of the mass matrix of the believed model."""
-    try:
-        inverse: Array = np.linalg.inv(M)  # type: ignore[assignment]
-    except np.linalg.LinAlgError:
-        raise SingularMassMatrixError(
-            "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
-            "inertia."
-        ) from None
-    return inverse
-
-
-def prioritised(M: Array, tasks: list[tuple[Array, Array]], free: Array) -> Array:
-    """Accelerations a with ``J a = wanted`` for tasks in the order of priority.
-
-    By dynamically consistent pseudo-inverses in the null spaces of the tasks before; what remains
-    free has the accelerations `free`.
-    """
-    inverse, N, a = _inverse(M), np.eye(len(M)), np.zeros(len(M))
-    for J, wanted in tasks:
-        mobility = N @ inverse @ J.T
-        P = mobility @ np.linalg.pinv(J @ mobility, RANK)
-        a, N = a + P @ (wanted - J @ a), N - P @ (J @ N)
-    return a + N @ free

@@ -40,13 +40,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .._arrays import Array, Value, as_exact, as_number, as_vector
+from .._arrays import Array, Value, as_exact, as_number
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
-from .law import Law, as_gains, started, virtual_torques
-from .reference import Desired, as_reference, joint_reference
+from .law import Desired, Law, as_gains, as_reference, joints_of, started, virtual_torques
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,14 @@ class PIDGains(Value):
     kd: float
     inertia: float
     viscous: float = 0.0
+
+    @property
+    def poles(self) -> NDArray[Any]:
+        """Poles of the controlled joint, 1/s, shape (3,): unstable with a positive real part.
+
+        They are the roots of ``inertia s^3 + (kd + viscous) s^2 + kp s + ki``.
+        """
+        return np.roots([self.inertia, self.kd + self.viscous, self.kp, self.ki])
 
     @property
     def critical_ki(self) -> float:
@@ -112,14 +120,13 @@ class JointLaw(Law):
         """Check the model, the reference and the gains."""
         if model is not None:
             check_model(model)
-        desired, n = joint_reference(self.reference, model and model.n)
+        desired, n = joints_of(self.reference, model and model.n)
         self._set(reference=as_reference(self.reference), n=n, _desired=desired)
         for name in gains:
             self._set(**{name: as_gains(getattr(self, name), name, n, name == zero)})
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the joints, shape (n,)."""
-        return self._desired(t)[0] - as_vector(q, self.n, "q")
+    def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._desired(t)[0] - q
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -128,18 +135,18 @@ class SurfaceLaw(JointLaw):
 
     def surface(self, t: float, q: Any, v: Any) -> Array:
         """``s = e' + slope e``, shape (n,)."""
-        _, v, v_r, _ = self._rates(t, q, v)
-        return v_r - v
+        q, v, *_ = self._measured(q, v, self.state0, None)
+        return self._rates(t, q, v)[0] - v
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``s^T A s / 2``."""
         s = self.surface(t, q, v)
         return 0.5 * float(s @ mass_matrix(plant, q) @ s)
 
-    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
-        """Also velocity ``q_d' + slope e`` and acceleration that reduce the error."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
-        return q, v, v_d + self.slope * (q_d - q), a_d + self.slope * (v_d - v)
+    def _rates(self: Any, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Velocity ``q_d' + slope e`` and acceleration that reduce the error."""
+        q_d, v_d, a_d = self._desired(t)
+        return v_d + self.slope * (q_d - q), a_d + self.slope * (v_d - v)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -151,30 +158,25 @@ class DecentralizedPID(JointLaw):
     ki: Any
     kd: Any
     feedforward: Any = None
+    state0: Array = field(init=False)
 
     def __post_init__(self) -> None:
         given = self.feedforward
         model = given if isinstance(given, RobotModel) else None
         self._prepare(("kp", "ki", "kd"), model, zero="ki")
+        self._set(state0=np.zeros(self.n))
         if given is not None and not isinstance(given, RobotModel):
             self._set(feedforward=as_exact(given, (self.n,), "feedforward"))
 
-    @property
-    def state0(self) -> Array:
-        """Integral of the error at the start, zero, shape (n,)."""
-        return np.zeros(self.n)
-
-    def command(self, t: float, q: Any, v: Any, x: Any, wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
-        tau = self.kp * (q_d - q) + self.kd * (v_d - v) + self.ki * as_vector(x, self.n, "x")
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        q_d, v_d, a_d = self._desired(t)
+        tau = self.kp * (q_d - q) + self.kd * (v_d - v) + self.ki * x
         if isinstance(self.feedforward, RobotModel):
             return tau + idm(self.feedforward, q_d, v_d, a_d)
         return tau if self.feedforward is None else tau + self.feedforward
 
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """The error, shape (n,)."""
-        return self.error(t, q, v)
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._desired(t)[0] - q
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -194,9 +196,8 @@ class PDGravity(JointLaw):
     def __post_init__(self) -> None:
         self._prepare(("kp", "kd"), self.model)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        q_d, v_d, a_d = self._desired(t)
         tau = self.kp * (q_d - q) + self.kd * (v_d - v)
         if (model := self.model) is None:
             return tau
@@ -207,7 +208,8 @@ class PDGravity(JointLaw):
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
         """``(e'^T A e' + e^T kp e) / 2``, with the rate ``-e'^T kd e'`` without friction."""
-        e, de = self.error(t, q, v), self._desired(t)[1] - v
+        q_d, v_d, _ = self._desired(t)
+        e, de = q_d - q, v_d - v
         V = 0.5 * float(de @ mass_matrix(plant, q) @ de + e @ (self.kp * e))
         return None if self.model is None else V
 
@@ -228,9 +230,8 @@ class Passivity(SurfaceLaw):
         check_model(self.model)
         self._prepare(("slope", "gain"), self.model)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        q, v, v_r, a_r = self._rates(t, q, v)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        v_r, a_r = self._rates(t, q, v)
         tau = virtual_torques(self.model, q, v, v_r, a_r) + self.gain * (v_r - v)
         drives = self.model.drive_matrices
         return tau if drives is None else tau + drives.torque(started(v, v_r), a_r)

@@ -1,21 +1,29 @@
-"""Parts of all control laws: their defaults, gains, and the model that the controller believes."""
+"""Parts of all control laws: defaults, gains, references, and torques of the believed model."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_floats, as_vector, read_only
+from .._arrays import Array, Value, as_exact, as_floats, as_reals, as_vector, read_only
 from ..dynamics import gravity_torque, idm
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
+from ..se3 import as_single_pose
+from ..trajectories import PoseTrajectory, Trajectory
 
 NONE = read_only([])
 NO_WRENCH = read_only(np.zeros(6))
+POSE = (4, 4), (6,), (6,)
+WRENCH = (6,), (6,), (6,)
 _SLOWEST = 5e-324
+
+Desired = Callable[[float], tuple[Array, Array, Array]]
+"""Value, rate and second rate at a time."""
 
 
 class Law(Value):
@@ -23,26 +31,35 @@ class Law(Value):
 
     __slots__ = ()
 
-    switches = False
+    switches: Any = False
     """Whether the torque or the rate of the state jumps: a continuous simulation would stall."""
+    state0: Any = NONE
+    """State at the start, shape (k,)."""
 
     @property
     def n(self: Any) -> int:
         """Number of joints."""
         return self.model.n
 
-    @property
-    def state0(self) -> Array:
-        """State at the start, shape (k,)."""
-        return NONE
+    def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """Torques (n,) at positions, velocities (n,), state (k,) and measured wrench (6,)."""
+        return self._torques(t, *self._measured(q, v, x, wrench))
 
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+    def rate(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
         """Time derivative of the state, shape (k,)."""
-        return NONE
+        return self._rate(t, *self._measured(q, v, x, wrench)) if self.state0.size else NONE
+
+    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
+        """Error of the law: of the joints (n,), of components of the task (m,), or of forces."""
+        return self._error(t, *self._measured(q, v, self.state0, wrench))
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
         """Lyapunov function at a state of the plant, None where the law has none."""
         return None
+
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """Sentences about a motion (N, n)."""
+        return ()
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -54,14 +71,19 @@ class Law(Value):
                 value = read_only(value, value.dtype.type)
             object.__setattr__(self, name, value)
 
-    def _measured(self, q: Any, v: Any, wrench: Any = None) -> tuple[Array, Array, Array]:
-        """Positions and velocities (n,), and the wrench (6,), zero without a sensor."""
-        f = NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench")
-        return as_vector(q, self.n, "q"), as_vector(v, self.n, "v"), f
+    def _measured(self, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Array, ...]:
+        """Checked q, v, x and wrench; the wrench is zero without a sensor."""
+        k = self.state0.size
+        return (
+            as_vector(q, self.n, "q"),
+            as_vector(v, self.n, "v"),
+            as_vector(x, k, "x") if k or len(x) else NONE,
+            NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench"),
+        )
 
     def __repr__(self) -> str:
         shown = []
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in (f for f in fields(self) if f.init):  # type: ignore[arg-type]
             value = getattr(self, f.name)
             if isinstance(value, np.ndarray) and value.ndim < 2 and value.size <= 7:
                 value = value.tolist()
@@ -69,9 +91,9 @@ class Law(Value):
                     value = value[0]
             elif isinstance(value, RobotModel):
                 value = value.name
-            elif not isinstance(value, (int, float, str, Law)):
-                value = None if value is None else type(value).__name__
-            if f.init and value is not None:
+            elif value is not None and not isinstance(value, (int, float, str, Law)):
+                value = type(value).__name__
+            if value is not None:
                 shown.append(f"{f.name}={value}")
         return f"{type(self).__name__}({', '.join(shown)})"
 
@@ -95,11 +117,96 @@ def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
         raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")
 
 
+def as_reference(reference: Any) -> Any:
+    """Motions and functions as they are; constants as arrays that nobody changes."""
+    if callable(reference) or isinstance(reference, (Trajectory, PoseTrajectory)):
+        return reference
+    return read_only(as_floats(getattr(reference, "homogeneous", reference), "reference"))
+
+
+def joints_of(reference: Any, n: int | None) -> tuple[Desired, int]:
+    """Positions, velocities and accelerations (n,) over time, and n."""
+    desired = desired_of(reference)
+    size = desired(0.0)[0].size
+    if n is not None and size != n:
+        raise ShapeError(f"reference: expected {n} joints, those of the model, got {size}.")
+    return desired, size
+
+
+def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:
+    """Function of time of a motion, function or constant; shapes None: of joints."""
+    if shapes is None and isinstance(reference, Trajectory):
+        if reference.motion.batch:
+            raise ShapeError(f"{name}: expected one motion, got {reference.motion.batch}.")
+        return _followed(reference)
+    if shapes is POSE and isinstance(reference, PoseTrajectory):
+
+        def at(t: float) -> tuple[Array, Array, Array]:
+            there = reference.at(np.array([t]))
+            return there.T[0], there.twist[0], there.acceleration[0]
+
+        return at
+    if callable(reference):
+        value = _answers(reference, 0.0)[0]
+        if shapes is POSE:
+            as_single_pose(value, f"{name}(0)")
+        return _function(reference, shapes or ((value.size,),) * 3)
+    if shapes is POSE:
+        value = as_single_pose(reference, name).copy()
+    elif shapes is WRENCH:
+        value = as_exact(reference, (6,), name).copy()
+    elif (value := as_reference(reference)).ndim != 1:
+        raise ShapeError(f"{name}: expected positions of shape (n,), got {value.shape}.")
+    rest = np.zeros(value.size if shapes is None else 6)
+    return lambda t: (value, rest, rest)
+
+
+def _followed(trajectory: Trajectory) -> Desired:
+    """A trajectory at single times, without its checks inside of its duration."""
+    motion, end, n = trajectory.motion, float(trajectory.duration), trajectory.n
+
+    def at(t: float) -> tuple[Array, Array, Array]:
+        if 0.0 <= t <= end:
+            q, v, a = motion.derivatives(np.array([t]), (0, 1, 2))
+        else:
+            q, v, a = trajectory.q(t), trajectory.v(t), trajectory.a(t)
+        return q.reshape(n), v.reshape(n), a.reshape(n)
+
+    return at
+
+
+def _function(law: Callable[[float], Any], shapes: Any) -> Desired:
+    """A function of the user with checks of its values; it is called once here."""
+
+    def at(t: float) -> tuple[Array, Array, Array]:
+        value, rate, second = _answers(law, t)
+        if (value.shape, rate.shape, second.shape) != shapes:
+            got = f"{value.shape}, {rate.shape}, {second.shape}"
+            raise ShapeError(f"reference({t:g}): expected shapes {shapes}, got {got}.")
+        if not np.isfinite(value.sum() + rate.sum() + second.sum()):
+            raise InvalidValueError(f"reference({t:g}): expected finite numbers.")
+        return value, rate, second
+
+    at(0.0)
+    return at
+
+
+def _answers(law: Callable[[float], Any], t: float) -> tuple[Array, Array, Array]:
+    answer = law(t)
+    if not isinstance(answer, (tuple, list)) or len(answer) != 3:
+        raise InvalidValueError(
+            f"reference({t:g}): expected three arrays, the value with its first and second "
+            f"derivative, got {type(answer).__name__}."
+        )
+    value, rate, second = (as_reals(x, f"reference({t:g})") for x in answer)
+    return value, rate, second
+
+
 def model_torques(
-    model: RobotModel, q: Array, v: Array, a: Array, wrench: ArrayLike | None = None
+    model: RobotModel, q: Array, v: Array, a: Array, wrench: Array = NO_WRENCH
 ) -> Array:
     """Inverse dynamics; a joint at rest has the dry friction of its direction of acceleration."""
-    return idm(model, q, started(v, a), a, wrench)
+    return idm(model, q, started(v, a), a, None if wrench is NO_WRENCH else wrench)
 
 
 def virtual_torques(model: RobotModel, q: Array, v: Array, v_r: Array, a_r: Array) -> Array:

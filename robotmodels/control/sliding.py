@@ -34,13 +34,13 @@ array([1.])
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_number, as_reals, as_vector
+from .._arrays import Array, as_floats, as_number, as_reals
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from .joint_laws import SurfaceLaw
@@ -56,28 +56,23 @@ class _Sliding(SurfaceLaw):
     def _begin(self: Any, gains: tuple[str, ...]) -> None:
         if self.reference is not None:
             self._prepare(gains, self.model, zero="layer")
-        else:  # the scalar law alone
-            self._set(n=None, _desired=None)
-            for name in gains:
-                self._set(**{name: as_gains(getattr(self, name), name, None, name == "layer")})
+            return
+        self._set(n=None, _desired=None)  # the scalar law alone
+        for name in gains:
+            self._set(**{name: as_gains(getattr(self, name), name, None, name == "layer")})
 
-    def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        q, v, v_r, a_r = self._rates(t, q, v)
-        u = -self.reaching(v_r - v, as_vector(x, len(self.state0), "x"))[0]
+    def _torques(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        v_r, a_r = self._rates(t, q, v)
+        u = -self.reaching(v_r - v, x)[0]
         return u if self.model is None else model_torques(self.model, q, v, a_r + u)
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the joints, shape (n,)."""
-        return SurfaceLaw.error(self._of_robot(), t, q, v)
+    def _rate(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.reaching(self._rates(t, q, v)[0] - v, x)[1]
 
-    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
-        return SurfaceLaw._rates(self._of_robot(), t, q, v)
-
-    def _of_robot(self: Any) -> Any:
+    def _measured(self: Any, *values: Any) -> tuple[Array, ...]:
         if self.reference is None:
             raise InvalidValueError("reference: a law for a robot needs one, this one is scalar.")
-        return self
+        return SurfaceLaw._measured(self, *values)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -102,7 +97,7 @@ class SlidingMode(_Sliding):
         self._begin(("slope", "gain", "layer"))
 
     @property
-    def switches(self) -> bool:  # type: ignore[override]
+    def switches(self) -> bool:
         """Whether a layer is missing."""
         return not np.all(self.layer)
 
@@ -131,20 +126,13 @@ class SuperTwisting(_Sliding):
     k1: Any
     k2: Any
     model: RobotModel | None = None
+    state0: Array = field(init=False)
 
     switches = True
 
     def __post_init__(self) -> None:
         self._begin(("slope", "k1", "k2"))
-
-    @property
-    def state0(self) -> Array:
-        """Integral at the start, zero, shape (n,); one number for the scalar law."""
-        return np.zeros(self.n or 1)
-
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """``k2 sign(s)``, shape (n,)."""
-        return self.k2 * np.sign(self.surface(t, q, v))
+        self._set(state0=np.zeros(self.n or 1))
 
     def reaching(self, s: Array, x: Array) -> tuple[Array, Array]:
         """``s'`` by the law alone, and the rate of its integral."""

@@ -52,55 +52,154 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector
+from .._arrays import Array, as_mask, read_only
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import NO_WRENCH, Law, as_gains, as_word, model_torques
-from .reference import Desired, as_reference, joint_reference, pose_reference
-from .task import (
-    TaskError,
-    accelerations,
-    frozen_mask,
-    row_gains,
-    singular_notes,
-    task_error,
-    task_rows,
-    tool_motion,
+from .law import (
+    NO_WRENCH,
+    POSE,
+    Desired,
+    Law,
+    as_gains,
+    as_reference,
+    as_word,
+    desired_of,
+    joints_of,
+    model_torques,
 )
+
+NEAR = 1e-3
+"""Singular values of J, relative to its longest row, below which motions are damped."""
+_RANK = 1e-9  # relative singular value of rows that depend
+_FIRST = np.zeros(6, dtype=np.int64)
+_UNWEIGHTED = read_only(np.empty((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TaskLaw(Law):
-    """Parts of laws of the tool: the rows of their task, and its error."""
+    """Parts of laws of the tool: the components of their task, their error and their notes."""
 
     rows: NDArray[np.int64] = field(init=False)
     _desired: Desired = field(init=False)
+    _axes: Array | None = field(init=False)
+    _free: float = field(init=False)
 
-    def _prepare(self: Any, gains: tuple[str, ...], frame: str | int | None = None) -> None:
+    space = "task"
+    frame = None
+
+    def _prepare(self: Any, gains: tuple[str, ...]) -> None:
         check_model(self.model)
-        rows, desired = task_rows(self.model, self.mask, frame), pose_reference(self.reference)
-        self._set(reference=as_reference(self.reference), rows=rows, _desired=desired)
-        self._set(mask=frozen_mask(self.mask))
+        self._set_rows()
+        self._set(reference=as_reference(self.reference))
+        self._set(_desired=desired_of(self.reference, POSE))
         for name in gains:
-            self._set(**{name: row_gains(as_gains(getattr(self, name), name), rows, name)})
+            self._set(**{name: row_gains(getattr(self, name), self.rows, name)})
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the task, shape (m,), or of the joints."""
-        q, v, _ = self._measured(q, v)
-        return self._task(t, q, v).e
+    def _set_rows(self: Any, turn: Array | None = None) -> None:
+        """Rows of the task, m <= n: of the mask, or the first that the robot moves alone."""
+        model, n, turn = self.model, self.model.n, np.eye(6) if turn is None else turn
+        if self.mask is not None:
+            rows = np.flatnonzero(as_mask(self.mask)).tolist()
+            if len(rows) > n:
+                raise InvalidValueError(
+                    f"mask: {len(rows)} components are more than the {n} joints of {model.name!r} "
+                    "control; choose fewer."
+                )
+        else:
+            postures = np.random.default_rng(0).uniform(-2.0, 2.0, (4, n))
+            J, rows = turn @ jacobian(model, postures, self.frame), list[int]()
+            for row in range(6):
+                ranks = np.linalg.matrix_rank(J[:, [*rows, row]], rtol=_RANK)
+                if len(rows) < n and (ranks > len(rows)).any():
+                    rows.append(row)
+        axes = turn[rows]
+        self._set(rows=np.array(rows, dtype=np.int64), mask=frozen_mask(self.mask))
+        self._set(_axes=None if np.array_equal(axes, np.eye(6)) else axes)
+
+    def _tool(
+        self: Any, q: Array, v: Array, desired: tuple[Array, ...], wrench: Array, *more: Array
+    ) -> tuple[Array, Array]:
+        """Rows of `tool_errors`, and more ones, in components (.., m) of the task; J (2, m, n)."""
+        from .kernels import tool_errors
+
+        if q.ndim != 1 or v.ndim != 1:
+            raise ShapeError(
+                f"q, v: expected one posture, shape ({self.n},), got {q.shape}, {v.shape}."
+            )
+        model, J, rows = self.model, np.empty((2, 6, len(q))), np.empty((6 + len(more), 6))
+        frame = model.twin.frame(self.frame).kernel_arguments
+        tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)
+        if more:
+            rows[6:] = more
+        return (rows, J) if self._axes is None else (rows @ self._axes.T, self._axes @ J)
+
+    def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
+        """Rows and Jacobians as `_tool` for the reference; the wrench acts at the tool."""
+        if self.frame is not None and wrench.any():  # the same wrench at the frame's origin
+            lever = dgm(self.model, q)[:3, 3] - dgm(self.model, q, self.frame)[:3, 3]
+            wrench = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
+        return self._tool(q, v, self._desired(t), wrench)
+
+    def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._task(t, q, v)[0][0]
+
+    def _resolved(self: Any, J: Array, wanted: Array, v: Array) -> Array:
+        return accelerations(J, wanted, -self._free * v)
 
     def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """A sentence for singular postures of a motion (N, n)."""
-        if getattr(self, "space", "task") == "joint":
+        """A sentence for postures of a motion (N, n) that are singular for the task, or nearly."""
+        if self.space == "joint":
             return ()
-        return singular_notes(self.model, t, q, self.rows, getattr(self, "frame", None))
+        J = jacobian(self.model, q, self.frame)
+        J = J if self._axes is None else self._axes @ J
+        longest = np.linalg.norm(J, axis=2).max(axis=1)
+        near = np.linalg.svd(J, compute_uv=False)[:, -1] < NEAR * longest
+        return (
+            f"At t = {t[np.argmax(near)]:.6g} s the posture is singular for the task, or nearly: "
+            "motions of the tool that the joints can hardly make there are damped.",
+        ) * bool(near.any())
 
-    def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
-        frame = getattr(self, "frame", None)
-        at = tool_motion(self.model, q, v, frame)
-        if frame is not None and wrench.any():  # the same wrench at the frame's origin
-            lever = tool_motion(self.model, q, v).T[:3, 3] - at.T[:3, 3]
-            wrench = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
-        return task_error(at, self._desired(t), self.rows, wrench)
+
+def accelerations(
+    J: Array,
+    wanted: Array,
+    free: Array,
+    order: NDArray[np.int64] = _FIRST,
+    M: Array = _UNWEIGHTED,
+    least: float = NEAR,
+) -> Array:
+    """Joint accelerations (n,) with ``J a = wanted``, J (m, n); motions of no effect are `free`.
+
+    Rows of order 1 do not disturb those of order 0; pseudo-inverses are weighted with M (n, n).
+    """
+    from .kernels import resolved
+
+    a = np.empty(J.shape[1])
+    if resolved(J, wanted, order[: len(J)], M, free, least, a) < 0:
+        raise SingularMassMatrixError(
+            "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
+            "inertia."
+        )
+    return a
+
+
+def frozen_mask(mask: Any) -> Any:
+    """A mask that can be hashed."""
+    return mask if mask is None or isinstance(mask, str) else tuple(map(int, as_mask(mask)))
+
+
+def row_gains(value: ArrayLike, rows: NDArray[np.int64], name: str) -> Array:
+    """Positive gains of the rows (m,) from one number, six, or m."""
+    gains = as_gains(value, name)
+    if gains.size == 6:
+        gains = gains[rows]
+    if gains.ndim and gains.size != len(rows):
+        raise InvalidValueError(
+            f"{name}: expected one number, six, or {len(rows)} for the components of the task, "
+            f"got {gains.size}."
+        )
+    return np.full(len(rows), gains)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -123,39 +222,36 @@ class ComputedTorque(TaskLaw):
         as_word(self.space, ("joint", "task"), "space")
         if self.space == "task":
             self._prepare(("omega", "zeta"))
-            return
-        desired, n = joint_reference(self.reference, self.model.n)
-        omega, zeta = as_gains(self.omega, "omega", n), as_gains(self.zeta, "zeta", n)
-        self._set(reference=as_reference(self.reference), rows=np.arange(n), _desired=desired)
-        self._set(omega=np.full(n, omega), zeta=np.full(n, zeta))
+        else:
+            desired, n = joints_of(self.reference, self.model.n)
+            self._set(reference=as_reference(self.reference), rows=np.arange(n), _desired=desired)
+            omega, zeta = as_gains(self.omega, "omega", n), as_gains(self.zeta, "zeta", n)
+            self._set(omega=np.full(n, omega), zeta=np.full(n, zeta))
+        self._set(_free=2.0 * float(np.max(self.zeta * self.omega)))
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,), at positions q and velocities v (n,)."""
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self.shifted(t, q, v, 0.0, 0.0)
 
-    def shifted(self, t: float, q: Any, v: Any, by: Any, speed: Any, wrench: Any = None) -> Array:
+    def shifted(
+        self, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
+    ) -> Array:
         """Torques with the error shifted at this speed (m,); a wrench (6,) is compensated."""
-        q, v, _ = self._measured(q, v)
         w, damping = self.omega, 2.0 * self.zeta * self.omega
-        if self.space == "joint":
-            q_d, v_d, a_d = self._desired(t)
-            a = a_d + damping * (v_d - v + speed) + w * w * (q_d - q + by)
-        else:
-            at = self._task(t, q, v)
-            wanted = -damping * (at.de + speed) - w * w * (at.e + by) - at.drift
-            a = accelerations(at.J, wanted, v, damping)
+        (e, de, drift, *_), J = self._task(t, q, v)
+        pull = damping * (de + speed) + w * w * (e + by) + drift
+        a = pull if self.space == "joint" else self._resolved(J[1], -pull, v)
         return model_torques(self.model, q, v, a, wrench)
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``(e'^T e' + e^T omega^2 e) / 2``, that of the linear error."""
-        e, de, *_ = self._task(t, q, v)
+        (e, de, *_), _ = self._task(t, q, v)
         return 0.5 * float(de @ de + e @ (self.omega**2 * e))
 
-    def _task(self, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
+    def _task(self, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
         if self.space == "task":
             return TaskLaw._task(self, t, q, v)
         q_d, v_d, a_d = self._desired(t)
-        return TaskError(q_d - q, v_d - v, -np.eye(self.n), a_d, wrench)
+        return (q_d - q, v_d - v, a_d), None
 
 
 class _Compliant(TaskLaw):
@@ -187,19 +283,19 @@ class Impedance(_Compliant):
     frame: str | int | None = None
 
     def __post_init__(self) -> None:
-        self._prepare(("M", "B", "K"), self.frame)
+        self._prepare(("M", "B", "K"))
+        self._set(_free=float(np.max(self.B / self.M)))
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        return self.shifted(t, q, v, 0.0, 0.0, wrench)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.shifted(t, q, v, 0.0, 0.0, f)
 
-    def shifted(self, t: float, q: Any, v: Any, by: Any, speed: Any, wrench: Any = None) -> Array:
+    def shifted(
+        self, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
+    ) -> Array:
         """Torques with the error shifted at this speed (m,)."""
-        q, v, f = self._measured(q, v, wrench)
-        at = self._task(t, q, v, f)
-        pull = at.force - self.B * (at.de + speed) - self.K * (at.e + by)
-        a = accelerations(at.J, pull / self.M - at.drift, v, self.B / self.M)
-        return model_torques(self.model, q, v, a, wrench)
+        (e, de, drift, force, *_), J = self._task(t, q, v, wrench)
+        pull = (force - self.B * (de + speed) - self.K * (e + by)) / self.M
+        return model_torques(self.model, q, v, self._resolved(J[1], pull - drift, v), wrench)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -219,29 +315,23 @@ class Admittance(_Compliant):
     zeta: Any = 1.0
     mask: Any = None
     frame: str | int | None = None
+    state0: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self._prepare(("M", "B", "K", "omega", "zeta"), self.frame)
+        self._prepare(("M", "B", "K", "omega", "zeta"))
+        free = 2.0 * float(np.max(self.zeta * self.omega))
+        self._set(state0=np.zeros(2 * len(self.rows)), _free=free)
 
-    @property
-    def state0(self) -> Array:
-        """The state at the start, zero, shape (2 m,)."""
-        return np.zeros(2 * len(self.rows))
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        (e, de, drift, force, *_), J = self._task(t, q, v, f)
+        xi, rate, second = self._motion(x, force)
+        w, damping = self.omega, 2.0 * self.zeta * self.omega
+        wanted = -second - damping * (de + rate) - w * w * (e + xi) - drift
+        return model_torques(self.model, q, v, self._resolved(J[1], wanted, v), f)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        q, v, f = self._measured(q, v, wrench)
-        at, w, damping = self._task(t, q, v, f), self.omega, 2.0 * self.zeta * self.omega
-        xi, rate, second = self._motion(x, at.force)
-        wanted = -second - damping * (at.de + rate) - w * w * (at.e + xi) - at.drift
-        return model_torques(self.model, q, v, accelerations(at.J, wanted, v, damping), wrench)
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return np.concatenate(self._motion(x, self._task(t, q, v, f)[0][3])[1:])
 
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Rates of xi and xi', shape (2 m,)."""
-        return np.concatenate(
-            self._motion(x, self._task(t, *self._measured(q, v, wrench)).force)[1:]
-        )
-
-    def _motion(self, x: ArrayLike, force: Array) -> tuple[Array, Array, Array]:
-        xi, rate = as_vector(x, 2 * len(self.rows), "x").reshape(2, -1)
+    def _motion(self, x: Array, force: Array) -> tuple[Array, Array, Array]:
+        xi, rate = x.reshape(2, -1)
         return xi, rate, -(force + self.B * rate + self.K * xi) / self.M
