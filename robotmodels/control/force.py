@@ -80,7 +80,6 @@ from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, frozen
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
-_NEAR = 1e-4  # as NEAR, of Jacobians weighted by masses, whose rows differ more
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -207,12 +206,12 @@ class ParallelHybrid(_Split):
         J, wanted, _, f_d = self._aims(t, q, v, f)
         forced, M = self._forced, mass_matrix(self.model, q)
         if self.inverse == "consistent":
-            order = forced.astype(np.int64)
-            a = accelerations(J, wanted, -self._free * v, order, M, _NEAR)
+            within = J @ self._resolved(J, wanted, v)  # damped near singular postures
+            a = accelerations(J, within, -self._free * v, forced.astype(np.int64), M)
             return model_torques(self.model, q, v, a, f)
         rest, J_f = np.zeros(self.n), J[forced]
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)
-        push = M @ accelerations(J_f, wanted[forced], rest, M=M, least=_NEAR)
+        push = M @ accelerations(J_f, wanted[forced], rest, M=M)
         return servo + push + J_f.T @ f_d[forced] + model_torques(self.model, q, v, rest)
 
 

@@ -162,20 +162,16 @@ class TaskLaw(Law):
 
 
 def accelerations(
-    J: Array,
-    wanted: Array,
-    free: Array,
-    order: NDArray[np.int64] = _FIRST,
-    M: Array = _UNWEIGHTED,
-    least: float = NEAR,
+    J: Array, wanted: Array, free: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
 ) -> Array:
     """Joint accelerations (n,) with ``J a = wanted``, J (m, n); motions of no effect are `free`.
 
-    Rows of order 1 do not disturb those of order 0; pseudo-inverses are weighted with M (n, n).
+    Damped near singular postures; with M (n, n) the least ones in its metric, not damped. Rows of
+    order 1 do not disturb those of order 0.
     """
     from .kernels import resolved
 
-    a = np.empty(J.shape[1])
+    a, least = np.empty(J.shape[1]), _RANK if len(M) else NEAR
     if resolved(J, wanted, order[: len(J)], M, free, least, a) < 0:
         raise SingularMassMatrixError(
             "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
