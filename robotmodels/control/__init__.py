@@ -7,8 +7,7 @@ v, x)``, the derivative of the state; laws that use forces take the measured ``w
 from .adaptive import AdaptiveSlotineLi, slotine_li_regressor
 from .force import ConstrainedDecoupling, ExternalForceLoop, ForceTracking, ParallelHybrid
 from .joint_laws import DecentralizedPID, Passivity, PDGravity, PIDGains, pid_gains
-from .result import ControlledMotion, ControlStatus
-from .run import run
+from .run import ControlledMotion, ControlStatus, run
 from .sliding import SlidingMode, SuperTwisting, first_order
 from .task_laws import Admittance, ComputedTorque, Impedance
 from .walls import SpringWall

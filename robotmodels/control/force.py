@@ -76,7 +76,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
 from .law import NO_WRENCH, WRENCH, as_gains, as_reference, as_word, desired_of, model_torques
-from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, frozen_mask, row_gains
+from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, frozen_mask
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
@@ -267,7 +267,8 @@ class ExternalForceLoop(TaskLaw):
             )
         rows = inner.rows
         for name in ("stiffness", "gain"):
-            self._set(**{name: row_gains(getattr(self, name), rows, name)})
+            gains = as_gains(getattr(self, name), name, len(rows), rows=rows)
+            self._set(**{name: gains})
         self._set(_desired=desired_of(self.force, WRENCH, "force"), force=as_reference(self.force))
         self._set(_active=as_mask(self.mask)[rows].astype(float), mask=frozen_mask(self.mask))
         self._set(model=inner.model, rows=rows, state0=np.zeros(len(rows)))

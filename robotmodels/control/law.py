@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_floats, as_reals, as_vector, read_only
+from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
 from ..dynamics import gravity_torque, idm
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
@@ -22,7 +22,7 @@ POSE = (4, 4), (6,), (6,)
 WRENCH = (6,), (6,), (6,)
 _SLOWEST = 5e-324
 
-Desired = Callable[[float], tuple[Array, Array, Array]]
+Desired = Callable[[float], tuple[Array, ...]]
 """Value, rate and second rate at a time."""
 
 
@@ -98,16 +98,21 @@ class Law(Value):
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def as_gains(value: ArrayLike, name: str, n: int | None = None, zero: bool = False) -> Array:
-    """Positive numbers: one, or one for each of n components."""
+def as_gains(
+    value: ArrayLike, name: str, n: int | None = None, zero: bool = False, rows: Any = None
+) -> Array:
+    """Positive numbers: one, or one for each of n components; of six components those of rows."""
     gains = as_floats(value, name)
+    if rows is not None and gains.shape == (6,):
+        gains = gains[rows]
     if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
         wanted = "(n,)" if n is None else f"({n},)"
-        raise ShapeError(f"{name}: expected one number or shape {wanted}, got {gains.shape}.")
+        more = "" if rows is None else " or (6,)"
+        raise ShapeError(f"{name}: expected one number or shape {wanted}{more}, got {gains.shape}.")
     if not ((gains >= 0.0) if zero else (gains > 0.0)).all():
         least = "at least 0" if zero else "above 0"
         raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
-    return gains.copy()
+    return gains.copy() if rows is None else np.full(n or 0, gains)
 
 
 def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
@@ -134,23 +139,45 @@ def joints_of(reference: Any, n: int | None) -> tuple[Desired, int]:
 
 
 def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:
-    """Function of time of a motion, function or constant; shapes None: of joints."""
+    """Function of time of a motion, function or constant; without shapes that of joints."""
     if shapes is None and isinstance(reference, Trajectory):
-        if reference.motion.batch:
-            raise ShapeError(f"{name}: expected one motion, got {reference.motion.batch}.")
-        return _followed(reference)
+        motion, end, n = reference.motion, float(reference.duration), reference.n
+        if motion.batch:
+            raise ShapeError(f"{name}: expected one motion, got {motion.batch}.")
+
+        def joints(t: float) -> tuple[Array, ...]:
+            if 0.0 <= t <= end:  # without the checks of a trajectory
+                q, v, a = motion.derivatives(np.array([t]), (0, 1, 2))
+            else:
+                q, v, a = reference.q(t), reference.v(t), reference.a(t)
+            return q.reshape(n), v.reshape(n), a.reshape(n)
+
+        return joints
     if shapes is POSE and isinstance(reference, PoseTrajectory):
 
-        def at(t: float) -> tuple[Array, Array, Array]:
+        def pose(t: float) -> tuple[Array, ...]:
             there = reference.at(np.array([t]))
             return there.T[0], there.twist[0], there.acceleration[0]
 
-        return at
+        return pose
     if callable(reference):
-        value = _answers(reference, 0.0)[0]
-        if shapes is POSE:
-            as_single_pose(value, f"{name}(0)")
-        return _function(reference, shapes or ((value.size,),) * 3)
+
+        def function(t: float) -> tuple[Array, ...]:
+            where, answer = f"{name}({t:g})", reference(t)
+            if not isinstance(answer, (tuple, list)) or len(answer) != 3:
+                raise InvalidValueError(
+                    f"{where}: expected three arrays, the value with its first and second "
+                    f"derivative, got {type(answer).__name__}."
+                )
+            values = tuple(as_floats(x, where) for x in answer)
+            wanted, found = shapes or ((values[0].size,),) * 3, tuple(x.shape for x in values)
+            if found != wanted:
+                raise ShapeError(f"{where}: expected shapes {wanted}, got {found}.")
+            return values
+
+        if function(0.0)[0].shape == POSE[0]:
+            as_single_pose(function(0.0)[0], f"{name}(0)")
+        return function
     if shapes is POSE:
         value = as_single_pose(reference, name).copy()
     elif shapes is WRENCH:
@@ -159,47 +186,6 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
         raise ShapeError(f"{name}: expected positions of shape (n,), got {value.shape}.")
     rest = np.zeros(value.size if shapes is None else 6)
     return lambda t: (value, rest, rest)
-
-
-def _followed(trajectory: Trajectory) -> Desired:
-    """A trajectory at single times, without its checks inside of its duration."""
-    motion, end, n = trajectory.motion, float(trajectory.duration), trajectory.n
-
-    def at(t: float) -> tuple[Array, Array, Array]:
-        if 0.0 <= t <= end:
-            q, v, a = motion.derivatives(np.array([t]), (0, 1, 2))
-        else:
-            q, v, a = trajectory.q(t), trajectory.v(t), trajectory.a(t)
-        return q.reshape(n), v.reshape(n), a.reshape(n)
-
-    return at
-
-
-def _function(law: Callable[[float], Any], shapes: Any) -> Desired:
-    """A function of the user with checks of its values; it is called once here."""
-
-    def at(t: float) -> tuple[Array, Array, Array]:
-        value, rate, second = _answers(law, t)
-        if (value.shape, rate.shape, second.shape) != shapes:
-            got = f"{value.shape}, {rate.shape}, {second.shape}"
-            raise ShapeError(f"reference({t:g}): expected shapes {shapes}, got {got}.")
-        if not np.isfinite(value.sum() + rate.sum() + second.sum()):
-            raise InvalidValueError(f"reference({t:g}): expected finite numbers.")
-        return value, rate, second
-
-    at(0.0)
-    return at
-
-
-def _answers(law: Callable[[float], Any], t: float) -> tuple[Array, Array, Array]:
-    answer = law(t)
-    if not isinstance(answer, (tuple, list)) or len(answer) != 3:
-        raise InvalidValueError(
-            f"reference({t:g}): expected three arrays, the value with its first and second "
-            f"derivative, got {type(answer).__name__}."
-        )
-    value, rate, second = (as_reals(x, f"reference({t:g})") for x in answer)
-    return value, rate, second
 
 
 def model_torques(

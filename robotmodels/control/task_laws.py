@@ -50,7 +50,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._arrays import Array, as_mask, read_only
 from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
@@ -94,7 +94,8 @@ class TaskLaw(Law):
         self._set(reference=as_reference(self.reference))
         self._set(_desired=desired_of(self.reference, POSE))
         for name in gains:
-            self._set(**{name: row_gains(getattr(self, name), self.rows, name)})
+            value, rows = getattr(self, name), self.rows
+            self._set(**{name: as_gains(value, name, len(rows), rows=rows)})
 
     def _set_rows(self: Any, turn: Array | None = None) -> None:
         """Rows of the task, m <= n: of the mask, or the first that the robot moves alone."""
@@ -183,19 +184,6 @@ def accelerations(
 def frozen_mask(mask: Any) -> Any:
     """A mask that can be hashed."""
     return mask if mask is None or isinstance(mask, str) else tuple(map(int, as_mask(mask)))
-
-
-def row_gains(value: ArrayLike, rows: NDArray[np.int64], name: str) -> Array:
-    """Positive gains of the rows (m,) from one number, six, or m."""
-    gains = as_gains(value, name)
-    if gains.size == 6:
-        gains = gains[rows]
-    if gains.ndim and gains.size != len(rows):
-        raise InvalidValueError(
-            f"{name}: expected one number, six, or {len(rows)} for the components of the task, "
-            f"got {gains.size}."
-        )
-    return np.full(len(rows), gains)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
