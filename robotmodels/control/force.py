@@ -10,16 +10,16 @@ kp, kv, ke : float or array_like
     stiffness of the environment as the controller believes it to be, N/m (N m/rad).
 feedforward : {"desired", "measured"}
     The force that is fed forward.
-model : RobotModel
-    The robot as the controller believes it to be, n joints.
-mask : array_like, shape (6,), optional
-    Components of the task, at most n.
+model, mask
+    As for the laws in task space.
 selection : array_like, shape (6,)
     1 where a force is controlled, 0 where a position is, in the axes of the task.
 task_frame, contact_frame : array_like, shape (4, 4) or (3, 3)
-    Pose or rotation, whose axes are those of the task; wrenches stay in world axes.
-position : ComputedTorque or reference
-    A law in task space, or a reference for one with its default gains.
+    Pose or rotation, whose axes are those of the task and of the gains; wrenches stay in world
+    axes.
+position, inner : ComputedTorque (``position`` also a reference) or Impedance
+    A law in task space: that of the directions without force, and that whose reference an external
+    loop moves.
 force, reference : ForceTracking or reference
     A wrench (a constant (6,), or a function of t that returns it with its rate and second rate);
     hybrid laws take the gains of a force law, too; of a wrench alone, kp = 400, kv = 40, ke = 2000.
@@ -27,8 +27,6 @@ inverse : {"consistent", "jacobian"}
     ``"consistent"``: positions through the dynamically consistent pseudo-inverse of their rows,
     forces in its null space. ``"jacobian"``: joint servos of equal gains through ``J^-1 S``, the
     historical form; it is unstable in some postures of revolute arms (An and Hollerbach).
-inner : ComputedTorque or Impedance
-    The law in task space whose reference an external loop moves.
 stiffness, gain : float or array_like
     Of the environment as the controller believes it to be, N/m (N m/rad); bandwidth of the external
     loop, 1/s.
@@ -36,8 +34,7 @@ stiffness, gain : float or array_like
 Raises
 ------
 ShapeError, InvalidValueError
-    Gains that are not positive; a selection that is not of zeros and ones; more components than
-    joints; no model.
+    As the laws in task space; a selection that is not of zeros and ones.
 
 References
 ----------
@@ -51,8 +48,6 @@ Examples
 >>> from robotmodels.kinematics import dgm
 >>> from robotmodels.robots import load
 >>> arm, q, push = load("rx90"), np.full(6, 0.3), [0.0, 0.0, -20.0, 0.0, 0.0, 0.0]
->>> ForceTracking(400.0, 40.0, 1e4, reference=push, model=arm).error(0.0, q, 0.0 * q)
-array([  0.,   0., -20.])
 >>> law = ParallelHybrid([0, 0, 1, 0, 0, 0], np.eye(4), dgm(arm, q), push, model=arm)
 >>> law.error(0.0, q, 0.0 * q, wrench=[0.0, 0.0, -5.0, 0.0, 0.0, 0.0]).round(9) + 0.0
 array([  0.,   0., -15.,   0.,   0.,   0.])
@@ -70,13 +65,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, as_floats, as_mask
+from .._arrays import Array, as_mask
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
 from .law import NO_WRENCH, WRENCH, as_gains, as_reference, as_word, desired_of, model_torques
-from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, frozen_mask
+from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
@@ -107,7 +102,7 @@ class ForceTracking(TaskLaw):
         rows = np.flatnonzero(as_mask(self.mask))
         self._set(rows=rows, _axes=np.eye(6)[rows], _free=float(np.max(self.kv)))
         self._set(_desired=desired_of(self.reference, WRENCH, "force reference"))
-        self._set(mask=frozen_mask(self.mask), reference=as_reference(self.reference))
+        self._set(mask=as_flags(self.mask), reference=as_reference(self.reference))
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         out, J = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
@@ -138,10 +133,9 @@ class _Split(TaskLaw):
 
     def _prepare(self: Any, frame: str) -> None:
         check_model(self.model)
-        axes = getattr(self, frame)
-        given = as_floats(getattr(axes, "homogeneous", axes), frame)
-        if given.shape not in ((3, 3), (4, 4)):
-            raise ShapeError(f"{frame}: expected shape (4, 4) or (3, 3), got {given.shape}.")
+        given = as_reference(getattr(self, frame))
+        if np.shape(given) not in ((3, 3), (4, 4)):
+            raise ShapeError(f"{frame}: expected shape (4, 4) or (3, 3), got {np.shape(given)}.")
         T = np.eye(4)
         T[:3, :3] = given[:3, :3]
         selection = as_mask(self.selection, name="selection")
@@ -157,11 +151,9 @@ class _Split(TaskLaw):
             raise InvalidValueError("position: expected a law in task space, space='task'.")
         if not isinstance(force, ForceTracking):
             force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
-        w = np.full(6, np.max(position.omega))
-        damping = 2.0 * w * np.max(position.zeta)
-        w[position.rows] = position.omega
-        damping[position.rows] = 2.0 * position.zeta * position.omega
-        gains = np.stack([w * w, damping, force.kp, force.kv, force.ke])[:, self.rows]
+        w, z = np.full((2, 6), [[np.max(position.omega)], [np.max(position.zeta)]])
+        w[position.rows], z[position.rows] = position.omega, position.zeta
+        gains = np.stack([w * w, 2.0 * z * w, force.kp, force.kv, force.ke])[:, self.rows]
         self._set(position=position, force=force, _forced=selection[self.rows], _gains=gains)
         self._set(selection=selection.astype(float), _free=2.0 * np.max(position.omega))
         self._set(**{frame: given})
@@ -270,7 +262,7 @@ class ExternalForceLoop(TaskLaw):
             gains = as_gains(getattr(self, name), name, len(rows), rows=rows)
             self._set(**{name: gains})
         self._set(_desired=desired_of(self.force, WRENCH, "force"), force=as_reference(self.force))
-        self._set(_active=as_mask(self.mask)[rows].astype(float), mask=frozen_mask(self.mask))
+        self._set(_active=as_mask(self.mask)[rows].astype(float), mask=as_flags(self.mask))
         self._set(model=inner.model, rows=rows, state0=np.zeros(len(rows)))
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:

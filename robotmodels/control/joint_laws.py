@@ -1,19 +1,28 @@
-"""Laws of the joints with constant gains: decentralised PID, PD with gravity, passivity.
+"""Laws of the joints with constant or adapted gains: PID, PD with gravity, passivity, adaptation.
 
-The error is ``e = q_d - q``; gains are one number or one for each joint.
+The error is ``e = q_d - q``; gains are one number or one for each joint. Passivity-based laws have
+``s = e' + slope e = q_r' - q'`` with the reference velocity ``q_r' = q_d' + slope e``.
 
 Parameters
 ----------
 reference : Trajectory, array_like (n,) or callable
     Positions: a motion, a constant, or a function of t that returns (q, v, a).
 model : RobotModel
-    The robot as the controller believes it to be, n joints.
+    The robot as the controller believes it to be, n joints; adaptive control ignores its inertia.
 kp, ki, kd : float or array_like
     Gains of the error, of its integral and of its rate; ki may be 0.
 slope, gain : float or array_like
-    Rate at which the error vanishes where ``s = e' + slope e`` is 0, 1/s; torque by s, N m s/rad.
+    Rate at which the error vanishes where s is 0, 1/s; torque by s, N m s/rad.
 feedforward : RobotModel or array_like (n,), optional
     Constant torques, or a model whose torques of the reference motion are added.
+adaptation : float or array_like, shape (p,)
+    Gains of the estimates.
+parameters : {"base", "standard"}
+    Estimated parameters. Standard ones drift along combinations that have no effect.
+start : array_like, shape (p,), optional
+    Estimates at the start; default zero.
+drive : bool or collection of DriveKind or str
+    Drive parameters that are estimated, too, as in `torque_regressor`.
 
 Raises
 ------
@@ -22,9 +31,9 @@ ShapeError, InvalidValueError
 
 References
 ----------
-Seed book section 5.2.5 (decentralised control); M. Takegaki and S. Arimoto, ASME J. Dyn. Syst.
-Meas. Control 103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and
-W. Li, "Applied Nonlinear Control", 1991, section 9.2.
+Seed book sections 5.2.5 and 5.2.8; M. Takegaki and S. Arimoto, ASME J. Dyn. Syst. Meas. Control
+103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and W. Li, "On the
+adaptive control of robot manipulators", Int. J. Robotics Research 6(3), 1987.
 
 Examples
 --------
@@ -32,6 +41,9 @@ Examples
 array([50., 20.])
 >>> PDGravity([0.5, 0.2], kp=100.0, kd=20.0).command(0.0, [0.0, 0.0], [1.0, 0.0])
 array([30., 20.])
+>>> from robotmodels.robots import load
+>>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
+('ZZ1', 'ZZ2', 'MX2', 'MY2')
 """
 
 from __future__ import annotations
@@ -40,13 +52,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, as_number
+from .._arrays import Array, Value, as_exact, as_number, as_vector, batch_rows
+from ..drive import Drives
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
+from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
-from .law import Desired, Law, as_gains, as_reference, joints_of, started, virtual_torques
+from ..regressors import parameter_names, parameter_vector
+from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
+from ..regressors.drives import add_torques, friction_terms, rotor_terms
+from .law import Desired, Law, as_gains, as_reference, as_word, joints_of, started, virtual_torques
+
+_REMAINS = 0.2
+"""Part of an error of a parameter that remains where the motion excites it too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +102,8 @@ class PIDGains(Value):
 def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     """Gains of a PID controller that give a joint a triple pole at -omega.
 
+    ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
+
     Parameters
     ----------
     inertia, viscous, omega : float
@@ -91,7 +113,6 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     Returns
     -------
     PIDGains
-        ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
 
     Examples
     --------
@@ -216,10 +237,7 @@ class PDGravity(JointLaw):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Passivity(SurfaceLaw):
-    """Passivity-based control: ``tau = A(q) q_r'' + C(q, q') q_r' + Q(q) + friction + gain s``.
-
-    The reference velocity is ``q_r' = q_d' + slope e``, and ``s = q_r' - q'``.
-    """
+    """Passivity-based control: ``tau = A(q) q_r'' + C(q, q') q_r' + Q(q) + friction + gain s``."""
 
     reference: Any
     slope: Any
@@ -235,3 +253,133 @@ class Passivity(SurfaceLaw):
         tau = virtual_torques(self.model, q, v, v_r, a_r) + self.gain * (v_r - v)
         drives = self.model.drive_matrices
         return tau if drives is None else tau + drives.torque(started(v, v_r), a_r)
+
+
+def slotine_li_regressor(
+    model: RobotModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    v_r: ArrayLike,
+    a_r: ArrayLike,
+    drive: Drives = True,
+) -> Array:
+    """Regressor of ``A a_r + C(q, v) v_r + Q``, with the friction of the drives at v.
+
+    Parameters
+    ----------
+    model, drive
+        The robot, whose inertia is not used, and its drive parameters with columns.
+    q, v, v_r, a_r : array_like, shape (..., n)
+        Joint variables (rad or m), their velocities, reference velocities and accelerations; the
+        leading axes broadcast.
+
+    Returns
+    -------
+    ndarray, shape (..., n, p)
+        Columns as `parameter_names`.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> Y = slotine_li_regressor(one, [0.0], [3.0], [1.0], [2.0])
+    >>> dict(zip(parameter_names(one), Y[0].tolist(), strict=True))["ZZ1"]
+    2.0
+    """
+    check_model(model)
+    given = {"q": q, "v": v, "v_r": v_r, "a_r": a_r}
+    vectors = tuple(as_vector(x, model.n, name) for name, x in given.items())
+    batch, rows = batch_rows(vectors, tuple(given))
+    chosen = chosen_columns(standard_blocks(model, drive, None), None, model)
+    return _regressors(model, chosen, *rows).reshape(*batch, model.n, chosen.count)
+
+
+def _regressors(
+    model: RobotModel, chosen: ChosenColumns, q: Array, v: Array, v_r: Array, a_r: Array
+) -> Array:
+    """The regressor of rows (N, n), shape (N, n, c): a difference of squares of half sums."""
+    from ..kernels.regressors import torque_regressors
+
+    W, squares = np.empty((2, len(q), model.n, chosen.count))
+    links, zero = chosen.places[LINKS], np.zeros(3)
+    torque_regressors(q, 0.5 * (v + v_r), a_r, model.chain, model.gravity, links, W)
+    torque_regressors(q, 0.5 * (v - v_r), 0.0 * a_r, model.chain, zero, links, squares)
+    W -= squares
+    add_torques(chosen, rotor_terms(model, a_r), W)
+    add_torques(chosen, friction_terms(model, q, v, None), W)
+    return W
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AdaptiveSlotineLi(SurfaceLaw):
+    """Adaptive control of Slotine and Li: ``tau = Y theta + gain s``, the state is theta.
+
+    With the regressor Y of `slotine_li_regressor`, ``theta' = adaptation Y^T s``. Errors of
+    tracking vanish whatever theta; theta itself converges where the motion excites it.
+    """
+
+    reference: Any
+    slope: Any
+    gain: Any
+    adaptation: Any
+    parameters: str = "base"
+    start: Any = None
+    model: RobotModel = None  # type: ignore[assignment]
+    drive: Drives = True
+    names: tuple[str, ...] = field(init=False)
+    state0: Array = field(init=False)
+    base: BaseParameters | None = field(init=False)
+    _chosen: ChosenColumns = field(init=False)
+
+    def __post_init__(self) -> None:
+        check_model(self.model)
+        self._prepare(("slope", "gain"), self.model)
+        as_word(self.parameters, ("base", "standard"), "parameters")
+        base = base_parameters(self.model, drive=self.drive) if self.parameters == "base" else None
+        names = tuple(base.names if base else parameter_names(self.model, self.drive))
+        blocks, p = standard_blocks(self.model, self.drive, None), len(names)
+        start = np.zeros(p) if self.start is None else as_exact(self.start, (p,), "start")
+        self._set(adaptation=as_gains(self.adaptation, "adaptation", p), start=start, state0=start)
+        self._set(base=base, names=names, _chosen=chosen_columns(blocks, names, self.model))
+
+    def true_values(self, plant: RobotModel) -> Array:
+        """Parameters (p,) of a robot of the same structure, to which the estimates converge."""
+        return self.base.values(plant) if self.base else parameter_vector(plant, self.drive)
+
+    def regressor(self, t: float, q: Any, v: Any) -> tuple[Array, Array]:
+        """Y, shape (n, p), and s, shape (n,)."""
+        q, v, *_ = self._measured(q, v, self.state0, None)
+        v_r, a_r = self._rates(t, q, v)
+        rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
+        return _regressors(self.model, self._chosen, *rows)[0], v_r - v
+
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return Y @ x + self.gain * s
+
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return self.adaptation * (s @ Y)
+
+    def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
+        """``(s^T A s + sum of squared errors of the estimates / adaptation) / 2``."""
+        missing = self.true_values(plant) - x
+        kinetic = SurfaceLaw.lyapunov(self, plant, t, q, v, x)
+        return kinetic + 0.5 * float(missing @ (missing / self.adaptation))
+
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence that names the parameters that a motion (N, n) excites too little."""
+        if len(t) < 2:
+            return ()
+        # errors of estimates decrease as theta' = -adaptation Y^T Y / gain theta, on average
+        root = np.sqrt(np.broadcast_to(self.adaptation, (len(self.names),)))
+        Y = np.array([self.regressor(*row)[0] for row in zip(t, q, v, strict=True)])
+        Y = Y * root / np.sqrt(np.broadcast_to(self.gain, (self.n,)))[:, None]
+        # persistent excitation: the second half, as if all of the run were like it
+        weights = 2.0 * np.convolve(np.diff(t), [0.5, 0.5]) * (t > 0.5 * (t[0] + t[-1]))
+        size, axes = np.linalg.eigh(np.einsum("k,kij,kil->jl", weights, Y, Y))
+        remains = (axes * axes) @ np.exp(-np.maximum(size, 0.0))
+        few = [name for name, part in zip(self.names, remains, strict=True) if part > _REMAINS]
+        names = ", ".join(few)
+        sentence = f"The motion excites these parameters too little to estimate: {names}."
+        return (sentence,) if few else ()

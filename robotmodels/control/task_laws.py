@@ -99,23 +99,21 @@ class TaskLaw(Law):
 
     def _set_rows(self: Any, turn: Array | None = None) -> None:
         """Rows of the task, m <= n: of the mask, or the first that the robot moves alone."""
-        model, n, turn = self.model, self.model.n, np.eye(6) if turn is None else turn
-        if self.mask is not None:
-            rows = np.flatnonzero(as_mask(self.mask)).tolist()
-            if len(rows) > n:
-                raise InvalidValueError(
-                    f"mask: {len(rows)} components are more than the {n} joints of {model.name!r} "
-                    "control; choose fewer."
-                )
-        else:
-            postures = np.random.default_rng(0).uniform(-2.0, 2.0, (4, n))
-            J, rows = turn @ jacobian(model, postures, self.frame), list[int]()
-            for row in range(6):
-                ranks = np.linalg.matrix_rank(J[:, [*rows, row]], rtol=_RANK)
-                if len(rows) < n and (ranks > len(rows)).any():
-                    rows.append(row)
+        n, turn, mask = self.model.n, np.eye(6) if turn is None else turn, self.mask
+        rows = [] if mask is None else np.flatnonzero(as_mask(mask)).tolist()
+        if len(rows) > n:
+            raise InvalidValueError(
+                f"mask: {len(rows)} components are more than the {n} joints of "
+                f"{self.model.name!r} control; choose fewer."
+            )
+        postures = np.random.default_rng(0).uniform(-2.0, 2.0, (4, n))
+        J = turn @ jacobian(self.model, postures, self.frame)
+        for row in range(6) if mask is None else ():
+            ranks = np.linalg.matrix_rank(J[:, [*rows, row]], rtol=_RANK)
+            if len(rows) < n and (ranks > len(rows)).any():
+                rows.append(row)
         axes = turn[rows]
-        self._set(rows=np.array(rows, dtype=np.int64), mask=frozen_mask(self.mask))
+        self._set(rows=np.array(rows, dtype=np.int64), mask=as_flags(mask))
         self._set(_axes=None if np.array_equal(axes, np.eye(6)) else axes)
 
     def _tool(
@@ -162,6 +160,11 @@ class TaskLaw(Law):
         ) * bool(near.any())
 
 
+def as_flags(mask: Any) -> Array | None:
+    """A mask as zeros and ones (6,)."""
+    return None if mask is None else as_mask(mask).astype(np.float64)
+
+
 def accelerations(
     J: Array, wanted: Array, free: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
 ) -> Array:
@@ -179,11 +182,6 @@ def accelerations(
             "inertia."
         )
     return a
-
-
-def frozen_mask(mask: Any) -> Any:
-    """A mask that can be hashed."""
-    return mask if mask is None or isinstance(mask, str) else tuple(map(int, as_mask(mask)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
