@@ -168,6 +168,7 @@ def first_order(
         raise InvalidValueError(f"step: {h:.3g} s would take more than {_MOST_STEPS} steps.")
     s = as_floats(s0, "s0")
     x = np.zeros(s.shape)
+    own: Any = law
     reaching: Any = getattr(law, "reaching", None)
     if reaching is None and not callable(law):
         raise InvalidValueError(
@@ -180,7 +181,7 @@ def first_order(
     out = np.empty((round(end / h) + 1, *s.shape))
     out[0] = s
     for k in range(1, len(out)):
-        rate, change = reaching(s, x) if reaching else (_fitting(law(s), s, "law(s)"), NONE)
+        rate, change = reaching(s, x) if reaching else (_fitting(own(s), s, "law(s)"), NONE)
         s = out[k] = s + h * (rate + _fitting(push((k - 1) * h), s, "disturbance"))
         x = x + h * change if change.size else x
     if not np.isfinite(out).all():
