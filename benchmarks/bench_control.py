@@ -56,29 +56,76 @@ def laws(arm: rm.RobotModel) -> dict[str, Any]:
     }
 
 
-def mujoco_run(arm: rm.RobotModel) -> float | None:
-    """Processor time of the run in MuJoCo: its inverse dynamics as the law, its step as plant."""
-    if importlib.util.find_spec("mujoco") is None:
-        return None
+def peers(arm: rm.RobotModel) -> dict[str, Callable[[], Any] | None]:
+    """The run in other libraries, which answers the last positions; None where one is missing."""
+    return {
+        name: make(arm) if importlib.util.find_spec(module) else None
+        for name, module, make in (
+            ("MuJoCo", "mujoco", mujoco_run),
+            ("Drake", "pydrake", drake_run),
+        )
+    }
+
+
+def mujoco_run(arm: rm.RobotModel) -> Callable[[], Any]:
+    """MuJoCo: the law through its mass matrix and bias, its step as the plant."""
     import mujoco  # pyright: ignore[reportMissingImports]
 
-    model = mujoco.MjModel.from_xml_string(rm.to_urdf(arm))
+    model, goal = mujoco.MjModel.from_xml_string(rm.to_urdf(arm)), quintic(Q, Q + 0.3, duration=1.0)
     model.opt.timestep = 1e-3
-    goal = quintic(Q, Q + 0.3, duration=1.0)
 
-    def run() -> None:
+    def run() -> Any:
         data, M = mujoco.MjData(model), np.zeros((model.nv, model.nv))
         data.qpos[:] = Q
         for k in range(1000):
-            t = 1e-3 * k
+            q, v, a = (x[0] for x in goal.motion.derivatives(np.array([1e-3 * k]), (0, 1, 2)))
             mujoco.mj_forward(model, data)
-            mujoco.mj_fullM(model, M, data.qM)
-            e, de = goal.q(t) - data.qpos, goal.v(t) - data.qvel
-            a = goal.a(t) + 20.0 * de + 100.0 * e
+            mujoco.mj_fullM(model, data, M)
+            a = a + 20.0 * (v - data.qvel) + 100.0 * (q - data.qpos)
             data.qfrc_applied[:] = M @ a + data.qfrc_bias
             mujoco.mj_step(model, data)
+        return data.qpos.copy()
 
-    return seconds(run, 1, RUNS)
+    return run
+
+
+def drake_run(arm: rm.RobotModel) -> Callable[[], Any]:
+    """Drake: its InverseDynamicsController and a discrete MultibodyPlant, all compiled."""
+    from pydrake import all as drake  # pyright: ignore[reportMissingImports]
+
+    def added(builder: Any) -> Any:
+        plant = drake.MultibodyPlant(1e-3)
+        drake.Parser(plant).AddModelsFromString(rm.to_urdf(arm), "urdf")
+        for index in plant.GetJointIndices():
+            if (joint := plant.get_joint(index)).num_velocities():
+                plant.AddJointActuator(joint.name(), joint)
+        plant.Finalize()
+        return plant if builder is None else builder.AddSystem(plant)
+
+    times, goal = np.linspace(0.0, 1.0, 201), quintic(Q, Q + 0.3, duration=1.0)
+    path = drake.PiecewisePolynomial.CubicHermite(times, goal.q(times).T, goal.v(times).T)
+    builder = drake.DiagramBuilder()
+    plant, believed = added(builder), added(None)
+    law = builder.AddSystem(
+        drake.InverseDynamicsController(believed, [100.0] * 6, [0.0] * 6, [20.0] * 6, True)
+    )
+    state = builder.AddSystem(drake.TrajectorySource(path, 1))
+    second = builder.AddSystem(drake.TrajectorySource(path.MakeDerivative(2)))
+    builder.Connect(plant.get_state_output_port(), law.get_input_port_estimated_state())
+    builder.Connect(state.get_output_port(), law.get_input_port_desired_state())
+    builder.Connect(second.get_output_port(), law.get_input_port_desired_acceleration())
+    force = plant.get_applied_generalized_force_input_port()
+    builder.Connect(law.get_output_port_generalized_force(), force)
+    diagram = builder.Build()
+
+    def run() -> Any:
+        simulator = drake.Simulator(diagram)
+        context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+        plant.SetPositions(context, Q)
+        simulator.AdvanceTo(1.0)
+        return plant.GetPositions(context)
+
+    return run
 
 
 def main() -> None:
@@ -91,13 +138,14 @@ def main() -> None:
         one = seconds(lambda law=law, x=x, f=wrench: law.command(0.1, Q, rest, x, f), CALLS, 5)
         print(f"  {name:32} {1e6 * one:8.1f}")
     law = laws(arm)["computed torque, trajectory"]
-    ours = seconds(lambda: control.run(arm, law, Q, t=1.0, period=1e-3), 1, RUNS)
-    print("1 s of computed torque at 1 kHz on a UR5, seconds of processor time")
-    print(f"  robotmodels {ours:.3f}")
-    theirs = mujoco_run(arm)
-    print("  MuJoCo      " + ("not installed" if theirs is None else f"{theirs:.3f}"))
-    if importlib.util.find_spec("pydrake") is None:
-        print("  Drake       not installed")
+    runs = {"robotmodels": lambda: control.run(arm, law, Q, t=1.0, period=1e-3).q[-1]}
+    print("1 s of computed torque at 1 kHz on a UR5, seconds of processor time, error at the end")
+    for name, run in (runs | peers(arm)).items():
+        if run is None:
+            print(f"  {name:12} not installed")
+        else:
+            error = np.abs(run() - Q - 0.3).max()
+            print(f"  {name:12} {seconds(run, 1, RUNS):.3f}   {error:.1e}")
 
 
 if __name__ == "__main__":
