@@ -74,6 +74,7 @@ from .law import NO_WRENCH, WRENCH, as_gains, as_reference, as_word, desired_of,
 from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
+_FED = {"measured": 6, "desired": 7}
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
 
 
@@ -93,6 +94,7 @@ class ForceTracking(TaskLaw):
     reference: Any = None
     model: RobotModel = None  # type: ignore[assignment]
     mask: Any = "position"
+    _gains: Array = field(init=False)
 
     def __post_init__(self) -> None:
         check_model(self.model)
@@ -103,25 +105,26 @@ class ForceTracking(TaskLaw):
         self._set(rows=rows, _axes=np.eye(6)[rows], _free=float(np.max(self.kv)))
         self._set(_desired=desired_of(self.reference, WRENCH, "force reference"))
         self._set(mask=as_flags(self.mask), reference=as_reference(self.reference))
+        self._set(_gains=pushes(self)[:, rows])
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        out, J = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
-        twist, bias, now, f_d, rate, second = out[4:]
-        rows = self.rows
-        gains = self.kp[rows], self.kv[rows], self.ke[rows]
-        wanted = pushed(gains, twist, now, f_d, rate, second) - bias
-        ahead = np.zeros(6)
-        ahead[rows] = f_d if self.feedforward == "desired" else now
-        return model_torques(self.model, q, v, self._resolved(J[0], wanted, v), ahead)
+        rows, J, _ = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
+        a = self._resolved(J[0], (self._gains * rows).sum(axis=0), v)
+        return model_torques(self.model, q, v, a) + rows[_FED[self.feedforward]] @ J[0]
 
     def _error(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return (self._desired(t)[0] - f)[self.rows]
 
 
-def pushed(gains: Any, twist: Array, f: Array, f_d: Array, rate: Array, second: Array) -> Array:
-    """Acceleration of the tool for a force, in components of a task."""
-    kp, kv, ke = gains
-    return (second + kv * (rate - ke * twist) + kp * (f_d - f)) / ke
+def pushes(law: ForceTracking) -> Array:
+    """Factors (10, 6) of error, rate, drift, wrench, twist, its drift, force and its reference.
+
+    Their sum is the acceleration ``(f_d'' + kv (f_d' - ke x') + kp (f_d - f)) / ke`` that is
+    wanted, less the drift of the twist.
+    """
+    kp, kv, ke = law.kp, law.kv, law.ke
+    ones = np.ones(6)
+    return np.stack([*np.zeros((4, 6)), -kv, -ones, -kp / ke, kp / ke, kv / ke, ones / ke])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -130,6 +133,8 @@ class _Split(TaskLaw):
 
     _forced: NDArray[np.bool_] = field(init=False)
     _gains: Array = field(init=False)
+    _errors: Array = field(init=False)
+    _kinds: NDArray[np.int64] = field(init=False)
 
     def _prepare(self: Any, frame: str) -> None:
         check_model(self.model)
@@ -153,24 +158,25 @@ class _Split(TaskLaw):
             force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
         w, z = np.full((2, 6), [[np.max(position.omega)], [np.max(position.zeta)]])
         w[position.rows], z[position.rows] = position.omega, position.zeta
-        gains = np.stack([w * w, 2.0 * z * w, force.kp, force.kv, force.ke])[:, self.rows]
-        self._set(position=position, force=force, _forced=selection[self.rows], _gains=gains)
+        gains, forced = pushes(force), selection[self.rows]
+        gains[:, ~selection] = 0.0
+        gains[:3, ~selection] = -np.stack([w * w, 2.0 * z * w, np.ones(6)])[:, ~selection]
+        errors = np.zeros((10, len(forced)))
+        errors[0], errors[6], errors[7] = ~forced, -1.0 * forced, forced
+        self._set(position=position, force=force, _forced=forced, _errors=errors)
+        self._set(_gains=gains[:, self.rows], _kinds=(~forced).astype(np.int64))
         self._set(selection=selection.astype(float), _free=2.0 * np.max(position.omega))
         self._set(**{frame: given})
 
     def _aims(self: Any, t: float, q: Array, v: Array, f: Array) -> tuple[Array, ...]:
-        """Jacobian (m, n) of the task's motions, wanted ``J a``, errors and forces, each (m,)."""
+        """Rows of `_tool`, Jacobian (m, n), wanted ``J a`` (m,) and torques (n,) of the wrench."""
         pose, force = self.position._desired(t), self.force._desired(t)
-        out, J = self._tool(q, v, pose, NO_WRENCH, f, *force)
-        e, de, drift, _, twist, bias, now, *desired = out
-        w, damping, *gains = self._gains
-        push = pushed(gains, twist, now, *desired) - bias
-        wanted = np.where(self._forced, push, w * e + damping * de + drift)
-        moved = np.where(self._forced[:, None], J[0], -J[1])
-        return moved, wanted, np.where(self._forced, desired[0] - now, e), desired[0]
+        rows, J, load = self._tool(q, v, pose, f, f, *force)
+        wanted = (self._gains * rows).sum(axis=0)
+        return rows, J[self._kinds, np.arange(len(wanted))], wanted, load
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        return self._aims(t, q, v, f)[2]
+        return (self._errors * self._aims(t, q, v, f)[0]).sum(axis=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -195,16 +201,16 @@ class ParallelHybrid(_Split):
             )
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        J, wanted, _, f_d = self._aims(t, q, v, f)
+        rows, J, wanted, load = self._aims(t, q, v, f)
         forced, M = self._forced, mass_matrix(self.model, q)
         if self.inverse == "consistent":
             within = J @ self._resolved(J, wanted, v)  # damped near singular postures
             a = accelerations(J, within, -self._free * v, forced.astype(np.int64), M)
-            return model_torques(self.model, q, v, a, f)
+            return model_torques(self.model, q, v, a) + load
         rest, J_f = np.zeros(self.n), J[forced]
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)
-        push = M @ accelerations(J_f, wanted[forced], rest, M=M)
-        return servo + push + J_f.T @ f_d[forced] + model_torques(self.model, q, v, rest)
+        push = M @ accelerations(J_f, wanted[forced], rest, M=M) + J_f.T @ rows[7, forced]
+        return servo + push + model_torques(self.model, q, v, rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -226,8 +232,8 @@ class ConstrainedDecoupling(_Split):
         self._prepare("contact_frame")
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        J, wanted, *_ = self._aims(t, q, v, f)
-        return model_torques(self.model, q, v, self._resolved(J, wanted, v), f)
+        _, J, wanted, load = self._aims(t, q, v, f)
+        return model_torques(self.model, q, v, self._resolved(J, wanted, v)) + load
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

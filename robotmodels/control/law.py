@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
 from ..dynamics import gravity_torque, idm
+from ..dynamics.inverse import motion_torques, warn_without_masses
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..se3 import as_single_pose
@@ -188,11 +189,11 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
     return lambda t: (value, rest, rest)
 
 
-def model_torques(
-    model: RobotModel, q: Array, v: Array, a: Array, wrench: Array = NO_WRENCH
-) -> Array:
+def model_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
     """Inverse dynamics; a joint at rest has the dry friction of its direction of acceleration."""
-    return idm(model, q, started(v, a), a, None if wrench is NO_WRENCH else wrench)
+    if model.twin.torques_warn:
+        warn_without_masses(model)
+    return motion_torques(model, q, started(v, a), a)
 
 
 def virtual_torques(model: RobotModel, q: Array, v: Array, v_r: Array, a_r: Array) -> Array:

@@ -118,8 +118,11 @@ class TaskLaw(Law):
 
     def _tool(
         self: Any, q: Array, v: Array, desired: tuple[Array, ...], wrench: Array, *more: Array
-    ) -> tuple[Array, Array]:
-        """Rows of `tool_errors`, and more ones, in components (.., m) of the task; J (2, m, n)."""
+    ) -> tuple[Array, Array, Array]:
+        """Rows of `tool_errors`, and more ones, in components (.., m) of the task; J (2, m, n).
+
+        Also the joint torques of the wrench.
+        """
         from .kernels import tool_errors
 
         if q.ndim != 1 or v.ndim != 1:
@@ -129,16 +132,18 @@ class TaskLaw(Law):
         model, J, rows = self.model, np.empty((2, 6, len(q))), np.empty((6 + len(more), 6))
         frame = model.twin.frame(self.frame).kernel_arguments
         tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)
+        load, axes = wrench @ J[0], self._axes
         if more:
             rows[6:] = more
-        return (rows, J) if self._axes is None else (rows @ self._axes.T, self._axes @ J)
+        return (rows, J, load) if axes is None else (rows @ axes.T, axes @ J, load)
 
     def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
-        """Rows and Jacobians as `_tool` for the reference; the wrench acts at the tool."""
-        if self.frame is not None and wrench.any():  # the same wrench at the frame's origin
-            lever = dgm(self.model, q)[:3, 3] - dgm(self.model, q, self.frame)[:3, 3]
-            wrench = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
-        return self._tool(q, v, self._desired(t), wrench)
+        """As `_tool` for the reference; the wrench acts at the tool."""
+        if self.frame is None or not wrench.any():
+            return self._tool(q, v, self._desired(t), wrench)
+        lever = dgm(self.model, q)[:3, 3] - dgm(self.model, q, self.frame)[:3, 3]
+        at = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
+        return *self._tool(q, v, self._desired(t), at)[:2], wrench @ jacobian(self.model, q)
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self._task(t, q, v)[0][0]
@@ -219,21 +224,21 @@ class ComputedTorque(TaskLaw):
     ) -> Array:
         """Torques with the error shifted at this speed (m,); a wrench (6,) is compensated."""
         w, damping = self.omega, 2.0 * self.zeta * self.omega
-        (e, de, drift, *_), J = self._task(t, q, v)
+        (e, de, drift, *_), J, load = self._task(t, q, v, wrench)
         pull = damping * (de + speed) + w * w * (e + by) + drift
         a = pull if self.space == "joint" else self._resolved(J[1], -pull, v)
-        return model_torques(self.model, q, v, a, wrench)
+        return model_torques(self.model, q, v, a) + load
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``(e'^T e' + e^T omega^2 e) / 2``, that of the linear error."""
-        (e, de, *_), _ = self._task(t, q, v)
+        e, de, *_ = self._task(t, q, v)[0]
         return 0.5 * float(de @ de + e @ (self.omega**2 * e))
 
     def _task(self, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
         if self.space == "task":
-            return TaskLaw._task(self, t, q, v)
+            return TaskLaw._task(self, t, q, v, wrench)
         q_d, v_d, a_d = self._desired(t)
-        return (q_d - q, v_d - v, a_d), None
+        return (q_d - q, v_d - v, a_d), None, 0.0
 
 
 class _Compliant(TaskLaw):
@@ -275,9 +280,9 @@ class Impedance(_Compliant):
         self, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
     ) -> Array:
         """Torques with the error shifted at this speed (m,)."""
-        (e, de, drift, force, *_), J = self._task(t, q, v, wrench)
+        (e, de, drift, force, *_), J, load = self._task(t, q, v, wrench)
         pull = (force - self.B * (de + speed) - self.K * (e + by)) / self.M
-        return model_torques(self.model, q, v, self._resolved(J[1], pull - drift, v), wrench)
+        return model_torques(self.model, q, v, self._resolved(J[1], pull - drift, v)) + load
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -305,11 +310,11 @@ class Admittance(_Compliant):
         self._set(state0=np.zeros(2 * len(self.rows)), _free=free)
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        (e, de, drift, force, *_), J = self._task(t, q, v, f)
+        (e, de, drift, force, *_), J, load = self._task(t, q, v, f)
         xi, rate, second = self._motion(x, force)
         w, damping = self.omega, 2.0 * self.zeta * self.omega
         wanted = -second - damping * (de + rate) - w * w * (e + xi) - drift
-        return model_torques(self.model, q, v, self._resolved(J[1], wanted, v), f)
+        return model_torques(self.model, q, v, self._resolved(J[1], wanted, v)) + load
 
     def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return np.concatenate(self._motion(x, self._task(t, q, v, f)[0][3])[1:])
