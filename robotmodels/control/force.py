@@ -109,7 +109,7 @@ class ForceTracking(TaskLaw):
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         rows, J, _ = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
-        a = self._resolved(J[0], (self._gains * rows).sum(axis=0), v)
+        a = self._resolved(J[0], np.einsum("kj,kj->j", self._gains, rows), v)
         return model_torques(self.model, q, v, a) + rows[_FED[self.feedforward]] @ J[0]
 
     def _error(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
@@ -172,7 +172,7 @@ class _Split(TaskLaw):
         """Rows of `_tool`, Jacobian (m, n), wanted ``J a`` (m,) and torques (n,) of the wrench."""
         pose, force = self.position._desired(t), self.force._desired(t)
         rows, J, load = self._tool(q, v, pose, f, f, *force)
-        wanted = (self._gains * rows).sum(axis=0)
+        wanted = np.einsum("kj,kj->j", self._gains, rows)
         return rows, J[self._kinds, np.arange(len(wanted))], wanted, load
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
@@ -204,8 +204,7 @@ class ParallelHybrid(_Split):
         rows, J, wanted, load = self._aims(t, q, v, f)
         forced, M = self._forced, mass_matrix(self.model, q)
         if self.inverse == "consistent":
-            within = J @ self._resolved(J, wanted, v)  # damped near singular postures
-            a = accelerations(J, within, -self._free * v, forced.astype(np.int64), M)
+            a = accelerations(J, wanted, -self._free * v, forced.astype(np.int64), M)
             return model_torques(self.model, q, v, a) + load
         rest, J_f = np.zeros(self.n), J[forced]
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)

@@ -346,9 +346,8 @@ class AdaptiveSlotineLi(SurfaceLaw):
         """Parameters (p,) of a robot of the same structure, to which the estimates converge."""
         return self.base.values(plant) if self.base else parameter_vector(plant, self.drive)
 
-    def regressor(self, t: float, q: Any, v: Any) -> tuple[Array, Array]:
+    def regressor(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Y, shape (n, p), and s, shape (n,)."""
-        q, v, *_ = self._measured(q, v, self.state0, None)
         v_r, a_r = self._rates(t, q, v)
         rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
         return _regressors(self.model, self._chosen, *rows)[0], v_r - v

@@ -14,7 +14,6 @@ from __future__ import annotations
 from math import cos, sin, sqrt, tan
 
 import numpy as np
-from numba import types
 
 from ..igm.kernels.damped import rotation_vector
 from ..kernels import Chain
@@ -32,6 +31,8 @@ _TOOL = (
 )  # chain, path, rotation and position of the tool
 
 SMALL = 1e-2  # squared angle below which series are used
+NEAR = 1e-3  # singular values, relative to the longest row, below which motions are damped
+RANK = 1e-9  # relative singular values of rows that depend
 
 
 @compiled()
@@ -140,40 +141,17 @@ def tool_errors(
             J[1, i, column], J[1, 3 + i, column] = -J[0, i, column], -z[i]
 
 
-@compiled(
-    kinds.INT(
-        kinds.MATRIX,
-        kinds.VECTOR,
-        kinds.INTS,
-        kinds.MATRIX,
-        kinds.VECTOR,
-        types.float64,
-        kinds.OUT1,
-    )
-)
-def resolved(
-    J: Floats, wanted: Floats, order: Ints, M: Floats, free: Floats, least: float, a: Floats
-) -> int:
-    """Joint accelerations a with ``J a = wanted`` for rows of order 0, then 1; else as `free`.
-
-    By pseudo-inverses in the metric of M (n, n), of the identity if M is (0, 0); directions of a
-    singular value below `least` of the longest row are damped. -1 if M is not positive definite.
-    """
+@compiled()
+def solve(
+    J: Floats, wanted: Floats, order: Ints, L: Floats, free: Floats, least: float, a: Floats
+) -> None:
+    """Accelerations a in the metric of ``L L^T``, see `resolved`."""
     m, n = J.shape
-    L, used = np.eye(n), np.zeros((m, n))  # M = L L^T, and directions that are not free any more
-    for j in range(M.shape[0]):
-        for i in range(j, n):
-            rest = M[i, j]
-            for k in range(j):
-                rest -= L[i, k] * L[j, k]
-            if i == j and not rest > 0.0:
-                return -1
-            L[i, j] = sqrt(rest) if i == j else rest / L[j, j]
+    B, used, lengths, count = np.empty((m, n + 1)), np.zeros((m, n)), np.empty(m), 0
     for i in range(n):  # y = L^T a
         a[i] = 0.0
         for k in range(i, n):
             a[i] += L[k, i] * free[k]
-    B, lengths, count = np.empty((m, n + 1)), np.empty(m), 0
     for level in range(2):
         p, longest = 0, 0.0
         for r in range(m):
@@ -207,4 +185,30 @@ def resolved(
         for k in range(i + 1, n):
             a[i] -= L[k, i] * a[k]
         a[i] /= L[i, i]
+
+
+@compiled(kinds.INT(kinds.MATRIX, kinds.VECTOR, kinds.INTS, kinds.MATRIX, kinds.VECTOR, kinds.OUT1))
+def resolved(J: Floats, wanted: Floats, order: Ints, M: Floats, free: Floats, a: Floats) -> int:
+    """Joint accelerations a with ``J a = wanted``; motions of no effect are `free`.
+
+    Directions of small singular values are damped. With M (n, n), not (0, 0), those least in its
+    metric, where rows of order 1 do not disturb those of order 0. -1 if M is not definite.
+    """
+    m, n = J.shape
+    L, met = np.eye(n), np.zeros(m)
+    solve(J, wanted, np.zeros(m, np.int64), L, free, NEAR, a)
+    if M.shape[0] == 0:
+        return 0
+    for r in range(m):
+        for i in range(n):
+            met[r] += J[r, i] * a[i]
+    for j in range(n):
+        for i in range(j, n):
+            rest = M[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            if i == j and not rest > 0.0:
+                return -1
+            L[i, j] = sqrt(rest) if i == j else rest / L[j, j]
+    solve(J, met, order, L, free, RANK, a)
     return 0

@@ -69,8 +69,6 @@ from .law import (
     model_torques,
 )
 
-NEAR = 1e-3
-"""Singular values of J, relative to its longest row, below which motions are damped."""
 _RANK = 1e-9  # relative singular value of rows that depend
 _FIRST = np.zeros(6, dtype=np.int64)
 _UNWEIGHTED = read_only(np.empty((0, 0)))
@@ -153,6 +151,8 @@ class TaskLaw(Law):
 
     def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
         """A sentence for postures of a motion (N, n) that are singular for the task, or nearly."""
+        from .kernels import NEAR
+
         if self.space == "joint":
             return ()
         J = jacobian(self.model, q, self.frame)
@@ -175,13 +175,13 @@ def accelerations(
 ) -> Array:
     """Joint accelerations (n,) with ``J a = wanted``, J (m, n); motions of no effect are `free`.
 
-    Damped near singular postures; with M (n, n) the least ones in its metric, not damped. Rows of
-    order 1 do not disturb those of order 0.
+    Damped near singular postures; with M (n, n) those least in its metric, where rows of order 1
+    do not disturb those of order 0.
     """
     from .kernels import resolved
 
-    a, least = np.empty(J.shape[1]), _RANK if len(M) else NEAR
-    if resolved(J, wanted, order[: len(J)], M, free, least, a) < 0:
+    a = np.empty(J.shape[1])
+    if resolved(J, wanted, order[: len(J)], M, free, a) < 0:
         raise SingularMassMatrixError(
             "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
             "inertia."
