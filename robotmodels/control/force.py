@@ -51,10 +51,6 @@ Examples
 >>> law = ParallelHybrid([0, 0, 1, 0, 0, 0], np.eye(4), dgm(arm, q), push, model=arm)
 >>> law.error(0.0, q, 0.0 * q, wrench=[0.0, 0.0, -5.0, 0.0, 0.0, 0.0]).round(9) + 0.0
 array([  0.,   0., -15.,   0.,   0.,   0.])
->>> inner = ComputedTorque(dgm(arm, q), omega=50.0, model=arm, space="task")
->>> law = ExternalForceLoop(inner, stiffness=1e4, gain=5.0, force=push)
->>> float(law.rate(0.0, q, 0.0 * q, law.state0)[2])
--0.01
 """
 
 from __future__ import annotations
@@ -131,10 +127,8 @@ def pushes(law: ForceTracking) -> Array:
 class _Split(TaskLaw):
     """Position in some directions of a task, force in the others."""
 
-    _forced: NDArray[np.bool_] = field(init=False)
+    _order: NDArray[np.int64] = field(init=False)  # 1 where a force is controlled
     _gains: Array = field(init=False)
-    _errors: Array = field(init=False)
-    _kinds: NDArray[np.int64] = field(init=False)
 
     def _prepare(self: Any, frame: str) -> None:
         check_model(self.model)
@@ -158,25 +152,22 @@ class _Split(TaskLaw):
             force = ForceTracking(*_FORCE_GAINS, reference=force, model=self.model)
         w, z = np.full((2, 6), [[np.max(position.omega)], [np.max(position.zeta)]])
         w[position.rows], z[position.rows] = position.omega, position.zeta
-        gains, forced = pushes(force), selection[self.rows]
-        gains[:, ~selection] = 0.0
-        gains[:3, ~selection] = -np.stack([w * w, 2.0 * z * w, np.ones(6)])[:, ~selection]
-        errors = np.zeros((10, len(forced)))
-        errors[0], errors[6], errors[7] = ~forced, -1.0 * forced, forced
-        self._set(position=position, force=force, _forced=forced, _errors=errors)
-        self._set(_gains=gains[:, self.rows], _kinds=(~forced).astype(np.int64))
-        self._set(selection=selection.astype(float), _free=2.0 * np.max(position.omega))
-        self._set(**{frame: given})
+        gains = np.where(selection, pushes(force), 0.0)
+        gains[:3] -= np.where(selection, 0.0, [w * w, 2.0 * z * w, np.ones(6)])
+        self._set(_gains=gains[:, self.rows], _order=selection[self.rows].astype(np.int64))
+        self._set(position=position, force=force, selection=selection.astype(float))
+        self._set(_free=2.0 * np.max(position.omega), **{frame: given})
 
     def _aims(self: Any, t: float, q: Array, v: Array, f: Array) -> tuple[Array, ...]:
         """Rows of `_tool`, Jacobian (m, n), wanted ``J a`` (m,) and torques (n,) of the wrench."""
         pose, force = self.position._desired(t), self.force._desired(t)
         rows, J, load = self._tool(q, v, pose, f, f, *force)
         wanted = np.einsum("kj,kj->j", self._gains, rows)
-        return rows, J[self._kinds, np.arange(len(wanted))], wanted, load
+        return rows, J[1 - self._order, np.arange(len(wanted))], wanted, load
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        return (self._errors * self._aims(t, q, v, f)[0]).sum(axis=0)
+        rows = self._aims(t, q, v, f)[0]
+        return np.where(self._order, rows[7] - rows[6], rows[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -202,11 +193,12 @@ class ParallelHybrid(_Split):
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         rows, J, wanted, load = self._aims(t, q, v, f)
-        forced, M = self._forced, mass_matrix(self.model, q)
+        M = mass_matrix(self.model, q)
         if self.inverse == "consistent":
-            a = accelerations(J, wanted, -self._free * v, forced.astype(np.int64), M)
+            a = accelerations(J, wanted, -self._free * v, self._order, M)
             return model_torques(self.model, q, v, a) + load
-        rest, J_f = np.zeros(self.n), J[forced]
+        rest, forced = np.zeros(self.n), self._order == 1
+        J_f = J[forced]
         servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)
         push = M @ accelerations(J_f, wanted[forced], rest, M=M) + J_f.T @ rows[7, forced]
         return servo + push + model_torques(self.model, q, v, rest)

@@ -39,8 +39,6 @@ Examples
 --------
 >>> DecentralizedPID([0.5, 0.2], kp=100.0, ki=50.0, kd=20.0).command(0, [0, 0], [0, 0], [0, 0])
 array([50., 20.])
->>> PDGravity([0.5, 0.2], kp=100.0, kd=20.0).command(0.0, [0.0, 0.0], [1.0, 0.0])
-array([30., 20.])
 >>> from robotmodels.robots import load
 >>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
 ('ZZ1', 'ZZ2', 'MX2', 'MY2')
