@@ -61,13 +61,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, as_mask
+from .._arrays import Array, as_floats, as_mask
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
-from .law import NO_WRENCH, WRENCH, as_gains, as_reference, as_word, desired_of, model_torques
-from .task_laws import ComputedTorque, Impedance, TaskLaw, accelerations, as_flags
+from .law import NO_WRENCH, WRENCH, as_word, model_torques
+from .task_laws import ComputedTorque, Impedance, TaskLaw, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FED = {"measured": 6, "desired": 7}
@@ -95,13 +95,11 @@ class ForceTracking(TaskLaw):
     def __post_init__(self) -> None:
         check_model(self.model)
         as_word(self.feedforward, ("desired", "measured"), "feedforward")
-        for name in ("kp", "kv", "ke"):
-            self._set(**{name: np.full(6, as_gains(getattr(self, name), name, 6))})
+        self._keep_gains(("kp", "kv", "ke"), 6, rows=range(6))
+        self._keep_reference(WRENCH)
         rows = np.flatnonzero(as_mask(self.mask))
         self._set(rows=rows, _axes=np.eye(6)[rows], _free=float(np.max(self.kv)))
-        self._set(_desired=desired_of(self.reference, WRENCH, "force reference"))
-        self._set(mask=as_flags(self.mask), reference=as_reference(self.reference))
-        self._set(_gains=pushes(self)[:, rows])
+        self._set(mask=as_flags(self.mask), _gains=pushes(self)[:, rows])
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         rows, J, _ = self._tool(q, v, _NOWHERE, NO_WRENCH, f, *self._desired(t))
@@ -132,9 +130,10 @@ class _Split(TaskLaw):
 
     def _prepare(self: Any, frame: str) -> None:
         check_model(self.model)
-        given = as_reference(getattr(self, frame))
-        if np.shape(given) not in ((3, 3), (4, 4)):
-            raise ShapeError(f"{frame}: expected shape (4, 4) or (3, 3), got {np.shape(given)}.")
+        axes = getattr(self, frame)
+        given = as_floats(getattr(axes, "homogeneous", axes), frame)
+        if given.shape not in ((3, 3), (4, 4)):
+            raise ShapeError(f"{frame}: expected shape (4, 4) or (3, 3), got {given.shape}.")
         T = np.eye(4)
         T[:3, :3] = given[:3, :3]
         selection = as_mask(self.selection, name="selection")
@@ -195,12 +194,12 @@ class ParallelHybrid(_Split):
         rows, J, wanted, load = self._aims(t, q, v, f)
         M = mass_matrix(self.model, q)
         if self.inverse == "consistent":
-            a = accelerations(J, wanted, -self._free * v, self._order, M)
+            a = self._resolved(J, wanted, v, self._order, M)
             return model_torques(self.model, q, v, a) + load
         rest, forced = np.zeros(self.n), self._order == 1
         J_f = J[forced]
-        servo = np.mean(np.diag(M)) * accelerations(J, np.where(forced, 0.0, wanted), rest)
-        push = M @ accelerations(J_f, wanted[forced], rest, M=M) + J_f.T @ rows[7, forced]
+        servo = np.mean(np.diag(M)) * self._resolved(J, np.where(forced, 0.0, wanted), rest)
+        push = M @ self._resolved(J_f, wanted[forced], rest, M=M) + J_f.T @ rows[7, forced]
         return servo + push + model_torques(self.model, q, v, rest)
 
 
@@ -255,10 +254,8 @@ class ExternalForceLoop(TaskLaw):
                 f"Impedance), got {inner!r:.80}."
             )
         rows = inner.rows
-        for name in ("stiffness", "gain"):
-            gains = as_gains(getattr(self, name), name, len(rows), rows=rows)
-            self._set(**{name: gains})
-        self._set(_desired=desired_of(self.force, WRENCH, "force"), force=as_reference(self.force))
+        self._keep_gains(("stiffness", "gain"), len(rows), rows=rows)
+        self._keep_reference(WRENCH, name="force")
         self._set(_active=as_mask(self.mask)[rows].astype(float), mask=as_flags(self.mask))
         self._set(model=inner.model, rows=rows, state0=np.zeros(len(rows)))
 

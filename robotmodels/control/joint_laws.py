@@ -61,7 +61,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
 from ..regressors.drives import add_torques, friction_terms, rotor_terms
-from .law import Desired, Law, as_gains, as_reference, as_word, joints_of, started, virtual_torques
+from .law import Desired, Law, as_word, started, virtual_torques
 
 _REMAINS = 0.2
 """Part of an error of a parameter that remains where the motion excites it too little."""
@@ -139,10 +139,8 @@ class JointLaw(Law):
         """Check the model, the reference and the gains."""
         if model is not None:
             check_model(model)
-        desired, n = joints_of(self.reference, model and model.n)
-        self._set(reference=as_reference(self.reference), n=n, _desired=desired)
-        for name in gains:
-            self._set(**{name: as_gains(getattr(self, name), name, n, name == zero)})
+        self._set(n=self._keep_reference(n=model and model.n))
+        self._keep_gains(gains, self.n, zero)
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self._desired(t)[0] - q
@@ -337,7 +335,8 @@ class AdaptiveSlotineLi(SurfaceLaw):
         names = tuple(base.names if base else parameter_names(self.model, self.drive))
         blocks, p = standard_blocks(self.model, self.drive, None), len(names)
         start = np.zeros(p) if self.start is None else as_exact(self.start, (p,), "start")
-        self._set(adaptation=as_gains(self.adaptation, "adaptation", p), start=start, state0=start)
+        self._keep_gains(("adaptation",), p)
+        self._set(start=start, state0=start)
         self._set(base=base, names=names, _chosen=chosen_columns(blocks, names, self.model))
 
     def true_values(self, plant: RobotModel) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
 from ..dynamics import gravity_torque, idm
@@ -72,6 +71,42 @@ class Law(Value):
                 value = read_only(value, value.dtype.type)
             object.__setattr__(self, name, value)
 
+    def _keep_gains(
+        self, names: tuple[str, ...], n: int | None, zero: str = "", rows: Any = None
+    ) -> None:
+        """Check positive gains: one number, or one for each of n components; six are of all rows.
+
+        Those of the name `zero` may be zero. With rows each component gets its own.
+        """
+        for name in names:
+            gains = as_floats(getattr(self, name), name)
+            if rows is not None and gains.shape == (6,):
+                gains = gains[rows]
+            if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
+                wanted = "(n,)" if n is None else f"({n},)"
+                more = "" if rows is None else " or (6,)"
+                raise ShapeError(
+                    f"{name}: expected one number or shape {wanted}{more}, got {gains.shape}."
+                )
+            if not (gains > 0.0).all() and not (name == zero and (gains >= 0.0).all()):
+                least = "at least 0" if name == zero else "above 0"
+                raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
+            self._set(**{name: gains if rows is None else np.full(len(rows), gains)})
+
+    def _keep_reference(
+        self, shapes: Any = None, n: int | None = None, name: Any = "reference"
+    ) -> int:
+        """Check the reference: of joints (their number is the answer), a pose or a wrench."""
+        given = getattr(self, name)
+        desired = desired_of(given, shapes, name)
+        if not (callable(given) or isinstance(given, (Trajectory, PoseTrajectory))):
+            given = desired(0.0)[0]
+        self._set(_desired=desired, **{name: given})
+        size = desired(0.0)[0].size
+        if n is not None and size != n:
+            raise ShapeError(f"{name}: expected {n} joints, those of the model, got {size}.")
+        return size
+
     def _measured(self, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Array, ...]:
         """Checked q, v, x and wrench; the wrench is zero without a sensor."""
         k = self.state0.size
@@ -99,44 +134,11 @@ class Law(Value):
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def as_gains(
-    value: ArrayLike, name: str, n: int | None = None, zero: bool = False, rows: Any = None
-) -> Array:
-    """Positive numbers: one, or one for each of n components; of six components those of rows."""
-    gains = as_floats(value, name)
-    if rows is not None and gains.shape == (6,):
-        gains = gains[rows]
-    if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
-        wanted = "(n,)" if n is None else f"({n},)"
-        more = "" if rows is None else " or (6,)"
-        raise ShapeError(f"{name}: expected one number or shape {wanted}{more}, got {gains.shape}.")
-    if not ((gains >= 0.0) if zero else (gains > 0.0)).all():
-        least = "at least 0" if zero else "above 0"
-        raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
-    return gains.copy() if rows is None else np.full(n or 0, gains)
-
-
 def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
     """Refuse a choice that is not listed."""
     if value not in words:
         wanted = " or ".join(map(repr, words))
         raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")
-
-
-def as_reference(reference: Any) -> Any:
-    """Motions and functions as they are; constants as arrays that nobody changes."""
-    if callable(reference) or isinstance(reference, (Trajectory, PoseTrajectory)):
-        return reference
-    return read_only(as_floats(getattr(reference, "homogeneous", reference), "reference"))
-
-
-def joints_of(reference: Any, n: int | None) -> tuple[Desired, int]:
-    """Positions, velocities and accelerations (n,) over time, and n."""
-    desired = desired_of(reference)
-    size = desired(0.0)[0].size
-    if n is not None and size != n:
-        raise ShapeError(f"reference: expected {n} joints, those of the model, got {size}.")
-    return desired, size
 
 
 def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:
@@ -183,7 +185,7 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
         value = as_single_pose(reference, name).copy()
     elif shapes is WRENCH:
         value = as_exact(reference, (6,), name).copy()
-    elif (value := as_reference(reference)).ndim != 1:
+    elif (value := as_floats(reference, name).copy()).ndim != 1:
         raise ShapeError(f"{name}: expected positions of shape (n,), got {value.shape}.")
     rest = np.zeros(value.size if shapes is None else 6)
     return lambda t: (value, rest, rest)

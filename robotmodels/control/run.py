@@ -224,8 +224,7 @@ def run(
         if values := [value for value in ways if value is not None]:
             lyapunov = np.array(values)
     status, notes = _outcome(model, motion, errors, loop)
-    if (more := getattr(law, "notes", None)) is not None:
-        notes += more(motion.t, motion.q, motion.v)
+    notes += law.notes(motion.t, motion.q, motion.v) if isinstance(law, Law) else ()
     return ControlledMotion(law, motion, errors, wrench, lyapunov, status, notes)
 
 

@@ -50,7 +50,7 @@ from .._arrays import Array, as_floats, as_number, as_reals
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from .joint_laws import SurfaceLaw
-from .law import NONE, as_gains, model_torques
+from .law import NONE, model_torques
 
 _MOST_STEPS = 10_000_000
 
@@ -62,10 +62,9 @@ class _Sliding(SurfaceLaw):
     def _begin(self: Any, gains: tuple[str, ...]) -> None:
         if self.reference is not None:
             self._prepare(gains, self.model, zero="layer")
-            return
-        self._set(n=None, _desired=None)  # the scalar law alone
-        for name in gains:
-            self._set(**{name: as_gains(getattr(self, name), name, None, name == "layer")})
+        else:  # the scalar law alone
+            self._set(n=None, _desired=None)
+            self._keep_gains(gains, None, "layer")
 
     def _torques(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         v_r, a_r = self._rates(t, q, v)

@@ -52,18 +52,7 @@ from .._arrays import Array, as_mask, read_only
 from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import (
-    NO_WRENCH,
-    POSE,
-    Desired,
-    Law,
-    as_gains,
-    as_reference,
-    as_word,
-    desired_of,
-    joints_of,
-    model_torques,
-)
+from .law import NO_WRENCH, POSE, Desired, Law, as_word, model_torques
 
 _RANK = 1e-9  # relative singular value of rows that depend
 _FIRST = np.zeros(6, dtype=np.int64)
@@ -85,11 +74,8 @@ class TaskLaw(Law):
     def _prepare(self: Any, gains: tuple[str, ...]) -> None:
         check_model(self.model)
         self._set_rows()
-        self._set(reference=as_reference(self.reference))
-        self._set(_desired=desired_of(self.reference, POSE))
-        for name in gains:
-            value, rows = getattr(self, name), self.rows
-            self._set(**{name: as_gains(value, name, len(rows), rows=rows)})
+        self._keep_reference(POSE)
+        self._keep_gains(gains, len(self.rows), rows=self.rows)
 
     def _set_rows(self: Any, turn: Array | None = None) -> None:
         """Rows of the task, m <= n: of the mask, or the first that the robot moves alone."""
@@ -142,8 +128,19 @@ class TaskLaw(Law):
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self._task(t, q, v)[0][0]
 
-    def _resolved(self: Any, J: Array, wanted: Array, v: Array) -> Array:
-        return accelerations(J, wanted, -self._free * v)
+    def _resolved(
+        self: Any, J: Array, wanted: Array, v: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
+    ) -> Array:
+        """Joint accelerations with ``J a = wanted``; see the kernel."""
+        from .kernels import resolved
+
+        a = np.empty(self.n)
+        if resolved(J, wanted, order[: len(J)], M, -self._free * v, a) < 0:
+            raise SingularMassMatrixError(
+                "model: the mass matrix is singular; a hybrid law needs a model whose joints all "
+                "have inertia."
+            )
+        return a
 
     def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
         """A sentence for postures of a motion (N, n) that are singular for the task, or nearly."""
@@ -164,25 +161,6 @@ class TaskLaw(Law):
 def as_flags(mask: Any) -> Array | None:
     """A mask as zeros and ones (6,)."""
     return None if mask is None else as_mask(mask).astype(np.float64)
-
-
-def accelerations(
-    J: Array, wanted: Array, free: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
-) -> Array:
-    """Joint accelerations (n,) with ``J a = wanted``, J (m, n); motions of no effect are `free`.
-
-    Damped near singular postures; with M (n, n) those least in its metric, where rows of order 1
-    do not disturb those of order 0.
-    """
-    from .kernels import resolved
-
-    a = np.empty(J.shape[1])
-    if resolved(J, wanted, order[: len(J)], M, free, a) < 0:
-        raise SingularMassMatrixError(
-            "model: the mass matrix is singular; a hybrid law needs a model whose joints all have "
-            "inertia."
-        )
-    return a
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -206,10 +184,8 @@ class ComputedTorque(TaskLaw):
         if self.space == "task":
             self._prepare(("omega", "zeta"))
         else:
-            desired, n = joints_of(self.reference, self.model.n)
-            self._set(reference=as_reference(self.reference), rows=np.arange(n), _desired=desired)
-            omega, zeta = as_gains(self.omega, "omega", n), as_gains(self.zeta, "zeta", n)
-            self._set(omega=np.full(n, omega), zeta=np.full(n, zeta))
+            self._set(rows=np.arange(self._keep_reference(n=self.n)))
+            self._keep_gains(("omega", "zeta"), self.n, rows=self.rows)
         self._set(_free=2.0 * float(np.max(self.zeta * self.omega)))
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
