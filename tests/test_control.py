@@ -82,6 +82,19 @@ def test_computed_torque_makes_the_error_linear(seed):
     assert np.allclose(run.error, goal.q(t) - run.q, atol=1e-12)
 
 
+def test_joints_at_rest_get_the_dry_friction_of_their_way():
+    model = arm().with_drive(DriveParameters(Fc=[3.0, 2.0], Ia=[0.1, 0.1]))
+    weight, M = gravity_torque(model, Q0), mass_matrix(model, Q0)
+    goal = Q0 + np.array([0.1, -0.2])
+    friction = [3.0, -2.0]
+    law = control.ComputedTorque(goal, omega=5.0, model=model)
+    expected = weight + M @ [2.5, -5.0] + friction
+    assert np.allclose(law.command(0.0, Q0, [0.0, 0.0]), expected, atol=1e-12)
+    law = control.Passivity(goal, slope=2.0, gain=4.0, model=model)
+    expected = weight + 4.0 * np.array([0.2, -0.4]) + friction
+    assert np.allclose(law.command(0.0, Q0, [0.0, 0.0]), expected, atol=1e-12)
+
+
 def turning(t):
     """Pose, twist and acceleration of a tool that moves and turns about changing axes."""
     w = np.array([0.3, -0.5, 0.9])

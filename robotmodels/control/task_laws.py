@@ -66,7 +66,8 @@ class TaskLaw(Law):
     rows: NDArray[np.int64] = field(init=False)
     _desired: Desired = field(init=False)
     _axes: Array | None = field(init=False)
-    _free: float = field(init=False)
+    _linear: Array = field(init=False)  # factors (3, m) of rate, error and force
+    _free: float = field(init=False)  # damping of motions of no effect
 
     space = "task"
     frame = None
@@ -128,6 +129,23 @@ class TaskLaw(Law):
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self._task(t, q, v)[0][0]
 
+    def _obey(self: Any, damping: Array, stiffness: Array, softness: Array) -> None:
+        """Keep factors of ``e'' + damping e' + stiffness e = softness force``, each (m,)."""
+        self._set(_linear=np.stack([damping, stiffness, softness]), _free=float(np.max(damping)))
+
+    def _torques(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.shifted(t, q, v, 0.0, 0.0, f)
+
+    def shifted(
+        self: Any, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
+    ) -> Array:
+        """Torques with the error shifted at this speed (m,); the wrench (6,) is compensated."""
+        (e, de, drift, force, *_), J, load = self._task(t, q, v, wrench)
+        damping, stiffness, softness = self._linear
+        pull = damping * (de + speed) + stiffness * (e + by) + drift - softness * force
+        a = pull if J is None else self._resolved(J[1], -pull, v)
+        return model_torques(self.model, q, v, a) + load
+
     def _resolved(
         self: Any, J: Array, wanted: Array, v: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
     ) -> Array:
@@ -186,20 +204,10 @@ class ComputedTorque(TaskLaw):
         else:
             self._set(rows=np.arange(self._keep_reference(n=self.n)))
             self._keep_gains(("omega", "zeta"), self.n, rows=self.rows)
-        self._set(_free=2.0 * float(np.max(self.zeta * self.omega)))
+        self._obey(2.0 * self.zeta * self.omega, self.omega**2, 0.0 * self.omega)
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         return self.shifted(t, q, v, 0.0, 0.0)
-
-    def shifted(
-        self, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
-    ) -> Array:
-        """Torques with the error shifted at this speed (m,); a wrench (6,) is compensated."""
-        w, damping = self.omega, 2.0 * self.zeta * self.omega
-        (e, de, drift, *_), J, load = self._task(t, q, v, wrench)
-        pull = damping * (de + speed) + w * w * (e + by) + drift
-        a = pull if self.space == "joint" else self._resolved(J[1], -pull, v)
-        return model_torques(self.model, q, v, a) + load
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``(e'^T e' + e^T omega^2 e) / 2``, that of the linear error."""
@@ -210,7 +218,7 @@ class ComputedTorque(TaskLaw):
         if self.space == "task":
             return TaskLaw._task(self, t, q, v, wrench)
         q_d, v_d, a_d = self._desired(t)
-        return (q_d - q, v_d - v, a_d), None, 0.0
+        return (q_d - q, v_d - v, a_d, 0.0), None, 0.0
 
 
 class _Compliant(TaskLaw):
@@ -243,18 +251,7 @@ class Impedance(_Compliant):
 
     def __post_init__(self) -> None:
         self._prepare(("M", "B", "K"))
-        self._set(_free=float(np.max(self.B / self.M)))
-
-    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        return self.shifted(t, q, v, 0.0, 0.0, f)
-
-    def shifted(
-        self, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
-    ) -> Array:
-        """Torques with the error shifted at this speed (m,)."""
-        (e, de, drift, force, *_), J, load = self._task(t, q, v, wrench)
-        pull = (force - self.B * (de + speed) - self.K * (e + by)) / self.M
-        return model_torques(self.model, q, v, self._resolved(J[1], pull - drift, v)) + load
+        self._obey(self.B / self.M, self.K / self.M, 1.0 / self.M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -278,19 +275,16 @@ class Admittance(_Compliant):
 
     def __post_init__(self) -> None:
         self._prepare(("M", "B", "K", "omega", "zeta"))
-        free = 2.0 * float(np.max(self.zeta * self.omega))
-        self._set(state0=np.zeros(2 * len(self.rows)), _free=free)
+        self._obey(2.0 * self.zeta * self.omega, self.omega**2, 1.0 / self.M)
+        self._set(state0=np.zeros(2 * len(self.rows)))
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        (e, de, drift, force, *_), J, load = self._task(t, q, v, f)
-        xi, rate, second = self._motion(x, force)
-        w, damping = self.omega, 2.0 * self.zeta * self.omega
-        wanted = -second - damping * (de + rate) - w * w * (e + xi) - drift
-        return model_torques(self.model, q, v, self._resolved(J[1], wanted, v)) + load
+        damping, stiffness, _ = self._linear
+        xi, rate = x.reshape(2, -1)
+        pull = (damping - self.B / self.M) * rate + (stiffness - self.K / self.M) * xi
+        return self.shifted(t, q, v, pull / stiffness, 0.0, f)
 
     def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
-        return np.concatenate(self._motion(x, self._task(t, q, v, f)[0][3])[1:])
-
-    def _motion(self, x: Array, force: Array) -> tuple[Array, Array, Array]:
         xi, rate = x.reshape(2, -1)
-        return xi, rate, -(force + self.B * rate + self.K * xi) / self.M
+        force = self._task(t, q, v, f)[0][3]
+        return np.concatenate([rate, -(force + self.B * rate + self.K * xi) / self.M])
