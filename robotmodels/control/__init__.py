@@ -4,11 +4,17 @@ A law is a frozen value with ``command(t, q, v, x) -> tau``, its state ``state0`
 v, x)``, the derivative of the state; laws that use forces take the measured ``wrench`` last.
 """
 
-from .adaptive import AdaptiveSlotineLi, slotine_li_regressor
 from .force import ConstrainedDecoupling, ExternalForceLoop, ForceTracking, ParallelHybrid
-from .joint_laws import DecentralizedPID, Passivity, PDGravity, PIDGains, pid_gains
-from .result import ControlledMotion, ControlStatus
-from .run import run
+from .joint_laws import (
+    AdaptiveSlotineLi,
+    DecentralizedPID,
+    Passivity,
+    PDGravity,
+    PIDGains,
+    pid_gains,
+    slotine_li_regressor,
+)
+from .run import ControlledMotion, ControlStatus, run
 from .sliding import SlidingMode, SuperTwisting, first_order
 from .task_laws import Admittance, ComputedTorque, Impedance
 from .walls import SpringWall

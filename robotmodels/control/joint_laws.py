@@ -1,19 +1,28 @@
-"""Laws of the joints with constant gains: decentralised PID, PD with gravity, passivity.
+"""Laws of the joints with constant or adapted gains: PID, PD with gravity, passivity, adaptation.
 
-The error is ``e = q_d - q``; gains are one number or one for each joint.
+The error is ``e = q_d - q``; gains are one number or one for each joint. Passivity-based laws have
+``s = e' + slope e = q_r' - q'`` with the reference velocity ``q_r' = q_d' + slope e``.
 
 Parameters
 ----------
 reference : Trajectory, array_like (n,) or callable
     Positions: a motion, a constant, or a function of t that returns (q, v, a).
 model : RobotModel
-    The robot as the controller believes it to be, n joints.
+    The robot as the controller believes it to be, n joints; adaptive control ignores its inertia.
 kp, ki, kd : float or array_like
     Gains of the error, of its integral and of its rate; ki may be 0.
 slope, gain : float or array_like
-    Rate at which the error vanishes where ``s = e' + slope e`` is 0, 1/s; torque by s, N m s/rad.
+    Rate at which the error vanishes where s is 0, 1/s; torque by s, N m s/rad.
 feedforward : RobotModel or array_like (n,), optional
     Constant torques, or a model whose torques of the reference motion are added.
+adaptation : float or array_like, shape (p,)
+    Gains of the estimates.
+parameters : {"base", "standard"}
+    Estimated parameters. Standard ones drift along combinations that have no effect.
+start : array_like, shape (p,), optional
+    Estimates at the start; default zero.
+drive : bool or collection of DriveKind or str
+    Drive parameters that are estimated, too, as in `torque_regressor`.
 
 Raises
 ------
@@ -22,16 +31,17 @@ ShapeError, InvalidValueError
 
 References
 ----------
-Seed book section 5.2.5 (decentralised control); M. Takegaki and S. Arimoto, ASME J. Dyn. Syst.
-Meas. Control 103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and
-W. Li, "Applied Nonlinear Control", 1991, section 9.2.
+Seed book sections 5.2.5 and 5.2.8; M. Takegaki and S. Arimoto, ASME J. Dyn. Syst. Meas. Control
+103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and W. Li, "On the
+adaptive control of robot manipulators", Int. J. Robotics Research 6(3), 1987.
 
 Examples
 --------
 >>> DecentralizedPID([0.5, 0.2], kp=100.0, ki=50.0, kd=20.0).command(0, [0, 0], [0, 0], [0, 0])
 array([50., 20.])
->>> PDGravity([0.5, 0.2], kp=100.0, kd=20.0).command(0.0, [0.0, 0.0], [1.0, 0.0])
-array([30., 20.])
+>>> from robotmodels.robots import load
+>>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
+('ZZ1', 'ZZ2', 'MX2', 'MY2')
 """
 
 from __future__ import annotations
@@ -40,13 +50,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, as_number, as_vector
+from .._arrays import Array, Value, as_exact, as_number, as_vector, batch_rows
+from ..drive import Drives
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
+from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
-from .law import Law, as_gains, started, virtual_torques
-from .reference import Desired, as_reference, joint_reference
+from ..regressors import parameter_names, parameter_vector
+from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
+from ..regressors.drives import add_torques, friction_terms, rotor_terms
+from .law import Desired, Law, as_word, started, virtual_torques
+
+_REMAINS = 0.2
+"""Part of an error of a parameter that remains where the motion excites it too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +76,14 @@ class PIDGains(Value):
     kd: float
     inertia: float
     viscous: float = 0.0
+
+    @property
+    def poles(self) -> NDArray[Any]:
+        """Poles of the controlled joint, 1/s, shape (3,): unstable with a positive real part.
+
+        They are the roots of ``inertia s^3 + (kd + viscous) s^2 + kp s + ki``.
+        """
+        return np.roots([self.inertia, self.kd + self.viscous, self.kp, self.ki])
 
     @property
     def critical_ki(self) -> float:
@@ -74,6 +100,8 @@ class PIDGains(Value):
 def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     """Gains of a PID controller that give a joint a triple pole at -omega.
 
+    ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
+
     Parameters
     ----------
     inertia, viscous, omega : float
@@ -83,7 +111,6 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     Returns
     -------
     PIDGains
-        ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
 
     Examples
     --------
@@ -112,14 +139,11 @@ class JointLaw(Law):
         """Check the model, the reference and the gains."""
         if model is not None:
             check_model(model)
-        desired, n = joint_reference(self.reference, model and model.n)
-        self._set(reference=as_reference(self.reference), n=n, _desired=desired)
-        for name in gains:
-            self._set(**{name: as_gains(getattr(self, name), name, n, name == zero)})
+        self._set(n=self._keep_reference(n=model and model.n))
+        self._keep_gains(gains, self.n, zero)
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the joints, shape (n,)."""
-        return self._desired(t)[0] - as_vector(q, self.n, "q")
+    def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._desired(t)[0] - q
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -128,18 +152,18 @@ class SurfaceLaw(JointLaw):
 
     def surface(self, t: float, q: Any, v: Any) -> Array:
         """``s = e' + slope e``, shape (n,)."""
-        _, v, v_r, _ = self._rates(t, q, v)
-        return v_r - v
+        q, v, *_ = self._measured(q, v, self.state0, None)
+        return self._rates(t, q, v)[0] - v
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``s^T A s / 2``."""
         s = self.surface(t, q, v)
         return 0.5 * float(s @ mass_matrix(plant, q) @ s)
 
-    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
-        """Also velocity ``q_d' + slope e`` and acceleration that reduce the error."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
-        return q, v, v_d + self.slope * (q_d - q), a_d + self.slope * (v_d - v)
+    def _rates(self: Any, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Velocity ``q_d' + slope e`` and acceleration that reduce the error."""
+        q_d, v_d, a_d = self._desired(t)
+        return v_d + self.slope * (q_d - q), a_d + self.slope * (v_d - v)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -151,30 +175,25 @@ class DecentralizedPID(JointLaw):
     ki: Any
     kd: Any
     feedforward: Any = None
+    state0: Array = field(init=False)
 
     def __post_init__(self) -> None:
         given = self.feedforward
         model = given if isinstance(given, RobotModel) else None
         self._prepare(("kp", "ki", "kd"), model, zero="ki")
+        self._set(state0=np.zeros(self.n))
         if given is not None and not isinstance(given, RobotModel):
             self._set(feedforward=as_exact(given, (self.n,), "feedforward"))
 
-    @property
-    def state0(self) -> Array:
-        """Integral of the error at the start, zero, shape (n,)."""
-        return np.zeros(self.n)
-
-    def command(self, t: float, q: Any, v: Any, x: Any, wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
-        tau = self.kp * (q_d - q) + self.kd * (v_d - v) + self.ki * as_vector(x, self.n, "x")
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        q_d, v_d, a_d = self._desired(t)
+        tau = self.kp * (q_d - q) + self.kd * (v_d - v) + self.ki * x
         if isinstance(self.feedforward, RobotModel):
             return tau + idm(self.feedforward, q_d, v_d, a_d)
         return tau if self.feedforward is None else tau + self.feedforward
 
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """The error, shape (n,)."""
-        return self.error(t, q, v)
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._desired(t)[0] - q
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -194,9 +213,8 @@ class PDGravity(JointLaw):
     def __post_init__(self) -> None:
         self._prepare(("kp", "kd"), self.model)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        (q_d, v_d, a_d), (q, v, _) = self._desired(t), self._measured(q, v)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        q_d, v_d, a_d = self._desired(t)
         tau = self.kp * (q_d - q) + self.kd * (v_d - v)
         if (model := self.model) is None:
             return tau
@@ -207,17 +225,15 @@ class PDGravity(JointLaw):
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
         """``(e'^T A e' + e^T kp e) / 2``, with the rate ``-e'^T kd e'`` without friction."""
-        e, de = self.error(t, q, v), self._desired(t)[1] - v
+        q_d, v_d, _ = self._desired(t)
+        e, de = q_d - q, v_d - v
         V = 0.5 * float(de @ mass_matrix(plant, q) @ de + e @ (self.kp * e))
         return None if self.model is None else V
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Passivity(SurfaceLaw):
-    """Passivity-based control: ``tau = A(q) q_r'' + C(q, q') q_r' + Q(q) + friction + gain s``.
-
-    The reference velocity is ``q_r' = q_d' + slope e``, and ``s = q_r' - q'``.
-    """
+    """Passivity-based control: ``tau = A(q) q_r'' + C(q, q') q_r' + Q(q) + friction + gain s``."""
 
     reference: Any
     slope: Any
@@ -228,9 +244,138 @@ class Passivity(SurfaceLaw):
         check_model(self.model)
         self._prepare(("slope", "gain"), self.model)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        q, v, v_r, a_r = self._rates(t, q, v)
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        v_r, a_r = self._rates(t, q, v)
         tau = virtual_torques(self.model, q, v, v_r, a_r) + self.gain * (v_r - v)
         drives = self.model.drive_matrices
         return tau if drives is None else tau + drives.torque(started(v, v_r), a_r)
+
+
+def slotine_li_regressor(
+    model: RobotModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    v_r: ArrayLike,
+    a_r: ArrayLike,
+    drive: Drives = True,
+) -> Array:
+    """Regressor of ``A a_r + C(q, v) v_r + Q``, with the friction of the drives at v.
+
+    Parameters
+    ----------
+    model, drive
+        The robot, whose inertia is not used, and its drive parameters with columns.
+    q, v, v_r, a_r : array_like, shape (..., n)
+        Joint variables (rad or m), their velocities, reference velocities and accelerations; the
+        leading axes broadcast.
+
+    Returns
+    -------
+    ndarray, shape (..., n, p)
+        Columns as `parameter_names`.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> Y = slotine_li_regressor(one, [0.0], [3.0], [1.0], [2.0])
+    >>> dict(zip(parameter_names(one), Y[0].tolist(), strict=True))["ZZ1"]
+    2.0
+    """
+    check_model(model)
+    given = {"q": q, "v": v, "v_r": v_r, "a_r": a_r}
+    vectors = tuple(as_vector(x, model.n, name) for name, x in given.items())
+    batch, rows = batch_rows(vectors, tuple(given))
+    chosen = chosen_columns(standard_blocks(model, drive, None), None, model)
+    return _regressors(model, chosen, *rows).reshape(*batch, model.n, chosen.count)
+
+
+def _regressors(
+    model: RobotModel, chosen: ChosenColumns, q: Array, v: Array, v_r: Array, a_r: Array
+) -> Array:
+    """The regressor of rows (N, n), shape (N, n, c): a difference of squares of half sums."""
+    from ..kernels.regressors import torque_regressors
+
+    W, squares = np.empty((2, len(q), model.n, chosen.count))
+    links, zero = chosen.places[LINKS], np.zeros(3)
+    torque_regressors(q, 0.5 * (v + v_r), a_r, model.chain, model.gravity, links, W)
+    torque_regressors(q, 0.5 * (v - v_r), 0.0 * a_r, model.chain, zero, links, squares)
+    W -= squares
+    add_torques(chosen, rotor_terms(model, a_r), W)
+    add_torques(chosen, friction_terms(model, q, v, None), W)
+    return W
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AdaptiveSlotineLi(SurfaceLaw):
+    """Adaptive control of Slotine and Li: ``tau = Y theta + gain s``, the state is theta.
+
+    With the regressor Y of `slotine_li_regressor`, ``theta' = adaptation Y^T s``. Errors of
+    tracking vanish whatever theta; theta itself converges where the motion excites it.
+    """
+
+    reference: Any
+    slope: Any
+    gain: Any
+    adaptation: Any
+    parameters: str = "base"
+    start: Any = None
+    model: RobotModel = None  # type: ignore[assignment]
+    drive: Drives = True
+    names: tuple[str, ...] = field(init=False)
+    state0: Array = field(init=False)
+    base: BaseParameters | None = field(init=False)
+    _chosen: ChosenColumns = field(init=False)
+
+    def __post_init__(self) -> None:
+        check_model(self.model)
+        self._prepare(("slope", "gain"), self.model)
+        as_word(self.parameters, ("base", "standard"), "parameters")
+        base = base_parameters(self.model, drive=self.drive) if self.parameters == "base" else None
+        names = tuple(base.names if base else parameter_names(self.model, self.drive))
+        blocks, p = standard_blocks(self.model, self.drive, None), len(names)
+        start = np.zeros(p) if self.start is None else as_exact(self.start, (p,), "start")
+        self._keep_gains(("adaptation",), p)
+        self._set(start=start, state0=start)
+        self._set(base=base, names=names, _chosen=chosen_columns(blocks, names, self.model))
+
+    def true_values(self, plant: RobotModel) -> Array:
+        """Parameters (p,) of a robot of the same structure, to which the estimates converge."""
+        return self.base.values(plant) if self.base else parameter_vector(plant, self.drive)
+
+    def regressor(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Y, shape (n, p), and s, shape (n,)."""
+        v_r, a_r = self._rates(t, q, v)
+        rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
+        return _regressors(self.model, self._chosen, *rows)[0], v_r - v
+
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return Y @ x + self.gain * s
+
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        Y, s = self.regressor(t, q, v)
+        return self.adaptation * (s @ Y)
+
+    def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
+        """``(s^T A s + sum of squared errors of the estimates / adaptation) / 2``."""
+        missing = self.true_values(plant) - x
+        kinetic = SurfaceLaw.lyapunov(self, plant, t, q, v, x)
+        return kinetic + 0.5 * float(missing @ (missing / self.adaptation))
+
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """A sentence that names the parameters that a motion (N, n) excites too little."""
+        if len(t) < 2:
+            return ()
+        # errors of estimates decrease as theta' = -adaptation Y^T Y / gain theta, on average
+        root = np.sqrt(np.broadcast_to(self.adaptation, (len(self.names),)))
+        Y = np.array([self.regressor(*row)[0] for row in zip(t, q, v, strict=True)])
+        Y = Y * root / np.sqrt(np.broadcast_to(self.gain, (self.n,)))[:, None]
+        # persistent excitation: the second half, as if all of the run were like it
+        weights = 2.0 * np.convolve(np.diff(t), [0.5, 0.5]) * (t > 0.5 * (t[0] + t[-1]))
+        size, axes = np.linalg.eigh(np.einsum("k,kij,kil->jl", weights, Y, Y))
+        remains = (axes * axes) @ np.exp(-np.maximum(size, 0.0))
+        few = [name for name, part in zip(self.names, remains, strict=True) if part > _REMAINS]
+        names = ", ".join(few)
+        sentence = f"The motion excites these parameters too little to estimate: {names}."
+        return (sentence,) if few else ()

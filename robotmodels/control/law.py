@@ -1,21 +1,29 @@
-"""Parts of all control laws: their defaults, gains, and the model that the controller believes."""
+"""Parts of all control laws: defaults, gains, references, and torques of the believed model."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_floats, as_vector, read_only
+from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
 from ..dynamics import gravity_torque, idm
+from ..dynamics.inverse import motion_torques, warn_without_masses
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
+from ..se3 import as_single_pose
+from ..trajectories import PoseTrajectory, Trajectory
 
 NONE = read_only([])
 NO_WRENCH = read_only(np.zeros(6))
+POSE = (4, 4), (6,), (6,)
+WRENCH = (6,), (6,), (6,)
 _SLOWEST = 5e-324
+
+Desired = Callable[[float], tuple[Array, ...]]
+"""Value, rate and second rate at a time."""
 
 
 class Law(Value):
@@ -23,26 +31,35 @@ class Law(Value):
 
     __slots__ = ()
 
-    switches = False
+    switches: Any = False
     """Whether the torque or the rate of the state jumps: a continuous simulation would stall."""
+    state0: Any = NONE
+    """State at the start, shape (k,)."""
 
     @property
     def n(self: Any) -> int:
         """Number of joints."""
         return self.model.n
 
-    @property
-    def state0(self) -> Array:
-        """State at the start, shape (k,)."""
-        return NONE
+    def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+        """Torques (n,) at positions, velocities (n,), state (k,) and measured wrench (6,)."""
+        return self._torques(t, *self._measured(q, v, x, wrench))
 
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
+    def rate(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
         """Time derivative of the state, shape (k,)."""
-        return NONE
+        return self._rate(t, *self._measured(q, v, x, wrench)) if self.state0.size else NONE
+
+    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
+        """Error of the law: of the joints (n,), of components of the task (m,), or of forces."""
+        return self._error(t, *self._measured(q, v, self.state0, wrench))
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
         """Lyapunov function at a state of the plant, None where the law has none."""
         return None
+
+    def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
+        """Sentences about a motion (N, n)."""
+        return ()
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -54,14 +71,55 @@ class Law(Value):
                 value = read_only(value, value.dtype.type)
             object.__setattr__(self, name, value)
 
-    def _measured(self, q: Any, v: Any, wrench: Any = None) -> tuple[Array, Array, Array]:
-        """Positions and velocities (n,), and the wrench (6,), zero without a sensor."""
-        f = NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench")
-        return as_vector(q, self.n, "q"), as_vector(v, self.n, "v"), f
+    def _keep_gains(
+        self, names: tuple[str, ...], n: int | None, zero: str = "", rows: Any = None
+    ) -> None:
+        """Check positive gains: one number, or one for each of n components; six are of all rows.
+
+        Those of the name `zero` may be zero. With rows each component gets its own.
+        """
+        for name in names:
+            gains = as_floats(getattr(self, name), name)
+            if rows is not None and gains.shape == (6,):
+                gains = gains[rows]
+            if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
+                wanted = "(n,)" if n is None else f"({n},)"
+                more = "" if rows is None else " or (6,)"
+                raise ShapeError(
+                    f"{name}: expected one number or shape {wanted}{more}, got {gains.shape}."
+                )
+            if not (gains > 0.0).all() and not (name == zero and (gains >= 0.0).all()):
+                least = "at least 0" if name == zero else "above 0"
+                raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
+            self._set(**{name: gains if rows is None else np.full(len(rows), gains)})
+
+    def _keep_reference(
+        self, shapes: Any = None, n: int | None = None, name: Any = "reference"
+    ) -> int:
+        """Check the reference: of joints (their number is the answer), a pose or a wrench."""
+        given = getattr(self, name)
+        desired = desired_of(given, shapes, name)
+        if not (callable(given) or isinstance(given, (Trajectory, PoseTrajectory))):
+            given = desired(0.0)[0]
+        self._set(_desired=desired, **{name: given})
+        size = desired(0.0)[0].size
+        if n is not None and size != n:
+            raise ShapeError(f"{name}: expected {n} joints, those of the model, got {size}.")
+        return size
+
+    def _measured(self, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Array, ...]:
+        """Checked q, v, x and wrench; the wrench is zero without a sensor."""
+        k = self.state0.size
+        return (
+            as_vector(q, self.n, "q"),
+            as_vector(v, self.n, "v"),
+            as_vector(x, k, "x") if k or len(x) else NONE,
+            NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench"),
+        )
 
     def __repr__(self) -> str:
         shown = []
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in (f for f in fields(self) if f.init):  # type: ignore[arg-type]
             value = getattr(self, f.name)
             if isinstance(value, np.ndarray) and value.ndim < 2 and value.size <= 7:
                 value = value.tolist()
@@ -69,23 +127,11 @@ class Law(Value):
                     value = value[0]
             elif isinstance(value, RobotModel):
                 value = value.name
-            elif not isinstance(value, (int, float, str, Law)):
-                value = None if value is None else type(value).__name__
-            if f.init and value is not None:
+            elif value is not None and not isinstance(value, (int, float, str, Law)):
+                value = type(value).__name__
+            if value is not None:
                 shown.append(f"{f.name}={value}")
         return f"{type(self).__name__}({', '.join(shown)})"
-
-
-def as_gains(value: ArrayLike, name: str, n: int | None = None, zero: bool = False) -> Array:
-    """Positive numbers: one, or one for each of n components."""
-    gains = as_floats(value, name)
-    if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
-        wanted = "(n,)" if n is None else f"({n},)"
-        raise ShapeError(f"{name}: expected one number or shape {wanted}, got {gains.shape}.")
-    if not ((gains >= 0.0) if zero else (gains > 0.0)).all():
-        least = "at least 0" if zero else "above 0"
-        raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
-    return gains.copy()
 
 
 def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
@@ -95,11 +141,61 @@ def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
         raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")
 
 
-def model_torques(
-    model: RobotModel, q: Array, v: Array, a: Array, wrench: ArrayLike | None = None
-) -> Array:
+def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:
+    """Function of time of a motion, function or constant; without shapes that of joints."""
+    if shapes is None and isinstance(reference, Trajectory):
+        motion, end, n = reference.motion, float(reference.duration), reference.n
+        if motion.batch:
+            raise ShapeError(f"{name}: expected one motion, got {motion.batch}.")
+
+        def joints(t: float) -> tuple[Array, ...]:
+            if 0.0 <= t <= end:  # without the checks of a trajectory
+                q, v, a = motion.derivatives(np.array([t]), (0, 1, 2))
+            else:
+                q, v, a = reference.q(t), reference.v(t), reference.a(t)
+            return q.reshape(n), v.reshape(n), a.reshape(n)
+
+        return joints
+    if shapes is POSE and isinstance(reference, PoseTrajectory):
+
+        def pose(t: float) -> tuple[Array, ...]:
+            there = reference.at(np.array([t]))
+            return there.T[0], there.twist[0], there.acceleration[0]
+
+        return pose
+    if callable(reference):
+
+        def function(t: float) -> tuple[Array, ...]:
+            where, answer = f"{name}({t:g})", reference(t)
+            if not isinstance(answer, (tuple, list)) or len(answer) != 3:
+                raise InvalidValueError(
+                    f"{where}: expected three arrays, the value with its first and second "
+                    f"derivative, got {type(answer).__name__}."
+                )
+            values = tuple(as_floats(x, where) for x in answer)
+            wanted, found = shapes or ((values[0].size,),) * 3, tuple(x.shape for x in values)
+            if found != wanted:
+                raise ShapeError(f"{where}: expected shapes {wanted}, got {found}.")
+            return values
+
+        if function(0.0)[0].shape == POSE[0]:
+            as_single_pose(function(0.0)[0], f"{name}(0)")
+        return function
+    if shapes is POSE:
+        value = as_single_pose(reference, name).copy()
+    elif shapes is WRENCH:
+        value = as_exact(reference, (6,), name).copy()
+    elif (value := as_floats(reference, name).copy()).ndim != 1:
+        raise ShapeError(f"{name}: expected positions of shape (n,), got {value.shape}.")
+    rest = np.zeros(value.size if shapes is None else 6)
+    return lambda t: (value, rest, rest)
+
+
+def model_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
     """Inverse dynamics; a joint at rest has the dry friction of its direction of acceleration."""
-    return idm(model, q, started(v, a), a, wrench)
+    if model.twin.torques_warn:
+        warn_without_masses(model)
+    return motion_torques(model, q, started(v, a), a)
 
 
 def virtual_torques(model: RobotModel, q: Array, v: Array, v_r: Array, a_r: Array) -> Array:

@@ -1,21 +1,23 @@
-"""Simulation of a controlled robot: plant, law, sampling, noise, disturbances and contact."""
+"""Simulation of a controlled robot: plant, law, sampling, noise, contact; and its result."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats, as_number, as_vector
+from .._arrays import Array, Value, as_exact, as_floats, as_number, as_vector
+from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..simulation import Integrator, Simulation, SimulationStatus, simulate
 from .law import Law
-from .result import ControlledMotion, ControlStatus
 
 _SAMPLES = 1000
 _WINDOWS = 6  # parts of a run whose largest errors tell whether it diverges
@@ -26,6 +28,92 @@ _SMALL = 1e-6  # errors that may grow
 
 Environment = Callable[[float, Array, Array], ArrayLike]
 """Wrench (6,) of the tool on the environment at time t, pose T (4, 4) and twist (6,)."""
+
+
+class ControlStatus(Outcome):
+    """Outcome of a run; fits int8. The motion until then is given for every status."""
+
+    FOLLOWED = 0, "The law was followed to the end, within the limits of the robot."
+    SATURATED = 1, "Torques were limited to the efforts of the joints."
+    LEFT_LIMITS = 2, "Joints left their limits."
+    DIVERGED = 3, "The law was not followed to the end."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlledMotion(Value):
+    """Motion of a controlled robot. Read-only.
+
+    Parameters
+    ----------
+    law : object
+        The control law.
+    simulation : Simulation
+        The motion of the plant, N samples, n joints.
+    error : ndarray, shape (N, k)
+        Error of the law: desired less actual joints, components of the task, or forces.
+    wrench : ndarray, shape (N, 6)
+        Wrench ``[f; m]`` of the tool on the environment, world axes.
+    lyapunov : ndarray, shape (N,), or None
+        Lyapunov function of the law, None if it has none.
+    status : ControlStatus
+        Outcome.
+    notes : tuple of str
+        Sentences that explain it.
+    """
+
+    law: Any
+    simulation: Simulation
+    error: Array
+    wrench: Array
+    lyapunov: Array | None
+    status: ControlStatus
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if isinstance(value := getattr(self, f.name), np.ndarray):
+                value.setflags(write=False)
+
+    t = property(attrgetter("simulation.t"), doc="Times, s, shape (N,).")
+    q = property(attrgetter("simulation.q"), doc="Positions, rad or m, shape (N, n).")
+    v = property(attrgetter("simulation.v"), doc="Velocities, shape (N, n).")
+    tau = property(attrgetter("simulation.tau"), doc="Torques of the control, shape (N, n).")
+    state = property(attrgetter("simulation.state"), doc="State of the law, shape (N, k).")
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        motion = self.simulation.model, self.t, self.q, self.v, self.tau, self.state
+        return self.law, *motion, self.error, self.wrench, self.lyapunov, self.status, self.notes
+
+    @property
+    def surface(self) -> Array | None:
+        """Values (N, n) of s of laws that have one: sliding modes, passivity, adaptive control."""
+        if not hasattr(self.law, "slope"):
+            return None
+        return np.array([self.law.surface(*x) for x in zip(self.t, self.q, self.v, strict=True)])
+
+    def rms(self, after: float = 0.0) -> Array:
+        """Root mean square of the error from a time on, shape (k,)."""
+        late = self.t >= as_number(after, "after")
+        if not late.any():
+            raise InvalidValueError(f"after: expected a time up to {self.t[-1]:.6g} s.")
+        weights = np.convolve(np.diff(self.t[late]), [0.5, 0.5]) if late.sum() > 1 else np.ones(1)
+        return np.sqrt(weights @ self.error[late] ** 2 / weights.sum())
+
+    def reason(self) -> str:
+        """The sentence of the status, and what explains it."""
+        return " ".join([self.status.sentence, *self.notes])
+
+    def __repr__(self) -> str:
+        last = self.rms(float(self.t[0] + 0.9 * (self.t[-1] - self.t[0])))
+        shown = np.array2string(last, precision=3, max_line_width=200, threshold=8)
+        lines = (
+            f"<ControlledMotion: {self.law!r:.90}",
+            f"  {self.t[-1] - self.t[0]:.6g} s, samples: {len(self.t)}",
+            f"  root mean square error of the last tenth: {shown:.70}",
+            f"  {self.reason():.200}>",
+        )
+        return "\n".join(lines)
 
 
 def run(
@@ -92,9 +180,9 @@ def run(
     >>> from robotmodels.control import ComputedTorque, run
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
-    >>> law = ComputedTorque(np.full(6, 0.1), omega=20.0, model=arm)
-    >>> run(arm, law, np.zeros(6), t=0.5, period=1e-3).status
-    <ControlStatus.FOLLOWED: 0>
+    >>> motion = run(arm, ComputedTorque(np.full(6, 0.1), model=arm), np.zeros(6), t=1.0)
+    >>> motion.status, bool(motion.rms(after=0.9).max() < 1e-3)
+    (<ControlStatus.FOLLOWED: 0>, True)
     """
     check_model(model)
     if not (callable(getattr(law, "command", None)) and callable(getattr(law, "rate", None))):
@@ -103,13 +191,13 @@ def run(
         )
     if (n := getattr(law, "n", model.n)) not in (None, model.n):
         raise ShapeError(f"law: expected a law for {model.n} joints, got one for {n}.")
-    if period is None and getattr(law, "switches", False):
+    if period is not None:
+        period = as_number(period, "period", above=0.0)
+    elif getattr(law, "switches", False):
         raise InvalidValueError(
             "law: its torque or its state switches, which stalls a continuous simulation; give a "
             "sampling period, or a boundary layer (layer=)."
         )
-    if period is not None:
-        period = as_number(period, "period", above=0.0)
     for name, instead in (("wrench", "environment="), ("control", "law=")):
         if name in options:
             raise InvalidValueError(f"{name}: give {instead} of run.")
@@ -117,21 +205,16 @@ def run(
     if times.ndim == 0 and times > 0.0:
         ratio = float(times) / period if period else _SAMPLES
         times = np.linspace(0.0, float(times), max(1, round(min(ratio, _SAMPLES * _SAMPLES))) + 1)
-    loop = Loop(model, law, environment, noise, rng, period)
+    loop = Loop(model, law, environment, _deviations(noise, rng, period), generator_of(rng))
     if disturbance is not None and not callable(disturbance):
         disturbance = as_exact(disturbance, (model.n,), "disturbance")
-    # between samples the torque is constant: order 5 is enough
-    options.setdefault("method", Integrator.DOP853 if period is None else Integrator.RK45)
     seconds = float(np.ptp(times)) if times.size else 0.0
-    options.setdefault(
-        "max_evaluations",
-        int(min(2e4 * (1.0 + seconds) + 20 * seconds / (period or 1.0), 2**62)),
-    )
-    wall = loop.wrench if loop.walls else None
-    motion = simulate(
-        *(model, q0, v0, loop, times, wall),
-        **{"period": period, "delay": delay, "disturbance": disturbance, **options},
-    )
+    evaluations = min(2e4 * (1.0 + seconds) + 20 * seconds / (period or 1.0), 2**62)
+    # between samples the torque is constant: order 5 is enough
+    method = Integrator.DOP853 if period is None else Integrator.RK45
+    options = {"method": method, "max_evaluations": int(evaluations)} | options
+    options |= {"period": period, "delay": delay, "disturbance": disturbance}
+    motion = simulate(model, q0, v0, loop, times, loop.wrench if loop.walls else None, **options)
     rows = list(zip(motion.t, motion.q, motion.v, strict=True))
     wrench = np.array([loop.wrench(*row) for row in rows])
     errors = np.array([loop.error(*row, f) for row, f in zip(rows, wrench, strict=True)])
@@ -141,8 +224,7 @@ def run(
         if values := [value for value in ways if value is not None]:
             lyapunov = np.array(values)
     status, notes = _outcome(model, motion, errors, loop)
-    if (more := getattr(law, "notes", None)) is not None:
-        notes += more(motion.t, motion.q, motion.v)
+    notes += law.notes(motion.t, motion.q, motion.v) if isinstance(law, Law) else ()
     return ControlledMotion(law, motion, errors, wrench, lyapunov, status, notes)
 
 
@@ -150,7 +232,7 @@ class Loop:
     """A law in a simulation: it gets measured values, and its torques are limited."""
 
     def __init__(
-        self, model: RobotModel, law: Any, environment: Any, noise: Any, rng: Any, period: Any
+        self, model: RobotModel, law: Any, environment: Any, noise: Any, rng: np.random.Generator
     ) -> None:
         walls = () if environment is None else environment
         self.walls = tuple(walls) if isinstance(walls, (tuple, list)) else (walls,)
@@ -162,8 +244,7 @@ class Loop:
         self.state0 = as_floats(getattr(law, "state0", ()), "law.state0")
         self.effort = np.where(np.isnan(model.table.effort), np.inf, model.table.effort)
         self.saturated = np.zeros(model.n, dtype=np.bool_)
-        self._deviations = _deviations(noise, rng, period)
-        self._rng = generator_of(rng)
+        self._noise, self._rng = noise, rng
         self._last: Any = (None,)
         self._sample: Any = None, []
 
@@ -171,11 +252,8 @@ class Loop:
         """Torques of the law within the efforts, shape (n,)."""
         answer = self.law.command(t, *self._measured(t, q, v, x))
         tau = as_exact(answer, self.effort.shape, "law.command(t, q, v, x)")
-        over = np.abs(tau) > self.effort
-        if over.any():
-            self.saturated |= over
-            tau = np.clip(tau, -self.effort, self.effort)
-        return tau
+        self.saturated |= np.abs(tau) > self.effort
+        return np.clip(tau, -self.effort, self.effort)
 
     def rate(self, t: float, q: Array, v: Array, x: Array) -> Array:
         """Rate of the state of the law, shape (k,)."""
@@ -202,9 +280,9 @@ class Loop:
 
     def _measured(self, t: float, q: Array, v: Array, x: Array) -> tuple[Array, ...]:
         f = self.wrench(t, q, v) if self.feels and self.walls else None
-        if self._deviations is not None:
+        if self._noise is not None:
             if self._sample[0] != t:  # one for the torque and the rate of the state
-                sizes = zip(self._deviations, (q.size, q.size, 6), strict=True)
+                sizes = zip(self._noise, (q.size, q.size, 6), strict=True)
                 self._sample = t, [s * self._rng.normal(size=k) for s, k in sizes]
             dq, dv, df = self._sample[1]
             q, v, f = q + dq, v + dv, f if f is None else f + df
@@ -235,19 +313,10 @@ def _growing(errors: Array) -> Array:
     if len(errors) < 2 * _WINDOWS:
         return np.zeros(0)
     peaks = np.array([np.abs(x).max(initial=0.0) for x in np.array_split(errors, _WINDOWS)])
-    if peaks[-1] <= max(_GROWS * peaks[0], _GROWS * np.abs(errors[0]).max(initial=0.0), _SMALL):
-        return np.zeros(0)
+    first = max(peaks[0], np.abs(errors[0]).max(initial=0.0))
     ratios = peaks[2:] / np.maximum(peaks[1:-1], 1e-300)
     grows = (ratios > _STEADY).all() and ratios[-1] > _STAYS * ratios[0]
-    return peaks if grows else np.zeros(0)
-
-
-def _moved(law: Any, t: Array) -> float:
-    """How far the reference of a law moves from its start."""
-    if (desired := getattr(law, "_desired", None)) is None:
-        return 0.0
-    values = np.array([desired(float(x))[0] for x in t])
-    return float(np.abs(values - values[0]).max(initial=0.0))
+    return peaks if grows and peaks[-1] > max(_GROWS * first, _SMALL) else np.zeros(0)
 
 
 def _outcome(
@@ -258,15 +327,17 @@ def _outcome(
         late = motion.status is SimulationStatus.NOT_CONVERGED
         advice = ("Give method='Radau' for stiff walls, or a period.",) * late
         return ControlStatus.DIVERGED, (f"At t = {motion.t[-1]:.6g} s: {motion.reason}", *advice)
-    if (peaks := _growing(errors)).size and peaks[-1] > _moved(loop.law, motion.t):
-        shown = ", ".join(f"{x:.3g}" for x in peaks)
-        return ControlStatus.DIVERGED, (
-            f"The error grows exponentially: its peaks in sixths of the run are {shown}.",
-        )
-    beyond = (motion.q < model.lower) | (motion.q > model.upper)
-    for status, at in (
-        (ControlStatus.LEFT_LIMITS, beyond.any(axis=0)), (ControlStatus.SATURATED, loop.saturated)
-    ):  # fmt: skip
+    if (peaks := _growing(errors)).size:
+        desired = getattr(loop.law, "_desired", None)  # an error may grow with the reference
+        values = np.array([desired(float(t))[0] if desired else 0.0 for t in motion.t])
+        if peaks[-1] > np.abs(values - values[0]).max():
+            shown = ", ".join(f"{x:.3g}" for x in peaks)
+            return ControlStatus.DIVERGED, (
+                f"The error grows exponentially: its peaks in sixths of the run are {shown}.",
+            )
+    beyond = ((motion.q < model.lower) | (motion.q > model.upper)).any(axis=0)
+    left, saturated = ControlStatus.LEFT_LIMITS, ControlStatus.SATURATED
+    for status, at in ((left, beyond), (saturated, loop.saturated)):
         if at.any():
             joints = ", ".join(str(j + 1) for j in np.flatnonzero(at))
             return status, (f"This concerns joints {joints}.",)

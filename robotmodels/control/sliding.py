@@ -11,6 +11,12 @@ reference : Trajectory, array_like (n,) or callable
     scalar law alone, see `first_order`.
 slope : float or array_like
     Rate at which the error vanishes on the surface, 1/s.
+gain : float or array_like
+    Of the first order: larger than every disturbance, in the unit of u.
+layer : float or array_like
+    Half width of the boundary layer, rad/s (m/s); 0 switches, and needs a sampling period.
+k1, k2 : float or array_like
+    Gains of the root and of the integral of super-twisting.
 model : RobotModel, optional
     The robot as the controller believes it to be.
 
@@ -34,17 +40,17 @@ array([1.])
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_number, as_reals, as_vector
+from .._arrays import Array, as_floats, as_number, as_reals
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from .joint_laws import SurfaceLaw
-from .law import NONE, as_gains, model_torques
+from .law import NONE, model_torques
 
 _MOST_STEPS = 10_000_000
 
@@ -58,39 +64,25 @@ class _Sliding(SurfaceLaw):
             self._prepare(gains, self.model, zero="layer")
         else:  # the scalar law alone
             self._set(n=None, _desired=None)
-            for name in gains:
-                self._set(**{name: as_gains(getattr(self, name), name, None, name == "layer")})
+            self._keep_gains(gains, None, "layer")
 
-    def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,)."""
-        q, v, v_r, a_r = self._rates(t, q, v)
-        u = -self.reaching(v_r - v, as_vector(x, len(self.state0), "x"))[0]
+    def _torques(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        v_r, a_r = self._rates(t, q, v)
+        u = -self.reaching(v_r - v, x)[0]
         return u if self.model is None else model_torques(self.model, q, v, a_r + u)
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the joints, shape (n,)."""
-        return SurfaceLaw.error(self._of_robot(), t, q, v)
+    def _rate(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.reaching(self._rates(t, q, v)[0] - v, x)[1]
 
-    def _rates(self: Any, t: float, q: Any, v: Any) -> tuple[Array, Array, Array, Array]:
-        return SurfaceLaw._rates(self._of_robot(), t, q, v)
-
-    def _of_robot(self: Any) -> Any:
+    def _measured(self: Any, *values: Any) -> tuple[Array, ...]:
         if self.reference is None:
             raise InvalidValueError("reference: a law for a robot needs one, this one is scalar.")
-        return self
+        return SurfaceLaw._measured(self, *values)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SlidingMode(_Sliding):
-    """Sliding mode of first order: ``u = gain sign(s)``, or ``gain sat(s / layer)`` with a layer.
-
-    Parameters
-    ----------
-    gain : float or array_like
-        Larger than every disturbance, in the unit of u.
-    layer : float or array_like
-        Half width of the boundary layer, rad/s (m/s); 0 switches, and needs a sampling period.
-    """
+    """Sliding mode of first order: ``u = gain sign(s)``, with a layer ``gain sat(s / layer)``."""
 
     reference: Any
     slope: Any
@@ -102,7 +94,7 @@ class SlidingMode(_Sliding):
         self._begin(("slope", "gain", "layer"))
 
     @property
-    def switches(self) -> bool:  # type: ignore[override]
+    def switches(self) -> bool:
         """Whether a layer is missing."""
         return not np.all(self.layer)
 
@@ -119,11 +111,6 @@ class SuperTwisting(_Sliding):
 
     It needs a sampling period. For disturbances with rates up to L, ``k1 = 1.5 sqrt(L)`` and
     ``k2 = 1.1 L`` (Levant).
-
-    Parameters
-    ----------
-    k1, k2 : float or array_like
-        Gains of the root and of the integral.
     """
 
     reference: Any
@@ -131,20 +118,13 @@ class SuperTwisting(_Sliding):
     k1: Any
     k2: Any
     model: RobotModel | None = None
+    state0: Array = field(init=False)
 
     switches = True
 
     def __post_init__(self) -> None:
         self._begin(("slope", "k1", "k2"))
-
-    @property
-    def state0(self) -> Array:
-        """Integral at the start, zero, shape (n,); one number for the scalar law."""
-        return np.zeros(self.n or 1)
-
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """``k2 sign(s)``, shape (n,)."""
-        return self.k2 * np.sign(self.surface(t, q, v))
+        self._set(state0=np.zeros(self.n or 1))
 
     def reaching(self, s: Array, x: Array) -> tuple[Array, Array]:
         """``s'`` by the law alone, and the rate of its integral."""
@@ -168,7 +148,7 @@ def first_order(
     s0 : array_like, shape (...)
         Start, of any shape: all entries are independent.
     disturbance : callable or array_like, optional
-        Function of t, or constant; its answers broadcast with s0.
+        Function of t, or constant; its answers broadcast with s0, as the gains do.
     t, step : float
         Duration and step, s.
 
@@ -176,16 +156,6 @@ def first_order(
     -------
     ndarray, shape (N + 1, ...)
         s at the multiples of the step, N = t / step.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Gains, rates or disturbances that do not broadcast to s0; a step that is not positive, a
-        negative duration, values that are not finite.
-
-    References
-    ----------
-    Seed book sections 5.2.6 and 5.2.7.
 
     Examples
     --------
@@ -196,28 +166,23 @@ def first_order(
     if end / h > _MOST_STEPS:
         raise InvalidValueError(f"step: {h:.3g} s would take more than {_MOST_STEPS} steps.")
     s = as_floats(s0, "s0")
-    reaching = getattr(law, "reaching", None)
+    x = np.zeros(s.shape)
+    own: Any = law
+    reaching: Any = getattr(law, "reaching", None)
     if reaching is None and not callable(law):
         raise InvalidValueError(
             f"law: expected a sliding mode or a function of s, got {type(law).__name__}."
         )
-    if disturbance is None or not callable(disturbance):
-        constant = _fitting(0.0 if disturbance is None else disturbance, s, "disturbance")
-    for name in ("gain", "layer", "k1", "k2"):
-        _fitting(getattr(law, name, 0.0) if reaching else 0.0, s, name)
+    for name in ("gain", "layer", "k1", "k2") if reaching else ():
+        _fitting(getattr(law, name, 0.0), s, name)
+    constant = 0.0 if disturbance is None else disturbance
+    push: Any = disturbance if callable(disturbance) else lambda t: constant
     out = np.empty((round(end / h) + 1, *s.shape))
-    out[0], x = s, np.zeros(s.shape)
-    for k in range(len(out) - 1):
-        push = (
-            _fitting(disturbance(k * h), s, "disturbance(t)") if callable(disturbance) else constant
-        )
-        if reaching is None:
-            rate, change = _fitting(law(s), s, "law(s)"), NONE  # type: ignore[operator]
-        else:
-            rate, change = reaching(s, x)
-        s = out[k + 1] = s + h * (rate + push)
-        if change is not NONE:
-            x = x + h * change
+    out[0] = s
+    for k in range(1, len(out)):
+        rate, change = reaching(s, x) if reaching else (_fitting(own(s), s, "law(s)"), NONE)
+        s = out[k] = s + h * (rate + _fitting(push((k - 1) * h), s, "disturbance"))
+        x = x + h * change if change.size else x
     if not np.isfinite(out).all():
         raise InvalidValueError("law, disturbance: s is not finite; expected finite values.")
     return out
@@ -226,8 +191,11 @@ def first_order(
 def _fitting(value: ArrayLike, s: Array, name: str) -> Array:
     """Numbers that broadcast to the shape of s."""
     array = as_reals(value, name)
-    short = s.shape[max(s.ndim - array.ndim, 0) :]
-    if array.ndim > s.ndim or any(k not in (1, n) for k, n in zip(array.shape, short, strict=True)):
+    try:
+        fits = array.shape == () or np.broadcast_shapes(array.shape, s.shape) == s.shape
+    except ValueError:
+        fits = False
+    if not fits:
         raise ShapeError(
             f"{name}: expected one number or shape {s.shape}, that of s0, got {array.shape}."
         )

@@ -34,14 +34,10 @@ Examples
 --------
 >>> from robotmodels.kinematics import dgm
 >>> from robotmodels.robots import load
->>> arm, q, rest = load("rx90"), np.full(6, 0.3), np.zeros(6)
->>> ComputedTorque(q + 0.1, omega=5.0, model=arm).error(0.0, q, rest).round(9)
-array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
+>>> arm, q = load("rx90"), np.full(6, 0.3)
 >>> law = Impedance(dgm(arm, q), M=2.0, B=40.0, K=800.0, model=arm)
 >>> float(law.frequency[0]), float(law.damping[0])
 (20.0, 0.5)
->>> law.command(0.0, q, rest, wrench=[5.0, 0, 0, 0, 0, 0]).shape
-(6,)
 """
 
 from __future__ import annotations
@@ -50,57 +46,139 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .._arrays import Array, as_vector
+from .._arrays import Array, as_mask, read_only
+from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import NO_WRENCH, Law, as_gains, as_word, model_torques
-from .reference import Desired, as_reference, joint_reference, pose_reference
-from .task import (
-    TaskError,
-    accelerations,
-    frozen_mask,
-    row_gains,
-    singular_notes,
-    task_error,
-    task_rows,
-    tool_motion,
-)
+from .law import NO_WRENCH, POSE, Desired, Law, as_word, model_torques
+
+_RANK = 1e-9  # relative singular value of rows that depend
+_FIRST = np.zeros(6, dtype=np.int64)
+_UNWEIGHTED = read_only(np.empty((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TaskLaw(Law):
-    """Parts of laws of the tool: the rows of their task, and its error."""
+    """Parts of laws of the tool: the components of their task, their error and their notes."""
 
     rows: NDArray[np.int64] = field(init=False)
     _desired: Desired = field(init=False)
+    _axes: Array | None = field(init=False)
+    _linear: Array = field(init=False)  # factors (3, m) of rate, error and force
+    _free: float = field(init=False)  # damping of motions of no effect
 
-    def _prepare(self: Any, gains: tuple[str, ...], frame: str | int | None = None) -> None:
+    space = "task"
+    frame = None
+
+    def _prepare(self: Any, gains: tuple[str, ...]) -> None:
         check_model(self.model)
-        rows, desired = task_rows(self.model, self.mask, frame), pose_reference(self.reference)
-        self._set(reference=as_reference(self.reference), rows=rows, _desired=desired)
-        self._set(mask=frozen_mask(self.mask))
-        for name in gains:
-            self._set(**{name: row_gains(as_gains(getattr(self, name), name), rows, name)})
+        self._set_rows()
+        self._keep_reference(POSE)
+        self._keep_gains(gains, len(self.rows), rows=self.rows)
 
-    def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
-        """Error of the task, shape (m,), or of the joints."""
-        q, v, _ = self._measured(q, v)
-        return self._task(t, q, v).e
+    def _set_rows(self: Any, turn: Array | None = None) -> None:
+        """Rows of the task, m <= n: of the mask, or the first that the robot moves alone."""
+        n, turn, mask = self.model.n, np.eye(6) if turn is None else turn, self.mask
+        rows = [] if mask is None else np.flatnonzero(as_mask(mask)).tolist()
+        if len(rows) > n:
+            raise InvalidValueError(
+                f"mask: {len(rows)} components are more than the {n} joints of "
+                f"{self.model.name!r} control; choose fewer."
+            )
+        postures = np.random.default_rng(0).uniform(-2.0, 2.0, (4, n))
+        J = turn @ jacobian(self.model, postures, self.frame)
+        for row in range(6) if mask is None else ():
+            ranks = np.linalg.matrix_rank(J[:, [*rows, row]], rtol=_RANK)
+            if len(rows) < n and (ranks > len(rows)).any():
+                rows.append(row)
+        axes = turn[rows]
+        self._set(rows=np.array(rows, dtype=np.int64), mask=as_flags(mask))
+        self._set(_axes=None if np.array_equal(axes, np.eye(6)) else axes)
+
+    def _tool(
+        self: Any, q: Array, v: Array, desired: tuple[Array, ...], wrench: Array, *more: Array
+    ) -> tuple[Array, Array, Array]:
+        """Rows of `tool_errors`, and more ones, in components (.., m) of the task; J (2, m, n).
+
+        Also the joint torques of the wrench.
+        """
+        from .kernels import tool_errors
+
+        if q.ndim != 1 or v.ndim != 1:
+            raise ShapeError(
+                f"q, v: expected one posture, shape ({self.n},), got {q.shape}, {v.shape}."
+            )
+        model, J, rows = self.model, np.empty((2, 6, len(q))), np.empty((6 + len(more), 6))
+        frame = model.twin.frame(self.frame).kernel_arguments
+        tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)
+        load, axes = wrench @ J[0], self._axes
+        if more:
+            rows[6:] = more
+        return (rows, J, load) if axes is None else (rows @ axes.T, axes @ J, load)
+
+    def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
+        """As `_tool` for the reference; the wrench acts at the tool."""
+        if self.frame is None or not wrench.any():
+            return self._tool(q, v, self._desired(t), wrench)
+        lever = dgm(self.model, q)[:3, 3] - dgm(self.model, q, self.frame)[:3, 3]
+        at = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
+        return *self._tool(q, v, self._desired(t), at)[:2], wrench @ jacobian(self.model, q)
+
+    def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self._task(t, q, v)[0][0]
+
+    def _obey(self: Any, damping: Array, stiffness: Array, softness: Array) -> None:
+        """Keep factors of ``e'' + damping e' + stiffness e = softness force``, each (m,)."""
+        self._set(_linear=np.stack([damping, stiffness, softness]), _free=float(np.max(damping)))
+
+    def _torques(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.shifted(t, q, v, 0.0, 0.0, f)
+
+    def shifted(
+        self: Any, t: float, q: Array, v: Array, by: Any, speed: Any, wrench: Array = NO_WRENCH
+    ) -> Array:
+        """Torques with the error shifted at this speed (m,); the wrench (6,) is compensated."""
+        (e, de, drift, force, *_), J, load = self._task(t, q, v, wrench)
+        damping, stiffness, softness = self._linear
+        pull = damping * (de + speed) + stiffness * (e + by) + drift - softness * force
+        a = pull if J is None else self._resolved(J[1], -pull, v)
+        return model_torques(self.model, q, v, a) + load
+
+    def _resolved(
+        self: Any, J: Array, wanted: Array, v: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
+    ) -> Array:
+        """Joint accelerations with ``J a = wanted``; see the kernel."""
+        from .kernels import resolved
+
+        a = np.empty(self.n)
+        if resolved(J, wanted, order[: len(J)], M, -self._free * v, a) < 0:
+            raise SingularMassMatrixError(
+                "model: the mass matrix is singular; a hybrid law needs a model whose joints all "
+                "have inertia."
+            )
+        return a
 
     def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """A sentence for singular postures of a motion (N, n)."""
-        if getattr(self, "space", "task") == "joint":
-            return ()
-        return singular_notes(self.model, t, q, self.rows, getattr(self, "frame", None))
+        """A sentence for postures of a motion (N, n) that are singular for the task, or nearly."""
+        from .kernels import NEAR
 
-    def _task(self: Any, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
-        frame = getattr(self, "frame", None)
-        at = tool_motion(self.model, q, v, frame)
-        if frame is not None and wrench.any():  # the same wrench at the frame's origin
-            lever = tool_motion(self.model, q, v).T[:3, 3] - at.T[:3, 3]
-            wrench = np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
-        return task_error(at, self._desired(t), self.rows, wrench)
+        if self.space == "joint":
+            return ()
+        J = jacobian(self.model, q, self.frame)
+        J = J if self._axes is None else self._axes @ J
+        longest = np.linalg.norm(J, axis=2).max(axis=1)
+        near = np.linalg.svd(J, compute_uv=False)[:, -1] < NEAR * longest
+        return (
+            f"At t = {t[np.argmax(near)]:.6g} s the posture is singular for the task, or nearly: "
+            "motions of the tool that the joints can hardly make there are damped.",
+        ) * bool(near.any())
+
+
+def as_flags(mask: Any) -> Array | None:
+    """A mask as zeros and ones (6,)."""
+    return None if mask is None else as_mask(mask).astype(np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -123,39 +201,24 @@ class ComputedTorque(TaskLaw):
         as_word(self.space, ("joint", "task"), "space")
         if self.space == "task":
             self._prepare(("omega", "zeta"))
-            return
-        desired, n = joint_reference(self.reference, self.model.n)
-        omega, zeta = as_gains(self.omega, "omega", n), as_gains(self.zeta, "zeta", n)
-        self._set(reference=as_reference(self.reference), rows=np.arange(n), _desired=desired)
-        self._set(omega=np.full(n, omega), zeta=np.full(n, zeta))
-
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques, shape (n,), at positions q and velocities v (n,)."""
-        return self.shifted(t, q, v, 0.0, 0.0)
-
-    def shifted(self, t: float, q: Any, v: Any, by: Any, speed: Any, wrench: Any = None) -> Array:
-        """Torques with the error shifted at this speed (m,); a wrench (6,) is compensated."""
-        q, v, _ = self._measured(q, v)
-        w, damping = self.omega, 2.0 * self.zeta * self.omega
-        if self.space == "joint":
-            q_d, v_d, a_d = self._desired(t)
-            a = a_d + damping * (v_d - v + speed) + w * w * (q_d - q + by)
         else:
-            at = self._task(t, q, v)
-            wanted = -damping * (at.de + speed) - w * w * (at.e + by) - at.drift
-            a = accelerations(at.J, wanted, v, damping)
-        return model_torques(self.model, q, v, a, wrench)
+            self._set(rows=np.arange(self._keep_reference(n=self.n)))
+            self._keep_gains(("omega", "zeta"), self.n, rows=self.rows)
+        self._obey(2.0 * self.zeta * self.omega, self.omega**2, 0.0 * self.omega)
+
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        return self.shifted(t, q, v, 0.0, 0.0)
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
         """``(e'^T e' + e^T omega^2 e) / 2``, that of the linear error."""
-        e, de, *_ = self._task(t, q, v)
+        e, de, *_ = self._task(t, q, v)[0]
         return 0.5 * float(de @ de + e @ (self.omega**2 * e))
 
-    def _task(self, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> TaskError:
+    def _task(self, t: float, q: Array, v: Array, wrench: Array = NO_WRENCH) -> Any:
         if self.space == "task":
-            return TaskLaw._task(self, t, q, v)
+            return TaskLaw._task(self, t, q, v, wrench)
         q_d, v_d, a_d = self._desired(t)
-        return TaskError(q_d - q, v_d - v, -np.eye(self.n), a_d, wrench)
+        return (q_d - q, v_d - v, a_d, 0.0), None, 0.0
 
 
 class _Compliant(TaskLaw):
@@ -187,19 +250,8 @@ class Impedance(_Compliant):
     frame: str | int | None = None
 
     def __post_init__(self) -> None:
-        self._prepare(("M", "B", "K"), self.frame)
-
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        return self.shifted(t, q, v, 0.0, 0.0, wrench)
-
-    def shifted(self, t: float, q: Any, v: Any, by: Any, speed: Any, wrench: Any = None) -> Array:
-        """Torques with the error shifted at this speed (m,)."""
-        q, v, f = self._measured(q, v, wrench)
-        at = self._task(t, q, v, f)
-        pull = at.force - self.B * (at.de + speed) - self.K * (at.e + by)
-        a = accelerations(at.J, pull / self.M - at.drift, v, self.B / self.M)
-        return model_torques(self.model, q, v, a, wrench)
+        self._prepare(("M", "B", "K"))
+        self._obey(self.B / self.M, self.K / self.M, 1.0 / self.M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -219,29 +271,20 @@ class Admittance(_Compliant):
     zeta: Any = 1.0
     mask: Any = None
     frame: str | int | None = None
+    state0: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self._prepare(("M", "B", "K", "omega", "zeta"), self.frame)
+        self._prepare(("M", "B", "K", "omega", "zeta"))
+        self._obey(2.0 * self.zeta * self.omega, self.omega**2, 1.0 / self.M)
+        self._set(state0=np.zeros(2 * len(self.rows)))
 
-    @property
-    def state0(self) -> Array:
-        """The state at the start, zero, shape (2 m,)."""
-        return np.zeros(2 * len(self.rows))
+    def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        damping, stiffness, _ = self._linear
+        xi, rate = x.reshape(2, -1)
+        pull = (damping - self.B / self.M) * rate + (stiffness - self.K / self.M) * xi
+        return self.shifted(t, q, v, pull / stiffness, 0.0, f)
 
-    def command(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Torques (n,), for the measured wrench (6,)."""
-        q, v, f = self._measured(q, v, wrench)
-        at, w, damping = self._task(t, q, v, f), self.omega, 2.0 * self.zeta * self.omega
-        xi, rate, second = self._motion(x, at.force)
-        wanted = -second - damping * (at.de + rate) - w * w * (at.e + xi) - at.drift
-        return model_torques(self.model, q, v, accelerations(at.J, wanted, v, damping), wrench)
-
-    def rate(self, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
-        """Rates of xi and xi', shape (2 m,)."""
-        return np.concatenate(
-            self._motion(x, self._task(t, *self._measured(q, v, wrench)).force)[1:]
-        )
-
-    def _motion(self, x: ArrayLike, force: Array) -> tuple[Array, Array, Array]:
-        xi, rate = as_vector(x, 2 * len(self.rows), "x").reshape(2, -1)
-        return xi, rate, -(force + self.B * rate + self.K * xi) / self.M
+    def _rate(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
+        xi, rate = x.reshape(2, -1)
+        force = self._task(t, q, v, f)[0][3]
+        return np.concatenate([rate, -(force + self.B * rate + self.K * xi) / self.M])

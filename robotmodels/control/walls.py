@@ -21,16 +21,10 @@ class SpringWall(Value):
 
     Parameters
     ----------
-    point : array_like, shape (3,)
-        On the undeformed surface, in the world, m.
-    normal : array_like, shape (3,)
-        Towards the free side; made a unit vector.
-    stiffness : float
-        N/m.
-    damping : float
-        N s/m.
-    friction : float
-        Coefficient of dry friction.
+    point, normal : array_like, shape (3,)
+        Point of the undeformed surface in the world, m; direction to the free side, of any length.
+    stiffness, damping, friction : float
+        N/m, N s/m, and the coefficient of dry friction.
     bilateral : bool
         Whether it holds the tool on both sides: a spring.
     slip : float
@@ -67,10 +61,9 @@ class SpringWall(Value):
         if not normal.any():
             raise InvalidValueError("normal: expected a vector that is not zero.")
         normal = normal / np.abs(normal).max()
-        numbers = {"stiffness": {"above": 0.0}, "slip": {"above": 0.0}}
-        numbers |= {"damping": {"least": 0.0}, "friction": {"least": 0.0}}
-        for name, bound in numbers.items():
-            object.__setattr__(self, name, as_number(getattr(self, name), name, **bound))
+        for bound, names in (("above", ("stiffness", "slip")), ("least", ("damping", "friction"))):
+            for name in names:
+                object.__setattr__(self, name, as_number(getattr(self, name), name, **{bound: 0.0}))
         if not isinstance(self.bilateral, (bool, np.bool_)):
             raise InvalidValueError(
                 f"bilateral: expected True or False, got {self.bilateral!r:.40}."
@@ -79,10 +72,7 @@ class SpringWall(Value):
         object.__setattr__(self, "normal", read_only(normal / np.linalg.norm(normal)))
 
     def __call__(self, t: float, T: ArrayLike, twist: ArrayLike) -> Array:
-        """Wrench ``[f; m]`` on the wall, world axes, shape (..., 6).
-
-        For poses of the tool T (..., 4, 4) and its twists (..., 6).
-        """
+        """Wrench (..., 6) on the wall, world axes, for poses (..., 4, 4) and twists (..., 6)."""
         T, twist = as_core(T, (4, 4), "T"), as_core(twist, (6,), "twist")
         depth, v = self.depth(T), twist[..., :3]
         away = v @ self.normal

@@ -1,16 +1,44 @@
 """Figures and scenes of controlled robots: errors, torques and forces, sliding surfaces, arrows.
 
-Functions of figures return a `matplotlib.figure.Figure`, `animate_control` a `Scene`; they raise
-`InvalidValueError` for what is no run of a controlled robot. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
+Panels of a force that is zero all the time, and of a law without Lyapunov function, are left out.
+
+Parameters
+----------
+run : ControlledMotion
+    As `robotmodels.control.run` gives it; for `plot_surface` of a law with a surface.
+title, size
+    Text over the figure; its width and height in inches, shape (2,).
+walls : SpringWall or sequence of SpringWall
+    Walls that are drawn.
+length : float, optional
+    Length of the arrow of the largest force, m; default some part of the scene.
+**options
+    As for `animate`.
 
 Returns
 -------
 matplotlib.figure.Figure or Scene
 
+Raises
+------
+InvalidValueError
+    What is no run of a controlled robot; a law without a surface.
+
 References
 ----------
 Seed book sections 5.2.3 and 5.3.2.
+
+Examples
+--------
+>>> from robotmodels.control import ComputedTorque, run
+>>> from robotmodels.robots import load
+>>> arm = load("rx90")
+>>> law = ComputedTorque(np.full(6, 0.1), model=arm)
+>>> motion = run(arm, law, np.zeros(6), t=0.5)
+>>> [axes.get_ylabel() for axes in plot_control(motion).axes]
+['error', 'torque (N m)', 'V']
+>>> animate_control(motion).motion.duration
+0.5
 """
 
 from __future__ import annotations
@@ -39,6 +67,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COMPONENTS = np.array(["x", "y", "z", "rx", "ry", "rz"])
+_FORCES = np.array(["fx", "fy", "fz", "mx", "my", "mz"])
 _PIECES = 8  # of the shaft of an arrow
 _ARROW = (0.85, 0.2, 0.1, 1.0)
 _WALL = (0.45, 0.55, 0.7, 0.45)
@@ -48,62 +77,33 @@ _WALL = (0.45, 0.55, 0.7, 0.45)
 def plot_control(
     run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """Error, torques, force on the environment and Lyapunov function of a run over time.
-
-    Panels of a force that is zero all the time, and of a law without Lyapunov function, are left
-    out.
-
-    Parameters
-    ----------
-    run : ControlledMotion
-        As `robotmodels.control.run` gives it.
-
-    Examples
-    --------
-    >>> from robotmodels.control import ComputedTorque, run
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> figure = plot_control(run(arm, ComputedTorque(np.full(6, 0.1), model=arm), np.zeros(6)))
-    >>> [axes.get_ylabel() for axes in figure.axes]
-    ['error', 'torque (N m)', 'V']
-    """
+    """Error, torques, force on the environment and Lyapunov function of a run over time."""
     run = style.as_instance(run, ControlledMotion, "run", "control.run")
     names = over_time.joint_names(None, run.q.shape[1], run.simulation.model)
-    panels = [("error", run.error, _error_names(run, names))] if run.error.size else []
+    count = run.error.shape[1]
+    rows = getattr(getattr(run.law, "inner", run.law), "rows", ())
+    errors = names if count == len(names) else [f"component {k + 1}" for k in range(count)]
+    if getattr(run.law, "space", "") != "joint" and len(rows) == count:
+        errors = _COMPONENTS[rows].tolist()
     slides = over_time.is_prismatic(run.simulation.model)
     unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
-    panels.append((f"torque ({unit})", run.tau, names))
     felt = np.abs(run.wrench).max(axis=0) > 1e-9 * max(np.abs(run.wrench).max(), 1e-9)
-    if felt.any():
-        labels = [f"f{c}" if k < 3 else f"m{c[1]}" for k, c in enumerate(_COMPONENTS)]
-        parts = [label for label, seen in zip(labels, felt, strict=True) if seen]
-        units = "force (N)" if not felt[3:].any() else "force, moment\n(N, N m)"
-        panels.append((units, run.wrench[:, felt], parts))
-    if run.lyapunov is not None:
-        panels.append(("V", run.lyapunov[:, None], ["V"]))
-    return _figure(run.t, panels, title, size)
+    force = "force, moment\n(N, N m)" if felt[3:].any() else "force (N)"
+    V = np.empty((len(run.t), 0)) if run.lyapunov is None else run.lyapunov[:, None]
+    panels = [
+        ("error", run.error, errors),
+        (f"torque ({unit})", run.tau, names),
+        (force, run.wrench[:, felt], _FORCES[felt].tolist()),
+        ("V", V, ["V"]),
+    ]
+    return _figure(run.t, [panel for panel in panels if panel[1].size], title, size)
 
 
 @style.plot
 def plot_surface(
     run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """The surface ``s = e' + slope e`` of sliding modes, passivity and adaptive control over time.
-
-    Parameters
-    ----------
-    run : ControlledMotion
-        As `robotmodels.control.run` gives it, of a law with a surface.
-
-    Examples
-    --------
-    >>> from robotmodels.control import Passivity, run
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> law = Passivity(np.full(6, 0.1), slope=5.0, gain=50.0, model=arm)
-    >>> len(plot_surface(run(arm, law, np.zeros(6), t=0.2)).axes)
-    1
-    """
+    """The surface ``s = e' + slope e`` of sliding modes, passivity and adaptive control."""
     run = style.as_instance(run, ControlledMotion, "run", "control.run")
     if (s := run.surface) is None:
         raise InvalidValueError(
@@ -121,28 +121,7 @@ def animate_control(
     length: float | None = None,
     **options: Any,
 ) -> Scene:
-    """Draw the robot of a run as it moves, with the force on the environment as an arrow.
-
-    Parameters
-    ----------
-    run : ControlledMotion
-        As `robotmodels.control.run` gives it.
-    walls : SpringWall or sequence of SpringWall
-        Walls that are drawn.
-    length : float, optional
-        Length of the arrow of the largest force, m; default some part of the scene.
-    **options
-        As for `animate`.
-
-    Examples
-    --------
-    >>> from robotmodels.control import ComputedTorque, run
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> law = ComputedTorque(np.full(6, 0.1), model=arm)
-    >>> animate_control(run(arm, law, np.zeros(6), t=0.5)).motion.duration
-    0.5
-    """
+    """Draw the robot of a run as it moves, with the force on the environment as an arrow."""
     run = style.as_instance(run, ControlledMotion, "run", "control.run")
     sim, still = run.simulation, 0.0 * run.q
     moving = animate(sim.model, Samples(run.t, run.q, run.v, sim.a, still), **options)
@@ -157,22 +136,12 @@ def animate_control(
     return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)
 
 
-def _error_names(run: ControlledMotion, names: list[str]) -> list[str]:
-    """Names of the components of the error."""
-    rows = getattr(getattr(run.law, "inner", run.law), "rows", None)
-    count = run.error.shape[1]
-    if getattr(run.law, "space", "") == "joint" or rows is None or len(rows) != count:
-        return names if count == len(names) else [f"component {k + 1}" for k in range(count)]
-    return _COMPONENTS[rows].tolist()
-
-
 def _figure(
     t: Array, panels: Sequence[tuple[str, Array, list[str]]], title: str | None, size: Any
 ) -> Figure:
     """Panels over each other with one axis of time."""
-    height = 0.6 + 1.5 * len(panels)
-    figure, grid = style.panels(style.COLUMN, height, size, len(panels), sharex=True)
-    for axes, (label, values, names) in zip(grid[:, 0], panels, strict=True):
+    figure, grid = style.panel_list(len(panels), 1, 1.5, size)
+    for axes, (label, values, names) in zip(grid, panels, strict=True):
         axes.axhline(0.0, **style.ZERO)
         # hidden from the legend of the figure: each panel has its own
         over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names])
@@ -180,7 +149,6 @@ def _figure(
         if len(names) > 1:
             lines = axes.get_lines()[-len(names) :]
             axes.legend(lines, names, loc="upper right", ncols=min(len(names), 3))
-    grid[-1, 0].set_xlabel("time (s)")
     return style.finished(figure, title)
 
 

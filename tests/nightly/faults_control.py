@@ -3,7 +3,7 @@
 from mutation_list import Mutation
 
 TESTS = "tests/test_control.py"
-FREE = f"{TESTS} -k (computed or poses or masks)"
+FREE = f"{TESTS} -k (computed or masks or dry_friction)"
 JOINTS = f"{TESTS} -k (pid or pd or lyapunov or feedforward)"
 SLIDING = f"{TESTS} -k (sliding or twisting)"
 ADAPTIVE = f"{TESTS} -k (adaptive or slotine or standard)"
@@ -15,15 +15,19 @@ FEEDBACK = "tests/test_simulation.py -k (state_of or sampled or feedback)"
 MUTATIONS = [
     Mutation("control: kernels", "the drift of the error of a rotation loses a product",
         "w_e = subtract((twist[3]", "cross(w_e, w_r)", "scale(0.0, cross(w_e, w_r))", FREE, True),
+    Mutation("control: kernels", "forces disturb positions", "def solve(\n    J: Floats, wanted",
+        "B[p, i] -= along * used[s, i]", "B[p, i] -= 0.0 * used[s, i]", FORCE, True),
+    Mutation("control: kernels", "near singular postures are not damped",
+        "def solve(\n    J: Floats, wanted",
+        "max(lengths[r], least * longest)", "lengths[r]", f"{TESTS} -k singular", True),
     Mutation("control: kernels", "a moment is not brought to the coordinates of the error",
         "w_e = subtract((twist[3]", "(wrench[3], wrench[4], wrench[5]), a, b)",
         "(wrench[3], wrench[4], wrench[5]), 0.0, 0.0)", CONTACT, True),
-    Mutation("control: computed torque", "half of the damping in joint space",
-        "q_d, v_d, a_d = self._desired(t)\n            a =",
-        " a_d + damping", " a_d + 0.5 * damping", FREE),
+    Mutation("control: computed torque", "half of the damping", "class ComputedTorque(",
+        "self._obey(2.0 * self.zeta", "self._obey(self.zeta", FREE),
     Mutation("control: computed torque", "the drift of the tool is added",
-        "wanted = -damping * (at.de + speed) - w * w * (at.e + by)", " - at.drift", " + at.drift",
-        FREE),
+        "damping, stiffness, softness = self._linear",
+        "(e + by) + drift", "(e + by) - drift", FREE),
     Mutation("control: model", "a joint at rest has no friction of the way it is moved",
         "def started(", "_SLOWEST * np.sign(towards)", "0.0 * np.sign(towards)", FREE),
     Mutation("control: model", "squares of the virtual torques are added", "def virtual_torques(",
@@ -43,19 +47,22 @@ MUTATIONS = [
     Mutation("control: adaptive", "every parameter counts as excited",
         "A sentence that names the parameters",
         "if part > _REMAINS", "if part > 2.0", ADAPTIVE),
-    Mutation("control: impedance", "the measured wrench pushes the wrong way", "class Impedance(",
-        "pull = at.force - self.B", "pull = -at.force - self.B", CONTACT),
+    Mutation("control: impedance", "the measured wrench pushes the wrong way",
+        "damping, stiffness, softness = self._linear",
+        "+ drift - softness * force", "+ drift + softness * force", CONTACT),
     Mutation("control: admittance", "the compliance forgets its stiffness", "class Admittance(",
         "+ self.K * xi) / self.M", "+ 0.0 * xi) / self.M", CONTACT),
+    Mutation("control: admittance", "the position follows the rate too late", "class Admittance(",
+        "(damping - self.B / self.M)", "(0.0 - self.B / self.M)", CONTACT),
     Mutation("control: walls", "a wall pulls", "def __call__(self, t: float, T: ArrayLike",
         "np.maximum(push, 0.0)", "push", CONTACT),
     Mutation("control: walls", "friction drives the tool",
         "def __call__(self, t: float, T: ArrayLike",
         "drag[..., None] * sliding", "-drag[..., None] * sliding", CONTACT),
-    Mutation("control: force", "the measured rate has the wrong sign", "def wanted(self, desired",
-        "rate - self.ke * twist", "rate + self.ke * twist", CONTACT),
-    Mutation("control: hybrid", "the second task is not in the null space of the first",
-        "def prioritised(", "N - P @ (J @ N)", "N", FORCE),
+    Mutation("control: force", "the measured rate has the wrong sign", "def pushes(",
+        "np.zeros((4, 6)), -kv", "np.zeros((4, 6)), kv", CONTACT),
+    Mutation("control: hybrid", "the wrench is added twice", "class ParallelHybrid(",
+        "q, v, a) + load", "q, v, a) + 2.0 * load", FORCE),
     Mutation("control: hybrid", "the axes of the task are transposed", "class _Split(",
         "[:3, :3].T)", "[:3, :3])", FORCE),
     Mutation("control: external loop", "the integral alone", "class ExternalForceLoop(",

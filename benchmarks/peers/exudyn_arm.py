@@ -1,24 +1,24 @@
-"""Exudyn's side of `bench_flexible`: a simulated second of two flexible links, as text in and out.
+"""Two flexible links in Exudyn: floating frames with given modes, a simulated second."""
 
-Reads points, masses, shapes and frequencies of a link, gravity and steps; each link is a floating
-frame with these modes. Prints seconds of processor time and the end of the second link, for each
-number of steps. It needs no package of this project, so that another interpreter runs it.
-"""
+from __future__ import annotations
 
-import json
-import sys
-import time
+from collections.abc import Callable, Mapping
 
-import exudyn as exu
+import exudyn as exu  # pyright: ignore[reportMissingImports]
 import numpy as np
-from exudyn import itemInterface
-from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface
+from exudyn import itemInterface  # pyright: ignore[reportMissingImports]
+from exudyn.FEM import (  # pyright: ignore[reportMissingImports]
+    FEMinterface,
+    ObjectFFRFreducedOrderInterface,
+)
 from scipy.sparse import csr_matrix, diags
 
 
-def main() -> None:
-    """Read, simulate, print."""
-    given = {key: np.array(value) for key, value in json.load(sys.stdin).items()}
+def two_links(given: Mapping[str, np.ndarray]) -> Callable[[int], np.ndarray]:
+    """A function of the number of steps that gives the end of the second link after a second.
+
+    From points (4 k, 3), their masses, shapes (4 k, 3, m) and frequencies (m,) of a link, gravity.
+    """
     X, mass, Phi = given["points"], np.repeat(given["masses"], 3), given["shapes"]
     Phi = Phi.reshape(len(mass), -1)
     left = mass[:, None] * Phi @ np.linalg.inv(Phi.T @ (mass[:, None] * Phi))
@@ -58,8 +58,8 @@ def main() -> None:
             outputVariableType=exu.OutputVariableType.Position,
         )
     )  # fmt: skip
-    found = []
-    for steps in given["steps"].tolist():
+
+    def run(steps: int) -> np.ndarray:
         arm.Assemble()
         settings = exu.SimulationSettings()
         settings.timeIntegration.numberOfSteps = steps
@@ -68,11 +68,7 @@ def main() -> None:
         settings.timeIntegration.newton.useModifiedNewton = True
         settings.solution.file.write = False
         settings.solution.sensors.writePeriod = 1.0
-        started = time.process_time()
         arm.SolveDynamic(settings)
-        found.append([time.process_time() - started, *arm.GetSensorValues(sensor)])
-    print(json.dumps(found))
+        return np.array(arm.GetSensorValues(sensor))
 
-
-if __name__ == "__main__":
-    main()
+    return run
