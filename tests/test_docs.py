@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_notebooks import SECTIONS
 
 import robotmodels as rm
 
@@ -196,3 +197,50 @@ def test_every_section_that_docstrings_cite_is_on_a_page_of_the_book():
 def test_chapter_1_has_every_numbered_equation_of_the_seed():
     numbers = re.findall(r"^\| \[1\.(\d+)\]", text_of(DOCS / "book" / "chapter_1.md"), re.MULTILINE)
     assert [int(n) for n in numbers] == list(range(1, 19))
+
+
+# --- the tables of the book's chapters ------------------------------------------------------------
+
+
+PROSE = {
+    "1.1", "1.4.1", "1.6.1", "1.7", "1.8", "2.5", "3.1", "3.5.1", "4.1", "4.5", "4.6", "4.7", "5.1", "5.4", "5.5",
+    "6.1", "6.5", "6.6", "7.1", "7.2.1", "7.3.1", "7.3.2", "7.4", "7.5",
+}  # fmt: skip
+"""Introductions, conclusions, bibliographies."""
+
+
+def chapter_rows(chapter):
+    """Cells of the rows that begin with section numbers of a chapter."""
+    text = (DOCS / f"book/chapter_{chapter}.md").read_text(encoding="utf-8")
+    rows = [re.split(r" \| ", line.strip("| ")) for line in text.splitlines()]
+    return [row for row in rows if re.match(rf"{chapter}\.\d", row[0]) and len(row) > 1]
+
+
+@pytest.mark.parametrize("chapter", "1234567")
+def test_a_chapter_has_all_its_sections_with_notebooks_and_tests(chapter):
+    rows = chapter_rows(chapter)
+    assert len(rows) > 10
+    listed = set()
+    for first, *cells in rows:
+        numbers = re.findall(rf"{chapter}(?:\.\d+)+", first)
+        if re.match(r"\S+ to \d", first):
+            head, _, last = numbers[0].rpartition(".")
+            numbers += [f"{head}.{k}" for k in range(int(last), int(numbers[1][-1]) + 1)]
+        listed |= set(numbers)
+        line = " | ".join(cells)
+        for number, section in re.findall(r"\b(\d\d) \((\d(?:\.\d+)+)\)", line):
+            (notebook,) = (ROOT / "notebooks").glob(f"{number}_*.ipynb")
+            assert section in notebook.read_text(encoding="utf-8"), (first, number, section)
+        for test in re.findall(r"`((?:identities/)?test_\w+\.py)`", line):
+            assert (ROOT / "tests" / test).is_file(), (first, test)
+        assert "not here" in line or "test_" in line, first
+    missing = [
+        section
+        for section in sorted(SECTIONS - PROSE)
+        if section.startswith(f"{chapter}.")
+        and not any(
+            section == s or section.startswith(f"{s}.") or s.startswith(f"{section}.")
+            for s in listed
+        )
+    ]
+    assert missing == []
