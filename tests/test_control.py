@@ -436,6 +436,16 @@ def test_impedance_oscillates_and_gives_way_as_stated():
         assert np.allclose(run.wrench[-1], [force, 0, 0, 0, 0, 0], atol=1e-5)
 
 
+def test_admittance_moves_as_stated():
+    T, M, B, K, f = dgm(arm(), Q0), 2.0, 24.0, 300.0, [3.0, -2.0, 0, 0, 0, 0]
+    law = control.Admittance(T, M, B, K, model=arm(), omega=60.0, mask=XY)
+    t = np.linspace(0, 0.3, 7)
+    run = control.run(arm(), law, Q0, t=t, environment=lambda t, T, w: f)
+    a, b = np.roots([M, B, K])
+    way = 1 - ((a * np.exp(b * t) - b * np.exp(a * t)) / (a - b)).real
+    assert np.allclose(run.error, np.outer(way, f[:2]) / K, atol=1e-9)
+
+
 def test_impedance_of_the_orientation_and_of_another_frame():
     tool = moved(np.eye(4), 0.05, 0.1, 0.2)
     model, K = load("erd:ur5").with_tool(tool), np.array([300.0, 400.0, 500.0, 20.0, 30.0, 40.0])
@@ -714,11 +724,13 @@ def test_laws_of_users_and_laws_in_simulate():
 
 def laws():
     model, T = arm(), dgm(arm(), Q0)
-    inner = control.ComputedTorque(T, model=model, space="task")
+    line = straight_line(T, moved(T, 0.1, 0, 0), 1.0)
+    inner = control.ComputedTorque(line, model=model, space="task")
     return [
         control.ComputedTorque(Q0, model=model), inner, control.DecentralizedPID(Q0, 1, 2, 3),
         control.PDGravity(Q0, 1, 2, model), control.Passivity(Q0, 1, 2, model),
-        control.SlidingMode(Q0, 1, 2), control.SuperTwisting(Q0, 1, 2, 3, model=model),
+        control.SlidingMode(quintic(Q0, Q0 + 1, duration=1.0), 1, 2),
+        control.SuperTwisting(Q0, 1, 2, 3, model=model),
         control.AdaptiveSlotineLi(Q0, 1, 2, 3, model=model, drive=False),
         control.Impedance(T, 1, 2, 3, model=model), control.Admittance(T, 1, 2, 3, model=model),
         control.ForceTracking(1, 2, 3, reference=PUSH, model=model), hybrid(),
@@ -737,7 +749,7 @@ def test_laws_and_runs_are_values():
             setattr(law, fields(law)[0].name, 1.0)
         if hasattr(law, "command"):
             x = law.state0
-            assert law.command(0.0, Q0, [0.1, 0.2], x).shape == (2,)
+            assert law.command(0, Q0, [0.1, 0.2], x).shape == (2,)
             assert law.rate(0.0, Q0, [0.1, 0.2], x).shape == x.shape
             assert np.array_equal(
                 law.command(0.0, Q0, [0.1, 0], x), again.command(0.0, Q0, [0.1, 0], x)
@@ -788,6 +800,16 @@ BAD = [
     (lambda: hybrid(position=control.ComputedTorque(Q0, model=arm())), "a law in task space"),
     (lambda: control.ExternalForceLoop(control.ComputedTorque(Q0, model=arm()), 1, 1), "inner:"),
     (lambda: control.ForceTracking(1, 1, 1, "none", PUSH, arm()), "'desired' or 'measured'"),
+    (lambda: control.ExternalForceLoop(laws()[9], 1, 1), "inner: expected a law in task space"),
+    (lambda: laws()[2].command("a", Q0, Q0, Q0), "t: expected"),
+    (lambda: laws()[8].command(np.nan, Q0, Q0), "t: expected a finite number"),
+    (lambda: laws()[0].command(0, Q0, Q0, (), [1]), "wrench: expected shape"),
+    (lambda: laws()[2].command(0, Q0, Q0, None), "x: expected real numbers"),
+    (lambda: laws()[7].command(0, [Q0, Q0], [Q0, Q0], np.ones(6)), "expected one posture"),
+    (lambda: control.PDGravity([], 1, 1), "at least one joint"),
+    (lambda: hybrid(inverse=np.zeros(3)), "'consistent' or 'jacobian'"),
+    (lambda: WALL(0, [np.eye(4)] * 2, np.zeros((3, 6))), "do not broadcast"),
+    (lambda: control.first_order(lambda s: 1e300 * s, 1, 0, 1, 0.1), "s is not finite"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 0], 1.0), "normal: expected a vector"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 0.0), "stiffness: expected"),
     (lambda: control.SpringWall([0, 0], [0, 0, 1], 1.0), "point: expected shape"),

@@ -126,6 +126,7 @@ class _Split(TaskLaw):
     """Position in some directions of a task, force in the others."""
 
     _order: NDArray[np.int64] = field(init=False)  # 1 where a force is controlled
+    _chosen: tuple[Array, Array] = field(init=False)  # rows of both Jacobians
     _gains: Array = field(init=False)
 
     def _prepare(self: Any, frame: str) -> None:
@@ -153,7 +154,10 @@ class _Split(TaskLaw):
         w[position.rows], z[position.rows] = position.omega, position.zeta
         gains = np.where(selection, pushes(force), 0.0)
         gains[:3] -= np.where(selection, 0.0, [w * w, 2.0 * z * w, np.ones(6)])
-        self._set(_gains=gains[:, self.rows], _order=selection[self.rows].astype(np.int64))
+        order = selection[self.rows].astype(np.int64)
+        self._set(
+            _gains=gains[:, self.rows], _order=order, _chosen=(1 - order, np.arange(len(order)))
+        )
         self._set(position=position, force=force, selection=selection.astype(float))
         self._set(_free=2.0 * np.max(position.omega), **{frame: given})
 
@@ -162,7 +166,7 @@ class _Split(TaskLaw):
         pose, force = self.position._desired(t), self.force._desired(t)
         rows, J, load = self._tool(q, v, pose, f, f, *force)
         wanted = np.einsum("kj,kj->j", self._gains, rows)
-        return rows, J[1 - self._order, np.arange(len(wanted))], wanted, load
+        return rows, J[self._chosen], wanted, load
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         rows = self._aims(t, q, v, f)[0]
@@ -248,7 +252,7 @@ class ExternalForceLoop(TaskLaw):
 
     def __post_init__(self) -> None:
         inner: Any = self.inner
-        if not (isinstance(inner, Impedance) or getattr(inner, "space", "") == "task"):
+        if not isinstance(inner, (ComputedTorque, Impedance)) or inner.space != "task":
             raise InvalidValueError(
                 "inner: expected a law in task space (ComputedTorque with space='task', "
                 f"Impedance), got {inner!r:.80}."

@@ -33,7 +33,7 @@ Environment = Callable[[float, Array, Array], ArrayLike]
 class ControlStatus(Outcome):
     """Outcome of a run; fits int8. The motion until then is given for every status."""
 
-    FOLLOWED = 0, "The law was followed to the end, within the limits of the robot."
+    FOLLOWED = 0, "The law was followed to the end, within all limits: no proof of stability."
     SATURATED = 1, "Torques were limited to the efforts of the joints."
     LEFT_LIMITS = 2, "Joints left their limits."
     DIVERGED = 3, "The law was not followed to the end."
