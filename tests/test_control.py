@@ -515,6 +515,10 @@ def test_hybrid_control_of_position_and_force():
         model, hybrid(task_frame=R, selection=[0, 1, 0, 0, 0, 0]), Q0, t=t, environment=WALL
     )
     assert np.allclose(turned.q, run.q, atol=1e-9)
+    R = Rotation.from_euler("z", 30, degrees=True).as_matrix()
+    law, f = hybrid(task_frame=R), np.array([3.0, 2.0, 0, 0, 0, 0])
+    expected = [R[:, 0] @ (PUSH - f)[:3], R[1, 1] * 0.1]  # the pose is 0.1 m along y away
+    assert np.allclose(law.error(0, Q0, [0, 0], f), expected, atol=1e-12)
 
 
 def test_forces_of_the_consistent_form_do_no_work_on_positions():
@@ -582,6 +586,17 @@ def test_the_external_force_loop_holds_the_force_on_any_wall(believed):
     assert np.abs(dgm(model, run.q[-1])[1, 3] - goal[1, 3]) < 1e-6
     lost = np.flatnonzero(run.wrench[:, 0] > 0)[0]
     assert (run.wrench[lost:, 0] > 0).all()  # no bounce
+
+
+def test_the_external_force_loop_moves_by_the_force_error_and_its_integral():
+    goal, w, x = moved(dgm(arm(), Q0), 0.01, -0.02, 0), 20.0, np.array([0.003, 0.001])
+    inner = control.ComputedTorque(goal, omega=w, model=arm(), space="task", mask=XY)
+    law = control.ExternalForceLoop(inner, 2e3, 5.0, force=PUSH)
+    f, J, rest = np.array([4.0, 1.0, 0, 0, 0, 0]), jacobian(arm(), Q0), np.zeros(2)
+    tau = law.command(0.0, Q0, rest, x, f) - gravity_torque(arm(), Q0) - J.T @ f
+    by = np.array([6.0, -1.0]) / 2e3
+    expected = w**2 * (np.array([0.01, -0.02]) + x + by) + 2 * w * 5.0 * by
+    assert np.allclose(J[:2] @ np.linalg.solve(mass_matrix(arm(), Q0), tau), expected, atol=1e-9)
 
 
 # --- runs --------------------------------------------------------------------------------------
