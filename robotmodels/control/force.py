@@ -62,11 +62,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, as_floats, as_mask
+from .._choices import one_of
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
-from .law import NO_WRENCH, WRENCH, as_word, model_torques
+from .law import NO_WRENCH, WRENCH, model_torques
 from .task_laws import ComputedTorque, Impedance, TaskLaw, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
@@ -94,7 +95,7 @@ class ForceTracking(TaskLaw):
 
     def __post_init__(self) -> None:
         check_model(self.model)
-        as_word(self.feedforward, ("desired", "measured"), "feedforward")
+        one_of(self.feedforward, ("desired", "measured"), "feedforward")
         self._keep_gains(("kp", "kv", "ke"), 6, rows=range(6))
         self._keep_reference(WRENCH)
         rows = np.flatnonzero(as_mask(self.mask))
@@ -187,7 +188,7 @@ class ParallelHybrid(_Split):
 
     def __post_init__(self) -> None:
         self._prepare("task_frame")
-        as_word(self.inverse, ("consistent", "jacobian"), "inverse")
+        one_of(self.inverse, ("consistent", "jacobian"), "inverse")
         if self.inverse == "jacobian" and len(self.rows) != self.n:
             raise InvalidValueError(
                 f"inverse: 'jacobian' needs as many components as joints, {self.n}, got "

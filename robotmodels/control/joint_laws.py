@@ -53,6 +53,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value, as_exact, as_number, as_vector, batch_rows
+from .._choices import one_of
 from ..drive import Drives
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
@@ -61,7 +62,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
 from ..regressors.drives import add_torques, friction_terms, rotor_terms
-from .law import Desired, Law, as_word, check_single, started, virtual_torques
+from .law import Desired, Law, check_single, started, virtual_torques
 
 _REMAINS = 0.2
 """Part of an error of a parameter that remains where the motion excites it too little."""
@@ -331,7 +332,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
     def __post_init__(self) -> None:
         check_model(self.model)
         self._prepare(("slope", "gain"), self.model)
-        as_word(self.parameters, ("base", "standard"), "parameters")
+        one_of(self.parameters, ("base", "standard"), "parameters")
         base = base_parameters(self.model, drive=self.drive) if self.parameters == "base" else None
         names = tuple(base.names if base else parameter_names(self.model, self.drive))
         blocks, p = standard_blocks(self.model, self.drive, None), len(names)

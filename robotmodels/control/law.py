@@ -138,13 +138,6 @@ class Law(Value):
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
-    """Refuse a choice that is not listed."""
-    if not isinstance(value, str) or value not in words:
-        wanted = " or ".join(map(repr, words))
-        raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")
-
-
 def check_single(q: Array, v: Array) -> None:
     """Refuse several postures."""
     if q.ndim != 1 or v.ndim != 1:

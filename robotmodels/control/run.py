@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_floats, as_number, as_vector
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number, as_vector
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian
@@ -40,7 +40,7 @@ class ControlStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ControlledMotion(Value):
+class ControlledMotion(Frozen, Value):
     """Motion of a controlled robot. Read-only.
 
     Parameters
@@ -68,11 +68,6 @@ class ControlledMotion(Value):
     lyapunov: Array | None
     status: ControlStatus
     notes: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            if isinstance(value := getattr(self, f.name), np.ndarray):
-                value.setflags(write=False)
 
     t = property(attrgetter("simulation.t"), doc="Times, s, shape (N,).")
     q = property(attrgetter("simulation.q"), doc="Positions, rad or m, shape (N, n).")

@@ -50,10 +50,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, as_mask, read_only
+from .._choices import one_of
 from ..errors import InvalidValueError, SingularMassMatrixError
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import NO_WRENCH, POSE, Desired, Law, as_word, check_single, model_torques
+from .law import NO_WRENCH, POSE, Desired, Law, check_single, model_torques
 
 _RANK = 1e-9  # relative singular value of rows that depend
 _FIRST = np.zeros(6, dtype=np.int64)
@@ -197,7 +198,7 @@ class ComputedTorque(TaskLaw):
 
     def __post_init__(self) -> None:
         check_model(self.model)
-        as_word(self.space, ("joint", "task"), "space")
+        one_of(self.space, ("joint", "task"), "space")
         if self.space == "task":
             self._prepare(("omega", "zeta"))
         else:
