@@ -30,6 +30,9 @@ def test_figures_have_the_panels_of_the_law(pushed):
         rm.viz.plot_surface(pushed)
     with pytest.raises(InvalidValueError, match="run: expected"):
         rm.viz.plot_control(law)
+    for wrong in ({"walls": 3}, {"walls": [law]}, {"length": 0.0}, {"length": "a"}):
+        with pytest.raises(InvalidValueError, match=f"{next(iter(wrong))}: expected"):
+            rm.viz.animate_control(pushed, **wrong)
 
 
 def test_the_force_is_an_arrow_at_the_tool(pushed):

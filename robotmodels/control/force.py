@@ -275,5 +275,5 @@ class ExternalForceLoop(TaskLaw):
         return self._active * (self._desired(t)[0] - f)[self.rows]
 
     def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """Those of the inner law."""
+        """Sentences of the inner law."""
         return self.inner.notes(t, q, v)

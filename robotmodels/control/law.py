@@ -77,7 +77,7 @@ class Law(Value):
     ) -> None:
         """Check positive gains: one number, or one for each of n components; six are of all rows.
 
-        Those of the name `zero` may be zero. With rows each component gets its own.
+        Gains of the name `zero` may be zero. With rows each component gets its own.
         """
         for name in names:
             gains = as_floats(getattr(self, name), name)

@@ -22,7 +22,7 @@ matplotlib.figure.Figure or Scene
 Raises
 ------
 InvalidValueError
-    What is no run of a controlled robot; a law without a surface.
+    A run that is no ControlledMotion; a law without a surface.
 
 References
 ----------
@@ -52,7 +52,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array
+from .._arrays import Array, as_number
 from ..control import ControlledMotion, SpringWall
 from ..errors import InvalidValueError
 from ..kinematics import dgm
@@ -130,9 +130,10 @@ def animate_control(
     if moving.motion is None:  # animations have one
         return moving
     tips, size = dgm(sim.model, run.q)[:, :3, 3], 0.15 * moving.camera.distance
-    size = size if length is None else float(length)
+    size = size if length is None else as_number(length, "length", above=0.0)
     nodes, tracks = _arrow(run.t - run.t[0], tips, run.wrench[:, :3], size)
-    given = (walls,) if isinstance(walls, SpringWall) else tuple(walls)
+    given = tuple(walls) if isinstance(walls, (list, tuple)) else (walls,)
+    given = [style.as_instance(wall, SpringWall, "walls", "control") for wall in given]
     nodes += [_wall(wall, tips, size, f"walls/{k}") for k, wall in enumerate(given, 1)]
     motion = replace(moving.motion, tracks=(*moving.motion.tracks, *tracks))
     return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)
@@ -149,7 +150,7 @@ def _figure(
         # hidden from the legend of the figure: each panel has its own
         over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names])
         axes.set_ylabel(label)
-        if len(names) > 1 and names != shown:  # that of the panel above serves for the same names
+        if names not in ([label], shown):  # the same names have the legend of the panel above
             shown, lines = names, axes.get_lines()[-len(names) :]
             rows = ceil(len(names) * (max(map(len, names)) + 9.0) / _LETTERS)
             axes.legend(
