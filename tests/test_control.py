@@ -436,6 +436,16 @@ def test_impedance_oscillates_and_gives_way_as_stated():
         assert np.allclose(run.wrench[-1], [force, 0, 0, 0, 0, 0], atol=1e-5)
 
 
+def test_admittance_moves_as_stated():
+    T, M, B, K, f = dgm(arm(), Q0), 2.0, 24.0, 300.0, [3.0, -2.0, 0, 0, 0, 0]
+    law = control.Admittance(T, M, B, K, model=arm(), omega=60.0, mask=XY)
+    t = np.linspace(0, 0.3, 7)
+    run = control.run(arm(), law, Q0, t=t, environment=lambda t, T, w: f)
+    a, b = np.roots([M, B, K])
+    way = 1 - ((a * np.exp(b * t) - b * np.exp(a * t)) / (a - b)).real
+    assert np.allclose(run.error, np.outer(way, f[:2]) / K, atol=1e-9)
+
+
 def test_impedance_of_the_orientation_and_of_another_frame():
     tool = moved(np.eye(4), 0.05, 0.1, 0.2)
     model, K = load("erd:ur5").with_tool(tool), np.array([300.0, 400.0, 500.0, 20.0, 30.0, 40.0])
@@ -505,6 +515,10 @@ def test_hybrid_control_of_position_and_force():
         model, hybrid(task_frame=R, selection=[0, 1, 0, 0, 0, 0]), Q0, t=t, environment=WALL
     )
     assert np.allclose(turned.q, run.q, atol=1e-9)
+    R = Rotation.from_euler("z", 30, degrees=True).as_matrix()
+    law, f = hybrid(task_frame=R), np.array([3.0, 2.0, 0, 0, 0, 0])
+    expected = [R[:, 0] @ (PUSH - f)[:3], R[1, 1] * 0.1]  # the pose is 0.1 m along y away
+    assert np.allclose(law.error(0, Q0, [0, 0], f), expected, atol=1e-12)
 
 
 def test_forces_of_the_consistent_form_do_no_work_on_positions():
@@ -572,6 +586,17 @@ def test_the_external_force_loop_holds_the_force_on_any_wall(believed):
     assert np.abs(dgm(model, run.q[-1])[1, 3] - goal[1, 3]) < 1e-6
     lost = np.flatnonzero(run.wrench[:, 0] > 0)[0]
     assert (run.wrench[lost:, 0] > 0).all()  # no bounce
+
+
+def test_the_external_force_loop_moves_by_the_force_error_and_its_integral():
+    goal, w, x = moved(dgm(arm(), Q0), 0.01, -0.02, 0), 20.0, np.array([0.003, 0.001])
+    inner = control.ComputedTorque(goal, omega=w, model=arm(), space="task", mask=XY)
+    law = control.ExternalForceLoop(inner, 2e3, 5.0, force=PUSH)
+    f, J, rest = np.array([4.0, 1.0, 0, 0, 0, 0]), jacobian(arm(), Q0), np.zeros(2)
+    tau = law.command(0.0, Q0, rest, x, f) - gravity_torque(arm(), Q0) - J.T @ f
+    by = np.array([6.0, -1.0]) / 2e3
+    expected = w**2 * (np.array([0.01, -0.02]) + x + by) + 2 * w * 5.0 * by
+    assert np.allclose(J[:2] @ np.linalg.solve(mass_matrix(arm(), Q0), tau), expected, atol=1e-9)
 
 
 # --- runs --------------------------------------------------------------------------------------
@@ -714,11 +739,13 @@ def test_laws_of_users_and_laws_in_simulate():
 
 def laws():
     model, T = arm(), dgm(arm(), Q0)
-    inner = control.ComputedTorque(T, model=model, space="task")
+    line = straight_line(T, moved(T, 0.1, 0, 0), 1.0)
+    inner = control.ComputedTorque(line, model=model, space="task")
     return [
         control.ComputedTorque(Q0, model=model), inner, control.DecentralizedPID(Q0, 1, 2, 3),
         control.PDGravity(Q0, 1, 2, model), control.Passivity(Q0, 1, 2, model),
-        control.SlidingMode(Q0, 1, 2), control.SuperTwisting(Q0, 1, 2, 3, model=model),
+        control.SlidingMode(quintic(Q0, Q0 + 1, duration=1.0), 1, 2),
+        control.SuperTwisting(Q0, 1, 2, 3, model=model),
         control.AdaptiveSlotineLi(Q0, 1, 2, 3, model=model, drive=False),
         control.Impedance(T, 1, 2, 3, model=model), control.Admittance(T, 1, 2, 3, model=model),
         control.ForceTracking(1, 2, 3, reference=PUSH, model=model), hybrid(),
@@ -737,7 +764,7 @@ def test_laws_and_runs_are_values():
             setattr(law, fields(law)[0].name, 1.0)
         if hasattr(law, "command"):
             x = law.state0
-            assert law.command(0.0, Q0, [0.1, 0.2], x).shape == (2,)
+            assert law.command(0, Q0, [0.1, 0.2], x).shape == (2,)
             assert law.rate(0.0, Q0, [0.1, 0.2], x).shape == x.shape
             assert np.array_equal(
                 law.command(0.0, Q0, [0.1, 0], x), again.command(0.0, Q0, [0.1, 0], x)
@@ -759,7 +786,7 @@ BAD = [
     (lambda: control.ComputedTorque(Q0, omega=[1, 2, 3], model=arm()), "omega: expected one"),
     (lambda: control.ComputedTorque([0.0], model=arm()), "expected 2 joints"),
     (lambda: control.ComputedTorque(Q0), "model: expected a RobotModel, got NoneType"),
-    (lambda: control.ComputedTorque(Q0, model=arm(), space="cartesian"), "'joint' or 'task'"),
+    (lambda: control.ComputedTorque(Q0, model=arm(), space="cartesian"), "'joint', 'task'"),
     (lambda: control.ComputedTorque(np.eye(4), model=arm(), space="task", mask=[1, 1, 1, 0, 0, 0]),
      "3 components are more than the 2 joints"),
     (lambda: control.ComputedTorque(lambda t: Q0, model=arm()), "expected three arrays"),
@@ -775,19 +802,29 @@ BAD = [
     (lambda: control.SlidingMode(None, 1, 1).command(0, Q0, Q0), "this one is scalar"),
     (lambda: control.first_order(control.SlidingMode(None, 1, 1), 1, 0, 1, 0), "step: expected"),
     (lambda: control.first_order("sign", 1, 0, 1, 0.1), "a sliding mode or a function of s"),
-    (lambda: control.AdaptiveSlotineLi(Q0, 1, 1, 1, "all", model=arm()), "'base' or 'standard'"),
+    (lambda: control.AdaptiveSlotineLi(Q0, 1, 1, 1, "all", model=arm()), "'base', 'standard'"),
     (lambda: control.AdaptiveSlotineLi(Q0, 1, 1, 1, start=[1.0], model=arm()), "start:"),
     (lambda: control.Impedance(np.eye(4), 1, 1, -5, model=arm()), "K: expected gains above 0"),
     (lambda: control.Impedance(np.eye(4), [1, 2, 3], 1, 5, model=arm()), "M: expected one"),
     (lambda: hybrid(selection=[0.5, 0, 0, 0, 0, 0]), "selection: expected zeros and ones"),
     (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "expected a force-controlled"),
-    (lambda: hybrid(inverse="pinv"), "'consistent' or 'jacobian'"),
+    (lambda: hybrid(inverse="pinv"), "'consistent', 'jacobian'"),
     (lambda: hybrid(inverse="jacobian", mask=[1, 0, 0, 0, 0, 0]), "as many components as joints"),
     (lambda: hybrid(task_frame=np.eye(2)), "task_frame: expected shape"),
     (lambda: hybrid(force=[1, 2, 3]), "reference: expected shape"),
     (lambda: hybrid(position=control.ComputedTorque(Q0, model=arm())), "a law in task space"),
     (lambda: control.ExternalForceLoop(control.ComputedTorque(Q0, model=arm()), 1, 1), "inner:"),
-    (lambda: control.ForceTracking(1, 1, 1, "none", PUSH, arm()), "'desired' or 'measured'"),
+    (lambda: control.ForceTracking(1, 1, 1, "none", PUSH, arm()), "'desired', 'measured'"),
+    (lambda: control.ExternalForceLoop(laws()[9], 1, 1), "inner: expected a law in task space"),
+    (lambda: laws()[2].command("a", Q0, Q0, Q0), "t: expected"),
+    (lambda: laws()[8].command(np.nan, Q0, Q0), "t: expected a finite number"),
+    (lambda: laws()[0].command(0, Q0, Q0, (), [1]), "wrench: expected shape"),
+    (lambda: laws()[2].command(0, Q0, Q0, None), "x: expected real numbers"),
+    (lambda: laws()[7].command(0, [Q0, Q0], [Q0, Q0], np.ones(6)), "expected one posture"),
+    (lambda: control.PDGravity([], 1, 1), "at least one joint"),
+    (lambda: hybrid(inverse=np.zeros(3)), "'consistent', 'jacobian'"),
+    (lambda: WALL(0, [np.eye(4)] * 2, np.zeros((3, 6))), "do not broadcast"),
+    (lambda: control.first_order(lambda s: 1e300 * s, 1, 0, 1, 0.1), "s is not finite"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 0], 1.0), "normal: expected a vector"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 0.0), "stiffness: expected"),
     (lambda: control.SpringWall([0, 0], [0, 0, 1], 1.0), "point: expected shape"),

@@ -5,7 +5,7 @@ import pytest
 from test_control import Q0, WALL, arm, hybrid
 
 import robotmodels as rm
-from robotmodels import control
+from robotmodels import control, se3
 from robotmodels.errors import InvalidValueError
 
 
@@ -30,6 +30,9 @@ def test_figures_have_the_panels_of_the_law(pushed):
         rm.viz.plot_surface(pushed)
     with pytest.raises(InvalidValueError, match="run: expected"):
         rm.viz.plot_control(law)
+    for wrong in ({"walls": 3}, {"walls": [law]}, {"length": 0.0}, {"length": "a"}):
+        with pytest.raises(InvalidValueError, match=f"{next(iter(wrong))}: expected"):
+            rm.viz.animate_control(pushed, **wrong)
 
 
 def test_the_force_is_an_arrow_at_the_tool(pushed):
@@ -42,15 +45,12 @@ def test_the_force_is_an_arrow_at_the_tool(pushed):
         T, parts = np.eye(4), path.split("/")
         for end in range(1, len(parts) + 1):
             at = "/".join(parts[:end])
-            T = T @ poses.get(at, np.eye(4))
-            if at in tracks:
-                value, moved = tracks[at].values[k], np.eye(4)
-                if tracks[at].prismatic:
-                    moved[2, 3] = value - poses[at][2, 3]
-                else:
-                    c, s = np.cos(value), np.sin(value)
-                    moved[:2, :2] = [[c, -s], [s, c]]
-                T = T @ moved
+            if at not in tracks:
+                T = T @ poses.get(at, np.eye(4))
+            elif tracks[at].prismatic:
+                T = T @ se3.translation(0, 0, tracks[at].values[k])
+            else:
+                T = T @ se3.rotation("z", tracks[at].values[k])
         return T
 
     head = next(path for path in tracks if path.endswith("head"))

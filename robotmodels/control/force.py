@@ -62,11 +62,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, as_floats, as_mask
+from .._choices import one_of
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from ..se3 import as_single_pose
-from .law import NO_WRENCH, WRENCH, as_word, model_torques
+from .law import NO_WRENCH, WRENCH, model_torques
 from .task_laws import ComputedTorque, Impedance, TaskLaw, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
@@ -94,7 +95,7 @@ class ForceTracking(TaskLaw):
 
     def __post_init__(self) -> None:
         check_model(self.model)
-        as_word(self.feedforward, ("desired", "measured"), "feedforward")
+        one_of(self.feedforward, ("desired", "measured"), "feedforward")
         self._keep_gains(("kp", "kv", "ke"), 6, rows=range(6))
         self._keep_reference(WRENCH)
         rows = np.flatnonzero(as_mask(self.mask))
@@ -126,6 +127,7 @@ class _Split(TaskLaw):
     """Position in some directions of a task, force in the others."""
 
     _order: NDArray[np.int64] = field(init=False)  # 1 where a force is controlled
+    _chosen: tuple[Array, Array] = field(init=False)  # rows of both Jacobians
     _gains: Array = field(init=False)
 
     def _prepare(self: Any, frame: str) -> None:
@@ -153,7 +155,10 @@ class _Split(TaskLaw):
         w[position.rows], z[position.rows] = position.omega, position.zeta
         gains = np.where(selection, pushes(force), 0.0)
         gains[:3] -= np.where(selection, 0.0, [w * w, 2.0 * z * w, np.ones(6)])
-        self._set(_gains=gains[:, self.rows], _order=selection[self.rows].astype(np.int64))
+        order = selection[self.rows].astype(np.int64)
+        self._set(
+            _gains=gains[:, self.rows], _order=order, _chosen=(1 - order, np.arange(len(order)))
+        )
         self._set(position=position, force=force, selection=selection.astype(float))
         self._set(_free=2.0 * np.max(position.omega), **{frame: given})
 
@@ -162,7 +167,7 @@ class _Split(TaskLaw):
         pose, force = self.position._desired(t), self.force._desired(t)
         rows, J, load = self._tool(q, v, pose, f, f, *force)
         wanted = np.einsum("kj,kj->j", self._gains, rows)
-        return rows, J[1 - self._order, np.arange(len(wanted))], wanted, load
+        return rows, J[self._chosen], wanted, load
 
     def _error(self: Any, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         rows = self._aims(t, q, v, f)[0]
@@ -183,7 +188,7 @@ class ParallelHybrid(_Split):
 
     def __post_init__(self) -> None:
         self._prepare("task_frame")
-        as_word(self.inverse, ("consistent", "jacobian"), "inverse")
+        one_of(self.inverse, ("consistent", "jacobian"), "inverse")
         if self.inverse == "jacobian" and len(self.rows) != self.n:
             raise InvalidValueError(
                 f"inverse: 'jacobian' needs as many components as joints, {self.n}, got "
@@ -248,7 +253,7 @@ class ExternalForceLoop(TaskLaw):
 
     def __post_init__(self) -> None:
         inner: Any = self.inner
-        if not (isinstance(inner, Impedance) or getattr(inner, "space", "") == "task"):
+        if not isinstance(inner, (ComputedTorque, Impedance)) or inner.space != "task":
             raise InvalidValueError(
                 "inner: expected a law in task space (ComputedTorque with space='task', "
                 f"Impedance), got {inner!r:.80}."
@@ -270,5 +275,5 @@ class ExternalForceLoop(TaskLaw):
         return self._active * (self._desired(t)[0] - f)[self.rows]
 
     def notes(self, t: Array, q: Array, v: Array) -> tuple[str, ...]:
-        """Those of the inner law."""
+        """Sentences of the inner law."""
         return self.inner.notes(t, q, v)

@@ -53,6 +53,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value, as_exact, as_number, as_vector, batch_rows
+from .._choices import one_of
 from ..drive import Drives
 from ..dynamics import gravity_torque, idm, mass_matrix
 from ..errors import InvalidValueError
@@ -61,7 +62,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
 from ..regressors.drives import add_torques, friction_terms, rotor_terms
-from .law import Desired, Law, as_word, started, virtual_torques
+from .law import Desired, Law, check_single, started, virtual_torques
 
 _REMAINS = 0.2
 """Part of an error of a parameter that remains where the motion excites it too little."""
@@ -152,7 +153,7 @@ class SurfaceLaw(JointLaw):
 
     def surface(self, t: float, q: Any, v: Any) -> Array:
         """``s = e' + slope e``, shape (n,)."""
-        q, v, *_ = self._measured(q, v, self.state0, None)
+        t, q, v, *_ = self._measured(t, q, v, self.state0, None)
         return self._rates(t, q, v)[0] - v
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float:
@@ -301,8 +302,9 @@ def _regressors(
     torque_regressors(q, 0.5 * (v + v_r), a_r, model.chain, model.gravity, links, W)
     torque_regressors(q, 0.5 * (v - v_r), 0.0 * a_r, model.chain, zero, links, squares)
     W -= squares
-    add_torques(chosen, rotor_terms(model, a_r), W)
-    add_torques(chosen, friction_terms(model, q, v, None), W)
+    if len(chosen.places) > 1:
+        add_torques(chosen, rotor_terms(model, a_r), W)
+        add_torques(chosen, friction_terms(model, q, v, None), W)
     return W
 
 
@@ -330,7 +332,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
     def __post_init__(self) -> None:
         check_model(self.model)
         self._prepare(("slope", "gain"), self.model)
-        as_word(self.parameters, ("base", "standard"), "parameters")
+        one_of(self.parameters, ("base", "standard"), "parameters")
         base = base_parameters(self.model, drive=self.drive) if self.parameters == "base" else None
         names = tuple(base.names if base else parameter_names(self.model, self.drive))
         blocks, p = standard_blocks(self.model, self.drive, None), len(names)
@@ -345,6 +347,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
 
     def regressor(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Y, shape (n, p), and s, shape (n,)."""
+        check_single(q, v)
         v_r, a_r = self._rates(t, q, v)
         rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
         return _regressors(self.model, self._chosen, *rows)[0], v_r - v

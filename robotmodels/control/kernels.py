@@ -23,12 +23,9 @@ from ..kernels._vectors import Vector, add, cross, dot, scale, subtract
 from ..kernels.poses import accelerations, jacobians, tip_poses
 from ..kernels.svd import orthogonal_rows
 
-_TOOL = (
-    kinds.CHAIN,
-    kinds.INTS,
-    kinds.MATRIX,
-    kinds.VECTOR,
-)  # chain, path, rotation and position of the tool
+# q, v, chain, path, rotation and position of the tool; pose, twist, acceleration and wrench
+_STATE = kinds.MATRIX, kinds.MATRIX, kinds.CHAIN, kinds.INTS, kinds.MATRIX, kinds.VECTOR
+_GOAL = kinds.MATRIX, kinds.VECTOR, kinds.VECTOR, kinds.VECTOR
 
 SMALL = 1e-2  # squared angle below which series are used
 NEAR = 1e-3  # singular values, relative to the longest row, below which motions are damped
@@ -67,19 +64,7 @@ def combined(phi: Vector, x: Vector, first: float, second: float) -> Vector:
     return add(x, add(scale(first, y), scale(second, cross(phi, y))))
 
 
-@compiled(
-    kinds.NOTHING(
-        kinds.MATRIX,
-        kinds.MATRIX,
-        *_TOOL,
-        kinds.MATRIX,
-        kinds.VECTOR,
-        kinds.VECTOR,
-        kinds.VECTOR,
-        kinds.OUT3,
-        kinds.OUT2,
-    )
-)
+@compiled(kinds.NOTHING(*_STATE, *_GOAL, kinds.OUT3, kinds.OUT2))
 def tool_errors(
     q: Floats,
     v: Floats,

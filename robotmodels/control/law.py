@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
+from .._arrays import Array, Value, as_exact, as_floats, as_number, as_vector, read_only
 from ..dynamics import gravity_torque, idm
 from ..dynamics.inverse import motion_torques, warn_without_masses
 from ..errors import InvalidValueError, ShapeError
@@ -43,15 +44,15 @@ class Law(Value):
 
     def command(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
         """Torques (n,) at positions, velocities (n,), state (k,) and measured wrench (6,)."""
-        return self._torques(t, *self._measured(q, v, x, wrench))
+        return self._torques(*self._measured(t, q, v, x, wrench))
 
     def rate(self: Any, t: float, q: Any, v: Any, x: Any = (), wrench: Any = None) -> Array:
         """Time derivative of the state, shape (k,)."""
-        return self._rate(t, *self._measured(q, v, x, wrench)) if self.state0.size else NONE
+        return self._rate(*self._measured(t, q, v, x, wrench)) if self.state0.size else NONE
 
     def error(self: Any, t: float, q: Any, v: Any, wrench: Any = None) -> Array:
         """Error of the law: of the joints (n,), of components of the task (m,), or of forces."""
-        return self._error(t, *self._measured(q, v, self.state0, wrench))
+        return self._error(*self._measured(t, q, v, self.state0, wrench))
 
     def lyapunov(self, plant: RobotModel, t: float, q: Array, v: Array, x: Array) -> float | None:
         """Lyapunov function at a state of the plant, None where the law has none."""
@@ -76,7 +77,7 @@ class Law(Value):
     ) -> None:
         """Check positive gains: one number, or one for each of n components; six are of all rows.
 
-        Those of the name `zero` may be zero. With rows each component gets its own.
+        Gains of the name `zero` may be zero. With rows each component gets its own.
         """
         for name in names:
             gains = as_floats(getattr(self, name), name)
@@ -103,17 +104,20 @@ class Law(Value):
             given = desired(0.0)[0]
         self._set(_desired=desired, **{name: given})
         size = desired(0.0)[0].size
+        if not size:
+            raise ShapeError(f"{name}: expected positions of at least one joint, got none.")
         if n is not None and size != n:
             raise ShapeError(f"{name}: expected {n} joints, those of the model, got {size}.")
         return size
 
-    def _measured(self, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Array, ...]:
-        """Checked q, v, x and wrench; the wrench is zero without a sensor."""
-        k = self.state0.size
+    def _measured(self, t: Any, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Any, ...]:
+        """Checked t, q, v, x and wrench; the wrench is zero without a sensor."""
+        k, n = self.state0.size, self.n
         return (
-            as_vector(q, self.n, "q"),
-            as_vector(v, self.n, "v"),
-            as_vector(x, k, "x") if k or len(x) else NONE,
+            t if isinstance(t, float) and isfinite(t) else as_number(t, "t"),
+            as_vector(q, n, "q"),
+            as_vector(v, n, "v"),
+            as_vector(x, k, "x") if k or np.size(x) else NONE,
             NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench"),
         )
 
@@ -134,11 +138,10 @@ class Law(Value):
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def as_word(value: Any, words: tuple[str, ...], name: str) -> None:
-    """Refuse a choice that is not listed."""
-    if value not in words:
-        wanted = " or ".join(map(repr, words))
-        raise InvalidValueError(f"{name}: expected {wanted}, got {value!r:.40}.")
+def check_single(q: Array, v: Array) -> None:
+    """Refuse several postures."""
+    if q.ndim != 1 or v.ndim != 1:
+        raise ShapeError(f"q, v: expected one posture, shape (n,), got {q.shape}, {v.shape}.")
 
 
 def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:
@@ -150,7 +153,7 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
 
         def joints(t: float) -> tuple[Array, ...]:
             if 0.0 <= t <= end:  # without the checks of a trajectory
-                q, v, a = motion.derivatives(np.array([t]), (0, 1, 2))
+                q, v, a = motion.derivatives(np.array([t], np.float64), (0, 1, 2))
             else:
                 q, v, a = reference.q(t), reference.v(t), reference.a(t)
             return q.reshape(n), v.reshape(n), a.reshape(n)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_floats, as_number, as_vector
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number, as_vector
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian
@@ -33,14 +33,14 @@ Environment = Callable[[float, Array, Array], ArrayLike]
 class ControlStatus(Outcome):
     """Outcome of a run; fits int8. The motion until then is given for every status."""
 
-    FOLLOWED = 0, "The law was followed to the end, within the limits of the robot."
+    FOLLOWED = 0, "The law was followed to the end, within all limits: no proof of stability."
     SATURATED = 1, "Torques were limited to the efforts of the joints."
     LEFT_LIMITS = 2, "Joints left their limits."
     DIVERGED = 3, "The law was not followed to the end."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ControlledMotion(Value):
+class ControlledMotion(Frozen, Value):
     """Motion of a controlled robot. Read-only.
 
     Parameters
@@ -68,11 +68,6 @@ class ControlledMotion(Value):
     lyapunov: Array | None
     status: ControlStatus
     notes: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            if isinstance(value := getattr(self, f.name), np.ndarray):
-                value.setflags(write=False)
 
     t = property(attrgetter("simulation.t"), doc="Times, s, shape (N,).")
     q = property(attrgetter("simulation.q"), doc="Positions, rad or m, shape (N, n).")

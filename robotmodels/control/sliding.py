@@ -179,10 +179,11 @@ def first_order(
     push: Any = disturbance if callable(disturbance) else lambda t: constant
     out = np.empty((round(end / h) + 1, *s.shape))
     out[0] = s
-    for k in range(1, len(out)):
-        rate, change = reaching(s, x) if reaching else (_fitting(own(s), s, "law(s)"), NONE)
-        s = out[k] = s + h * (rate + _fitting(push((k - 1) * h), s, "disturbance"))
-        x = x + h * change if change.size else x
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        for k in range(1, len(out)):
+            rate, change = reaching(s, x) if reaching else (_fitting(own(s), s, "law(s)"), NONE)
+            s = out[k] = s + h * (rate + _fitting(push((k - 1) * h), s, "disturbance"))
+            x = x + h * change if change.size else x
     if not np.isfinite(out).all():
         raise InvalidValueError("law, disturbance: s is not finite; expected finite values.")
     return out

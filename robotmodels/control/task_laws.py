@@ -43,16 +43,18 @@ Examples
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, as_mask, read_only
-from ..errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from .._choices import one_of
+from ..errors import InvalidValueError, SingularMassMatrixError
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import NO_WRENCH, POSE, Desired, Law, as_word, model_torques
+from .law import NO_WRENCH, POSE, Desired, Law, check_single, model_torques
 
 _RANK = 1e-9  # relative singular value of rows that depend
 _FIRST = np.zeros(6, dtype=np.int64)
@@ -104,15 +106,10 @@ class TaskLaw(Law):
 
         Also the joint torques of the wrench.
         """
-        from .kernels import tool_errors
-
-        if q.ndim != 1 or v.ndim != 1:
-            raise ShapeError(
-                f"q, v: expected one posture, shape ({self.n},), got {q.shape}, {v.shape}."
-            )
+        check_single(q, v)
         model, J, rows = self.model, np.empty((2, 6, len(q))), np.empty((6 + len(more), 6))
         frame = model.twin.frame(self.frame).kernel_arguments
-        tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)
+        _kernels().tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)
         load, axes = wrench @ J[0], self._axes
         if more:
             rows[6:] = more
@@ -150,10 +147,8 @@ class TaskLaw(Law):
         self: Any, J: Array, wanted: Array, v: Array, order: Any = _FIRST, M: Array = _UNWEIGHTED
     ) -> Array:
         """Joint accelerations with ``J a = wanted``; see the kernel."""
-        from .kernels import resolved
-
         a = np.empty(self.n)
-        if resolved(J, wanted, order[: len(J)], M, -self._free * v, a) < 0:
+        if _kernels().resolved(J, wanted, order[: len(J)], M, -self._free * v, a) < 0:
             raise SingularMassMatrixError(
                 "model: the mass matrix is singular; a hybrid law needs a model whose joints all "
                 "have inertia."
@@ -162,18 +157,23 @@ class TaskLaw(Law):
 
     def notes(self: Any, t: Array, q: Array, v: Array) -> tuple[str, ...]:
         """A sentence for postures of a motion (N, n) that are singular for the task, or nearly."""
-        from .kernels import NEAR
-
         if self.space == "joint":
             return ()
         J = jacobian(self.model, q, self.frame)
         J = J if self._axes is None else self._axes @ J
         longest = np.linalg.norm(J, axis=2).max(axis=1)
-        near = np.linalg.svd(J, compute_uv=False)[:, -1] < NEAR * longest
+        near = np.linalg.svd(J, compute_uv=False)[:, -1] < _kernels().NEAR * longest
         return (
             f"At t = {t[np.argmax(near)]:.6g} s the posture is singular for the task, or nearly: "
             "motions of the tool that the joints can hardly make there are damped.",
         ) * bool(near.any())
+
+
+@cache
+def _kernels() -> Any:
+    from . import kernels
+
+    return kernels
 
 
 def as_flags(mask: Any) -> Array | None:
@@ -198,7 +198,7 @@ class ComputedTorque(TaskLaw):
 
     def __post_init__(self) -> None:
         check_model(self.model)
-        as_word(self.space, ("joint", "task"), "space")
+        one_of(self.space, ("joint", "task"), "space")
         if self.space == "task":
             self._prepare(("omega", "zeta"))
         else:

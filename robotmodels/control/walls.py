@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_core, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_core, as_exact, as_number, batch_shape, read_only
 from ..errors import InvalidValueError
 
 
@@ -74,12 +74,12 @@ class SpringWall(Value):
     def __call__(self, t: float, T: ArrayLike, twist: ArrayLike) -> Array:
         """Wrench (..., 6) on the wall, world axes, for poses (..., 4, 4) and twists (..., 6)."""
         T, twist = as_core(T, (4, 4), "T"), as_core(twist, (6,), "twist")
+        wrench = np.zeros((*batch_shape((T[..., 0], twist), ("T", "twist")), 6))
         depth, v = self.depth(T), twist[..., :3]
         away = v @ self.normal
         push = self.stiffness * depth - self.damping * away
         if not self.bilateral:
             push = np.where(depth > 0.0, np.maximum(push, 0.0), 0.0)
-        wrench = np.zeros((*np.broadcast_shapes(T.shape[:-2], twist.shape[:-1]), 6))
         wrench[..., :3] = -push[..., None] * self.normal
         if self.friction:
             sliding = v - away[..., None] * self.normal

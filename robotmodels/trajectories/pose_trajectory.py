@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Rebuilt, as_floats
+from .._arrays import Array, Frozen, Value, as_floats
 from ..errors import ShapeError
 from ..se3 import skew
 from ..se3.orientation import rotation_vectors_of
@@ -47,7 +47,7 @@ class PoseSamples(Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseTrajectory(Rebuilt):
+class PoseTrajectory(Value):
     """Motion of the tool: a path in space and a law of time on it.
 
     Parameters
@@ -137,7 +137,7 @@ class PosePath(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FixedAxisPath:
+class FixedAxisPath(Value):
     """Line or circle, with a rotation about a fixed axis, both in proportion to s from 0 to 1."""
 
     start: Array

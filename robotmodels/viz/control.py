@@ -22,7 +22,7 @@ matplotlib.figure.Figure or Scene
 Raises
 ------
 InvalidValueError
-    What is no run of a controlled robot; a law without a surface.
+    A run that is no ControlledMotion; a law without a surface.
 
 References
 ----------
@@ -45,13 +45,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array
+from .._arrays import Array, as_number
 from ..control import ControlledMotion, SpringWall
 from ..errors import InvalidValueError
 from ..kinematics import dgm
@@ -60,7 +61,7 @@ from ..visual import Box, Cylinder
 from . import over_time, style
 from .motion import Track, keyframes
 from .scene import Scene
-from .shapes import Node, Triangles
+from .shapes import Node, Triangles, along_bars, moving_chain
 from .show import animate
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
 _COMPONENTS = np.array(["x", "y", "z", "rx", "ry", "rz"])
 _FORCES = np.array(["fx", "fy", "fz", "mx", "my", "mz"])
 _PIECES = 8  # of the shaft of an arrow
+_LETTERS = 58.0  # that fit over a panel
 _ARROW = (0.85, 0.2, 0.1, 1.0)
 _WALL = (0.45, 0.55, 0.7, 0.45)
 
@@ -128,9 +130,10 @@ def animate_control(
     if moving.motion is None:  # animations have one
         return moving
     tips, size = dgm(sim.model, run.q)[:, :3, 3], 0.15 * moving.camera.distance
-    size = size if length is None else float(length)
+    size = size if length is None else as_number(length, "length", above=0.0)
     nodes, tracks = _arrow(run.t - run.t[0], tips, run.wrench[:, :3], size)
-    given = (walls,) if isinstance(walls, SpringWall) else tuple(walls)
+    given = tuple(walls) if isinstance(walls, (list, tuple)) else (walls,)
+    given = [style.as_instance(wall, SpringWall, "walls", "control") for wall in given]
     nodes += [_wall(wall, tips, size, f"walls/{k}") for k, wall in enumerate(given, 1)]
     motion = replace(moving.motion, tracks=(*moving.motion.tracks, *tracks))
     return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)
@@ -140,53 +143,47 @@ def _figure(
     t: Array, panels: Sequence[tuple[str, Array, list[str]]], title: str | None, size: Any
 ) -> Figure:
     """Panels over each other with one axis of time."""
-    figure, grid = style.panel_list(len(panels), 1, 1.5, size)
+    figure, grid = style.panel_list(len(panels), 1, 1.6, size)
+    shown = [""]
     for axes, (label, values, names) in zip(grid, panels, strict=True):
         axes.axhline(0.0, **style.ZERO)
         # hidden from the legend of the figure: each panel has its own
         over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names])
         axes.set_ylabel(label)
-        if len(names) > 1:
-            lines = axes.get_lines()[-len(names) :]
-            axes.legend(lines, names, loc="upper right", ncols=min(len(names), 3))
+        if names not in ([label], shown):  # the same names have the legend of the panel above
+            shown, lines = names, axes.get_lines()[-len(names) :]
+            rows = ceil(len(names) * (max(map(len, names)) + 9.0) / _LETTERS)
+            axes.legend(
+                lines,
+                names,
+                loc="lower right",
+                bbox_to_anchor=(1, 1),
+                ncols=ceil(len(names) / rows),
+            )
     return style.finished(figure, title)
 
 
 def _arrow(t: Array, tips: Array, force: Array, size: float) -> tuple[list[Node], list[Track]]:
-    """An arrow that begins at the tool: shifts along x, y, z, two turns, and pieces that spread."""
+    """An arrow that begins at the tool; pieces of its shaft spread."""
     norms = np.linalg.norm(force, axis=1)
     if not norms.max() > 0.0:
         return [], []
     seen = np.where(norms[:, None] > 1e-3 * norms.max(), force, 0.0)
-    turn = np.unwrap(np.arctan2(seen[:, 1], seen[:, 0]))
-    tilt = np.unwrap(np.arctan2(np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]))
-    along = size * norms / norms.max()
-    times, values = keyframes(t, np.column_stack([tips, turn, tilt, along]))
-    path, nodes, tracks = "force", list[Node](), list[Track]()
-    # turned so that the axis of each shift or turn is z: x, y, z, then z and y of the arrow
-    before = np.eye(3)
-    for k, (name, first) in enumerate((("x", 1), ("y", 2), ("z", 0), ("turn", 0), ("tilt", 2))):
-        axes = np.eye(3)[:, [first, (first + 1) % 3, (first + 2) % 3]]
-        pose = np.eye(4)
-        pose[:3, :3], before = before.T @ axes, axes
-        nodes += [Node(f"{path}/{name}", pose), Node(f"{path}/{name}/moved", np.eye(4))]
-        path += f"/{name}/moved"
-        tracks.append(Track(path, k < 3, times, values[:, k]))
-    pose = np.eye(4)
-    pose[:3, :3] = before.T
-    nodes.append(Node(f"{path}/arrow", pose))
+    nodes, tracks = moving_chain("force", "xyzzy", t, along_bars(tips, tips + seen))
+    times, along = keyframes(t, (size * norms / norms.max())[:, None])
+    path = nodes[-1].path
     ring = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
     circle = 0.045 * size * np.column_stack([np.cos(ring), np.sin(ring), 0.0 * ring])
     points = np.vstack([circle, [[0.0, 0.0, 0.0], [0.0, 0.0, 0.13 * size]]]).astype(np.float32)
     sides = [(k, (k + 1) % 24, apex) for k in range(24) for apex in (24, 25)]
     shapes = [(f"piece_{k}", (k + 0.5) / _PIECES) for k in range(_PIECES)] + [("head", 1.0)]
     for name, part in shapes:
-        at = f"{path}/arrow/{name}"
+        at = f"{path}/{name}"
         rod = Cylinder(0.015 * size, size / _PIECES)
         shape = rod if name != "head" else Triangles(points, np.array(sides, dtype=np.uint32))
-        nodes += [Node(at, se3.translation(0.0, 0.0, part * values[0, 5]))]
+        nodes += [Node(at, se3.translation(0.0, 0.0, part * along[0, 0]))]
         nodes += [Node(f"{at}/shape", np.eye(4), shape, _ARROW)]
-        tracks.append(Track(at, True, times, part * values[:, 5]))
+        tracks.append(Track(at, True, times, part * along[:, 0]))
     return nodes, tracks
 
 

@@ -65,9 +65,9 @@ from ..parallel.velocities import states
 from ..visual import Color, Cylinder, Sphere
 from . import style
 from .camera import framed
-from .motion import Motion, Track, keyframes
+from .motion import Motion, Track
 from .scene import Scene
-from .shapes import Node, Triangles, floor_grid
+from .shapes import Node, Triangles, along_bars, chain, floor_grid, moving_chain
 from .sliders import SliderPanel
 from .style import INK, PAGE, PALETTE
 
@@ -77,7 +77,6 @@ if TYPE_CHECKING:
 _BASE: Color = (0.45, 0.48, 0.52, 1.0)
 _GHOST: Color = (0.5, 0.6, 0.7, 0.22)
 _THIN = 0.012
-_ALONG = {"x": se3.rotation("y", 0.5 * np.pi), "y": se3.rotation("x", -0.5 * np.pi), "z": np.eye(4)}
 
 
 def show_parallel(
@@ -93,13 +92,16 @@ def show_parallel(
     poses = (robot.home if T is None else robot.checked(T)).reshape(-1, 4, 4)
     points, legs = _points(robot, poses)
     nodes, tracks = _still(robot, points, ghost, dark), list[Track]()
+    times = np.arange(len(poses)) / 30.0
     for name, color, width, start, end in _bars(robot, poses, legs):
-        nodes += _placed(name, _between(start, end), tracks)
+        bars, moves = moving_chain(name, "xyzzy", times, along_bars(start, end))
+        nodes, tracks = nodes + bars, tracks + moves
         length = float(np.linalg.norm(end[0] - start[0]))
         bar = Cylinder(width * _THIN * robot.size, length)
         middle = se3.translation(0, 0, 0.5 * length)
         nodes.append(Node(f"{nodes[-1].path}/bar", middle, bar, color))
-    nodes += _placed("platform", poses, tracks)
+    carrier, moves = moving_chain("platform", "xyzzyx", times, _six(poses))
+    nodes, tracks = nodes + carrier, tracks + moves
     nodes += _plate(robot, np.eye(4), f"{nodes[-1].path}/plate", PALETTE[0])
     motion = None
     if len(poses) > 1:
@@ -119,10 +121,10 @@ def jog_parallel(
         raise InvalidValueError("robot: sliders of the platform need legs of variable length.")
     pose = robot.checked(robot.home if T is None else T)
     points, _ = _points(robot, np.stack((robot.home, pose)))
-    chain = _chain("platform", pose)
-    frame = chain[-1].path
+    platform = chain("platform", "xyzzyx", _six(pose))
+    frame = platform[-1].path
     plate = _plate(robot, np.eye(4), f"{frame}/plate", PALETTE[0])
-    nodes, struts = [*_still(robot, points, True, dark), *chain, *plate], []
+    nodes, struts = [*_still(robot, points, True, dark), *platform, *plate], []
     for i in range(robot.m):
         bar = Cylinder(_THIN * robot.size, 1.0)
         nodes.append(Node(f"leg_{i}", np.eye(4)))
@@ -138,7 +140,7 @@ def jog_parallel(
         reach = 0.4 * robot.size if k < 3 else (0.9 if k == 3 else 0.45) * np.pi
         middle = home[k] if k < 3 else 0.0
         sliders.append({
-            "name": name, "path": chain[2 * k + 1].path, "prismatic": k < 3, "lower": -1e9,
+            "name": name, "path": platform[2 * k + 1].path, "prismatic": k < 3, "lower": -1e9,
             "upper": 1e9, "ends": [middle - reach, middle + reach], "leads": k in kept,
             "note": "" if k in kept else "constant",
         })  # fmt: skip
@@ -253,47 +255,10 @@ def _bars(robot: ParallelRobot, T: Array, legs: LegStates) -> list[Bar]:
     return bars
 
 
-def _between(start: Array, end: Array) -> Array:
-    """Poses at the starts of bars whose z axes point to their ends. Shapes: (N, 3) -> (N, 4, 4)."""
-    z = end - start
-    z = z / np.linalg.norm(z, axis=1)[:, None]
-    yaw, pitch = np.unwrap(np.arctan2(z[:, 1], z[:, 0])), np.arccos(np.clip(z[:, 2], -1.0, 1.0))
-    pairs = zip(yaw, pitch, strict=True)
-    T = np.array([se3.rotation("z", a) @ se3.rotation("y", b) for a, b in pairs])
-    T[:, :3, 3] = start
-    return T
-
-
 def _six(T: Array) -> Array:
     """Position, yaw, pitch and roll of poses. Shapes: (..., 4, 4) -> (..., 6)."""
     rows = [(*X[:3, 3], *se3.to_rpy(X[:3, :3])[::-1]) for X in T.reshape(-1, 4, 4)]
     return np.array(rows).reshape(*T.shape[:-2], 6)
-
-
-def _chain(path: str, T: Array) -> list[Node]:
-    """Nodes of three slides and three turns about z, y, x, each below one that aligns its axis."""
-    nodes, here, last = [], path, np.eye(4)
-    for k, (axis, value) in enumerate(zip("xyzzyx", _six(T), strict=True)):
-        align = se3.inverse(last) @ _ALONG[axis]
-        here = f"{here}/{k}a" if k else here
-        nodes.append(Node(here, align))
-        here = f"{here}/{k}"
-        moved = se3.translation(0, 0, value) if k < 3 else se3.rotation("z", value)
-        nodes.append(Node(here, moved))
-        last = _ALONG[axis]
-    return [*nodes, Node(f"{here}/end", se3.inverse(last))]
-
-
-def _placed(path: str, T: Array, tracks: list[Track]) -> list[Node]:
-    """A node at a pose, or nodes that follow poses (N, 4, 4), with their tracks."""
-    if len(T) == 1:
-        return [Node(path, T[0])]
-    nodes, values = _chain(path, T[0]), _six(T)
-    values[:, 3:] = np.unwrap(values[:, 3:], axis=0)
-    times, values = keyframes(np.arange(len(T)) / 30.0, values)
-    for k, node in enumerate(nodes[1:-1:2]):
-        tracks.append(Track(node.path, k < 3, times, values[:, k]))
-    return nodes
 
 
 def _plate(robot: ParallelRobot, T: Array, path: str, color: Color) -> list[Node]:

@@ -1,4 +1,4 @@
-"""Nodes of a scene, and shapes around robots: floor, workspace box, path of a tool, ellipsoids."""
+"""Nodes of a scene, what moves them, and shapes: floor, box, path of a tool, ellipsoids."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from .._arrays import Array, as_exact
 from ..errors import InvalidValueError
 from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
 from ..visual import Box, Color, Cylinder, Sphere, triad
+from .motion import Track, keyframes
 
 _GRID_COLOR: Color = (0.78, 0.80, 0.83, 1.0)
 _DARK_GRID_COLOR: Color = (0.30, 0.33, 0.38, 1.0)
@@ -22,6 +23,7 @@ _BOX_COLOR: Color = (0.20, 0.45, 0.80, 0.08)
 _BOX_EDGE_COLOR: Color = (0.20, 0.40, 0.75, 1.0)
 _PATH_COLOR: Color = (0.80, 0.10, 0.45, 1.0)
 _SIDES = 8
+_ALONG = {"x": se3.rotation("y", 0.5 * np.pi), "y": se3.rotation("x", -0.5 * np.pi), "z": np.eye(4)}
 
 # ellipsoids, in parts of the size of the robot
 _REACH = 0.25  # of the largest ellipsoid of a kind, at most
@@ -76,6 +78,40 @@ class Node:
     pose: Array
     shape: Drawable | None = None
     color: Color = (0.7, 0.7, 0.7, 1.0)
+
+
+def chain(path: str, axes: str, values: Array) -> list[Node]:
+    """Nodes of slides along the first three axes and turns about the others, and of their end.
+
+    Each is below a node that aligns its axis with z.
+    """
+    nodes, last = list[Node](), np.eye(4)
+    for k, (axis, value) in enumerate(zip(axes, values, strict=True)):
+        path = f"{path}/{k}a" if k else path
+        nodes.append(Node(path, se3.inverse(last) @ _ALONG[axis]))
+        path, last = f"{path}/{k}", _ALONG[axis]
+        moved = se3.translation(0, 0, value) if k < 3 else se3.rotation("z", value)
+        nodes.append(Node(path, moved))
+    return [*nodes, Node(f"{path}/end", se3.inverse(last))]
+
+
+def moving_chain(
+    path: str, axes: str, times: Array, values: Array
+) -> tuple[list[Node], list[Track]]:
+    """Nodes of a chain that follows values (N, k), and their tracks; one node if it rests."""
+    angles = np.unwrap(values[:, 3:], axis=0)
+    times, values = keyframes(times, np.column_stack([values[:, :3], angles]))
+    nodes = chain(path, axes, values[0])
+    if len(values) == 1:
+        return [Node(path, np.linalg.multi_dot([node.pose for node in nodes]))], []
+    pairs = enumerate(zip(nodes[1:-1:2], values.T, strict=True))
+    return nodes, [Track(node.path, k < 3, times, column) for k, (node, column) in pairs]
+
+
+def along_bars(start: Array, end: Array) -> Array:
+    """Values (N, 5) of a chain "xyzzy" from starts (N, 3), whose z axis points to the ends."""
+    x, y, z = (end - start).T
+    return np.column_stack([start, np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)])
 
 
 def extent(shape: Drawable) -> Array:
