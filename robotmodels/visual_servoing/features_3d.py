@@ -39,11 +39,11 @@ class PoseError(_InSpace):
     desired camera is at the frame of the object. In a `Task` it is the pose of the task.
     """
 
-    desired: Array | None = None
+    desired: Array = None  # type: ignore[assignment]
     _period = (0.0,) * 6
 
     def _see(self, T: Array) -> Sight:
-        M = inverse(T) if self.desired is None else self.desired @ inverse(T)
+        M = self.desired @ inverse(T)
         s = np.concatenate((M[..., :3, 3], rotation_vectors_of(M[..., :3, :3])), axis=-1)
         return self._sight(s, T[..., :3, 3])
 

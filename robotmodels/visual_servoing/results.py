@@ -52,7 +52,6 @@ class Result(_arrays.Frozen):
     """Base of results: equal if their fields are, where NaN equals NaN."""
 
     __slots__ = ()
-    _outcome: ClassVar[type[Outcome]]
     __repr__ = brief
 
     def _key(self) -> tuple[Any, ...]:
@@ -69,12 +68,19 @@ class Result(_arrays.Frozen):
     def __hash__(self) -> int:
         return hash(self._key())
 
+
+class Judged(Result):
+    """Base of results with a status."""
+
+    __slots__ = ()
+    _outcome: ClassVar[type[Outcome]]
+
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
         codes = np.asarray(self.status)  # type: ignore[attr-defined]
         try:
             return self._outcome(index(codes[i if codes.ndim else ()])).sentence
-        except (IndexError, TypeError):
+        except (IndexError, TypeError, ValueError):
             raise InvalidValueError(
                 f"i: expected the index of one row of {codes.shape}, got {i!r}."
             ) from None
@@ -159,8 +165,7 @@ def _depth(value: Any, name: str) -> str | float:
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
     "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
-    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
-    "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
+    "desired": as_single_pose, "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
     "gain": _positive, "weight": as_number, "interaction": _interaction, "depth": _depth,
     "kalman": _flag, "process": _positive, "noise": _positive,
 }  # fmt: skip

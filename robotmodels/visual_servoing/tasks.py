@@ -59,7 +59,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, as_exact
 from ..errors import InvalidValueError, ShapeError
-from ..se3 import as_single_pose
+from ..se3 import as_pose, as_single_pose
 from .features import Feature, Sight, as_sensed
 from .features_3d import PointAndRotation, PoseError
 from .results import Value
@@ -173,11 +173,11 @@ class Hybrid(Value):
 
 def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
     """Position-based (3-D) visual servoing."""
-    return Task(PoseError(), as_single_pose(desired, "desired"), gain)
+    return Task(PoseError(), as_pose(desired, "desired"), gain)
 
 
 def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
     """2 1/2-D visual servoing."""
     first = as_core(points, (3,), "points").reshape(-1, 3)[0]
-    T = as_single_pose(desired, "desired")
+    T = as_pose(desired, "desired")
     return Task(PointAndRotation(first, T), T, gain)

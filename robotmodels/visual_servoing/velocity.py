@@ -49,12 +49,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import LARGEST, Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .camera import Camera
 from .features import Feature, as_sensed, sight_of
-from .results import Result, packed
+from .results import Judged, Result, packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -80,7 +80,7 @@ class ServoStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ServoStep(Result):
+class ServoStep(Judged):
     """Velocity of the camera for one measurement, or for a batch. Read-only.
 
     Parameters
@@ -144,6 +144,9 @@ def law(
         return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     measured: Any = sight.s if s is None and sight is not None else s
     error = primary.error(measured)
+    size = math.hypot(*error.tolist())
+    if not size < LARGEST:  # seen from its own plane
+        return np.zeros(6), np.nan * error, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
     inverse, rank = own, _ = pseudo_inverse(A)
@@ -151,7 +154,6 @@ def law(
         inverse = 0.5 * (own + pseudo_inverse(L_desired)[0])
         rank = pseudo_inverse(inverse)[1]
     direction, status = inverse @ error, ServoStatus.CONVERGES
-    size = math.sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
         if rank < min(A.shape) and rank < _generic_rank(feature):
