@@ -20,7 +20,7 @@ _TURN = 2.0 * np.pi
 
 
 class Sight(NamedTuple):
-    """An object as a camera sees it."""
+    """Measurement of an object by a camera, and the data of its interaction matrix."""
 
     exists: Any  # whether the feature exists, bool (...)
     s: Array  # measurement (..., k)
@@ -123,6 +123,13 @@ def placed(T: Array, points: Array) -> Array:
     return X + (T[..., :3, 3] if points.ndim == 1 else T[..., None, :3, 3])
 
 
+def projected(T: Array, points: Array) -> tuple[Array, Array, Any]:
+    """Image (..., m, 2) of points, their depths, and whether all are in front of the camera."""
+    X = placed(T, points)
+    Z = X[..., 2]
+    return X[..., :2] / Z[..., None], Z, (Z > 0.0).all(axis=-1)
+
+
 def inner(a: Array, b: Array) -> Array:
     """Scalar products of vectors in the last axis, which is kept."""
     return (a * b).sum(axis=-1, keepdims=True)
@@ -141,10 +148,8 @@ class Points(Feature):
     _period = (0.0, 0.0)
 
     def _see(self, T: Array) -> Sight:
-        X = placed(T, self.object_points)
-        Z = X[..., 2]
-        image = X[..., :2] / Z[..., None]
-        return Sight((Z > 0.0).all(axis=-1), _flat(image), Z, image)
+        image, Z, exists = projected(T, self.object_points)
+        return Sight(exists, _flat(image), Z, image)
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         return bool(camera.sees(s.reshape(-1, 2)))
@@ -187,16 +192,12 @@ class Segments(Feature):
     _matrix = interaction_segment
 
     def _see(self, T: Array) -> Sight:
-        X = placed(T, self.points.reshape(-1, 3))
-        Z = X[..., 2]
-        image = X[..., :2] / Z[..., None]
+        image, Z, exists = projected(T, self.points.reshape(-1, 3))
         p, q = image[..., 0::2, :], image[..., 1::2, :]
         dx, dy = np.moveaxis(q - p, -1, 0)
         polar = np.stack((np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1)
         s = _flat(np.concatenate((0.5 * (p + q), polar), axis=-1))
-        return Sight(
-            (Z > 0.0).all(axis=-1), s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image
-        )
+        return Sight(exists, s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

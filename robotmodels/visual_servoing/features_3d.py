@@ -1,7 +1,7 @@
 """Features in space: pose, point, plane, and the features of 2 1/2-D servoing.
 
 Their measurement comes from an estimated pose, or from stereo or range cameras; their rows need
-the measurement alone. Points that are in front of the camera have to be in its image.
+the measurement alone. With a `Camera` their point has to be in its image if it is in front.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _arrays
 from .._arrays import Array, as_core, as_exact, as_number, read_only
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
@@ -140,32 +141,25 @@ def _flag(value: Any, name: str) -> bool:
     return bool(value)
 
 
-def _vector(value: Any, name: str) -> Array:
-    return as_exact(value, (3,), name)
-
-
 def _positive(value: Any, name: str) -> float:
     return as_number(value, name, above=0.0)
 
 
-def _interaction(value: Any, name: str) -> str:
-    if isinstance(value, str) and value in ("current", "desired", "mean"):
-        return value
-    raise InvalidValueError(f"{name}: expected current, desired or mean, got {value!r:.40}.")
-
-
 def _depth(value: Any, name: str) -> str | float:
-    if not isinstance(value, str):
-        return as_number(value, name, above=0.0)
-    if value in ("true", "desired"):
-        return value
-    raise InvalidValueError(f'{name}: expected "true", "desired" or metres, got {value!r:.40}.')
+    if isinstance(value, str):
+        return one_of(value, ("true", "desired"), f"{name}, if not metres")
+    return _positive(value, name)
 
 
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
-    "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
-    "desired": as_single_pose, "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
-    "gain": _positive, "weight": as_number, "interaction": _interaction, "depth": _depth,
-    "kalman": _flag, "process": _positive, "noise": _positive,
-}  # fmt: skip
+    **dict.fromkeys(("centre", "point"), lambda value, name: as_exact(value, (3,), name)),
+    **dict.fromkeys(("normal", "axis"), _unit),
+    **dict.fromkeys(("radius", "gain", "process", "noise"), _positive),
+    **dict.fromkeys(("distance", "weight"), as_number),
+    **dict.fromkeys(("desired", "T_tool_camera", "T_world_camera"), as_single_pose),
+    "interaction": lambda value, name: one_of(value, ("current", "desired", "mean"), name),
+    "object_points": as_points,
+    "points": _pairs,
+    "depth": _depth,
+    "kalman": _flag,
+}

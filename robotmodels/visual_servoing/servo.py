@@ -6,7 +6,7 @@ With a robot, noise or tracking the law is sampled: every velocity is held for o
 Parameters
 ----------
 task : Task or Hybrid
-    What is regulated, k components.
+    The task, k components.
 T0 : array_like, shape (4, 4)
     Pose of the object in the camera at the start.
 camera : Camera, optional
@@ -109,7 +109,7 @@ class ServoMotion(Result):
     q : ndarray, shape (N, n), or None
         Joint variables, rad or m.
     s, error, velocity : ndarray, shapes (N, k), (N, k) and (N, 6)
-        Measurements; ``s - s*``; twists [v; w] of the camera that the law asks for.
+        Measurements; ``s - s*``; twists [v; w] of the camera by the law.
     codes : ndarray of int8, shape (N,)
         `ServoStatus` of every sample.
     """

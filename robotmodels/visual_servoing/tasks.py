@@ -1,4 +1,4 @@
-"""Tasks: what a camera regulates, with which interaction matrix (section 6.3).
+"""Tasks: regulation of a feature with an interaction matrix (section 6.3).
 
 Parameters
 ----------
@@ -148,7 +148,7 @@ class Task(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hybrid(Value):
-    """A primary task, and a secondary motion z in what it leaves free.
+    """A primary task, and a secondary motion z in the kernel of its matrix.
 
     ``[v; w] = primary + weight (I - L^+ L) z``.
     """

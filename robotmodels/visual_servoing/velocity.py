@@ -1,4 +1,4 @@
-"""Velocity of the camera that regulates a task, and a status that states what it achieves.
+"""Velocity of the camera that regulates a task, and a status.
 
 Parameters
 ----------
@@ -89,7 +89,7 @@ class ServoStep(Judged):
         Twist [v; w] of the camera in its own axes, m/s and rad/s, zero for an object that is
         behind the camera or out of sight; ``s - s*``, NaN behind the camera.
     rank, status : int and ServoStatus, or ndarrays of int8, shape (...)
-        Rank of the matrix of the law; what the velocity achieves.
+        Rank of the matrix of the law; outcome.
     """
 
     v: Array
@@ -123,7 +123,7 @@ def camera_velocity(
 
 
 def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
-    """Raise for what is no task, and for options of another kind."""
+    """Raise for anything but a task, and for options of another kind."""
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
     for name, (value, kind) in given.items():
@@ -195,7 +195,7 @@ def _generic_rank(feature: Feature) -> int:
 
 
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
-    """Twist that the secondary motion asks for."""
+    """Twist of the secondary motion."""
     if isinstance(task.secondary, Task):
         if T is None and task.secondary.feature != task.primary.feature:
             raise InvalidValueError(
@@ -212,7 +212,7 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
 
 
 def rate_matrix(v: Array) -> Array:
-    """M of ``dT/dt = M T``, the motion of what stands still, seen by a camera with the twist v."""
+    """M of ``dT/dt = M T``, the motion of a fixed object in a camera with the twist v."""
     a, b, c, x, y, z = v.tolist()
     return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4))
 
