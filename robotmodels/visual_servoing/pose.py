@@ -52,12 +52,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_core
+from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
-from .results import Judged, as_points, packed, taken
+from .results import Judged, as_points, as_sized, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
@@ -111,7 +111,7 @@ class PoseSolutions(Judged):
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     """Poses of three points, at most four."""
-    P, m = as_core(points, (3, 3), "points"), as_core(image, (3, 2), "image")
+    P, m = as_sized(points, (3, 3), "points"), as_sized(image, (3, 2), "image")
     try:
         batch = np.broadcast_shapes(P.shape[:-2], m.shape[:-2])
     except ValueError:
@@ -317,7 +317,7 @@ def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.boo
 def _checked(points: Any, image: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Points (n, 3), images (N, n, 2) and the shape of their batch."""
     P = as_points(points, "points", 3)
-    m = as_core(image, (len(P), 2), "image")
+    m = as_sized(image, (len(P), 2), "image")
     sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
     if sizes[1] <= _THIN * sizes[0]:
         raise InvalidValueError("points: expected points that are not all on one line.")

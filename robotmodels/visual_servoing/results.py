@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _arrays
-from .._arrays import Array, as_core, as_exact, as_number, read_only
+from .._arrays import LARGEST, Array, as_bounded, as_core, as_exact, as_number, read_only
 from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
@@ -105,9 +105,14 @@ def packed(valid: Any, *solutions: Array) -> list[Any]:
     ]
 
 
+def as_sized(value: Any, core: tuple[int, ...], name: str) -> Array:
+    """Floats of shape (..., *core), zero or of a size whose powers are floats."""
+    return as_bounded(as_core(value, core, name), name, LARGEST, 1.0 / LARGEST)
+
+
 def as_points(value: Any, name: str, least: int = 1) -> Array:
     """Points of an object. Shapes: -> (k, 3)."""
-    points = as_core(value, (3,), name)
+    points = as_sized(value, (3,), name)
     points = points[None] if points.ndim == 1 else points
     if points.ndim != 2 or len(points) < least:
         raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
@@ -116,7 +121,7 @@ def as_points(value: Any, name: str, least: int = 1) -> Array:
 
 def _pairs(value: Any, name: str) -> Array:
     """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
-    pairs = as_core(value, (2, 3), name)
+    pairs = as_sized(value, (2, 3), name)
     pairs = pairs[None] if pairs.ndim == 2 else pairs
     if pairs.ndim != 3 or not len(pairs):
         raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
@@ -125,9 +130,13 @@ def _pairs(value: Any, name: str) -> Array:
     return pairs
 
 
+def _vector(value: Any, name: str) -> Array:
+    return as_sized(as_exact(value, (3,), name), (3,), name)
+
+
 def _unit(value: Any, name: str) -> Array:
     """A direction as a unit vector."""
-    array = as_exact(value, (3,), name)
+    array = _vector(value, name)
     length = float(np.linalg.norm(array))
     if not length > 0.0:
         raise InvalidValueError(f"{name}: expected a vector that is not zero.")
@@ -142,7 +151,7 @@ def _flag(value: Any, name: str) -> bool:
 
 
 def _positive(value: Any, name: str) -> float:
-    return as_number(value, name, above=0.0)
+    return as_number(value, name, above=0.0, below=LARGEST)
 
 
 def _depth(value: Any, name: str) -> str | float:
@@ -152,7 +161,7 @@ def _depth(value: Any, name: str) -> str | float:
 
 
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    **dict.fromkeys(("centre", "point"), lambda value, name: as_exact(value, (3,), name)),
+    **dict.fromkeys(("centre", "point"), _vector),
     **dict.fromkeys(("normal", "axis"), _unit),
     **dict.fromkeys(("radius", "gain", "process", "noise"), _positive),
     **dict.fromkeys(("distance", "weight"), as_number),

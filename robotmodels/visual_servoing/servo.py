@@ -130,7 +130,7 @@ class ServoMotion(Result):
         """Outcome at the end."""
         return ServoStatus(int(self.codes[-1]))
 
-    def reason(self) -> str:  # type: ignore[override]
+    def reason(self) -> str:
         """Sentence of the status, with the error at the end."""
         return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
 

@@ -57,12 +57,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact
+from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose, as_single_pose
 from .features import Feature, Sight, as_sensed
 from .features_3d import PointAndRotation, PoseError
-from .results import Value
+from .results import Value, as_points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -178,6 +178,5 @@ def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
 
 def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
     """2 1/2-D visual servoing."""
-    first = as_core(points, (3,), "points").reshape(-1, 3)[0]
     T = as_pose(desired, "desired")
-    return Task(PointAndRotation(first, T), T, gain)
+    return Task(PointAndRotation(as_points(points, "points")[0], T), T, gain)
