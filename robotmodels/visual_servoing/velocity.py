@@ -139,13 +139,11 @@ def law(
     feature, L_desired = primary.feature, primary.L_desired
     if sight is None and T is not None:
         sight = sight_of(feature, T)
-    if sight is not None and not sight.exists:
-        nothing = np.full(feature.size, np.nan)
-        return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     measured: Any = sight.s if s is None and sight is not None else s
-    error = primary.error(measured)
+    exists = sight is None or sight.exists
+    error = primary.error(measured) if exists else np.full(feature.size, np.nan)
     size = math.hypot(*error.tolist())
-    if not size < LARGEST:  # seen from its own plane
+    if not size < LARGEST:  # no measurement, or one from the plane of the object
         return np.zeros(6), np.nan * error, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
