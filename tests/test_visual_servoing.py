@@ -153,6 +153,14 @@ def on_ellipse(X, s):
     assert abs(np.einsum("ki,ij,kj->k", d, M, d) - 4.0).max() < 1e-9
 
 
+def test_small_circles_keep_their_digits():
+    """Moments of a parallel circle: radius and depth only."""
+    for radius in (1e-1, 1e-3, 1e-5):
+        s = vs.Circle([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], radius).measure(translation(0.3, -0.2, 2.0))
+        n = radius**2 / 16.0
+        assert s == pytest.approx([0.15, -0.1, n, n, 0.0], rel=1e-13, abs=1e-13 * n)
+
+
 def test_moments_are_those_of_many_small_cells():
     T = pose(np.random.default_rng(4))
     corners = np.array(PLATE, float)
@@ -386,10 +394,23 @@ EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
     [
         (lambda: vs.Points(SQUARE).measure(translation(0, 0, 0)), InvalidValueError, "in front"),
         (lambda: vs.Points(SQUARE).measure(translation(0, 0, -1)), InvalidValueError, "in front"),
-        (lambda: vs.Sphere([0, 0, 0], 1).measure(GOAL), InvalidValueError, "camera inside"),
+        (lambda: vs.Sphere([0, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
         (lambda: vs.Circle([0, 0, 0], [1, 0, 0], 0.1).measure(GOAL), InvalidValueError, "edge-on"),
         (lambda: vs.Cylinder([0, 0, 0], [1, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
         (lambda: vs.Lines([[[0, 0, 0], [0, 0, 1]]]).measure(GOAL), InvalidValueError, "edge-on"),
+        (lambda: vs.Points(SQUARE).interaction(translation(0, 0, 1e-300)), InvalidValueError,
+         "front"),
+        (lambda: vs.Circle([0, 0, 0], [0, 0, 1], 0.1).measure(translation(0, 0, 1e-300)),
+         InvalidValueError, "front"),
+        (lambda: vs.pnp(1e200 * SQUARE, SQUARE[:, :2]), InvalidValueError, "units"),
+        (lambda: vs.pnp(1e-200 * SQUARE, SQUARE[:, :2]), InvalidValueError, "units"),
+        (lambda: vs.Moments(1e200 * SQUARE), InvalidValueError, "units"),
+        (lambda: vs.Circle([0, 0, 0], [1e200, 0, 1e200], 1), InvalidValueError, "units"),
+        (lambda: vs.Sphere([0, 0, 0], 1e199), InvalidValueError, "radius"),
+        (lambda: vs.task_3d(None), InvalidValueError, "desired"),
+        (lambda: vs.task_2_1_2d(np.empty((0, 3)), GOAL), ShapeError, "points"),
+        (lambda: vs.servo(TASK, None), InvalidValueError, "T0"),
+        (lambda: vs.camera_velocity(TASK, [GOAL]).reason([[1], []]), InvalidValueError, "index"),
         (lambda: vs.Moments(SQUARE[:2]), ShapeError, "k from 3"),
         (lambda: vs.Moments([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), InvalidValueError, "area"),
         (lambda: vs.Moments(SQUARE[[0, 2, 1, 3]]), InvalidValueError, "cross|area"),

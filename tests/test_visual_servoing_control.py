@@ -53,6 +53,18 @@ def test_four_points_converge(interaction):
     assert abs(run.T[-1] - GOAL).max() < 1e-6
 
 
+def test_simulated_poses_are_poses_and_of_order_four():
+    lines = vs.Lines([SQUARE[:2], SQUARE[1:3], SQUARE[2:]])
+    run = vs.servo(vs.Task(lines, GOAL, 3.0), START, duration=6.0, step=0.5)
+    R = run.T[:, :3, :3]
+    assert abs(R @ R.swapaxes(1, 2) - np.eye(3)).max() < 1e-9
+    last = [
+        vs.servo(vs.Task(POINTS, GOAL, 1.0), START, duration=1.6, step=h).T[-1]
+        for h in (0.2, 0.1, 0.0125)
+    ]
+    assert abs(last[0] - last[2]).max() > 12.0 * abs(last[1] - last[2]).max()
+
+
 def test_matrices_of_the_law():
     L, goal = POINTS.interaction(START), POINTS.interaction(GOAL)
     e = POINTS.measure(START) - POINTS.measure(GOAL)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import LARGEST, Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
 from .camera import Camera
@@ -20,7 +20,7 @@ _TURN = 2.0 * np.pi
 
 
 class Sight(NamedTuple):
-    """An object as a camera sees it."""
+    """Measurement of an object by a camera, and the data of its interaction matrix."""
 
     exists: Any  # whether the feature exists, bool (...)
     s: Array  # measurement (..., k)
@@ -36,7 +36,7 @@ class Feature(Value):
 
     Parameters
     ----------
-    T : array_like, shape (..., 4, 4)
+    T_camera_object : array_like, shape (..., 4, 4)
         Of ``measure`` and ``interaction``: poses of the object in the camera.
 
     Returns
@@ -69,13 +69,13 @@ class Feature(Value):
     _see: ClassVar[Callable[..., Sight]]  # sight at poses T, NaN where it does not exist
     _matrix: ClassVar[Callable[..., Array]]  # interaction matrix of one element
 
-    def measure(self, T: ArrayLike) -> Array:
-        """Measurement s (..., k) of the object at poses T."""
-        return self._seen(T).s
+    def measure(self, T_camera_object: ArrayLike) -> Array:
+        """Measurement s (..., k) of the object at poses."""
+        return self._seen(T_camera_object).s
 
-    def interaction(self, T: ArrayLike) -> Array:
-        """Interaction matrix L (..., k, 6) at poses T, ``ds/dt = L [v; w]``."""
-        return self._rows(*self._seen(T)[1:])
+    def interaction(self, T_camera_object: ArrayLike) -> Array:
+        """Interaction matrix L (..., k, 6) at poses, ``ds/dt = L [v; w]``."""
+        return self._rows(*self._seen(T_camera_object)[1:])
 
     @property
     def size(self) -> int:
@@ -95,14 +95,15 @@ class Feature(Value):
 
     def _seen(self, T: Any) -> Sight:
         """Sight at checked poses, where the feature exists."""
-        poses = as_pose(T)
+        poses = as_pose(T, "T_camera_object")
         sight = sight_of(self, poses)
-        if not np.all(sight.exists):
-            row = f" (row {np.argwhere(~sight.exists)[0].tolist()})" if poses.ndim > 2 else ""
+        exists = sight.exists & (np.abs(sight.s) < LARGEST).all(axis=-1)
+        if not np.all(exists):
+            row = f" (row {np.argwhere(~exists)[0].tolist()})" if poses.ndim > 2 else ""
             raise InvalidValueError(
-                f"T: the feature of {type(self).__name__} does not exist there{row}: expected the "
-                "object in front of the plane of the camera, not seen edge-on and without the "
-                "camera inside; move the camera."
+                f"T_camera_object: the feature of {type(self).__name__} does not exist there{row}: "
+                "expected the object in front of the plane of the camera, not seen edge-on, the "
+                "camera not inside it; move the camera."
             )
         return sight
 
@@ -120,6 +121,13 @@ def placed(T: Array, points: Array) -> Array:
     """Points of the object in the camera. Shapes: points (m, 3) or (3,)."""
     X = points @ np.swapaxes(T[..., :3, :3], -1, -2)
     return X + (T[..., :3, 3] if points.ndim == 1 else T[..., None, :3, 3])
+
+
+def projected(T: Array, points: Array) -> tuple[Array, Array, Any]:
+    """Image (..., m, 2) of points, their depths, and whether all are in front of the camera."""
+    X = placed(T, points)
+    Z = X[..., 2]
+    return X[..., :2] / Z[..., None], Z, (Z > 0.0).all(axis=-1)
 
 
 def inner(a: Array, b: Array) -> Array:
@@ -140,10 +148,8 @@ class Points(Feature):
     _period = (0.0, 0.0)
 
     def _see(self, T: Array) -> Sight:
-        X = placed(T, self.object_points)
-        Z = X[..., 2]
-        image = X[..., :2] / Z[..., None]
-        return Sight((Z > 0.0).all(axis=-1), _flat(image), Z, image)
+        image, Z, exists = projected(T, self.object_points)
+        return Sight(exists, _flat(image), Z, image)
 
     def _in_image(self, camera: Camera, s: Array, image: Any) -> bool:
         return bool(camera.sees(s.reshape(-1, 2)))
@@ -186,16 +192,12 @@ class Segments(Feature):
     _matrix = interaction_segment
 
     def _see(self, T: Array) -> Sight:
-        X = placed(T, self.points.reshape(-1, 3))
-        Z = X[..., 2]
-        image = X[..., :2] / Z[..., None]
+        image, Z, exists = projected(T, self.points.reshape(-1, 3))
         p, q = image[..., 0::2, :], image[..., 1::2, :]
         dx, dy = np.moveaxis(q - p, -1, 0)
         polar = np.stack((np.hypot(dx, dy), np.arctan2(dy, dx)), axis=-1)
         s = _flat(np.concatenate((0.5 * (p + q), polar), axis=-1))
-        return Sight(
-            (Z > 0.0).all(axis=-1), s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image
-        )
+        return Sight(exists, s, Z.reshape(*Z.shape[:-1], len(self.points), 2), image)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -229,10 +231,6 @@ class Sphere(Feature):
         """Sight of the circle that is the outline of the sphere with this centre."""
         part = 1.0 - self.radius**2 / inner(centre, centre)
         return _sight_of_circle(part * centre, centre / norm(centre), self.radius * np.sqrt(part))
-
-    def _rows(self, s: Array, depth: Any, image: Any = None) -> Array:
-        elements = s.reshape(*s.shape[:-1], s.shape[-1] // len(self._period), len(self._period))
-        return type(self)._matrix(*np.moveaxis(elements, -1, 0), depth).reshape(*s.shape, 6)
 
     def _parallel(self, Z: float) -> float:
         if not self.radius < Z:
@@ -294,17 +292,21 @@ def _sight_of_lines(p: Array, along: Array) -> Sight:
 
 
 def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
-    """Sight of the ellipse ``[x y 1] Q [x y 1]^T = 0`` that is the image of a circle."""
-    lowest = c[..., 2:] - radius * np.sqrt(np.maximum(1.0 - n[..., 2:] ** 2, 0.0))
-    d, excess = inner(c, n), (inner(c, c) - radius**2)[..., None]
-    cn, nn = c[..., :, None] * n[..., None, :], n[..., :, None] * n[..., None, :]
-    Q = d[..., None] ** 2 * np.eye(3) - d[..., None] * (cn + np.swapaxes(cn, -1, -2)) + excess * nn
-    exists = ((lowest > 0.0) & (np.abs(d) > THIN * norm(c)))[..., 0]
-    adjugate = np.linalg.cross(Q[..., 0, :], Q[..., 1, :])
-    determinant = adjugate[..., 2]
-    x, y = adjugate[..., 0] / determinant, adjugate[..., 1] / determinant
-    scale = -(Q[..., 0, 2] * x + Q[..., 1, 2] * y + Q[..., 2, 2]) / (4.0 * determinant)
-    s = np.stack((x, y, scale * Q[..., 1, 1], scale * Q[..., 0, 0], -scale * Q[..., 0, 1]), axis=-1)
+    """Sight of the ellipse that is the image of a circle, from its dual conic.
+
+    The conic is ``radius^2 N - c c^T`` with ``N = I - n n^T``.
+    """
+    N, square = np.eye(3) - n[..., :, None] * n[..., None, :], radius**2 * np.ones_like(c[..., :1])
+    x, z, w, tilt = c[..., :2], c[..., 2:], N[..., :2, 2], N[..., 2, 2:]
+    size = z * z - square * tilt
+    i, j = (0, 1, 0), (0, 1, 1)  # n20, n02, n11
+    flat = z * z * N[..., i, j] + tilt * x[..., i] * x[..., j]
+    flat -= z * (w[..., i] * x[..., j] + w[..., j] * x[..., i])
+    spread = square * (w[..., i] * w[..., j] - tilt * N[..., i, j]) + flat
+    spread *= 0.25 * square / size**2
+    s = np.concatenate(((z * x - square * w) / size, spread), axis=-1)
+    d = inner(c, n)
+    exists = ((z > 0.0) & (size > 0.0) & (np.abs(d) > THIN * norm(c)))[..., 0]
     reach, plane = 2.0 * np.sqrt(s[..., 2:4]), np.concatenate((n, -d), axis=-1)[..., None, :]
     return Sight(exists, s, plane, np.stack((s[..., :2] - reach, s[..., :2] + reach), axis=-2))
 
@@ -312,10 +314,12 @@ def _sight_of_circle(c: Array, n: Array, radius: Any) -> Sight:
 def as_sensed(given: Any, feature: Feature, name: str) -> tuple[Array, bool]:
     """Checked measurements (..., k) or poses (..., 4, 4), and whether they are poses."""
     array = as_floats(getattr(given, "homogeneous", given), name)
+    if array.shape == (4, 4) and _is_exact(array):
+        return array, True
     if array.shape[-2:] == (4, 4):
         four = array.ndim == 2 and feature.size == 4  # may be four measurements
         if not four or np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
-            return array if array.ndim == 2 and _is_exact(array) else as_pose(array, name), True
+            return as_pose(array, name), True
     if array.ndim == 0 or array.shape[-1] != feature.size:
         raise ShapeError(
             f"{name}: expected {feature.size} numbers of {type(feature).__name__}, or a pose "

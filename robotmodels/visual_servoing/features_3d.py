@@ -1,7 +1,7 @@
 """Features in space: pose, point, plane, and the features of 2 1/2-D servoing.
 
 Their measurement comes from an estimated pose, or from stereo or range cameras; their rows need
-the measurement alone. Points that are in front of the camera have to be in its image.
+the measurement alone. With a `Camera` their point has to be in its image if it is in front.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class PoseError(_InSpace):
     desired camera is at the frame of the object. In a `Task` it is the pose of the task.
     """
 
-    desired: Array | None = None
+    desired: Array = None  # type: ignore[assignment]
     _period = (0.0,) * 6
 
     def _see(self, T: Array) -> Sight:
-        M = inverse(T) if self.desired is None else self.desired @ inverse(T)
+        M = self.desired @ inverse(T)
         s = np.concatenate((M[..., :3, 3], rotation_vectors_of(M[..., :3, :3])), axis=-1)
         return self._sight(s, T[..., :3, 3])
 

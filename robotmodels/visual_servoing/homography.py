@@ -39,9 +39,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core
+from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
-from .results import Result, packed
+from .results import Result, as_sized, packed
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -64,7 +64,7 @@ class PlaneMotions(Result):
 
 def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
     """Homography ``x_2 ~ H x_1`` of points of a plane, by least squares of normalised points."""
-    p, q = as_core(image_1, (2,), "image_1"), as_core(image_2, (2,), "image_2")
+    p, q = as_sized(image_1, (2,), "image_1"), as_sized(image_2, (2,), "image_2")
     if p.ndim < 2 or p.shape != q.shape or p.shape[-2] < 4:
         raise ShapeError(
             "image_1, image_2: expected the same shape (..., n, 2), n from 4, got "
@@ -89,7 +89,7 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
 
 def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneMotions:
     """Motions and planes of a homography: four in general, two with the plane in front."""
-    A = as_core(H, (3, 3), "H")
+    A = as_sized(H, (3, 3), "H")
     sizes, Vt = np.linalg.svd(A)[1:]
     if not (sizes[..., 2] > 1e-12 * sizes[..., 0]).all():
         raise InvalidValueError("H: expected a regular matrix; this one has a zero singular value.")
@@ -113,7 +113,7 @@ def decompose_homography(H: ArrayLike, image: ArrayLike | None = None) -> PlaneM
     t, n = (np.stack((x, -x), axis=-2).reshape(*x.shape[:-2], 4, 3) for x in (t, n))
     valid = np.arange(4) < np.where(still, 1, np.where(axial, 2, 4))[..., None]
     if image is not None:
-        x = np.atleast_2d(as_core(image, (2,), "image"))
+        x = np.atleast_2d(as_sized(image, (2,), "image"))
         height = n[..., :2] @ np.swapaxes(x, -1, -2) + n[..., 2:]
         valid = valid & ((height > 0.0).all(axis=-1) | still[..., None])
     return PlaneMotions(*packed(valid, np.repeat(R, 2, axis=-3), t, n)[1:])

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .features import Feature, Sight, inner, norm, placed
+from .features import Feature, Sight, inner, norm, placed, projected
 from .matrices import point_rows
 from .results import THIN, as_points
 
@@ -101,12 +101,11 @@ class Moments(Feature):
         return np.array([np.pi if name == "alpha" else 0.0 for name in self.components])
 
     def _see(self, T: Array) -> Sight:
-        X = placed(T, self._corners)
-        image, exists = X[..., :2] / X[..., 2:], (X[..., 2] > 0.0).all(axis=-1)
+        image, Z, exists = projected(T, self._corners)
         if self.points is None:
-            n, corner = T[..., :3, :3] @ _axes(self._corners)[2], X[..., 0, :]
+            n, corner = T[..., :3, :3] @ _axes(self._corners)[2], placed(T, self._corners[0])
             exists &= (np.abs(inner(n, corner)) > _FLAT * norm(corner))[..., 0]  # not edge-on
-        return Sight(exists, self._of(image[..., 0], image[..., 1]).real, X[..., 2], image)
+        return Sight(exists, self._of(image[..., 0], image[..., 1]).real, Z, image)
 
     def _rows(self, s: Any, depth: Any, image: Any = None) -> Array:
         if image is None:

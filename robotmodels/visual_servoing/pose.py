@@ -52,12 +52,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_core
+from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
-from .results import Result, as_points, packed, taken
+from .results import Judged, as_points, as_sized, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
@@ -76,7 +76,7 @@ class PoseStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PoseSolutions(Result):
+class PoseSolutions(Judged):
     """Poses of an object in the camera; rows are packed, missing ones NaN. Read-only.
 
     Parameters
@@ -111,7 +111,7 @@ class PoseSolutions(Result):
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     """Poses of three points, at most four."""
-    P, m = as_core(points, (3, 3), "points"), as_core(image, (3, 2), "image")
+    P, m = as_sized(points, (3, 3), "points"), as_sized(image, (3, 2), "image")
     try:
         batch = np.broadcast_shapes(P.shape[:-2], m.shape[:-2])
     except ValueError:
@@ -146,7 +146,7 @@ def pnp(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     triples = triples[np.argsort(-_sine(P[triples]), kind="stable")[:_TRIPLES]]
     triples = triples[_sine(P[triples]) > _THIN]
     three = np.tile(P[triples], (len(m), 1, 1)), m[:, triples].reshape(-1, 3, 2)
-    T = _poses_of_triples(*three)[0].reshape(len(m), 12 * len(triples), 4, 4)
+    T = _poses_of_triples(*three, rounds=3)[0].reshape(len(m), 12 * len(triples), 4, 4)
     off = np.where((placed(T, P)[..., 2] > 0.0).all(axis=-1), _residual(T, P, m), np.inf)
     T = taken(T, np.argsort(off, axis=-1)[:, :_STARTS])
     if planar:  # the other pose of a planar object: its normal mirrored at the line of sight
@@ -172,7 +172,7 @@ def refine_pose(points: ArrayLike, image: ArrayLike, T0: ArrayLike) -> PoseSolut
     return _packed((P, m, batch), T, cost, cost[..., None], 0.0, done, 1)
 
 
-def _poses_of_triples(P: Array, m: Array) -> tuple[Array, Array, Array]:
+def _poses_of_triples(P: Array, m: Array, rounds: int = _NEWTON) -> tuple[Array, Array, Array]:
     """Candidates T (N, 12, 4, 4) with distances s (N, 12, 3) and their misfits (N, 12).
 
     Shapes: P (N, 3, 3), m (N, 3, 2).
@@ -180,7 +180,7 @@ def _poses_of_triples(P: Array, m: Array) -> tuple[Array, Array, Array]:
     rays = np.concatenate((m, np.ones((len(m), 3, 1))), axis=-1)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     sides, chords = (((x[:, _I] - x[:, _J]) ** 2).sum(axis=-1) for x in (P, rays))
-    s, off = _fitted(_cones(chords, sides), chords[:, None], sides[:, None])
+    s, off = _fitted(_cones(chords, sides), chords[:, None], sides[:, None], rounds)
     C, T = np.abs(s)[..., None] * rays[:, None], np.zeros((*s.shape[:2], 4, 4))
     T[..., :3, :3] = R = _triad(C) @ np.swapaxes(_triad(P), -1, -2)[:, None]
     T[..., :3, 3] = C.mean(axis=-2) - np.einsum("npij,nj->npi", R, P.mean(axis=-2))
@@ -238,12 +238,12 @@ def _law(s: Array, chords: Array, sides: Any) -> Array:
     return 0.5 * ((s[..., _I] - s[..., _J]) ** 2 + s[..., _I] * s[..., _J] * chords - sides)
 
 
-def _fitted(s: Array, chords: Array, sides: Array) -> tuple[Array, Array]:
+def _fitted(s: Array, chords: Array, sides: Array, rounds: int) -> tuple[Array, Array]:
     """Distances of the law of cosines by Newton's method, and their largest residuals."""
     part, row, J = np.ones((*s.shape[:2], 1)), np.arange(3), np.zeros((*s.shape, 3))
     residual = _law(s, chords, sides)
     off = np.abs(residual).max(axis=-1, keepdims=True)
-    for _ in range(_NEWTON):  # steps that increase the residual, near double roots, are cut
+    for _ in range(rounds):  # steps that increase the residual, near double roots, are cut
         gap = s[..., _I] - s[..., _J]
         J[..., row, _I] = gap + 0.5 * s[..., _J] * chords
         J[..., row, _J] = 0.5 * s[..., _I] * chords - gap
@@ -317,7 +317,7 @@ def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.boo
 def _checked(points: Any, image: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Points (n, 3), images (N, n, 2) and the shape of their batch."""
     P = as_points(points, "points", 3)
-    m = as_core(image, (len(P), 2), "image")
+    m = as_sized(image, (len(P), 2), "image")
     sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
     if sizes[1] <= _THIN * sizes[0]:
         raise InvalidValueError("points: expected points that are not all on one line.")

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _arrays
-from .._arrays import Array, as_core, as_exact, as_number, read_only
+from .._arrays import LARGEST, Array, as_bounded, as_core, as_exact, as_number, read_only
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
@@ -52,7 +53,6 @@ class Result(_arrays.Frozen):
     """Base of results: equal if their fields are, where NaN equals NaN."""
 
     __slots__ = ()
-    _outcome: ClassVar[type[Outcome]]
     __repr__ = brief
 
     def _key(self) -> tuple[Any, ...]:
@@ -69,12 +69,19 @@ class Result(_arrays.Frozen):
     def __hash__(self) -> int:
         return hash(self._key())
 
+
+class Judged(Result):
+    """Base of results with a status."""
+
+    __slots__ = ()
+    _outcome: ClassVar[type[Outcome]]
+
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status, of row i in a batch."""
         codes = np.asarray(self.status)  # type: ignore[attr-defined]
         try:
             return self._outcome(index(codes[i if codes.ndim else ()])).sentence
-        except (IndexError, TypeError):
+        except (IndexError, TypeError, ValueError):
             raise InvalidValueError(
                 f"i: expected the index of one row of {codes.shape}, got {i!r}."
             ) from None
@@ -98,9 +105,14 @@ def packed(valid: Any, *solutions: Array) -> list[Any]:
     ]
 
 
+def as_sized(value: Any, core: tuple[int, ...], name: str) -> Array:
+    """Floats of shape (..., *core), zero or of a size whose powers are floats."""
+    return as_bounded(as_core(value, core, name), name, LARGEST, 1.0 / LARGEST)
+
+
 def as_points(value: Any, name: str, least: int = 1) -> Array:
     """Points of an object. Shapes: -> (k, 3)."""
-    points = as_core(value, (3,), name)
+    points = as_sized(value, (3,), name)
     points = points[None] if points.ndim == 1 else points
     if points.ndim != 2 or len(points) < least:
         raise ShapeError(f"{name}: expected shape (k, 3), k from {least}, got {points.shape}.")
@@ -109,7 +121,7 @@ def as_points(value: Any, name: str, least: int = 1) -> Array:
 
 def _pairs(value: Any, name: str) -> Array:
     """Distinct pairs of points. Shapes: -> (k, 2, 3)."""
-    pairs = as_core(value, (2, 3), name)
+    pairs = as_sized(value, (2, 3), name)
     pairs = pairs[None] if pairs.ndim == 2 else pairs
     if pairs.ndim != 3 or not len(pairs):
         raise ShapeError(f"{name}: expected shape (k, 2, 3), k from 1, got {pairs.shape}.")
@@ -118,9 +130,13 @@ def _pairs(value: Any, name: str) -> Array:
     return pairs
 
 
+def _vector(value: Any, name: str) -> Array:
+    return as_sized(as_exact(value, (3,), name), (3,), name)
+
+
 def _unit(value: Any, name: str) -> Array:
     """A direction as a unit vector."""
-    array = as_exact(value, (3,), name)
+    array = _vector(value, name)
     length = float(np.linalg.norm(array))
     if not length > 0.0:
         raise InvalidValueError(f"{name}: expected a vector that is not zero.")
@@ -134,33 +150,25 @@ def _flag(value: Any, name: str) -> bool:
     return bool(value)
 
 
-def _vector(value: Any, name: str) -> Array:
-    return as_exact(value, (3,), name)
-
-
 def _positive(value: Any, name: str) -> float:
-    return as_number(value, name, above=0.0)
-
-
-def _interaction(value: Any, name: str) -> str:
-    if isinstance(value, str) and value in ("current", "desired", "mean"):
-        return value
-    raise InvalidValueError(f"{name}: expected current, desired or mean, got {value!r:.40}.")
+    return as_number(value, name, above=0.0, below=LARGEST)
 
 
 def _depth(value: Any, name: str) -> str | float:
-    if not isinstance(value, str):
-        return as_number(value, name, above=0.0)
-    if value in ("true", "desired"):
-        return value
-    raise InvalidValueError(f'{name}: expected "true", "desired" or metres, got {value!r:.40}.')
+    if isinstance(value, str):
+        return one_of(value, ("true", "desired"), f"{name}, if not metres")
+    return _positive(value, name)
 
 
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "object_points": as_points, "points": _pairs, "centre": _vector, "point": _vector,
-    "normal": _unit, "axis": _unit, "radius": _positive, "distance": as_number,
-    "desired": lambda value, name: None if value is None else as_single_pose(value, name),
-    "T_tool_camera": as_single_pose, "T_world_camera": as_single_pose,
-    "gain": _positive, "weight": as_number, "interaction": _interaction, "depth": _depth,
-    "kalman": _flag, "process": _positive, "noise": _positive,
-}  # fmt: skip
+    **dict.fromkeys(("centre", "point"), _vector),
+    **dict.fromkeys(("normal", "axis"), _unit),
+    **dict.fromkeys(("radius", "gain", "process", "noise"), _positive),
+    **dict.fromkeys(("distance", "weight"), as_number),
+    **dict.fromkeys(("desired", "T_tool_camera", "T_world_camera"), as_single_pose),
+    "interaction": lambda value, name: one_of(value, ("current", "desired", "mean"), name),
+    "object_points": as_points,
+    "points": _pairs,
+    "depth": _depth,
+    "kalman": _flag,
+}

@@ -1,12 +1,12 @@
 """Simulation of visual servoing: a free camera, eye in hand, eye to hand.
 
-A free camera without noise follows its law in continuous time (Runge-Kutta of order 4). With a
-robot, noise or tracking the law is sampled: every velocity is held for one step.
+A free camera without noise follows its law in continuous time (Runge-Kutta-Munthe-Kaas, order 4).
+With a robot, noise or tracking the law is sampled: every velocity is held for one step.
 
 Parameters
 ----------
 task : Task or Hybrid
-    What is regulated, k components.
+    The task, k components.
 T0 : array_like, shape (4, 4)
     Pose of the object in the camera at the start.
 camera : Camera, optional
@@ -68,13 +68,13 @@ from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
-from ..se3 import as_single_pose, inverse
+from ..se3 import as_pose, as_single_pose, inverse
 from .camera import Camera
 from .features import sight_of
 from .results import Result, Value
 from .tasks import Hybrid, Task
 from .tracking import TargetMotion
-from .velocity import ServoStatus, check_kinds, law, moved, rate_matrix
+from .velocity import ServoStatus, check_kinds, law, moved
 
 _MOST = 1_000_000  # steps of a simulation
 
@@ -109,7 +109,7 @@ class ServoMotion(Result):
     q : ndarray, shape (N, n), or None
         Joint variables, rad or m.
     s, error, velocity : ndarray, shapes (N, k), (N, k) and (N, 6)
-        Measurements; ``s - s*``; twists [v; w] of the camera that the law asks for.
+        Measurements; ``s - s*``; twists [v; w] of the camera by the law.
     codes : ndarray of int8, shape (N,)
         `ServoStatus` of every sample.
     """
@@ -130,7 +130,7 @@ class ServoMotion(Result):
         """Outcome at the end."""
         return ServoStatus(int(self.codes[-1]))
 
-    def reason(self) -> str:  # type: ignore[override]
+    def reason(self) -> str:
         """Sentence of the status, with the error at the end."""
         return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
 
@@ -163,7 +163,7 @@ def servo(
         limits=(bounds, JointBounds),
     )
     primary = task.regulated
-    T = as_single_pose(T0, "T0")
+    T = as_single_pose(as_pose(T0, "T0"), "T0")
     h, total = as_number(step, "step", above=0.0), as_number(duration, "duration", least=0.0)
     sigma = as_number(noise, "noise", least=0.0)
     if total > _MOST * h:
@@ -246,12 +246,19 @@ class _Arm:
 
 
 def _continued(task: Task | Hybrid, T: Array, v: Array, h: float) -> Array:
-    """Pose after a step of the continuous law by the Runge-Kutta method of order 4."""
-    rates = [rate_matrix(v) @ T]
-    for part in (0.5, 0.5, 1.0):
-        between = T + part * h * rates[-1]
-        rates.append(rate_matrix(law(task, None, between)[0]) @ between)
-    after = T + h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
-    R = after[:3, :3]
-    after[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R  # back to a rotation, to which it is close
-    return after
+    """Pose after a step of the continuous law: order 4, by Runge-Kutta-Munthe-Kaas on poses."""
+
+    def at(twist: Array) -> Array:
+        return h * law(task, None, moved(T, twist))[0]
+
+    a = h * v
+    b = at(0.5 * a)
+    c = at(0.5 * b + 0.125 * _bracket(a, b))
+    d = at(c)
+    return moved(T, (a + 2.0 * (b + c) + d + 0.5 * _bracket(a, d)) / 6.0)
+
+
+def _bracket(a: Array, b: Array) -> Array:
+    """Lie bracket of twists."""
+    linear = np.cross(a[3:], b[:3]) - np.cross(b[3:], a[:3])
+    return np.concatenate((linear, np.cross(a[3:], b[3:])))

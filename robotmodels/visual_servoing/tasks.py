@@ -1,4 +1,4 @@
-"""Tasks: what a camera regulates, with which interaction matrix (section 6.3).
+"""Tasks: regulation of a feature with an interaction matrix (section 6.3).
 
 Parameters
 ----------
@@ -57,12 +57,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact
+from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, ShapeError
-from ..se3 import as_single_pose
+from ..se3 import as_pose, as_single_pose
 from .features import Feature, Sight, as_sensed
 from .features_3d import PointAndRotation, PoseError
-from .results import Value
+from .results import Value, as_points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -148,7 +148,7 @@ class Task(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hybrid(Value):
-    """A primary task, and a secondary motion z in what it leaves free.
+    """A primary task, and a secondary motion z in the kernel of its matrix.
 
     ``[v; w] = primary + weight (I - L^+ L) z``.
     """
@@ -173,11 +173,10 @@ class Hybrid(Value):
 
 def task_3d(desired: ArrayLike, gain: float = 0.5) -> Task:
     """Position-based (3-D) visual servoing."""
-    return Task(PoseError(), as_single_pose(desired, "desired"), gain)
+    return Task(PoseError(), as_pose(desired, "desired"), gain)
 
 
 def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Task:
     """2 1/2-D visual servoing."""
-    first = as_core(points, (3,), "points").reshape(-1, 3)[0]
-    T = as_single_pose(desired, "desired")
-    return Task(PointAndRotation(first, T), T, gain)
+    T = as_pose(desired, "desired")
+    return Task(PointAndRotation(as_points(points, "points")[0], T), T, gain)

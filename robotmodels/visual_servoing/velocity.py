@@ -1,4 +1,4 @@
-"""Velocity of the camera that regulates a task, and a status that states what it achieves.
+"""Velocity of the camera that regulates a task, and a status.
 
 Parameters
 ----------
@@ -49,12 +49,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import LARGEST, Array, as_exact, read_only
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .camera import Camera
 from .features import Feature, as_sensed, sight_of
-from .results import Result, packed
+from .results import Judged, Result, packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -80,7 +80,7 @@ class ServoStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ServoStep(Result):
+class ServoStep(Judged):
     """Velocity of the camera for one measurement, or for a batch. Read-only.
 
     Parameters
@@ -89,7 +89,7 @@ class ServoStep(Result):
         Twist [v; w] of the camera in its own axes, m/s and rad/s, zero for an object that is
         behind the camera or out of sight; ``s - s*``, NaN behind the camera.
     rank, status : int and ServoStatus, or ndarrays of int8, shape (...)
-        Rank of the matrix of the law; what the velocity achieves.
+        Rank of the matrix of the law; outcome.
     """
 
     v: Array
@@ -123,7 +123,7 @@ def camera_velocity(
 
 
 def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
-    """Raise for what is no task, and for options of another kind."""
+    """Raise for anything but a task, and for options of another kind."""
     if not isinstance(task, Task | Hybrid):
         raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
     for name, (value, kind) in given.items():
@@ -139,11 +139,12 @@ def law(
     feature, L_desired = primary.feature, primary.L_desired
     if sight is None and T is not None:
         sight = sight_of(feature, T)
-    if sight is not None and not sight.exists:
-        nothing = np.full(feature.size, np.nan)
-        return np.zeros(6), nothing, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     measured: Any = sight.s if s is None and sight is not None else s
-    error = primary.error(measured)
+    exists = sight is None or sight.exists
+    error = primary.error(measured) if exists else np.full(feature.size, np.nan)
+    size = math.hypot(*error.tolist())
+    if not size < LARGEST:  # no measurement, or one from the plane of the object
+        return np.zeros(6), np.nan * error, 0, ServoStatus.BEHIND, np.zeros((6, feature.size))
     mean = primary.interaction == "mean"
     A = primary.matrix(measured, sight) if L_desired is None or mean else L_desired
     inverse, rank = own, _ = pseudo_inverse(A)
@@ -151,7 +152,6 @@ def law(
         inverse = 0.5 * (own + pseudo_inverse(L_desired)[0])
         rank = pseudo_inverse(inverse)[1]
     direction, status = inverse @ error, ServoStatus.CONVERGES
-    size = math.sqrt(error @ error)
     if size > _ZERO:
         seen = A @ direction
         if rank < min(A.shape) and rank < _generic_rank(feature):
@@ -193,7 +193,7 @@ def _generic_rank(feature: Feature) -> int:
 
 
 def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
-    """Twist that the secondary motion asks for."""
+    """Twist of the secondary motion."""
     if isinstance(task.secondary, Task):
         if T is None and task.secondary.feature != task.primary.feature:
             raise InvalidValueError(
@@ -210,7 +210,7 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
 
 
 def rate_matrix(v: Array) -> Array:
-    """M of ``dT/dt = M T``, the motion of what stands still, seen by a camera with the twist v."""
+    """M of ``dT/dt = M T``, the motion of a fixed object in a camera with the twist v."""
     a, b, c, x, y, z = v.tolist()
     return np.array(((0.0, z, -y, -a), (-z, 0.0, x, -b), (y, -x, 0.0, -c), (0.0,) * 4))
 

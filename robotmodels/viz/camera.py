@@ -1,4 +1,4 @@
-"""Where to look from, so that what is drawn fills the picture."""
+"""Viewpoints from which the drawn points fill the picture."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Camera:
     Parameters
     ----------
     target : ndarray, shape (3,)
-        What it looks at and turns about, world axes, metres.
+        Centre of the view and of its rotation, world axes, metres.
     position : ndarray, shape (3,)
-        Where it is, world axes, metres.
+        Position of the camera, world axes, metres.
     depth : float
-        How far what it sees reaches behind the target, metres.
+        Extent of the drawn points behind the target, metres.
 
     Examples
     --------
