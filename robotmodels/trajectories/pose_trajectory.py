@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Rebuilt, as_floats
+from .._arrays import Array, Frozen, Value, as_floats
 from ..errors import ShapeError
 from ..se3 import skew
 from ..se3.orientation import rotation_vectors_of
@@ -17,7 +17,7 @@ from .trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseSamples(Frozen):
+class PoseSamples(Frozen, Value):
     """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
 
     Parameters
@@ -47,7 +47,7 @@ class PoseSamples(Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseTrajectory(Rebuilt):
+class PoseTrajectory(Value):
     """Motion of the tool: a path in space and a law of time on it.
 
     Parameters
@@ -137,7 +137,7 @@ class PosePath(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FixedAxisPath:
+class FixedAxisPath(Value):
     """Line or circle, with a rotation about a fixed axis, both in proportion to s from 0 to 1."""
 
     start: Array
@@ -194,7 +194,7 @@ class FixedAxisPath:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BlendedPoses:
+class BlendedPoses(Value):
     """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
 
     Shapes: poses_at (m, 4, 4); twists (m - 1, 6); times, blends (m,).

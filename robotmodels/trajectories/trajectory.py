@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Rebuilt, Value, as_floats, as_number, read_only
+from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from .checks import counted, greatest_shown, seconds_shown
 from .limits import RATES, LimitsReport, MotionLimits
@@ -17,7 +17,7 @@ from .motions import FunctionMotion, Motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples(Rebuilt):
+class Samples(Value):
     """A trajectory at given times. As an array (``np.asarray``) it is its positions.
 
     Parameters
