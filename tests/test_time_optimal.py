@@ -350,6 +350,8 @@ def test_a_path_of_poses_needs_the_robot():
         ({"points": 10**12}, InvalidValueError, "at most"),
         ({"start_rate": -1.0}, InvalidValueError, "start_rate"),
         ({"end_rate": np.nan}, InvalidValueError, "end_rate"),
+        ({"start_rate": 1e300}, InvalidValueError, "start_rate"),
+        ({"both_ends": "x"}, InvalidValueError, "both_ends"),
         ({"friction": "dry", "model": planar(), "torque": 9e2}, InvalidValueError, "friction"),
     ],
 )  # fmt: skip

@@ -808,6 +808,13 @@ def test_before_and_after():
     assert move.resample(period=0.5).t.size == 5
     with pytest.raises(InvalidValueError, match="either"):
         move.resample()
+    with pytest.raises(InvalidValueError, match="samples"):
+        move.resample(10**12)
+    for limits in (None, 3.0):
+        with pytest.raises(InvalidValueError, match="MotionLimits"):
+            move.check(limits)
+    with pytest.raises(InvalidValueError, match="angle"):
+        circle(np.eye(4), [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0])
 
 
 def test_extremes_are_exact(rng):
@@ -848,7 +855,7 @@ def test_no_joints_are_refused():
 def test_seconds_between_samples_are_a_period():
     move = quintic(0.0, 1.0, duration=1.0)
     for wrong in (0.1, 2.5, 0, -3, np.nan, np.inf, "ten"):
-        with pytest.raises(InvalidValueError, match=r"whole number from 1, got .*period="):
+        with pytest.raises(InvalidValueError, match=r"whole number from 1 to 1e9, got .*period="):
             move.resample(wrong)
     assert len(move.resample(3)) == len(move.resample(3.0)) == 3
 

@@ -265,7 +265,8 @@ def _one_by_one(
             return next(one for one in found if isinstance(one, str))
         longest = max(row[0] for row in rows)
         if waits or (common is not None and longest <= common * (1.0 + ROUNDING)):
-            return longest, *(np.concatenate(parts) for parts in list(zip(*rows, strict=True))[1:])
+            h, phases = (np.concatenate([row[k] for row in rows]) for k in (1, 2))
+            return longest, h, phases
         # one joint cannot take the time of the others: all take the next that it can
         common = longest
     return "no duration that all joints can take"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_mask
+from .._arrays import Array, Frozen, Value, as_exact, as_mask, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
@@ -165,7 +165,7 @@ def joint_path(
         if (np.diff(times) <= 0.0).any():
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
-    singular_below = float(as_floats(singular_below, "singular_below"))
+    singular_below = as_number(singular_below, "singular_below")
     given = (mask, mask_axes)
     tolerances = {
         "position_tolerance": position_tolerance,

@@ -162,8 +162,10 @@ def time_optimal(
     (1.5, 'velocity of joint 1')
     """
     points = sample_count(points, "points", 2, _MOST)
-    rates = tuple(as_number(r, k, least=0.0) for r, k in
+    rates = tuple(as_number(r, k, least=0.0, below=1e150) for r, k in
                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    if not isinstance(both_ends, bool | np.bool_):
+        raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
