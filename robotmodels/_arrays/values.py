@@ -84,4 +84,4 @@ def _hashable(value: Any) -> Any:
     """A field for a hash, in which 0.0 and -0.0 are the same, as they compare alike, and NaN."""
     if isinstance(value, np.ndarray):
         return (value if value.dtype.kind == "U" else value + 0.0).tobytes()
-    return value if value == value else "NaN"
+    return "NaN" if isinstance(value, float) and value != value else value
