@@ -322,6 +322,8 @@ def test_ends_that_are_not_allowed_have_a_status():
         ({"via": [[0.5, 0.5], [0.5, 0.5]]}, InvalidValueError, r"via\[1\]"),
         ({"via": [0.5, 0.5]}, InvalidValueError, "via"),
         ({"via": Pose(np.eye(4))}, InvalidValueError, "via"),
+        ({"via": 3}, InvalidValueError, "via"),
+        ({"nodes": 10**9}, InvalidValueError, "nodes"),
         ({"limits": MotionLimits(upper=0.5)}, InvalidValueError, "outside its limits"),
         ({"torque": None}, InvalidValueError, "infinite"),
         ({"torque": [1.0, np.nan]}, InvalidValueError, "torque"),

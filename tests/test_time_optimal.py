@@ -218,6 +218,14 @@ def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
     )
 
 
+def test_dry_friction_acts_on_joints_however_slow():
+    path, torque = line([0.0, 0.0], [1.0, 1e-5]), [120.0, 40.0]
+    dry, constant = planar(Fc=[0.0, 20.0]), planar(offset=[0.0, 20.0])
+    durations = [time_optimal(path, FREE, m, torque).duration for m in (dry, constant, planar())]
+    assert durations[0] == pytest.approx(durations[1], rel=1e-9)
+    assert durations[0] > durations[2] * 1.001
+
+
 def test_rates_at_the_ends():
     limits = MotionLimits(velocity=2.0, acceleration=3.0)
     timed = time_optimal(line([0.0], [1.0]), limits, start_rate=0.8, end_rate=0.5)
@@ -339,8 +347,11 @@ def test_a_path_of_poses_needs_the_robot():
         ({"torque_rate": 5.0}, InvalidValueError, "torque_rate"),
         ({"points": 1}, InvalidValueError, "points"),
         ({"points": 2.5}, InvalidValueError, "points"),
+        ({"points": 10**12}, InvalidValueError, "at most"),
         ({"start_rate": -1.0}, InvalidValueError, "start_rate"),
         ({"end_rate": np.nan}, InvalidValueError, "end_rate"),
+        ({"start_rate": 1e300}, InvalidValueError, "start_rate"),
+        ({"both_ends": "x"}, InvalidValueError, "both_ends"),
         ({"friction": "dry", "model": planar(), "torque": 9e2}, InvalidValueError, "friction"),
     ],
 )  # fmt: skip

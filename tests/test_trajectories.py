@@ -773,10 +773,23 @@ def test_shapes_scalars_and_samples():
     assert np.array_equal(np.asarray(s), s.q)
     assert len(s) == 11
     assert not s.q.flags.writeable
-    copy = pickle.loads(pickle.dumps(move))
-    assert np.array_equal(copy.q([0.3, 0.7]), move.q([0.3, 0.7]))
     shuffled = np.array([1.5, 0.2, 1.0, 0.7, 2.0, 0.0])
     assert np.abs(move.q(shuffled) - [move.q(t) for t in shuffled]).max() < 1e-15
+
+
+def test_values_are_equal_to_their_copies_and_print_in_six_lines():
+    limits = MotionLimits(np.arange(1.0, 9.0) / 7.0, 2.0, 3.0, lower=-0.3)
+    move = quintic(np.zeros(8), np.ones(8), 0.5)
+    pose = straight_line(np.eye(4), se3.translation(1.0, 2.0, 3.0), duration=1.0)
+    series = fourier(1.0 / np.arange(1.0, 17.0).reshape(2, 8), np.ones((2, 8)), 3.0)
+    values = [limits, move, move.resample(3), move.check(limits), pose, pose.resample(3), series]
+    for value in [*values, series.motion, linear(np.zeros((0, 2)), 1.0, 1.0).at([0.0, 1.0])]:
+        copy = pickle.loads(pickle.dumps(value))
+        assert copy == value
+        assert hash(copy) == hash(value)
+        assert len(repr(value).splitlines()) <= 6
+    assert limits != MotionLimits(np.arange(1.0, 9.0) / 7.0, 2.0, 3.0)
+    assert "and 36 more" in repr(move.check(limits))
 
 
 def test_before_and_after():
@@ -795,6 +808,13 @@ def test_before_and_after():
     assert move.resample(period=0.5).t.size == 5
     with pytest.raises(InvalidValueError, match="either"):
         move.resample()
+    with pytest.raises(InvalidValueError, match="samples"):
+        move.resample(10**12)
+    for limits in (None, 3.0):
+        with pytest.raises(InvalidValueError, match="MotionLimits"):
+            move.check(limits)
+    with pytest.raises(InvalidValueError, match="angle"):
+        circle(np.eye(4), [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0])
 
 
 def test_extremes_are_exact(rng):
@@ -835,7 +855,7 @@ def test_no_joints_are_refused():
 def test_seconds_between_samples_are_a_period():
     move = quintic(0.0, 1.0, duration=1.0)
     for wrong in (0.1, 2.5, 0, -3, np.nan, np.inf, "ten"):
-        with pytest.raises(InvalidValueError, match=r"whole number from 1, got .*period="):
+        with pytest.raises(InvalidValueError, match=r"whole number from 1 to 1e9, got .*period="):
             move.resample(wrong)
     assert len(move.resample(3)) == len(move.resample(3.0)) == 3
 

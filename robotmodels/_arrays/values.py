@@ -68,13 +68,20 @@ class Value(Rebuilt):
 
 
 def same_value(a: object, b: object) -> bool:
-    """Equality of fields that may be arrays: same shape and same numbers."""
+    """Equality of fields that may be arrays: same shape and same numbers, or NaN in both."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.shape == b.shape and bool(np.array_equal(a, b))
-    return bool(a == b)
+        floats = a.dtype.kind == b.dtype.kind == "f"
+        return np.array_equal(a, b) or (floats and np.array_equal(a, b, equal_nan=True))
+    return bool(a == b or (a != a and b != b))
 
 
 def value_hash(*fields: object) -> int:
     """Hash of fields that may be arrays, consistent with `same_value`."""
-    # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
-    return hash(tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields))
+    return hash(tuple(map(_hashable, fields)))
+
+
+def _hashable(value: Any) -> Any:
+    """A field for a hash, in which 0.0 and -0.0 are the same, as they compare alike, and NaN."""
+    if isinstance(value, np.ndarray):
+        return (value if value.dtype.kind == "U" else value + 0.0).tobytes()
+    return "NaN" if isinstance(value, float) and value != value else value

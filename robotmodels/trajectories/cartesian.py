@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats
+from .._arrays import Array, as_exact, as_number
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
@@ -214,7 +214,7 @@ def circle(
     foot = point + n * (n @ (first[:3, 3] - point))
     if np.linalg.norm(first[:3, 3] - foot) <= 1e-12 * max(1.0, float(np.abs(first[:3, 3]).max())):
         raise InvalidValueError("T0: the pose stands on the axis, so its circle has no radius.")
-    sweep = float(as_floats(angle, "angle"))
+    sweep = as_number(angle, "angle")
     last = first.copy()
     R = rotation_about(n, np.array(sweep))
     last[:3, 3] = foot + R @ (first[:3, 3] - foot)

@@ -12,12 +12,11 @@ from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.singular.task import whole_number
 from .laws import LineLimits
-from .limits import MotionLimits, ranges_of
+from .limits import RATES, MotionLimits, ranges_of
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
 
-_MOST = 10**9  # samples; more would be a mistake
 _EXTREME = 1e50
 """Largest size of states, durations and limits: cubes of their ratios are floats."""
 
@@ -40,11 +39,11 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
     return rows, shape[:-1], scalar
 
 
-def sample_count(N: Any) -> int:
+def sample_count(N: Any, name: str = "N", least: int = 0, most: int = 10**9) -> int:
     """A number of samples, not more than can be held."""
-    count = whole_number(N, "N", 0)
-    if count > _MOST:
-        raise InvalidValueError(f"N: expected at most {_MOST} samples, got more.")
+    count = whole_number(N, name, least)
+    if count > most:
+        raise InvalidValueError(f"{name}: expected a whole number of at most {most}, got {count}.")
     return count
 
 
@@ -64,34 +63,25 @@ def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] 
     """
     own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
     u = direction[..., 0] if own else direction[..., 0, :]
-    size = np.where(u != 0.0, np.abs(u), 1.0)
-
-    def along(name: str, least: Array, most: Array, needed: bool = True) -> Array:
-        """The bound that stops the coordinate from growing."""
-        bound = np.where(u > 0.0, most, -least)
-        zero = (u != 0.0) & (bound == 0.0)
-        if needed and zero.any():
-            j = int(np.argwhere(zero)[0][-1])
-            what, other = f"joint {j + 1}", "leave the joint where it is"
-            if names:
-                what, other = names[j], f"take poses without {names[j]}"
-            raise InvalidValueError(
-                f"limits: the limit of {name} of {what} is 0, but it has to move; any other limit "
-                f"will do, or {other}."
-            )
-        with np.errstate(over="ignore"):
-            bound = np.where(u != 0.0, bound / size, np.inf)
-        return bound.reshape(-1) if own else bound.min(axis=-1)
-
-    least_v, least_a = limits.velocity_lower, limits.acceleration_lower
-    return LineLimits(
-        along("velocity", least_v, limits.velocity),
-        along("acceleration", least_a, limits.acceleration),
-        along("acceleration", -limits.acceleration, -least_a),
-        along("jerk", limits.jerk_lower, limits.jerk),
-        along("jerk", -limits.jerk, -limits.jerk_lower),
-        along("velocity", -limits.velocity, -least_v, needed=False),
-    )
+    pairs = [(getattr(limits, f"{name}_lower"), getattr(limits, name)) for name in RATES]
+    most = np.stack([x for low, high in pairs for x in (high, -low)])[:, None]
+    # the bound that stops the coordinate from growing; then that of the way back
+    bounds = np.where(u > 0.0, most, most[[1, 0, 3, 2, 5, 4]])
+    zero = (u != 0.0) & (bounds == 0.0)
+    zero[1] = False
+    if zero.any():
+        i, *_, j = (int(k) for k in np.argwhere(zero)[0])
+        what, other = f"joint {j + 1}", "leave the joint where it is"
+        if names:
+            what, other = names[j], f"take poses without {names[j]}"
+        raise InvalidValueError(
+            f"limits: the limit of {RATES[i // 2]} of {what} is 0, but it has to move; any other "
+            f"limit will do, or {other}."
+        )
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        bounds = np.where(u != 0.0, bounds / np.abs(u), np.inf)
+    V, back, A, B, J, K = bounds.reshape(6, -1) if own else bounds.min(axis=-1)
+    return LineLimits(V, A, B, J, K, back)
 
 
 def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:

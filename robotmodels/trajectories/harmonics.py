@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_floats, as_number, read_only
+from .._arrays import Array, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
+from .checks import counted
 from .trajectory import Trajectory
 
 # what multiplies the cosines and the sines in q, v, a and jerk, apart from powers of k w
@@ -22,7 +23,7 @@ _TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FourierSeries(Rebuilt):
+class FourierSeries(Value):
     """Finite Fourier series of n joints, with period ``2 pi / w``.
 
     ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``: ``a`` and ``b`` are the
@@ -58,6 +59,12 @@ class FourierSeries(Rebuilt):
             object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
         for name, value in (("a", a), ("b", b), ("mean", mean)):
             object.__setattr__(self, name, read_only(value))
+
+    def __repr__(self) -> str:
+        return (
+            f"<FourierSeries: {counted(self.n, 'joint')}, {counted(len(self.a), 'harmonic')}, "
+            f"{self.periods:g} x {self.period:.6g} s>"
+        )
 
     @property
     def n(self) -> int:

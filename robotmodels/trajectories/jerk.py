@@ -109,6 +109,8 @@ def jerk_limited(
         c.reshape(*batch, _PHASES + 1, 4, n),
         lengths.reshape(*batch, n, _PHASES + 1),
     )
+    if np.isinf([bounds.lower, bounds.upper]).all():
+        return Trajectory(motion, scalar)
     low, high = motion.extremes(0)
     outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
     if outside.any():
@@ -176,56 +178,29 @@ def _of_joints(
 
 
 def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
-    """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints.
-
-    Each joint is solved in units of its own, in which its numbers are near to 1.
-    """
-    from ..kernels.jerk_phases import polished_phases
-
+    """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints."""
     k = state["q0"].size
     _refuse_states(state, box)
     waits = how is Synchronisation.INDEPENDENT and T is None
-    s, unit = _units(state, box)  # metres or radians, and seconds, to the unit
-    scales = np.stack((s, s / unit, s / unit**2), axis=-1)
-    start = np.stack((np.zeros(k), state["v0"], state["a0"]), axis=-1) / scales
-    goal = np.stack((state["q1"] - state["q0"], state["v1"], state["a1"]), axis=-1) / scales
-    rates = (scales[:, 1], scales[:, 1], scales[:, 2], scales[:, 2], scales[:, 2] / unit)
-    bounds = np.stack([bound / rate for bound, rate in zip(box, rates, strict=True)], axis=-1)
-    common, longest = T, 0.0
-    for _ in range(50):
-        times = np.zeros(k) if common is None else common / unit
-        rows = (start.tolist(), goal.tolist(), bounds.tolist(), times.tolist())
-        found = [_solved(*of) for of in zip(*rows, strict=True)]
-        failed = [one for one in found if isinstance(one, str)]
-        if failed:
-            break
-        longest = float(max(one.duration * u for one, u in zip(found, unit, strict=True)))
-        if waits or k == 1 or (common is not None and longest <= common * (1.0 + ROUNDING)):
-            break
-        # one joint cannot take the time of the others: all take the next that it can
-        common = longest
-    else:
-        failed = ["no duration that all joints can take"]
-    if failed:
-        message = f"No motion between these states was found by ruckig: {failed[0]}."
+    found = _solved(state, box, T, waits)
+    if isinstance(found, str) and k > 1:
+        found = _one_by_one(state, box, T, waits)
+    if isinstance(found, str):
+        message = f"No motion between these states was found by ruckig: {found}."
         if T is not None:
             breaks, _, _ = _by_ruckig(state, box, None, how)
             message = f"duration: {message} The least duration is {least_shown(breaks.max())} s."
         raise InvalidValueError(message)
+    longest, h, phases = found
     if T is not None and abs(longest - T) > ROUNDING * max(T, longest):
         raise InvalidValueError(
             f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
             f"with which they are is {least_shown(longest)} s."
         )
-    h, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
-    given, jerk = (np.array(rows) for rows in zip(*map(_phases, found), strict=True))
-    # where ruckig is asked for a time it meets positions to 1e-8 only
-    polished_phases(given, jerk, start, goal, h, phases)
-    h, phases = h * unit[:, None], phases * s[:, None, None]
     breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
-    lengths[:, :-1], breaks[:, 1:-1] = h, np.cumsum(h, axis=-1)
+    lengths[:, :-1], breaks[:, 1:-1] = h, h.cumsum(axis=-1)
     c = np.zeros((_PHASES + 1, 4, k))
-    c[:-1], c[-1, 0] = np.moveaxis(phases, 0, -1), state["q1"]
+    c[:-1], c[-1, 0] = phases.transpose(1, 2, 0), state["q1"]
     c[:-1, 0] += state["q0"]
     breaks[:, -1] = breaks.max() if T is None else T
     if waits:
@@ -236,44 +211,80 @@ def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchro
     return breaks, c, lengths
 
 
-def _solved(start: list[float], goal: list[float], bounds: list[float], least: float) -> Any:
-    """Motion of one joint, not shorter than the least duration; or what ruckig says."""
+def _solved(
+    state: dict[str, Array], box: _Box, T: float | None, waits: bool
+) -> tuple[float, Array, Array] | str:
+    """Duration, and lengths (k, 9) and coefficients (k, 9, 4) of phases; or what ruckig says."""
     import ruckig
 
-    given, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    for name, value in zip(_GIVEN, (*start, *goal, *bounds), strict=True):
-        setattr(given, name, [value])
-    if least > 0.0:
-        given.minimum_duration = least
+    from ..kernels.jerk_phases import polished_phases
+
+    s, unit = _units(state, box)
+    k, scales = s.size, np.stack((s, s / unit, s / unit**2, s / unit**3))
+    start = np.stack((np.zeros(k), state["v0"], state["a0"])) / scales[:3]
+    goal = np.stack((state["q1"] - state["q0"], state["v1"], state["a1"])) / scales[:3]
+    bounds = np.stack(box) / scales[[1, 1, 2, 2, 3]]
+    given, found = ruckig.InputParameter(k), ruckig.Trajectory(k)
+    rows = (*start.tolist(), *goal.tolist(), *bounds.tolist())
+    for name, row in zip(_GIVEN, rows, strict=True):
+        setattr(given, name, row)
+    given.synchronization = getattr(ruckig.Synchronization, "No" if waits else "Time")
+    if T is not None:
+        given.minimum_duration = T / unit
     try:
-        code = ruckig.Ruckig(1).calculate(given, found).name
+        code = ruckig.Ruckig(k).calculate(given, found).name
     except (ruckig.RuckigError, ValueError) as error:  # or a number for which it has no name
         code = str(error).strip().partition("\n")[0]
-    return found if code in ("Working", "Finished") else code
-
-
-def _phases(found: Any) -> tuple[list[float], list[float]]:
-    """Times and jerks of the phases of the motion of one joint."""
-    profile = found.profiles[0][0]
-    brake = profile.brake
+    if code not in ("Working", "Finished"):
+        return code
+    each = [(profile, profile.brake) for profile in found.profiles[0]]
+    h = np.array([(*brake.t, *profile.t) for profile, brake in each])
+    jerk = np.array([(*brake.j, *profile.j) for profile, brake in each])
     # phases of a brake that is not used hold what was there before
-    used = np.cumsum(brake.t) <= brake.duration * (1.0 + 1e-12)
-    return [*np.where(used, brake.t, 0.0), *profile.t], [*brake.j, *profile.j]
+    whole = np.array([[brake.duration] for _, brake in each])
+    h[:, :2] *= h[:, :2].cumsum(axis=-1) <= whole * (1.0 + 1e-12)
+    lengths, phases = np.empty(h.shape), np.empty((k, _PHASES, 4))
+    # where ruckig is asked for a time it meets positions to 1e-8 only
+    polished_phases(h, jerk, start.T.copy(), goal.T.copy(), lengths, phases)
+    return found.duration * unit, lengths * unit, phases * s[:, None, None]
 
 
-def _units(state: dict[str, Array], box: _Box) -> tuple[Array, Array]:
-    """Units of length and time (k,) in which numbers are near to 1, as ruckig expects.
+def _one_by_one(
+    state: dict[str, Array], box: _Box, T: float | None, waits: bool
+) -> tuple[float, Array, Array] | str:
+    """As `_solved`, each joint in a unit of time of its own: for joints of very unlike motions."""
+    joints = [slice(i, i + 1) for i in range(state["q0"].size)]
+    common = T
+    for _ in range(50):
+        found = [
+            _solved({x: v[i] for x, v in state.items()}, _Box(*(b[i] for b in box)), common, waits)
+            for i in joints
+        ]
+        rows = [one for one in found if not isinstance(one, str)]
+        if len(rows) < len(found):
+            return next(one for one in found if isinstance(one, str))
+        longest = max(row[0] for row in rows)
+        if waits or (common is not None and longest <= common * (1.0 + ROUNDING)):
+            h, phases = (np.concatenate([row[k] for row in rows]) for k in (1, 2))
+            return longest, h, phases
+        # one joint cannot take the time of the others: all take the next that it can
+        common = longest
+    return "no duration that all joints can take"
+
+
+def _units(state: dict[str, Array], box: _Box) -> tuple[Array, float]:
+    """Units of length (k,) and of time in which numbers are near to 1, as ruckig expects.
 
     They are powers of two, so that no digit is lost.
     """
-    v, a = (np.maximum(*np.abs((state[f"{k}0"], state[f"{k}1"]))) for k in "va")
+    v, a = (np.maximum(np.abs(state[k + "0"]), np.abs(state[k + "1"])) for k in "va")
     V = np.minimum(box.velocity, -box.velocity_lower)
     A = np.minimum(box.acceleration, -box.acceleration_lower)
     ends = a / box.jerk + v / A + np.sqrt(v / box.jerk)  # until they have come to rest
     size = np.abs(state["q1"] - state["q0"]) + v * ends + a * ends * ends
-    times = ends + size / V + np.sqrt(size / A) + np.cbrt(size / box.jerk)
-    s, unit = (np.exp2(np.round(np.log2(np.where(x > 0.0, x, 1.0)))) for x in (size, times))
-    return s, unit
+    longest = (ends + size / V + np.sqrt(size / A) + np.cbrt(size / box.jerk)).max()
+    s = np.exp2(np.round(np.log2(np.where(size > 0.0, size, 1.0))))
+    return s, 2.0 ** round(np.log2(longest)) if longest > 0.0 else 1.0
 
 
 def _refuse_states(state: dict[str, Array], box: _Box) -> None:

@@ -15,18 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Frozen, as_exact, as_floats, as_mask
+from .._arrays import Array, Frozen, Value, as_exact, as_mask, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
 from ..model import RobotModel
 from .follow import continuous, follow, follow_singly
+from .limits import few_lines
 from .path_events import PathEvent, PathEventKind, Task, path_events
 from .pose_trajectory import PoseTrajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath(Frozen):
+class JointPath(Frozen, Value):
     """Postures that follow poses, and what happens on the way.
 
     Parameters
@@ -71,8 +72,7 @@ class JointPath(Frozen):
 
     def __repr__(self) -> str:
         state = "complete" if self.complete else "not complete"
-        lines = [f"<JointPath: {len(self.q)} poses, {state}>", *(str(e) for e in self.events)]
-        return "\n  ".join(lines)
+        return few_lines(f"<JointPath: {len(self.q)} poses, {state}", self.events)
 
 
 def joint_path(
@@ -165,7 +165,7 @@ def joint_path(
         if (np.diff(times) <= 0.0).any():
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
-    singular_below = float(as_floats(singular_below, "singular_below"))
+    singular_below = as_number(singular_below, "singular_below")
     given = (mask, mask_axes)
     tolerances = {
         "position_tolerance": position_tolerance,

@@ -23,18 +23,19 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm import igm
-from ..kinematics.singular.task import generator_of, whole_number
+from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, knots_of
-from .checks import checked_limits
+from .checks import checked_limits, sample_count
 from .limits import MotionLimits
 from .path_limits import SLOWEST, PathLimits, not_held
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import TimingResult, Trajectory
 
+_MOST = 200  # nodes
 _NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
 
@@ -214,7 +215,7 @@ def kinodynamic(
     if not isinstance(cost, Cost):
         raise InvalidValueError(f"cost: expected a Cost, got {type(cost).__name__}.")
     wanted = as_number(clearance, "clearance", least=0.0)
-    count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
+    count, bodies = sample_count(nodes, "nodes", 0, _MOST), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
     seconds = as_number(seconds, "seconds", above=0.0)
     if cost.torque and not problem.loaded.size:
@@ -277,8 +278,10 @@ def _without(status: PlanStatus, why: str) -> Plan:
 
 def _listed(via: Any) -> list[Any]:
     """Via points one by one."""
-    if isinstance(via, Pose):
-        raise InvalidValueError("via: expected a sequence of configurations or poses, got a Pose.")
+    if not np.iterable(via):
+        raise InvalidValueError(
+            f"via: expected a sequence of configurations or poses, got {type(via).__name__}."
+        )
     points = list(via)
     if points and np.ndim(points[0]) == 0 and not isinstance(points[0], Pose):
         raise InvalidValueError("via: expected a sequence of configurations, got one; write [q].")

@@ -24,6 +24,8 @@ _MARGIN = 1.0 + 1e-14
 """Durations are this much above the least, so that rounding does not exceed a limit."""
 _PHASE = 1.0 / 3.0
 """Part of the duration of each ramp without limits, as in the Robotics Toolbox's ``ctraj``."""
+_BACK = np.array([[-1, 0, 0, 0], [-1, 1, 0, 0], [-1, 2, -1, 0], [-1, 3, -3, 1.0]])
+"""Coefficients of p(x) times this are those of -p(1 - x)."""
 
 
 class TimeLaw(Enum):
@@ -239,18 +241,13 @@ def phases(L: Array, V: Array, first: Ramp, cruise: Array, last: Ramp) -> tuple[
 
     Shapes: L, V, cruise (R,) -> durations (R, 7), coefficients (R, 7, 4).
     """
-    h, c = np.zeros((L.size, 7)), np.zeros((L.size, 7, 4))
-    h[:, :3] = np.stack((first.rise, first.level, first.fall), axis=-1)
-    h[:, 3] = cruise
-    h[:, 4:] = np.stack((last.fall, last.level, last.rise), axis=-1)
+    c = np.zeros((L.size, 7, 4))
+    h = (first.rise, first.level, first.fall, cruise, last.fall, last.level, last.rise)
     c[:, :3], end = _on_ramp(first, V)
     c[:, 3, 0], c[:, 3, 1] = end, V * cruise
-    back, _ = _on_ramp(last, V)
-    for k in range(3):  # L - p(1 - x)
-        p0, p1, p2, p3 = np.moveaxis(back[:, k], -1, 0)
-        run = (L - (p0 + p1 + p2 + p3), p1 + 2.0 * p2 + 3.0 * p3, -(p2 + 3.0 * p3), p3)
-        c[:, 6 - k] = np.stack(run, axis=-1)
-    return h, c
+    c[:, 6:3:-1] = _on_ramp(last, V)[0] @ _BACK
+    c[:, 4:, 0] += L[:, None]
+    return np.array(h).T, c
 
 
 def _on_ramp(r: Ramp, V: Array) -> tuple[Array, Array]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_reals, read_only
+from .._arrays import Array, Value, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..table_text import joints_text
@@ -17,7 +18,7 @@ RATES = ("velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionLimits(Rebuilt):
+class MotionLimits(Value):
     """Limits that a motion keeps; a number stands for all joints.
 
     Parameters
@@ -51,6 +52,12 @@ class MotionLimits(Rebuilt):
     jerk_lower: Array = None  # type: ignore[assignment]
     lower: Array = -np.inf  # type: ignore[assignment]
     upper: Array = np.inf  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        ranges = [(name, least.min(), most.max()) for name, least, most in ranges_of(self)
+                  if np.isfinite([least, most]).any()]  # fmt: skip
+        shown = [f"{name} {least:.4g} to {most:.4g}" for name, least, most in ranges]
+        return f"<MotionLimits: {', '.join(shown) or 'no limits'}>"
 
     def __str__(self) -> str:
         shown = [f.name for f in fields(self) if np.isfinite(getattr(self, f.name)).any()]
@@ -122,7 +129,7 @@ def ranges_of(limits: MotionLimits) -> tuple[tuple[str, Array, Array], ...]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LimitsReport:
+class LimitsReport(Value):
     """What a motion asks of each joint, beside what is allowed.
 
     Parameters
@@ -179,4 +186,10 @@ class LimitsReport:
     def __repr__(self) -> str:
         if self.kept:
             return "<LimitsReport: every limit is kept>"
-        return "\n  ".join(["<LimitsReport: limits are exceeded", *self.violations()]) + ">"
+        return few_lines("<LimitsReport: limits are exceeded", self.violations())
+
+
+def few_lines(first: str, lines: Sequence[object]) -> str:
+    """Text of at most six lines, the first one and as many others as fit."""
+    more = [f"and {len(lines) - 4} more"] if len(lines) > 5 else []
+    return "\n  ".join([first, *map(str, lines[: 5 - len(more)]), *more]) + ">"

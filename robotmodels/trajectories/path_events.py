@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array
+from .._arrays import Array, Value
 from ..igm import IGMStatus
 from ..kinematics import jacobian
 from ..model import RobotModel
@@ -41,8 +41,8 @@ class PathEventKind(Enum):
     TOO_FAST = "The joints would have to be faster than they can."
 
 
-@dataclass(frozen=True, slots=True)
-class PathEvent:
+@dataclass(frozen=True, slots=True, eq=False)
+class PathEvent(Value):
     """Something that happens on a run of poses.
 
     Parameters

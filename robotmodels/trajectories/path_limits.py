@@ -29,8 +29,9 @@ from .pose_trajectory import PoseTrajectory
 from .splines import cubic_spline
 from .trajectory import Trajectory
 
+_FREE = MotionLimits()
 SLOWEST = 1e-30  # rate at which friction is that of a joint that only just moves
-_STILL = 1e-9  # of the greatest rate: a joint that is slower does not move
+_ROUNDING = 1e-9  # of the greatest rate: a joint that is slower does not move
 _SWEEPS = 60
 _SETTLED = 1e-10  # relative change of the duration
 _SLOW, _STILL = 1e-3, 2e-5  # of the greatest rate: slower ends, and rests inside, need the length
@@ -69,7 +70,7 @@ class PathLimits:
         self, n: int, model: RobotModel | None, limits: MotionLimits | None,
         torque: object, friction: bool | Friction, both_ends: bool, torque_rate: object = None,
     ) -> None:  # fmt: skip
-        bounds = checked_limits(MotionLimits() if limits is None else limits, n)
+        bounds = checked_limits(_FREE if limits is None else limits, n)
         assert bounds is not None
         self.n, self.model, self.limits = n, model, bounds
         self.torque = checked_torque(torque, model, n)
@@ -96,8 +97,8 @@ class PathLimits:
             + [f"velocity of joint {j + 1}" for j in range(n)]
             + [""]
         )
-        own = isinstance(friction, Friction) and not isinstance(friction, bool)
-        if not own and not isinstance(friction, bool | np.bool_):
+        own = not isinstance(friction, bool | np.bool_)
+        if own and not isinstance(friction, Friction):
             raise InvalidValueError(
                 f"friction: expected True, False or a friction model, got {friction!r:.60}."
             )
@@ -162,7 +163,7 @@ class PathLimits:
 
     def direction(self, rate: Array) -> Array:
         """The rates, with those that are nothing but rounding made zero."""
-        return np.where(np.abs(rate) > _STILL * np.abs(rate).max(initial=0.0), rate, 0.0)
+        return np.where(np.abs(rate) > _ROUNDING * np.abs(rate).max(initial=0.0), rate, 0.0)
 
     def passes(
         self, s: Array, q: Array, rate: Array, bend: Array, ends: tuple[float, float] = (0.0, 0.0),

@@ -17,7 +17,7 @@ from .trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseSamples(Frozen):
+class PoseSamples(Frozen, Value):
     """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
 
     Parameters
@@ -194,7 +194,7 @@ class FixedAxisPath(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BlendedPoses:
+class BlendedPoses(Value):
     """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
 
     Shapes: poses_at (m, 4, 4); twists (m - 1, 6); times, blends (m,).

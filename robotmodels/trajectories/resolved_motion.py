@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, read_only
+from .._arrays import Array, Value, as_exact, read_only
 from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
@@ -32,7 +32,7 @@ _MOVE, _TURN = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResolvedMotion(Rebuilt):
+class ResolvedMotion(Value):
     """Joints that follow a trajectory of poses by their velocities.
 
     Parameters

@@ -12,9 +12,8 @@ from .._outcomes import Outcome
 from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..friction import Friction
-from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
-from .checks import checked_limits
+from .checks import checked_limits, sample_count
 from .limits import MotionLimits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
 from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
@@ -27,6 +26,7 @@ _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
 _ROUNDS = 12
+_MOST = 10**6  # intervals
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
 
@@ -76,9 +76,6 @@ class TimedPath(TimingResult):
     active: NDArray[np.str_]
     grid_gap: float = np.inf
     explanation: str = field(default="")
-
-    def __hash__(self) -> int:
-        return hash((self.status, self.duration, self.explanation))
 
     def __repr__(self) -> str:
         lines = [f"<TimedPath: {self.status.name}"]
@@ -164,9 +161,11 @@ def time_optimal(
     >>> round(timed.duration, 6), str(timed.active[100])  # D / v + v / a
     (1.5, 'velocity of joint 1')
     """
-    points = whole_number(points, "points", 2)
-    rates = tuple(as_number(r, k, least=0.0) for r, k in
+    points = sample_count(points, "points", 2, _MOST)
+    rates = tuple(as_number(r, k, least=0.0, below=1e150) for r, k in
                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    if not isinstance(both_ends, bool | np.bool_):
+        raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)

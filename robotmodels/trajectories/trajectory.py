@@ -9,15 +9,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Rebuilt, Value, as_floats, as_number, read_only
+from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .checks import counted, greatest_shown, seconds_shown
+from .checks import checked_limits, counted, greatest_shown, seconds_shown
 from .limits import RATES, LimitsReport, MotionLimits
 from .motions import FunctionMotion, Motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples(Rebuilt):
+class Samples(Value):
     """A trajectory at given times. As an array (``np.asarray``) it is its positions.
 
     Parameters
@@ -179,8 +179,11 @@ class Trajectory(Value):
 
         ``tolerance`` is the relative overshoot that counts as rounding.
         """
+        bounds = checked_limits(limits, self.n)
+        if bounds is None:
+            raise InvalidValueError("limits: expected MotionLimits, got None.")
         q, v, a, jerk = (np.stack(self.motion.extremes(order)) for order in range(4))
-        return LimitsReport(limits.for_joints(self.n), q, v, a, jerk, tolerance)
+        return LimitsReport(bounds, q, v, a, jerk, tolerance)
 
     def _moving(self, ends: Array) -> bool:
         """Whether any joint has a velocity at one of the times."""
@@ -254,9 +257,9 @@ def _count(samples: Any) -> int:
         count = int(samples)
     except (TypeError, ValueError, OverflowError):
         count = 0
-    if count < 1 or count != samples:
+    if not 1 <= count <= 10**9 or count != samples:
         raise InvalidValueError(
-            f"samples: expected a whole number from 1, got {samples!r:.40}; the seconds between "
-            "samples are given as period=."
+            f"samples: expected a whole number from 1 to 1e9, got {samples!r:.40}; the "
+            "seconds between samples are given as period=."
         )
     return count

@@ -758,7 +758,7 @@ MUTATIONS = [
     Mutation("trajectories: seven phases", "falling acceleration covers as much as rising",
         "def ramp(V: Array", "fall * fall / 3.0", "fall * fall / 6.0", RAMPS),
     Mutation("trajectories: seven phases", "a phase run backwards with one sign",
-        "def phases(L: Array", "-(p2 + 3.0 * p3)", "-p2 + 3.0 * p3", RAMPS),
+        "_BACK = np.array(", "[-1, 2, -1, 0]", "[-1, 2, 1, 0]", RAMPS),
     # --- simulation ------------------------------------------------------------------------------
     Mutation("simulation: dry friction", "a joint that breaks away slips against its torque",
         "def loosened(self, mode", "np.sign(over[first])", "-np.sign(over[first])",
