@@ -18,7 +18,7 @@ from benchmarks.works import (
     same,
 )
 from robotmodels import flexible
-from robotmodels.flexible.models import generalized_forces
+from robotmodels.flexible.models import forces
 
 
 def chain(n: int) -> flexible.FlexibleRobot:
@@ -38,11 +38,10 @@ def direct(settings: Settings) -> Iterator[Work]:
         e, ev = 0.01 * rng.normal(size=(2, arm.m))
 
         def dense(arm=arm, x=(q, e, v, ev), tau=tau) -> np.ndarray:
-            rows = [part[None] for part in x]
-            rest = np.hstack(generalized_forces(arm, *rows, 0.0 * rows[0], 0.0 * rows[1]))[0]
-            return np.linalg.solve(
-                flexible.mass_matrix(arm, *x[:2]), np.append(tau, np.zeros(arm.m)) - rest
-            )
+            rows = [np.concatenate(pair)[None] for pair in (x[:2], x[2:])]
+            rest = forces(arm, *rows, 0.0 * rows[0])[0][0]
+            M = flexible.mass_matrix(arm, *x[:2])
+            return np.linalg.solve(M, np.append(tau, np.zeros(arm.m)) - rest)
 
         found = np.concatenate(flexible.ddm(arm, q, e, v, ev, tau))
         ways = [
