@@ -9,7 +9,7 @@ arm : FlexibleRobot
 q, v, a : array_like, shape (..., n)
     Positions, velocities and accelerations of the motors, rad or m.
 e, e_v : array_like, shape (..., m)
-    Elastic coordinates and their velocities; None is zero.
+    Elastic coordinates and their velocities; None is zero, of v as well.
 tau : array_like, shape (..., n)
     Torques of the motors, N m or N.
 wrench : array_like, shape (..., 6), optional
@@ -242,7 +242,8 @@ def checked_rows(
     vectors = []
     for name, value in (*named, *given.items()):
         k = m if name in ("e", "e_v") else 6 if name == "wrench" else n
-        vectors.append(np.zeros(k) if value is None else as_vector(value, k, name))
+        zero = value is None and name not in ("q", "a", "tau")
+        vectors.append(np.zeros(k) if zero else as_vector(value, k, name))  # type: ignore[arg-type]
     batch, k = (), 2 * len(pairs)
     if any(vector.ndim > 1 for vector in vectors):
         batch, vectors = batch_rows(tuple(vectors), (*(name for name, _ in named), *given))

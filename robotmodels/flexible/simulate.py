@@ -33,7 +33,8 @@ progress : callable, optional
 Raises
 ------
 ShapeError, InvalidValueError, SingularMassMatrixError
-    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
+    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity; a
+    free body with modes that move it as a rigid body.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ from .robot import FlexibleRobot, check_arm
 
 _LAW = Callable[..., ArrayLike]
 _LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
+_RIGID = 1e-10  # least share of the modal mass that rigid motions do not explain
 _PER_SECOND = 60_000  # default budget of evaluations
 
 
@@ -215,14 +217,19 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     if not callable(law):
         values = as_exact(np.zeros(size) if law is None else law, (size,), name)
         return lambda t, q, e, v, ev: values
-    try:
-        count = len(signature(law).parameters)
-    except (TypeError, ValueError):
-        count = 3
+    for count in (5, 3, 1):
+        try:
+            signature(law).bind(*range(count))
+            break
+        except (TypeError, ValueError):  # it takes another number of arguments, or tells none
+            continue
+    else:
+        raise InvalidValueError(
+            f"{name}: expected a function of t, of (t, q, v) or of (t, q, v, e, e_v)."
+        )
 
     def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
-        given = (q, v, e, ev) if count >= 5 else (q, v) if count > 1 else ()
-        answer: Any = law(t, *(x.copy() for x in given))
+        answer: Any = law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1]))
         return as_exact(answer, (size,), f"{name} at t = {t:.9g} s")
 
     return value
@@ -244,7 +251,10 @@ def _followed(
 
     start, end, wanted = times_of(t)
     rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
-    most = int(_PER_SECOND * (1.0 + end - start)) if budget is None else budget
+    most = _PER_SECOND * (1.0 + end - start) if budget is None else budget
+    most = as_number(most, "max_evaluations", least=1.0)
+    if progress is not None and not callable(progress):
+        raise InvalidValueError(f"progress: expected a function, got {progress!r:.40}.")
     kind: Any = getattr(scipy.integrate, method.value)
 
     def finite(t: float, y: Array) -> Array:
@@ -348,6 +358,7 @@ def free_body(
     >>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
     (True, True)
     """
+    from scipy.linalg import eigvalsh
     from scipy.spatial.transform import Rotation
 
     if not isinstance(link, FlexibleLink):
@@ -361,6 +372,14 @@ def free_body(
         link = replace(link, invariants=replace(inv, inertia=inv.inertia + more))
     table = DHTable(antecedent=[0], sigma=[2])
     parts = FlexibleRobot(RobotModel.from_table(table, gravity=(0, 0, 0)), {1: link}).parts
+    C, MS = np.hstack([inv.translation, inv.rotation]), np.cross(np.eye(3), inv.first_moment)
+    own = np.block([[inv.mass * np.eye(3), MS.T], [MS, link.invariants.inertia]])
+    left = eigvalsh(inv.modal_mass - C @ np.linalg.solve(own, C.T), inv.modal_mass) if m else C
+    if (left < _RIGID).any():
+        raise SingularMassMatrixError(
+            "link: its modes together displace it as a rigid motion does, which a free body makes "
+            "without them. Leave out shapes in which it only turns about its root."
+        )
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
     none, outer = np.zeros((1, m)), np.zeros((1, 12))
 
