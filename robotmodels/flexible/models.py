@@ -287,11 +287,11 @@ def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
 
 
 def states(arm: FlexibleRobot, x: Array, dx: Array) -> tuple[Array, Array, Array]:
-    """Kinetic and potential energies (N,), and momenta in the world (N, 6), of rows."""
+    """Kinetic and potential energies (N,), and momenta (N, 6) in axes of the base, of rows."""
     # the momenta are the loads of accelerations dx at rest
     Q, base = forces(arm, x, 0.0 * x, dx, bare=True)
     potential = 0.5 * ((x @ arm.parts.K) * x).sum(axis=1) - base[:, 6:9] @ arm.model.gravity
-    return 0.5 * (Q * dx).sum(axis=1), potential, in_world(arm.model.base, base[:, :6])
+    return 0.5 * (Q * dx).sum(axis=1), potential, base[:, :6]
 
 
 def in_world(pose: Array, load: Array) -> Array:

@@ -196,6 +196,8 @@ def _append_beam(
     springs: list[float],
 ) -> None:  # fmt: skip
     """Append the parts of a beam: their first is the row of the joint, their last where it was."""
+    from scipy.spatial.transform import Rotation
+
     h, T = beam.length / count, np.array(beam.pose).reshape(4, 4)
     none = dict.fromkeys(("mu", "gamma", "b", "beta", "alpha", "d", "theta", "r"), 0.0)
 
@@ -208,7 +210,7 @@ def _append_beam(
         """Two fixed rows: a translation, then a rotation, which is the frame of a part."""
         x, y, z = T[:3, 3]
         turn = float(np.arctan2(y, x))
-        yaw, pitch, roll = _euler(T[:3, :3])
+        yaw, pitch, roll = Rotation.from_matrix(T[:3, :3]).as_euler("ZYX").tolist()
         moved = {"gamma": turn, "d": float(np.hypot(x, y)), "theta": -turn, "r": float(z)}
         for row in (moved, {"gamma": yaw, "beta": pitch, "alpha": roll}):
             append({**none, "sigma": 2.0, **row})
@@ -247,11 +249,3 @@ def _append_beam(
     J = np.array(beam.tip_inertia).reshape(3, 3)
     inertia[-1] = inertia[-1] + InertialParameters.from_com([beam.tip_mass], [com], [J]).values[0]
     fixed(se3.translation(0.5 * h - beam.length, 0.0, 0.0) @ np.linalg.inv(T))
-
-
-def _euler(R: Array) -> tuple[float, float, float]:
-    """Angles of Rot(z) Rot(y) Rot(x)."""
-    from scipy.spatial.transform import Rotation
-
-    yaw, pitch, roll = Rotation.from_matrix(R).as_euler("ZYX")
-    return float(yaw), float(pitch), float(roll)

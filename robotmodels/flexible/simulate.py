@@ -22,7 +22,8 @@ wrench : callable or array_like of shape (6,), optional
 t : array_like
     A duration, with samples at the steps of the integrator, or ascending times (N,), s.
 method : Integrator or str
-    As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
+    As for `robotmodels.simulate`. The highest mode limits the step, at loose tolerances too: take
+    few modes, or ``"Radau"`` for stiff links with modal damping; without damping it is no quicker.
 rtol, atol : float
     Tolerances of a step.
 max_evaluations : int, optional
@@ -33,13 +34,13 @@ progress : callable, optional
 Raises
 ------
 ShapeError, InvalidValueError, SingularMassMatrixError
-    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity; a
-    free body with modes that move it as a rigid body.
+    Wrong shapes, NaN or infinity, also of ``control`` and ``wrench``; modes that are rigid motions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any
@@ -130,15 +131,12 @@ class FlexibleMotion(Result):
     @property
     def momentum_drift(self) -> float:
         """Largest error of the momentum balance, relative to the largest momentum and impulse."""
-        return _relative(
-            self.momentum - self.momentum[0] - self.impulse, self.momentum, self.impulse
-        )
+        error = self.momentum - self.momentum[0] - self.impulse
+        return _relative(error, self.momentum, self.impulse)
 
     def __repr__(self) -> str:
-        return (
-            f"<FlexibleMotion: {self.t[-1] - self.t[0]:.6g} s, {len(self.t)} samples, energy drift "
-            f"{self.energy_drift:.1g}>"
-        )
+        span, drift = self.t[-1] - self.t[0], self.energy_drift
+        return f"<FlexibleMotion: {span:.6g} s, {len(self.t)} samples, energy drift {drift:.1g}>"
 
 
 def simulate(
@@ -204,7 +202,8 @@ def simulate(
     tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
     weight = arm.parts.chain.pi[:, 9].sum() * np.outer(times - times[0], model.gravity)
-    impulse = in_world(model.base, load) + np.hstack([weight, cross(first, model.gravity)])
+    momentum, impulse = (in_world(model.base, x) for x in (momentum, load))
+    impulse = impulse + np.hstack([weight, cross(first, model.gravity)])
     impulse -= 0.0 if wrench is None else pull
     if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
         status = FlexibleMotionStatus.SOFTENED
@@ -218,14 +217,12 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
         values = as_exact(np.zeros(size) if law is None else law, (size,), name)
         return lambda t, q, e, v, ev: values
     for count in (5, 3, 1):
-        try:
+        with suppress(TypeError, ValueError):  # another number of arguments
             signature(law).bind(*range(count))
             break
-        except (TypeError, ValueError):  # it takes another number of arguments, or tells none
-            continue
     else:
         raise InvalidValueError(
-            f"{name}: expected a function of t, of (t, q, v) or of (t, q, v, e, e_v)."
+            f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v)."
         )
 
     def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
@@ -291,11 +288,9 @@ def _followed(
 
 def _relative(error: Array, *sizes: Array) -> float:
     """Largest error of linear and of angular momenta (N, 6), relative to their sizes."""
-    found = 0.0
-    for part in (slice(0, 3), slice(3, 6)):
-        size = max(float(np.linalg.norm(x[:, part], axis=1).max()) for x in sizes)
-        found = max(found, float(np.abs(error[:, part]).max()) / max(size, 1e-9))
-    return found
+    largest = np.abs(error).reshape(-1, 2, 3).max(axis=(0, 2))
+    size = [np.linalg.norm(x.reshape(-1, 2, 3), axis=2).max(axis=0) for x in sizes]
+    return float((largest / np.maximum(np.max(size, axis=0), 1e-9)).max())
 
 
 # --- one body in space ---------------------------------------------------------------------------
@@ -377,8 +372,7 @@ def free_body(
     left = eigvalsh(inv.modal_mass - C @ np.linalg.solve(own, C.T), inv.modal_mass) if m else C
     if (left < _RIGID).any():
         raise SingularMassMatrixError(
-            "link: its modes together displace it as a rigid motion does, which a free body makes "
-            "without them. Leave out shapes in which it only turns about its root."
+            "link: a sum of its modes is a rigid motion, which a free body has without modes."
         )
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
     none, outer = np.zeros((1, m)), np.zeros((1, 12))
