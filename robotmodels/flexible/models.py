@@ -340,7 +340,7 @@ def solved(
             "with_drive."
         )
     if len(joints):
-        moved = (motor + spring) / rotor if direct else motor
+        moved = (motor + spring) / rotor if direct else motor  # type: ignore[reportOperatorIssue]
         found = np.hstack([found, found[:, joints] - moved])
         found[:, joints] = moved if direct else moved * rotor - spring
     if not direct:
@@ -358,7 +358,7 @@ def forces(
     """
     joints, s, parts = arm.joints, arm.n + arm.modes, arm.parts
     rows = (_of_links(arm, row) for row in (x, dx, ddx))
-    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)
+    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)  # type: ignore[reportCallIssue]
     if len(joints):
         spring = 0.0 if bare else x @ parts.K[:, s:] + dx @ parts.D[:, s:]
         Q = np.hstack([Q, Q[:, joints] + spring])

@@ -175,7 +175,7 @@ def simulate(
     given = (("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
-    ddm(arm, *start, np.zeros(n))  # its errors name what is singular
+    ddm(arm, *start, np.zeros(n))  # type: ignore[reportCallIssue]  # its errors name what is singular
     k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
 
     def rate(time: float, y: Array) -> Array:
