@@ -8,7 +8,7 @@ from test_flexible import INF, ONE, PIVOT, close, random_arm
 
 import robotmodels as rm
 from robotmodels import DHTable, DriveParameters, InertialParameters, RobotModel, flexible, se3
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError, ShapeError, SingularMassMatrixError
 from robotmodels.flexible import (
     DeflectionStatus,
     FlexibleMotionStatus,
@@ -112,6 +112,38 @@ def test_a_rigid_robot_or_a_motion_of_other_joints_is_refused():
         flexible.tip_tracking(ONE, motion)
     with pytest.raises(InvalidValueError, match="up to 100"):
         flexible.elastica(1.0, 1.0, 1e3)
+
+
+def test_what_belongs_to_no_model_is_refused():
+    beam, swing = flexible.beam, swinging()
+    for call in (
+        lambda: beam(1.0, 1.0, GJ=[1.0, 2.0]), lambda: beam(1.0, 1.0, GJ=np.nan),
+        lambda: beam(1.0, 1.0, tip=(1.0, [1.0, 2.0])), lambda: beam(1.0, 1.0, ends=np.zeros(2)),
+        lambda: flexible.input_shaper(1.0, kind=["ZV"]), lambda: flexible.mass_matrix(swing, None),
+        lambda: flexible.simulate(swing, [0.0], control=lambda t, q: [0.0]),
+        lambda: flexible.simulate(swing, [0.0], max_evaluations="few"),
+        lambda: flexible.simulate(swing, [0.0], progress=3),
+    ):  # fmt: skip
+        with pytest.raises((InvalidValueError, ShapeError), match=": expected"):
+            call()
+    with pytest.raises(SingularMassMatrixError):
+        flexible.linearize(flexible.FlexibleRobot(PIVOT, {}), [0.0])
+    nodes = np.outer(np.arange(3.0), [1, 0, 0])  # a shape of all nodes, turned about the root
+    turning = flexible.from_modes(np.ones(3), np.eye(9), nodes[:, [1, 0, 2]][:, :, None], nodes)
+    with pytest.raises(SingularMassMatrixError, match="rigid motion"):
+        flexible.free_body(turning, [0.0], np.ones(6), 1.0)
+
+
+def test_empty_batches_and_functions_of_any_number_of_arguments():
+    arm = swinging()
+    found = flexible.static_deflection(arm, np.zeros((0, 1)))
+    assert (found.e.shape, found.tau.shape, found.status.shape) == ((0, arm.m), (0, 1), (0,))
+    plan = flexible.rest_to_rest(arm, [0.0], [0.1], 1.0)
+    assert plan.torque([]).shape == (0, 1)
+    assert len(repr(plan.trajectory).splitlines()) == 1
+    laws = (lambda t: [0.1], lambda t, k=0.1: [k], lambda *x: 0.1 + 0 * x[4][:1])
+    ends = [flexible.simulate(arm, [0.0], control=law, t=0.01).q[-1, 0] for law in laws]
+    assert ends[0] == ends[1] == ends[2] > 0.0
 
 
 # --- frequencies, poles and zeros -----------------------------------------------------

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_exact, as_number, as_reals, read_only
+from .._choices import one_of
 from ..errors import InertiaError, InvalidValueError
 from .link import BeamData, FlexibleLink, Section, integrals
 
@@ -110,15 +111,14 @@ def beam(
     """
     L = as_number(length, "length", above=0.0)
     rho = as_number(density, "density", above=0.0)
-    stiff = np.broadcast_to(as_reals(EI, "EI"), (2,)) if np.ndim(EI) == 0 else as_reals(EI, "EI")
-    torsion = np.inf if GJ is None else float(as_reals(GJ, "GJ"))
-    if stiff.shape != (2,) or not ((stiff > 0.0).all() and torsion > 0.0):
+    stiff, torsion = as_reals(EI, "EI"), as_reals(np.inf if GJ is None else GJ, "GJ")
+    stiff = np.broadcast_to(stiff, (2,)) if stiff.ndim == 0 else stiff
+    if (stiff.shape, torsion.shape) != ((2,), ()) or not (np.append(stiff, torsion) > 0.0).all():
         raise InvalidValueError(
             f"EI, GJ: expected positive stiffness, N m^2: EI = (about y, about z) and GJ, got EI = "
             f"{EI!r:.60}, GJ = {GJ!r:.20}; infinite where the beam is rigid."
         )
-    if ends not in _ENDS:
-        raise InvalidValueError(f"ends: expected one of {_ENDS}, got {ends!r:.40}.")
+    one_of(ends, _ENDS, "ends")
     if not isinstance(modes, int | np.integer) or modes < 0:
         raise InvalidValueError(f"modes: expected a number from 0, got {modes!r:.40}.")
     h = 0.0 if hub is None else as_number(hub, "hub", least=0.0)
@@ -133,7 +133,7 @@ def beam(
     T = np.eye(4) if pose is None else se3.as_single_pose(pose, "pose")
 
     kinds, bodies = list[Mode](), [(mass, com, J), _tip_body(carried)]
-    for axis, value in ((1, float(stiff[0])), (2, float(stiff[1])), (0, torsion)):
+    for axis, value in ((1, float(stiff[0])), (2, float(stiff[1])), (0, float(torsion))):
         loads, across = [], 3 - axis
         for m, c, I in bodies:  # noqa: E741
             if axis:
@@ -148,7 +148,7 @@ def beam(
     body = BeamData(
         length=L,
         EI=(float(stiff[0]), float(stiff[1])),
-        GJ=torsion,
+        GJ=float(torsion),
         density=rho,
         gyration=k,
         tip_mass=mass,
@@ -233,7 +233,7 @@ def _tip_body(tip: Any) -> tuple[float, Array, Array]:
     mass = as_number(given[0], "tip mass", least=0.0)
     com = as_exact(given[1], (3,), "tip com") if len(given) == 3 else np.zeros(3)
     J = as_reals(given[-1] if len(given) > 1 else 0.0, "tip inertia")
-    J = as_exact(J if J.ndim == 2 else np.diag(np.broadcast_to(J, (3,))), (3, 3), "tip inertia")
+    J = as_exact(J * np.eye(3) if J.shape in ((), (3,)) else J, (3, 3), "tip inertia")
     least = np.linalg.eigvalsh(0.5 * np.trace(J) * np.eye(3) - J)[0]
     if not np.allclose(J, J.T) or least < -1e-9 * abs(np.trace(J)) or (mass == 0.0 and J.any()):
         raise InertiaError(

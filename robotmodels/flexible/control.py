@@ -194,6 +194,10 @@ class JointPolynomial(Frozen, Value):
         """Accelerations (..., n) at times (...)."""
         return self._at(t, 2)
 
+    def __repr__(self) -> str:
+        d, *_, n = self.coefficients.shape
+        return f"<JointPolynomial: {self.duration:g} s, {n} joints, degree {d - 1}>"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestToRest(Result):
@@ -225,8 +229,9 @@ class RestToRest(Result):
     def elastic(self, t: ArrayLike) -> tuple[Array, Array]:
         """Elastic coordinates and velocities (..., m) at times (...)."""
         times = np.clip(np.asarray(t, np.float64), 0.0, self.trajectory.duration)
-        y = np.moveaxis(self._elastic(times.ravel()), 0, -1).reshape(*times.shape, -1)
-        return y[..., : self.arm.m], y[..., self.arm.m :]
+        m = self.arm.m
+        y = self._elastic(times.ravel()).T if times.size else times
+        return tuple(np.split(y.reshape(*times.shape, 2 * m), 2, axis=-1))  # type: ignore[return-value]
 
     def torque(self, t: ArrayLike) -> Array:
         """Torques (..., n) at times (...), which hold the arm before and after the motion."""

@@ -152,8 +152,7 @@ def workspace(arm: Arm) -> Work:
 def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
     """Write inertial parameters, tip and rows of now of deformed body k."""
     put_vector(work.P, k + 1, vector(arm.tip, k))
-    for x in range(10):
-        work.body[k, x] = arm.pi[k, x]
+    work.body[k] = arm.pi[k]
     for c in range(arm.start[k], arm.start[k + 1]):
         for x in range(15):
             value = arm.first[c, x]
@@ -299,10 +298,9 @@ def load_body(
     put_vector(work.w, j, add(w, spin))
     put_vector(work.dw, j, add(dw, add(cross(w, spin), rest)))
     for x in range(3):
-        unit = axis(x)
-        lever, column = cross(unit, MS), inertia_times(J, unit)
+        lever, column = cross(axis(x), MS), inertia_times(J, axis(x))
         for y in range(3):
-            work.H[j, y, x] = M * unit[y]
+            work.H[j, y, x] = M if x == y else 0.0
             work.H[j, y, x + 3] = work.H[j, x + 3, y] = lever[y]
             work.H[j, y + 3, x + 3] = column[y]
     transform(work.T, j, ONE, vector(work.P, j))
@@ -411,8 +409,7 @@ def loads(
             R, P = link_pose(arm.chain, k, y, i)
             R, P = product(matrix(work.R, b), R), times(matrix(work.R, b), P)
             W = product(matrix(work.W, b), R)
-            x = times(matrix(work.W, b), add(vector(work.P, b), P))
-            x = add(vector(work.x, b), x)
+            x = add(vector(work.x, b), times(matrix(work.W, b), add(vector(work.P, b), P)))
             put_matrix(work.W, j, W)
             put_vector(work.x, j, x)
             put_pose(poses, i, k, W, x)

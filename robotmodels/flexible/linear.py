@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_exact
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, SingularMassMatrixError
 from .models import checked_rows, forces, jacobian, mass_matrix
@@ -141,7 +142,7 @@ def static_deflection(
     status[(status == DeflectionStatus.SMALL) & (deflection > _LARGE)] = DeflectionStatus.LARGE
     found = np.hstack([e, tau, deflection[:, None]])
     found[status == DeflectionStatus.NOT_FOUND] = np.nan
-    e, tau, deflection = np.split(found.reshape(*batch, -1), [m, m + n], axis=-1)
+    e, tau, deflection = np.split(found.reshape(*batch, m + n + 1), [m, m + n], axis=-1)
     return Deflection(e, tau, deflection[..., 0], status.reshape(batch))
 
 
@@ -166,18 +167,11 @@ def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked"
     >>> natural_frequencies(arm, [0.0], joints="free").shape
     (3,)
     """
-    if joints not in ("locked", "free"):
-        raise InvalidValueError(f"joints: expected 'locked' or 'free', got {joints!r:.40}.")
+    one_of(joints, ("locked", "free"), "joints")
     batch, (x,) = checked_rows(arm, (q, None))
     first = arm.n if joints == "locked" else 0
     M, K = mass_matrix(arm, x[:, : arm.n])[:, first:, first:], arm.parts.K[first:, first:]
-    try:
-        L = np.linalg.inv(np.linalg.cholesky(M))
-    except np.linalg.LinAlgError:
-        raise SingularMassMatrixError(
-            f"{arm.model.name!r}: a coordinate moves no inertia. Give inertial parameters with "
-            "model.with_inertia(...) or Ia with model.with_drive(...)."
-        ) from None
+    L = _inverse_factor(arm, M)
     found = np.sqrt(np.maximum(np.linalg.eigvalsh(L @ K @ L.swapaxes(1, 2)), 0.0))
     if not first:
         found[:, : arm.n] = 0.0
@@ -246,8 +240,7 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     >>> bool(linearize(arm, [0.0], "tip").zeros.real.max() > 1.0)
     True
     """
-    if output not in ("joint", "tip"):
-        raise InvalidValueError(f"output: expected 'joint' or 'tip', got {output!r:.40}.")
+    one_of(output, ("joint", "tip"), "output")
     n, q = check_arm(arm).n, as_exact(q, (arm.n,), "q")
     k, found = n + arm.m, static_deflection(arm, q)
     if found.status == DeflectionStatus.NOT_FOUND:
@@ -257,7 +250,8 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     K = tangent(arm, np.concatenate([q, e])[None], None)[0]
     J = jacobian(arm, q, e)
     H = np.zeros((n, arm.m)) if output == "joint" else tip_inverse(J, n) @ J[:, n:]
-    inverse: Any = np.linalg.inv(M)
+    L = _inverse_factor(arm, M)
+    inverse = L.T @ L
     zero, one = np.zeros((k, k)), np.eye(k)
     A = np.block([[zero, one], [-inverse @ K, -inverse @ D]])
     E, F = slice(n, k), slice(0, n)
@@ -272,12 +266,24 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     )
 
 
+def _inverse_factor(arm: FlexibleRobot, M: Array) -> Array:
+    """Inverse of Cholesky's factor of mass matrices (..., k, k)."""
+    try:
+        return np.linalg.inv(np.linalg.cholesky(M))  # type: ignore[return-value]
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError(
+            f"{arm.model.name!r}: a coordinate moves no inertia. Give inertial parameters with "
+            "model.with_inertia(...) or Ia with model.with_drive(...)."
+        ) from None
+
+
 def tip_inverse(J: Array, n: int) -> Array:
     """J_q^+ of Jacobians (..., 6, n + m), with zeros for rotations if positions determine it."""
     for rows in (3, 6):
         values = np.linalg.svd(J[..., :rows, :n], compute_uv=False)
         if n <= rows and (values[..., -1] > _SINGULAR * values[..., 0]).all():
-            return np.linalg.pinv(J[..., :n] * (np.arange(6) < rows)[:, None])
+            inverse: Any = np.linalg.pinv(J[..., :n] * (np.arange(6) < rows)[:, None])
+            return inverse
     raise InvalidValueError(
         "q: the joints do not determine the pose of the tool here: a singular posture, or more "
         "joints than six. Take output='joint', or another posture."

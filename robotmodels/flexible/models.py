@@ -9,7 +9,7 @@ arm : FlexibleRobot
 q, v, a : array_like, shape (..., n)
     Positions, velocities and accelerations of the motors, rad or m.
 e, e_v : array_like, shape (..., m)
-    Elastic coordinates and their velocities; None is zero.
+    Elastic coordinates and their velocities; None is zero, of v as well.
 tau : array_like, shape (..., n)
     Torques of the motors, N m or N.
 wrench : array_like, shape (..., 6), optional
@@ -242,7 +242,8 @@ def checked_rows(
     vectors = []
     for name, value in (*named, *given.items()):
         k = m if name in ("e", "e_v") else 6 if name == "wrench" else n
-        vectors.append(np.zeros(k) if value is None else as_vector(value, k, name))
+        zero = value is None and name not in ("q", "a", "tau")
+        vectors.append(np.zeros(k) if zero else as_vector(value, k, name))  # type: ignore[arg-type]
     batch, k = (), 2 * len(pairs)
     if any(vector.ndim > 1 for vector in vectors):
         batch, vectors = batch_rows(tuple(vectors), (*(name for name, _ in named), *given))
@@ -286,11 +287,11 @@ def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
 
 
 def states(arm: FlexibleRobot, x: Array, dx: Array) -> tuple[Array, Array, Array]:
-    """Kinetic and potential energies (N,), and momenta in the world (N, 6), of rows."""
+    """Kinetic and potential energies (N,), and momenta (N, 6) in axes of the base, of rows."""
     # the momenta are the loads of accelerations dx at rest
     Q, base = forces(arm, x, 0.0 * x, dx, bare=True)
     potential = 0.5 * ((x @ arm.parts.K) * x).sum(axis=1) - base[:, 6:9] @ arm.model.gravity
-    return 0.5 * (Q * dx).sum(axis=1), potential, in_world(arm.model.base, base[:, :6])
+    return 0.5 * (Q * dx).sum(axis=1), potential, base[:, :6]
 
 
 def in_world(pose: Array, load: Array) -> Array:
@@ -339,7 +340,7 @@ def solved(
             "with_drive."
         )
     if len(joints):
-        moved = (motor + spring) / rotor if direct else motor
+        moved = (motor + spring) / rotor if direct else motor  # type: ignore[reportOperatorIssue]
         found = np.hstack([found, found[:, joints] - moved])
         found[:, joints] = moved if direct else moved * rotor - spring
     if not direct:
@@ -357,7 +358,7 @@ def forces(
     """
     joints, s, parts = arm.joints, arm.n + arm.modes, arm.parts
     rows = (_of_links(arm, row) for row in (x, dx, ddx))
-    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)
+    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)  # type: ignore[reportCallIssue]
     if len(joints):
         spring = 0.0 if bare else x @ parts.K[:, s:] + dx @ parts.D[:, s:]
         Q = np.hstack([Q, Q[:, joints] + spring])

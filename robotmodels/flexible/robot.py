@@ -270,7 +270,7 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
     )
     free = np.zeros((3, n + 2), np.int64)
     free[1:, joints], free[1:, n], free[2, :n] = 1, 1, 1
-    return Parts(chain, bare, *map(read_only, (K, D, rotor)), read_only(free, np.int64))
+    return Parts(chain, bare, *map(read_only, (K, D, rotor)), read_only(free, np.int64))  # type: ignore[reportCallIssue]
 
 
 def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:

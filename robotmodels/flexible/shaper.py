@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_floats, as_number
-from ..errors import InvalidValueError
+from .._choices import one_of
 
 _IMPULSES = {"ZV": 2, "ZVD": 3}
 
@@ -81,9 +81,7 @@ def input_shaper(frequency: float, damping: float = 0.0, kind: str = "ZV") -> Sh
     """
     w = as_number(frequency, "frequency", above=0.0)
     damping = as_number(damping, "damping", least=0.0, below=1.0)
-    if kind not in _IMPULSES:
-        raise InvalidValueError(f"kind: expected 'ZV' or 'ZVD', got {kind!r:.40}.")
-    count, root = _IMPULSES[kind], np.sqrt(1.0 - damping**2)
+    count, root = _IMPULSES[one_of(kind, tuple(_IMPULSES), "kind")], np.sqrt(1.0 - damping**2)
     ratio = np.exp(-damping * np.pi / root)
     amplitudes = np.array([comb(count - 1, i) * ratio**i for i in range(count)])
     times = np.arange(count) * np.pi / (w * root)

@@ -22,7 +22,8 @@ wrench : callable or array_like of shape (6,), optional
 t : array_like
     A duration, with samples at the steps of the integrator, or ascending times (N,), s.
 method : Integrator or str
-    As for `robotmodels.simulate`; ``"Radau"`` for stiff links.
+    As for `robotmodels.simulate`. The highest mode limits the step, at loose tolerances too: take
+    few modes, or ``"Radau"`` for stiff links with modal damping; without damping it is no quicker.
 rtol, atol : float
     Tolerances of a step.
 max_evaluations : int, optional
@@ -33,12 +34,13 @@ progress : callable, optional
 Raises
 ------
 ShapeError, InvalidValueError, SingularMassMatrixError
-    Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity.
+    Wrong shapes, NaN or infinity, also of ``control`` and ``wrench``; modes that are rigid motions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any
@@ -61,6 +63,7 @@ from .robot import FlexibleRobot, check_arm
 
 _LAW = Callable[..., ArrayLike]
 _LARGEST = 10.0  # deflection, in lengths or rad, at which a motion is given up
+_RIGID = 1e-10  # least share of the modal mass that rigid motions do not explain
 _PER_SECOND = 60_000  # default budget of evaluations
 
 
@@ -128,15 +131,12 @@ class FlexibleMotion(Result):
     @property
     def momentum_drift(self) -> float:
         """Largest error of the momentum balance, relative to the largest momentum and impulse."""
-        return _relative(
-            self.momentum - self.momentum[0] - self.impulse, self.momentum, self.impulse
-        )
+        error = self.momentum - self.momentum[0] - self.impulse
+        return _relative(error, self.momentum, self.impulse)
 
     def __repr__(self) -> str:
-        return (
-            f"<FlexibleMotion: {self.t[-1] - self.t[0]:.6g} s, {len(self.t)} samples, energy drift "
-            f"{self.energy_drift:.1g}>"
-        )
+        span, drift = self.t[-1] - self.t[0], self.energy_drift
+        return f"<FlexibleMotion: {span:.6g} s, {len(self.t)} samples, energy drift {drift:.1g}>"
 
 
 def simulate(
@@ -175,7 +175,7 @@ def simulate(
     given = (("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
-    ddm(arm, *start, np.zeros(n))  # its errors name what is singular
+    ddm(arm, *start, np.zeros(n))  # type: ignore[reportCallIssue]  # its errors name what is singular
     k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
 
     def rate(time: float, y: Array) -> Array:
@@ -202,7 +202,8 @@ def simulate(
     tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
     weight = arm.parts.chain.pi[:, 9].sum() * np.outer(times - times[0], model.gravity)
-    impulse = in_world(model.base, load) + np.hstack([weight, cross(first, model.gravity)])
+    momentum, impulse = (in_world(model.base, x) for x in (momentum, load))
+    impulse = impulse + np.hstack([weight, cross(first, model.gravity)])
     impulse -= 0.0 if wrench is None else pull
     if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
         status = FlexibleMotionStatus.SOFTENED
@@ -215,14 +216,17 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     if not callable(law):
         values = as_exact(np.zeros(size) if law is None else law, (size,), name)
         return lambda t, q, e, v, ev: values
-    try:
-        count = len(signature(law).parameters)
-    except (TypeError, ValueError):
-        count = 3
+    for count in (5, 3, 1):
+        with suppress(TypeError, ValueError):  # another number of arguments
+            signature(law).bind(*range(count))
+            break
+    else:
+        raise InvalidValueError(
+            f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v)."
+        )
 
     def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
-        given = (q, v, e, ev) if count >= 5 else (q, v) if count > 1 else ()
-        answer: Any = law(t, *(x.copy() for x in given))
+        answer: Any = law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1]))
         return as_exact(answer, (size,), f"{name} at t = {t:.9g} s")
 
     return value
@@ -244,7 +248,10 @@ def _followed(
 
     start, end, wanted = times_of(t)
     rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
-    most = int(_PER_SECOND * (1.0 + end - start)) if budget is None else budget
+    most = _PER_SECOND * (1.0 + end - start) if budget is None else budget
+    most = as_number(most, "max_evaluations", least=1.0)
+    if progress is not None and not callable(progress):
+        raise InvalidValueError(f"progress: expected a function, got {progress!r:.40}.")
     kind: Any = getattr(scipy.integrate, method.value)
 
     def finite(t: float, y: Array) -> Array:
@@ -281,11 +288,9 @@ def _followed(
 
 def _relative(error: Array, *sizes: Array) -> float:
     """Largest error of linear and of angular momenta (N, 6), relative to their sizes."""
-    found = 0.0
-    for part in (slice(0, 3), slice(3, 6)):
-        size = max(float(np.linalg.norm(x[:, part], axis=1).max()) for x in sizes)
-        found = max(found, float(np.abs(error[:, part]).max()) / max(size, 1e-9))
-    return found
+    largest = np.abs(error).reshape(-1, 2, 3).max(axis=(0, 2))
+    size = [np.linalg.norm(x.reshape(-1, 2, 3), axis=2).max(axis=0) for x in sizes]
+    return float((largest / np.maximum(np.max(size, axis=0), 1e-9)).max())
 
 
 # --- one body in space ---------------------------------------------------------------------------
@@ -348,6 +353,7 @@ def free_body(
     >>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
     (True, True)
     """
+    from scipy.linalg import eigvalsh
     from scipy.spatial.transform import Rotation
 
     if not isinstance(link, FlexibleLink):
@@ -361,6 +367,13 @@ def free_body(
         link = replace(link, invariants=replace(inv, inertia=inv.inertia + more))
     table = DHTable(antecedent=[0], sigma=[2])
     parts = FlexibleRobot(RobotModel.from_table(table, gravity=(0, 0, 0)), {1: link}).parts
+    C, MS = np.hstack([inv.translation, inv.rotation]), np.cross(np.eye(3), inv.first_moment)
+    own = np.block([[inv.mass * np.eye(3), MS.T], [MS, link.invariants.inertia]])
+    left = eigvalsh(inv.modal_mass - C @ np.linalg.solve(own, C.T), inv.modal_mass) if m else C
+    if (left < _RIGID).any():
+        raise SingularMassMatrixError(
+            "link: a sum of its modes is a rigid motion, which a free body has without modes."
+        )
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
     none, outer = np.zeros((1, m)), np.zeros((1, 12))
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_floats, as_number
+from .._choices import one_of
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .control import motion_of
@@ -162,8 +163,7 @@ def tip_tracking(
     >>> tip_tracking(arm, motion, method="causal").status
     <TipStatus.NON_MINIMUM_PHASE: 1>
     """
-    if method not in _METHODS:
-        raise InvalidValueError(f"method: expected one of {_METHODS}, got {method!r:.40}.")
+    one_of(method, _METHODS, "method")
     if len(check_arm(arm).joints) or not arm.m:
         raise InvalidValueError(
             "arm: tip tracking is for flexible links with rigid joints. Take rest_to_rest or "

@@ -172,7 +172,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "momenta with centrifugal loads",
-        "Kinetic and potential energies (N,), and momenta in the world",
+        "Kinetic and potential energies (N,), and momenta (N, 6)",
         "forces(arm, x, 0.0 * x, dx, bare=True)",
         "forces(arm, x, dx, dx, bare=True)",
         f"{TWO} -k balance",
