@@ -379,6 +379,19 @@ def test_limits_and_obstacles_divide_the_joint_space():
     assert pf.free_components(TWO, lambda q: q[:, 0] > 9).status is pf.AspectStatus.NO_FREE_SPACE
 
 
+def test_cells_without_a_core_belong_to_the_next_part():
+    from robotmodels.performance.aspects import _connected
+
+    code, certain = np.zeros((200, 200), np.int64), np.ones((200, 200), np.bool_)
+    code[:, 100:] = 1
+    code[50, 98] = 1
+    certain[:, 97:103] = False
+    labels, separates = _connected(code, certain, np.zeros(2, np.bool_))
+    assert separates
+    assert labels.max() == 2
+    assert labels[50, 98] == labels[50, 150] != labels[50, 10]
+
+
 def test_aspects_of_redundant_arms_are_not_defined():
     for name in ("iiwa14", "lab_rr"):
         found = pf.aspects(rm.load(name), limits=False)
