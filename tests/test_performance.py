@@ -65,6 +65,8 @@ BESIDE_A_SURFACE = [
     (0.5086990916, 1.8479154978, 1.7129785869),
     (1.907760080309011, 1.913408770344491, 0.28177146725972213),
     (1.2582322765569636, 5.23462489563347, 1.0424207609817377),
+    (1.0327, 5.6669, 0.1764),
+    (0.9249800320642823, 14.166352940981108, 1.146668561691413),
 ]
 SWEEP = [(2, d4, 1) for d4 in (0.1, 0.25, 1.6, 2.0, 2.15, 2.7, 3.1)]
 
@@ -135,6 +137,15 @@ def test_two_configurations_of_a_node_reach_one_point():
     np.testing.assert_allclose(rho[:, 0], rho[:, 1], atol=1e-9)
     np.testing.assert_allclose(p[:, 0, 2], p[:, 1, 2], atol=1e-9)
     assert np.abs(found.q[:, 0] - found.q[:, 1]).max() > 1e-3
+
+
+def test_curves_that_lie_on_each_other_have_no_nodes():
+    for alpha in ((0, np.pi / 2, 0), (0, 0, np.pi / 2), (0, np.pi / 2, np.pi / 2)):
+        for d in ((0, 0, 0.5), (0, 1, 0.5)):
+            table = DHTable(antecedent=[0, 1, 2], sigma=[0, 0, 0], alpha=alpha, d=d,
+                            theta=[0, 0.3, 0.2], r=[0, 0, 0])  # fmt: skip
+            arm = rm.RobotModel.from_table(table, tool=translation(0.6, 0.1, 0.2))
+            assert len(pf.nodes(arm)) <= 4
 
 
 def test_curves_are_singular_and_their_kind_holds():
@@ -366,6 +377,19 @@ def test_limits_and_obstacles_divide_the_joint_space():
     # without limits the gap at zero leaves a way around
     assert pf.free_components(TWO, gap, limits=False).count == 1
     assert pf.free_components(TWO, lambda q: q[:, 0] > 9).status is pf.AspectStatus.NO_FREE_SPACE
+
+
+def test_cells_without_a_core_belong_to_the_next_part():
+    from robotmodels.performance.aspects import _connected
+
+    code, certain = np.zeros((200, 200), np.int64), np.ones((200, 200), np.bool_)
+    code[:, 100:] = 1
+    code[50, 98] = 1
+    certain[:, 97:103] = False
+    labels, separates = _connected(code, certain, np.zeros(2, np.bool_))
+    assert separates
+    assert labels.max() == 2
+    assert labels[50, 98] == labels[50, 150] != labels[50, 10]
 
 
 def test_aspects_of_redundant_arms_are_not_defined():

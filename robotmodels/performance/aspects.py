@@ -351,7 +351,7 @@ def _connected(code: Ints, certain: Flags, closed: Flags) -> tuple[NDArray[np.in
     for value in np.unique(code[(labels == 0) & (code >= 0)]):
         # the cut-off tips of a part belong to it
         lost, other = (labels == 0) & (code == value), (labels == 0) | (code != value)
-        near = ndimage.distance_transform_edt(other, False, True)
+        near = ndimage.distance_transform_edt(other, return_distances=False, return_indices=True)
         labels[lost] = labels[tuple(axis[lost] for axis in near)]
     return labels.astype(np.int32), bool((number[kept] == 1).all())
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
 from .._arrays import Array
 from .._outcomes import Outcome
 from ..model import RobotModel
-from .arms import Result, SectionArm, joint_space, section_arm, wrapped
+from .arms import Flags, Result, SectionArm, joint_space, section_arm, wrapped
 from .arrangement import cut, lines_of, pieces
 from .level_curves import Line
 
@@ -226,7 +227,7 @@ def nodes(arm: RobotModel) -> SpecialPoints:
     ]
     x, residual = _solved(section, np.reshape(pairs, (-1, 4)), _node_equations)
     away = np.abs(wrapped(x[:, :2] - x[:, 2:], section.turns)).max(axis=1, initial=0.0)
-    good = (residual < 1e-9) & (away > 1e-3)
+    good = (residual < 1e-9) & (away > 1e-3) & _isolated(section, x, _node_equations)
     x, residual = _distinct(section, x[good], residual[good])
     points, status = section.values(x[:, :2])[:, :2], SectionStatus(int(touch))
     return SpecialPoints(_postures(arm, section, x.reshape(-1, 2, 2)), points, residual, status)
@@ -234,28 +235,35 @@ def nodes(arm: RobotModel) -> SpecialPoints:
 
 def cusps_of(arm: SectionArm, lines: tuple[Line, ...]) -> tuple[Array, Array]:
     """Cusps on curves and what they lack of the equations. Shapes: -> (k, 2), (k,)."""
-    starts = [np.zeros((0, 2))]
-    for line in (line for line in lines if not line.of_limit):
+    singular = [line for line in lines if not line.of_limit]
+    roots = {float(line.x[0, 1]) for line in singular if np.ptp(line.x[:, 1]) == 0.0}
+    found = [(np.zeros((0, 2)), np.zeros(0))]
+    for line in singular:
         values = arm.values(line.x)
         if np.ptp(values[:, :2], axis=0).max() < 1e-6 * arm.size:
             continue  # a point on the second axis: no fold
-        A = values[:, 2:6].reshape(-1, 2, 2)
+        A, starts = values[:, 2:6].reshape(-1, 2, 2), []
         # both rows are along the direction that keeps the point
         still = np.stack((-A[..., 1], A[..., 0]), axis=-1)
         for g in np.einsum("nij,nj->in", still, values[:, 7:9]):
             at = np.flatnonzero((g[1:] > 0.0) != (g[:-1] > 0.0))
             share = (g[at] / (g[at] - g[at + 1]))[:, None]
-            starts.append(line.x[at] + share * (line.x[at + 1] - line.x[at]))
-    x, residual = _solved(arm, np.concatenate(starts), _cusp_equations)
-    values = arm.values(x)
-    # where the determinant has no slope, singular curves touch or cross: no fold either
-    good = (residual < 1e-12) & (np.linalg.norm(values[:, 7:9], axis=1) > 1e-7 * arm.size**3)
-    # on a curve whose image is a point the equations hold along it
-    s = np.linalg.svd(_slopes(arm, x, _cusp_equations), compute_uv=False)
-    good &= s[:, 1] > 1e-6 * s[:, 0]
-    if arm.radial:
-        good &= values[:, 0] > 1e-6 * arm.size
-    x, residual = _distinct(arm, x[good], residual[good])
+            # from both ends too: about an axis of symmetry two cusps lie between them
+            starts += [line.x[at] + t * (line.x[at + 1] - line.x[at]) for t in (0.0, share, 1.0)]
+        # other curves of constant x3 are divided out, so that none of their points is found
+        own = {float(line.x[0, 1])} if np.ptp(line.x[:, 1]) == 0.0 else set()
+        others = tuple(roots - own)
+        equations = partial(_cusp_equations, roots=others)
+        x, residual = _solved(arm, np.concatenate(starts), equations)
+        values, whole = arm.values(x), np.abs(_cusp_equations(arm, x)).max(axis=1, initial=0.0)
+        # where the determinant has no slope, singular curves touch or cross: no fold either
+        slope = np.linalg.norm(values[:, 7:9], axis=1) / _others(arm, x, others)
+        good = (whole < 1e-12) & (residual < 1e-9) & (slope > 1e-7 * arm.size**3)
+        good &= _isolated(arm, x, equations)
+        if arm.radial:
+            good &= values[:, 0] > 1e-6 * arm.size
+        found.append((x[good], whole[good]))
+    x, residual = _distinct(arm, *map(np.concatenate, zip(*found, strict=True)))
     # a cusp takes three of at most four postures, so that a point has no second one
     points = arm.values(x)[:, :2]
     near = np.linalg.norm(points[:, None] - points, axis=2) < 1e-9 * arm.size
@@ -271,7 +279,14 @@ def _forward(values: Array) -> Array:
     return np.asarray(row / np.maximum(length.max(axis=1), 1e-300)[:, None])
 
 
-def _cusp_equations(arm: SectionArm, x: Array) -> Array:
+def _others(arm: SectionArm, x: Array, roots: tuple[float, ...]) -> Array:
+    """Product (N,) of the factors of the determinant that vanish at values of x3, not signed."""
+    away = x[:, 1:] - np.array(roots)
+    product = np.abs(np.prod(np.sin(0.5 * away) if arm.turns[1] else away, axis=1))
+    return np.maximum(product, 1e-12)
+
+
+def _cusp_equations(arm: SectionArm, x: Array, roots: tuple[float, ...] = ()) -> Array:
     """Determinant, and its slope in the direction that keeps the point. (N, 2) -> (N, 2)."""
     values = arm.values(x)
     forward = _forward(values)
@@ -279,7 +294,8 @@ def _cusp_equations(arm: SectionArm, x: Array) -> Array:
     # of a fixed sense, so that differences are smooth
     still *= np.where(still[:, :1] + 0.5 * still[:, 1:] >= 0.0, 1.0, -1.0)
     slope = np.einsum("ij,ij->i", values[:, 7:9], still)
-    return np.column_stack((values[:, 6], slope)) / arm.size**3
+    unit = _others(arm, x, roots) * arm.size**3
+    return np.column_stack((values[:, 6], slope)) / unit[:, None]
 
 
 def _node_equations(arm: SectionArm, x: Array) -> Array:
@@ -310,6 +326,12 @@ def _slopes(arm: SectionArm, x: Array, equations: Equations) -> Array:
         (equations(arm, x + h * e) - equations(arm, x - h * e)) / (2.0 * h) for e in np.eye(d)
     ]
     return np.stack(columns, axis=2)
+
+
+def _isolated(arm: SectionArm, x: Array, equations: Equations) -> Flags:
+    """Which solutions are alone: not on curves whose images are points, or lie on each other."""
+    s = np.linalg.svd(_slopes(arm, x, equations), compute_uv=False)
+    return np.asarray(s[:, -1] > 1e-6 * s[:, 0])
 
 
 def _distinct(arm: SectionArm, x: Array, residual: Array) -> tuple[Array, Array]:

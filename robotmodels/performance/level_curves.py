@@ -24,6 +24,7 @@ STEP = 0.006  # between points, rad, or part of the range of a slide times tau
 _GRID = 4096  # values of x3 at which turning points are looked for
 _LEAST, _MOST = 400, 20000  # points of a curve
 _ZERO = 1e-9  # beside the largest value
+_BESIDE = 1e-11  # rad or m, of a common root
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +95,8 @@ class LevelSet:
     def _coefficients(self, x3: Array) -> Array:
         """A, B and C - level (3, N), without their common roots, in units of the arm."""
         turns, unit = self.arm.turns, self.arm.size**3
+        for root in self.roots:  # beside a root, where there is 0 / 0
+            x3 = np.where(np.abs(wrapped(x3 - root, turns[1:])) < _BESIDE, x3 + 1e-6, x3)
         x2 = np.array((0.0, 0.5 * pi, pi) if turns[0] else (0.0, 1.0))
         x = np.stack(np.broadcast_arrays(x2[:, None], x3), axis=-1)
         f = (self.arm.values(x.reshape(-1, 2))[:, 6].reshape(len(x2), -1) - self.level) / unit

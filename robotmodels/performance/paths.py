@@ -83,7 +83,7 @@ class FeasiblePath(Result):
 
     def __repr__(self) -> str:
         return (
-            f"<FeasiblePath of {len(self.q)} poses: {self.status.name} from "
+            f"<FeasiblePath of {len(self.q)} poses: {self.status.name}, followed from "
             f"{int(self.reached.sum())} of {len(self.reached)} postures; {self.reason()}>"
         )
 
