@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from operator import index
 from pathlib import Path
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -135,9 +135,12 @@ def line(k: int) -> dict[str, Any]:
 
 
 def wrapped(text: str, width: float) -> str:
-    """Text in lines that fit into a width in inches."""
-    letters = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4)
-    return "\n".join(fill(part, letters, break_long_words=False) for part in text.split("\n"))
+    """Text in lines of similar lengths that fit into a width in inches."""
+    most, lines = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4), list[str]()
+    for part in text.split("\n"):
+        tried = [wrap(part, letters, break_long_words=False) for letters in range(4, most + 1)]
+        lines.append("\n".join(next(some for some in tried if len(some) == len(tried[-1]))))
+    return "\n".join(lines)
 
 
 def note(axes: Axes, text: str) -> None:

@@ -410,7 +410,7 @@ def _draw_map(
     for axis, name, (_, symbol) in zip((axes.xaxis, axes.yaxis), grid.names, scales, strict=True):
         axis.set_label_text(f"{name} ({symbol})")
         steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if symbol == "deg" else None
-        axis.set_major_locator(MaxNLocator(6, steps=steps))
+        axis.set_major_locator(MaxNLocator(5, steps=steps))
     if most == 0.0:
         style.note(axes, "zero everywhere:\nsingular in all\nof these postures")
         return
