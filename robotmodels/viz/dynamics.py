@@ -115,17 +115,8 @@ def plot_torque_parts(
         lines = np.stack([values[part][:, k] for part in present] or [np.zeros_like(times)], axis=1)
         labels = [_PARTS[part][1] for part in present] or ["_none"]
         over_time.lines_over_time(axes, times, lines, labels, present or [0])
-        marker = "" if len(times) > 1 else "o"
-        axes.plot(
-            times,
-            total[:, k],
-            marker=marker,
-            color=INK,
-            linewidth=1.8,
-            alpha=0.85,
-            zorder=1.9,
-            label="total",
-        )
+        look = {"marker": "" if len(times) > 1 else "o", "color": INK, "linewidth": 1.8}
+        axes.plot(times, total[:, k], alpha=0.85, zorder=1.9, label="total", **look)
         axes.set_title(f"{names[j]} ({'N' if prismatic[j] else 'N m'})", loc="left")
     return style.finished(figure, title)
 
@@ -331,8 +322,6 @@ def _maps(
     size: Any,
 ) -> Figure:
     """Maps over two joints."""
-    from matplotlib.ticker import MaxNLocator
-
     i, j = pair
     long = over_time.is_prismatic(grid.model)[joint]
     figure, places = style.panels(PAGE, 2.55 if title is None else 2.8, size, 1, 3, sharey=True)
@@ -365,8 +354,7 @@ def _maps(
         axes.set_title(style.wrapped(label, PAGE / 3.0 - 0.6))
         axes.set_xlabel(f"{names[grid.joints[0]]} ({x_unit})")
         for axis, symbol in ((axes.xaxis, x_unit), (axes.yaxis, y_unit)):
-            steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if symbol == "deg" else None
-            axis.set_major_locator(MaxNLocator(5, steps=steps))
+            style.few_numbers(axis, symbol)
     places[0, 0].set_ylabel(f"{names[grid.joints[1]]} ({y_unit})")
     return style.finished(figure, title)
 

@@ -116,13 +116,8 @@ def finished(figure: Figure, title: str | None = None, names: Sequence[str] = ()
         # a letter is about half as wide as it is high; a line takes as much as five letters
         width = (0.5 * max(map(len, texts)) + 5.2) * 8.0 / 72.0
         rows = -(-len(texts) // int(np.clip(figure.get_figwidth() // width, 1, len(texts))))
-        figure.legend(
-            [entries[text] for text in texts],
-            texts,
-            loc="outside upper center",
-            ncols=-(-len(texts) // rows),
-            title=title,
-        )
+        place = {"loc": "outside upper center", "ncols": -(-len(texts) // rows), "title": title}
+        figure.legend([entries[text] for text in texts], texts, **place)
     elif title is not None:
         figure.suptitle(title)
     return figure
@@ -158,6 +153,14 @@ def plain_logarithmic(axis: Any, most: int = 6, subs: Sequence[float] = (1.0,)) 
     axis.set_major_locator(LogLocator(subs=subs, numticks=most))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _=None: f"{value:g}"))
+
+
+def few_numbers(axis: Any, unit: str) -> None:
+    """Axis with at most six numbers, multiples of 15, 30, 45 or 90 where they are degrees."""
+    from matplotlib.ticker import MaxNLocator
+
+    steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if unit == "deg" else None
+    axis.set_major_locator(MaxNLocator(5, steps=steps))
 
 
 def subdivisions(limits: tuple[float, float]) -> tuple[float, ...]:
@@ -237,17 +240,9 @@ def interval_panel(
     y = np.arange(len(names))
     for k, (label, mask) in enumerate(groups.items()):
         if mask.any():
-            axes.errorbar(
-                values[mask],
-                y[mask],
-                xerr=np.nan_to_num(half[mask], posinf=0.0),
-                fmt="os"[k % 2],
-                color=PALETTE[k],
-                markersize=3.2,
-                elinewidth=1.1,
-                capsize=1.8,
-                label=label,
-            )
+            x, width = values[mask], np.nan_to_num(half[mask], posinf=0.0)
+            look = {"fmt": "os"[k % 2], "markersize": 3.2, "elinewidth": 1.1, "capsize": 1.8}
+            axes.errorbar(x, y[mask], xerr=width, color=PALETTE[k], label=label, **look)
     ends = np.abs(values) + np.nan_to_num(half, posinf=0.0)
     if truth is not None and not np.isnan(truth).all():
         axes.plot(truth, y, "x", color=INK, markersize=4.5, zorder=3.0, label="truth")
