@@ -2,6 +2,11 @@
 
 A scene is a meshcat page that needs no network. Figures need the extra ``plots``; Matplotlib is
 imported when the first one is drawn.
+
+Every ``plot_*`` returns a `matplotlib.figure.Figure` that shows itself in a notebook
+(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
+that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
+``size`` its width and height in inches, shape (2,).
 """
 
 from .calibration import (

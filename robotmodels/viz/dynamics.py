@@ -1,10 +1,5 @@
 """Figures of dynamics: the parts of torques, the energy balance of a simulation, inertia maps.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Returns
 -------
 matplotlib.figure.Figure
@@ -296,17 +291,11 @@ def _lines(
     }
     strongest = sorted(sorted(pairs, key=lambda p: -pairs[p])[:_PAIRS])
     drawn = [p for p in strongest if pairs[p] > _LEAST]
+    both = [f"{names[i]} and {names[j]}" for i, j in drawn]
     for k, (i, j) in enumerate(drawn):
-        coupling.plot(
-            x, grid.coupling[:, i, j], label=f"_{names[i]} and {names[j]}", **style.line(k)
-        )
+        coupling.plot(x, grid.coupling[:, i, j], label=f"_{both[k]}", **style.line(k))
     if drawn:
-        figure.legend(
-            coupling.get_lines()[1:],
-            [f"{names[i]} and {names[j]}" for i, j in drawn],
-            loc="outside lower center",
-            ncols=2,
-        )
+        figure.legend(coupling.get_lines()[1:], both, loc="outside lower center", ncols=2)
     else:
         style.note(coupling, "no coupling" if pairs else "one joint: no coupling")
     return style.finished(figure, title)
@@ -327,16 +316,10 @@ def _maps(
     figure, places = style.panels(PAGE, 2.55 if title is None else 2.8, size, 1, 3, sharey=True)
     torque = grid.gravity[..., joint]
     tiny = _ROUNDING * float(np.abs(grid.gravity).max(initial=0.0))
-    coupling = grid.coupling[..., i, j]
+    coupling, inertia = grid.coupling[..., i, j], grid.mass[..., joint, joint]
     maps = (
         (f"gravity torque\nof {names[joint]}", "(N)" if long else "(N m)", torque, tiny, True),
-        (
-            f"inertia\nof {names[joint]}",
-            "(kg)" if long else "(kg m²)",
-            grid.mass[..., joint, joint],
-            0.0,
-            False,
-        ),
+        (f"inertia\nof {names[joint]}", "(kg)" if long else "(kg m²)", inertia, 0.0, False),
         (f"coupling\n{names[i]}, {names[j]}", "no unit", coupling, _ROUNDING, True),
     )
     (x_factor, x_unit), (y_factor, y_unit) = (_axis(grid, k, degrees) for k in (0, 1))

@@ -59,10 +59,6 @@ def plot_processing(
         The choices for a log, of `identification.choose_processing`.
     model : RobotModel, optional
         The robot of a log, for units and names of its joints.
-    title : str, optional
-        Over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
 
     Returns
     -------

@@ -1,12 +1,5 @@
 """Figures of motions within limits: phase plane of a path, plan, joints in their ranges.
 
-Parameters
-----------
-title : str, optional
-    Text over the figure.
-size : array_like, shape (2,), optional
-    Width and height, inches.
-
 Returns
 -------
 matplotlib.figure.Figure
