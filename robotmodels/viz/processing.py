@@ -134,8 +134,8 @@ def plot_processing(
             axes.set_ylim(*_range(before[:, j], after[:, j]))
             relative = what == "torque" and rms[j] > 0.0
             share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if relative else ""
-            axes.set_title(f"{name}, {what}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
-            axes.set_ylabel(f"({of[j]}/√Hz)" if " or " not in of[j] else "density (1/√Hz)")
+            axes.set_title(f"{name}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
+            axes.set_ylabel(f"{what}\n({of[j]}/√Hz)" if " or " not in of[j] else f"{what}\n(1/√Hz)")
         column[-1].set_xlabel("frequency (Hz)")
     if system is not None:
         _draw_criteria(grid[-1], system)
