@@ -3,9 +3,9 @@
     python notebooks/one_robot.py [--small] [--out FOLDER]
 
 A simulated UR5e differs from its data sheet in lengths, angles, masses and friction. It is
-calibrated by touching four sockets, identified from a log, asked where it can go, given the
-quickest line its torques allow, controlled along it, and exported. ``--small`` takes fewer touches
-and a shorter log, for tests. Notebook 15 tells the same story with pictures.
+calibrated by touching four sockets and identified from a log; its workspace is computed; it moves
+along a line as fast as its torques allow, controlled, and its model is exported. ``--small`` takes
+fewer touches and a shorter log, for tests. Notebook 15 has the same steps with pictures.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from robotmodels import se3, simulation, viz
 from robotmodels import trajectories as tr
 from robotmodels.errors import InvalidValueError, RobotModelsError, RobotModelsWarning, ShapeError
 from robotmodels.symbolic import SingularityMap
+from robotmodels.viz import style
 
 H = np.pi / 2
 RX90 = rm.load("rx90").with_drive(
@@ -570,6 +571,34 @@ def test_inertia_over_two_joints():
     massless = viz.plot_inertia_map(grid)
     texts = [axes.texts[0].get_text() for axes in massless.axes if axes.texts]
     assert texts == ["zero everywhere", "zero everywhere", "a joint moves\nno inertia"]
+
+
+def test_plan_and_phase_plane_show_limits_that_exist():
+    arm, ends = rm.load("ur5e"), ([0, -1.5, 1, 0, 0, 0], [1, -1, 0.5, 0, 0, 0])
+    plan = tr.kinodynamic(arm, *ends, tr.MotionLimits(), seconds=0.1)
+    bound = np.array([100.0, np.inf, 90.0, 80.0, 70.0, 60.0])
+    position, _, torque = viz.plot_plan(plan, model=arm, torque=bound).axes
+    assert position.get_ylabel() == "position (rad)"
+    names = [x.get_label() for x in lines(position)]
+    assert [x.get_label() for x in lines(torque)][:5] == names[:1] + names[2:]
+    at = plan.trajectory.at(lines(torque)[0].get_xdata())
+    expected = rm.idm(arm, at.q, at.v, at.a)[:, 2] / 90.0
+    np.testing.assert_allclose(data(torque, names[2]), expected)
+    for wrong, message in (([1.0, 2.0], "shape"), (-1.0, "positive"), (np.inf, "finite")):
+        with pytest.raises(RobotModelsError, match=f"torque: .*{message}"):
+            viz.plot_plan(plan, model=arm, torque=wrong)
+    path, curve = tr.linear([0.0], [1.0], 1.0), "maximum velocity curve"
+    near = viz.plot_phase_plane(tr.time_optimal(path, tr.MotionLimits(1.0, 2.0)))
+    far = viz.plot_phase_plane(tr.time_optimal(path, tr.MotionLimits(9.0, 2.0)))
+    assert [curve in legend(figure) for figure in (near, far)] == [True, False]
+    assert far.axes[0].get_ylim()[1] < 1.2 * data(far.axes[0], "quickest motion").max()
+
+
+def test_lines_of_a_title_are_of_similar_lengths():
+    text = "a sentence of many words that does not fit into a line, less than 2 %."
+    first, second = style.wrapped(text, 4.0).split("\n")
+    assert abs(len(first) - len(second)) < 12
+    assert style.wrapped("a\n\nb", 4.0) == "a\n\nb"
 
 
 # ---------------------------------------------------------------- mistakes

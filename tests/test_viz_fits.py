@@ -296,7 +296,7 @@ def test_processing_shows_cutoffs_and_the_noise_they_cut(found):
     log, chosen = found.equations.log, found.equations.processing
     figure = viz.plot_processing(log, chosen, model=found.model)
     assert len(figure.axes) == 6
-    assert figure.axes[0].get_ylabel() == "(m/√Hz)"
+    assert figure.axes[0].get_ylabel() == "position\n(m/√Hz)"
     for axes, cutoff in zip(figure.axes, (chosen.cutoff, chosen.torque_cutoff), strict=False):
         for label, frequency in (
             ("cutoff of the positions", chosen.cutoff),
@@ -312,7 +312,7 @@ def test_processing_shows_cutoffs_and_the_noise_they_cut(found):
         )
         assert (after[f > 2.0 * cutoff] < 0.1 * before[f > 2.0 * cutoff]).all()
         np.testing.assert_allclose(after[f < 0.5 * cutoff], before[f < 0.5 * cutoff], rtol=0.15)
-    noise = float(re.search(r"position: (\S+) m", figure.axes[0].get_title(loc="left"))[1])
+    noise = float(re.search(r": (\S+) m", figure.axes[0].get_title(loc="left"))[1])
     assert noise == pytest.approx(1e-5 * np.sqrt(1.0 - 2.0 * DT * chosen.cutoff), rel=0.1)
     raw = viz.plot_processing(log, idn.choose_processing(log, filtered=False, decimation=1))
     assert not any("cutoff" in str(line.get_label()) for line in raw.axes[0].get_lines())
@@ -334,7 +334,7 @@ def test_processing_of_a_result_shows_the_criteria_of_its_choice(found):
     # one equation of each joint for each sample that is kept
     expected = len(found.equations.log) * 3 / chosen.decimation / len(found.base)
     assert data(count, "choice")[0] == pytest.approx(expected)
-    share = re.search(r"torque: (\S+) N rms \((\S+) %\) cut", figure.axes[1].get_title(loc="left"))
+    share = re.search(r": (\S+) N rms \((\S+) %\) cut", figure.axes[1].get_title(loc="left"))
     rms = np.sqrt(np.mean(found.equations.log.tau[:3500, 0] ** 2))  # of the longest recording
     assert float(share[2]) == pytest.approx(100.0 * float(share[1]) / rms, rel=0.1)
 

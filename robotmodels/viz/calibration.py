@@ -1,10 +1,5 @@
 """Figures of calibrations: residuals, parameters, errors in space, selected configurations.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Parameters
 ----------
 result : CalibrationResult
@@ -62,6 +57,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BEFORE, _AFTER = PALETTE[1], PALETTE[0]
+_RING: dict[str, Any] = {"marker": "o", "linestyle": "", "color": ALERT, "markersize": 6.0}
+_RING |= {"markerfacecolor": "none", "markeredgewidth": 0.9, "clip_on": False}
 _FEW = 60  # configurations up to which every residual has a stem
 _UNITS = {
     "m": (1e3, "mm", "lengths"),
@@ -127,17 +124,8 @@ def plot_calibration_residuals(
                 axes.vlines(x, 0.0, y, color=color, linewidth=0.8, alpha=0.6)
             axes.plot(x, y, marker, color=color, markersize=dot, markeredgewidth=0.0, label=label)
             if outlier.any():
-                axes.plot(
-                    x[outlier],
-                    np.clip(y[outlier], -most, most),
-                    "o",
-                    color=ALERT,
-                    markersize=6.0,
-                    markerfacecolor="none",
-                    markeredgewidth=0.9,
-                    clip_on=False,
-                    label="outlier (at the edge: beyond it)",
-                )
+                far = np.clip(y[outlier], -most, most)
+                axes.plot(x[outlier], far, label="outlier (at the edge: beyond it)", **_RING)
             axes.set_ylim(-most, most)
             axes.locator_params(axis="y", nbins=5)
             rms = float(np.sqrt(np.mean(y**2)))

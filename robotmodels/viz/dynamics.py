@@ -1,10 +1,5 @@
 """Figures of dynamics: the parts of torques, the energy balance of a simulation, inertia maps.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Returns
 -------
 matplotlib.figure.Figure
@@ -115,17 +110,8 @@ def plot_torque_parts(
         lines = np.stack([values[part][:, k] for part in present] or [np.zeros_like(times)], axis=1)
         labels = [_PARTS[part][1] for part in present] or ["_none"]
         over_time.lines_over_time(axes, times, lines, labels, present or [0])
-        marker = "" if len(times) > 1 else "o"
-        axes.plot(
-            times,
-            total[:, k],
-            marker=marker,
-            color=INK,
-            linewidth=1.8,
-            alpha=0.85,
-            zorder=1.9,
-            label="total",
-        )
+        look = {"marker": "" if len(times) > 1 else "o", "color": INK, "linewidth": 1.8}
+        axes.plot(times, total[:, k], alpha=0.85, zorder=1.9, label="total", **look)
         axes.set_title(f"{names[j]} ({'N' if prismatic[j] else 'N m'})", loc="left")
     return style.finished(figure, title)
 
@@ -305,17 +291,11 @@ def _lines(
     }
     strongest = sorted(sorted(pairs, key=lambda p: -pairs[p])[:_PAIRS])
     drawn = [p for p in strongest if pairs[p] > _LEAST]
+    both = [f"{names[i]} and {names[j]}" for i, j in drawn]
     for k, (i, j) in enumerate(drawn):
-        coupling.plot(
-            x, grid.coupling[:, i, j], label=f"_{names[i]} and {names[j]}", **style.line(k)
-        )
+        coupling.plot(x, grid.coupling[:, i, j], label=f"_{both[k]}", **style.line(k))
     if drawn:
-        figure.legend(
-            coupling.get_lines()[1:],
-            [f"{names[i]} and {names[j]}" for i, j in drawn],
-            loc="outside lower center",
-            ncols=2,
-        )
+        figure.legend(coupling.get_lines()[1:], both, loc="outside lower center", ncols=2)
     else:
         style.note(coupling, "no coupling" if pairs else "one joint: no coupling")
     return style.finished(figure, title)
@@ -331,23 +311,15 @@ def _maps(
     size: Any,
 ) -> Figure:
     """Maps over two joints."""
-    from matplotlib.ticker import MaxNLocator
-
     i, j = pair
     long = over_time.is_prismatic(grid.model)[joint]
     figure, places = style.panels(PAGE, 2.55 if title is None else 2.8, size, 1, 3, sharey=True)
     torque = grid.gravity[..., joint]
     tiny = _ROUNDING * float(np.abs(grid.gravity).max(initial=0.0))
-    coupling = grid.coupling[..., i, j]
+    coupling, inertia = grid.coupling[..., i, j], grid.mass[..., joint, joint]
     maps = (
         (f"gravity torque\nof {names[joint]}", "(N)" if long else "(N m)", torque, tiny, True),
-        (
-            f"inertia\nof {names[joint]}",
-            "(kg)" if long else "(kg m²)",
-            grid.mass[..., joint, joint],
-            0.0,
-            False,
-        ),
+        (f"inertia\nof {names[joint]}", "(kg)" if long else "(kg m²)", inertia, 0.0, False),
         (f"coupling\n{names[i]}, {names[j]}", "no unit", coupling, _ROUNDING, True),
     )
     (x_factor, x_unit), (y_factor, y_unit) = (_axis(grid, k, degrees) for k in (0, 1))
@@ -365,8 +337,7 @@ def _maps(
         axes.set_title(style.wrapped(label, PAGE / 3.0 - 0.6))
         axes.set_xlabel(f"{names[grid.joints[0]]} ({x_unit})")
         for axis, symbol in ((axes.xaxis, x_unit), (axes.yaxis, y_unit)):
-            steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if symbol == "deg" else None
-            axis.set_major_locator(MaxNLocator(5, steps=steps))
+            style.few_numbers(axis, symbol)
     places[0, 0].set_ylabel(f"{names[grid.joints[1]]} ({y_unit})")
     return style.finished(figure, title)
 

@@ -1,10 +1,5 @@
 """Figures of identifications: torques, residuals, parameters, exciting trajectories.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Parameters
 ----------
 result : IdentificationResult
@@ -64,6 +59,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_BAND: dict[str, Any] = {"color": BAND, "linewidth": 0.0, "zorder": 0.5}
 _POINTS = 700  # groups of samples of a log that are drawn
 _RESIDUALS = 4000  # residuals that are drawn
 _BODIES = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
@@ -107,18 +103,8 @@ def plot_identification_torques(
         signals, slow_t, slow = _torques(found, log)
         for j, axes in enumerate(column):
             place = axes.get_xaxis_transform()
-            axes.fill_between(
-                slow_t,
-                0.0,
-                1.0,
-                where=slow[:, j],
-                step="mid",
-                transform=place,
-                color=BAND,
-                linewidth=0.0,
-                zorder=0.5,
-                label="dead band",
-            )
+            area = {"step": "mid", "transform": place, "label": "dead band"} | _BAND
+            axes.fill_between(slow_t, 0.0, 1.0, where=slow[:, j], **area)
             axes.axhline(0.0, **ZERO)
             for k, width, label in (
                 (3, 0.8, "measured"),
@@ -205,23 +191,15 @@ def plot_identification_residuals(
     figure, grid = style.panels(
         PAGE, 0.9 + 1.1 * len(names), size, len(names), 2, sharex="col", width_ratios=[2.2, 1.0]
     )
-    band: dict[str, Any] = {"color": BAND, "linewidth": 0.0, "zorder": 0.5}
+    dot = {"color": PALETTE[0], "markersize": 1.4, "markeredgewidth": 0.0}
     both = "two standard deviations; 95 % of white residuals"
     for j, (left, right) in enumerate(grid):
-        left.axhspan(-2.0 * sigma[j], 2.0 * sigma[j], label=both, **band)
-        left.plot(
-            t,
-            e[:, j],
-            "o",
-            color=PALETTE[0],
-            markersize=1.4,
-            markeredgewidth=0.0,
-            label="residual; its autocorrelation",
-        )
+        left.axhspan(-2.0 * sigma[j], 2.0 * sigma[j], label=both, **_BAND)
+        left.plot(t, e[:, j], "o", label="residual; its autocorrelation", **dot)
         left.set_ylabel(f"residual ({units[j]})")
         left.set_title(f"{names[j]}: {100.0 * far[j]:.2g} % outside", loc="left")
         bound = correlation.bounds[j, 1:]
-        right.fill_between(lag, -bound, bound, **band)
+        right.fill_between(lag, -bound, bound, **_BAND)
         right.vlines(lag, 0.0, correlation.autocorrelation[j, 1:], color=PALETTE[0], linewidth=1.2)
         right.set(ylim=(-1.05, 1.05), xlim=(0.0, 1.03 * float(lag[-1])))
         for axes in (left, right):
@@ -320,22 +298,8 @@ def plot_identification_standard_errors(
         weak = relative[some] > 100.0 * WEAK
         for k, (mask, label) in enumerate(((~weak, "determined"), (weak, "poorly determined"))):
             if mask.any():
-                axes.bar(
-                    x[mask],
-                    height[mask] - low,
-                    bottom=low,
-                    width=0.7,
-                    color=PALETTE[k],
-                    label=label,
-                )
-        axes.hlines(
-            white[some],
-            x - 0.42,
-            x + 0.42,
-            color=INK,
-            linewidth=1.1,
-            label="if residuals were white",
-        )
+                axes.bar(x[mask], height[mask] - low, 0.7, low, color=PALETTE[k], label=label)
+        axes.hlines(white[some], x - 0.42, x + 0.42, color=INK, label="if residuals were white")
         axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
         axes.set_yscale("log")
         axes.set_ylim(low, high)

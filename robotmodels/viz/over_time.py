@@ -120,11 +120,9 @@ def as_unit(unit: Unit | str) -> Unit:
 
 def as_limits(limits: MotionLimits | None, n: int) -> MotionLimits | None:
     """Limits of n joints, checked."""
-    return (
-        None
-        if limits is None
-        else style.as_instance(limits, MotionLimits, "limits", "").for_joints(n)
-    )
+    if limits is None:
+        return None
+    return style.as_instance(limits, MotionLimits, "limits", "").for_joints(n)
 
 
 def as_orders(orders: Sequence[int]) -> list[int]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
+_NOISE: dict[str, Any] = {"color": ALERT, "linewidth": 0.9, "linestyle": (0, (1.3, 1.1))}
 _LONGEST = 1 << 18  # samples for spectra
 _KAISER = 18.0  # window of the spectra: its leakage is six decades below the motion
 _BINS = 240
@@ -58,10 +59,6 @@ def plot_processing(
         The choices for a log, of `identification.choose_processing`.
     model : RobotModel, optional
         The robot of a log, for units and names of its joints.
-    title : str, optional
-        Over the figure.
-    size : array_like, shape (2,), optional
-        Width and height, inches.
 
     Returns
     -------
@@ -114,16 +111,10 @@ def plot_processing(
     inner = slice(min(chosen.edges, N // 4), N - min(chosen.edges, N // 4))  # without transients
     count = log.n + (system is not None)
     figure, grid = style.panels(PAGE, 1.2 + 1.15 * count, size, count, 2, sharex=True)
+    decimated = _decimated(tau, chosen.decimation)
     for column, what, whole, kept, cutoff, of in (
         (grid[:, 0], "position", q, filtered, chosen.cutoff, units),
-        (
-            grid[:, 1],
-            "torque",
-            tau,
-            _decimated(tau, chosen.decimation),
-            chosen.torque_cutoff,
-            efforts,
-        ),
+        (grid[:, 1], "torque", tau, decimated, chosen.torque_cutoff, efforts),
     ):
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)
@@ -139,18 +130,12 @@ def plot_processing(
             high = (f > 0.25 / log.dt) & (f < 0.45 / log.dt)  # frequencies without motion
             noise = float(np.median(before[high, j])) if high.any() else 0.0
             if what == "position" and noise > 0.0:
-                axes.axhline(
-                    noise,
-                    color=ALERT,
-                    linewidth=0.9,
-                    linestyle=(0, (1.3, 1.1)),
-                    label="noise of the positions",
-                )
+                axes.axhline(noise, label="noise of the positions", **_NOISE)
             axes.set_ylim(*_range(before[:, j], after[:, j]))
             relative = what == "torque" and rms[j] > 0.0
             share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if relative else ""
-            axes.set_title(f"{name}, {what}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
-            axes.set_ylabel(f"({of[j]}/√Hz)" if " or " not in of[j] else "density (1/√Hz)")
+            axes.set_title(f"{name}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
+            axes.set_ylabel(f"{what}\n({of[j]}/√Hz)" if " or " not in of[j] else f"{what}\n(1/√Hz)")
         column[-1].set_xlabel("frequency (Hz)")
     if system is not None:
         _draw_criteria(grid[-1], system)
@@ -213,15 +198,10 @@ def _draw_criteria(row: Any, system: Equations) -> None:
     counts = np.array([equations(decimation_for(x, log.dt)) for x in f])
     count = equations(processing.decimation)
     bounds = f"bounds: {MOST_BIAS:g} standard errors, {LEAST_EQUATIONS} equations"
+    # without noise there is no bias, and logarithmic axes have no place for it
+    biases = np.where(biases > 0.0, biases, np.nan)
     for axes, curve, cutoff, value, bound in (
-        # without noise there is no bias, and logarithmic axes have no place for it
-        (
-            row[0],
-            np.where(biases > 0.0, biases, np.nan),
-            lower,
-            max(chosen[worst], _LEAST_BIAS),
-            MOST_BIAS,
-        ),
+        (row[0], biases, lower, max(chosen[worst], _LEAST_BIAS), MOST_BIAS),
         (row[1], counts, torque, count, LEAST_EQUATIONS),
     ):
         axes.loglog(f, curve, color=PALETTE[4], label="at other cutoffs")

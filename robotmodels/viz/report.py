@@ -1,5 +1,14 @@
 """Reports with their figures as one HTML file, readable offline and on paper.
 
+Raises
+------
+InvalidValueError, ShapeError
+    Not a result; not a log of its joints.
+MissingExtraError
+    Matplotlib is not installed.
+OSError
+    The file cannot be written.
+
 References
 ----------
 Seed book sections 1.4 and 1.6.5.
@@ -43,15 +52,6 @@ def html_report(result: CalibrationResult, path: str | Path) -> None:
         Of `calibration.fit`.
     path : str or Path
         The HTML file.
-
-    Raises
-    ------
-    InvalidValueError
-        Not a result.
-    MissingExtraError
-        Matplotlib is not installed.
-    OSError
-        The file cannot be written.
 
     Examples
     --------
@@ -110,15 +110,6 @@ def identification_html(
         Held-out log, for the figures; the result contains its errors only.
     robot : StandardParameters, optional
         Result of `consistent_robot`; the increase of its residuals is reported.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Not a result; not a log of its joints.
-    MissingExtraError
-        Matplotlib is not installed.
-    OSError
-        The file cannot be written.
 
     Examples
     --------

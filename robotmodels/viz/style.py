@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from operator import index
 from pathlib import Path
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -116,13 +116,8 @@ def finished(figure: Figure, title: str | None = None, names: Sequence[str] = ()
         # a letter is about half as wide as it is high; a line takes as much as five letters
         width = (0.5 * max(map(len, texts)) + 5.2) * 8.0 / 72.0
         rows = -(-len(texts) // int(np.clip(figure.get_figwidth() // width, 1, len(texts))))
-        figure.legend(
-            [entries[text] for text in texts],
-            texts,
-            loc="outside upper center",
-            ncols=-(-len(texts) // rows),
-            title=title,
-        )
+        place = {"loc": "outside upper center", "ncols": -(-len(texts) // rows), "title": title}
+        figure.legend([entries[text] for text in texts], texts, **place)
     elif title is not None:
         figure.suptitle(title)
     return figure
@@ -135,9 +130,12 @@ def line(k: int) -> dict[str, Any]:
 
 
 def wrapped(text: str, width: float) -> str:
-    """Text in lines that fit into a width in inches."""
-    letters = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4)
-    return "\n".join(fill(part, letters, break_long_words=False) for part in text.split("\n"))
+    """Text in lines of similar lengths that fit into a width in inches."""
+    most, lines = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4), list[str]()
+    for part in text.split("\n"):
+        tried = [wrap(part, letters, break_long_words=False) for letters in range(4, most + 1)]
+        lines.append("\n".join(next(some for some in tried if len(some) == len(tried[-1]))))
+    return "\n".join(lines)
 
 
 def note(axes: Axes, text: str) -> None:
@@ -155,6 +153,14 @@ def plain_logarithmic(axis: Any, most: int = 6, subs: Sequence[float] = (1.0,)) 
     axis.set_major_locator(LogLocator(subs=subs, numticks=most))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _=None: f"{value:g}"))
+
+
+def few_numbers(axis: Any, unit: str) -> None:
+    """Axis with at most six numbers, multiples of 15, 30, 45 or 90 where they are degrees."""
+    from matplotlib.ticker import MaxNLocator
+
+    steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if unit == "deg" else None
+    axis.set_major_locator(MaxNLocator(5, steps=steps))
 
 
 def subdivisions(limits: tuple[float, float]) -> tuple[float, ...]:
@@ -234,17 +240,9 @@ def interval_panel(
     y = np.arange(len(names))
     for k, (label, mask) in enumerate(groups.items()):
         if mask.any():
-            axes.errorbar(
-                values[mask],
-                y[mask],
-                xerr=np.nan_to_num(half[mask], posinf=0.0),
-                fmt="os"[k % 2],
-                color=PALETTE[k],
-                markersize=3.2,
-                elinewidth=1.1,
-                capsize=1.8,
-                label=label,
-            )
+            x, width = values[mask], np.nan_to_num(half[mask], posinf=0.0)
+            look = {"fmt": "os"[k % 2], "markersize": 3.2, "elinewidth": 1.1, "capsize": 1.8}
+            axes.errorbar(x, y[mask], xerr=width, color=PALETTE[k], label=label, **look)
     ends = np.abs(values) + np.nan_to_num(half, posinf=0.0)
     if truth is not None and not np.isnan(truth).all():
         axes.plot(truth, y, "x", color=INK, markersize=4.5, zorder=3.0, label="truth")

@@ -1,12 +1,5 @@
 """Figures of motions within limits: phase plane of a path, plan, joints in their ranges.
 
-Parameters
-----------
-title : str, optional
-    Text over the figure.
-size : array_like, shape (2,), optional
-    Width and height, inches.
-
 Returns
 -------
 matplotlib.figure.Figure
@@ -34,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_HIGHEST = 2.5  # of the greatest rate: the maximum velocity curve is drawn up to this
+_HIGHEST = 2.5  # of the greatest rate: the maximum velocity curve is drawn below this
 _SAMPLES = 501
 _MARGIN = 0.12  # of the range of a joint, shown beyond either limit
 
@@ -66,10 +59,12 @@ def plot_phase_plane(
     s, rate, most = timed.parameter, timed.rate, timed.maximum_rate
     figure, grid = style.panels(COLUMN, 3.0, size, 2, sharex=True, height_ratios=[1.0, 0.07])
     above, below = grid[:, 0]
-    top = 1.1 * min(float(most.max()), _HIGHEST * float(rate.max()))
+    shown = most <= _HIGHEST * rate.max()
+    top = 1.1 * max(float(rate.max()), float(most.max(where=shown, initial=0.0)))
     above.fill_between(s, np.minimum(most, top), top, color=style.BAND, linewidth=0.0)
-    above.plot(s, np.where(most <= top, most, np.nan), color=PALE, label="maximum velocity curve",
-               **DASHED)  # fmt: skip
+    if shown.any():
+        curve = np.where(most <= top, most, np.nan)
+        above.plot(s, curve, color=PALE, label="maximum velocity curve", **DASHED)
     above.plot(s, rate, color=INK, label="quickest motion")
     above.set_ylim(0.0, top)
     above.set_ylabel("rate s′ (1/s)")
@@ -105,8 +100,8 @@ def plot_plan(
     model : RobotModel, optional
         The robot, n joints: its torques are drawn.
     torque : array_like, shape () or (n,), optional
-        Limits of torque, N m or N: torques are drawn as shares of them; default those of the
-        model's table.
+        Limits of torque, N m or N: torques are drawn as shares of them, but for joints without a
+        limit; default those of the model's table.
 
     Examples
     --------
@@ -116,7 +111,7 @@ def plot_plan(
     >>> plan = kinodynamic(arm, [0, -1.5, 1, 0, 0, 0], [1, -1, 0.5, 0, 0, 0], MotionLimits(),
     ...                    seconds=0.2)
     >>> sorted(" ".join(axes.get_ylabel().split()) for axes in plot_plan(plan, model=arm).axes)
-    ['cost', 'position (rad or m)', 'torque (of its limit)']
+    ['cost', 'position (rad)', 'torque (of its limit)']
     """
     style.as_instance(plan, Plan, "plan", "kinodynamic")
     if plan.trajectory is None:
@@ -124,20 +119,20 @@ def plot_plan(
     t = np.linspace(0.0, plan.duration, _SAMPLES)
     seen = plan.trajectory.at(t)
     n = seen.q.shape[1]
+    names, kinds = over_time.joint_names(None, n, model), over_time.joint_units(None, n, model)
     figure, grid = style.panels(PAGE, 2.9, size, 2 if model is not None else 1, 2)
     left, right = grid[:, 0], grid[0, 1]
-    labels = [f"joint {j + 1}" for j in range(n)]
-    for j in range(n):
-        left[0].plot(t, seen.q[:, j], label=labels[j], **style.line(j))
-        for time in plan.via_times:
-            left[0].plot(time, plan.trajectory.q(time)[j], "o", color=INK, markersize=3.0,
-                         label="via point")  # fmt: skip
-    left[0].set_ylabel("position (rad or m)")
+    over_time.lines_over_time(left[0], t, seen.q, names)
+    for time in plan.via_times:
+        q = plan.trajectory.q(time)
+        left[0].plot([time] * n, q, "o", color=INK, markersize=3.0, label="via point")
+    symbols = dict.fromkeys(kind.value for kind in kinds)
+    left[0].set_ylabel(f"position ({' or '.join(symbols)})")
     if model is not None:
-        bound = np.asarray(model.table.effort if torque is None else torque, dtype=float)
-        share = idm(model, seen.q, seen.v, seen.a) / bound
-        for j in range(n):
-            left[1].plot(t, share[:, j], label=labels[j], **style.line(j))
+        bound = _torque_limits(model, torque)
+        some = np.flatnonzero(np.isfinite(bound)).tolist()
+        share = idm(model, seen.q, seen.v, seen.a)[:, some] / bound[some]
+        over_time.lines_over_time(left[1], t, share, [names[j] for j in some], some)
         for side in (-1.0, 1.0):
             left[1].axhline(side, color=PALE, label=LIMIT, **DASHED)
         left[1].set_ylabel("torque\n(of its limit)")
@@ -153,7 +148,20 @@ def plot_plan(
     right.axhline(plan.cost, color=ALERT, label="checked motion", **DASHED)
     right.set_xlabel("evaluations")
     right.set_ylabel("cost")
-    return style.finished(figure, title, labels)
+    return style.finished(figure, title, names)
+
+
+def _torque_limits(model: RobotModel, torque: ArrayLike | None) -> Array:
+    """Limits of torque, at least one of them finite. Shapes: -> (n,)."""
+    bound = model.table.effort if torque is None else as_reals(torque, "torque")
+    if bound.shape not in ((), (model.n,)):
+        raise ShapeError(f"torque: expected shape () or ({model.n},), got {bound.shape}.")
+    if not (bound > 0.0).all() or np.isinf(bound).all():
+        raise InvalidValueError(
+            f"torque: expected positive limits, some of them finite, got {bound}; give torque= "
+            "where the model has none."
+        )
+    return np.broadcast_to(bound, (model.n,))
 
 
 @style.plot

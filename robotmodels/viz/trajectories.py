@@ -1,10 +1,5 @@
 """Figures of motions: over time, as laws of motion, along paths of poses.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Parameters
 ----------
 model : RobotModel, optional

@@ -1,10 +1,5 @@
 """Figures of velocities: inverse models near singularities, ellipsoids, maps of singularities.
 
-Every function returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
-
 Returns
 -------
 matplotlib.figure.Figure
@@ -381,18 +376,8 @@ def plot_singularities(
         if postures is not None:
             x, y = (k * postures[:, grid.joints[i]] for i, (k, _) in enumerate(scales))
             every = max(1, len(x) // 10)
-            axes.plot(
-                x,
-                y,
-                color=INK,
-                linewidth=1.0,
-                marker="o",
-                markersize=3.6,
-                zorder=4.0,
-                markerfacecolor="white",
-                markevery=every,
-                label="postures",
-            )
+            look = {"marker": "o", "markersize": 3.6, "markerfacecolor": "white", "zorder": 4.0}
+            axes.plot(x, y, color=INK, markevery=every, label="postures", **look)
         axes.set_title(style.wrapped(grid.label, width / wide))
     return style.finished(figure, title)
 
@@ -401,16 +386,13 @@ def _draw_map(
     figure: Figure, axes: Axes, grid: SingularityMap, scales: list[tuple[float, str]]
 ) -> None:
     """Colours for the values, bold lines where they are zero."""
-    from matplotlib.ticker import MaxNLocator
-
     x, y = (k * axis for (k, _), axis in zip(scales, (grid.first, grid.second), strict=True))
     unit = grid.units[2].replace("^2", "²").replace("^3", "³")
     label = "value" if unit == "1" else f"value ({unit})"
     most = style.color_map(figure, axes, x, y, grid.values, True, label)
     for axis, name, (_, symbol) in zip((axes.xaxis, axes.yaxis), grid.names, scales, strict=True):
         axis.set_label_text(f"{name} ({symbol})")
-        steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if symbol == "deg" else None
-        axis.set_major_locator(MaxNLocator(6, steps=steps))
+        style.few_numbers(axis, symbol)
     if most == 0.0:
         style.note(axes, "zero everywhere:\nsingular in all\nof these postures")
         return
@@ -431,14 +413,8 @@ def _hatch_outside(
     axes: Axes, grid: SingularityMap, model: RobotModel, scales: list[tuple[float, str]]
 ) -> None:
     """Hatches outside the joint limits, and lines at them."""
-    box = {
-        "facecolor": (1.0, 1.0, 1.0, 0.55),
-        "edgecolor": PALE,
-        "hatch": "////",
-        "linewidth": 0.0,
-        "zorder": 2.4,
-        "label": "outside joint limits",
-    }
+    box = {"facecolor": (1.0, 1.0, 1.0, 0.55), "edgecolor": PALE, "hatch": "////"}
+    box |= {"linewidth": 0.0, "zorder": 2.4, "label": "outside joint limits"}
     lines, areas = (axes.axvline, axes.axhline), (axes.axvspan, axes.axhspan)
     for i, values in enumerate((grid.first, grid.second)):
         j, k = int(grid.joints[i]), scales[i][0]
