@@ -306,7 +306,7 @@ def test_the_direct_model_solves_the_dense_equations(robot, q_ref, rng):
     full[:, robot.actuated] = tau
     if (d := robot.tree.drive_matrices) is not None:
         full -= d.torque(v, None)
-    reference = projected(robot, q, v, full, engine_of(robot).rotor)
+    reference = projected(robot, q, v, full, engine_of(robot))
     found = loops.ddm(robot, q, v, tau)
     assert engine_of(robot).serves
     assert np.abs(found - reference).max() < 1e-10 * (1.0 + np.abs(reference).max())
@@ -390,10 +390,10 @@ def test_massless_links_and_singular_masses(rng):
 # --- simulation ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("k", [0, 3, 4], ids=lambda k: ids[k])
-def test_simulated_loops_stay_closed_and_keep_their_energy(k):
+@pytest.mark.parametrize(("k", "until"), [(0, 10.0), (3, 10.0), (4, 10.0), (5, 3.0)])
+def test_simulated_loops_stay_closed_and_keep_their_energy(k, until):
     robot, q = FLEET[k]
-    found = loops.simulate(robot, q, t=np.linspace(0.0, 10.0, 101))
+    found = loops.simulate(robot, q, t=np.linspace(0.0, until, 101))
     assert found.status == rm.simulation.SimulationStatus.FINISHED
     assert np.ptp(found.q, axis=0).max() > 1.0
     assert gap(robot, found.q) < 1e-12
@@ -401,6 +401,13 @@ def test_simulated_loops_stay_closed_and_keep_their_energy(k):
     assert found.relative_drift < 1e-8
     a = loops.ddm(robot, found.q, found.v, np.zeros((101, len(robot.actuated))))
     assert np.allclose(a, found.a, atol=1e-6 * (1.0 + np.abs(a).max()))
+
+
+def test_a_simulation_starts_in_a_singular_posture_and_leaves_it(rng):
+    found = loops.simulate(parallelogram(rng), np.zeros(3), [1.0, 1.0, -1.0], t=0.02)
+    assert found.status == rm.simulation.SimulationStatus.FINISHED
+    assert len(repr(found).splitlines()) <= 6
+    assert pickle.loads(pickle.dumps(found)) == found
 
 
 def test_simulated_controls_wrenches_and_friction(rng):
@@ -472,6 +479,7 @@ def test_base_parameters_of_known_robots(rng):
     assert base.regrouping["ZZ1"]["M3"] == pytest.approx(0.25)
     general = loops.base_parameters(four_bar(rng), FLEET[0][1], drive=False)
     assert len(general) < len(rm.base_parameters(FLEET[0][0].tree, drive=False))
+    assert pickle.loads(pickle.dumps(general)) == general
 
 
 def test_a_simulated_log_of_a_palletiser_gives_its_base_parameters_back(rng):
@@ -586,6 +594,11 @@ def test_arguments_that_cannot_be_meant(rng):
         loops.close(robot, [[1.0]], q).reason(9)
     with pytest.raises(ShapeError, match="q_ref"):
         loops.base_parameters(robot, [q, q])
+    for tolerance in (np.nan, "a", -1.0):
+        with pytest.raises(InvalidValueError, match="tolerance"):
+            loops.base_parameters(robot, q, tolerance=tolerance)
+    with pytest.raises(LoopError, match="block the actuated"):
+        loops.base_parameters(loops.LoopedRobot(robot.tree, robot.closures, range(robot.n)), q)
     assert loops.mobility(robot, np.empty((0, 3))).redundant == ()
     with pytest.raises(InvalidValueError, match="smoothing"):
         loops.simulate(robot, q, smoothing=0.0)

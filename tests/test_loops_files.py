@@ -126,6 +126,11 @@ def test_par_files_that_are_no_looped_robots(read):
         loops.read_par("none.par")
     with pytest.raises(LoopError, match="cannot read"):
         loops.read_mjcf("none.xml")
+    for path in (None, "a\0b"):
+        with pytest.raises(LoopError, match="cannot read"):
+            loops.read_mjcf(path)
+    with pytest.raises(ParFileError, match="path"):
+        loops.read_par(None)
 
 
 def test_mjcf_with_one_and_with_two_root_bodies(read):

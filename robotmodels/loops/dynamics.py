@@ -21,8 +21,9 @@ Raises
 ShapeError, InvalidValueError
     Arguments of the wrong length, or with NaN or infinity.
 LoopError
-    Loops that are open at q (which `ddm` does not check); actuated joints that do not determine the
-    others; velocities that violate the closures (which `idm` does not check).
+    Loops that are open at q, and actuated joints that do not determine the others (of `idm`); no
+    accelerations that keep the loops closed (of `ddm` and `closure_forces`, which do not check
+    that the loops are closed at q and stay so at the velocities).
 SingularMassMatrixError
     Free motions without inertia.
 
@@ -199,13 +200,15 @@ def closed(robot: LoopedRobot, q: Array) -> Array:
 class Engine:
     """Pinocchio's closures of one robot, with the scratch data of one thread.
 
-    With a ``rate`` (1/s), errors of the closures decay at that rate.
+    With a ``rate`` (1/s), errors of the closures decay at that rate. At most ``rank`` constraints
+    count: those of overconstrained robots depend on each other with closed loops only.
     """
 
     def __init__(self, robot: LoopedRobot, drive: bool = True, rate: float = 0.0) -> None:
         tree, twin = robot.tree, robot.tree.twin
         drives = tree.drive_matrices if drive else None
         self.rotor = np.zeros((tree.n, tree.n)) if drives is None else drives.rotor
+        self.rate, self.rank = rate, tree.n
         self.serves = twin.serves_dynamics and not (self.rotor - np.diag(np.diag(self.rotor))).any()
         if not self.serves:
             return
@@ -246,6 +249,10 @@ class Engine:
         holds = left <= _LEFT or left <= _LEFT * np.linalg.norm(a)
         return a[self.back] if holds and isfinite(sum(a.tolist())) else None
 
+    def independent(self, sizes: Array) -> int:
+        """Number of independent constraints by their singular values, the largest first."""
+        return min(self.rank, int((sizes > _RANK * sizes.max(initial=0.0)).sum()))
+
 
 def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
     """The engine of the calling thread."""
@@ -262,17 +269,19 @@ def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
     return engine
 
 
-def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, rotor: Array) -> Array:
+def projected(robot: LoopedRobot, q: Array, v: Array, tau: Array, engine: Engine) -> Array:
     """Accelerations by projection on the free motions, for any masses. Shapes: (N, n) -> (N, n)."""
-    units = robot.units
-    J = scaled(robot, closure_rows(robot, q)[1])
-    bias = np.einsum("kij,kj->ki", scaled(robot, row_rates(robot, q, v)), v / units)
+    units, rate = robot.units, engine.rate
+    e, J = closure_rows(robot, q)
+    J, dJ = scaled(robot, J), scaled(robot, row_rates(robot, q, v))
+    bias = np.einsum("kij,kj->ki", dJ + 2.0 * rate * J, v / units)
+    bias += rate**2 * np.sqrt(robot.cuts.weight) * e
     h = rigid_torques(robot.tree, q, v, np.zeros_like(q))
-    M = (dynamics.mass_matrix(robot.tree, q, False) + rotor) * units * units[:, None]
+    M = (dynamics.mass_matrix(robot.tree, q, False) + engine.rotor) * units * units[:, None]
     out = np.empty_like(q)
     for i in range(len(q)):
         U, sizes, Vt = np.linalg.svd(J[i])
-        rank = int((sizes > _RANK * sizes.max(initial=0.0)).sum())
+        rank = engine.independent(sizes)
         part = U.T @ bias[i]
         if np.abs(part[rank:]).max(initial=0.0) > _REJECTED * (1.0 + np.abs(part).max(initial=0.0)):
             raise LoopError(
@@ -305,5 +314,5 @@ def accelerations(robot: LoopedRobot, engine: Engine, q: Array, v: Array, tau: A
             out[i] = a
     if left:
         q, v, tau = (x[left] for x in rows)
-        out[left] = projected(robot, q, v, tau, engine.rotor)
+        out[left] = projected(robot, q, v, tau, engine)
     return out.reshape(*batch, robot.n)

@@ -13,7 +13,7 @@ drive, columns
     As for `robotmodels.torque_regressor` of the tree, drives of passive joints included;
     ``columns`` may be base parameters.
 tolerance : float
-    Largest relative torque of a parameter that is not kept.
+    Largest relative torque of a parameter that is not kept, between 0 and 1.
 
 Raises
 ------
@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import regressors
-from .._arrays import Array, as_exact, batch_rows
+from .._arrays import Array, Value, as_exact, as_number, batch_rows
 from ..drive import Drives, drive_kinds
 from ..errors import LoopError
 from ..estimation.columns import NOTHING
@@ -68,7 +68,7 @@ _CHECKED = 40  # samples of the final check
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopedParameters(BaseParameters):
+class LoopedParameters(Value, BaseParameters):
     """Base parameters of a looped robot, in the assembly of a closed posture ``q_ref`` (n,)."""
 
     robot: LoopedRobot = None  # type: ignore[assignment]
@@ -147,7 +147,9 @@ def base_parameters(
         Given to `robotmodels.identification.fit`, they name the assembly of the log.
     """
     check_looped(robot)
+    tolerance = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     kinds, reference = drive_kinds(drive), _reference(robot, q_ref)
+    maps(robot, reference)  # refuses more actuated joints than can move
     columns = TorqueColumns(robot.tree, kinds, None, tolerance)
     p, rng = len(columns.names), np.random.default_rng(0)
     count = max(_ROWS_A_COLUMN * p // max(len(robot.actuated), 1), 2)

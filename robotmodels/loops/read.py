@@ -15,9 +15,10 @@ LoopedRobot
 Raises
 ------
 ParFileError, TableError, InvalidValueError
-    As for `robotmodels.read_par`; a file without loops.
+    As for `robotmodels.read_par`; a ``.par`` file without loops.
 LoopError
-    An MJCF file that cannot be read; other joints or equalities than those supported, by name.
+    An MJCF file that cannot be read, or without joints; other joints or equalities than those
+    supported, by name.
 
 References
 ----------
@@ -91,10 +92,10 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
     ``weld_k`` (full). Joints of actuators are actuated, in the order of the tree; armature,
     damping and friction loss are Ia, Fv and Fc.
     """
-    path = Path(path)
     try:
+        path = Path(path)
         root = ET.parse(path).getroot()
-    except (OSError, ET.ParseError) as error:
+    except (OSError, TypeError, ValueError, ET.ParseError) as error:
         raise LoopError(f"cannot read {str(path)!r} as MJCF: {error}.") from None
     world = root.find("worldbody")
     if root.tag != "mujoco" or world is None:
@@ -119,6 +120,8 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
             model, constraints = pin.buildModelAndLegacyConstraintsFromMJCF(str(copy))
         except (ValueError, RuntimeError) as error:
             raise LoopError(f"{path.name}: Pinocchio cannot read it: {error}") from None
+    if not model.nq:
+        raise LoopError(f"{path.name}: expected bodies with joints, got none.")
     if len(constraints) != len(equalities):
         raise LoopError(
             f"{path.name}: Pinocchio reads {len(constraints)} of {len(equalities)} equalities; "

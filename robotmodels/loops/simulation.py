@@ -15,7 +15,8 @@ from ..simulation.feedback import Feedback
 from ..simulation.integration import Integration
 from ..simulation.motion import Loads, Motion
 from ..simulation.simulate import followed, law_of, times_of
-from .constraints import closure_rows
+from .closing import ClosingStatus, close
+from .constraints import closure_rows, mobility
 from .dynamics import Engine, accelerations, closed
 from .robot import LoopedRobot, check_looped, scaled
 
@@ -111,6 +112,10 @@ def simulate(
 
     motion = LoopMotion(tree, Feedback(torques), tool, drive, None, width)
     motion.robot, motion.engine = robot, Engine(robot, drive, _RATE)
+    # the start may be singular: there, a posture beside it has the rank
+    beside = close(robot, q[robot.actuated] + 0.01 * robot.units[robot.actuated], q)
+    near = beside.q if beside.status == ClosingStatus.CLOSED else q
+    motion.engine.rank = n - int(mobility(robot, [q, near]).count.min())
     moved = motion.projected(q, v)
     if np.abs(moved[1] - v).max(initial=0.0) > _MOVING * np.abs(v).max(initial=0.0):
         raise LoopError(
@@ -150,8 +155,8 @@ class LoopMotion(Motion):
     def _passes(self, q: Array) -> bool:
         """Whether the least singular value of the closures changed its sign on the way to q."""
         J = scaled(self.robot, closure_rows(self.robot, q)[1])
-        U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
-        last = int((sizes > 1e-12 * sizes.max(initial=0.0)).sum()) - 1
+        U, _, Vt = np.linalg.svd(J, full_matrices=False)
+        last = self.engine.rank - 1
         before, self.weakest = self.weakest, (U[:, last], Vt[last]) if last >= 0 else None
         if before is None or self.weakest is None:
             return False
@@ -163,7 +168,9 @@ class LoopMotion(Motion):
         weight, units = np.sqrt(self.robot.cuts.weight), self.robot.units
         for _ in range(3):
             e, J = closure_rows(self.robot, q)
-            inverse = units[:, None] * np.linalg.pinv(scaled(self.robot, J), rcond=1e-8)
+            U, sizes, Vt = np.linalg.svd(scaled(self.robot, J), full_matrices=False)
+            rank = self.engine.independent(sizes)
+            inverse = units[:, None] * (Vt[:rank].T / sizes[:rank]) @ U[:, :rank].T
             q = q - inverse @ (weight * e)
         return q, v - inverse @ (weight * (J @ v))
 

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt
+from .._arrays import Array, Value
 from .._outcomes import Outcome
 from ..model import RobotModel
 
@@ -89,7 +89,7 @@ class SimulationEvent:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation(Rebuilt):
+class Simulation(Value):
     """Simulated motion of a robot. Read-only.
 
     At every sample ``M a + C v + g + offset + friction + J^T wrench = tau``.
@@ -205,6 +205,9 @@ class Simulation(Rebuilt):
         """
         least = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
         return float(np.abs(self.drift).max()) / max(self.energy_turnover, least)
+
+    def __repr__(self) -> str:
+        return f"<Simulation of {self.model.name!r}, {len(self.t)} samples: {self.reason}>"
 
     def __str__(self) -> str:
         lines = [

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from ..errors import RobotModelsWarning
+from ..errors import ParFileError, RobotModelsWarning
 from ..geometry import FIXED, DHTable
 from ..model import RobotModel
 from .dynamics import check_rigid_fixed, dynamics, gravity_of, left_out, listed_parameters
@@ -104,6 +104,8 @@ def read_tree(
     loops: bool = False,
 ) -> tuple[RobotModel, list[tuple[int, int]]]:
     """Spanning tree of a file, and the two frames of each cut joint; see `read_par`."""
+    if not isinstance(path, (str, Path)):
+        raise ParFileError(f"path: expected a str or Path, got {type(path).__name__}.")
     file = ParFile(Path(path))
     numbers = Numbers(file, checked_values(values, file))
     links, joints, f = counts(file, loops)

@@ -77,6 +77,9 @@ MUTATIONS = [
         FILES + "root_bodies"),
     Mutation("loops", "the second frame of a cut joint is the next one",
         "cuts = [(j + 1, joints + j - links", "+ 1)", "+ 0)", FILES + "symoro"),
+    Mutation("loops", "constraints of an overconstrained loop counted where it is open",
+        "motion.engine.rank = n -", "int(mobility(robot, [q, near]).count.min())", "0",
+        LOOPS + "keep_their_energy"),
     Mutation("loops", "masses of an MJCF file at the joint",
         "<link name='body_{k}'><inertial>", "Y.lever", "0.0 * Y.lever", FILES + "root_bodies"),
 ]  # fmt: skip
