@@ -59,7 +59,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import LARGEST, Array, as_bounded, as_vector, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
@@ -214,7 +214,7 @@ def _spheres(robot: ParallelRobot, q: Array) -> Found:
 
 def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
     """Actuated lengths or angles, lengths not negative. Shapes: -> (..., m)."""
-    q = as_vector(q, robot.m, "q")
+    q = as_bounded(as_vector(q, robot.m, "q"), "q", LARGEST)
     if not robot.has_cranks and (q < 0.0).any():
         raise InvalidValueError(
             f"q: expected lengths of legs in metres that are not negative (not strokes), got "

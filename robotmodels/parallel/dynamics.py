@@ -71,7 +71,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact
+from .._arrays import Array, as_exact, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..simulation.simulate import law_of, times_of
@@ -284,8 +284,10 @@ def simulate(
     if not last > first:
         raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
     times = np.linspace(first, last, 201) if times is None else times
+    rtol, atol = as_number(rtol, "rtol", least=1e-13), as_number(atol, "atol", above=0.0)
     drive, load = _law(control, robot.m, times, "control"), _law(wrench, 6, times, "wrench")
-    ddm(robot, T0, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
+    for model, x in ((idm, np.zeros(6)), (ddm, np.zeros(robot.m))):
+        model(robot, T0, V, x, mode=mode)  # raises for what cannot start
     columns, unit = list(robot.columns), scales(robot, robot.length)
 
     def poses(x: Array) -> Array:

@@ -145,7 +145,7 @@ class ParallelRobot(Value):
     def size(self) -> float:
         """Diameter of the base, or the longest part of a leg or of the platform, m."""
         spread = np.linalg.norm(self.base - self.base.mean(axis=0), axis=1).max()
-        return float(max(2.0 * spread, self.length, self.crank.max(), self.rod.max()))
+        return float(max(2.0 * spread, np.abs(self.platform).max(), *self.crank, *self.rod))
 
     def coordinates(self, T: ArrayLike) -> Array:
         """Coordinates (..., m) of poses: position and rotation vector, (x, y, phi), (x, y, z)."""
