@@ -25,7 +25,8 @@ PlatformPoses or AssemblyModes
     m, and ``det`` determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components
     of the twist that the platform has: zero at singular poses, one sign for each side.
     ``iterations`` are those of Newton's method, of loops how often they were closed;
-    ``complex_count`` is the number of solutions in complex numbers, the real ones included.
+    ``complex_count`` is the number of solutions in complex numbers, the real ones included, without
+    those that are nearly at infinity.
 
 Raises
 ------
