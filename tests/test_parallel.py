@@ -423,6 +423,30 @@ def test_similar_triangles_have_at_most_four_modes():
     assert pr.assembly_modes(equal, [1.0] * 3).status == pr.AssemblyStatus.DEGENERATE
 
 
+@pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [0, 1, 0]])
+def test_anchors_that_two_planar_legs_share_leave_four_solutions(pair):
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        base, platform = rng.normal(size=(2, 3, 2))
+        for robot in (
+            pr.planar_3rpr(base[pair], platform),
+            pr.planar_3rpr(base, platform[pair]),
+            pr.planar_3rpr(base, 1.2 * base[pair]),
+        ):
+            T = robot.pose(rng.normal(size=3))
+            modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
+            assert modes.complex_count == 4
+            assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-8
+
+
+def test_assembly_modes_do_not_depend_on_the_unit_of_length():
+    for unit in (1e-6, 1e4):
+        five = pr.five_bar(unit * np.array([[0, 0], [0.5, 0]]), 0.4 * unit, 0.6 * unit)
+        assert pr.assembly_modes(five, [2.0, 1.0]).count == 2
+        SSM = pr.gough(unit * ROBOTS["SSM"].base, unit * ROBOTS["SSM"].platform)
+        assert pr.assembly_modes(SSM, [1.2 * unit] * 6).count == 8
+
+
 def test_solutions_of_equal_orientation_are_both_listed():
     # base and platform on lines: mirrored pairs, one of them with equal orientation
     robot = pr.planar_3rpr([[0, 0], [1, 0], [3, 0]], [[0, 0], [0.5, 0], [0.9, 0]])
@@ -543,6 +567,9 @@ GOOD = ROBOTS["SSM"]
         (lambda: pr.ikm(GOOD, np.tile(GOOD.home, (2, 1, 1)), np.zeros((3, 6))), ShapeError, "axes"),
         (lambda: pr.assembly_modes(GOOD, [1.0] * 6).reason(3), InvalidValueError, "index"),
         (lambda: pr.determinant(None, np.eye(4)), InvalidValueError, "parallel.gough"),
+        (lambda: pr.dgm(GOOD, [1e200] * 6), InvalidValueError, "up to"),
+        (lambda: pr.ikm(GOOD, GOOD.home, np.ones(6), [[0], [0, 1]]), InvalidValueError, "mode"),
+        (lambda: pr.delta(RING, RING, TURN, np.inf, 1.0), InvalidValueError, "upper_arm"),
         (lambda: GOOD.with_masses(5.0), ShapeError, "two parts"),
         (lambda: GOOD.with_masses((1.0, [0, 0, 0], np.eye(3)), (1, 2)), ShapeError, "two parts"),
     ],

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from test_parallel import ROBOTS, moved, poses_near_home, random_gough, twists
+from test_parallel import ROBOTS, moved, poses_near_home, twists
 
 from robotmodels import parallel as pr
 from robotmodels import performance, viz
@@ -426,6 +426,10 @@ def test_mistakes_in_dynamics():
     heavy = with_masses(robot)
     with pytest.raises(InvalidValueError, match="singular"):
         pr.idm(heavy, robot.pose([0, 0, 1, 0, 0, np.pi / 2]), np.zeros(6), np.zeros(6))
+    with pytest.raises(InvalidValueError, match="singular"):
+        pr.simulate(heavy, robot.pose([0, 0, 1, 0, 0, np.pi / 2]))
+    with pytest.raises(InvalidValueError, match="atol"):
+        pr.simulate(heavy, robot.home, atol="small")
     with pytest.raises(ShapeError, match="control"):
         pr.simulate(heavy, robot.home, control=lambda t, T, V: [1.0], t=0.1)
     for start in (0.0, 0.05):  # once without an end
@@ -629,5 +633,3 @@ def test_a_gough_platform_is_calibrated_from_poses_and_lengths():
     scaled = (fit.x - true) / np.sqrt(np.diag(fit.covariance))
     assert np.sqrt((scaled**2).mean()) == pytest.approx(1.0, abs=0.5)
     assert np.abs(fit.x - true).max() < 0.1 * np.abs(start - true).max()
-    random = random_gough(rng)
-    assert random.m == 6

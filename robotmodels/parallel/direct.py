@@ -25,7 +25,8 @@ PlatformPoses or AssemblyModes
     m, and ``det`` determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components
     of the twist that the platform has: zero at singular poses, one sign for each side.
     ``iterations`` are those of Newton's method, of loops how often they were closed;
-    ``complex_count`` is the number of solutions in complex numbers, the real ones included.
+    ``complex_count`` is the number of solutions in complex numbers, the real ones included, without
+    those that are nearly at infinity.
 
 Raises
 ------
@@ -59,7 +60,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import LARGEST, Array, as_bounded, as_vector, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
@@ -214,7 +215,7 @@ def _spheres(robot: ParallelRobot, q: Array) -> Found:
 
 def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
     """Actuated lengths or angles, lengths not negative. Shapes: -> (..., m)."""
-    q = as_vector(q, robot.m, "q")
+    q = as_bounded(as_vector(q, robot.m, "q"), "q", LARGEST)
     if not robot.has_cranks and (q < 0.0).any():
         raise InvalidValueError(
             f"q: expected lengths of legs in metres that are not negative (not strokes), got "

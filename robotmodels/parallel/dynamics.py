@@ -71,16 +71,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact
+from .._arrays import Array, as_exact, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..simulation.simulate import law_of, times_of
 from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
 from .robot import Masses, ParallelRobot, Result, only_freedoms
-from .velocities import ikm, rates_of_rows, scales, states
+from .velocities import SINGULAR, ikm, rates_of_rows, scales, states
 
-_SINGULAR = 1e-12  # smallest singular value, relative
-_TOO_NEAR = 1e-6  # the same at the end of a simulation, and sine of an elbow
+_TOO_NEAR = 1e-6  # determinant and speeds of knees at the end, relative to the start
+Load = ArrayLike | None
 Law = Callable[[float, Array, Array], ArrayLike]
 _POSE = (
     "T: the pose of row {} is singular: no bounded forces of the legs balance every load; see "
@@ -93,12 +93,7 @@ _MASS = (
 
 
 def idm(
-    robot: Robot,
-    T: ArrayLike,
-    V: ArrayLike,
-    A: ArrayLike,
-    wrench: ArrayLike | None = None,
-    mode: Mode = None,
+    robot: Robot, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: Load = None, mode: Mode = None
 ) -> Array:
     """Inverse dynamic model: forces or torques of the actuators for a motion of the platform."""
     load = np.zeros(6) if wrench is None else wrench
@@ -112,12 +107,7 @@ def idm(
 
 
 def ddm(
-    robot: Robot,
-    T: ArrayLike,
-    V: ArrayLike,
-    tau: ArrayLike,
-    wrench: ArrayLike | None = None,
-    mode: Mode = None,
+    robot: Robot, T: ArrayLike, V: ArrayLike, tau: ArrayLike, wrench: Load = None, mode: Mode = None
 ) -> Array:
     """Direct dynamic model: acceleration of the platform under forces of the actuators."""
     load = np.zeros(6) if wrench is None else wrench
@@ -232,7 +222,7 @@ def _crank_forces(
 def _solved(B: Array, x: Array, words: str) -> Array:
     """Solutions of B y = x; raises for singular matrices. Shapes: (N, m, m), (N, m) -> (N, m)."""
     s = np.linalg.svd(B, compute_uv=False)
-    for n in np.flatnonzero(~(s[:, -1] > _SINGULAR * s[:, 0]))[:1]:
+    for n in np.flatnonzero(~(s[:, -1] > SINGULAR * s[:, 0]))[:1]:
         raise InvalidValueError(words.format(n))
     y: Array = np.linalg.solve(B, x[..., None])[..., 0]  # type: ignore[assignment]
     return y
@@ -284,8 +274,10 @@ def simulate(
     if not last > first:
         raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
     times = np.linspace(first, last, 201) if times is None else times
+    rtol, atol = as_number(rtol, "rtol", least=1e-13), as_number(atol, "atol", above=0.0)
     drive, load = _law(control, robot.m, times, "control"), _law(wrench, 6, times, "wrench")
-    ddm(robot, T0, V, np.zeros(robot.m), mode=mode)  # raises for what cannot start
+    for model, x in ((idm, np.zeros(6)), (ddm, np.zeros(robot.m))):
+        model(robot, T0, V, x, mode=mode)  # raises for what cannot start
     columns, unit = list(robot.columns), scales(robot, robot.length)
 
     def poses(x: Array) -> Array:

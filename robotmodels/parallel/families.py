@@ -175,8 +175,11 @@ def _robot(
     elbow = {Family.GOUGH: [1.0] * 6, Family.FIVE_BAR: [1.0, -1.0], Family.DELTA: [-1.0] * 3}
     signs = np.array(elbow.get(family, [1.0] * 3))
     m, flat = len(signs), 2 not in family.value[1]
-    a, b = (as_floats(P, name) for P, name in zip(points, ("base", "platform"), strict=True))
-    for name, P in (("base", a), ("platform", b)):
+    names = ("base", "platform", "proximal", "distal")
+    if family is Family.DELTA:
+        names = ("hips", "platform", "upper_arm", "forearm")
+    a, b = map(as_floats, points, names[:2])
+    for name, P in zip(names[:2], (a, b), strict=True):
         if P.shape != (m, 2 if flat else 3):
             raise ShapeError(
                 f"{name}: expected {m} points, shape ({m}, {2 if flat else 3}), got {P.shape}."
@@ -192,8 +195,8 @@ def _robot(
                 "coincide; give each leg its own points."
             )
     crank, rod = (
-        np.zeros(m) if arms is None else for_legs(value, m, name, 1e-300)
-        for value, name in zip(arms or (0, 0), ("proximal", "distal"), strict=True)
+        np.zeros(m) if arms is None else for_legs(as_floats(value, name), m, name, 1e-300)
+        for value, name in zip(arms or (0, 0), names[2:], strict=True)
     )
     low, high = checked_limits(*limits[:2], m, arms is None)
     outward = np.stack((np.cos(turn), np.sin(turn), 0.0 * np.cos(turn)), axis=-1) + np.zeros((m, 3))

@@ -18,7 +18,8 @@ _ACCURACIES = 3e-2, 1e-3, 1e-4  # of predictions, and what is tried where paths 
 _REAL = 1e-6  # imaginary parts, relative, at simple ends of paths
 _SAME = 1e-7  # distance of ends of two paths
 _NEAR = 1e-3  # the same for paths that get stuck at multiple solutions
-_FINITE = 1e-9  # |e.e| beside |e|^2
+_FINITE = 1e-9  # |e.e| beside |e|^2, which are equal at real solutions
+_NEARLY_INFINITE = 1e-6  # the same of solutions whose conjugates may be lost, never real ones
 _FAR = 1e4  # |g| beside |e|, in units of the robot, of stuck paths to translations at infinity
 _CONJUGATE = 1e-5  # distance of conjugate ends
 _MANY = 8  # stuck paths, not in groups, are a continuum and no numerical accident
@@ -130,6 +131,7 @@ def _is_incomplete(y: Complex, stuck: NDArray[np.bool_]) -> bool:
     twin = (_distances(y, y) + 9.0 * np.eye(len(y)) < near[:, None]).any(axis=1)
     conjugate = _distances(y, _normalised(y.conj())).min(axis=1, initial=9.0)
     alone = conjugate > np.where(stuck, _NEAR, _CONJUGATE)
+    alone &= np.abs((y[:, :4] ** 2).sum(axis=1)) > _NEARLY_INFINITE
     return bool((stuck != twin).any() or alone.any())
 
 

@@ -252,10 +252,10 @@ def closure(c: Floats, b: Floats, rods: Floats, f: Floats) -> float:
 def roots_of(f: Floats, z: Floats, largest: float) -> int:
     """Roots of the closure equation by Aberth's method, by ascending angle, and their number.
 
-    Shapes: f (7,), z (6,). Real orientations are brought onto the unit circle.
+    Shapes: f (7,), its terms' largest value, z (6,). Real ones are brought onto the unit circle.
     """
     low = 0
-    while low < 3 and abs(f[low]) < 1e-13 * largest:
+    while low < 3 and abs(f[low]) < 1e-15 * largest:
         low += 1
     degree = 6 - 2 * low
     for k in range(degree):
@@ -321,13 +321,14 @@ def planar(
         # the orientation at which the triangles of base and platform are equal and parallel
         on = complex(c[s, 1, 0] - c[s, 0, 0], c[s, 1, 1] - c[s, 0, 1])
         on *= complex(b[1, 0] - b[0, 0], b[0, 1] - b[1, 1])
-        u2, u3, _, _, k2, k3, _ = loop_of(c[s], b, rods[s], on / max(abs(on), 1e-300))
+        on = on / abs(on) if on != 0j else 1.0 + 0j
+        u2, u3, _, _, k2, k3, _ = loop_of(c[s], b, rods[s], on)
         equal = abs(u2) + abs(u3) < 1e-9 * size and abs(k2) + abs(k3) < 1e-9 * size * size
         if equal or largest <= 1e-14 * size**6:
             out[s, 0] = 1.0
             continue
         count = 0
-        for k in range(roots_of(f, z, largest)):
+        for k in range(roots_of(f, z, max(100.0 * largest, size**6))):
             u2, u3, _, _, k2, k3, D = loop_of(c[s], b, rods[s], z[k])
             flat = abs(D) < 1e-7 * size * size
             twin = False

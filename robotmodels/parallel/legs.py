@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array
+from .._arrays import Array, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .looped import LoopedPlatform
@@ -206,7 +206,7 @@ def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
         )
     if isinstance(robot, ParallelRobot):
         return False
-    if mode is not None and np.any(np.asarray(mode) != 0):
+    if mode is not None and np.any(as_reals(mode, "mode") != 0):
         raise InvalidValueError(
             f"mode: a robot from from_loops has the working mode of its home alone, got "
             f"{mode!r:.40}; give from_loops another q_home."
@@ -216,8 +216,11 @@ def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
 
 def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArray[np.int64]:
     """Checked working modes of N poses. Shapes: -> (N,)."""
-    given, most = np.asarray(0 if mode is None else mode), 2**robot.m if robot.has_cranks else 1
-    if given.dtype.kind not in "iu" or ((given < 0) | (given >= most)).any():
+    given, most = (
+        as_reals(0 if mode is None else mode, "mode"),
+        2**robot.m if robot.has_cranks else 1,
+    )
+    if not np.isin(given, np.arange(most)).all():
         raise InvalidValueError(
             f"mode: expected whole numbers from 0 to {most - 1}, as igm(robot, T).mode numbers the "
             f"working modes, got {mode!r:.60}."

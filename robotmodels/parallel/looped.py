@@ -162,7 +162,7 @@ class LoopedPlatform(Value):
     def _twist_rates(self, q: Array, rate: Array) -> Array:
         """Time derivative of `_twists`. Shapes: (..., n), (..., m) -> (..., 6, m)."""
         tree, G = self.robot.tree, loops.velocity_map(self.robot, q)
-        v = _times(G, rate)
+        v = times(G, rate)
         change = jacobian_rate(tree, q, v, self.frame) @ G
         return change + jacobian(tree, q, self.frame) @ loops.velocity_map_rate(self.robot, q, v)
 
@@ -182,7 +182,7 @@ class LoopedPlatform(Value):
         """Time derivative (..., m, 6) of the inverse Jacobian."""
         q = self._reached(T)
         J = self._inverse(self._twists(q))
-        return -J @ self._twist_rates(q, _times(J, V)) @ J
+        return -J @ self._twist_rates(q, times(J, V)) @ J
 
     def closed(self, q: ArrayLike, T0: ArrayLike | None) -> tuple[Any, ...]:
         """Fields of `PlatformPoses` at actuated positions (..., m), by one closing of the loops."""
@@ -229,24 +229,24 @@ class LoopedPlatform(Value):
         q, V, A = self._reached(T), as_core(V, (6,), "V"), as_core(A, (6,), "A")
         P, G = self._twists(q), loops.velocity_map(self.robot, q)
         J = self._inverse(P)
-        rate = _times(J, V)
-        v = _times(G, rate)
-        second = _times(J, A - _times(self._twist_rates(q, rate), rate))
-        a = _times(G, second) + _times(loops.velocity_map_rate(self.robot, q, v), rate)
+        rate = times(J, V)
+        v = times(G, rate)
+        second = times(J, A - times(self._twist_rates(q, rate), rate))
+        a = times(G, second) + times(loops.velocity_map_rate(self.robot, q, v), rate)
         return np.broadcast_to(q, a.shape), np.broadcast_to(v, a.shape), a, np.swapaxes(P, -1, -2)
 
     def idm(self, T: ArrayLike, V: ArrayLike, A: ArrayLike, wrench: ArrayLike) -> Array:
         """Inverse dynamic model, as `parallel.idm`."""
         q, v, a, Pt = self._motion(T, V, A)
-        return loops.idm(self.robot, q, v, a) + _times(Pt, as_core(wrench, (6,), "wrench"))
+        return loops.idm(self.robot, q, v, a) + times(Pt, as_core(wrench, (6,), "wrench"))
 
     def ddm(self, T: ArrayLike, V: ArrayLike, tau: ArrayLike, wrench: ArrayLike) -> Array:
         """Direct dynamic model, as `parallel.ddm`."""
         q, v, _, Pt = self._motion(T, V, np.zeros(6))
-        load = _times(Pt, as_core(wrench, (6,), "wrench"))
+        load = times(Pt, as_core(wrench, (6,), "wrench"))
         a = loops.ddm(self.robot, q, v, as_core(tau, (self.m,), "tau") - load)
         tree, frame = self.robot.tree, self.frame
-        return _times(jacobian(tree, q, frame), a) + _times(jacobian_rate(tree, q, v, frame), v)
+        return times(jacobian(tree, q, frame), a) + times(jacobian_rate(tree, q, v, frame), v)
 
     def singular_motions(self, T: ArrayLike, epsilon: float) -> tuple[int, Array]:
         """Code of `SingularityKind` at a pose, and twists (k, 6) with locked actuators."""
@@ -303,7 +303,7 @@ def null_space(A: Any, epsilon: float) -> Array:
     return Vt[int((s > epsilon * max(s.max(initial=0.0), 1e-300)).sum()) :]
 
 
-def _times(J: Array, x: Array) -> Array:
+def times(J: Array, x: Array) -> Array:
     """Products of matrices and vectors with batches."""
     batch_shape((J[..., 0], x), ("the poses' matrices", "the vector"))
     return np.einsum("...ij,...j->...i", J, x)

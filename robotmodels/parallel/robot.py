@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import (
     Array,
-    Rebuilt,
     Value,
     as_core,
     as_exact,
@@ -20,7 +19,6 @@ from .._arrays import (
     as_number,
     as_reals,
     read_only,
-    value_hash,
 )
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
@@ -145,7 +143,7 @@ class ParallelRobot(Value):
     def size(self) -> float:
         """Diameter of the base, or the longest part of a leg or of the platform, m."""
         spread = np.linalg.norm(self.base - self.base.mean(axis=0), axis=1).max()
-        return float(max(2.0 * spread, self.length, self.crank.max(), self.rod.max()))
+        return float(max(2.0 * spread, np.abs(self.platform).max(), *self.crank, *self.rod))
 
     def coordinates(self, T: ArrayLike) -> Array:
         """Coordinates (..., m) of poses: position and rotation vector, (x, y, phi), (x, y, z)."""
@@ -266,8 +264,11 @@ def pose_at(twist: Array) -> Array:
     return T
 
 
-class Result(Rebuilt):
-    """Base of results; of batches they have a ``status`` (...) and perhaps ``valid`` (..., S)."""
+class Result(Value):
+    """Base of results; of batches they have a ``status`` (...) and perhaps ``valid`` (..., S).
+
+    NaN equals NaN.
+    """
 
     __slots__ = ()
     outcomes: ClassVar[type[Outcome]]
@@ -276,10 +277,6 @@ class Result(Rebuilt):
         for value in self._values:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
-
-    @property
-    def _values(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
 
     @property
     def count(self) -> NDArray[np.int64]:
@@ -299,8 +296,7 @@ class Result(Rebuilt):
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and all(map(_same, self._values, other._values))  # type: ignore[attr-defined]
 
-    def __hash__(self) -> int:
-        return value_hash(type(self).__name__, *self._values)
+    __hash__ = Value.__hash__
 
     def __repr__(self) -> str:
         named = zip((f.name for f in fields(self)), self._values, strict=True)  # type: ignore[arg-type]
@@ -309,5 +305,4 @@ class Result(Rebuilt):
 
 
 def _same(a: Any, b: Any) -> bool:
-    """Equality of fields; NaN equals NaN."""
     return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")

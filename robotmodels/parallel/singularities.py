@@ -177,7 +177,7 @@ def _form(L: Array, rank: int, epsilon: float) -> str:
     u = L[:, :3]
     flat = np.linalg.svd(u, compute_uv=False)[-1] <= np.sqrt(epsilon)
     mutual = L[:, :3] @ L[:, 3:].T  # their sums with the transposed: zero where two lines meet
-    meet = np.abs(mutual + mutual.T) <= np.sqrt(epsilon)
+    meet = np.abs(mutual + mutual.T) <= 100.0 * epsilon
     if rank == 3:
         if not meet.all():
             return "3a" if not (meet & ~np.eye(4, dtype=bool)).any() else "3b"

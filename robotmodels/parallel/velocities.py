@@ -60,14 +60,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core, as_floats, as_number, batch_rows, batch_shape
+from .._arrays import Array, as_core, as_floats, as_number, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
+from .looped import times
 from .robot import ParallelRobot, Result, only_freedoms
 
 _STRAIGHT = 1e-12
-_SINGULAR = 1e-12  # smallest singular value, relative
+SINGULAR = 1e-12  # smallest singular value, relative
 
 
 def inverse_jacobian(robot: Robot, T: ArrayLike, mode: Mode = None) -> Array:
@@ -91,7 +92,7 @@ def inverse_jacobian_rate(robot: Robot, T: ArrayLike, twist: ArrayLike, mode: Mo
 
 def ikm(robot: Robot, T: ArrayLike, twist: ArrayLike, mode: Mode = None) -> Array:
     """Inverse kinematic model: velocities of the actuators."""
-    return _times(inverse_jacobian(robot, T, mode), as_core(twist, (6,), "twist"))
+    return times(inverse_jacobian(robot, T, mode), as_core(twist, (6,), "twist"))
 
 
 def dkm(robot: Robot, T: ArrayLike, q_rate: ArrayLike, mode: Mode = None) -> Array:
@@ -100,8 +101,8 @@ def dkm(robot: Robot, T: ArrayLike, q_rate: ArrayLike, mode: Mode = None) -> Arr
     At parallel singularities the twist is not unique: the one of least norm is returned, angles
     times the characteristic length. See `classify_singularity`.
     """
-    inverse: Array = np.linalg.pinv(_unitless(robot, T, None, mode), rcond=0.1 * _SINGULAR)  # type: ignore[assignment]
-    part = _times(inverse, as_core(q_rate, (robot.m,), "q_rate"))
+    inverse: Array = np.linalg.pinv(_unitless(robot, T, None, mode), rcond=0.1 * SINGULAR)  # type: ignore[assignment]
+    part = times(inverse, as_core(q_rate, (robot.m,), "q_rate"))
     V = np.zeros((*part.shape[:-1], 6))
     V[..., list(robot.columns)] = part * scales(robot, robot.length)
     return V
@@ -111,7 +112,7 @@ def ikm_second_order(
     robot: Robot, T: ArrayLike, twist: ArrayLike, acceleration: ArrayLike, mode: Mode = None
 ) -> Array:
     """Inverse kinematic model of second order: accelerations of the actuators."""
-    drift = _times(inverse_jacobian_rate(robot, T, twist, mode), as_core(twist, (6,), "twist"))
+    drift = times(inverse_jacobian_rate(robot, T, twist, mode), as_core(twist, (6,), "twist"))
     return ikm(robot, T, acceleration, mode) + drift
 
 
@@ -120,7 +121,7 @@ def dkm_second_order(
 ) -> Array:
     """Direct kinematic model of second order: time derivative of the twist; see `dkm`."""
     V = dkm(robot, T, q_rate, mode)
-    drift = _times(inverse_jacobian_rate(robot, T, V, mode), V)
+    drift = times(inverse_jacobian_rate(robot, T, V, mode), V)
     return dkm(robot, T, as_core(q_acceleration, (robot.m,), "q_acceleration") - drift, mode)
 
 
@@ -147,9 +148,9 @@ def leg_forces(robot: Robot, T: ArrayLike, wrench: ArrayLike, mode: Mode = None)
     """
     J, W = _unitless(robot, T, None, mode), as_core(wrench, (6,), "wrench")
     U, s, Vt = np.linalg.svd(J)
-    singular = s[..., -1:] <= _SINGULAR * s[..., :1]
-    part = _times(Vt, W[..., list(robot.columns)] * scales(robot, robot.length))
-    forces = _times(U, part / np.where(singular, np.nan, s))
+    singular = s[..., -1:] <= SINGULAR * s[..., :1]
+    part = times(Vt, W[..., list(robot.columns)] * scales(robot, robot.length))
+    forces = times(U, part / np.where(singular, np.nan, s))
     return LegForces(forces, np.isnan(forces[..., 0]).astype(np.int8))
 
 
@@ -261,10 +262,4 @@ def _unitless(robot: Robot, T: ArrayLike, length: float | None, mode: Mode) -> A
 def _singular_values(robot: Robot, T: ArrayLike, length: float | None, mode: Mode) -> Array:
     """Singular values (..., m) of the inverse Jacobian; 0 below those of a singular one."""
     s = np.linalg.svd(_unitless(robot, T, length, mode), compute_uv=False)
-    return np.where(s <= _SINGULAR * s[..., :1], 0.0, s)
-
-
-def _times(J: Array, x: Array) -> Array:
-    """Products of matrices and vectors with batches."""
-    batch_shape((J[..., 0], x), ("the Jacobian's rows", "the vector"))
-    return np.einsum("...ij,...j->...i", J, x)
+    return np.where(s <= SINGULAR * s[..., :1], 0.0, s)

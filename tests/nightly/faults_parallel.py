@@ -34,6 +34,9 @@ MUTATIONS = [
         "if not flat and not twin:", "if not twin:", f"{MODELS} -k similar", True),
     Mutation("parallel: planar", "only one of two poses of equal orientation", "def planar(",
         "tries = 2", "tries = 1", f"{MODELS} -k equal_orientation", True),
+    Mutation("parallel: planar", "shared anchors are no case of their own", "def planar(",
+        "on / abs(on) if on != 0j else 1.0 + 0j", "on / max(abs(on), 1e-300)",
+        f"{MODELS} -k planar_legs_share", True),
     Mutation("parallel: homotopy", "a path that jumped is accepted", "def _is_incomplete(",
         "(stuck != twin).any() or alone.any()", "alone.any()", f"{MODELS} -k locked_legs", True),
     Mutation("parallel: homotopy", "constant of the quadrics without the first length",
@@ -76,5 +79,6 @@ MUTATIONS = [
         "np.repeat([True, not turns], 3)", "np.isin(np.arange(6), self.columns)",
         f"{MOTION} -k five_bar_as_loops"),
     Mutation("parallel: loops", "working modes of loops are ignored", "def is_looped(",
-        "np.asarray(mode) != 0", "np.asarray(mode) < 0", f"{MOTION} -k five_bar_as_loops"),
+        'as_reals(mode, "mode") != 0', 'as_reals(mode, "mode") < 0',
+        f"{MOTION} -k five_bar_as_loops"),
 ]
