@@ -189,7 +189,7 @@ def _arranged(
     unsolved: dict[str, Array | None] = {"closest": found.closest, "missing": found.missing}
     for name, values in unsolved.items():
         if values is not None:
-            unsolved[name] = shaped(np.where(solved[:, None], np.nan, values))
+            unsolved[name] = shaped(np.where(solved.reshape(-1, 1), np.nan, values))
     return IGMSolutions(
         q=packed(reading, np.nan),
         valid=shaped(there),
