@@ -1,16 +1,17 @@
 """Speed beside yardsticks that stand still: fails where ours has become slower than they have.
 
-    python .ci/ratios.py [--write [--attempts 16]] [--only NAME ...] [--slowed NAME [--times 2]]
+    python .ci/ratios.py [--write [--attempts 10]] [--only NAME ...] [--slowed NAME [--times 2]]
 
 Each work of ours is timed in turns with something of other hands, NumPy, SciPy, Pinocchio, ruckig,
 in this process. Only the ratio of the two medians is looked at, never a time: a machine that is
 slow or busy is so for both. `benchmarks/results/ratios.json` keeps the median of such ratios and
 their spread, the standard deviation of their logarithm. A ratio that is above the kept one by more
 than `margin` of the spread, or below `FASTER` of it, is found again until there are `ATTEMPTS`,
-and their median is judged: above fails, below is said. ``--write`` writes the file anew, which
-another kind of processor may need: half of the attempts on the machine as it is, half beside
-processes that keep it busy, so that the spread holds for both. ``--slowed`` does a work of ours
-more often than it says: the check has to fail then.
+and their median is judged: above fails, below is said. Every attempt after the first has a process
+of its own, because where arrays and code come to lie decides up to a third of a ratio.
+``--write`` writes the file anew, which another kind of processor may need: half of the attempts on
+the machine as it is, half beside processes that keep it busy, so that the spread holds for both.
+``--slowed`` does a work of ours more often than it says: the check has to fail then.
 """
 
 # ruff: noqa: E402
@@ -263,12 +264,20 @@ def estimations() -> Iterator[Pair]:
     )  # fmt: skip
 
 
-def checked(pair: Pair, kept: Kept) -> tuple[float, int]:
+def checked(pair: Pair, kept: Kept, given: list[str]) -> tuple[float, int]:
     """The ratio, and of how many attempts it is the median."""
     found = [pair.ratio()]
     if kept.slower(found[0]) or kept.faster(found[0]):
-        found += [pair.ratio() for _ in range(ATTEMPTS - 1)]
+        found += [
+            in_new_process("--only", pair.name, *given)[pair.name] for _ in range(ATTEMPTS - 1)
+        ]
     return float(np.median(found)), len(found)
+
+
+def in_new_process(*given: str) -> dict[str, float]:
+    """The ratios, found by a process of their own."""
+    command = [sys.executable, __file__, "--bare", *given]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
 def slowed(pair: Pair, times: int) -> Pair:
@@ -297,14 +306,14 @@ def others_at_work() -> Iterator[None]:
 def write(attempts: int) -> None:
     """Keep the ratios of this machine and their spread."""
     about = machine(["ruckig"])
+    runs = [in_new_process() for _ in range(attempts // 2)]
+    with others_at_work():
+        runs += [in_new_process() for _ in range(attempts - attempts // 2)]
     told = {}
-    for pair in pairs():
-        found = [pair.ratio() for _ in range(attempts // 2)]
-        with others_at_work():
-            found += [pair.ratio() for _ in range(attempts - attempts // 2)]
-        kept = Kept(float(np.median(found)), float(np.std(np.log(found))))
-        told[pair.name] = kept
-        print(f"{pair.name:28} {kept.ratio:9.3f}  {rates(kept)}  {pair.yardstick}", flush=True)
+    for name in runs[0]:
+        found = np.array([run[name] for run in runs])
+        told[name] = Kept(float(np.median(found)), float(np.std(np.log(found))))
+        print(f"{name:28} {told[name].ratio:9.3f}  {rates(told[name])}", flush=True)
     keep(about, told, attempts)
 
 
@@ -341,26 +350,33 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=None, metavar="NAME")
     parser.add_argument("--slowed", metavar="NAME", help="do this work of ours more often")
     parser.add_argument("--times", type=int, default=2, help="how often, with --slowed")
-    parser.add_argument("--attempts", type=int, default=16, help="of each pair, with --write")
+    parser.add_argument("--attempts", type=int, default=10, help="processes, with --write")
+    parser.add_argument(
+        "--bare", action="store_true", help="print the ratios as JSON, no judgement"
+    )
     given = parser.parse_args()
     if given.write:
         write(given.attempts)
+        return
+    again = [] if given.slowed is None else ["--slowed", given.slowed, "--times", str(given.times)]
+    watched = (slowed(pair, given.times) if given.slowed == pair.name else pair for pair in pairs())
+    if given.bare:
+        wanted = (pair for pair in watched if given.only is None or pair.name in given.only)
+        print(json.dumps({pair.name: pair.ratio() for pair in wanted}))
         return
     start = time.perf_counter()
     told = json.loads(FILE.read_text(encoding="utf-8"))["pairs"]
     kept = {name: Kept(**known) for name, known in told.items()}
     print(f"{load()}; ratios to yardsticks. {summary(kept)}")
     slow, fast, seen = [], [], set()
-    for pair in pairs():
+    for pair in watched:
         seen.add(pair.name)
         if given.only is not None and pair.name not in given.only:
             continue
         if pair.name not in kept:
             sys.exit(f"{FILE.name} has no ratio of {pair.name!r}: .ci/ratios.py --write adds it.")
-        if given.slowed == pair.name:
-            pair = slowed(pair, given.times)
         known = kept[pair.name]
-        found, attempts = checked(pair, known)
+        found, attempts = checked(pair, known, again)
         if known.slower(found):
             slow.append(pair.name)
         if known.faster(found):
