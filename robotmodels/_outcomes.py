@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Self
+from operator import index
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ._arrays import Frozen, Value
+from .errors import InvalidValueError
 
 
 class Outcome(IntEnum):
@@ -17,3 +23,37 @@ class Outcome(IntEnum):
         outcome._value_ = value
         outcome.sentence = sentence
         return outcome
+
+
+class Result(Frozen, Value):
+    """Base of results whose ``status`` is an `Outcome`, or codes of one, shape (...).
+
+    Arrays are read-only, and results are equal if their fields are.
+    """
+
+    __slots__ = ()
+    outcomes: ClassVar[type[Outcome]]
+
+    def outcome(self, i: int | tuple[int, ...] = ()) -> Outcome:
+        """Outcome of row i; i is left out for a single row."""
+        status = self.status  # type: ignore[attr-defined]
+        if isinstance(status, Outcome):
+            return status
+        codes = np.asarray(status)
+        try:  # a single row is also the first of one
+            return self.outcomes(index(codes[() if codes.ndim == 0 and i in (0, (0,)) else i]))
+        except (IndexError, TypeError, ValueError):
+            raise InvalidValueError(
+                f"i: expected the index of one row among {codes.shape}, got {i!r:.40}."
+            ) from None
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """Outcome of row i as a sentence; i is left out for a single row."""
+        return self.outcome(i).sentence
+
+    @property
+    def counted(self) -> str:
+        """How many rows have which outcome, in words."""
+        codes, numbers = np.unique(self.status, return_counts=True)  # type: ignore[attr-defined]
+        pairs = zip(codes, numbers, strict=True)
+        return ", ".join(f"{m} {self.outcomes(int(c)).name}" for c, m in pairs) or "empty"

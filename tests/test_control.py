@@ -733,7 +733,7 @@ def test_laws_of_users_and_laws_in_simulate():
     assert run.state.shape == (1001, 2)
     law = control.Impedance(dgm(arm(), Q0), 1.0, 20.0, 100.0, model=arm())
     assert isinstance(law, StatefulControl)
-    assert simulate(arm(), Q0, None, law, 0.1).reason.startswith("The motion was followed")
+    assert simulate(arm(), Q0, None, law, 0.1).reason().startswith("The motion was followed")
     assert np.allclose(law.command(0.0, Q0.tolist(), [0.0, 0.0]), gravity_torque(arm(), Q0))
 
 

@@ -164,5 +164,5 @@ def test_torques_in_a_wrong_unit_end_with_a_status():
         inertia=rm.InertialParameters.from_com([1.0, 1.0], com, tensor),
     )
     wild = rm.simulate(arm, [0.0, 0.0], [0.0, 0.0], [1e5, 1e5], t=1.0)
-    assert "evaluations of the model were used up" in wild.reason
+    assert "evaluations of the model were used up" in wild.reason()
     assert 100_000 <= wild.evaluations < 112_000

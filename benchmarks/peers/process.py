@@ -45,7 +45,7 @@ class Foreign:
         """Start the peer; why it cannot be had, None where it can."""
         try:
             self._process = subprocess.Popen(
-                [self.python, "-W", "ignore", str(self.script)], stdin=subprocess.PIPE,
+                [self.python, "-P", "-W", "ignore", str(self.script)], stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, text=True,
             )  # fmt: skip
             return self._answer().get("skipped")

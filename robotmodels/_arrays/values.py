@@ -44,9 +44,14 @@ class Frozen(Rebuilt):
 
     def __post_init__(self) -> None:
         for field in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, field.name, read_only(value, value.dtype.type))
+            object.__setattr__(self, field.name, _kept(getattr(self, field.name)))
+
+
+def _kept(value: Any) -> Any:
+    """A read-only copy of an array, also inside tuples."""
+    if type(value) is tuple:
+        return tuple(map(_kept, value))
+    return read_only(value, value.dtype.type) if isinstance(value, np.ndarray) else value
 
 
 class Value(Rebuilt):
@@ -68,10 +73,12 @@ class Value(Rebuilt):
 
 
 def same_value(a: object, b: object) -> bool:
-    """Equality of fields that may be arrays: same shape and same numbers, or NaN in both."""
+    """Equality of fields that may be arrays or tuples of them; NaN equals NaN."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         floats = a.dtype.kind == b.dtype.kind == "f"
         return np.array_equal(a, b) or (floats and np.array_equal(a, b, equal_nan=True))
+    if type(a) is tuple and type(b) is tuple:
+        return len(a) == len(b) and all(map(same_value, a, b))
     return bool(a == b or (a != a and b != b))
 
 
@@ -84,4 +91,6 @@ def _hashable(value: Any) -> Any:
     """A field for a hash, in which 0.0 and -0.0 are the same, as they compare alike, and NaN."""
     if isinstance(value, np.ndarray):
         return (value if value.dtype.kind == "U" else value + 0.0).tobytes()
+    if type(value) is tuple:
+        return tuple(map(_hashable, value))
     return "NaN" if isinstance(value, float) and value != value else value

@@ -321,7 +321,7 @@ def _outcome(
     if motion.status is not SimulationStatus.FINISHED:
         late = motion.status is SimulationStatus.NOT_CONVERGED
         advice = ("Give method='Radau' for stiff walls, or a period.",) * late
-        return ControlStatus.DIVERGED, (f"At t = {motion.t[-1]:.6g} s: {motion.reason}", *advice)
+        return ControlStatus.DIVERGED, (f"At t = {motion.t[-1]:.6g} s: {motion.reason()}", *advice)
     if (peaks := _growing(errors)).size:
         desired = getattr(loop.law, "_desired", None)  # an error may grow with the reference
         values = np.array([desired(float(t))[0] if desired else 0.0 for t in motion.t])

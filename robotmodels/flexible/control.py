@@ -40,10 +40,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
 from .linear import DeflectionStatus, scales, static_deflection
-from .link import Result
 from .models import idm, mass_matrix, solved
 from .robot import FlexibleRobot, check_arm
 

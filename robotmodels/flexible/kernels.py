@@ -152,7 +152,8 @@ def workspace(arm: Arm) -> Work:
 def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
     """Write inertial parameters, tip and rows of now of deformed body k."""
     put_vector(work.P, k + 1, vector(arm.tip, k))
-    work.body[k] = arm.pi[k]
+    for x in range(10):  # a copy by numba would take seconds to compile
+        work.body[k, x] = arm.pi[k, x]
     for c in range(arm.start[k], arm.start[k + 1]):
         for x in range(15):
             value = arm.first[c, x]
@@ -402,8 +403,7 @@ def loads(
         w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
         put_vector(work.w, 0, w)
         put_vector(work.dw, 0, part(outer, i, 15))
-        u = add(cross(w, part(outer, i, 6)), part(outer, i, 12))
-        put_vector(work.u, 0, subtract(u, g))
+        put_vector(work.u, 0, subtract(add(cross(w, part(outer, i, 6)), part(outer, i, 12)), g))
         for k in range(f):
             j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
             R, P = link_pose(arm.chain, k, y, i)
@@ -439,7 +439,8 @@ def loads(
         for k in range(f - 1, -1, -1):
             eliminate(arm, k, free, value, work)
         if free[n + 1]:
-            root[:, 0] = -work.p[0]
+            for z in range(6):
+                root[z, 0] = -work.p[0, z]
             solve(work.I[0], 0, 6, root, 1)
         for z in range(6):
             base[i, z] = root[z, 0] if free[n + 1] else work.p[0, z]

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_exact
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, SingularMassMatrixError
 from .models import checked_rows, forces, jacobian, mass_matrix
 from .robot import FlexibleRobot, check_arm
@@ -62,7 +62,7 @@ class DeflectionStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Deflection(Frozen, Value):
+class Deflection(Result):
     """Elastic equilibrium of an arm whose joints are held.
 
     Parameters
@@ -81,10 +81,7 @@ class Deflection(Frozen, Value):
     tau: Array
     deflection: Array
     status: NDArray[np.int8]
-
-    def reason(self, i: Any = ()) -> str:
-        """The sentence of the status of sample i."""
-        return DeflectionStatus(int(self.status[i])).sentence
+    outcomes = DeflectionStatus
 
     def __repr__(self) -> str:
         return f"<Deflection: shape {self.e.shape}, up to {np.max(self.deflection, initial=0):.3g}>"

@@ -14,16 +14,6 @@ import numpy as np
 from .._arrays import Array, Frozen, Value
 
 
-class Result(Frozen, Value):
-    """Base of results with a status."""
-
-    __slots__ = ()
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence  # type: ignore[attr-defined]
-
-
 class Section(NamedTuple):
     """Undeformed position of the tip section, displacement and rotation of it by the modes.
 

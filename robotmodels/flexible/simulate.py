@@ -50,14 +50,14 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
 from .._choices import chosen
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, SingularMassMatrixError
 from ..geometry import DHTable
 from ..model import RobotModel
 from ..simulation import Integrator
 from ..simulation.simulate import times_of
 from .linear import scales
-from .link import FlexibleLink, Result
+from .link import FlexibleLink
 from .models import SpinStatus, cross, ddm, dgm, in_world, jacobian, recursion, solved, states
 from .robot import FlexibleRobot, check_arm
 

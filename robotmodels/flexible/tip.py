@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_floats, as_number
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from .control import motion_of
 from .linear import linearize, scales, tip_inverse
-from .link import Result
 from .models import cross, dgm, forces, jacobian, mass_matrix
 from .robot import FlexibleRobot, check_arm
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_floats, as_vector, batch_rows
-from .._outcomes import Outcome
-from ..errors import InvalidValueError
+from .._arrays import Array, as_floats, as_vector, batch_rows
+from .._outcomes import Outcome, Result
 from ..geometry import PRISMATIC
 from .robot import LoopedRobot, check_looped
 
@@ -31,7 +30,7 @@ _OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ClosedPostures(Frozen, Value):
+class ClosedPostures(Result):
     """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
 
     Parameters
@@ -47,23 +46,17 @@ class ClosedPostures(Frozen, Value):
     q: Array
     residual: Array
     status: NDArray[np.int8]
+    outcomes = ClosingStatus
 
-    def reason(self, index: int | tuple[int, ...] = ()) -> str:
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Sentence of the status of one posture, with the residual where its loops are open."""
-        try:
-            status = ClosingStatus(self.status[index].item())
-        except (IndexError, TypeError, ValueError):
-            raise InvalidValueError(
-                f"index: expected the index of a posture of a batch of shape {self.status.shape}, "
-                f"got {index!r:.40}."
-            ) from None
-        left = f" Least residual: {self.residual[index].item():.3g} m or rad."
-        return status.sentence + (left if status in _OPEN else "")
+        status = self.outcome(i)
+        if status not in _OPEN:
+            return status.sentence
+        return f"{status.sentence} Least residual: {np.ravel(self.residual[i])[0]:.3g} m or rad."
 
     def __repr__(self) -> str:
-        counts = [(int(np.sum(self.status == s)), s.name) for s in ClosingStatus]
-        listed = ", ".join(f"{count} {name}" for count, name in counts if count)
-        return f"<ClosedPostures, q {self.q.shape}: {listed or 'empty'}>"
+        return f"<ClosedPostures, q {self.q.shape}: {self.counted}>"
 
 
 def close(

@@ -18,7 +18,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, as_reals, read_only
+from .._arrays import Array, Value, as_exact, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 
 Nearest = tuple[Array, Array, Array]
@@ -36,7 +36,7 @@ class Obstacle(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sphere(Rebuilt):
+class Sphere(Value):
     """A solid sphere.
 
     Parameters
@@ -65,7 +65,7 @@ class Sphere(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Capsule(Rebuilt):
+class Capsule(Value):
     """A solid cylinder with round ends: the points near a segment, such as a post or a pipe.
 
     Parameters
@@ -96,7 +96,7 @@ class Capsule(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plane(Rebuilt):
+class Plane(Value):
     """A half space bounded by a plane, such as a floor, a table or a wall.
 
     Parameters
@@ -131,7 +131,7 @@ class Plane(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Box(Rebuilt):
+class Box(Value):
     """A box whose edges are parallel to the axes of the world.
 
     Parameters

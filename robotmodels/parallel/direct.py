@@ -65,7 +65,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .families import height_above
 from .legs import Found, Robot, is_looped, rods
-from .robot import Family, ParallelRobot, Result
+from .robot import Family, ParallelRobot, PlatformResult
 
 
 class PoseStatus(Outcome):
@@ -84,7 +84,7 @@ class PoseStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PlatformPoses(Result):
+class PlatformPoses(PlatformResult):
     """Poses of the platform, see the head of the file. Read-only."""
 
     outcomes: ClassVar = PoseStatus
@@ -108,7 +108,7 @@ class AssemblyStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class AssemblyModes(Result):
+class AssemblyModes(PlatformResult):
     """All poses of the platform at given lengths or angles, packed. Read-only."""
 
     outcomes: ClassVar = AssemblyStatus
@@ -121,7 +121,7 @@ class AssemblyModes(Result):
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """Outcome of row i as a sentence; i is left out for a single row."""
-        words = Result.reason(self, i)
+        words = PlatformResult.reason(self, i)
         if words == AssemblyStatus.ALL.sentence and not self.count[i]:
             return "There is no assembly mode: legs of these lengths do not meet the platform."
         return words

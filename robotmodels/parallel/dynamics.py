@@ -76,7 +76,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..simulation.simulate import law_of, times_of
 from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
-from .robot import Masses, ParallelRobot, Result, only_freedoms
+from .robot import Masses, ParallelRobot, PlatformResult, only_freedoms
 from .velocities import SINGULAR, ikm, rates_of_rows, scales, states
 
 _TOO_NEAR = 1e-6  # determinant and speeds of knees at the end, relative to the start
@@ -237,7 +237,7 @@ class MotionStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ParallelMotion(Result):
+class ParallelMotion(PlatformResult):
     """Simulated motion of a parallel robot, see the head of the file. Read-only."""
 
     outcomes: ClassVar = MotionStatus

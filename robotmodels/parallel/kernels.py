@@ -28,6 +28,14 @@ Room = tuple[Floats, Floats, Ints]
 
 
 @compiled()
+def put(out: Floats, T: Floats) -> None:
+    """Copy a pose; array assignments take seconds to compile."""
+    for i in range(4):
+        for j in range(4):
+            out[i, j] = T[i, j]
+
+
+@compiled()
 def errors(T: Floats, c: Floats, b: Floats, columns: Ints, length: Floats, J: Floats) -> None:
     """Lengths of rods and their derivatives by the platform's twist.
 
@@ -147,11 +155,12 @@ def direct(
     """
     m = b.shape[0]
     room = room_for(m)
-    first, target, piece = np.zeros(m), np.zeros(m), np.zeros((4, 4))
+    first, target, last, piece = np.zeros(m), np.zeros(m), np.zeros((4, 4)), np.zeros((4, 4))
     for s in range(c.shape[0]):
-        T[s] = T0[s]
+        put(T[s], T0[s])
         _, side = measured(T[s], c[s], b, rods[s], columns, room)
-        first[:] = room[1]
+        for i in range(m):
+            first[i] = room[1][i]
         done = newton(T[s], c[s], b, rods[s], columns, room)
         total = abs(done)
         worst, det = measured(T[s], c[s], b, rods[s], columns, room)
@@ -159,23 +168,23 @@ def direct(
         if done > 0 and det * side < 0.0:
             code = LEFT_THE_MODE
         if code != CONVERGED:
-            last = T0[s].copy()
+            put(last, T0[s])
             now, h, pieces = 0.0, 0.125, 0
             while now < 1.0 and h > _FINEST and pieces < _PIECES:
                 pieces += 1
                 after = min(1.0, now + h)
                 for i in range(m):
                     target[i] = first[i] + after * (rods[s, i] - first[i])
-                piece[:] = last
+                put(piece, last)
                 done = newton(piece, c[s], b, target, columns, room)
                 total += abs(done)
                 error, here = measured(piece, c[s], b, target, columns, room)
                 if 0 < done <= 6 and here * side > 0.0:
                     now, h = after, 2.0 * h
-                    last[:] = piece
+                    put(last, piece)
                     if now == 1.0:
                         code, worst, det = CONVERGED, error, here
-                        T[s] = piece
+                        put(T[s], piece)
                 else:
                     h *= 0.25
         out[s, 0], out[s, 1], out[s, 2], out[s, 3] = code, total, worst, det
@@ -195,7 +204,7 @@ def polish(
         for k in range(T.shape[1]):
             if np.isnan(T[s, k, 0, 3]):
                 continue
-            X[:] = T[s, k]
+            put(X, T[s, k])
             before, side = measured(X, c[s], b, rods[s], columns, room)
             newton(X, c[s], b, rods[s], columns, room)
             after, here = measured(X, c[s], b, rods[s], columns, room)
@@ -207,7 +216,7 @@ def polish(
             # at a double solution the derivative is singular and a step may be anything
             if after <= before and moved < _FAR:
                 residual[s, k], det[s, k] = after, here
-                T[s, k] = X
+                put(T[s, k], X)
 
 
 @compiled()
@@ -352,7 +361,7 @@ def planar(
             else:
                 p = 1j * (k2 * u3 - k3 * u2) / D
             for side in range(tries):
-                X[:] = home
+                put(X, home)
                 x, y = z[k].real, z[k].imag
                 X[0, 0], X[0, 1], X[1, 0], X[1, 1] = x, -y, y, x
                 at = p + (1.0 - 2.0 * side) * shift
@@ -363,6 +372,7 @@ def planar(
                 worst, here = measured(X, c[s], b, rods[s], columns, room)
                 if worst <= 1e-11 * size and count < 6:
                     X[2, 3] = home[2, 3]
-                    T[s, count], residual[s, count], det[s, count] = X, worst, here
+                    put(T[s, count], X)
+                    residual[s, count], det[s, count] = worst, here
                     count += 1
                     out[s, 1] += 1.0

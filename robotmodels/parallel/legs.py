@@ -45,7 +45,7 @@ from .._arrays import Array, as_reals
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .looped import LoopedPlatform
-from .robot import ParallelRobot, Result
+from .robot import ParallelRobot, PlatformResult
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -66,7 +66,7 @@ class LegStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LegSolutions(Result):
+class LegSolutions(PlatformResult):
     """Actuated lengths or angles that give poses, see the head of the file. Read-only."""
 
     outcomes: ClassVar = LegStatus

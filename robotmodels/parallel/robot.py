@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ from .._arrays import (
     as_reals,
     read_only,
 )
-from .._outcomes import Outcome
+from .._outcomes import Result
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 
@@ -264,45 +264,17 @@ def pose_at(twist: Array) -> Array:
     return T
 
 
-class Result(Value):
-    """Base of results; of batches they have a ``status`` (...) and perhaps ``valid`` (..., S).
-
-    NaN equals NaN.
-    """
+class PlatformResult(Result):
+    """Base of results of batches: printed by shapes."""
 
     __slots__ = ()
-    outcomes: ClassVar[type[Outcome]]
-
-    def __post_init__(self) -> None:
-        for value in self._values:
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
 
     @property
     def count(self) -> NDArray[np.int64]:
         """Number of solutions of each row, shape (...)."""
         return self.valid.sum(axis=-1)  # type: ignore[attr-defined]
 
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of row i as a sentence; i is left out for a single row."""
-        status = np.asarray(self.status)  # type: ignore[attr-defined]
-        try:
-            return self.outcomes(int(status[i])).sentence
-        except (IndexError, TypeError):
-            raise InvalidValueError(
-                f"i: expected the index of a row of a batch of shape {status.shape}, got {i!r:.40}."
-            ) from None
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and all(map(_same, self._values, other._values))  # type: ignore[attr-defined]
-
-    __hash__ = Value.__hash__
-
     def __repr__(self) -> str:
         named = zip((f.name for f in fields(self)), self._values, strict=True)  # type: ignore[arg-type]
         shapes = [f"{name} {x.shape}" for name, x in named if isinstance(x, np.ndarray)]
         return f"<{type(self).__name__}: {', '.join(shapes)}>"
-
-
-def _same(a: Any, b: Any) -> bool:
-    return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")

@@ -50,11 +50,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_number
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import ShapeError
 from .legs import Mode, Robot, is_looped, leg_states, modes_of
 from .looped import null_space
-from .robot import Family, Result
+from .robot import Family
 from .velocities import states
 
 _WORDS = {

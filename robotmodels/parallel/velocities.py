@@ -65,7 +65,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .legs import LegStates, Mode, Robot, is_looped, leg_states, modes_of
 from .looped import times
-from .robot import ParallelRobot, Result, only_freedoms
+from .robot import ParallelRobot, PlatformResult, only_freedoms
 
 _STRAIGHT = 1e-12
 SINGULAR = 1e-12  # smallest singular value, relative
@@ -133,7 +133,7 @@ class ForceStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LegForces(Result):
+class LegForces(PlatformResult):
     """Forces (..., m) of the actuators, positive where a leg pushes; NaN at singular poses."""
 
     outcomes: ClassVar = ForceStatus

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_mask
 from .._arrays.tasks import Workers
 from .._choices import one_of
-from .._outcomes import Outcome
-from ..errors import InvalidValueError
+from .._outcomes import Outcome, Result
 from ..igm import IGMStatus, igm
 from ..igm.known import known_arm, solver_for
 from ..igm.request import Task, poses_of
@@ -24,7 +23,7 @@ from ..igm.solver import Tolerances, postures
 from ..kinematics import dgm
 from ..model import RobotModel
 from . import arms
-from .arms import Flags, Ints, JointSpace, Values
+from .arms import Flags, Ints, JointSpace
 
 LEVELS = ("position", "pose", "every_orientation")
 ANGLES, ROTATIONS = 180, 96  # orientations that stand for all, in a plane and in space
@@ -42,7 +41,7 @@ class AccessStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Accessibility(Values):
+class Accessibility(Result):
     """Accessibility of poses.
 
     Parameters
@@ -56,26 +55,13 @@ class Accessibility(Values):
         What was asked: position, pose, or every orientation.
     """
 
+    outcomes: ClassVar = AccessStatus
     status: NDArray[np.int8]
     count: Ints
     level: str
 
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Outcome of one pose as a sentence; ``i`` is left out for a single pose."""
-        try:
-            code = np.asarray(self.status[i] if self.status.ndim else self.status)
-        except (IndexError, TypeError):
-            code = np.zeros(1)
-        if code.ndim:
-            raise InvalidValueError(
-                f"i: expected the index of one pose among {self.status.shape}, got {i!r}."
-            )
-        return AccessStatus(int(code)).sentence
-
     def __repr__(self) -> str:
-        codes, numbers = np.unique(self.status, return_counts=True)
-        text = [f"{m} {AccessStatus(int(c)).name}" for c, m in zip(codes, numbers, strict=True)]
-        return f"<Accessibility of {self.level}, {self.status.shape}: {', '.join(text) or 'none'}>"
+        return f"<Accessibility of {self.level}, {self.status.shape}: {self.counted}>"
 
 
 def accessibility(

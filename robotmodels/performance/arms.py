@@ -1,9 +1,9 @@
-"""Joint space, task and section of an arm, and the base of results: shared by the analyses."""
+"""Joint space, task and section of an arm: shared by the analyses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from functools import wraps
 from math import pi, tau
 from typing import Any, TypeVar
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_mask, read_only
+from .._arrays import Array, as_mask
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
 from ..igm.loop import joint_chain
@@ -29,54 +29,6 @@ Ints = NDArray[np.int64]
 T = TypeVar("T")
 PLACE = np.repeat((True, False), 3)
 _SLACK = 1e-9  # rad or m, of limits
-
-
-class Values(Rebuilt):
-    """Base of results: read-only copies of arrays, equal if the fields are, NaN included."""
-
-    __slots__ = ()
-
-    def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            object.__setattr__(self, f.name, _kept(getattr(self, f.name)))
-
-    def __eq__(self, other: object) -> bool:
-        return _same(self, other) if type(other) is type(self) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash((type(self).__name__, *map(str, _fields(self))))
-
-
-class Result(Values):
-    """Base of results with a status."""
-
-    __slots__ = ()
-
-    def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence  # type: ignore[attr-defined]
-
-
-def _fields(value: Any) -> tuple[Any, ...]:
-    return tuple(getattr(value, f.name) for f in fields(value))
-
-
-def _kept(value: Any) -> Any:
-    """A read-only copy of an array, also inside tuples."""
-    if isinstance(value, tuple):
-        return tuple(map(_kept, value))
-    return read_only(value, value.dtype.type) if isinstance(value, np.ndarray) else value
-
-
-def _same(a: Any, b: Any) -> bool:
-    """Equality of values that are or contain arrays."""
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return len(a) == len(b) and all(map(_same, a, b))
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    if is_dataclass(a) and type(a) is type(b) and type(a).__eq__ in (object.__eq__, Values.__eq__):
-        return _same(_fields(a), _fields(b))
-    return bool(a == b) or (a != a and b != b)
 
 
 def per_model(function: Callable[..., T]) -> Callable[..., T]:

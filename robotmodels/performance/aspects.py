@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector
+from .._arrays import Array, Frozen, Value, as_vector
 from .._arrays.tasks import Workers
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..igm.loop import joint_chain
 from ..model import RobotModel
-from .arms import Flags, Ints, JointSpace, Result, Values, joint_space, wrapped
+from .arms import Flags, Ints, JointSpace, joint_space, wrapped
 from .cells import checked_resolution
 from .singularity import Factors, sign_factors
 
@@ -39,7 +39,7 @@ class AspectStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Group(Values):
+class Group(Frozen, Value):
     """A grid over some joints (columns of q): lower ends, sides, which close, labels from 1."""
 
     joints: tuple[int, ...]

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from .._arrays import Array
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..model import RobotModel
-from .arms import Flags, Result, SectionArm, joint_space, section_arm, wrapped
+from .arms import Flags, SectionArm, joint_space, section_arm, wrapped
 from .arrangement import cut, lines_of, pieces
 from .level_curves import Line
 

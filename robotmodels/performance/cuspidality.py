@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from .._arrays.tasks import Workers
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from ..igm import igm
 from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
-from .arms import PLACE, Result, SectionArm, section_arm, turning, wrapped
+from .arms import PLACE, SectionArm, section_arm, turning, wrapped
 from .arrangement import counted_cut, cut, lines_of
 from .aspects import aspects
 from .curves import cusps_of

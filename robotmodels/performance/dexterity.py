@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_mask, as_vector
+from .._arrays import Array, Frozen, Value, as_mask, as_vector
 from .._arrays.tasks import Workers
 from .._choices import one_of
 from ..errors import InvalidValueError
@@ -20,7 +20,7 @@ from ..kinematics import dgm, jacobian
 from ..kinematics.lengths import length_of
 from ..model import RobotModel, check_model
 from .accessibility import allowed_postures
-from .arms import Flags, JointSpace, Values, section_arm, task_rows
+from .arms import Flags, JointSpace, section_arm, task_rows
 from .workspace import Workspace, workspace
 
 INDICES = ("inverse_condition", "manipulability", "least_singular_value", "isotropy")
@@ -29,7 +29,7 @@ _SAMPLES = 200000
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class DexterityMap(Values):
+class DexterityMap(Frozen, Value):
     """Index of dexterity at the cells of a workspace.
 
     Parameters

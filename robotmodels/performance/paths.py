@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_mask
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..model import RobotModel
 from . import arms
 from .accessibility import postures_of
-from .arms import Flags, Ints, JointSpace, Result, joint_space
+from .arms import Flags, Ints, JointSpace, joint_space
 from .continuation import Continuation
 from .singularity import bound_of, sign_factors
 

@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_mask, as_vector
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..dynamics import mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import jacobian
 from ..model import RobotModel, check_model
-from .arms import Result
 
 KINDS = ("velocity", "force", "acceleration")
 _ZERO = 1e-10  # beside the largest generator, or the largest distance of a plane

@@ -14,12 +14,12 @@ import numpy as np
 from .._arrays import Array
 from .._arrays.tasks import Workers
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..model import RobotModel
 from .accessibility import allowed_postures
-from .arms import Flags, Ints, JointSpace, Result, joint_space, section_arm, task_rows
+from .arms import Flags, Ints, JointSpace, joint_space, section_arm, task_rows
 from .aspects import Aspects, free_components, linked
 from .cells import SAMPLES, neighbours
 from .continuation import Continuation

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact, as_mask, as_reals
 from .._arrays.tasks import Workers
 from .._choices import one_of
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
 from ..igm.request import poses_of
 from ..kinematics import dgm
 from ..model import RobotModel
 from . import arms
 from .accessibility import in_every_orientation, posture_counts
-from .arms import Flags, Ints, JointSpace, Result
+from .arms import Flags, Ints, JointSpace
 from .arrangement import boundary, measures
 from .cells import SECTIONS, Cells, Space, cells_of, outlines, reached_cells, space_of
 

@@ -169,7 +169,6 @@ class Simulation(Value):
         """Simulated time, s."""
         return float(self.t[-1] - self.t[0])
 
-    @property
     def reason(self) -> str:
         """The sentence of the status."""
         return self.status.sentence
@@ -207,13 +206,13 @@ class Simulation(Value):
         return float(np.abs(self.drift).max()) / max(self.energy_turnover, least)
 
     def __repr__(self) -> str:
-        return f"<Simulation of {self.model.name!r}, {len(self.t)} samples: {self.reason}>"
+        return f"<Simulation of {self.model.name!r}, {len(self.t)} samples: {self.reason()}>"
 
     def __str__(self) -> str:
         lines = [
             f"{self.model.name}: {self.duration:.6g} s, steps: {self.steps}, evaluations of the "
             f"model: {self.evaluations}",
-            self.reason,
+            self.reason(),
             f"energy drift {self.drift[-1]:.2g} J, {self.relative_drift:.2g} of the energy "
             "turnover",
             *map(str, self.events[:10]),

@@ -131,7 +131,7 @@ def simulate(
     --------
     >>> from robotmodels.robots import load
     >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=np.linspace(0.0, 0.2, 5))
-    >>> motion.q.shape, motion.reason, bool(abs(motion.drift).max() < 1e-8)
+    >>> motion.q.shape, motion.reason(), bool(abs(motion.drift).max() < 1e-8)
     ((5, 6), 'The motion was followed to its end.', True)
     """
     check_model(model)

@@ -41,11 +41,11 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
-from .results import Result, as_sized, packed
+from .results import Values, as_sized, packed
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PlaneMotions(Result):
+class PlaneMotions(Values):
     """Motions that a homography allows, ``H = R + t n^T``; missing rows of a batch are NaN.
 
     Parameters

@@ -57,7 +57,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
-from .results import Judged, as_points, as_sized, packed, taken
+from .results import Result, as_points, as_sized, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
@@ -76,7 +76,7 @@ class PoseStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PoseSolutions(Judged):
+class PoseSolutions(Result):
     """Poses of an object in the camera; rows are packed, missing ones NaN. Read-only.
 
     Parameters
@@ -93,7 +93,7 @@ class PoseSolutions(Judged):
     valid: NDArray[np.bool_]
     residual: Array
     status: NDArray[np.int8]
-    _outcome = PoseStatus
+    outcomes = PoseStatus
 
     @property
     def count(self) -> NDArray[np.int64]:

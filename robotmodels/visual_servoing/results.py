@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
-from operator import index
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from .. import _arrays
+from .. import _arrays, _outcomes
 from .._arrays import LARGEST, Array, as_bounded, as_core, as_exact, as_number, read_only
 from .._choices import one_of
-from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 
@@ -49,42 +47,18 @@ class Value(_arrays.Value):
         object.__setattr__(self, name, value)
 
 
-class Result(_arrays.Frozen):
-    """Base of results: equal if their fields are, where NaN equals NaN."""
+class Values(_arrays.Frozen, _arrays.Value):
+    """Base of results without a status."""
 
     __slots__ = ()
     __repr__ = brief
 
-    def _key(self) -> tuple[Any, ...]:
-        return tuple(
-            (e.shape, (e + 0.0 if e.dtype.kind == "f" else e).tobytes())
-            if isinstance(e, np.ndarray)
-            else e
-            for e in (getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
-        )
 
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
-
-    def __hash__(self) -> int:
-        return hash(self._key())
-
-
-class Judged(Result):
+class Result(_outcomes.Result):
     """Base of results with a status."""
 
     __slots__ = ()
-    _outcome: ClassVar[type[Outcome]]
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status, of row i in a batch."""
-        codes = np.asarray(self.status)  # type: ignore[attr-defined]
-        try:
-            return self._outcome(index(codes[i if codes.ndim else ()])).sentence
-        except (IndexError, TypeError, ValueError):
-            raise InvalidValueError(
-                f"i: expected the index of one row of {codes.shape}, got {i!r}."
-            ) from None
+    __repr__ = brief
 
 
 def taken(x: Array, order: Any) -> Array:

@@ -39,11 +39,11 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_floats, as_number
 from ..errors import InvalidValueError
-from .results import Result, Value
+from .results import Value, Values
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TargetEstimate(Result):
+class TargetEstimate(Values):
     """Estimate of the motion of a target."""
 
     s: Array

@@ -54,7 +54,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from .camera import Camera
 from .features import Feature, as_sensed, sight_of
-from .results import Judged, Result, packed
+from .results import Result, Values, packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -80,7 +80,7 @@ class ServoStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ServoStep(Judged):
+class ServoStep(Result):
     """Velocity of the camera for one measurement, or for a batch. Read-only.
 
     Parameters
@@ -96,7 +96,7 @@ class ServoStep(Judged):
     error: Array
     rank: int | NDArray[np.int8]
     status: ServoStatus | NDArray[np.int8]
-    _outcome = ServoStatus
+    outcomes = ServoStatus
 
     def __post_init__(self) -> None:
         self.v.flags.writeable = self.error.flags.writeable = False  # quicker than copies
@@ -234,7 +234,7 @@ _LINKS = {
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class VirtualLink(Result):
+class VirtualLink(Values):
     """The motions of a camera that leave a feature unchanged at a pose (section 6.3.3.1).
 
     Parameters
