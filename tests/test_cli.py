@@ -309,6 +309,7 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
     assert "robotmodels demo --real" in out
 
 
+@pytest.mark.nightly  # `.ci/run` runs the demonstration from the wheel
 def test_demo_identifies_the_real_robot(run, tmp_path, monkeypatch):
     pages = []  # drawing them takes longer than all the rest, and has tests of its own
     monkeypatch.setattr(rm.viz, "identification_html", lambda *what: pages.append(what))

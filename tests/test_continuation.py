@@ -45,10 +45,12 @@ def traced(kind, eps, roots, start, period, most, longest):
     return beside, curve[0][part], curve[3][part], (back, why), found[:count], double[:count]
 
 
+# the kernel of these residuals takes ten seconds to compile; tests of `igm` and of singular curves
+# follow such curves in every run
+pytestmark = pytest.mark.nightly
 NO_PERIOD, NO_ROOTS = np.zeros(2), np.zeros(1)
 
 
-@pytest.mark.nightly
 def test_a_closed_curve_of_fewer_equations_than_unknowns():
     beside, points, missing, ends, found, _ = traced(
         0, 0.0, NO_ROOTS, np.array([0.9, 0.5]), NO_PERIOD, 1.0, 0.2

@@ -11,22 +11,9 @@ from dataclasses import dataclass
 from ...errors import InvalidValueError
 from ..loop import JointChain
 from .catalogue import Candidate, candidates, cost
-from .equations import Arm, Split
-from .expressions import Expression
+from .equations import Arm
 from .normal_form import NormalForm, normal_form
-from .program import Program, compile_plan
-from .types import EquationType
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """One step of a plan."""
-
-    type: EquationType
-    unknowns: tuple[int, ...]
-    coefficients: tuple[Expression, ...]
-    splits: tuple[Split, ...]
-    elements: tuple[tuple[int, int], ...]
+from .program import Program, Step, compile_plan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,7 @@ from .equations import Arm, Split
 from .expressions import ONE, Expression, Graph, Kind
 from .polynomials import part
 from .products import Fixed, product
-
-if TYPE_CHECKING:
-    from .plan import Step
+from .types import EquationType
 
 SLACK = 1e-9
 """Overshoot beside the amplitude that is tried as a double root."""
@@ -31,6 +28,17 @@ SMALL_AMPLITUDE = 1e-4
 """Amplitudes beside their usual size below which a pose is left to a more careful method."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """One step of a plan."""
+
+    type: EquationType
+    unknowns: tuple[int, ...]
+    coefficients: tuple[Expression, ...]
+    splits: tuple[Split, ...]
+    elements: tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
