@@ -342,8 +342,9 @@ def _connected(code: Ints, certain: Flags, closed: Flags) -> tuple[NDArray[np.in
     code_of = np.zeros(int(whole.max()) + 1, np.int64)
     code_of[whole] = code.ravel()
     sizes, sure = np.bincount(whole), certain.ravel()
-    pairs = np.unique(np.stack((whole[sure], cores[sure])), axis=1)
-    number = np.bincount(pairs[0], minlength=len(sizes))
+    owner = np.full(int(cores.max()) + 1, -1)  # every core lies in one part
+    owner[cores[sure]] = whole[sure]
+    number = np.bincount(owner[owner >= 0], minlength=len(sizes))
     kept = (code_of >= 0) & ((number > 0) | (sizes > _SPECKS * code.size))
     for value in np.setdiff1d(code_of[code_of >= 0], code_of[kept]):
         kept[np.argmax(np.where(code_of == value, sizes, 0))] = True
@@ -358,14 +359,19 @@ def _connected(code: Ints, certain: Flags, closed: Flags) -> tuple[NDArray[np.in
 
 def _components(code: Ints, closed: Flags) -> Ints:
     """Numbers (N,) of the connected parts of equal codes of a grid that closes along some axes."""
-    at, pairs = np.arange(code.size).reshape(code.shape), []
-    for axis, joined in enumerate(closed):
-        same = (code == np.roll(code, -1, axis)) & (code >= 0)
-        if not joined:
-            np.moveaxis(same, axis, 0)[-1] = False
-        pairs.append((at[same], np.roll(at, -1, axis)[same]))
-    a, b = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-    return linked(a, b, code.size)
+    from scipy import ndimage
+
+    labels, count = np.zeros(code.shape, np.int64), 0
+    for value in np.flatnonzero(np.bincount(code[code >= 0])):
+        part, more = ndimage.label(code == value)
+        labels += np.where(part > 0, part + count, 0)
+        count += more
+    ends = [np.zeros((2, 0), np.int64)]
+    for axis in np.flatnonzero(closed):
+        values, numbers = (np.moveaxis(x, axis, 0)[[-1, 0]].reshape(2, -1) for x in (code, labels))
+        ends.append(numbers[:, (values[0] == values[1]) & (values[0] >= 0)])
+    a, b = np.concatenate(ends, axis=1)
+    return linked(a, b, count + 1)[labels.ravel()]
 
 
 def linked(a: Ints, b: Ints, count: int) -> Ints:
