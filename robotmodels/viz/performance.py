@@ -140,15 +140,19 @@ def plot_aspects(a: Aspects, *, title: str | None = None, size: ArrayLike | None
     if arm is not None and of_section:
         mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
         points, text = arm.values(mesh)[:, :2], _SECTION if arm.radial else ("x (m)", "y (m)")
+        dot: dict[str, Any] = {"markersize": 1.6, "markeredgewidth": 0.0}
         for k, panel in enumerate(right):
             inside = points[(labels == k + 1).ravel()]
-            panel.plot(*points.T, ",", color="#e8e8e8", rasterized=True, label="_all")
-            panel.plot(*inside.T, ",", color=colors[k], alpha=0.3, rasterized=True, label=f"_{k}")
+            panel.plot(*points.T, ".", color="#e8e8e8", rasterized=True, label="_all", **dot)
+            panel.plot(
+                *inside.T, ".", color=colors[k], alpha=0.12, rasterized=True, label=f"_{k}", **dot
+            )
             panel.set(xlabel=text[0], ylabel="" if k else text[1], aspect="equal")
             panel.set_title(f"aspect with {100.0 * group.volumes[k] / group.volumes.sum():.0f} %")
     else:
-        right[0].bar(np.arange(a.count), a.volume, color=INK, alpha=0.6)
+        right[0].bar(np.arange(1, a.count + 1), a.volume, color=INK, alpha=0.6)
         right[0].set(xlabel="aspect", ylabel="volume of joint space")
+        right[0].locator_params(axis="x", integer=True)
     return style.finished(figure, title)
 
 
