@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, least_shown, refuse_jointless, slowed
+from .checks import ROUNDING, checked_limits, least_shown, slowed
 from .limits import MotionLimits
 from .motions import PiecewisePolynomial
+from .splines import as_points
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5
@@ -77,13 +78,8 @@ def blended_lines(
     >>> path.duration, path.q(2.25)
     (3.5..., array([1.9375, 0.0625]))
     """
-    q = as_floats(points, "points")
-    if q.ndim not in (1, 2) or len(q) < 2:
-        raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
-    scalar = q.ndim == 1
-    q = q[:, None] if scalar else q
+    q, scalar = as_points(points)
     m, n = q.shape
-    refuse_jointless(n, "points")
     bounds = checked_limits(limits, n, q)
     step = np.diff(q, axis=0)
     if segment_times is None:
