@@ -51,20 +51,20 @@ def follow(
     if index.size == 0:
         return rows
     postures, valid, code = found.q[index], found.valid[index], found.code[index]
-    following = _following(postures, valid, revolute)
+    after = following(postures, valid, revolute)
     if start is not None:
         s = _nearest(postures[0], valid[0], start, revolute)
     else:
-        s = _best_start(postures, valid, found.within_limits[index], following, revolute)
+        s = _best_start(postures, valid, found.within_limits[index], after, revolute)
     loose, picks = np.any(found.free_joints[index], axis=-1), []
     settled: dict[int, tuple[Array, str]] = {}  # their free joints depend on the posture before
-    if not loose.any() and (following == np.arange(following.shape[-1])).all():
+    if not loose.any() and (after == np.arange(after.shape[-1])).all():
         picks = [s] * index.size
     for k in range(len(picks), index.size):
         if k - 1 in settled:
             s = _nearest(postures[k], valid[k], settled[k - 1][0], revolute)
         elif k:
-            s = int(following[k - 1, s])
+            s = int(after[k - 1, s])
         picks.append(s)
         if loose[k, s]:
             settled[k] = postures[k, s], str(names[code[k, s]])
@@ -151,35 +151,33 @@ def continuous(
     return out
 
 
-def _following(
-    postures: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """For every posture the one of the next pose that goes on from it, shape (M - 1, S)."""
-    from ..kernels.posture_chains import following_postures
-
-    postures, valid = np.ascontiguousarray(postures), np.ascontiguousarray(valid)
-    following = np.empty((max(len(valid) - 1, 0), valid.shape[1]), np.int64)
-    following_postures(postures, valid, revolute, _NEAR, following)
-    return following
+def following(q: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """For every posture (M, S, n) the one of the next pose that continues it, shape (M - 1, S)."""
+    M, S, _ = q.shape
+    way = np.abs(np.diff(q, axis=0))
+    way = np.where(revolute, np.minimum(way, np.abs(2.0 * np.pi - way)), way)
+    near = (way < _NEAR).all(axis=-1)  # also False for NaN, where the next pose lacks this posture
+    after = np.tile(np.arange(S), (max(M - 1, 0), 1))
+    rows = np.flatnonzero((valid[:-1] & ~near).any(axis=1))
+    apart = posture_distance(q[rows + 1, None], q[rows, :, None], revolute)
+    nearest = np.where(valid[rows + 1, None], apart, np.inf).argmin(axis=-1)
+    after[rows] = np.where(valid[rows], nearest, after[rows])
+    return after
 
 
 def _best_start(
-    postures: Array,
-    valid: NDArray[np.bool_],
-    inside: NDArray[np.bool_],
-    following: NDArray,
-    revolute: NDArray[np.bool_],
-) -> int:
+    postures: Array, valid: NDArray[np.bool_], inside: NDArray[np.bool_],
+    after: NDArray[np.intp], revolute: NDArray[np.bool_],
+) -> int:  # fmt: skip
     """The first posture whose branch goes through best."""
     M, S = valid.shape
     chains = np.tile(np.arange(S), (M, 1))
-    if (following != chains[0]).any():
+    if (after != chains[0]).any():
         for k in range(M - 1):
-            chains[k + 1] = following[k][chains[k]]
+            chains[k + 1] = after[k][chains[k]]
     ways = np.take_along_axis(postures, chains[..., None], axis=1)
     steps = posture_distance(ways[1:], ways[:-1], revolute)
     ordinary = np.median(steps, axis=0) if M > 1 else np.zeros(S)
     jumps = (steps > np.maximum(0.3, 8.0 * ordinary)).sum(axis=0)
     outside = (~np.take_along_axis(inside, chains, axis=1)).sum(axis=0)
-    ranks = np.lexsort((steps.sum(axis=0), outside, jumps, ~valid[0]))
-    return int(ranks[0])
+    return int(np.lexsort((steps.sum(axis=0), outside, jumps, ~valid[0]))[0])

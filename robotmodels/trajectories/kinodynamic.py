@@ -31,7 +31,7 @@ from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, knots_of
 from .checks import checked_limits, sample_count
 from .limits import MotionLimits
-from .path_limits import SLOWEST, PathLimits, not_held
+from .path_limits import PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import TimingResult, Trajectory
 
@@ -229,13 +229,14 @@ def kinodynamic(
         return _without(PlanStatus.NONE_FOUND, why)
     for k, q in enumerate(postures):
         end, name = k in (0, len(given) - 1), _name(k, len(given))
-        held, why = _held(problem, q, name) if end else (np.ones(len(q), np.bool_), "")
-        if not held.any():
-            return _without(PlanStatus.ENDS_NOT_HELD, why)
+        held = [problem.not_held(x[None], lambda _, at=name: at, True) if end else "" for x in q]
+        if all(held):
+            return _without(PlanStatus.ENDS_NOT_HELD, held[0])
+        q = q[[not why for why in held]]
         clear, why = _clear(model, q, bodies, wanted, name)
-        if not (held & clear).any():
+        if not clear.any():
             return _without(PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND, why)
-        postures[k] = q[held & clear]
+        postures[k] = q[clear]
     generator = generator_of(rng)
     tasks = []
     for choice in product(*postures):
@@ -316,18 +317,6 @@ def _postures(
         out = (q > limits.upper) if side > 0.0 else (q < limits.lower)
         q = q - side * turn * out
     return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
-
-
-def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], str]:
-    """Which configurations (m, n) the torques hold, and a sentence about the first."""
-    rest = np.zeros(q.shape)
-    load = problem.rows(q, rest, rest).held
-    stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-    why = [
-        not_held(load[k : k + 1], problem.torque, lambda _: name, stuck[k : k + 1])
-        for k in range(len(q))
-    ]
-    return np.array([not text for text in why]), why[0]
 
 
 def _clear(

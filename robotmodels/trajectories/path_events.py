@@ -97,7 +97,7 @@ class Task:
         self.conditioning, self.sign = np.full(len(q), np.nan), np.zeros(len(q))
         self._inverse = np.full((*q.shape, J.shape[-2]), np.nan)
         self._inverse[reached] = 0.0
-        inverse, self.conditioning[reached], self.sign[reached] = _inverted(J)
+        inverse, self.conditioning[reached], self.sign[reached] = inverted(J)
         self._inverse[np.ix_(reached, columns)] = inverse
 
     def rates(self, twists: Array) -> Array:
@@ -124,28 +124,22 @@ class Task:
         return twists[:, self._asked]
 
 
-def _inverted(J: Array) -> tuple[Any, Any, Any]:
+def inverted(J: Array) -> tuple[Any, Any, Any]:
     """(Pseudo-)inverses, conditioning and sign of the determinant of Jacobians (M, m, n)."""
     from ..kernels.inverses import inverses
 
     M, m, n = J.shape
-    r = min(m, n)
     if m == n:
-        inverse, conditioning, sign = np.empty((M, n, n)), np.empty(M), np.empty(M)
+        inverse, conditioning, sign = np.empty(J.shape), np.empty(M), np.empty(M)
         if inverses(np.ascontiguousarray(J), inverse, conditioning, sign) < 0:
             return inverse, np.nan_to_num(conditioning), sign
     # one of them is singular to the last digit, or they are not square
-    size = np.sqrt(np.einsum("kij,kij->k", J, J))
-    U, s, Vt = np.linalg.svd(J, full_matrices=False)
-    live = s > 1e-14 * s[:, :1]
-    with np.errstate(divide="ignore"):
-        other = np.sqrt((1.0 / (s * s)).sum(axis=-1))
-        factor = np.where(live, 1.0 / np.where(live, s, 1.0), 0.0)
-    inverse = np.swapaxes(Vt, -1, -2) @ (factor[..., None] * np.swapaxes(U, -1, -2))
-    with np.errstate(invalid="ignore"):
-        conditioning = np.where(size > 0.0, r / (size * other), 0.0)
-    sign = np.sign(np.linalg.det(J)) if m == n else np.zeros(len(J))
-    return inverse, conditioning, sign
+    s = np.linalg.svd(J, compute_uv=False)
+    live = s[:, -1] > 1e-14 * s[:, 0]
+    product = (s * s).sum(axis=-1) * (1.0 / np.where(live[:, None], s, 1.0) ** 2).sum(axis=-1)
+    conditioning = np.where(live, min(m, n) / np.sqrt(np.maximum(product, 1e-300)), 0.0)
+    sign = np.sign(np.linalg.det(J)) if m == n else np.zeros(M)
+    return np.linalg.pinv(J, rcond=1e-14), conditioning, sign
 
 
 def path_events(

@@ -44,14 +44,14 @@ _KNOTS = 800  # more of them would lose digits of the second derivative
 class Rows(NamedTuple):
     """``lower <= a u + b x + c <= upper`` and ``x <= top``, of K quantities at N + 1 points.
 
-    Shapes: a, b, c (N + 1, K), top (N + 1,); held (N + 1, n), torques at rest without friction.
+    Shapes: a, b, c (N + 1, K), top (N + 1,); still (K,), the last c without friction.
     """
 
     a: Array
     b: Array
     c: Array
     top: Array
-    held: Array
+    still: Array
 
 
 class Passes(NamedTuple):
@@ -121,23 +121,49 @@ class PathLimits:
 
     def drag(self, q: Array, v: Array) -> Array:
         """Torques of friction at velocities. Shapes: q, v (..., n) -> (..., n)."""
-        if self.friction is False:
-            return np.zeros(v.shape)
         drag = np.zeros(v.shape)
+        if self.friction is False:
+            return drag
         if self.drives is not None:
             drag = self.drives.torque(v, None) - self.drives.offset
         if self.friction is not None:
             drag = drag + torque_at(self.friction, v, q)  # type: ignore[arg-type]
         return drag
 
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Torques (N, n) of a motion; none without limits of torque."""
+        if self.model is None or not self.loaded.size:
+            return np.zeros(q.shape)
+        tau = rigid_torques(self.model, q, v, a) + self.drag(q, v)
+        return tau if self.drives is None else tau + a @ self.drives.rotor + self.drives.offset
+
+    def not_held(self, q: Array, place: Callable[[int], str], stuck: bool) -> str:
+        """Where torques at rest (N, n) exceed their limits most, as a sentence; or nothing.
+
+        ``stuck``: whether dry friction helps.
+        """
+        none = np.zeros(q.shape)
+        load = self.torques(q, none, none)
+        help_ = np.abs(self.drag(q, none + SLOWEST)) if stuck else none
+        margin = self.torque * (1.0 + 1e-9) - np.abs(load) + help_
+        if (margin >= 0.0).all():
+            return ""
+        i, j = np.unravel_index(int(margin.argmin()), margin.shape)
+        return (
+            f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
+            f"{abs(load[i, j]):.6g} to be held still and has {self.torque[j]:.6g}"
+            f"{' and dry friction' if help_.any() else ''}, margin of {margin[i, j]:.4g} "
+            "(N m or N)."
+        )
+
     def rows(self, q: Array, rate: Array, bend: Array) -> Rows:
         """Rows at points of a path. Shapes: q and its derivatives by s (N + 1, n)."""
         some, N = self.acceleration, len(q)
-        a, b, c = np.empty((3, N, self.scale.size))
-        k, gravity = some.size, np.zeros(q.shape)
-        a[:, :k], b[:, :k], c[:, :k] = rate[:, some], bend[:, some], 0.0
+        a, b, c = np.zeros((3, N, self.scale.size))
+        k, still = some.size, np.zeros(self.scale.size)
+        a[:, :k], b[:, :k] = rate[:, some], bend[:, some]
         if self.loaded.size and self.model is not None:
-            none = np.zeros(q.shape)
+            load, none = self.loaded, np.zeros(q.shape)
             tau = rigid_torques(
                 self.model,
                 np.concatenate((q, q, q)),
@@ -149,17 +175,15 @@ class PathLimits:
                 rotor = self.drives.rotor
                 inertial, moving = inertial + rate @ rotor, moving + bend @ rotor
                 gravity = gravity + self.drives.offset
-            load, steady = self.loaded, gravity
+            steady, still[k:] = gravity, gravity[-1, load]
             if self.drives is not None or self.friction:
                 steady = gravity + self.drag(q, SLOWEST * self.direction(rate))
             a[:, k:], b[:, k:], c[:, k:] = inertial[:, load], moving[:, load], steady[:, load]
-        a /= self.scale
-        b /= self.scale
-        c /= self.scale
         with np.errstate(divide="ignore"):
             most = np.where(rate > 0.0, self.limits.velocity, -self.limits.velocity_lower)
             top = (most / np.abs(rate)).min(axis=1) ** 2
-        return Rows(a, b, c, np.minimum(top, 1e300), gravity)
+        scale = self.scale
+        return Rows(a / scale, b / scale, c / scale, np.minimum(top, 1e300), still / scale)
 
     def direction(self, rate: Array) -> Array:
         """The rates, with those that are nothing but rounding made zero."""
@@ -173,18 +197,32 @@ class PathLimits:
 
         ``tight`` (2, N, K): by how much the lower and upper limits are narrower on each interval.
         """
+        from .kernels import path_rates
+
         rows = self.rows(q, rate, bend) if rows is None else rows
         if ends[1] == 0.0:  # at rest dry friction does not help to brake
-            held = rows.held[-1, self.loaded]
-            rows.c[-1, self.acceleration.size :] = held / self.scale[self.acceleration.size :]
+            rows.c[-1] = rows.still
         steps, given, narrow = np.diff(s), np.square(ends), np.zeros((2, len(s) - 1, 1)) + tight
         bounds = (self.lower + narrow[0], self.upper - narrow[1])
-        now = self._swept(steps, rows, given, bounds)
+
+        def swept(rows: Rows) -> Passes:
+            found = np.empty((len(s), 6))
+            failed = path_rates(
+                steps, rows.a, rows.b, rows.c, *bounds, self.ends, rows.top, given, found
+            )
+            if failed >= 0:
+                return Passes(found, failed, np.inf, rows)
+            speed = np.sqrt(np.maximum(found[:, 0], 0.0))
+            pace = speed[1:] + speed[:-1]
+            duration = float((2.0 * steps / pace).sum()) if pace.min() > 0.0 else np.inf
+            return Passes(found, -1, duration, rows)
+
+        now = swept(rows)
         if not self.viscous or now.failed >= 0:
             return now
         x, best = now.found[:, 0], None
         for _ in range(sweeps):
-            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given, bounds)
+            last, now = now, swept(self.tangent(rows, x, q, rate))
             if now.failed >= 0:
                 x, now = 0.25 * x, last
                 continue
@@ -195,8 +233,6 @@ class PathLimits:
 
     def tangent(self, rows: Rows, x: Array, q: Array, rate: Array) -> Rows:
         """Rows with the friction that depends on the speed, by its tangent at squared rates x."""
-        if not self.viscous:
-            return rows
         k, turns = self.acceleration.size, self.direction(rate)
         speed = np.sqrt(np.maximum(x, 0.0))[:, None]
         square = np.where(x > 0.0, x, np.inf)[:, None]
@@ -213,40 +249,6 @@ class PathLimits:
         b[:, k:] += slope / self.scale[k:]
         c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
         return rows._replace(b=b, c=c)
-
-    def _swept(
-        self, steps: Array, rows: Rows, given: Array, bounds: tuple[Array, Array]
-    ) -> Passes:  # fmt: skip
-        from .kernels import path_rates
-
-        found = np.empty((len(steps) + 1, 6))
-        failed = path_rates(
-            steps, rows.a, rows.b, rows.c, *bounds, self.ends, rows.top, given, found
-        )
-        if failed >= 0:
-            return Passes(found, failed, np.inf, rows)
-        rate = np.sqrt(np.maximum(found[:, 0], 0.0))
-        pace = rate[1:] + rate[:-1]
-        duration = float((2.0 * steps / pace).sum()) if pace.min() > 0.0 else np.inf
-        return Passes(found, -1, duration, rows)
-
-
-def not_held(
-    held: Array, bound: Array, place: Callable[[int], str], stuck: Array | float = 0.0
-) -> str:
-    """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence; or nothing.
-
-    ``stuck``: torques of dry friction that help.
-    """
-    margin = bound * (1.0 + 1e-9) - np.abs(held) + stuck
-    if (margin >= 0.0).all():
-        return ""
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    return (
-        f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
-        f"{abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}"
-        f"{' and dry friction' if np.any(stuck) else ''}, margin of {margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def checked_torque(

@@ -9,14 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_number
 from .._outcomes import Outcome
-from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..friction import Friction
 from ..model import RobotModel
 from .checks import checked_limits, sample_count
 from .limits import MotionLimits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
-from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
+from .path_limits import Passes, PathLimits, Rows, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
 from .trajectory import TimingResult, Trajectory
@@ -183,19 +182,23 @@ def time_optimal(
     ends = (rates[0], rates[1])
     rows = problem.rows(q, rate, bend)
     rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
-    stuck = np.abs(problem.drag(q[rests], np.full((len(rests), n), SLOWEST)))
-    found = not_held(rows.held[rests], problem.torque, lambda i: f"s = {s[rests[i]]:.6g}", stuck)
+    found = problem.not_held(q[rests], lambda i: f"s = {s[rests[i]]:.6g}", True) if rests else ""
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
-        found = not_held(rows.held, problem.torque, lambda i: f"s = {s[i]:.6g}")
+        found = problem.not_held(q, lambda i: f"s = {s[i]:.6g}", False)
         if found:
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
     coarse = problem.passes(
-        s[half], q[half], rate[half], bend[half], ends, Rows(*(part[half] for part in rows))
+        s[half],
+        q[half],
+        rate[half],
+        bend[half],
+        ends,
+        Rows(*(part[half] for part in rows[:4]), rows.still),
     )
     gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
@@ -248,7 +251,7 @@ def time_optimal(
 def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside: Array) -> Array:
     """Torques (N, P, n) at places inside the intervals, over their limits."""
     N = law.lengths.size
-    if problem.model is None or not problem.loaded.size:
+    if not problem.loaded.size:
         return np.zeros((N, 1, problem.n))
     timed, places = TimedMotion(motion, law), np.tile(inside, (N, 1))
     if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
@@ -257,10 +260,7 @@ def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside:
         at = np.where(turns, v[:-1] / np.where(turns, v[:-1] - v[1:], 1.0), 0.0).max(axis=1)
         places = np.hstack((places, np.clip(at[:, None] + _BESIDE, 0.0, 1.0 - 1e-9)))
     times = (law.breaks[0, :-1, None] + law.lengths[0][:, None] * places).reshape(-1)
-    q, v, a = timed.derivatives(times, (0, 1, 2))
-    tau = rigid_torques(problem.model, q, v, a) + problem.drag(q, v)
-    if problem.drives is not None:
-        tau = tau + a @ problem.drives.rotor + problem.drives.offset
+    tau = problem.torques(*timed.derivatives(times, (0, 1, 2)))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.nan_to_num(tau / problem.torque, nan=0.0).reshape(N, -1, problem.n)
 
