@@ -60,8 +60,13 @@ class JointPath(Frozen, Value):
     @property
     def complete(self) -> bool:
         """Whether every pose is reached, inside the joint limits and without a jump."""
-        stops = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
-        return not any(event.kind in stops for event in self.events)
+        return not self.stops
+
+    @property
+    def stops(self) -> tuple[PathEvent, ...]:
+        """The events after which the robot cannot go on."""
+        kinds = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
+        return tuple(event for event in self.events if event.kind in kinds)
 
     def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
         """The events of a kind, in the order of the path."""

@@ -28,7 +28,7 @@ from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
-from .candidates import Candidates, Cost, knots_of
+from .candidates import Candidates, Cost, shares, spread
 from .checks import checked_limits, sample_count
 from .limits import MotionLimits
 from .path_limits import PathLimits
@@ -242,9 +242,9 @@ def kinodynamic(
     for choice in product(*postures):
         stations = np.array(choice)
         if np.any(np.diff(stations, axis=0), axis=1).all():
-            at, optimal = knots_of(stations, count), timing is Timing.OPTIMAL
+            at, optimal = spread(shares(stations), count), timing is Timing.OPTIMAL
             task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-            straight = task.evaluated(task.straight())
+            straight = task.evaluated(task.straight)
             if straight.duration < _NO_TIME:
                 raise InvalidValueError(
                     "limits, torque: nothing limits the straight motion, so its time would be "
@@ -263,12 +263,11 @@ def kinodynamic(
     search.share(1.0)
     results.sort(key=lambda result: result.found.penalized)
     restarts = np.array([result.found.penalized for result in results])
-    best = best_motion(search, results, model, limits)
+    best, history = best_motion(search, results, limits), np.reshape(search.history, (-1, 3))
     if best is None:
-        return replace(_without(PlanStatus.NONE_FOUND, ""), history=search.rows, restarts=restarts)
-    return Plan(
-        best.motion, PlanStatus.FOUND, best.cost, search.rows, best.use, restarts, best.times
-    )
+        return replace(_without(PlanStatus.NONE_FOUND, ""), history=history, restarts=restarts)
+    motion, cost_of_best, use, times = best
+    return Plan(motion, PlanStatus.FOUND, cost_of_best, history, use, restarts, times)
 
 
 def _without(status: PlanStatus, why: str) -> Plan:
