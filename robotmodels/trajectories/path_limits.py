@@ -140,6 +140,8 @@ class PathLimits:
 
         ``stuck``: whether dry friction helps.
         """
+        if not self.loaded.size or not q.size:
+            return ""
         none = np.zeros(q.shape)
         load = self.torques(q, none, none)
         help_ = np.abs(self.drag(q, none + SLOWEST)) if stuck else none

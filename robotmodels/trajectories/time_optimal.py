@@ -161,8 +161,8 @@ def time_optimal(
     (1.5, 'velocity of joint 1')
     """
     points = sample_count(points, "points", 2, _MOST)
-    rates = tuple(as_number(r, k, least=0.0, below=1e150) for r, k in
-                  ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    first, last = (as_number(r, k, least=0.0, below=1e150) for r, k in
+                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
     if not isinstance(both_ends, bool | np.bool_):
         raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
@@ -170,21 +170,20 @@ def time_optimal(
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
-    own = isinstance(path, Trajectory) and motion is path.motion
-    evenly = own and not np.isfinite(problem.rates).any()
-    s = np.linspace(0.0, 1.0, points + 1) if evenly else toward_ends(points)
+    own, rated = motion is getattr(path, "motion", None), bool(np.isfinite(problem.rates).any())
+    s = np.linspace(0.0, 1.0, points + 1) if own and not rated else toward_ends(points)
     s = float(motion.duration) * s
     q, rate, bend = motion.derivatives(s, (0, 1, 2))
     checked_limits(problem.limits, n, q)
+    ends = (first, last)
     if isinstance(path, Trajectory) and not own:  # rates of the length
         (speed,) = path.motion.derivatives(np.array([0.0, path.duration]), (1,))
-        rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
-    ends = (rates[0], rates[1])
-    rows = problem.rows(q, rate, bend)
-    rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
-    found = problem.not_held(q[rests], lambda i: f"s = {s[rests[i]]:.6g}", True) if rests else ""
+        ends = (first * float(np.linalg.norm(speed[0])), last * float(np.linalg.norm(speed[1])))
+    rests = [k for k, r in ((0, first), (points, last)) if r == 0.0]
+    found = problem.not_held(q[rests], lambda i: f"s = {s[rests[i]]:.6g}", True)
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
+    rows = problem.rows(q, rate, bend)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
         found = problem.not_held(q, lambda i: f"s = {s[i]:.6g}", False)
@@ -192,25 +191,17 @@ def time_optimal(
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = problem.passes(
-        s[half],
-        q[half],
-        rate[half],
-        bend[half],
-        ends,
-        Rows(*(part[half] for part in rows[:4]), rows.still),
-    )
-    gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
+    coarse = Rows(*(part[half] for part in rows[:4]), rows.still)
+    gap = problem.passes(s[half], q[half], rate[half], bend[half], ends, coarse).duration
+    gap = abs(gap - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
     if not x.max() < 1e200:
         raise InvalidValueError(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
-    law, slowed, tight = law_of(s, x), np.zeros(x.shape, np.bool_), np.zeros((2, points, 1))
-    inside = _INSIDE if both_ends else _INSIDE[::2]
-    use = _uses(problem, motion, law, inside)
-    if np.isfinite(problem.rates).any():
+    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    if rated:
         slower = rate_limited(problem, s, q, rate, rows, x)
         if slower is None:
             return _without(
@@ -219,41 +210,40 @@ def time_optimal(
             )
         slowed = slower[0] < x * (1.0 - 1e-3)
         x, law = slower
-        use = _uses(problem, motion, law, inside)
-    elif both_ends:
-        for _ in range(_ROUNDS):
-            over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
-            if not over.max(initial=0.0) > _HELD:
-                break
-            # where torques inside an interval exceed their limits, those at its ends are narrower
-            wide = np.zeros((2, points, problem.scale.size))
-            wide[..., problem.acceleration.size :] = 1.1 * np.maximum(over[..., problem.loaded], 0)
-            tight = tight + wide
-            then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
-            if then.failed >= 0 or np.isinf(then.duration):
-                break
-            passes, law = then, law_of(s, then.found[:, 0])
-            x, use = passes.found[:, 0], _uses(problem, motion, law, inside)
+    use = _uses(problem, motion, law, both_ends)
+    tight = np.zeros((2, points, problem.scale.size))
+    for _ in range(_ROUNDS if both_ends and not rated else 0):
+        over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
+        if not over.max(initial=0.0) > _HELD:
+            break
+        # where torques inside an interval exceed their limits, those at its ends are narrower
+        tight[..., problem.acceleration.size :] += 1.1 * np.maximum(over[..., problem.loaded], 0.0)
+        then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
+        if then.failed >= 0 or np.isinf(then.duration):
+            break
+        passes, x = then, then.found[:, 0]
+        law = law_of(s, x)
+        use = _uses(problem, motion, law, both_ends)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
     if velocity.any():
         with np.errstate(divide="ignore"):
             spare = np.where(rate > 0.0, problem.limits.velocity, -problem.limits.velocity_lower)
             code[velocity] += (spare / np.abs(rate)).argmin(axis=1)[velocity]
-    most = np.sqrt(np.maximum(passes.found[:, 4], 0.0))
     active = np.where(slowed, "rate", problem.names[code])
-    trajectory = Trajectory(TimedMotion(motion, law), scalar)
-    x = np.sqrt(np.maximum(x, 0.0))
-    why = _beyond(use, s, both_ends)
-    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, x, most, active, gap, why)
+    speed, most = (np.sqrt(np.maximum(y, 0.0)) for y in (x, passes.found[:, 4]))
+    trajectory, why = Trajectory(TimedMotion(motion, law), scalar), _beyond(use, s, both_ends)
+    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, speed, most, active, gap, why)
 
 
-def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside: Array) -> Array:
+def _uses(
+    problem: PathLimits, motion: Motion, law: PiecewisePolynomial, both_ends: bool
+) -> Array:  # fmt: skip
     """Torques (N, P, n) at places inside the intervals, over their limits."""
     N = law.lengths.size
     if not problem.loaded.size:
         return np.zeros((N, 1, problem.n))
-    timed, places = TimedMotion(motion, law), np.tile(inside, (N, 1))
+    timed, places = TimedMotion(motion, law), np.tile(_INSIDE[:: 1 if both_ends else 2], (N, 1))
     if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
         (v,) = timed.derivatives(law.breaks[0], (1,))
         turns = v[1:] * v[:-1] < 0.0
