@@ -57,7 +57,6 @@ from .pose_trajectory import (
     PoseTrajectory,
     arc,
     axis_and_angle,
-    line,
     rotation_about,
 )
 from .trajectory import Trajectory
@@ -145,7 +144,7 @@ def straight_line(
     >>> move.duration, move.twist(1.0).round(9) + 0.0
     (2.50..., array([0.5 , 0.  , 0.  , 0.  , 0.  , 0.25]))
     """
-    path = line(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
+    path = arc(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
     return _timed(path, duration, limits, law)
 
 
@@ -219,7 +218,7 @@ def circle(
     R = rotation_about(n, np.array(sweep))
     last[:3, 3] = foot + R @ (first[:3, 3] - foot)
     if sweep == 0.0:
-        return _timed(line(first, first), duration, limits, law)
+        return _timed(arc(first, first), duration, limits, law)
     if not turning:
         return _timed(arc(first, last, foot, n, sweep), duration, limits, law)
     last[:3, :3] = R @ first[:3, :3]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Frozen, Value, as_exact, as_mask, as_number
+from .._arrays import Array, as_exact, as_mask, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
@@ -24,10 +24,11 @@ from .follow import continuous, follow, follow_singly
 from .limits import few_lines
 from .path_events import PathEvent, PathEventKind, Task, path_events
 from .pose_trajectory import PoseTrajectory
+from .trajectory import Sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath(Frozen, Value):
+class JointPath(Sampled):
     """Postures that follow poses, and what happens on the way.
 
     Parameters
@@ -71,9 +72,6 @@ class JointPath(Frozen, Value):
     def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
         """The events of a kind, in the order of the path."""
         return tuple(event for event in self.events if event.kind is kind)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.q, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
         state = "complete" if self.complete else "not complete"
