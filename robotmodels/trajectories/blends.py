@@ -1,8 +1,7 @@
 """Straight lines between points at constant velocity, joined by blends near the points.
 
-The motion would turn a corner at each inner point; a blend of a chosen time around it changes the
-velocity evenly (parabola) or smoothly (quartic), and leaves the corner aside. The first and the
-last point are met at rest: there a line of no velocity precedes or follows.
+A blend changes the velocity evenly (parabola) or smoothly (quartic) and leaves the corner aside;
+the first and the last point are met at rest.
 """
 
 from __future__ import annotations
@@ -50,8 +49,7 @@ def blended_lines(
     segment_times : array_like, shape () or (m - 1,), optional
         Seconds from corner to corner instead.
     blend_times : array_like, shape () or (m,), optional
-        Seconds of each blend, with ``segment_times``; default the least that the limits allow. The
-        motion starts and ends half a blend before and after the time of its end points.
+        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
     smooth : bool
         Whether the blends keep the acceleration continuous.
 

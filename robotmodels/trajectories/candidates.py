@@ -229,8 +229,8 @@ def random_profile(
 ) -> Trajectory:
     """Random motion from rest to rest between two configurations, in one second.
 
-    The nodes are evenly spaced in time, at positions drawn uniformly around the straight line: by
-    up to half of the way of their joint, and at least a tenth of the longest way of all joints.
+    The nodes are evenly spaced in time and drawn uniformly around the straight line: by up to half
+    of the way of their joint, and at least a tenth of the longest way of all joints.
 
     Parameters
     ----------
@@ -239,8 +239,7 @@ def random_profile(
     nodes : int
         Number of free configurations between the ends.
     law : ProfileLaw or str
-        ``"spline"``, ``"trapezoid"`` (with random durations of its accelerations; the nodes are
-        passed at a distance) or ``"quintic"``.
+        ``"spline"``, ``"trapezoid"`` (which passes the nodes at a distance) or ``"quintic"``.
     rng : Generator or int, optional
         Random numbers, or their seed; by default a fixed one.
 

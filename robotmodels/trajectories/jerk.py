@@ -1,8 +1,6 @@
 """Motions of constant jerk by phases, the quickest under limits of jerk, between any two states.
 
-From rest to rest, and on the straight line of coordinated joints, the closed form of `laws` or a
-single joint's solution serves. Other states go through ruckig (Berscheid and Kroeger, 2021), of
-which only the phases of its profiles are taken.
+From rest to rest the closed form of `laws` serves, other states go through ruckig.
 """
 
 from __future__ import annotations
@@ -45,8 +43,7 @@ def jerk_limited(
     """The quickest motion under limits of velocity, acceleration and jerk, between any states.
 
     Also called double S, seven-phase profile, online trajectory generation. Coordinated joints stay
-    on the straight line between the postures, which states at the ends must lie along; joints that
-    share the time only may start and end in any state.
+    on the straight line between the postures, along which their states at the ends must be.
 
     Parameters
     ----------
@@ -55,9 +52,8 @@ def jerk_limited(
     duration : array_like, shape () or (...), optional
         Seconds; default the least.
     limits : MotionLimits
-        May be asymmetric; all but that of jerk may be infinite. Where a state at an end moves,
-        ruckig keeps the smaller limit of jerk both ways: only from rest to rest is the motion the
-        quickest.
+        All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
+        both ways.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation or str

@@ -1,9 +1,4 @@
-"""From poses of the tool to joints: one posture after the other, without leaving its branch.
-
-The seed book's section 4.3 ends with this step. A straight line in space may leave the reach of the
-robot, meet a singular position or ask for joint velocities that no motor has; where it does, the
-`JointPath` tells.
-"""
+"""From poses of the tool to joints: one posture after the other, without leaving its branch."""
 
 from __future__ import annotations
 
@@ -42,8 +37,8 @@ class JointPath(Sampled):
     status : ndarray of int8, shape (N,)
         Codes of `IGMStatus`.
     conditioning : ndarray, shape (N,)
-        Of the Jacobian, from 1 where it is best to 0 where it is singular (the inverse of its
-        condition number in the Frobenius norm, positions taken in units of the arm's lever).
+        Of the Jacobian, from 1 to 0 where it is singular: the inverse of its condition number in
+        the Frobenius norm, positions in units of the arm's lever.
     branch : ndarray of str, shape (N,)
         Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
@@ -93,12 +88,10 @@ def joint_path(
 ) -> JointPath:
     """Joint positions along poses, branch kept, with a report of what happens on the way.
 
-    Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
-    nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
-    with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
-    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if it
-    has one; others go on by the least steps from the last posture, and are solved for all postures
-    only where that fails.
+    Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the nearest to
+    the last one is taken. Without ``q_start`` the branch is chosen with the fewest jumps, the
+    fewest poses outside the limits, and then the shortest way. A redundant arm keeps its arm angle
+    if it has one; others go on by the least steps from the last posture.
 
     Parameters
     ----------
@@ -107,9 +100,8 @@ def joint_path(
     poses : PoseTrajectory or array_like, shape (N, 4, 4)
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
-        Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
-        value (without it 0, or the nearest value inside their limits). A first posture that is more
-        than 0.1 away from it is reported as a jump.
+        Posture from which the robot comes, rad or m; a first posture more than 0.1 away from it is
+        reported as a jump. Joints that do not move the tool keep its value.
     q_near : array_like, shape (n,), optional
         A guess instead: the path begins with the solution of the first pose that is nearest to it.
     t : array_like, shape (N,), optional

@@ -85,12 +85,11 @@ class Plan(TimingResult):
     cost : float
         Its cost, see `Cost`; infinite without one.
     history : ndarray, shape (N, 3)
-        Number of the evaluation, cost of the candidate (with a penalty for limits of position and
-        clearance that it does not keep; infinite without a timing), least cost so far.
+        Number of the evaluation, cost of the candidate with penalties, least cost so far.
     torque_use : ndarray, shape (n,)
         Greatest torque of each joint over its limit; 0 where it has none.
     restarts : ndarray, shape (R,)
-        Least cost of each restart of the search: their spread shows how local it is.
+        Least cost of each restart of the search.
     via_times : ndarray, shape (k,)
         Times at which the via points are met, s.
     explanation : str
@@ -150,11 +149,9 @@ def kinodynamic(
     """Kinodynamic planning: the best motion from rest to rest without a given path.
 
     Also called optimal motion planning, minimum-time trajectory optimisation. Paths are splines
-    through free nodes; simulated annealing varies the nodes, with the exact timing of every path
-    (`time_optimal`), from several restarts. The best path of each is then refined to more nodes
-    and improved by sequential linear programming. The motion is checked at 10 000 times.
-
-    The search is local in the end: `Plan.restarts` shows its spread.
+    through free nodes, varied by simulated annealing with the exact timing of every path
+    (`time_optimal`), then refined to more nodes and improved by sequential linear programming. The
+    search is local: `Plan.restarts` shows its spread. The motion is checked at 10 000 times.
 
     Parameters
     ----------
@@ -163,14 +160,13 @@ def kinodynamic(
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
     limits : MotionLimits
-        Of velocity, acceleration, jerk and position; those of the model's table count only if given
-        here, as by `MotionLimits.of_model`.
+        Of velocity, acceleration, jerk and position; see `MotionLimits.of_model` for the table's.
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     via : sequence of array_like, shape (n,), or Pose
         Configurations on the way, in this order.
     obstacles : Sphere, Box, Plane, Capsule, or iterable of these
-        Bodies that the links avoid, see `robotmodels.obstacles`.
+        Bodies that the links avoid.
     clearance : float
         Least distance from them, m.
     cost : Cost
@@ -180,13 +176,13 @@ def kinodynamic(
     method : PlanMethod or str
         ``"anneal"`` or ``"descent"``.
     timing : Timing or str
-        ``"optimal"`` times every path exactly; ``"profile"`` takes the nodes as a profile over
-        time and stretches it, with the windows of `time_scaled`.
+        ``"optimal"`` times every path exactly; ``"profile"`` stretches a profile over time, as
+        `time_scaled`.
     rng : Generator or int, optional
         Random numbers, or their seed; by default a fixed one.
     seconds : float
-        Greatest duration of the search, by the clock. It makes up to 500 evaluations for each
-        second and ends early; only if the clock ends it, results with one seed may differ.
+        Greatest duration of the search, of up to 500 evaluations for each second; results with one
+        seed differ only where the clock ends it.
     progress : bool or callable
         Called with the number of evaluations and the least cost; True prints both.
 

@@ -1,9 +1,4 @@
-"""Following poses by joint velocities: the inverse kinematic model, step after step.
-
-What `joint_path` does with postures, this does with velocities, and so for every robot: with more
-joints than the task needs the rest is free for criteria, lower tasks and bounds; near singular
-positions the tool falls behind instead of the joints racing.
-"""
+"""Following poses by joint velocities: the inverse kinematic model, step after step."""
 
 from __future__ import annotations
 
@@ -87,9 +82,9 @@ def resolved_motion(
     """Follow a trajectory of the tool by joint velocities.
 
     Also called resolved motion rate control, closed-loop inverse kinematics, ``rrmc``. Each step
-    asks `ikm`, half a step ahead, for the velocity that the trajectory has there, plus ``feedback``
-    times what the tool is behind: the error falls with the square of the step. With ``limits`` it
-    asks where the joints are, so that no bound is passed, and the error falls with the step.
+    takes the velocity of `ikm` half a step ahead plus ``feedback`` times what the tool is behind:
+    the error falls with the square of the step. With ``limits`` it is taken where the joints are,
+    so that no bound is passed, and the error falls with the step.
 
     Parameters
     ----------

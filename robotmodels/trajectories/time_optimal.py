@@ -45,24 +45,21 @@ class TimedPath(TimingResult):
     Parameters
     ----------
     trajectory : Trajectory or None
-        The motion; None without one. The acceleration of the path parameter is constant between
-        the points of the grid.
+        The motion, whose parameter has a constant acceleration in each interval; or None.
     status : TimingStatus
         Outcome.
     parameter : ndarray, shape (N,)
-        Path parameter s at the points of the grid: the path's own, or its length in joint space
-        where its own timing rests or jumps.
+        Path parameter s on the grid: the path's own, or its length in joint space where its own
+        timing rests or jumps, or comes from functions.
     rate : ndarray, shape (N,)
         Rate of the parameter there, 1/s (of its unit).
     maximum_rate : ndarray, shape (N,)
         Greatest rate that the limits allow at each point alone: the maximum velocity curve.
     active : ndarray of str, shape (N,)
         The limit that binds from each point on, such as ``"torque of joint 2"``; ``"rate"`` where
-        a limit of jerk or of the rate of a torque makes the motion slower; empty where none does
-        (one interval at a change between two limits).
+        a limit of jerk or of the rate of a torque does; empty at changes between limits.
     grid_gap : float
-        Relative difference from the duration on the grid with half as many intervals, which
-        estimates the relative error of the duration; infinite without one.
+        Relative difference from the duration on half as many intervals, an estimate of the error.
     explanation : str
         Details of the status; where torques exceed their limits between the points of the grid.
     """
@@ -103,20 +100,16 @@ def time_optimal(
 ) -> TimedPath:
     """Time-optimal path parametrisation: the quickest motion along a path.
 
-    Also called TOPP, TOPP-RA. The path keeps its shape and loses its own timing. On a grid of its
-    parameter, the rates from which the end is reached are computed backward, and the greatest of
-    them forward (reachability analysis). Accelerations are limited at both ends of every interval
-    of the grid, torques at its start, as is usual (collocation). Between points torques may then be
-    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where it is more
-    than 2 %. With ``both_ends`` torques are limited at both ends and, by narrower limits where that
-    is needed, between them to 1.001 of their limits, but for moments where dry friction changes its
-    sign.
+    Also called TOPP, TOPP-RA: reachability analysis of a path whose own timing is dropped.
+    Accelerations are limited at both ends of every interval of a grid, torques at its start
+    (collocation); `TimedPath.reason` says where torques between the points exceed their limits by
+    more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
+    needed, between them to 1.001, but for moments where dry friction changes its sign.
 
     Parameters
     ----------
     path : Trajectory or PoseTrajectory
-        n joints along a path, or poses (which need ``model``; its joints then follow them as in
-        `joint_path`). Continuous in its direction.
+        n joints, continuous in direction, or poses (which need ``model``, see `joint_path`).
     limits : MotionLimits
         Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
     model : RobotModel, optional
@@ -124,13 +117,12 @@ def time_optimal(
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     torque_rate : array_like, shape () or (n,), optional
-        Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
-        is then a local optimum, found from the one without them, and keeps them within 1 %.
+        Greatest rates of the torques, N m/s or N/s, without jumps of dry friction. The motion is
+        then a local optimum that keeps them within 1 %.
     friction : bool or Friction
-        Whether Fv and Fc of the drives count; or a friction model that acts besides. Rotor inertia
-        and offsets always count.
+        Whether Fv and Fc of the drives count; or a friction model that acts besides them.
     points : int
-        Number of intervals of the grid, evenly spaced in the parameter.
+        Number of intervals of the grid.
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
     both_ends : bool
@@ -144,8 +136,8 @@ def time_optimal(
     Raises
     ------
     ShapeError, InvalidValueError
-        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates, no
-        finite limit, a path outside the limits of position.
+        No path, numbers of joints that differ, NaN, negative torques or rates, no finite limit, a
+        path outside the limits of position.
 
     References
     ----------

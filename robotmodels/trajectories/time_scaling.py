@@ -53,9 +53,8 @@ class ScaledTrajectory(TimingResult):
     fraction : ndarray, shape (N,)
         Samples, as fractions of the duration.
     windows : ndarray, shape (N, 2)
-        Least and greatest duration with which each sample keeps the limits, s: the window of the
-        shortest ones if there are several, both infinite if there is none. The greatest is
-        infinite where the robot is held still.
+        Least and greatest duration with which each sample keeps the limits, s: of several windows
+        that of the shortest, both infinite if there is none.
     explanation : str
         Details of the status.
     """
@@ -82,8 +81,8 @@ def time_scaled(
 ) -> ScaledTrajectory:
     """Uniform time scaling: the least duration with which a motion keeps limits.
 
-    Also called dynamic time scaling. Limits of torque are checked at samples of the profile, and
-    between them around those that decide; those of velocity, acceleration and jerk everywhere.
+    Also called dynamic time scaling. Torques are checked at samples of the profile, and between
+    those that decide; velocities, accelerations and jerks everywhere.
 
     Parameters
     ----------
