@@ -37,11 +37,9 @@ def revolute_joints(model: RobotModel) -> NDArray[np.bool_]:
 
 
 def follow(
-    model: RobotModel,
-    found: IGMSolutions,
-    start: Array | None,
+    model: RobotModel, found: IGMSolutions, start: Array | None,
     solve: Callable[[int, Array], IGMSolutions],
-) -> Followed:
+) -> Followed:  # fmt: skip
     """Choose the posture of every pose that continues the one before. Shapes: start (n,)."""
     names, revolute = np.array((*found.labels, "")), revolute_joints(model)
     reached = np.atleast_1d(found.valid.any(axis=-1))
@@ -56,27 +54,20 @@ def follow(
         s = _nearest(postures[0], valid[0], start, revolute)
     else:
         s = _best_start(postures, valid, found.within_limits[index], after, revolute)
-    loose, picks = np.any(found.free_joints[index], axis=-1), []
-    settled: dict[int, tuple[Array, str]] = {}  # their free joints depend on the posture before
+    loose = np.any(found.free_joints[index], axis=-1)
     if not loose.any() and (after == np.arange(after.shape[-1])).all():
-        picks = [s] * index.size
-    for k in range(len(picks), index.size):
-        if k - 1 in settled:
-            s = _nearest(postures[k], valid[k], settled[k - 1][0], revolute)
-        elif k:
-            s = int(after[k - 1, s])
-        picks.append(s)
-        if loose[k, s]:
-            settled[k] = postures[k, s], str(names[code[k, s]])
-            before = settled.get(k - 1, (postures[k - 1, picks[k - 1]],))[0] if k else start
-            if before is not None:
-                one = solve(int(index[k]), before)
-                best = _nearest(one.q, one.valid, before, revolute)
-                settled[k] = one.q[best], str(one.branch[best])
-    q[index] = postures[np.arange(index.size), picks]
-    branch[index] = names[code[np.arange(index.size), picks]]
-    for k, (posture, label) in settled.items():
-        q[index[k]], branch[index[k]] = posture, label
+        q[index], branch[index] = postures[:, s], names[code[:, s]]
+        return rows
+    for k, i in enumerate(index.tolist()):
+        before = q[index[k - 1]] if k else start
+        if k:  # free joints depend on the posture before
+            freed = before is not None and loose[k - 1, s]
+            s = _nearest(postures[k], valid[k], before, revolute) if freed else int(after[k - 1, s])
+        q[i], branch[i] = postures[k, s], names[code[k, s]]
+        if loose[k, s] and before is not None:
+            one = solve(i, before)
+            best = _nearest(one.q, one.valid, before, revolute)
+            q[i], branch[i] = one.q[best], one.branch[best]
     return rows
 
 
@@ -86,12 +77,9 @@ def _nearest(q: Array, valid: NDArray[np.bool_], near: Array, revolute: NDArray[
 
 
 def follow_singly(
-    model: RobotModel,
-    N: int,
-    start: Array | None,
-    solve: Callable[[int, Array | None], IGMSolutions],
-    go_on: Callable[[int, Array], IGMSolutions],
-) -> Followed:
+    model: RobotModel, N: int, start: Array | None,
+    solve: Callable[[int, Array | None], IGMSolutions], go_on: Callable[[int, Array], IGMSolutions],
+) -> Followed:  # fmt: skip
     """Solve pose by pose, each from the posture before: for arms with a choice of postures."""
     revolute = revolute_joints(model)
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)

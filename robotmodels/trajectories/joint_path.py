@@ -14,7 +14,7 @@ from .._arrays import Array, as_exact, as_mask, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
-from ..model import RobotModel
+from ..model import RobotModel, check_model
 from .follow import continuous, follow, follow_singly
 from .limits import few_lines
 from .path_events import PathEvent, PathEventKind, Task, path_events
@@ -139,21 +139,19 @@ def joint_path(
     >>> path.complete, path.q[-1].round(6)
     (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
-    if not isinstance(model, RobotModel):
-        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    check_model(model)
     if q_start is not None and q_near is not None:
         raise InvalidValueError("q_near and q_start: give only one of the two.")
     start = None if q_start is None else as_exact(q_start, (model.n,), "q_start")
     near = start if q_near is None else as_exact(q_near, (model.n,), "q_near")
     motion = poses if isinstance(poses, PoseTrajectory) else None
-    twists = None
     if motion is not None:
         if t is not None:
             raise InvalidValueError("t: a PoseTrajectory has its own times; pass samples.")
         grid = motion.resample(samples)
         times, T, twists = grid.t, np.asarray(grid.T), np.asarray(grid.twist)
     else:
-        T = se3.as_pose(poses, "poses")
+        T, twists = se3.as_pose(poses, "poses"), None
         if T.ndim != 3:
             raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
         times = np.full(len(T), np.nan) if t is None else as_exact(t, (len(T),), "t")
@@ -161,20 +159,16 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = as_number(singular_below, "singular_below")
-    given = (mask, mask_axes)
-    tolerances = {
-        "position_tolerance": position_tolerance,
-        "orientation_tolerance": orientation_tolerance,
-    }
+    tolerances = {"position_tolerance": position_tolerance,
+                  "orientation_tolerance": orientation_tolerance}  # fmt: skip
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
-        return igm(model, targets, near, *given, **tolerances)  # type: ignore[arg-type]
+        return igm(model, targets, near, mask, mask_axes, **tolerances)
 
     def go_on(i: int, near: Array) -> IGMSolutions:
-        return igm_numeric(model, T[i], near, *given, restarts=0, **tolerances)  # type: ignore[arg-type]
+        return igm_numeric(model, T[i], near, mask, mask_axes, restarts=0, **tolerances)
 
-    columns = joint_chain(model).columns
-    found = None
+    columns, found = joint_chain(model).columns, None
     if columns.size <= (6 if mask is None else np.count_nonzero(mask)):
         # without a reference postures come in the order of their branches
         found = solve(T, None)
@@ -188,17 +182,12 @@ def joint_path(
     rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
-    if twists is not None and task.square:
-        v = task.rates(twists)
-    else:
-        v = _differences(times, q, rows.reached)
+    rated = twists is not None and task.square
+    v = task.rates(twists) if rated else _differences(times, q, rows.reached)
     events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
         pose = motion.pose
-        events = [
-            _located(event, times, lambda t: bool(solve(pose(t), near).count > 0))
-            for event in events
-        ]
+        events = [_located(e, times, lambda t: solve(pose(t), near).count > 0) for e in events]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 
 
@@ -214,19 +203,15 @@ def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
     return np.where(reached[:, None], both, np.nan)
 
 
-def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -> PathEvent:
+def _located(event: PathEvent, times: Array, reached: Callable[[float], Any]) -> PathEvent:
     """The edges of a run out of reach, found between the samples by bisection."""
     if event.kind is not PathEventKind.OUT_OF_REACH:
         return event
-
-    def edge(inside: int, outside: float) -> float:
-        if not 0 <= inside < len(times):
-            return outside
-        good = times[inside]
+    edges = []
+    for inside, outside in ((event.first - 1, event.start), (event.last + 1, event.stop)):
+        good = times[inside] if 0 <= inside < len(times) else outside
         for _ in range(30):
             middle = 0.5 * (good + outside)
             good, outside = (middle, outside) if reached(middle) else (good, middle)
-        return outside
-
-    start, stop = edge(event.first - 1, event.start), edge(event.last + 1, event.stop)
-    return replace(event, start=start, stop=stop)
+        edges.append(outside)
+    return replace(event, start=edges[0], stop=edges[1])

@@ -1,9 +1,4 @@
-"""Events along poses, and the Jacobians of the task that show them.
-
-References
-----------
-Seed book section 4.3.
-"""
+"""Events along poses, and the Jacobians of the task that show them (seed book section 4.3)."""
 
 from __future__ import annotations
 
@@ -78,15 +73,9 @@ class Task:
     """
 
     def __init__(
-        self,
-        model: RobotModel,
-        T: Array,
-        q: Array,
-        reached: NDArray[np.bool_],
-        mask: ArrayLike | None,
-        mask_axes: str,
-        columns: NDArray[np.int64],
-    ) -> None:
+        self, model: RobotModel, T: Array, q: Array, reached: NDArray[np.bool_],
+        mask: ArrayLike | None, mask_axes: str, columns: NDArray[np.int64],
+    ) -> None:  # fmt: skip
         self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         self._tool, self._poses = mask_axes == "tool", T
         J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
@@ -143,15 +132,9 @@ def inverted(J: Array) -> tuple[Any, Any, Any]:
 
 
 def path_events(
-    model: RobotModel,
-    times: Array,
-    q: Array,
-    v: Array,
-    rows: Followed,
-    task: Task,
-    singular_below: float,
-    start: Array | None = None,
-) -> list[PathEvent]:
+    model: RobotModel, times: Array, q: Array, v: Array, rows: Followed, task: Task,
+    singular_below: float, start: Array | None = None,
+) -> list[PathEvent]:  # fmt: skip
     """Events along a path, in order. Shapes: times (N,); q, v (N, n); start (n,)."""
     reached = rows.reached
     events: list[PathEvent] = []
@@ -159,14 +142,10 @@ def path_events(
     def add(kind: PathEventKind, i: int, j: int, text: str) -> None:
         events.append(PathEvent(kind, i, j, times[i], times[j], text))
 
-    for i, j in _runs(~reached):
-        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
     with np.errstate(invalid="ignore", divide="ignore"):
         over = np.maximum(q - model.upper, model.lower - q)
         share = np.abs(v) / model.table.velocity
         outside, fast = over > 1e-9, share > 1.0 + 1e-9
-    for i, j in _runs(np.any(outside, axis=-1)):
-        add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     step, jump, gaps = _jumps(q, reached, task)
     adjacent = reached[1:] & reached[:-1]
     flips = adjacent & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
@@ -174,13 +153,18 @@ def path_events(
     low = reached & (task.conditioning < singular_below)
     low[:-1] |= flips
     low[1:] |= flips
+    for i, j in _runs(~reached):
+        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
+    for i, j in _runs(np.any(outside, axis=-1)):
+        add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     for i, j in _runs(low):
         least = np.nanmin(task.conditioning[i : j + 1])
-        text = f"The least conditioning of the samples is {least:.2g}."
-        add(PathEventKind.SINGULAR, i, j, text)
+        add(PathEventKind.SINGULAR, i, j, f"The least conditioning of the samples is {least:.2g}.")
+    for i, j in _runs(np.any(fast, axis=-1)):
+        text = "needs {:.4g} times its greatest velocity."
+        add(PathEventKind.TOO_FAST, i, j, _worst(share[i : j + 1], text))
     for i in np.flatnonzero(jump).tolist():
-        text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
-        add(PathEventKind.JUMP, i, i + 1, text)
+        add(PathEventKind.JUMP, i, i + 1, _worst(np.abs(step[i : i + 1]), "steps by {:.4g}."))
     if start is not None and reached.any():
         k = int(reached.argmax())
         away = np.abs(q[k : k + 1] - start)
@@ -188,9 +172,8 @@ def path_events(
             add(PathEventKind.JUMP, k, k, _worst(away, "is {:.4g} away from q_start."))
     for i, j in gaps:
         between = f"{i + 1}" + (f" to {j - 1}" if j > i + 2 else "")
-        text = _worst(np.abs(q[j : j + 1] - q[i]), "steps by {:.4g}")
-        text += f"; in between, at pose {between}, the path is out of reach."
-        add(PathEventKind.JUMP, i, j, text)
+        text = f"steps by {{:.4g}}; in between, at pose {between}, the path is out of reach."
+        add(PathEventKind.JUMP, i, j, _worst(np.abs(q[j : j + 1] - q[i]), text))
     changed = adjacent & ((rows.branch[1:] != rows.branch[:-1]) | flips)
     for i in np.flatnonzero(changed).tolist():
         before, after = str(rows.branch[i]), str(rows.branch[i + 1])
@@ -199,9 +182,6 @@ def path_events(
         if named or flips[i]:
             text = f"From {before} to {after}." if named else ""
             add(PathEventKind.CHANGES_POSTURE, i, i + 1, text)
-    for i, j in _runs(np.any(fast, axis=-1)):
-        text = _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity.")
-        add(PathEventKind.TOO_FAST, i, j, text)
     return sorted(events, key=lambda event: (event.first, event.last))
 
 
@@ -209,10 +189,8 @@ def _missed(rows: Followed, first: int, last: int) -> str:
     """Why a run of poses is not reached: of every reason the pose that is missed by most."""
     if first == last:
         return rows.reason(first)
-    metres = np.linalg.norm(rows.missing[:, :3], axis=-1)
-    angle = np.linalg.norm(rows.missing[:, 3:], axis=-1)
-    texts = []
-    status = rows.status[first : last + 1]
+    metres, angle = (np.linalg.norm(rows.missing[:, part], axis=-1) for part in np.s_[:3, 3:])
+    texts, status = [], rows.status[first : last + 1]
     for code in dict.fromkeys(status.tolist()):
         run = first + np.flatnonzero(status == code)
         turned = code == IGMStatus.ORIENTATION_NOT_AVAILABLE or not (metres[run] > 0.0).any()
