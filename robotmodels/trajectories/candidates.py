@@ -22,6 +22,7 @@ from ..obstacles.clearance import link_distances
 from ..obstacles.shapes import Obstacle
 from .blends import blended_lines
 from .checks import joint_vectors
+from .limits import ranges_of
 from .path_limits import SLOWEST, PathLimits
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_scaling import windows_of
@@ -149,11 +150,11 @@ class Candidates:
         rows, limits = self.limits.rows(q, rate, bend), self.limits.limits
         k, scale = self.limits.acceleration.size, self.limits.scale
         with np.errstate(divide="ignore", invalid="ignore"):
-            pace = np.where(rate > 0.0, rate / limits.velocity, rate / limits.velocity_lower)
-            rise = np.where(
-                bend > 0.0, bend / limits.acceleration, bend / limits.acceleration_lower
+            pace, rise = (
+                np.nanmax(np.where(x > 0.0, x / most, x / least), initial=0.0)
+                for x, (_, least, most) in zip((rate, bend), ranges_of(limits)[1:3], strict=True)
             )
-        least = max(float(np.nanmax(pace, initial=0.0)), np.sqrt(np.nanmax(rise, initial=0.0)))
+        least = max(float(pace), float(np.sqrt(rise)))
         A, C = rows.b[:, k:], rows.c[:, k:]
         # rows hold the torques of q'' and of q' apart: together those of the profile in one second
         B = (self.limits.drag(q, rate) - self.limits.drag(q, SLOWEST * rate))[:, self.limits.loaded]

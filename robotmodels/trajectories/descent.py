@@ -11,6 +11,7 @@ from .._arrays import Array
 from ..dynamics.inverse import rigid_torques
 from ..obstacles.clearance import link_distances
 from .candidates import Candidates, Evaluated
+from .limits import ranges_of
 from .path_limits import PathLimits
 
 _FIRST = 0.1  # of the longest way of a joint: first bound of a step
@@ -85,16 +86,14 @@ def _program(task: Candidates, free: Array, now: Evaluated) -> tuple[Array, Arra
     bounds = limits.limits
     for side in (1.0, -1.0):
         add(side * by, side * by_T, side * tau / unit, np.broadcast_to(most / unit, tau.shape), 0.0)
-        for order, value, ends in (
-            (1, v, (bounds.velocity, -bounds.velocity_lower)),
-            (2, a, (bounds.acceleration, -bounds.acceleration_lower)),
-        ):
-            end = np.broadcast_to(ends[0] if side > 0.0 else ends[1], value.shape)
-            part = side * by_joint[order] / T**order
-            add(part, -order * side * value / T, side * value, end, 0.0)
-        end = (bounds.upper if side > 0.0 else -bounds.lower) - task.margin
-        end = np.broadcast_to(end, q.shape)
-        add(side * by_joint[0], 0.0, side * q, end, 1.0)
+        pairs = zip((q, v, a), ranges_of(bounds)[:3], strict=True)
+        for order, (value, (_, low, high)) in enumerate(pairs):
+            end = np.broadcast_to(high if side > 0.0 else -low, q.shape)
+            part, by_time = side * by_joint[order] / T**order, -order * side * value / T
+            if order:
+                add(part, by_time, side * value, end, 0.0)
+            else:
+                add(part, 0.0, side * value, end - task.margin, 1.0)
     if task.bodies and limits.model is not None:
         distance, slope = link_distances(limits.model, q, task.bodies)
         near = np.where(distance < task.clearance + _NEAR, -task.clearance - task.margin, np.inf)

@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, Value, as_exact, as_number, read_only
@@ -217,42 +217,45 @@ def kinodynamic(
     if cost.torque and not problem.loaded.size:
         raise InvalidValueError("cost: a weight of the torques needs limits of torque.")
     given = [q0, *_listed(via), q1]
-    postures = [_postures(model, each, k, given, problem) for k, each in enumerate(given)]
-    missing = [k for k, each in enumerate(postures) if not len(each)]
-    if missing:
-        name = _name(missing[0], len(given))
-        why = f"No posture reaches the pose {name} within the limits of position."
-        return _without(PlanStatus.NONE_FOUND, why)
-    for k, q in enumerate(postures):
-        end, name = k in (0, len(given) - 1), _name(k, len(given))
+    names = ["q0", *(f"via[{k}]" for k in range(len(given) - 2)), "q1"]
+    postures = [_postures(problem, given, k, names) for k in range(len(given))]
+    for name, q in zip(names, postures, strict=True):
+        if not len(q):
+            why = f"No posture reaches the pose {name} within the limits of position."
+            return _without(PlanStatus.NONE_FOUND, why)
+    for k, (name, q) in enumerate(zip(names, postures, strict=True)):
+        end = name in ("q0", "q1")
         held = [problem.not_held(x[None], lambda _, at=name: at, True) if end else "" for x in q]
         if all(held):
             return _without(PlanStatus.ENDS_NOT_HELD, held[0])
         q = q[[not why for why in held]]
-        clear, why = _clear(model, q, bodies, wanted, name)
-        if not clear.any():
-            return _without(PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND, why)
-        postures[k] = q[clear]
-    generator = generator_of(rng)
-    tasks = []
-    for choice in product(*postures):
-        stations = np.array(choice)
-        if np.any(np.diff(stations, axis=0), axis=1).all():
-            at, optimal = spread(shares(stations), count), timing is Timing.OPTIMAL
-            task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-            straight = task.evaluated(task.straight)
-            if straight.duration < _NO_TIME:
-                raise InvalidValueError(
-                    "limits, torque: nothing limits the straight motion, so its time would be "
-                    "zero; give the robot inertia, or limits of velocity and acceleration of "
-                    "every joint."
+        if bodies:
+            distance = np.atleast_1d(clearance_of(model, q, bodies))
+            if (distance < wanted).all():
+                return _without(
+                    PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND,
+                    f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m "
+                    "asked for.",
                 )
-            tasks.append((straight.penalized, len(tasks), task))
+            q = q[distance >= wanted]
+        postures[k] = q
+    tasks, optimal = [], timing is Timing.OPTIMAL
+    for stations in map(np.array, product(*postures)):
+        if not np.any(np.diff(stations, axis=0), axis=1).all():
+            continue
+        at = spread(shares(stations), count)
+        task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
+        straight = task.evaluated(task.straight)
+        if straight.duration < _NO_TIME:
+            raise InvalidValueError(
+                "limits, torque: nothing limits the straight motion, so its time would be zero; "
+                "give the robot inertia, or limits of velocity and acceleration of every joint."
+            )
+        tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
-    search = Search(seconds, progress)
-    results = []
+    search, results, generator = Search(seconds, progress), [], generator_of(rng)
     for r in range(RESTARTS):
         search.share((r + 1) / (RESTARTS + 1))
         results.append(restart(search, tasks[r % len(tasks)], method, generator, r))
@@ -284,22 +287,16 @@ def _listed(via: Any) -> list[Any]:
     return points
 
 
-def _name(k: int, stations: int) -> str:
-    return "q0" if k == 0 else "q1" if k == stations - 1 else f"via[{k - 1}]"
-
-
-def _postures(
-    model: RobotModel, given: Any, k: int, every: list[Any], problem: PathLimits
-) -> Array:  # fmt: skip
+def _postures(problem: PathLimits, every: list[Any], k: int, names: list[str]) -> Array:
     """Configurations (m, n) of an end or via point, within the limits of position."""
-    limits, name = problem.limits, _name(k, len(every))
+    model, limits, given = problem.model, problem.limits, every[k]
+    assert model is not None
     if not isinstance(given, Pose):
-        q = as_exact(given, (model.n,), name)
+        q = as_exact(given, (model.n,), names[k])
         checked_limits(limits, model.n, q[None])
-        before = every[k - 1] if k else None
-        if before is not None and not isinstance(before, Pose) and np.array_equal(before, q):
+        if k and not isinstance(every[k - 1], Pose) and np.array_equal(every[k - 1], q):
             raise InvalidValueError(
-                f"{name}: it is the same as {_name(k - 1, len(every))}; leave one of them out."
+                f"{names[k]}: it is the same as {names[k - 1]}; leave one of them out."
             )
         return q[None]
     near = next((np.asarray(q, float) for q in every if not isinstance(q, Pose)), None)
@@ -308,19 +305,6 @@ def _postures(
     turn = 2.0 * np.pi * (model.table.sigma[model.table.joint_rows] == REVOLUTE)
     reference = np.clip(np.zeros(model.n) if near is None else near, limits.lower, limits.upper)
     q = q - turn * np.round((q - reference) / np.where(turn > 0.0, turn, 1.0))
-    for side in (1.0, -1.0):  # a whole turn back inside
-        out = (q > limits.upper) if side > 0.0 else (q < limits.lower)
-        q = q - side * turn * out
+    q = q - turn * (q > limits.upper)  # a whole turn back inside
+    q = q + turn * (q < limits.lower)
     return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
-
-
-def _clear(
-    model: RobotModel, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[NDArray[np.bool_], str]:
-    """Which configurations (m, n) keep the clearance, and a sentence about the first."""
-    if not bodies:
-        return np.ones(len(q), np.bool_), ""
-    distance = np.atleast_1d(clearance_of(model, q, bodies))
-    return distance >= wanted, (
-        f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
-    )

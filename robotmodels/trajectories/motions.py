@@ -61,19 +61,10 @@ class PiecewisePolynomial(Motion):
     lengths: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
-        lengths = read_only(np.diff(breaks) if self.lengths is None else self.lengths)
-        *batch, K, _, n = coefficients.shape
-        c = breaks.shape[-2] if breaks.ndim > 1 else 0
-        wanted = ((*batch, c, K + 1), (*batch, c, K))
-        if c not in (1, n) or (breaks.shape, lengths.shape) != wanted or K == 0:
-            raise ShapeError(
-                f"breaks, lengths: expected shapes {(*batch, 1, K + 1)} and {(*batch, 1, K)} for "
-                f"coefficients {coefficients.shape}, got {breaks.shape} and {lengths.shape}."
-            )
-        values = (breaks, coefficients, lengths)
+        lengths = np.diff(self.breaks) if self.lengths is None else self.lengths
+        values = (self.breaks, self.coefficients, lengths)
         for name, value in zip(("breaks", "coefficients", "lengths"), values, strict=True):
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, read_only(value))
 
     @property
     def n(self) -> int:
@@ -94,18 +85,12 @@ class PiecewisePolynomial(Motion):
         """Derivatives at times inside the motion. Shapes: t (..., N) -> (..., N, n)."""
         from ..kernels.piecewise_polynomials import piecewise_derivatives
 
-        *_, K, powers, n = self.coefficients.shape
-        M, c = prod(self.batch), self.breaks.shape[-2]
-        out = np.empty((len(orders), M, t.shape[-1], n))
-        piecewise_derivatives(
-            np.ascontiguousarray(t).reshape(M, t.shape[-1]),
-            self.breaks.reshape(M, c, K + 1),
-            self.lengths.reshape(M, c, K),
-            self.coefficients.reshape(M, K, powers, n),
-            np.asarray(orders, np.int64),
-            out,
-        )
-        return [values.reshape(*t.shape, n) for values in out]
+        M, N, parts = prod(self.batch), t.shape[-1], (self.breaks, self.lengths, self.coefficients)
+        breaks, lengths, c = (x.reshape(M, *x.shape[len(self.batch) :]) for x in parts)
+        out = np.empty((len(orders), M, N, self.n))
+        times = np.ascontiguousarray(t).reshape(M, N)
+        piecewise_derivatives(times, breaks, lengths, c, np.asarray(orders, np.int64), out)
+        return [values.reshape(*t.shape, self.n) for values in out]
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece."""

@@ -1,4 +1,9 @@
-"""Events along poses, and the Jacobians of the task that show them (seed book section 4.3)."""
+"""Events along poses, and the Jacobians of the task that show them.
+
+References
+----------
+Seed book section 4.3.
+"""
 
 from __future__ import annotations
 
