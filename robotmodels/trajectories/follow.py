@@ -60,9 +60,9 @@ def follow(
         return rows
     for k, i in enumerate(index.tolist()):
         before = q[index[k - 1]] if k else start
-        if k:  # free joints depend on the posture before
-            freed = before is not None and loose[k - 1, s]
-            s = _nearest(postures[k], valid[k], before, revolute) if freed else int(after[k - 1, s])
+        if k and before is not None:  # free joints depend on the posture before
+            freed, s = loose[k - 1, s], int(after[k - 1, s])
+            s = _nearest(postures[k], valid[k], before, revolute) if freed else s
         q[i], branch[i] = postures[k, s], names[code[k, s]]
         if loose[k, s] and before is not None:
             one = solve(i, before)

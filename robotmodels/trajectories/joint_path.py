@@ -159,8 +159,8 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = as_number(singular_below, "singular_below")
-    tolerances = {"position_tolerance": position_tolerance,
-                  "orientation_tolerance": orientation_tolerance}  # fmt: skip
+    tolerances: dict[str, Any] = {"position_tolerance": position_tolerance,
+                                  "orientation_tolerance": orientation_tolerance}  # fmt: skip
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
         return igm(model, targets, near, mask, mask_axes, **tolerances)
@@ -182,8 +182,10 @@ def joint_path(
     rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
-    rated = twists is not None and task.square
-    v = task.rates(twists) if rated else _differences(times, q, rows.reached)
+    if twists is not None and task.square:
+        v = task.rates(twists)
+    else:
+        v = _differences(times, q, rows.reached)
     events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
         pose = motion.pose

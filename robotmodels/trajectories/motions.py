@@ -45,8 +45,8 @@ class Motion(Value):
         return values.min(axis=0), values.max(axis=0)
 
     def jumps(self, order: int) -> tuple[Any, Any]:
-        """Whether a derivative jumps down, and up, inside the motion, (..., n)."""
-        raise NotImplementedError
+        """Whether a derivative jumps down, and up, inside the motion, (..., n); here smooth."""
+        return np.zeros(self.n, np.bool_), np.zeros(self.n, np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

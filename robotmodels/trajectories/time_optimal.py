@@ -183,7 +183,7 @@ def time_optimal(
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = Rows(*(part[half] for part in rows[:4]), rows.still)
+    coarse = Rows(*(part[half] for part in rows[:4]), still=rows.still)
     gap = problem.passes(s[half], q[half], rate[half], bend[half], ends, coarse).duration
     gap = abs(gap - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
