@@ -12,7 +12,6 @@ from robotmodels.kernels.inverses import inverses
 from robotmodels.kernels.jerk_phases import polished_phases
 from robotmodels.kernels.mass import joint_accelerations
 from robotmodels.kernels.poses import improper_pose
-from robotmodels.kernels.posture_chains import following_postures
 from robotmodels.kernels.regressor_gradient import regressor_gradients
 from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
@@ -290,23 +289,3 @@ def test_poses_that_are_proper_to_rounding_and_others(rng):
             bad[3, :3, 0] += 1e-14 * bad[3, :3, 1]
         assert improper_pose(bad) == 3
         assert improper_pose(bad[4:]) == -1
-
-
-def test_postures_go_on_where_they_change_least():
-    """A way through a half turn is short, and beside a length of metres angles count by chords."""
-    periodic, following = np.array([True, False]), np.empty((1, 3), np.int64)
-    valid = np.ones((2, 3), np.bool_)
-    now = [[3.0, 0.0], [-1.0, 0.2], [0.5, -0.3]]
-    later = [[-3.1, 0.0], [-0.9, 0.2], [0.6, -0.3]]
-    for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2]):
-        q = np.array([now, np.array(later)[order]])
-        following_postures(q, valid, periodic, 0.5, following)
-        np.testing.assert_array_equal(following[0], np.argsort(order))
-    # the nearest by the chord is another one than by twice the chord's angle, or by signed lengths
-    q = np.array([[[0.0, 0.0]] * 3, [[3.0, 0.0], [0.0, 1.5], [1.0, -3.0]]])
-    following_postures(q, valid, periodic, 0.5, following)
-    np.testing.assert_array_equal(following[0], [1, 1, 1])
-    # near enough for all: nothing is compared, though another one would be nearer
-    q = np.array([[[0.0, 0.0], [3.1, 0.0], [1.0, 1.0]], [[0.3, 0.0], [-2.9, 0.0], [1.0, 1.3]]])
-    following_postures(q, valid, periodic, 0.5, following)
-    np.testing.assert_array_equal(following[0], [0, 1, 2])

@@ -35,8 +35,8 @@ from robotmodels.trajectories import (
     straight_line,
     trapezoidal,
 )
-from robotmodels.trajectories.follow import _following
-from robotmodels.trajectories.path_events import _inverted
+from robotmodels.trajectories.follow import following
+from robotmodels.trajectories.path_events import inverted
 from robotmodels.trajectories.pose_trajectory import rotation_about
 
 
@@ -734,7 +734,7 @@ def test_small_inverses_beside_lapack(rng):
     for n in (1, 3, 6):
         A = rng.normal(size=(200, n, n))
         A[:, :, 0] *= 10.0 ** rng.uniform(-8.0, 2.0, (200, 1))
-        inverse, conditioning, sign = _inverted(A)
+        inverse, conditioning, sign = inverted(A)
         want = np.linalg.inv(A)
         norm = np.linalg.norm
         bound = 1e-14 * np.linalg.cond(A) * norm(want, axis=(1, 2))
@@ -743,7 +743,7 @@ def test_small_inverses_beside_lapack(rng):
         assert np.abs(conditioning / by_norms - 1.0).max() < 1e-6
         assert np.array_equal(sign, np.sign(np.linalg.det(A)))
     A[7, 2] = 0.0  # one singular matrix: the others are as before
-    pseudo, conditioning, sign = _inverted(A)
+    pseudo, conditioning, sign = inverted(A)
     assert conditioning[7] < 1e-15
     assert sign[7] == 0.0
     assert np.abs(pseudo[7] - np.linalg.pinv(A[7])).max() < 1e-8 * np.abs(pseudo[7]).max()
@@ -758,12 +758,12 @@ def test_postures_go_on_by_the_shortest_step(rng):
     mixed = np.take_along_axis(q, order[..., None], axis=1)
     valid = np.ones((40, 5), np.bool_)
     valid[20] = order[20] != 2  # one branch is lost
-    following = _following(mixed, valid, np.array([True, True, True, False]))
+    after = following(mixed, valid, np.array([True, True, True, False]))
     for k in range(39):
         for s in range(5):
             if valid[k, s] and valid[k + 1, list(order[k + 1]).index(order[k, s])]:
-                assert order[k + 1, following[k, s]] == order[k, s]
-    assert _following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)
+                assert order[k + 1, after[k, s]] == order[k, s]
+    assert following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)
 
 
 def test_a_guess_chooses_the_branch_and_is_no_posture_of_the_path():

@@ -1,8 +1,7 @@
 """Straight lines between points at constant velocity, joined by blends near the points.
 
-The motion would turn a corner at each inner point; a blend of a chosen time around it changes the
-velocity evenly (parabola) or smoothly (quartic), and leaves the corner aside. The first and the
-last point are met at rest: there a line of no velocity precedes or follows.
+A blend changes the velocity evenly (parabola) or smoothly (quartic) and leaves the corner aside;
+the first and the last point are met at rest.
 """
 
 from __future__ import annotations
@@ -14,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, least_shown, refuse_jointless, slowed
+from .checks import ROUNDING, checked_limits, least_shown, slowed
 from .limits import MotionLimits
 from .motions import PiecewisePolynomial
+from .splines import as_points
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5
@@ -49,8 +49,7 @@ def blended_lines(
     segment_times : array_like, shape () or (m - 1,), optional
         Seconds from corner to corner instead.
     blend_times : array_like, shape () or (m,), optional
-        Seconds of each blend, with ``segment_times``; default the least that the limits allow. The
-        motion starts and ends half a blend before and after the time of its end points.
+        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
     smooth : bool
         Whether the blends keep the acceleration continuous.
 
@@ -77,13 +76,8 @@ def blended_lines(
     >>> path.duration, path.q(2.25)
     (3.5..., array([1.9375, 0.0625]))
     """
-    q = as_floats(points, "points")
-    if q.ndim not in (1, 2) or len(q) < 2:
-        raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
-    scalar = q.ndim == 1
-    q = q[:, None] if scalar else q
+    q, scalar = as_points(points)
     m, n = q.shape
-    refuse_jointless(n, "points")
     bounds = checked_limits(limits, n, q)
     step = np.diff(q, axis=0)
     if segment_times is None:

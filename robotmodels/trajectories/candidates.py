@@ -22,7 +22,8 @@ from ..obstacles.clearance import link_distances
 from ..obstacles.shapes import Obstacle
 from .blends import blended_lines
 from .checks import joint_vectors
-from .path_limits import PathLimits
+from .limits import ranges_of
+from .path_limits import SLOWEST, PathLimits
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_scaling import windows_of
 from .trajectory import Trajectory
@@ -55,13 +56,6 @@ class Cost:
             raise InvalidValueError("time, torque: expected at least one weight above zero.")
 
 
-class Knots(NamedTuple):
-    """Parameters (K,) of stations and nodes, and which of them are stations."""
-
-    at: Array
-    fixed: NDArray[np.intp]
-
-
 class Evaluated(NamedTuple):
     """Result of a candidate; its duration is infinite where it has no timing."""
 
@@ -83,7 +77,7 @@ class Candidates:
     """
 
     def __init__(
-        self, limits: PathLimits, stations: Array, at: Knots,
+        self, limits: PathLimits, stations: Array, at: tuple[Array, NDArray[np.intp]],
         bodies: tuple[Obstacle, ...], clearance: float, cost: Cost, optimal: bool,
     ) -> None:  # fmt: skip
         from scipy.interpolate import CubicSpline
@@ -96,17 +90,14 @@ class Candidates:
         ends = "not-a-knot" if optimal else "clamped"
         spline = CubicSpline(self.knots, np.eye(len(self.knots)), bc_type=ends)
         self.basis = np.stack([spline(self.grid, k) for k in range(3)])
-
-    def finer(self, at: Knots, optimal: bool = False) -> Candidates:
-        """The same task with other knots."""
-        return Candidates(
-            self.limits, self.stations, at, self.bodies, self.clearance, self.cost, optimal
-        )
-
-    def straight(self) -> Array:
-        """Nodes (k, n) on the straight lines between the stations."""
         along = [np.interp(self.knots, self.knots[self.fixed], x) for x in self.stations.T]
-        return np.stack(along, axis=-1)[self.free]
+        self.straight = np.stack(along, axis=-1)[self.free]
+        self.width = half_width(stations.min(axis=0), stations.max(axis=0))
+
+    def as_profile(self, at: Array, nodes: int) -> Candidates:
+        """The same task for profiles with more nodes between stations at fractions of the time."""
+        more = (self.limits, self.stations, spread(at, nodes), self.bodies, self.clearance)
+        return Candidates(*more, self.cost, optimal=False)
 
     def points(self, free: Array) -> Array:
         """Stations and nodes (K, n) in the order of the path."""
@@ -126,22 +117,18 @@ class Candidates:
 
     def evaluated(self, free: Array) -> Evaluated:
         """Timing, cost and violation of a candidate."""
-        q, rate, bend = self.sampled(free)
-        violation = self.violation(q)
-        if self.optimal:
-            T, cost = self._by_passes(q, rate, bend)
-        else:
-            T, cost = self._by_windows(q, rate, bend)
-        return Evaluated(cost, T, violation)
+        points = self.sampled(free)
+        T, cost = self._by_passes(*points) if self.optimal else self._by_windows(*points)
+        return Evaluated(cost, T, self.violation(points[0], self.margin))
 
-    def violation(self, q: Array) -> float:
+    def violation(self, q: Array, margin: float = 0.0) -> float:
         """How far postures (N, n) are outside of the limits of position and the clearance."""
         limits = self.limits.limits
         over = np.maximum(q - limits.upper, limits.lower - q).max(initial=-np.inf)
-        over = max(float(over) + self.margin, 0.0)
+        over = max(float(over) + margin, 0.0)
         if self.bodies and self.limits.model is not None:
             distances, _ = link_distances(self.limits.model, q, self.bodies)
-            over += max(self.clearance + self.margin - float(distances.min(initial=np.inf)), 0.0)
+            over += max(self.clearance + margin - float(distances.min(initial=np.inf)), 0.0)
         return over
 
     def _by_passes(self, q: Array, rate: Array, bend: Array) -> tuple[float, float]:
@@ -163,14 +150,14 @@ class Candidates:
         rows, limits = self.limits.rows(q, rate, bend), self.limits.limits
         k, scale = self.limits.acceleration.size, self.limits.scale
         with np.errstate(divide="ignore", invalid="ignore"):
-            pace = np.where(rate > 0.0, rate / limits.velocity, rate / limits.velocity_lower)
-            rise = np.where(
-                bend > 0.0, bend / limits.acceleration, bend / limits.acceleration_lower
+            pace, rise = (
+                np.nanmax(np.where(x > 0.0, x / most, x / least), initial=0.0)
+                for x, (_, least, most) in zip((rate, bend), ranges_of(limits)[1:3], strict=True)
             )
-        least = max(float(np.nanmax(pace, initial=0.0)), np.sqrt(np.nanmax(rise, initial=0.0)))
+        least = max(float(pace), float(np.sqrt(rise)))
         A, C = rows.b[:, k:], rows.c[:, k:]
         # rows hold the torques of q'' and of q' apart: together those of the profile in one second
-        B = (self.limits.drag(q, rate) - self.limits.drag(q, 1e-30 * rate))[:, self.limits.loaded]
+        B = (self.limits.drag(q, rate) - self.limits.drag(q, SLOWEST * rate))[:, self.limits.loaded]
         B = B / scale[k:]
         if not A.shape[1]:
             return least, self.cost.time * least
@@ -208,22 +195,22 @@ class Candidates:
         return float(tried[k]), float(costs[k])
 
 
-def knots_of(stations: Array, nodes: int) -> Knots:
-    """Knots of a path whose legs share its parameter as their lengths."""
-    length = np.linalg.norm(np.diff(stations, axis=0), axis=1)
-    share = np.maximum(length / length.sum(), _SHORTEST)
-    return spread(np.concatenate(((0.0,), np.cumsum(share / share.sum()))), nodes)
-
-
-def spread(at: Array, nodes: int) -> Knots:
-    """Knots with nodes spread evenly between stations, which are at given parameters."""
+def spread(at: Array, nodes: int) -> tuple[Array, NDArray[np.intp]]:
+    """Knots (K,), nodes spread evenly between stations at given parameters; which are stations."""
     share = np.diff(at)
     parts = np.ones(len(share), dtype=int)
     for _ in range(nodes):
         parts[(share / parts).argmax()] += 1
     inner = [np.linspace(at[i], at[i + 1], k + 1)[:-1] for i, k in enumerate(parts.tolist())]
     fixed = np.concatenate((np.zeros(1, np.intp), np.cumsum(parts)))
-    return Knots(np.append(np.concatenate(inner), at[-1]), fixed)
+    return np.append(np.concatenate(inner), at[-1]), fixed
+
+
+def shares(stations: Array) -> Array:
+    """Parameters of the stations of a path whose legs share it as their lengths."""
+    length = np.linalg.norm(np.diff(stations, axis=0), axis=1)
+    share = np.maximum(length / length.sum(), _SHORTEST)
+    return np.concatenate(((0.0,), np.cumsum(share / share.sum())))
 
 
 class ProfileLaw(Enum):
@@ -243,8 +230,8 @@ def random_profile(
 ) -> Trajectory:
     """Random motion from rest to rest between two configurations, in one second.
 
-    The nodes are evenly spaced in time, at positions drawn uniformly around the straight line: by
-    up to half of the way of their joint, and at least a tenth of the longest way of all joints.
+    The nodes are evenly spaced in time and drawn uniformly around the straight line: by up to half
+    of the way of their joint, and at least a tenth of the longest way of all joints.
 
     Parameters
     ----------
@@ -253,8 +240,7 @@ def random_profile(
     nodes : int
         Number of free configurations between the ends.
     law : ProfileLaw or str
-        ``"spline"``, ``"trapezoid"`` (with random durations of its accelerations; the nodes are
-        passed at a distance) or ``"quintic"``.
+        ``"spline"``, ``"trapezoid"`` (which passes the nodes at a distance) or ``"quintic"``.
     rng : Generator or int, optional
         Random numbers, or their seed; by default a fixed one.
 

@@ -46,7 +46,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 from .blends import PARABOLA, QUARTIC, rates_of, schedule
 from .checks import given_durations, limits_along, refuse_short, sample_count, slowed
-from .circle_timing import CircleLimits, circle_law
+from .circle_timing import circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits, ranges_of
 from .motions import PiecewisePolynomial
@@ -57,7 +57,6 @@ from .pose_trajectory import (
     PoseTrajectory,
     arc,
     axis_and_angle,
-    line,
     rotation_about,
 )
 from .trajectory import Trajectory
@@ -145,7 +144,7 @@ def straight_line(
     >>> move.duration, move.twist(1.0).round(9) + 0.0
     (2.50..., array([0.5 , 0.  , 0.  , 0.  , 0.  , 0.25]))
     """
-    path = line(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
+    path = arc(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
     return _timed(path, duration, limits, law)
 
 
@@ -219,7 +218,7 @@ def circle(
     R = rotation_about(n, np.array(sweep))
     last[:3, 3] = foot + R @ (first[:3, 3] - foot)
     if sweep == 0.0:
-        return _timed(line(first, first), duration, limits, law)
+        return _timed(arc(first, first), duration, limits, law)
     if not turning:
         return _timed(arc(first, last, foot, n, sweep), duration, limits, law)
     last[:3, :3] = R @ first[:3, :3]
@@ -277,25 +276,18 @@ def _timed(
     law, bounds = chosen(TimeLaw, law, "law"), _of_space(limits)
     turn = abs(path.turn)
     size = np.array([path.length, turn if turn > _NO_TURN else 0.0])
-    of_s = None
+    goal, of_s = np.ones(1) if size.any() else np.zeros(1), None
     if bounds is not None:
         V, A, B, J, K, _ = limits_along(bounds, size[None, None, :], _MOVES)
         of_s = MotionLimits(V, A, J, velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K)
-    goal = np.ones(1) if size.any() else np.zeros(1)
-    curved = bounds is not None and path.radius > 0.0
-    if bounds is None or not (
-        curved and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any()
-    ):
-        moves = along_line(law, np.zeros(1), goal, duration, of_s)
-        return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
-    along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
-    T, pairs = given_durations(duration, ()), (bounds.velocity, bounds.acceleration, bounds.jerk)
-    V, A, J = ((float(move), float(spin)) for move, spin in pairs)
-    pieces = circle_law(law, CircleLimits(path.length, path.radius, turn, V, A, J))
-    refuse_short(T, pieces.durations.sum(axis=-1), np.ones((1, 1)))
-    return PoseTrajectory(
-        path, assembled(pieces, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
-    )
+        if path.radius > 0.0 and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any():
+            along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
+            T, pieces = given_durations(duration, ()), circle_law(law, path, bounds)
+            refuse_short(T, pieces.durations.sum(axis=-1), np.ones((1, 1)))
+            moves = assembled(pieces, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
+            return PoseTrajectory(path, moves)
+    moves = along_line(law, np.zeros(1), goal, duration, of_s)
+    return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
 
 
 def _of_space(limits: MotionLimits | None) -> MotionLimits | None:

@@ -22,21 +22,16 @@ _EXTREME = 1e50
 
 
 def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
-    """Check positions and rates given for the same joints and give them one shape.
-
-    Shapes: **given () or (..., n) -> arrays (R, n).
-    """
+    """Positions and rates of the same joints as arrays (R, n); leading axes; whether scalar."""
     arrays = {name: as_floats(value, name) for name, value in given.items()}
-    scalar = all(array.ndim == 0 for array in arrays.values())
     try:
         shape = np.broadcast_shapes((1,), *(array.shape for array in arrays.values()))
     except ValueError:
         got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
-    n = shape[-1]
-    refuse_jointless(n, " and ".join(tuple(given)[:2]))
-    rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
-    return rows, shape[:-1], scalar
+    refuse_jointless(shape[-1], " and ".join(tuple(given)[:2]))
+    rows = {k: np.broadcast_to(v, shape).reshape(-1, shape[-1]) for k, v in arrays.items()}
+    return rows, shape[:-1], all(array.ndim == 0 for array in arrays.values())
 
 
 def sample_count(N: Any, name: str = "N", least: int = 0, most: int = 10**9) -> int:
@@ -167,11 +162,11 @@ def checked_request(
     for name, values in given.items():
         size = np.abs(values)
         small = (size > 0.0) & (size < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
-        wrong = np.isfinite(size) & ((size > _EXTREME) | small)
-        if wrong.any():
+        wrong = size[np.isfinite(size) & ((size > _EXTREME) | small)]
+        if wrong.size:
             raise InvalidValueError(
                 f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0), got "
-                f"{size[wrong][0]:.3g}; check the units."
+                f"{wrong[0]:.3g}; check the units."
             )
     return T, bounds
 

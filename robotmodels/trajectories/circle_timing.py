@@ -9,54 +9,37 @@ take and, with seven phases, the part of a ramp that bends.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from .laws import Pieces, Ramp, TimeLaw, law_of_duration, phases, ramped
+from .limits import MotionLimits
+from .pose_trajectory import FixedAxisPath
 
 _MARGIN = 1.0 + 1e-13
 """Durations are this much above the least, so that rounding does not exceed a limit."""
 _SAMPLES = np.linspace(0.0, 1.0, 33)
 
 
-class CircleLimits(NamedTuple):
-    """Limits of a motion on a circle."""
-
-    length: float
-    radius: float
-    turn: float
-    velocity: tuple[float, float]
-    acceleration: tuple[float, float]
-    jerk: tuple[float, float]
-
-
-def circle_law(law: TimeLaw, limits: CircleLimits) -> Pieces:
-    """The quickest motion of a law along the whole arc."""
+def circle_law(law: TimeLaw, path: FixedAxisPath, limits: MotionLimits) -> Pieces:
+    """The quickest motion of a law along a whole arc, under limits of translation and rotation."""
     from scipy.optimize import minimize, minimize_scalar
 
-    shape, digits = np.zeros(2), {"xatol": 1e-13}
+    shape = np.zeros(2)
     if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.SMOOTHED_TRAPEZOIDAL):
         smooth = law is TimeLaw.SMOOTHED_TRAPEZOIDAL
-        best = minimize_scalar(
-            lambda part: _stretch(_of_shape(law, part, 0.0), limits, smooth),
-            bounds=(1e-6, 0.5),
-            method="bounded",
-            options=digits,
-        )
-        shape[0] = best.x
+        shape[0] = minimize_scalar(
+            lambda part: _stretch(_of_shape(law, part, 0.0), path, limits, smooth),
+            bounds=(1e-6, 0.5), method="bounded", options={"xatol": 1e-13},
+        ).x  # fmt: skip
     elif law is TimeLaw.JERK_LIMITED:
-        best = minimize(
-            lambda x: _stretch(_of_shape(law, *x), limits),
-            (0.3, 0.3),
-            bounds=((1e-6, 0.5), (1e-6, 0.5)),
-            method="Nelder-Mead",
+        shape = minimize(
+            lambda x: _stretch(_of_shape(law, *x), path, limits), (0.3, 0.3),
+            bounds=((1e-6, 0.5), (1e-6, 0.5)), method="Nelder-Mead",
             options={"xatol": 1e-7, "fatol": 1e-10},
-        )
-        shape = best.x
+        ).x  # fmt: skip
     pieces = _of_shape(law, *shape)
-    stretch = _stretch(pieces, limits, exact=True) * _MARGIN
+    stretch = _stretch(pieces, path, limits, exact=True) * _MARGIN
     return Pieces(pieces.durations * stretch, pieces.coefficients)
 
 
@@ -72,13 +55,17 @@ def _of_shape(law: TimeLaw, part: float, bend: float) -> Pieces:
     return law_of_duration(law, one, one)
 
 
-def _stretch(pieces: Pieces, limits: CircleLimits, exact: bool = False) -> float:
+def _stretch(
+    pieces: Pieces, path: FixedAxisPath, limits: MotionLimits, exact: bool = False
+) -> float:
     """Factor on the duration of a motion with which it keeps all limits, one in full.
 
     Not ``exact``: at samples, ends of the phases included, which serves to compare shapes.
     """
-    L, r, turn = limits.length, limits.radius, limits.turn
-    (V, W), (A, B), (J, K) = limits.velocity, limits.acceleration, limits.jerk
+    L, r, turn = path.length, path.radius, abs(path.turn)
+    V, W, A, B, J, K = (
+        float(x) for pair in (limits.velocity, limits.acceleration, limits.jerk) for x in pair
+    )
     need = 0.0
     half = (pieces.durations.shape[-1] + 1) // 2  # both halves of a motion are alike
     for h, c in zip(pieces.durations[0, :half], pieces.coefficients[0], strict=False):

@@ -11,6 +11,8 @@ from .._arrays import Array
 from ..dynamics.inverse import rigid_torques
 from ..obstacles.clearance import link_distances
 from .candidates import Candidates, Evaluated
+from .limits import ranges_of
+from .path_limits import PathLimits
 
 _FIRST = 0.1  # of the longest way of a joint: first bound of a step
 _LEAST = 1e-5
@@ -84,16 +86,14 @@ def _program(task: Candidates, free: Array, now: Evaluated) -> tuple[Array, Arra
     bounds = limits.limits
     for side in (1.0, -1.0):
         add(side * by, side * by_T, side * tau / unit, np.broadcast_to(most / unit, tau.shape), 0.0)
-        for order, value, ends in (
-            (1, v, (bounds.velocity, -bounds.velocity_lower)),
-            (2, a, (bounds.acceleration, -bounds.acceleration_lower)),
-        ):
-            end = np.broadcast_to(ends[0] if side > 0.0 else ends[1], value.shape)
-            part = side * by_joint[order] / T**order
-            add(part, -order * side * value / T, side * value, end, 0.0)
-        end = (bounds.upper if side > 0.0 else -bounds.lower) - task.margin
-        end = np.broadcast_to(end, q.shape)
-        add(side * by_joint[0], 0.0, side * q, end, 1.0)
+        pairs = zip((q, v, a), ranges_of(bounds)[:3], strict=True)
+        for order, (value, (_, low, high)) in enumerate(pairs):
+            end = np.broadcast_to(high if side > 0.0 else -low, q.shape)
+            part, by_time = side * by_joint[order] / T**order, -order * side * value / T
+            if order:
+                add(part, by_time, side * value, end, 0.0)
+            else:
+                add(part, 0.0, side * value, end - task.margin, 1.0)
     if task.bodies and limits.model is not None:
         distance, slope = link_distances(limits.model, q, task.bodies)
         near = np.where(distance < task.clearance + _NEAR, -task.clearance - task.margin, np.inf)
@@ -108,16 +108,13 @@ def _program(task: Candidates, free: Array, now: Evaluated) -> tuple[Array, Arra
     return gain, np.concatenate(rows), np.concatenate(room)
 
 
-def _torques(limits: object, q: Array, v: Array, a: Array, B: Array) -> tuple[Array, Array]:
+def _torques(limits: PathLimits, q: Array, v: Array, a: Array, B: Array) -> tuple[Array, Array]:
     """Torques (G, n), and their derivatives (G, n, k n + 1) by the nodes and T d/dT."""
-    model = limits.model  # type: ignore[attr-defined]
     G, n = q.shape
     k = B.shape[2]
-    if model is None:
+    if limits.model is None:
         return np.zeros((G, n)), np.zeros((G, n, k * n + 1))
-    drives = model.drive_matrices
-    E = np.eye(n)
-    blocks: list[Any] = [(q, v, a)]
+    E, blocks = np.eye(n), []
     # quadratic in v and linear in a: differences over steps of 1 are exact
     for part, h in enumerate((_STEP, 1.0, 1.0)):
         for j in range(n):
@@ -126,16 +123,12 @@ def _torques(limits: object, q: Array, v: Array, a: Array, B: Array) -> tuple[Ar
                 moved[part] = moved[part] + side * E[j]
                 blocks.append(moved)
     stacked = (np.concatenate(x) for x in zip(*blocks, strict=True))
-    every = rigid_torques(model, *stacked).reshape(1 + 6 * n, G, n)
-    tau = every[0]
-    pairs = every[1:].reshape(3, n, 2, G, n)
+    pairs = rigid_torques(limits.model, *stacked).reshape(3, n, 2, G, n)
     by = (pairs[:, :, 0] - pairs[:, :, 1]) / np.array([2.0 * _STEP, 2.0, 2.0])[:, None, None, None]
-    by = np.moveaxis(by, 1, -1)  # (3, G, n, n): torque i by joint j
-    if drives is not None:
-        tau = tau + drives.torque(v, a)
-        by = by.copy()
+    by = np.moveaxis(by, 1, -1).copy()  # (3, G, n, n): torque i by joint j
+    if (drives := limits.model.drive_matrices) is not None:
         by[1] += drives.viscous
         by[2] += drives.rotor
     slopes = np.einsum("pgij,pgk->gikj", by, B).reshape(G, n, k * n)
     scaled = -np.einsum("gij,gj->gi", by[1], v) - 2.0 * np.einsum("gij,gj->gi", by[2], a)
-    return tau, np.concatenate((slopes, scaled[..., None]), axis=-1)
+    return limits.torques(q, v, a), np.concatenate((slopes, scaled[..., None]), axis=-1)

@@ -37,11 +37,9 @@ def revolute_joints(model: RobotModel) -> NDArray[np.bool_]:
 
 
 def follow(
-    model: RobotModel,
-    found: IGMSolutions,
-    start: Array | None,
+    model: RobotModel, found: IGMSolutions, start: Array | None,
     solve: Callable[[int, Array], IGMSolutions],
-) -> Followed:
+) -> Followed:  # fmt: skip
     """Choose the posture of every pose that continues the one before. Shapes: start (n,)."""
     names, revolute = np.array((*found.labels, "")), revolute_joints(model)
     reached = np.atleast_1d(found.valid.any(axis=-1))
@@ -51,32 +49,25 @@ def follow(
     if index.size == 0:
         return rows
     postures, valid, code = found.q[index], found.valid[index], found.code[index]
-    following = _following(postures, valid, revolute)
+    after = following(postures, valid, revolute)
     if start is not None:
         s = _nearest(postures[0], valid[0], start, revolute)
     else:
-        s = _best_start(postures, valid, found.within_limits[index], following, revolute)
-    loose, picks = np.any(found.free_joints[index], axis=-1), []
-    settled: dict[int, tuple[Array, str]] = {}  # their free joints depend on the posture before
-    if not loose.any() and (following == np.arange(following.shape[-1])).all():
-        picks = [s] * index.size
-    for k in range(len(picks), index.size):
-        if k - 1 in settled:
-            s = _nearest(postures[k], valid[k], settled[k - 1][0], revolute)
-        elif k:
-            s = int(following[k - 1, s])
-        picks.append(s)
-        if loose[k, s]:
-            settled[k] = postures[k, s], str(names[code[k, s]])
-            before = settled.get(k - 1, (postures[k - 1, picks[k - 1]],))[0] if k else start
-            if before is not None:
-                one = solve(int(index[k]), before)
-                best = _nearest(one.q, one.valid, before, revolute)
-                settled[k] = one.q[best], str(one.branch[best])
-    q[index] = postures[np.arange(index.size), picks]
-    branch[index] = names[code[np.arange(index.size), picks]]
-    for k, (posture, label) in settled.items():
-        q[index[k]], branch[index[k]] = posture, label
+        s = _best_start(postures, valid, found.within_limits[index], after, revolute)
+    loose = np.any(found.free_joints[index], axis=-1)
+    if not loose.any() and (after == np.arange(after.shape[-1])).all():
+        q[index], branch[index] = postures[:, s], names[code[:, s]]
+        return rows
+    for k, i in enumerate(index.tolist()):
+        before = q[index[k - 1]] if k else start
+        if k and before is not None:  # free joints depend on the posture before
+            freed, s = loose[k - 1, s], int(after[k - 1, s])
+            s = _nearest(postures[k], valid[k], before, revolute) if freed else s
+        q[i], branch[i] = postures[k, s], names[code[k, s]]
+        if loose[k, s] and before is not None:
+            one = solve(i, before)
+            best = _nearest(one.q, one.valid, before, revolute)
+            q[i], branch[i] = one.q[best], one.branch[best]
     return rows
 
 
@@ -86,12 +77,9 @@ def _nearest(q: Array, valid: NDArray[np.bool_], near: Array, revolute: NDArray[
 
 
 def follow_singly(
-    model: RobotModel,
-    N: int,
-    start: Array | None,
-    solve: Callable[[int, Array | None], IGMSolutions],
-    go_on: Callable[[int, Array], IGMSolutions],
-) -> Followed:
+    model: RobotModel, N: int, start: Array | None,
+    solve: Callable[[int, Array | None], IGMSolutions], go_on: Callable[[int, Array], IGMSolutions],
+) -> Followed:  # fmt: skip
     """Solve pose by pose, each from the posture before: for arms with a choice of postures."""
     revolute = revolute_joints(model)
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
@@ -151,35 +139,33 @@ def continuous(
     return out
 
 
-def _following(
-    postures: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """For every posture the one of the next pose that goes on from it, shape (M - 1, S)."""
-    from ..kernels.posture_chains import following_postures
-
-    postures, valid = np.ascontiguousarray(postures), np.ascontiguousarray(valid)
-    following = np.empty((max(len(valid) - 1, 0), valid.shape[1]), np.int64)
-    following_postures(postures, valid, revolute, _NEAR, following)
-    return following
+def following(q: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """For every posture (M, S, n) the one of the next pose that continues it, shape (M - 1, S)."""
+    M, S, _ = q.shape
+    way = np.abs(np.diff(q, axis=0))
+    way = np.where(revolute, np.minimum(way, np.abs(2.0 * np.pi - way)), way)
+    near = (way < _NEAR).all(axis=-1)  # also False for NaN, where the next pose lacks this posture
+    after = np.tile(np.arange(S), (max(M - 1, 0), 1))
+    rows = np.flatnonzero((valid[:-1] & ~near).any(axis=1))
+    apart = posture_distance(q[rows + 1, None], q[rows, :, None], revolute)
+    nearest = np.where(valid[rows + 1, None], apart, np.inf).argmin(axis=-1)
+    after[rows] = np.where(valid[rows], nearest, after[rows])
+    return after
 
 
 def _best_start(
-    postures: Array,
-    valid: NDArray[np.bool_],
-    inside: NDArray[np.bool_],
-    following: NDArray,
-    revolute: NDArray[np.bool_],
-) -> int:
+    postures: Array, valid: NDArray[np.bool_], inside: NDArray[np.bool_],
+    after: NDArray[np.intp], revolute: NDArray[np.bool_],
+) -> int:  # fmt: skip
     """The first posture whose branch goes through best."""
     M, S = valid.shape
     chains = np.tile(np.arange(S), (M, 1))
-    if (following != chains[0]).any():
+    if (after != chains[0]).any():
         for k in range(M - 1):
-            chains[k + 1] = following[k][chains[k]]
+            chains[k + 1] = after[k][chains[k]]
     ways = np.take_along_axis(postures, chains[..., None], axis=1)
     steps = posture_distance(ways[1:], ways[:-1], revolute)
     ordinary = np.median(steps, axis=0) if M > 1 else np.zeros(S)
     jumps = (steps > np.maximum(0.3, 8.0 * ordinary)).sum(axis=0)
     outside = (~np.take_along_axis(inside, chains, axis=1)).sum(axis=0)
-    ranks = np.lexsort((steps.sum(axis=0), outside, jumps, ~valid[0]))
-    return int(ranks[0])
+    return int(np.lexsort((steps.sum(axis=0), outside, jumps, ~valid[0]))[0])

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_floats, as_number, read_only
+from .._arrays import Array, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 from .checks import counted
+from .motions import Motion
 from .trajectory import Trajectory
 
 # what multiplies the cosines and the sines in q, v, a and jerk, apart from powers of k w
@@ -23,7 +24,7 @@ _TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FourierSeries(Value):
+class FourierSeries(Motion):
     """Finite Fourier series of n joints, with period ``2 pi / w``.
 
     ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``: ``a`` and ``b`` are the
@@ -70,11 +71,6 @@ class FourierSeries(Value):
     def n(self) -> int:
         """Number of joints."""
         return self.mean.size
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """No leading axes: one motion."""
-        return ()
 
     @property
     def duration(self) -> Array:

@@ -1,8 +1,6 @@
 """Motions of constant jerk by phases, the quickest under limits of jerk, between any two states.
 
-From rest to rest, and on the straight line of coordinated joints, the closed form of `laws` or a
-single joint's solution serves. Other states go through ruckig (Berscheid and Kroeger, 2021), of
-which only the phases of its profiles are taken.
+From rest to rest the closed form of `laws` serves, other states go through ruckig.
 """
 
 from __future__ import annotations
@@ -45,8 +43,7 @@ def jerk_limited(
     """The quickest motion under limits of velocity, acceleration and jerk, between any states.
 
     Also called double S, seven-phase profile, online trajectory generation. Coordinated joints stay
-    on the straight line between the postures, which states at the ends must lie along; joints that
-    share the time only may start and end in any state.
+    on the straight line between the postures, along which their states at the ends must be.
 
     Parameters
     ----------
@@ -55,9 +52,8 @@ def jerk_limited(
     duration : array_like, shape () or (...), optional
         Seconds; default the least.
     limits : MotionLimits
-        May be asymmetric; all but that of jerk may be infinite. Where a state at an end moves,
-        ruckig keeps the smaller limit of jerk both ways: only from rest to rest is the motion the
-        quickest.
+        All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
+        both ways.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation or str
@@ -179,28 +175,61 @@ def _of_joints(
 
 def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
     """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints."""
+    import ruckig
+
+    from ..kernels.jerk_phases import polished_phases
+
     k = state["q0"].size
     _refuse_states(state, box)
     waits = how is Synchronisation.INDEPENDENT and T is None
-    found = _solved(state, box, T, waits)
-    if isinstance(found, str) and k > 1:
-        found = _one_by_one(state, box, T, waits)
-    if isinstance(found, str):
-        message = f"No motion between these states was found by ruckig: {found}."
-        if T is not None:
-            breaks, _, _ = _by_ruckig(state, box, None, how)
-            message = f"duration: {message} The least duration is {least_shown(breaks.max())} s."
-        raise InvalidValueError(message)
-    longest, h, phases = found
+    s, unit = _units(state, box)
+    scales = s * unit ** -np.arange(4.0)[:, None]
+    start = np.stack((np.zeros(k), state["v0"], state["a0"])) / scales[:3]
+    goal = np.stack((state["q1"] - state["q0"], state["v1"], state["a1"])) / scales[:3]
+    joints = []
+    for column in np.concatenate((start, goal, np.stack(box) / scales[[1, 1, 2, 2, 3]])).T.tolist():
+        joints.append(ruckig.InputParameter(1))
+        for name, value in zip(_GIVEN, column, strict=True):
+            setattr(joints[-1], name, [value])
+    found, common = [ruckig.Trajectory(1) for _ in joints], T
+    for _ in range(50):
+        for joint, move, second in zip(joints, found, unit.tolist(), strict=True):
+            if common is not None:
+                joint.minimum_duration = common / second
+            try:
+                code = ruckig.Ruckig(1).calculate(joint, move).name
+            except (ruckig.RuckigError, ValueError) as error:  # or a number without a name
+                code = str(error).strip().partition("\n")[0]
+            if code not in ("Working", "Finished"):
+                message = f"No motion between these states was found by ruckig: {code}."
+                if T is not None:
+                    least = least_shown(_by_ruckig(state, box, None, how)[0].max())
+                    message = f"duration: {message} The least duration is {least} s."
+                raise InvalidValueError(message)
+        longest = max(move.duration * second for move, second in zip(found, unit, strict=True))
+        if waits or k == 1 or (common is not None and longest <= common * (1.0 + ROUNDING)):
+            break
+        common = longest  # one joint cannot take the time of the others: all take its next one
     if T is not None and abs(longest - T) > ROUNDING * max(T, longest):
         raise InvalidValueError(
             f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
             f"with which they are is {least_shown(longest)} s."
         )
+    profiles = [move.profiles[0][0] for move in found]
+    h, jerk = (
+        np.array([[*getattr(x.brake, name), *getattr(x, name)] for x in profiles]) for name in "tj"
+    )
+    # phases of a brake that is not used hold what was there before
+    whole = np.array([[x.brake.duration] for x in profiles])
+    h[:, :2] *= h[:, :2].cumsum(axis=-1) <= whole * (1.0 + 1e-12)
+    polished, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
+    # where ruckig is asked for a time it meets positions to 1e-8 only
+    polished_phases(h, jerk, start.T.copy(), goal.T.copy(), polished, phases)
     breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
-    lengths[:, :-1], breaks[:, 1:-1] = h, h.cumsum(axis=-1)
+    lengths[:, :-1] = polished * unit[:, None]
+    breaks[:, 1:-1] = lengths[:, :-1].cumsum(axis=-1)
     c = np.zeros((_PHASES + 1, 4, k))
-    c[:-1], c[-1, 0] = phases.transpose(1, 2, 0), state["q1"]
+    c[:-1], c[-1, 0] = phases.transpose(1, 2, 0) * s, state["q1"]
     c[:-1, 0] += state["q0"]
     breaks[:, -1] = breaks.max() if T is None else T
     if waits:
@@ -211,80 +240,16 @@ def _by_ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchro
     return breaks, c, lengths
 
 
-def _solved(
-    state: dict[str, Array], box: _Box, T: float | None, waits: bool
-) -> tuple[float, Array, Array] | str:
-    """Duration, and lengths (k, 9) and coefficients (k, 9, 4) of phases; or what ruckig says."""
-    import ruckig
-
-    from ..kernels.jerk_phases import polished_phases
-
-    s, unit = _units(state, box)
-    k, scales = s.size, np.stack((s, s / unit, s / unit**2, s / unit**3))
-    start = np.stack((np.zeros(k), state["v0"], state["a0"])) / scales[:3]
-    goal = np.stack((state["q1"] - state["q0"], state["v1"], state["a1"])) / scales[:3]
-    bounds = np.stack(box) / scales[[1, 1, 2, 2, 3]]
-    given, found = ruckig.InputParameter(k), ruckig.Trajectory(k)
-    rows = (*start.tolist(), *goal.tolist(), *bounds.tolist())
-    for name, row in zip(_GIVEN, rows, strict=True):
-        setattr(given, name, row)
-    given.synchronization = getattr(ruckig.Synchronization, "No" if waits else "Time")
-    if T is not None:
-        given.minimum_duration = T / unit
-    try:
-        code = ruckig.Ruckig(k).calculate(given, found).name
-    except (ruckig.RuckigError, ValueError) as error:  # or a number for which it has no name
-        code = str(error).strip().partition("\n")[0]
-    if code not in ("Working", "Finished"):
-        return code
-    each = [(profile, profile.brake) for profile in found.profiles[0]]
-    h = np.array([(*brake.t, *profile.t) for profile, brake in each])
-    jerk = np.array([(*brake.j, *profile.j) for profile, brake in each])
-    # phases of a brake that is not used hold what was there before
-    whole = np.array([[brake.duration] for _, brake in each])
-    h[:, :2] *= h[:, :2].cumsum(axis=-1) <= whole * (1.0 + 1e-12)
-    lengths, phases = np.empty(h.shape), np.empty((k, _PHASES, 4))
-    # where ruckig is asked for a time it meets positions to 1e-8 only
-    polished_phases(h, jerk, start.T.copy(), goal.T.copy(), lengths, phases)
-    return found.duration * unit, lengths * unit, phases * s[:, None, None]
-
-
-def _one_by_one(
-    state: dict[str, Array], box: _Box, T: float | None, waits: bool
-) -> tuple[float, Array, Array] | str:
-    """As `_solved`, each joint in a unit of time of its own: for joints of very unlike motions."""
-    joints = [slice(i, i + 1) for i in range(state["q0"].size)]
-    common = T
-    for _ in range(50):
-        found = [
-            _solved({x: v[i] for x, v in state.items()}, _Box(*(b[i] for b in box)), common, waits)
-            for i in joints
-        ]
-        rows = [one for one in found if not isinstance(one, str)]
-        if len(rows) < len(found):
-            return next(one for one in found if isinstance(one, str))
-        longest = max(row[0] for row in rows)
-        if waits or (common is not None and longest <= common * (1.0 + ROUNDING)):
-            h, phases = (np.concatenate([row[k] for row in rows]) for k in (1, 2))
-            return longest, h, phases
-        # one joint cannot take the time of the others: all take the next that it can
-        common = longest
-    return "no duration that all joints can take"
-
-
-def _units(state: dict[str, Array], box: _Box) -> tuple[Array, float]:
-    """Units of length (k,) and of time in which numbers are near to 1, as ruckig expects.
-
-    They are powers of two, so that no digit is lost.
-    """
+def _units(state: dict[str, Array], box: _Box) -> tuple[Array, Array]:
+    """Units of length and of time (k,): powers of two, numbers near 1 for ruckig."""
     v, a = (np.maximum(np.abs(state[k + "0"]), np.abs(state[k + "1"])) for k in "va")
     V = np.minimum(box.velocity, -box.velocity_lower)
     A = np.minimum(box.acceleration, -box.acceleration_lower)
     ends = a / box.jerk + v / A + np.sqrt(v / box.jerk)  # until they have come to rest
     size = np.abs(state["q1"] - state["q0"]) + v * ends + a * ends * ends
-    longest = (ends + size / V + np.sqrt(size / A) + np.cbrt(size / box.jerk)).max()
-    s = np.exp2(np.round(np.log2(np.where(size > 0.0, size, 1.0))))
-    return s, 2.0 ** round(np.log2(longest)) if longest > 0.0 else 1.0
+    longest = ends + size / V + np.sqrt(size / A) + np.cbrt(size / box.jerk)
+    s, unit = (np.exp2(np.round(np.log2(np.where(x > 0.0, x, 1.0)))) for x in (size, longest))
+    return s, unit
 
 
 def _refuse_states(state: dict[str, Array], box: _Box) -> None:

@@ -1,9 +1,4 @@
-"""From poses of the tool to joints: one posture after the other, without leaving its branch.
-
-The seed book's section 4.3 ends with this step. A straight line in space may leave the reach of the
-robot, meet a singular position or ask for joint velocities that no motor has; where it does, the
-`JointPath` tells.
-"""
+"""From poses of the tool to joints: one posture after the other, without leaving its branch."""
 
 from __future__ import annotations
 
@@ -15,19 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Frozen, Value, as_exact, as_mask, as_number
+from .._arrays import Array, as_exact, as_mask, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..igm import IGMSolutions, igm, igm_numeric
 from ..igm.loop import joint_chain
-from ..model import RobotModel
+from ..model import RobotModel, check_model
 from .follow import continuous, follow, follow_singly
 from .limits import few_lines
 from .path_events import PathEvent, PathEventKind, Task, path_events
 from .pose_trajectory import PoseTrajectory
+from .trajectory import Sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath(Frozen, Value):
+class JointPath(Sampled):
     """Postures that follow poses, and what happens on the way.
 
     Parameters
@@ -41,8 +37,8 @@ class JointPath(Frozen, Value):
     status : ndarray of int8, shape (N,)
         Codes of `IGMStatus`.
     conditioning : ndarray, shape (N,)
-        Of the Jacobian, from 1 where it is best to 0 where it is singular (the inverse of its
-        condition number in the Frobenius norm, positions taken in units of the arm's lever).
+        Of the Jacobian, from 1 to 0 where it is singular: the inverse of its condition number in
+        the Frobenius norm, positions in units of the arm's lever.
     branch : ndarray of str, shape (N,)
         Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
@@ -60,15 +56,17 @@ class JointPath(Frozen, Value):
     @property
     def complete(self) -> bool:
         """Whether every pose is reached, inside the joint limits and without a jump."""
-        stops = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
-        return not any(event.kind in stops for event in self.events)
+        return not self.stops
+
+    @property
+    def stops(self) -> tuple[PathEvent, ...]:
+        """The events after which the robot cannot go on."""
+        kinds = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
+        return tuple(event for event in self.events if event.kind in kinds)
 
     def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
         """The events of a kind, in the order of the path."""
         return tuple(event for event in self.events if event.kind is kind)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.q, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
         state = "complete" if self.complete else "not complete"
@@ -90,12 +88,10 @@ def joint_path(
 ) -> JointPath:
     """Joint positions along poses, branch kept, with a report of what happens on the way.
 
-    Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
-    nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
-    with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
-    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if it
-    has one; others go on by the least steps from the last posture, and are solved for all postures
-    only where that fails.
+    Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the nearest to
+    the last one is taken. Without ``q_start`` the branch is chosen with the fewest jumps, the
+    fewest poses outside the limits, and then the shortest way. A redundant arm keeps its arm angle
+    if it has one; others go on by the least steps from the last posture.
 
     Parameters
     ----------
@@ -104,9 +100,8 @@ def joint_path(
     poses : PoseTrajectory or array_like, shape (N, 4, 4)
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
-        Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
-        value (without it 0, or the nearest value inside their limits). A first posture that is more
-        than 0.1 away from it is reported as a jump.
+        Posture from which the robot comes, rad or m; a first posture more than 0.1 away from it is
+        reported as a jump. Joints that do not move the tool keep its value.
     q_near : array_like, shape (n,), optional
         A guess instead: the path begins with the solution of the first pose that is nearest to it.
     t : array_like, shape (N,), optional
@@ -144,21 +139,19 @@ def joint_path(
     >>> path.complete, path.q[-1].round(6)
     (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
     """
-    if not isinstance(model, RobotModel):
-        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    check_model(model)
     if q_start is not None and q_near is not None:
         raise InvalidValueError("q_near and q_start: give only one of the two.")
     start = None if q_start is None else as_exact(q_start, (model.n,), "q_start")
     near = start if q_near is None else as_exact(q_near, (model.n,), "q_near")
     motion = poses if isinstance(poses, PoseTrajectory) else None
-    twists = None
     if motion is not None:
         if t is not None:
             raise InvalidValueError("t: a PoseTrajectory has its own times; pass samples.")
         grid = motion.resample(samples)
         times, T, twists = grid.t, np.asarray(grid.T), np.asarray(grid.twist)
     else:
-        T = se3.as_pose(poses, "poses")
+        T, twists = se3.as_pose(poses, "poses"), None
         if T.ndim != 3:
             raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
         times = np.full(len(T), np.nan) if t is None else as_exact(t, (len(T),), "t")
@@ -166,20 +159,16 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = as_number(singular_below, "singular_below")
-    given = (mask, mask_axes)
-    tolerances = {
-        "position_tolerance": position_tolerance,
-        "orientation_tolerance": orientation_tolerance,
-    }
+    tolerances: dict[str, Any] = {"position_tolerance": position_tolerance,
+                                  "orientation_tolerance": orientation_tolerance}  # fmt: skip
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
-        return igm(model, targets, near, *given, **tolerances)  # type: ignore[arg-type]
+        return igm(model, targets, near, mask, mask_axes, **tolerances)
 
     def go_on(i: int, near: Array) -> IGMSolutions:
-        return igm_numeric(model, T[i], near, *given, restarts=0, **tolerances)  # type: ignore[arg-type]
+        return igm_numeric(model, T[i], near, mask, mask_axes, restarts=0, **tolerances)
 
-    columns = joint_chain(model).columns
-    found = None
+    columns, found = joint_chain(model).columns, None
     if columns.size <= (6 if mask is None else np.count_nonzero(mask)):
         # without a reference postures come in the order of their branches
         found = solve(T, None)
@@ -200,10 +189,7 @@ def joint_path(
     events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
         pose = motion.pose
-        events = [
-            _located(event, times, lambda t: bool(solve(pose(t), near).count > 0))
-            for event in events
-        ]
+        events = [_located(e, times, lambda t: solve(pose(t), near).count > 0) for e in events]
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 
 
@@ -219,19 +205,15 @@ def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
     return np.where(reached[:, None], both, np.nan)
 
 
-def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -> PathEvent:
+def _located(event: PathEvent, times: Array, reached: Callable[[float], Any]) -> PathEvent:
     """The edges of a run out of reach, found between the samples by bisection."""
     if event.kind is not PathEventKind.OUT_OF_REACH:
         return event
-
-    def edge(inside: int, outside: float) -> float:
-        if not 0 <= inside < len(times):
-            return outside
-        good = times[inside]
+    edges = []
+    for inside, outside in ((event.first - 1, event.start), (event.last + 1, event.stop)):
+        good = times[inside] if 0 <= inside < len(times) else outside
         for _ in range(30):
             middle = 0.5 * (good + outside)
             good, outside = (middle, outside) if reached(middle) else (good, middle)
-        return outside
-
-    start, stop = edge(event.first - 1, event.start), edge(event.last + 1, event.stop)
-    return replace(event, start=start, stop=stop)
+        edges.append(outside)
+    return replace(event, start=edges[0], stop=edges[1])

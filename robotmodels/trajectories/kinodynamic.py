@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, Value, as_exact, as_number, read_only
@@ -28,10 +28,10 @@ from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
-from .candidates import Candidates, Cost, knots_of
+from .candidates import Candidates, Cost, shares, spread
 from .checks import checked_limits, sample_count
 from .limits import MotionLimits
-from .path_limits import SLOWEST, PathLimits, not_held
+from .path_limits import PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import TimingResult, Trajectory
 
@@ -85,12 +85,11 @@ class Plan(TimingResult):
     cost : float
         Its cost, see `Cost`; infinite without one.
     history : ndarray, shape (N, 3)
-        Number of the evaluation, cost of the candidate (with a penalty for limits of position and
-        clearance that it does not keep; infinite without a timing), least cost so far.
+        Number of the evaluation, cost of the candidate with penalties, least cost so far.
     torque_use : ndarray, shape (n,)
         Greatest torque of each joint over its limit; 0 where it has none.
     restarts : ndarray, shape (R,)
-        Least cost of each restart of the search: their spread shows how local it is.
+        Least cost of each restart of the search.
     via_times : ndarray, shape (k,)
         Times at which the via points are met, s.
     explanation : str
@@ -150,11 +149,9 @@ def kinodynamic(
     """Kinodynamic planning: the best motion from rest to rest without a given path.
 
     Also called optimal motion planning, minimum-time trajectory optimisation. Paths are splines
-    through free nodes; simulated annealing varies the nodes, with the exact timing of every path
-    (`time_optimal`), from several restarts. The best path of each is then refined to more nodes
-    and improved by sequential linear programming. The motion is checked at 10 000 times.
-
-    The search is local in the end: `Plan.restarts` shows its spread.
+    through free nodes, varied by simulated annealing with the exact timing of every path
+    (`time_optimal`), then refined to more nodes and improved by sequential linear programming. The
+    search is local: `Plan.restarts` shows its spread. The motion is checked at 10 000 times.
 
     Parameters
     ----------
@@ -163,14 +160,13 @@ def kinodynamic(
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
     limits : MotionLimits
-        Of velocity, acceleration, jerk and position; those of the model's table count only if given
-        here, as by `MotionLimits.of_model`.
+        Of velocity, acceleration, jerk and position; see `MotionLimits.of_model` for the table's.
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     via : sequence of array_like, shape (n,), or Pose
         Configurations on the way, in this order.
     obstacles : Sphere, Box, Plane, Capsule, or iterable of these
-        Bodies that the links avoid, see `robotmodels.obstacles`.
+        Bodies that the links avoid.
     clearance : float
         Least distance from them, m.
     cost : Cost
@@ -180,13 +176,13 @@ def kinodynamic(
     method : PlanMethod or str
         ``"anneal"`` or ``"descent"``.
     timing : Timing or str
-        ``"optimal"`` times every path exactly; ``"profile"`` takes the nodes as a profile over
-        time and stretches it, with the windows of `time_scaled`.
+        ``"optimal"`` times every path exactly; ``"profile"`` stretches a profile over time, as
+        `time_scaled`.
     rng : Generator or int, optional
         Random numbers, or their seed; by default a fixed one.
     seconds : float
-        Greatest duration of the search, by the clock. It makes up to 500 evaluations for each
-        second and ends early; only if the clock ends it, results with one seed may differ.
+        Greatest duration of the search, of up to 500 evaluations for each second; results with one
+        seed differ only where the clock ends it.
     progress : bool or callable
         Called with the number of evaluations and the least cost; True prints both.
 
@@ -221,53 +217,56 @@ def kinodynamic(
     if cost.torque and not problem.loaded.size:
         raise InvalidValueError("cost: a weight of the torques needs limits of torque.")
     given = [q0, *_listed(via), q1]
-    postures = [_postures(model, each, k, given, problem) for k, each in enumerate(given)]
-    missing = [k for k, each in enumerate(postures) if not len(each)]
-    if missing:
-        name = _name(missing[0], len(given))
-        why = f"No posture reaches the pose {name} within the limits of position."
-        return _without(PlanStatus.NONE_FOUND, why)
-    for k, q in enumerate(postures):
-        end, name = k in (0, len(given) - 1), _name(k, len(given))
-        held, why = _held(problem, q, name) if end else (np.ones(len(q), np.bool_), "")
-        if not held.any():
-            return _without(PlanStatus.ENDS_NOT_HELD, why)
-        clear, why = _clear(model, q, bodies, wanted, name)
-        if not (held & clear).any():
-            return _without(PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND, why)
-        postures[k] = q[held & clear]
-    generator = generator_of(rng)
-    tasks = []
-    for choice in product(*postures):
-        stations = np.array(choice)
-        if np.any(np.diff(stations, axis=0), axis=1).all():
-            at, optimal = knots_of(stations, count), timing is Timing.OPTIMAL
-            task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
-            straight = task.evaluated(task.straight())
-            if straight.duration < _NO_TIME:
-                raise InvalidValueError(
-                    "limits, torque: nothing limits the straight motion, so its time would be "
-                    "zero; give the robot inertia, or limits of velocity and acceleration of "
-                    "every joint."
+    names = ["q0", *(f"via[{k}]" for k in range(len(given) - 2)), "q1"]
+    postures = [_postures(problem, given, k, names) for k in range(len(given))]
+    for name, q in zip(names, postures, strict=True):
+        if not len(q):
+            why = f"No posture reaches the pose {name} within the limits of position."
+            return _without(PlanStatus.NONE_FOUND, why)
+    for k, (name, q) in enumerate(zip(names, postures, strict=True)):
+        end = name in ("q0", "q1")
+        held = [problem.not_held(x[None], lambda _, at=name: at, True) if end else "" for x in q]
+        if all(held):
+            return _without(PlanStatus.ENDS_NOT_HELD, held[0])
+        q = q[[not why for why in held]]
+        if bodies:
+            distance = np.atleast_1d(clearance_of(model, q, bodies))
+            if (distance < wanted).all():
+                return _without(
+                    PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND,
+                    f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m "
+                    "asked for.",
                 )
-            tasks.append((straight.penalized, len(tasks), task))
+            q = q[distance >= wanted]
+        postures[k] = q
+    tasks, optimal = [], timing is Timing.OPTIMAL
+    for stations in map(np.array, product(*postures)):
+        if not np.any(np.diff(stations, axis=0), axis=1).all():
+            continue
+        at = spread(shares(stations), count)
+        task = Candidates(problem, stations, at, bodies, wanted, cost, optimal)
+        straight = task.evaluated(task.straight)
+        if straight.duration < _NO_TIME:
+            raise InvalidValueError(
+                "limits, torque: nothing limits the straight motion, so its time would be zero; "
+                "give the robot inertia, or limits of velocity and acceleration of every joint."
+            )
+        tasks.append((straight.penalized, len(tasks), task))
     if not tasks:
         raise InvalidValueError("q0, q1, via: two that follow each other are the same posture.")
     tasks = [task for _, _, task in sorted(tasks)[:RESTARTS]]
-    search = Search(seconds, progress)
-    results = []
+    search, results, generator = Search(seconds, progress), [], generator_of(rng)
     for r in range(RESTARTS):
         search.share((r + 1) / (RESTARTS + 1))
         results.append(restart(search, tasks[r % len(tasks)], method, generator, r))
     search.share(1.0)
     results.sort(key=lambda result: result.found.penalized)
     restarts = np.array([result.found.penalized for result in results])
-    best = best_motion(search, results, model, limits)
+    best, history = best_motion(search, results, limits), np.reshape(search.history, (-1, 3))
     if best is None:
-        return replace(_without(PlanStatus.NONE_FOUND, ""), history=search.rows, restarts=restarts)
-    return Plan(
-        best.motion, PlanStatus.FOUND, best.cost, search.rows, best.use, restarts, best.times
-    )
+        return replace(_without(PlanStatus.NONE_FOUND, ""), history=history, restarts=restarts)
+    motion, cost_of_best, use, times = best
+    return Plan(motion, PlanStatus.FOUND, cost_of_best, history, use, restarts, times)
 
 
 def _without(status: PlanStatus, why: str) -> Plan:
@@ -288,22 +287,16 @@ def _listed(via: Any) -> list[Any]:
     return points
 
 
-def _name(k: int, stations: int) -> str:
-    return "q0" if k == 0 else "q1" if k == stations - 1 else f"via[{k - 1}]"
-
-
-def _postures(
-    model: RobotModel, given: Any, k: int, every: list[Any], problem: PathLimits
-) -> Array:  # fmt: skip
+def _postures(problem: PathLimits, every: list[Any], k: int, names: list[str]) -> Array:
     """Configurations (m, n) of an end or via point, within the limits of position."""
-    limits, name = problem.limits, _name(k, len(every))
+    model, limits, given = problem.model, problem.limits, every[k]
+    assert model is not None
     if not isinstance(given, Pose):
-        q = as_exact(given, (model.n,), name)
+        q = as_exact(given, (model.n,), names[k])
         checked_limits(limits, model.n, q[None])
-        before = every[k - 1] if k else None
-        if before is not None and not isinstance(before, Pose) and np.array_equal(before, q):
+        if k and not isinstance(every[k - 1], Pose) and np.array_equal(every[k - 1], q):
             raise InvalidValueError(
-                f"{name}: it is the same as {_name(k - 1, len(every))}; leave one of them out."
+                f"{names[k]}: it is the same as {names[k - 1]}; leave one of them out."
             )
         return q[None]
     near = next((np.asarray(q, float) for q in every if not isinstance(q, Pose)), None)
@@ -312,31 +305,6 @@ def _postures(
     turn = 2.0 * np.pi * (model.table.sigma[model.table.joint_rows] == REVOLUTE)
     reference = np.clip(np.zeros(model.n) if near is None else near, limits.lower, limits.upper)
     q = q - turn * np.round((q - reference) / np.where(turn > 0.0, turn, 1.0))
-    for side in (1.0, -1.0):  # a whole turn back inside
-        out = (q > limits.upper) if side > 0.0 else (q < limits.lower)
-        q = q - side * turn * out
+    q = q - turn * (q > limits.upper)  # a whole turn back inside
+    q = q + turn * (q < limits.lower)
     return q[((q >= limits.lower) & (q <= limits.upper)).all(axis=1)]
-
-
-def _held(problem: PathLimits, q: Array, name: str) -> tuple[NDArray[np.bool_], str]:
-    """Which configurations (m, n) the torques hold, and a sentence about the first."""
-    rest = np.zeros(q.shape)
-    load = problem.rows(q, rest, rest).held
-    stuck = np.abs(problem.drag(q, np.full(q.shape, SLOWEST)))
-    why = [
-        not_held(load[k : k + 1], problem.torque, lambda _: name, stuck[k : k + 1])
-        for k in range(len(q))
-    ]
-    return np.array([not text for text in why]), why[0]
-
-
-def _clear(
-    model: RobotModel, q: Array, bodies: tuple[Obstacle, ...], wanted: float, name: str
-) -> tuple[NDArray[np.bool_], str]:
-    """Which configurations (m, n) keep the clearance, and a sentence about the first."""
-    if not bodies:
-        return np.ones(len(q), np.bool_), ""
-    distance = np.atleast_1d(clearance_of(model, q, bodies))
-    return distance >= wanted, (
-        f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m asked for."
-    )

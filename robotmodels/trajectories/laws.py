@@ -125,21 +125,25 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K:
         both = np.where(up + down > 0.0, up + down, 1.0)
         share = np.where(up + down > 0.0, up / both, 0.5)
         return ramped(law, L, 2.0 * L, T, share, 1.0 - share)
-    if law is not TimeLaw.SMOOTHED_TRAPEZOIDAL:  # a trapezoid is what no limit of jerk leaves
-        h, c = seven_phases(L, V, A, B, J, K)
-        return Pieces(h[:, 1::2], c[:, 1::2, :3]) if law is TimeLaw.TRAPEZOIDAL else Pieces(h, c)
-    J = np.minimum(J, K)
+    smooth, up, down = law is TimeLaw.SMOOTHED_TRAPEZOIDAL, 1.0 / J, 1.0 / K
+    of, one, zero = _smooth_ramp if smooth else ramp, np.ones_like(L), np.zeros_like(L)
     with np.errstate(divide="ignore", invalid="ignore"):
         # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
-        full = np.minimum(np.sqrt(2.0 * L / (1.5 / A + 1.5 / B)), np.cbrt(L) ** 2 * np.cbrt(J / 6))
-    V = _cruise(L, V, full, lambda v: (_smooth_ramp(v, A, J), _smooth_ramp(v, B, J)))
-    up, down = _smooth_ramp(V, A, J).time, _smooth_ramp(V, B, J).time
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cruise = np.where(L > 0.0, L / V - 0.5 * (up + down), 0.0)
-        none = cruise <= 1e-14 * (up + down)
+        by_a = of(one, A, zero, zero).distance + of(one, B, zero, zero).distance
+        by_j = of(one, one / zero, up, down).distance
+        full = np.minimum(np.sqrt(L / by_a), np.cbrt(0.5 * L / by_j) ** 2)
+        V = _cruise(L, V, full, lambda v: (of(v, A, up, down), of(v, B, up, down)))
+        first, last = of(V, A, up, down), of(V, B, up, down)
+        ramps = first.distance + last.distance
+        cruise = np.where(L > 0.0, (L - ramps) / V, 0.0)
+        none = cruise <= 1e-14 * (first.time + last.time)
         # without a cruise the ramps alone cover the distance, to the last digit
-        V = np.where(L > 0.0, np.where(none, 2.0 * L / (up + down), V), 0.0)
-    return _three_phases(law, L, V, up, np.where(none, 0.0, cruise), down)
+        V = np.where(none & (ramps > 0.0), V * (L / ramps), V)
+    cruise = np.where(none, 0.0, cruise)
+    if smooth:
+        return _three_phases(law, L, V, first.time, cruise, last.time)
+    h, c = phases(L, V, first, cruise, last)  # a trapezoid is what no limit of jerk leaves
+    return Pieces(h[:, 1::2], c[:, 1::2, :3]) if law is TimeLaw.TRAPEZOIDAL else Pieces(h, c)
 
 
 def ramped(law: TimeLaw, L: Array, VT: Array, T: Array, up: Array, down: Array) -> Pieces:
@@ -186,16 +190,16 @@ class Ramp(NamedTuple):
         return self.rise + self.level + self.fall
 
 
-def _smooth_ramp(V: Array, A: Array, J: Array) -> Ramp:
+def _smooth_ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
     """The quickest ramp from rest to a velocity whose acceleration is a parabola of time."""
     # it peaks at 1.5 V / time and starts with the jerk 6 V / time^2
-    by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V / J)
+    by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V * np.maximum(up, down))
     time, rise = np.maximum(by_a, by_j), np.where(by_a >= by_j, by_a, 0.5 * by_j)
     return Ramp(time, 0.0 * time, 0.0 * time, 0.5 * V * time, 0.5 * (time + rise))
 
 
 def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
-    """The quickest ramp from rest to a velocity. Shapes: V, A, up, down (R,)."""
+    """The quickest ramp from rest to a velocity; up, down: inverses of the limits of jerk."""
     bends = up + down  # time of both bends for each unit of acceleration
     with np.errstate(divide="ignore", invalid="ignore"):
         # the acceleration of a ramp that is never level
@@ -209,31 +213,6 @@ def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
         distance = np.where(distance > 0.0, a * distance, 0.0)
         slope = np.where(level > 0.0, 0.5 * rise + level + fall, 1.5 * distance / V)
     return Ramp(rise, level, fall, distance, np.where(V > 0.0, slope, 0.0))
-
-
-def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> tuple[Array, Array]:
-    """Phases of the quickest motion.
-
-    Shapes: L, V, A, B, J, K (R,) -> durations (R, 7), coefficients (R, 7, 4).
-    """
-    up, down = 1.0 / J, 1.0 / K
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
-        full = np.sqrt(2.0 * L / (1.0 / A + 1.0 / B))
-        if not (up + down).any():
-            V = np.where(L > 0.0, np.minimum(V, full), 0.0)
-        else:
-            of_one = ramp(np.ones_like(L), np.full_like(L, np.inf), up, down).distance
-            full = np.minimum(full, np.cbrt(0.5 * L / of_one) ** 2)
-            V = _cruise(L, V, full, lambda v: (ramp(v, A, up, down), ramp(v, B, up, down)))
-    first, last = ramp(V, A, up, down), ramp(V, B, up, down)
-    ramps = first.distance + last.distance
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cruise = np.where(L > 0.0, (L - ramps) / V, 0.0)
-        none = cruise <= 1e-14 * (first.time + last.time)
-        # without a cruise the ramps alone cover the distance, to the last digit
-        V = np.where(none & (ramps > 0.0), V * (L / ramps), V)
-    return phases(L, V, first, np.where(none, 0.0, cruise), last)
 
 
 def phases(L: Array, V: Array, first: Ramp, cruise: Array, last: Ramp) -> tuple[Array, Array]:

@@ -65,12 +65,11 @@ class MotionLimits(Value):
         return joints_text(columns) if columns else "MotionLimits: no limits"
 
     def __post_init__(self) -> None:
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        for rate in RATES:
-            if given[f"{rate}_lower"] is None:
-                given[f"{rate}_lower"] = -as_reals(given[rate], rate)
-        arrays = {name: as_reals(value, name) for name, value in given.items()}
-        for name, array in arrays.items():
+        arrays = {}
+        for field in fields(self):
+            name, value = field.name, getattr(self, field.name)
+            lower = name.removesuffix("_lower") if name.endswith("_lower") else ""
+            array = arrays[name] = -arrays[lower] if value is None else as_reals(value, name)
             if array.ndim > 1:
                 raise ShapeError(
                     f"{name}: expected one number or one per joint, got {array.shape}."
@@ -79,7 +78,7 @@ class MotionLimits(Value):
                 raise InvalidValueError(f"{name}: a limit is NaN; infinity means no limit.")
             if name in RATES and (array < 0.0).any():
                 raise InvalidValueError(f"{name}: expected limits of at least 0, got {array}.")
-            if name.removesuffix("_lower") != name and (array > 0.0).any():
+            if lower and (array > 0.0).any():
                 raise InvalidValueError(f"{name}: expected limits of at most 0, got {array}.")
         try:
             shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
@@ -112,7 +111,8 @@ class MotionLimits(Value):
             return self
         result = object.__new__(type(self))  # valid as it is: no check again
         for field in fields(self):
-            value = read_only(np.full(n, getattr(self, field.name)))
+            value = np.full(n, getattr(self, field.name))
+            value.setflags(write=False)
             object.__setattr__(result, field.name, value)
         return result
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial, prod
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array, Value, read_only
 from ..errors import InvalidValueError, ShapeError
@@ -20,8 +21,36 @@ _JUMP = 1e-6  # of the largest value: smaller jumps are put down to rounding
 _INSIDE = np.linspace(0.0, 1.0 - 1e-7, 6)  # of a piece of a law: where extremes are sought
 
 
+class Motion(Value):
+    """Functions of time for n joints, of which a `Trajectory` is made."""
+
+    __slots__ = ()
+    n: int
+    """Number of joints."""
+    duration: Array
+    """Durations of the motions, s, shape (...)."""
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Leading axes: one motion each."""
+        return ()
+
+    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
+        raise NotImplementedError
+
+    def extremes(self, order: int) -> tuple[Array, Array]:
+        """Least and greatest value (..., n) of a derivative, here of samples."""
+        (values,) = self.derivatives(np.linspace(0.0, float(self.duration), _SAMPLES), (order,))
+        return values.min(axis=0), values.max(axis=0)
+
+    def jumps(self, order: int) -> tuple[Any, Any]:
+        """Whether a derivative jumps down, and up, inside the motion, (..., n); here smooth."""
+        return np.zeros(self.n, np.bool_), np.zeros(self.n, np.bool_)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class PiecewisePolynomial(Value):
+class PiecewisePolynomial(Motion):
     """Polynomials of the normalised time of each piece.
 
     Shapes: breaks (..., c, K + 1), coefficients (..., K, d + 1, n), lengths (..., c, K).
@@ -32,22 +61,10 @@ class PiecewisePolynomial(Value):
     lengths: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
-        lengths = read_only(np.diff(breaks) if self.lengths is None else self.lengths)
-        *batch, K, _, n = coefficients.shape
-        c = breaks.shape[-2] if breaks.ndim > 1 else 0
-        wanted = ((*batch, c, K + 1), (*batch, c, K))
-        if c not in (1, n) or (breaks.shape, lengths.shape) != wanted or K == 0:
-            raise ShapeError(
-                f"breaks, lengths: expected shapes {(*batch, 1, K + 1)} and {(*batch, 1, K)} for "
-                f"coefficients {coefficients.shape}, got {breaks.shape} and {lengths.shape}."
-            )
-        for name, value in (
-            ("breaks", breaks),
-            ("coefficients", coefficients),
-            ("lengths", lengths),
-        ):
-            object.__setattr__(self, name, value)
+        lengths = np.diff(self.breaks) if self.lengths is None else self.lengths
+        values = (self.breaks, self.coefficients, lengths)
+        for name, value in zip(("breaks", "coefficients", "lengths"), values, strict=True):
+            object.__setattr__(self, name, read_only(value))
 
     @property
     def n(self) -> int:
@@ -68,26 +85,17 @@ class PiecewisePolynomial(Value):
         """Derivatives at times inside the motion. Shapes: t (..., N) -> (..., N, n)."""
         from ..kernels.piecewise_polynomials import piecewise_derivatives
 
-        *_, K, powers, n = self.coefficients.shape
-        M, c = prod(self.batch), self.breaks.shape[-2]
-        out = np.empty((len(orders), M, t.shape[-1], n))
-        piecewise_derivatives(
-            np.ascontiguousarray(t).reshape(M, t.shape[-1]),
-            self.breaks.reshape(M, c, K + 1),
-            self.lengths.reshape(M, c, K),
-            self.coefficients.reshape(M, K, powers, n),
-            np.asarray(orders, np.int64),
-            out,
-        )
-        return [values.reshape(*t.shape, n) for values in out]
+        M, N, parts = prod(self.batch), t.shape[-1], (self.breaks, self.lengths, self.coefficients)
+        breaks, lengths, c = (x.reshape(M, *x.shape[len(self.batch) :]) for x in parts)
+        out = np.empty((len(orders), M, N, self.n))
+        times = np.ascontiguousarray(t).reshape(M, N)
+        piecewise_derivatives(times, breaks, lengths, c, np.asarray(orders, np.int64), out)
+        return [values.reshape(*t.shape, self.n) for values in out]
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece."""
-        h = np.swapaxes(self.lengths, -1, -2)  # (..., K, c)
-        live = h > 0.0
-        step = np.where(live, h, 1.0)
-        c = _in_time(_derived(self.coefficients, order), step, order)
-        low, high = _range_on_unit_interval(c)
+        live, step = self._steps
+        low, high = _range_on_unit_interval(_in_time(self.coefficients, step, order))
         none = ~live.any(axis=-2)
         low = np.where(live, low, np.inf).min(axis=-2)
         high = np.where(live, high, -np.inf).max(axis=-2)
@@ -95,13 +103,20 @@ class PiecewisePolynomial(Value):
             still = self.coefficients[..., 0, 0, :] if order == 0 else 0.0
             low, high = np.where(none, still, low), np.where(none, still, high)
         if order > 0:
-            down, up = self._jumps(order - 1, live, step)
+            down, up = self.jumps(order - 1)
             low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
         return low, high
 
-    def _jumps(self, order: int, live: Any, step: Array) -> tuple[Any, Any]:
+    @property
+    def _steps(self) -> tuple[NDArray[np.bool_], Array]:
+        """Whether pieces last, and their lengths or 1, each (..., K, c)."""
+        h = np.swapaxes(self.lengths, -1, -2)
+        return h > 0.0, np.where(h > 0.0, h, 1.0)
+
+    def jumps(self, order: int) -> tuple[Any, Any]:
         """Whether a derivative jumps down, and up, between pieces beyond rounding, (..., n)."""
-        c = _in_time(_derived(self.coefficients, order), step, order)
+        live, step = self._steps
+        c = _in_time(self.coefficients, step, order)
         first, last = c[..., 0, :], c.sum(axis=-2)
         live = np.broadcast_to(live, first.shape)
         scale = np.abs(np.where(live[..., None, :], c, 0.0)).sum(axis=-2).max(axis=-2)
@@ -115,19 +130,15 @@ class PiecewisePolynomial(Value):
         return down < -_ROUNDING * scale, up > _ROUNDING * scale
 
 
-def _derived(c: Array, order: int) -> Array:
-    """Coefficients of a derivative with respect to x; the powers are the last axis but one."""
-    for _ in range(order):
-        if c.shape[-2] == 1:
-            return np.zeros_like(c)
-        c = c[..., 1:, :] * np.arange(1.0, c.shape[-2])[:, None]
-    return c
+def _derived(c: Array) -> Array:
+    """Coefficients of the derivative with respect to x; the powers are the last axis but one."""
+    return c[..., 1:, :] * np.arange(1.0, c.shape[-2])[:, None]
 
 
 def _in_time(c: Array, step: Array, order: int) -> Array:
-    """Derivatives by x as derivatives by time; one by one, as the power of a step may vanish."""
+    """Derivatives by time; divided one by one, as the power of a step may vanish."""
     for _ in range(order):
-        c = c / step[..., None, :]
+        c = _derived(c) / step[..., None, :] if c.shape[-2] > 1 else np.zeros_like(c)
     return c
 
 
@@ -137,7 +148,7 @@ def _range_on_unit_interval(c: Array) -> tuple[Array, Array]:
     low, high = ends.min(axis=0), ends.max(axis=0)
     if c.shape[-2] < 3:
         return low, high
-    x = _real_roots(np.moveaxis(_derived(c, 1), -2, -1))  # (..., n, d - 1)
+    x = _real_roots(np.moveaxis(_derived(c), -2, -1))  # (..., n, d - 1)
     y = np.zeros(x.shape)
     for part in np.moveaxis(c, -2, 0)[::-1, ..., None]:
         y = y * x + part
@@ -180,45 +191,13 @@ def _real_roots(c: Array) -> Array:
     return np.clip(x, 0.0, 1.0)
 
 
-class Motion(Protocol):
-    """Functions of time for n joints, of which a `Trajectory` is made."""
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        ...
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """Leading axes: one motion each."""
-        ...
-
-    @property
-    def duration(self) -> Array:
-        """Durations, s, shape (...)."""
-        ...
-
-    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
-        ...
-
-    def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value (..., n) of a derivative over the motion."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class FunctionMotion(Value):
+class FunctionMotion(Motion):
     """Position and the derivatives that are known, as functions t (N,) -> (N, n) or (N,)."""
 
     functions: tuple[Callable[[Array], Any], ...]
     end: float
     n: int
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """One motion."""
-        return ()
 
     @property
     def duration(self) -> Array:
@@ -232,11 +211,6 @@ class FunctionMotion(Value):
             self._value(order, t) if order <= last else self._difference(t, last, order - last)
             for order in orders
         ]
-
-    def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value at samples."""
-        (values,) = self.derivatives(np.linspace(0.0, self.end, _SAMPLES), (order,))
-        return values.min(axis=0), values.max(axis=0)
 
     def _value(self, order: int, t: Array) -> Array:
         name = ("q", "v", "a", "jerk")[order]
@@ -268,7 +242,7 @@ class FunctionMotion(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TimedMotion(Value):
+class TimedMotion(Motion):
     """A path and a law of time: the path's parameter s as piecewise polynomial of time."""
 
     path: Motion
@@ -280,41 +254,40 @@ class TimedMotion(Value):
         return self.path.n
 
     @property
-    def batch(self) -> tuple[int, ...]:
-        """One motion."""
-        return ()
-
-    @property
     def duration(self) -> Array:
         """Seconds."""
         return self.law.duration
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
         """Derivatives at times (N,), by the chain rule."""
-        s = [row[:, 0] for row in self.law.derivatives(t, tuple(range(max(orders) + 1)))]
-        return self._chained(s, orders)
+        every = tuple(range(max(orders) + 1))
+        s, *r = self.law.derivatives(t, every)
+        q = self.path.derivatives(np.clip(s[:, 0], 0.0, float(self.path.duration)), every)
+        found = {0: lambda: q[0], 1: lambda: q[1] * r[0]}
+        found[2] = lambda: q[2] * r[0] ** 2 + q[1] * r[1]
+        found[3] = lambda: q[3] * r[0] ** 3 + 3.0 * q[2] * r[0] * r[1] + q[1] * r[2]
+        return [found[order]() for order in orders]
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value at samples of each piece; infinite where the one below jumps."""
-        live = self.law.lengths[0] > 0.0
-        begin, lengths = self.law.breaks[0, :-1][live], self.law.lengths[0, live]
-        t = (begin[:, None] + lengths[:, None] * _INSIDE).reshape(-1)
-        *below, values = self.derivatives(t, (order - 1, order) if order else (0,))
+        (values,) = self.derivatives(self._inside.reshape(-1), (order,))
         low, high = values.min(axis=0), values.max(axis=0)
-        for x in below:
-            ends = x.reshape(lengths.size, _INSIDE.size, self.n)[:, [0, -1]]
-            jump = np.append(ends[1:, 0] - ends[:-1, 1], np.zeros((1, self.n)), axis=0)
-            size = _JUMP * np.abs(x).max()
-            low = np.where(jump.min(axis=0) < -size, -np.inf, low)
-            high = np.where(jump.max(axis=0) > size, np.inf, high)
+        if order:
+            down, up = self.jumps(order - 1)
+            low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
         return low, high
 
-    def _chained(self, s: list[Array], orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives by time from those of s (k + 1 rows (N,)) and of the path."""
-        end = float(self.path.duration)
-        q = self.path.derivatives(np.clip(s[0], 0.0, end), tuple(range(max(orders) + 1)))
-        r = [rate[:, None] for rate in s]
-        found = {0: lambda: q[0], 1: lambda: q[1] * r[1]}
-        found[2] = lambda: q[2] * r[1] ** 2 + q[1] * r[2]
-        found[3] = lambda: q[3] * r[1] ** 3 + 3.0 * q[2] * r[1] * r[2] + q[1] * r[3]
-        return [found[order]() for order in orders]
+    def jumps(self, order: int) -> tuple[Any, Any]:
+        """Whether a derivative jumps down, and up, between the pieces of the law."""
+        (x,) = self.derivatives(self._inside.reshape(-1), (order,))
+        ends = x.reshape(-1, _INSIDE.size, self.n)[:, [0, -1]]
+        jump = np.append(ends[1:, 0] - ends[:-1, 1], np.zeros((1, self.n)), axis=0)
+        size = _JUMP * np.abs(x).max()
+        return jump.min(axis=0) < -size, jump.max(axis=0) > size
+
+    @property
+    def _inside(self) -> Array:
+        """Times inside the pieces of the law, (K, 6)."""
+        live = self.law.lengths[0] > 0.0
+        begin, lengths = self.law.breaks[0, :-1][live], self.law.lengths[0, live]
+        return begin[:, None] + lengths[:, None] * _INSIDE

@@ -78,15 +78,9 @@ class Task:
     """
 
     def __init__(
-        self,
-        model: RobotModel,
-        T: Array,
-        q: Array,
-        reached: NDArray[np.bool_],
-        mask: ArrayLike | None,
-        mask_axes: str,
-        columns: NDArray[np.int64],
-    ) -> None:
+        self, model: RobotModel, T: Array, q: Array, reached: NDArray[np.bool_],
+        mask: ArrayLike | None, mask_axes: str, columns: NDArray[np.int64],
+    ) -> None:  # fmt: skip
         self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         self._tool, self._poses = mask_axes == "tool", T
         J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
@@ -97,7 +91,7 @@ class Task:
         self.conditioning, self.sign = np.full(len(q), np.nan), np.zeros(len(q))
         self._inverse = np.full((*q.shape, J.shape[-2]), np.nan)
         self._inverse[reached] = 0.0
-        inverse, self.conditioning[reached], self.sign[reached] = _inverted(J)
+        inverse, self.conditioning[reached], self.sign[reached] = inverted(J)
         self._inverse[np.ix_(reached, columns)] = inverse
 
     def rates(self, twists: Array) -> Array:
@@ -124,40 +118,28 @@ class Task:
         return twists[:, self._asked]
 
 
-def _inverted(J: Array) -> tuple[Any, Any, Any]:
+def inverted(J: Array) -> tuple[Any, Any, Any]:
     """(Pseudo-)inverses, conditioning and sign of the determinant of Jacobians (M, m, n)."""
     from ..kernels.inverses import inverses
 
     M, m, n = J.shape
-    r = min(m, n)
     if m == n:
-        inverse, conditioning, sign = np.empty((M, n, n)), np.empty(M), np.empty(M)
+        inverse, conditioning, sign = np.empty(J.shape), np.empty(M), np.empty(M)
         if inverses(np.ascontiguousarray(J), inverse, conditioning, sign) < 0:
             return inverse, np.nan_to_num(conditioning), sign
     # one of them is singular to the last digit, or they are not square
-    size = np.sqrt(np.einsum("kij,kij->k", J, J))
-    U, s, Vt = np.linalg.svd(J, full_matrices=False)
-    live = s > 1e-14 * s[:, :1]
-    with np.errstate(divide="ignore"):
-        other = np.sqrt((1.0 / (s * s)).sum(axis=-1))
-        factor = np.where(live, 1.0 / np.where(live, s, 1.0), 0.0)
-    inverse = np.swapaxes(Vt, -1, -2) @ (factor[..., None] * np.swapaxes(U, -1, -2))
-    with np.errstate(invalid="ignore"):
-        conditioning = np.where(size > 0.0, r / (size * other), 0.0)
-    sign = np.sign(np.linalg.det(J)) if m == n else np.zeros(len(J))
-    return inverse, conditioning, sign
+    s = np.linalg.svd(J, compute_uv=False)
+    live = s[:, -1] > 1e-14 * s[:, 0]
+    product = (s * s).sum(axis=-1) * (1.0 / np.where(live[:, None], s, 1.0) ** 2).sum(axis=-1)
+    conditioning = np.where(live, min(m, n) / np.sqrt(np.maximum(product, 1e-300)), 0.0)
+    sign = np.sign(np.linalg.det(J)) if m == n else np.zeros(M)
+    return np.linalg.pinv(J, rcond=1e-14), conditioning, sign
 
 
 def path_events(
-    model: RobotModel,
-    times: Array,
-    q: Array,
-    v: Array,
-    rows: Followed,
-    task: Task,
-    singular_below: float,
-    start: Array | None = None,
-) -> list[PathEvent]:
+    model: RobotModel, times: Array, q: Array, v: Array, rows: Followed, task: Task,
+    singular_below: float, start: Array | None = None,
+) -> list[PathEvent]:  # fmt: skip
     """Events along a path, in order. Shapes: times (N,); q, v (N, n); start (n,)."""
     reached = rows.reached
     events: list[PathEvent] = []
@@ -165,14 +147,10 @@ def path_events(
     def add(kind: PathEventKind, i: int, j: int, text: str) -> None:
         events.append(PathEvent(kind, i, j, times[i], times[j], text))
 
-    for i, j in _runs(~reached):
-        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
     with np.errstate(invalid="ignore", divide="ignore"):
         over = np.maximum(q - model.upper, model.lower - q)
         share = np.abs(v) / model.table.velocity
         outside, fast = over > 1e-9, share > 1.0 + 1e-9
-    for i, j in _runs(np.any(outside, axis=-1)):
-        add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     step, jump, gaps = _jumps(q, reached, task)
     adjacent = reached[1:] & reached[:-1]
     flips = adjacent & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
@@ -180,13 +158,18 @@ def path_events(
     low = reached & (task.conditioning < singular_below)
     low[:-1] |= flips
     low[1:] |= flips
+    for i, j in _runs(~reached):
+        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
+    for i, j in _runs(np.any(outside, axis=-1)):
+        add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     for i, j in _runs(low):
         least = np.nanmin(task.conditioning[i : j + 1])
-        text = f"The least conditioning of the samples is {least:.2g}."
-        add(PathEventKind.SINGULAR, i, j, text)
+        add(PathEventKind.SINGULAR, i, j, f"The least conditioning of the samples is {least:.2g}.")
+    for i, j in _runs(np.any(fast, axis=-1)):
+        text = "needs {:.4g} times its greatest velocity."
+        add(PathEventKind.TOO_FAST, i, j, _worst(share[i : j + 1], text))
     for i in np.flatnonzero(jump).tolist():
-        text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
-        add(PathEventKind.JUMP, i, i + 1, text)
+        add(PathEventKind.JUMP, i, i + 1, _worst(np.abs(step[i : i + 1]), "steps by {:.4g}."))
     if start is not None and reached.any():
         k = int(reached.argmax())
         away = np.abs(q[k : k + 1] - start)
@@ -194,9 +177,8 @@ def path_events(
             add(PathEventKind.JUMP, k, k, _worst(away, "is {:.4g} away from q_start."))
     for i, j in gaps:
         between = f"{i + 1}" + (f" to {j - 1}" if j > i + 2 else "")
-        text = _worst(np.abs(q[j : j + 1] - q[i]), "steps by {:.4g}")
-        text += f"; in between, at pose {between}, the path is out of reach."
-        add(PathEventKind.JUMP, i, j, text)
+        text = f"steps by {{:.4g}}; in between, at pose {between}, the path is out of reach."
+        add(PathEventKind.JUMP, i, j, _worst(np.abs(q[j : j + 1] - q[i]), text))
     changed = adjacent & ((rows.branch[1:] != rows.branch[:-1]) | flips)
     for i in np.flatnonzero(changed).tolist():
         before, after = str(rows.branch[i]), str(rows.branch[i + 1])
@@ -205,9 +187,6 @@ def path_events(
         if named or flips[i]:
             text = f"From {before} to {after}." if named else ""
             add(PathEventKind.CHANGES_POSTURE, i, i + 1, text)
-    for i, j in _runs(np.any(fast, axis=-1)):
-        text = _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity.")
-        add(PathEventKind.TOO_FAST, i, j, text)
     return sorted(events, key=lambda event: (event.first, event.last))
 
 
@@ -215,10 +194,8 @@ def _missed(rows: Followed, first: int, last: int) -> str:
     """Why a run of poses is not reached: of every reason the pose that is missed by most."""
     if first == last:
         return rows.reason(first)
-    metres = np.linalg.norm(rows.missing[:, :3], axis=-1)
-    angle = np.linalg.norm(rows.missing[:, 3:], axis=-1)
-    texts = []
-    status = rows.status[first : last + 1]
+    metres, angle = (np.linalg.norm(rows.missing[:, part], axis=-1) for part in np.s_[:3, 3:])
+    texts, status = [], rows.status[first : last + 1]
     for code in dict.fromkeys(status.tolist()):
         run = first + np.flatnonzero(status == code)
         turned = code == IGMStatus.ORIENTATION_NOT_AVAILABLE or not (metres[run] > 0.0).any()

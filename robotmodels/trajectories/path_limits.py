@@ -23,7 +23,6 @@ from .checks import checked_limits
 from .joint_path import joint_path
 from .limits import MotionLimits
 from .motions import FunctionMotion, Motion
-from .path_events import PathEventKind
 from .point_to_point import linear
 from .pose_trajectory import PoseTrajectory
 from .splines import cubic_spline
@@ -35,7 +34,6 @@ _ROUNDING = 1e-9  # of the greatest rate: a joint that is slower does not move
 _SWEEPS = 60
 _SETTLED = 1e-10  # relative change of the duration
 _SLOW, _STILL = 1e-3, 2e-5  # of the greatest rate: slower ends, and rests inside, need the length
-_BEND = 1e-3  # of the greatest rate: changes between samples that are looked at more closely
 _TURN = 1e-2  # rad: a smaller change of direction within a millionth of the path is no kink
 _SAMPLES = 8  # for each interval of the grid
 _KNOTS = 800  # more of them would lose digits of the second derivative
@@ -44,14 +42,14 @@ _KNOTS = 800  # more of them would lose digits of the second derivative
 class Rows(NamedTuple):
     """``lower <= a u + b x + c <= upper`` and ``x <= top``, of K quantities at N + 1 points.
 
-    Shapes: a, b, c (N + 1, K), top (N + 1,); held (N + 1, n), torques at rest without friction.
+    Shapes: a, b, c (N + 1, K), top (N + 1,); still (K,), the last c without friction.
     """
 
     a: Array
     b: Array
     c: Array
     top: Array
-    held: Array
+    still: Array
 
 
 class Passes(NamedTuple):
@@ -121,23 +119,51 @@ class PathLimits:
 
     def drag(self, q: Array, v: Array) -> Array:
         """Torques of friction at velocities. Shapes: q, v (..., n) -> (..., n)."""
-        if self.friction is False:
-            return np.zeros(v.shape)
         drag = np.zeros(v.shape)
+        if self.friction is False:
+            return drag
         if self.drives is not None:
             drag = self.drives.torque(v, None) - self.drives.offset
         if self.friction is not None:
             drag = drag + torque_at(self.friction, v, q)  # type: ignore[arg-type]
         return drag
 
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Torques (N, n) of a motion; none without limits of torque."""
+        if self.model is None or not self.loaded.size:
+            return np.zeros(q.shape)
+        tau = rigid_torques(self.model, q, v, a) + self.drag(q, v)
+        return tau if self.drives is None else tau + a @ self.drives.rotor + self.drives.offset
+
+    def not_held(self, q: Array, place: Callable[[int], str], stuck: bool) -> str:
+        """Where torques at rest (N, n) exceed their limits most, as a sentence; or nothing.
+
+        ``stuck``: whether dry friction helps.
+        """
+        if not self.loaded.size or not q.size:
+            return ""
+        none = np.zeros(q.shape)
+        load = self.torques(q, none, none)
+        help_ = np.abs(self.drag(q, none + SLOWEST)) if stuck else none
+        margin = self.torque * (1.0 + 1e-9) - np.abs(load) + help_
+        if (margin >= 0.0).all():
+            return ""
+        i, j = np.unravel_index(int(margin.argmin()), margin.shape)
+        return (
+            f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
+            f"{abs(load[i, j]):.6g} to be held still and has {self.torque[j]:.6g}"
+            f"{' and dry friction' if help_.any() else ''}, margin of {margin[i, j]:.4g} "
+            "(N m or N)."
+        )
+
     def rows(self, q: Array, rate: Array, bend: Array) -> Rows:
         """Rows at points of a path. Shapes: q and its derivatives by s (N + 1, n)."""
         some, N = self.acceleration, len(q)
-        a, b, c = np.empty((3, N, self.scale.size))
-        k, gravity = some.size, np.zeros(q.shape)
-        a[:, :k], b[:, :k], c[:, :k] = rate[:, some], bend[:, some], 0.0
+        a, b, c = np.zeros((3, N, self.scale.size))
+        k, still = some.size, np.zeros(self.scale.size)
+        a[:, :k], b[:, :k] = rate[:, some], bend[:, some]
         if self.loaded.size and self.model is not None:
-            none = np.zeros(q.shape)
+            load, none = self.loaded, np.zeros(q.shape)
             tau = rigid_torques(
                 self.model,
                 np.concatenate((q, q, q)),
@@ -149,17 +175,15 @@ class PathLimits:
                 rotor = self.drives.rotor
                 inertial, moving = inertial + rate @ rotor, moving + bend @ rotor
                 gravity = gravity + self.drives.offset
-            load, steady = self.loaded, gravity
+            steady, still[k:] = gravity, gravity[-1, load]
             if self.drives is not None or self.friction:
                 steady = gravity + self.drag(q, SLOWEST * self.direction(rate))
             a[:, k:], b[:, k:], c[:, k:] = inertial[:, load], moving[:, load], steady[:, load]
-        a /= self.scale
-        b /= self.scale
-        c /= self.scale
         with np.errstate(divide="ignore"):
             most = np.where(rate > 0.0, self.limits.velocity, -self.limits.velocity_lower)
             top = (most / np.abs(rate)).min(axis=1) ** 2
-        return Rows(a, b, c, np.minimum(top, 1e300), gravity)
+        scale = self.scale
+        return Rows(a / scale, b / scale, c / scale, np.minimum(top, 1e300), still / scale)
 
     def direction(self, rate: Array) -> Array:
         """The rates, with those that are nothing but rounding made zero."""
@@ -173,18 +197,32 @@ class PathLimits:
 
         ``tight`` (2, N, K): by how much the lower and upper limits are narrower on each interval.
         """
+        from .kernels import path_rates
+
         rows = self.rows(q, rate, bend) if rows is None else rows
         if ends[1] == 0.0:  # at rest dry friction does not help to brake
-            held = rows.held[-1, self.loaded]
-            rows.c[-1, self.acceleration.size :] = held / self.scale[self.acceleration.size :]
+            rows.c[-1] = rows.still
         steps, given, narrow = np.diff(s), np.square(ends), np.zeros((2, len(s) - 1, 1)) + tight
         bounds = (self.lower + narrow[0], self.upper - narrow[1])
-        now = self._swept(steps, rows, given, bounds)
+
+        def swept(rows: Rows) -> Passes:
+            found = np.empty((len(s), 6))
+            failed = path_rates(
+                steps, rows.a, rows.b, rows.c, *bounds, self.ends, rows.top, given, found
+            )
+            if failed >= 0:
+                return Passes(found, failed, np.inf, rows)
+            speed = np.sqrt(np.maximum(found[:, 0], 0.0))
+            pace = speed[1:] + speed[:-1]
+            duration = float((2.0 * steps / pace).sum()) if pace.min() > 0.0 else np.inf
+            return Passes(found, -1, duration, rows)
+
+        now = swept(rows)
         if not self.viscous or now.failed >= 0:
             return now
         x, best = now.found[:, 0], None
         for _ in range(sweeps):
-            last, now = now, self._swept(steps, self.tangent(rows, x, q, rate), given, bounds)
+            last, now = now, swept(self.tangent(rows, x, q, rate))
             if now.failed >= 0:
                 x, now = 0.25 * x, last
                 continue
@@ -195,8 +233,6 @@ class PathLimits:
 
     def tangent(self, rows: Rows, x: Array, q: Array, rate: Array) -> Rows:
         """Rows with the friction that depends on the speed, by its tangent at squared rates x."""
-        if not self.viscous:
-            return rows
         k, turns = self.acceleration.size, self.direction(rate)
         speed = np.sqrt(np.maximum(x, 0.0))[:, None]
         square = np.where(x > 0.0, x, np.inf)[:, None]
@@ -213,40 +249,6 @@ class PathLimits:
         b[:, k:] += slope / self.scale[k:]
         c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
         return rows._replace(b=b, c=c)
-
-    def _swept(
-        self, steps: Array, rows: Rows, given: Array, bounds: tuple[Array, Array]
-    ) -> Passes:  # fmt: skip
-        from .kernels import path_rates
-
-        found = np.empty((len(steps) + 1, 6))
-        failed = path_rates(
-            steps, rows.a, rows.b, rows.c, *bounds, self.ends, rows.top, given, found
-        )
-        if failed >= 0:
-            return Passes(found, failed, np.inf, rows)
-        rate = np.sqrt(np.maximum(found[:, 0], 0.0))
-        pace = rate[1:] + rate[:-1]
-        duration = float((2.0 * steps / pace).sum()) if pace.min() > 0.0 else np.inf
-        return Passes(found, -1, duration, rows)
-
-
-def not_held(
-    held: Array, bound: Array, place: Callable[[int], str], stuck: Array | float = 0.0
-) -> str:
-    """Where torques at rest (N, n) exceed their limits (n,) most, as a sentence; or nothing.
-
-    ``stuck``: torques of dry friction that help.
-    """
-    margin = bound * (1.0 + 1e-9) - np.abs(held) + stuck
-    if (margin >= 0.0).all():
-        return ""
-    i, j = np.unravel_index(int(margin.argmin()), margin.shape)
-    return (
-        f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
-        f"{abs(held[i, j]):.6g} to be held still and has {bound[j]:.6g}"
-        f"{' and dry friction' if np.any(stuck) else ''}, margin of {margin[i, j]:.4g} (N m or N)."
-    )
 
 
 def checked_torque(
@@ -273,59 +275,43 @@ def checked_torque(
 def path_of(path: object, model: RobotModel | None, points: int) -> tuple[Motion | str, bool]:
     """A regular path of n joints (or why there is none), and whether it is scalar."""
     if isinstance(path, PoseTrajectory):
-        return _through_poses(path, model, points), False
+        path = _through_poses(path, model, points)
+        if isinstance(path, str):
+            return path, False
     if not isinstance(path, Trajectory):
         raise InvalidValueError(
             f"path: expected a Trajectory or a PoseTrajectory, got {type(path).__name__}; a path "
             "through points is cubic_spline(points, times, ends='not_a_knot')."
         )
-    if path.motion.batch:
+    motion = path.motion
+    if motion.batch:
         raise InvalidValueError("path: expected one path, got a batch of motions.")
-    if not float(path.motion.duration) > 0.0:
+    if not (end := float(motion.duration)) > 0.0:
         raise InvalidValueError("path: it has no length; its ends are the same.")
-    return _regular(path.motion, points), path.scalar
-
-
-def _through_poses(path: PoseTrajectory, model: RobotModel | None, points: int) -> Motion | str:
-    """Joints along a path of poses, at even steps of its own parameter."""
-    if model is None:
-        raise InvalidValueError("model: a path of poses needs the robot that follows it.")
-    check_model(model)
-    end = path.path.end
-    evenly = PoseTrajectory(path.path, linear(0.0, end, duration=end))
-    found = joint_path(model, evenly, samples=2 * max(points, 200) + 1)
-    if not found.complete:
-        stops = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
-        first = next(event for event in found.events if event.kind in stops)
-        return f"The joints cannot follow the poses: {first}"
-    return _regular(cubic_spline(found.q, found.t, ends="not_a_knot").motion, points)
-
-
-def _regular(motion: Motion, points: int) -> Motion | str:
-    """The motion itself where its velocity is continuous and nowhere small, else by its length."""
-    end = float(motion.duration)
+    # the path itself serves where its velocity is continuous and nowhere small
     t = np.linspace(0.0, end, _SAMPLES * points + 1)
-    q, rate, bend = motion.derivatives(t, (0, 1, 2))
+    rate, bend = motion.derivatives(t, (1, 2))
     speed, swing = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (rate, bend))
     most = float(speed.max())
     # inside, a path may turn back in its own parameter, which goes on, but not rest in it
     moves = min(speed[0], speed[-1]) > _SLOW * most and (speed + swing * t[1]).min() > _STILL * most
-    if moves and not _jumps(motion, t, q, most):
-        return motion
-    return _by_length(motion, np.linspace(0.0, end, 10 * _KNOTS + 1))
+    if moves and not isinstance(motion, FunctionMotion) and not np.any(motion.jumps(1)):
+        return motion, path.scalar
+    return _by_length(motion, np.linspace(0.0, end, 10 * _KNOTS + 1)), path.scalar
 
 
-def _jumps(motion: Motion, t: Array, q: Array, most: float) -> bool:
-    """Whether the velocity jumps: of functions, a change that does not shrink with the step."""
-    if not isinstance(motion, FunctionMotion):
-        return bool(np.isinf(motion.extremes(2)).any())
-    change = np.abs(np.diff(q, 3, axis=0)).max(axis=1, initial=0.0) / t[1]
-    worst = np.argsort(change)[-20:]
-    return any(
-        change[k] > _BEND * most
-        and _is_sharp(motion, float(t[k]), float(t[k + 3]), float(change[k]), None)
-        for k in worst.tolist()
-    )
+def _through_poses(
+    path: PoseTrajectory, model: RobotModel | None, points: int
+) -> Trajectory | str:  # fmt: skip
+    """Joints along a path of poses, at even steps of its own parameter."""
+    if model is None:
+        raise InvalidValueError("model: a path of poses needs the robot that follows it.")
+    end = path.path.end
+    evenly = PoseTrajectory(path.path, linear(0.0, end, duration=end))
+    found = joint_path(model, evenly, samples=2 * max(points, 200) + 1)
+    if found.stops:
+        return f"The joints cannot follow the poses: {found.stops[0]}"
+    return cubic_spline(found.q, found.t, ends="not_a_knot")
 
 
 def _by_length(motion: Motion, t: Array) -> Motion | str:
@@ -350,24 +336,18 @@ def _by_length(motion: Motion, t: Array) -> Motion | str:
     return cubic_spline(knots[apart], at, ends="not_a_knot").motion
 
 
-def _is_sharp(motion: Motion, low: float, high: float, size: float, length: float | None) -> bool:
-    """Whether the velocity changes by as much within any part of an interval, however short.
-
-    With the ``length`` of the path its direction, where it moves.
-    """
+def _is_sharp(motion: Motion, low: float, high: float, size: float, length: float) -> bool:
+    """Whether the direction turns by as much within any part of an interval, however short."""
     for _ in range(3):
         t = np.linspace(low, high, 68)
-        (q,) = motion.derivatives(t, (0,))
-        slope, seen = np.diff(q, axis=0) / (t[1] - t[0]), np.arange(67)
-        if length is not None:
-            sizes = np.linalg.norm(slope, axis=1)
-            seen = np.flatnonzero(sizes * (t[1] - t[0]) > 1e-10 * length)
-            slope = slope[seen] / sizes[seen, None]
+        slope = np.diff(motion.derivatives(t, (0,))[0], axis=0)
+        sizes = np.linalg.norm(slope, axis=1)
+        seen = np.flatnonzero(sizes > 1e-10 * length)  # where it moves
         if seen.size < 3:
             break
-        change = np.linalg.norm(np.diff(slope, axis=0), axis=1)
-        k = int(change.argmax())
-        if change[k] < 0.5 * size:
+        turn = np.linalg.norm(np.diff(slope[seen] / sizes[seen, None], axis=0), axis=1)
+        k = int(turn.argmax())
+        if turn[k] < 0.5 * size:
             return False
         low, high = float(t[seen[k]]), float(t[seen[k + 1] + 1])
     return True

@@ -17,15 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._arrays import Array
-from ..dynamics import idm
-from ..model import RobotModel
-from .candidates import Candidates, Evaluated, half_width, spread
+from .candidates import Candidates, Evaluated
 from .descent import descended
 from .limits import MotionLimits, ranges_of
 from .motions import TimedMotion
 from .time_optimal import law_of, time_optimal
 from .time_scaling import at_rest, stretched, time_scaled
-from .trajectory import Trajectory
+from .trajectory import Samples, Trajectory
 
 RATE = 500  # evaluations for each second
 RESTARTS = 3
@@ -54,25 +52,13 @@ class Restart(NamedTuple):
     path: Trajectory | None
 
 
-class Best(NamedTuple):
-    """The best motion that keeps all limits."""
-
-    motion: Trajectory
-    cost: float
-    use: Array
-    times: Array
-
-
 class Search:
     """Counts evaluations, keeps their costs and ends the search."""
 
-    __slots__ = ("allowed", "best", "deadline", "history", "report", "seconds", "start")
-
     def __init__(self, seconds: float, progress: bool | Callable[[int, float], Any]) -> None:
-        self.start, self.seconds = time.monotonic(), seconds
+        self.start, self.seconds, self.best = time.monotonic(), seconds, np.inf
         self.share(1.0)
         self.allowed = int(RATE * seconds) + 1
-        self.best = np.inf
         self.history: list[tuple[int, float, float]] = []
         self.report = progress if callable(progress) else (_printed if progress else None)
 
@@ -91,11 +77,6 @@ class Search:
             self.report(len(self.history), self.best)
         return found
 
-    @property
-    def rows(self) -> Array:
-        """History (N, 3)."""
-        return np.array(self.history).reshape(-1, 3)
-
 
 def _printed(evaluations: int, cost: float) -> None:
     sys.stderr.write(f"{evaluations} evaluations, least cost {cost:.6g}\n")
@@ -105,17 +86,15 @@ def _annealed(
     search: Search, task: Candidates, rng: np.random.Generator, evaluations: int
 ) -> tuple[Array, Evaluated]:
     """Simulated annealing from the straight path, with steps that shrink with the temperature."""
-    free = best = task.straight()
+    free = best = task.straight
     now = least = task.evaluated(free)
-    width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
     scale = now.penalized if np.isfinite(now.penalized) else 1.0
     for k in range(evaluations):
         cold = k / max(evaluations - 1, 1)
-        size = width * _NARROW**cold
         wave = int(rng.geometric(0.5)) if len(free) > 1 else 1
         bump = np.sin(wave * np.pi * task.knots[task.free]) / wave**2
         step = bump[:, None] * rng.normal(0.0, 1.0, free.shape[1])
-        trial = free + size * step
+        trial = free + task.width * _NARROW**cold * step
         then = search.evaluated(task, trial)
         if then is None:
             break
@@ -133,27 +112,25 @@ def restart(
     search: Search, task: Candidates, method: PlanMethod, rng: np.random.Generator, r: int
 ) -> Restart:
     """One search from the straight path, or from a random one."""
-    free = task.straight()
+    free = task.straight
     if method is PlanMethod.ANNEAL:
         free, now = _annealed(search, task, rng, search.allowed // (RESTARTS + 1))
     else:
-        if r:
-            width = half_width(task.stations.min(axis=0), task.stations.max(axis=0))
-            free = free + width * rng.uniform(-1.0, 1.0, free.shape)
+        free = free + task.width * rng.uniform(-1.0, 1.0, free.shape) if r else free
         now = task.evaluated(free)
     if not task.optimal:
         free, now = descended(task, free, 2 * _STEPS, search.evaluated)
         return Restart(now, task, free, None)
-    path, timed, at = _timed(task, free)
-    if timed is None:
+    path, passes = task.path(free), task.limits.passes(task.grid, *task.sampled(free))
+    if not np.isfinite(passes.duration):
         return Restart(now, task, free, path)
-    profile, fine, done = timed, task, now
+    law = law_of(task.grid, passes.found[:, 0])
+    at = np.interp(task.knots[task.fixed], task.grid, law.breaks[0]) / passes.duration
+    profile = Trajectory(TimedMotion(path.motion, law))
     for nodes in _levels(task)[:-1]:
-        fine = task.finer(spread(at, nodes))
-        free = profile.q(fine.knots[fine.free] * profile.duration)
-        free, done = descended(fine, free, _STEPS, search.evaluated)
-        profile = fine.path(free)
-    return Restart(done, fine, free, path)
+        now, task, free = _finer(search, task, profile, at, nodes)
+        profile = task.path(free)
+    return Restart(now, task, free, path)
 
 
 def _levels(task: Candidates) -> tuple[int, ...]:
@@ -161,59 +138,60 @@ def _levels(task: Candidates) -> tuple[int, ...]:
     return tuple(k for k in _LEVELS if k * task.limits.n <= _MOST or k <= _LEVELS[1])
 
 
-def _timed(task: Candidates, free: Array) -> tuple[Trajectory, Trajectory | None, Array]:
-    """A path, its quickest motion, and the fractions of time of its stations."""
-    path = task.path(free)
-    passes = task.limits.passes(task.grid, *task.sampled(free))
-    if not np.isfinite(passes.duration):
-        return path, None, np.empty(0)
-    law = law_of(task.grid, passes.found[:, 0])
-    at = np.interp(task.knots[task.fixed], task.grid, law.breaks[0]) / passes.duration
-    return path, Trajectory(TimedMotion(path.motion, law)), at
+def _finer(
+    search: Search, task: Candidates, profile: Trajectory, at: Array, nodes: int
+) -> tuple[Evaluated, Candidates, Array]:
+    """A profile with more nodes, improved."""
+    fine = task.as_profile(at, nodes)
+    free = profile.q(fine.knots[fine.free] * profile.duration)
+    free, now = descended(fine, free, _STEPS, search.evaluated)
+    return now, fine, free
 
 
 def best_motion(
-    search: Search, results: list[Restart], model: RobotModel, limits: MotionLimits | None
-) -> Best | None:
-    """The best motion from the restarts in the order of their costs; the first is refined."""
+    search: Search, results: list[Restart], limits: MotionLimits | None
+) -> tuple[Trajectory, float, Array, Array] | None:
+    """The best motion of the first restart that keeps all limits, its cost, torques and via times.
+
+    The restarts are in the order of their costs; the first is refined.
+    """
     smooth = limits is not None and np.isfinite([limits.jerk, limits.jerk_lower]).any()
     for k, (done, task, free, path) in enumerate(results):
         options: list[Trajectory | None] = []
         if np.isfinite(done.cost) and not task.optimal:
             if path is not None and k == 0:
-                fine = task.finer(spread(task.knots[task.fixed], _levels(task)[-1]))
-                start = task.path(free).q(fine.knots[fine.free])
-                finer, then = descended(fine, start, _STEPS, search.evaluated)
+                at, nodes = task.knots[task.fixed], _levels(task)[-1]
+                then, fine, finer = _finer(search, task, task.path(free), at, nodes)
                 if then.penalized < done.penalized:
                     task, free = fine, finer
-            options = _finished(search, task, free, model, limits, path is not None and not smooth)
+            options = _finished(search, task, free, limits, path is not None and not smooth)
         if path is not None and not smooth:
-            options.append(_retimed(task, path, model))
+            options.append(_retimed(task, path))
         kept = []
-        for motion in (o for o in options if o is not None and _short(task, o) <= 1e-9):
-            times = _times_at(motion, task.stations[1:-1])
-            missed = np.abs(motion.q(times) - task.stations[1:-1]).max(initial=0.0)
-            if missed <= _MET:
-                share, weights = _shares(task, model, motion), task.cost
+        for motion in options:
+            if motion is None or task.violation(_seen(motion).q) > 1e-9:
+                continue
+            times, via = _times_at(motion, task.stations[1:-1]), task.stations[1:-1]
+            if np.abs(motion.q(times) - via).max(initial=0.0) <= _MET:
+                share, weights = _shares(task, motion), task.cost
                 cost = weights.time + weights.torque * float((share**2).sum(axis=1).mean())
-                use = np.abs(share).max(axis=0)
-                kept.append(Best(motion, cost * motion.duration, use, times))
+                kept.append((motion, cost * motion.duration, np.abs(share).max(axis=0), times))
         if kept:
-            return min(kept, key=lambda best: best.cost)
+            return min(kept, key=lambda best: best[1])
     return None
 
 
 def _finished(
-    search: Search, task: Candidates, free: Array, model: RobotModel,
-    limits: MotionLimits | None, retimed: bool,
-) -> list[Trajectory | None]:  # fmt: skip
+    search: Search, task: Candidates, free: Array, limits: MotionLimits | None, retimed: bool
+) -> list[Trajectory | None]:
     """Motions of a profile: stretched to the least duration, and timed anew along its path."""
     rates = None if limits is None else replace(limits, lower=-np.inf, upper=np.inf)
-    path, scaled = task.path(free), None
+    path, model, scaled = task.path(free), task.limits.model, None
+    assert model is not None
     for _ in range(4):
         path = task.path(free)
         scaled = time_scaled(path, model, task.limits.torque, rates).trajectory
-        short = 0.0 if scaled is None else _short(task, scaled)
+        short = 0.0 if scaled is None else task.violation(_seen(scaled).q)
         if short <= 0.0:
             break
         task.margin += 1.5 * short + 1e-6
@@ -222,42 +200,37 @@ def _finished(
         slow = task.evaluated(free).duration
         if slow > scaled.duration:
             scaled = Trajectory(stretched(scaled.motion, slow))
-    return [scaled, _retimed(task, path, model) if retimed else None]
+    return [scaled, _retimed(task, path) if retimed else None]
 
 
-def _retimed(task: Candidates, path: Trajectory, model: RobotModel) -> Trajectory | None:
+def _retimed(task: Candidates, path: Trajectory) -> Trajectory | None:
     """The quickest motion along a path that keeps the limits between the points of its grid too."""
     given, share = task.limits.limits.without_jerk(), 1.0
     for _ in range(4):
         v, a = ((share * x, share * y) for _, x, y in ranges_of(given)[1:3])
         tight = MotionLimits(v[1], a[1], velocity_lower=v[0], acceleration_lower=a[0])
-        motion = time_optimal(
-            path, tight, model, task.limits.torque * share, points=400, both_ends=True
-        ).trajectory
-        if motion is None:
+        torque = task.limits.torque * share
+        timed = time_optimal(path, tight, task.limits.model, torque, points=400, both_ends=True)
+        if timed.trajectory is None:
             return None
-        over = float(np.abs(_shares(task, model, motion)).max(initial=0.0))
-        over = max(over, motion.check(given).stretch)
+        over = float(np.abs(_shares(task, timed.trajectory)).max(initial=0.0))
+        over = max(over, timed.trajectory.check(given).stretch)
         if over <= 1.0 + 1e-6:
-            return motion
+            return timed.trajectory
         share /= over
     return None
 
 
-def _shares(task: Candidates, model: RobotModel, motion: Trajectory) -> Array:
+def _seen(motion: Trajectory) -> Samples:
+    return motion.at(np.linspace(0.0, motion.duration, _CHECKED))
+
+
+def _shares(task: Candidates, motion: Trajectory) -> Array:
     """Torques over their limits at many times, shape (N, n)."""
-    seen = motion.at(np.linspace(0.0, motion.duration, _CHECKED))
+    seen = _seen(motion)
     with np.errstate(divide="ignore", invalid="ignore"):
-        tau = idm(model, seen.q, at_rest(seen.v), seen.a)
+        tau = task.limits.torques(seen.q, at_rest(seen.v), seen.a)
         return np.where(tau != 0.0, tau / task.limits.torque, 0.0)
-
-
-def _short(task: Candidates, motion: Trajectory) -> float:
-    """How far a motion is outside of the limits of position or the clearance, at many times."""
-    margin, task.margin = task.margin, 0.0
-    found = task.violation(motion.q(np.linspace(0.0, motion.duration, _CHECKED)))
-    task.margin = margin
-    return found
 
 
 def _times_at(motion: Trajectory, stations: Array) -> Array:
@@ -268,7 +241,6 @@ def _times_at(motion: Trajectory, stations: Array) -> Array:
         for _ in range(12):
             t = np.linspace(a, b, 401)
             k = int(np.linalg.norm(motion.q(t) - q, axis=1).argmin())
-            a, b = t[max(k - 1, 0)], t[min(k + 1, 400)]
-        times.append(t[k])
-        low = t[k]
+            a, low, b = t[max(k - 1, 0)], t[k], t[min(k + 1, 400)]
+        times.append(low)
     return np.array(times)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_floats
+from .._arrays import Array, Value, as_floats
 from ..errors import ShapeError
 from ..se3 import skew
 from ..se3.orientation import rotation_vectors_of
 from .checks import seconds_shown
-from .trajectory import Trajectory
+from .trajectory import Sampled, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseSamples(Frozen, Value):
+class PoseSamples(Sampled):
     """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
 
     Parameters
@@ -36,14 +35,8 @@ class PoseSamples(Frozen, Value):
     twist: Array
     acceleration: Array
 
-    def __len__(self) -> int:
-        return self.t.size
-
     def __repr__(self) -> str:
         return f"<PoseSamples: {seconds_shown(self.t)}\n  {_speeds(self.twist)}>"
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.T, dtype=dtype, copy=copy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,33 +65,30 @@ class PoseTrajectory(Value):
         The tool rests before and after the motion; where it does not, such a time is an error.
         """
         s = self.law.q(t)
-        return self._poses(np.asarray(t, dtype=np.float64), s)
-
-    def _poses(self, t: Array, s: Array) -> Array:
         # the last pose is met to the last digit, though the law ends a rounding beside it
-        s = np.where(t >= self.duration, self.path.end, s)
+        s = np.where(np.asarray(t, dtype=np.float64) >= self.duration, self.path.end, s)
         return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
 
     def twist(self, t: ArrayLike) -> Array:
         """Velocities (t.shape..., 6), ``[v; w]`` of the tool's origin in world axes."""
-        s, v = self.law.q(t), self.law.v(t)
-        return self.path.rates(s.reshape(-1))[0].reshape(*s.shape, 6) * v[..., None]
+        return self._rates(t)[0]
 
     def acceleration(self, t: ArrayLike) -> Array:
         """Derivatives (t.shape..., 6) of the twist, m/s^2 and rad/s^2."""
-        s, v, a = self.law.q(t), self.law.v(t), self.law.a(t)
-        rate, change = (x.reshape(*s.shape, 6) for x in self.path.rates(s.reshape(-1)))
-        return rate * a[..., None] + change * (v * v)[..., None]
+        return self._rates(t)[1]
+
+    def _rates(self, t: ArrayLike) -> tuple[Array, Array]:
+        law = self.law.at(t)
+        rate, change = (x.reshape(*law.q.shape, 6) for x in self.path.rates(law.q.reshape(-1)))
+        v, a = law.v[..., None], law.a[..., None]
+        return rate * v, rate * a + change * (v * v)
 
     def at(self, t: ArrayLike) -> PoseSamples:
         """Poses, twists and accelerations together at times t (N,)."""
         times = as_floats(t, "t")
         if times.ndim != 1:
             raise ShapeError(f"t: expected shape (N,), got {times.shape}.")
-        law = self.law.at(times)
-        s, v, a = np.asarray(law.q), law.v[:, None], law.a[:, None]
-        rate, change = self.path.rates(s)
-        return PoseSamples(times, self._poses(times, s), rate * v, rate * a + change * (v * v))
+        return PoseSamples(times, self.pose(times), *self._rates(times))
 
     def resample(self, samples: int | None = None, period: float | None = None) -> PoseSamples:
         """The motion on a regular grid of time, as `Trajectory.resample`."""
@@ -117,23 +107,6 @@ class PoseTrajectory(Value):
 def _speeds(twist: Array) -> str:
     v, w = (np.linalg.norm(part, axis=-1).max(initial=0.0) for part in (twist[:, :3], twist[:, 3:]))
     return f"greatest speeds {v:.4g} m/s and {w:.4g} rad/s"
-
-
-class PosePath(Protocol):
-    """Path that a `PoseTrajectory` follows."""
-
-    @property
-    def end(self) -> float:
-        """The parameter runs from 0 to this."""
-        ...
-
-    def poses(self, s: Array) -> Array:
-        """World poses (N, 4, 4) at parameters (N,)."""
-        ...
-
-    def rates(self, s: Array) -> tuple[Array, Array]:
-        """Twist and its derivative with respect to s, each (N, 6), rows ``[v; w]`` in the world."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -267,22 +240,19 @@ class BlendedPoses(Value):
         return corner, before, after, f1, f2
 
 
-def line(T0: Array, T1: Array) -> FixedAxisPath:
-    """Straight line between two checked poses, with the shorter rotation about a fixed axis."""
-    axis, angle = _turn(T0, T1)
-    zero, z = np.zeros(3), np.array([0.0, 0.0, 1.0])
-    return FixedAxisPath(T0, T1, T1[:3, 3] - T0[:3, 3], zero, z, 0.0, axis, angle)
+PosePath = FixedAxisPath | BlendedPoses
 
 
-def arc(T0: Array, T1: Array, centre: Array, normal: Array, sweep: float) -> FixedAxisPath:
-    """Circular arc between two checked poses, with the shorter rotation about a fixed axis."""
-    axis, angle = _turn(T0, T1)
-    return FixedAxisPath(T0, T1, np.zeros(3), centre, normal, sweep, axis, angle)
-
-
-def _turn(T0: Array, T1: Array) -> tuple[Array, float]:
+def arc(
+    T0: Array, T1: Array, centre: Array | None = None, normal: Array | None = None,
+    sweep: float = 0.0,
+) -> FixedAxisPath:  # fmt: skip
+    """Line or circular arc between checked poses, with the shorter rotation about a fixed axis."""
     axis, angle = axis_and_angle(rotation_vectors_of(T1[:3, :3] @ T0[:3, :3].T))
-    return axis, float(angle)
+    turn, zero, z = float(angle), np.zeros(3), np.array([0.0, 0.0, 1.0])
+    if centre is None or normal is None:
+        return FixedAxisPath(T0, T1, T1[:3, 3] - T0[:3, 3], zero, z, 0.0, axis, turn)
+    return FixedAxisPath(T0, T1, zero, centre, normal, sweep, axis, turn)
 
 
 def rotation_about(axis: Array, angle: Array) -> Array:

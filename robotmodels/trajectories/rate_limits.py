@@ -71,10 +71,9 @@ def _improved(
         if not better > 0.0:
             radius *= 0.3
             continue
-        hoped = now.duration * now.excess - float(found.fun)
-        radius = min(2.0 * radius, 0.8) if better > 0.5 * hoped else radius
-        settled = better < _ENOUGH * now.merit and then.excess <= 1e-6
-        now = then
+        if better > 0.5 * (now.duration * now.excess - float(found.fun)):
+            radius = min(2.0 * radius, 0.8)
+        settled, now = better < _ENOUGH * now.merit and then.excess <= 1e-6, then
         if settled:
             break
     return now.x if now.excess <= 1e-3 else None
@@ -142,11 +141,9 @@ class _Program:
         """Objective, rows and bounds of the step (N + 1,) and the slack."""
         from scipy.sparse import csr_array, hstack, vstack
 
-        gain = np.append(self.by_duration.sum(axis=0), self.duration)
-        rows = [
-            hstack(
-                (block, csr_array(np.zeros((room.size, 1)) if slack is None else -slack[:, None]))
-            )
-            for block, room, slack in self.blocks
-        ]
-        return gain, vstack(rows).tocsr(), np.concatenate([room for _, room, _ in self.blocks])
+        gain, rows, rooms = np.append(self.by_duration.sum(axis=0), self.duration), [], []
+        for block, room, slack in self.blocks:
+            column = np.zeros(room.size) if slack is None else -slack
+            rows.append(hstack((block, csr_array(column[:, None]))))
+            rooms.append(room)
+        return gain, vstack(rows).tocsr(), np.concatenate(rooms)

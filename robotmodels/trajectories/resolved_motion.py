@@ -1,20 +1,14 @@
-"""Following poses by joint velocities: the inverse kinematic model, step after step.
-
-What `joint_path` does with postures, this does with velocities, and so for every robot: with more
-joints than the task needs the rest is free for criteria, lower tasks and bounds; near singular
-positions the tool falls behind instead of the joints racing.
-"""
+"""Following poses by joint velocities: the inverse kinematic model, step after step."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Value, as_exact, read_only
+from .._arrays import Array, as_exact
 from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
@@ -27,12 +21,13 @@ from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
 from .checks import ROUNDING, counted, greatest_shown, least_shown, seconds_shown
 from .pose_trajectory import PoseTrajectory
+from .trajectory import Sampled
 
 _MOVE, _TURN = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResolvedMotion(Value):
+class ResolvedMotion(Sampled):
     """Joints that follow a trajectory of poses by their velocities.
 
     Parameters
@@ -56,14 +51,6 @@ class ResolvedMotion(Value):
     position_error: Array
     orientation_error: Array
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            dtype = np.int8 if field.name == "status" else np.float64
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name), dtype))
-
-    def __len__(self) -> int:
-        return len(self.t)
-
     def __repr__(self) -> str:
         unmet = int(np.count_nonzero(self.status != IKMStatus.MET))
         met = f"{counted(unmet, 'motion')} not met" if unmet else "all met"
@@ -76,9 +63,6 @@ class ResolvedMotion(Value):
             f"\n  {greatest_shown([('velocity', self.v)])}; behind by at most {metres:.2g} m and "
             f"{angle:.2g} rad>"
         )
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.q, dtype=dtype, copy=copy)
 
 
 def resolved_motion(
@@ -98,9 +82,9 @@ def resolved_motion(
     """Follow a trajectory of the tool by joint velocities.
 
     Also called resolved motion rate control, closed-loop inverse kinematics, ``rrmc``. Each step
-    asks `ikm`, half a step ahead, for the velocity that the trajectory has there, plus ``feedback``
-    times what the tool is behind: the error falls with the square of the step. With ``limits`` it
-    asks where the joints are, so that no bound is passed, and the error falls with the step.
+    takes the velocity of `ikm` half a step ahead plus ``feedback`` times what the tool is behind:
+    the error falls with the square of the step. With ``limits`` it is taken where the joints are,
+    so that no bound is passed, and the error falls with the step.
 
     Parameters
     ----------

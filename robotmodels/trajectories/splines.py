@@ -57,7 +57,7 @@ from .limits import MotionLimits, ranges_of
 from .motions import PiecewisePolynomial
 from .trajectory import Trajectory
 
-_KEPT = 1e-14  # relative excess that rounding alone makes
+_ROUNDED = 1e-14  # relative excess that rounding alone makes
 _TRIALS = 2000  # durations of the grid
 
 
@@ -141,22 +141,12 @@ def quintic_spline(
 class _Knots:
     """Points, times and rates as given, checked; and the end of the work, common to all splines."""
 
-    __slots__ = ("chosen", "limits", "moving", "points", "rates", "scalar", "times")
-
     def __init__(
-        self,
-        points: ArrayLike,
-        times: ArrayLike | None,
-        limits: MotionLimits | None,
+        self, points: ArrayLike, times: ArrayLike | None, limits: MotionLimits | None,
         rates: dict[str, ArrayLike],
-    ) -> None:
-        q = as_floats(points, "points")
-        if q.ndim not in (1, 2) or len(q) < 2:
-            raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
-        self.scalar = q.ndim == 1
-        self.points = q[:, None] if self.scalar else q
-        n = self.points.shape[1]
-        refuse_jointless(n, "points")
+    ) -> None:  # fmt: skip
+        self.points, self.scalar = as_points(points)
+        m, n = self.points.shape
         try:
             self.rates = {k: np.broadcast_to(as_floats(v, k), n) for k, v in rates.items()}
         except ValueError as error:
@@ -164,7 +154,15 @@ class _Knots:
         self.moving = any(rate.any() for rate in self.rates.values())
         self.limits = checked_limits(limits, n, self.points)
         self.chosen = times is None
-        self.times = _chosen_times(self) if times is None else _given_times(times, len(q))
+        self.times = _chosen_times(self) if times is None else as_floats(times, "times")
+        if self.times.shape != (m,):
+            raise ShapeError(
+                f"times: expected one per point, shape ({m},), got {self.times.shape}."
+            )
+        if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
+            raise InvalidValueError(
+                "times: expected times that ascend from 0, each later than the last."
+            )
 
     def finished(self, order: int, **rates: Array) -> Trajectory:
         """Polynomials between the states at the knots, each (m, n), and the check of the limits.
@@ -186,26 +184,28 @@ class _Knots:
             trajectory = Trajectory(motion, self.scalar)
             report = trajectory.check(self.limits, ROUNDING)
         if not report.kept:
-            sentences = "; ".join(report.violations())
             advice = "Choose other points or times."
             if report.stretch > 1.0 and not self.moving:
                 advice = f"The least factor on the times is {least_shown(report.stretch)}."
-            raise InvalidValueError(f"The limits are not kept: {sentences}. {advice}")
+            raise InvalidValueError(
+                f"The limits are not kept: {'; '.join(report.violations())}. {advice}"
+            )
         return trajectory
 
 
-def _given_times(times: ArrayLike, m: int) -> Array:
-    t = as_floats(times, "times")
-    if t.shape != (m,):
-        raise ShapeError(f"times: expected one per point, shape ({m},), got {t.shape}.")
-    if t[0] != 0.0 or (np.diff(t) <= 0.0).any():
-        raise InvalidValueError(
-            "times: expected times that ascend from 0, each later than the last."
-        )
-    return t
+def as_points(points: ArrayLike) -> tuple[Array, bool]:
+    """At least two points (m, n), and whether they are scalar."""
+    q = as_floats(points, "points")
+    if q.ndim not in (1, 2) or len(q) < 2:
+        raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
+    scalar = q.ndim == 1
+    q = q[:, None] if scalar else q
+    refuse_jointless(q.shape[1], "points")
+    return q, scalar
 
 
 def _chosen_times(knots: _Knots) -> Array:
+    """Times in proportion to the time of the slowest joint of each interval."""
     if knots.limits is None:
         raise InvalidValueError("Give times, limits or both.")
     if knots.moving:
@@ -237,52 +237,45 @@ def motion_between(
     refuse_short(T, np.zeros(R), np.ones((R, 1)))
     if bounds is not None:
         rows = [{name: value[i] for name, value in states.items()} for i in range(R)]
-        if T is None:
-            T = np.array([_least(order, row, bounds) for row in rows])
-        for row, time in zip(rows, T, strict=True):
-            if excess(order, row, np.array([time]), bounds)[0] > ROUNDING:
-                _refuse(order, row, bounds, float(time))
+        given = np.full(R, np.nan) if T is None else T
+        T = np.array([_kept(order, *row, bounds) for row in zip(rows, given, strict=True)])
     assert T is not None
     c = np.moveaxis(between_states(order, states, T[:, None]), 0, -2)
     breaks = np.stack((np.zeros(R), T), axis=-1).reshape(*batch, 1, 2)
     return Trajectory(PiecewisePolynomial(breaks, c.reshape(*batch, 1, order + 1, n)), scalar)
 
 
-def _least(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
-    """Least duration, or why there is none."""
-    for rate, (_, least, most) in zip("va", ranges_of(limits)[1:3], strict=True):
+def _kept(order: int, state: dict[str, Array], T: float, limits: MotionLimits) -> float:
+    """The duration T if it keeps the limits, or for NaN the least that does."""
+    if not np.isnan(T) and excess(order, state, np.array([T]), limits)[0] <= ROUNDING:
+        return T
+    for rate, (_, low, high) in zip("va", ranges_of(limits)[1:3], strict=True):
         for name in (f"{rate}0", f"{rate}1") if f"{rate}0" in state else ():
-            wrong = (state[name] > most) | (state[name] < least)
+            wrong = (state[name] > high) | (state[name] < low)
             if wrong.any():
                 j = int(wrong.argmax())
                 raise InvalidValueError(
                     f"limits: {name} of joint {j + 1} is {state[name][j]:.9g}, outside its limits "
-                    f"{least[j]:.9g} to {most[j]:.9g}; the least limit that will do is "
+                    f"{low[j]:.9g} to {high[j]:.9g}; the least limit that will do is "
                     f"{least_shown(abs(state[name][j]))}."
                 )
-    T = least_duration(order, state, limits)
-    if T is None:
+    least = least_duration(order, state, limits)
+    if least is None:
         raise InvalidValueError(
             "limits: no duration keeps them with these states at the ends; give slower states or "
             "greater limits, or take jerk_limited, which finds a motion between any states."
         )
-    return T
-
-
-def _refuse(order: int, state: dict[str, Array], limits: MotionLimits, T: float) -> None:
-    least = _least(order, state, limits)
-    message = (
-        f"duration: with {T:.9g} s the limits are not kept; the least duration that keeps them is "
-        f"{least_shown(least)} s."
-    )
+    if np.isnan(T):
+        return least
+    more = ""
     if least < T:
         longer = least_duration(order, state, limits, T)
-        message += (
-            " No longer one does."
-            if longer is None
-            else f" The least that is longer than that given is {least_shown(longer)} s."
-        )
-    raise InvalidValueError(message)
+        more = f" The least that is longer than that given is {least_shown(longer or T)} s."
+        more = more if longer else " No longer one does."
+    raise InvalidValueError(
+        f"duration: with {T:.9g} s the limits are not kept; the least duration that keeps them is "
+        f"{least_shown(least)} s.{more}"
+    )
 
 
 def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
@@ -304,8 +297,8 @@ def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
 def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) -> Array:
     """Relative excess over the worst limit for given durations."""
     c = np.moveaxis(between_states(order, state, T[:, None]), 0, -2)[:, None]
-    motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
     worst = np.full(T.shape, -np.inf)
+    motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
     for k, (_, least, most) in enumerate(ranges_of(limits)):
         if np.isfinite((least, most)).any():
             low, high = motion.extremes(k)
@@ -319,13 +312,24 @@ def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) 
 def least_duration(
     order: int, state: dict[str, Array], limits: MotionLimits, after: float = 0.0
 ) -> float | None:
-    """Least duration with which the polynomials keep the limits."""
-    scales = _scales(state, limits)
-    if not scales.size:
+    """Least duration with which the polynomials keep the limits: trials, then bisection."""
+    q0, q1 = state["q0"], state["q1"]
+    room = np.minimum(limits.upper - np.maximum(q0, q1), np.minimum(q0, q1) - limits.lower)
+    sizes = [(0, np.abs(q1 - q0))]
+    sizes += [("qva".index(name[0]), np.abs(x)) for name, x in state.items() if name[0] != "q"]
+    if not any(size.any() for _, size in sizes):
         return 0.0
-    trials = np.geomspace(scales.min() / 1e3, scales.max() * 1e3, _TRIALS)
+    # times that states and limits make: the durations sought are of their size
+    sizes += [(0, np.maximum(room, 0.0))]
+    sizes += [(k, np.minimum(m, -x)) for k, (_, x, m) in enumerate(ranges_of(limits)) if k]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pairs = combinations(sorted(sizes, key=lambda size: size[0]), 2)
+        scales = np.concatenate([(x / y) ** (1.0 / (k - i)) for (i, x), (k, y) in pairs if k > i])
+    scales = scales[np.isfinite(scales) & (scales > 0.0)]
+    ends = (1e-3 * scales.min(), 1e3 * scales.max()) if scales.size else (1e-3, 1e3)
+    trials = np.geomspace(*ends, _TRIALS)
     trials = np.append(after, trials[trials > after]) if after > 0.0 else trials
-    kept = excess(order, state, trials, limits) <= _KEPT
+    kept = excess(order, state, trials, limits) <= _ROUNDED
     if not kept.any():
         return None
     k = int(kept.argmax())
@@ -334,29 +338,9 @@ def least_duration(
             "limits: between these states they are kept in any time, however short; give duration."
         )
     below, T = float(trials[max(k - 1, 0)]), float(trials[k])
-    while np.nextafter(below, T) < T:
-        finer = np.linspace(below, T, 18)
-        inner = np.append(excess(order, state, finer[1:-1], limits) <= _KEPT, True)
-        k = int(inner.argmax()) + 1
-        if (below, T) == (finer[k - 1], finer[k]):
-            break
-        below, T = float(finer[k - 1]), float(finer[k])
+    while below < (middle := 0.5 * (below + T)) < T:
+        if excess(order, state, np.array([middle]), limits)[0] <= _ROUNDED:
+            T = middle
+        else:
+            below = middle
     return T
-
-
-def _scales(state: dict[str, Array], limits: MotionLimits) -> Array:
-    """Times that the states and limits make: the durations sought are of their size."""
-    q0, q1 = state["q0"], state["q1"]
-    room = np.minimum(limits.upper - np.maximum(q0, q1), np.minimum(q0, q1) - limits.lower)
-    sizes = [(0, np.abs(q1 - q0))]
-    sizes += [("qva".index(name[0]), np.abs(x)) for name, x in state.items() if name[0] != "q"]
-    if not any(size.any() for _, size in sizes):
-        return np.empty(0)
-    sizes += [(0, np.maximum(room, 0.0))]
-    sizes += [(k, np.minimum(m, -x)) for k, (_, x, m) in enumerate(ranges_of(limits)) if k]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        pairs = combinations(sorted(sizes, key=lambda size: size[0]), 2)
-        times = [(x / y) ** (1.0 / (k - i)) for (i, x), (k, y) in pairs if k > i]
-    times = np.concatenate(times)
-    times = times[np.isfinite(times) & (times > 0.0)]
-    return times if times.size else np.ones(1)

@@ -9,14 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_number
 from .._outcomes import Outcome
-from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..friction import Friction
 from ..model import RobotModel
 from .checks import checked_limits, sample_count
 from .limits import MotionLimits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
-from .path_limits import SLOWEST, Passes, PathLimits, Rows, not_held, path_of, toward_ends
+from .path_limits import Passes, PathLimits, Rows, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
 from .trajectory import TimingResult, Trajectory
@@ -46,24 +45,21 @@ class TimedPath(TimingResult):
     Parameters
     ----------
     trajectory : Trajectory or None
-        The motion; None without one. The acceleration of the path parameter is constant between
-        the points of the grid.
+        The motion, whose parameter has a constant acceleration in each interval; or None.
     status : TimingStatus
         Outcome.
     parameter : ndarray, shape (N,)
-        Path parameter s at the points of the grid: the path's own, or its length in joint space
-        where its own timing rests or jumps.
+        Path parameter s on the grid: the path's own, or its length in joint space where its own
+        timing rests or jumps, or comes from functions.
     rate : ndarray, shape (N,)
         Rate of the parameter there, 1/s (of its unit).
     maximum_rate : ndarray, shape (N,)
         Greatest rate that the limits allow at each point alone: the maximum velocity curve.
     active : ndarray of str, shape (N,)
         The limit that binds from each point on, such as ``"torque of joint 2"``; ``"rate"`` where
-        a limit of jerk or of the rate of a torque makes the motion slower; empty where none does
-        (one interval at a change between two limits).
+        a limit of jerk or of the rate of a torque does; empty at changes between limits.
     grid_gap : float
-        Relative difference from the duration on the grid with half as many intervals, which
-        estimates the relative error of the duration; infinite without one.
+        Relative difference from the duration on half as many intervals, an estimate of the error.
     explanation : str
         Details of the status; where torques exceed their limits between the points of the grid.
     """
@@ -104,20 +100,16 @@ def time_optimal(
 ) -> TimedPath:
     """Time-optimal path parametrisation: the quickest motion along a path.
 
-    Also called TOPP, TOPP-RA. The path keeps its shape and loses its own timing. On a grid of its
-    parameter, the rates from which the end is reached are computed backward, and the greatest of
-    them forward (reachability analysis). Accelerations are limited at both ends of every interval
-    of the grid, torques at its start, as is usual (collocation). Between points torques may then be
-    exceeded, on a coarse grid of a curved path by much: `TimedPath.reason` says so where it is more
-    than 2 %. With ``both_ends`` torques are limited at both ends and, by narrower limits where that
-    is needed, between them to 1.001 of their limits, but for moments where dry friction changes its
-    sign.
+    Also called TOPP, TOPP-RA: reachability analysis of a path whose own timing is dropped.
+    Accelerations are limited at both ends of every interval of a grid, torques at its start
+    (collocation); `TimedPath.reason` says where torques between the points exceed their limits by
+    more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
+    needed, between them to 1.001, but for moments where dry friction changes its sign.
 
     Parameters
     ----------
     path : Trajectory or PoseTrajectory
-        n joints along a path, or poses (which need ``model``; its joints then follow them as in
-        `joint_path`). Continuous in its direction.
+        n joints, continuous in direction, or poses (which need ``model``, see `joint_path`).
     limits : MotionLimits
         Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
     model : RobotModel, optional
@@ -125,13 +117,12 @@ def time_optimal(
     torque : array_like, shape () or (n,), optional
         Greatest torques of both signs, N m or N; default those of the model's table.
     torque_rate : array_like, shape () or (n,), optional
-        Greatest rates of the torques, N m/s or N/s; jumps of dry friction do not count. The motion
-        is then a local optimum, found from the one without them, and keeps them within 1 %.
+        Greatest rates of the torques, N m/s or N/s, without jumps of dry friction. The motion is
+        then a local optimum that keeps them within 1 %.
     friction : bool or Friction
-        Whether Fv and Fc of the drives count; or a friction model that acts besides. Rotor inertia
-        and offsets always count.
+        Whether Fv and Fc of the drives count; or a friction model that acts besides them.
     points : int
-        Number of intervals of the grid, evenly spaced in the parameter.
+        Number of intervals of the grid.
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
     both_ends : bool
@@ -145,8 +136,8 @@ def time_optimal(
     Raises
     ------
     ShapeError, InvalidValueError
-        Objects that are no path, numbers of joints that differ, NaN, negative torques or rates, no
-        finite limit, a path outside the limits of position.
+        No path, numbers of joints that differ, NaN, negative torques or rates, no finite limit, a
+        path outside the limits of position.
 
     References
     ----------
@@ -162,8 +153,8 @@ def time_optimal(
     (1.5, 'velocity of joint 1')
     """
     points = sample_count(points, "points", 2, _MOST)
-    rates = tuple(as_number(r, k, least=0.0, below=1e150) for r, k in
-                  ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    first, last = (as_number(r, k, least=0.0, below=1e150) for r, k in
+                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
     if not isinstance(both_ends, bool | np.bool_):
         raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
@@ -171,43 +162,38 @@ def time_optimal(
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
-    own = isinstance(path, Trajectory) and motion is path.motion
-    evenly = own and not np.isfinite(problem.rates).any()
-    s = np.linspace(0.0, 1.0, points + 1) if evenly else toward_ends(points)
+    own, rated = motion is getattr(path, "motion", None), bool(np.isfinite(problem.rates).any())
+    s = np.linspace(0.0, 1.0, points + 1) if own and not rated else toward_ends(points)
     s = float(motion.duration) * s
     q, rate, bend = motion.derivatives(s, (0, 1, 2))
     checked_limits(problem.limits, n, q)
+    ends = (first, last)
     if isinstance(path, Trajectory) and not own:  # rates of the length
         (speed,) = path.motion.derivatives(np.array([0.0, path.duration]), (1,))
-        rates = tuple(r * float(np.linalg.norm(v)) for r, v in zip(rates, speed, strict=True))
-    ends = (rates[0], rates[1])
-    rows = problem.rows(q, rate, bend)
-    rests = [k for k, r in ((0, ends[0]), (points, ends[1])) if r == 0.0]
-    stuck = np.abs(problem.drag(q[rests], np.full((len(rests), n), SLOWEST)))
-    found = not_held(rows.held[rests], problem.torque, lambda i: f"s = {s[rests[i]]:.6g}", stuck)
+        ends = (first * float(np.linalg.norm(speed[0])), last * float(np.linalg.norm(speed[1])))
+    rests = [k for k, r in ((0, first), (points, last)) if r == 0.0]
+    found = problem.not_held(q[rests], lambda i: f"s = {s[rests[i]]:.6g}", True)
     if found:
         return _without(TimingStatus.NOT_HELD_STILL, found)
+    rows = problem.rows(q, rate, bend)
     passes = problem.passes(s, q, rate, bend, ends, rows)
     if passes.failed >= 0 or np.isinf(passes.duration):
-        found = not_held(rows.held, problem.torque, lambda i: f"s = {s[i]:.6g}")
+        found = problem.not_held(q, lambda i: f"s = {s[i]:.6g}", False)
         if found:
             return _without(TimingStatus.NOT_HELD_STILL, found)
         return _without(TimingStatus.NOT_CONTROLLABLE, _where(passes, s, ends))
     half = np.append(np.arange(0, points, 2), points)
-    coarse = problem.passes(
-        s[half], q[half], rate[half], bend[half], ends, Rows(*(part[half] for part in rows))
-    )
-    gap = abs(coarse.duration - passes.duration) / passes.duration + _ROUNDING / points
+    coarse = Rows(*(part[half] for part in rows[:4]), still=rows.still)
+    gap = problem.passes(s[half], q[half], rate[half], bend[half], ends, coarse).duration
+    gap = abs(gap - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
     if not x.max() < 1e200:
         raise InvalidValueError(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "
             "zero there; give limits of velocity and acceleration of every joint, or of torque."
         )
-    law, slowed, tight = law_of(s, x), np.zeros(x.shape, np.bool_), np.zeros((2, points, 1))
-    inside = _INSIDE if both_ends else _INSIDE[::2]
-    use = _uses(problem, motion, law, inside)
-    if np.isfinite(problem.rates).any():
+    law, slowed = law_of(s, x), np.zeros(x.shape, np.bool_)
+    if rated:
         slower = rate_limited(problem, s, q, rate, rows, x)
         if slower is None:
             return _without(
@@ -216,51 +202,47 @@ def time_optimal(
             )
         slowed = slower[0] < x * (1.0 - 1e-3)
         x, law = slower
-        use = _uses(problem, motion, law, inside)
-    elif both_ends:
-        for _ in range(_ROUNDS):
-            over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
-            if not over.max(initial=0.0) > _HELD:
-                break
-            # where torques inside an interval exceed their limits, those at its ends are narrower
-            wide = np.zeros((2, points, problem.scale.size))
-            wide[..., problem.acceleration.size :] = 1.1 * np.maximum(over[..., problem.loaded], 0)
-            tight = tight + wide
-            then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
-            if then.failed >= 0 or np.isinf(then.duration):
-                break
-            passes, law = then, law_of(s, then.found[:, 0])
-            x, use = passes.found[:, 0], _uses(problem, motion, law, inside)
+    use = _uses(problem, motion, law, both_ends)
+    tight = np.zeros((2, points, problem.scale.size))
+    for _ in range(_ROUNDS if both_ends and not rated else 0):
+        over = np.stack((-1.0 - use.min(axis=1), use.max(axis=1) - 1.0))
+        if not over.max(initial=0.0) > _HELD:
+            break
+        # where torques inside an interval exceed their limits, those at its ends are narrower
+        tight[..., problem.acceleration.size :] += 1.1 * np.maximum(over[..., problem.loaded], 0.0)
+        then = problem.passes(s, q, rate, bend, ends, rows, tight=tight)
+        if then.failed >= 0 or np.isinf(then.duration):
+            break
+        passes, x = then, then.found[:, 0]
+        law = law_of(s, x)
+        use = _uses(problem, motion, law, both_ends)
     code = passes.found[:, 5].astype(int)
     velocity = code == problem.scale.size
     if velocity.any():
         with np.errstate(divide="ignore"):
             spare = np.where(rate > 0.0, problem.limits.velocity, -problem.limits.velocity_lower)
             code[velocity] += (spare / np.abs(rate)).argmin(axis=1)[velocity]
-    most = np.sqrt(np.maximum(passes.found[:, 4], 0.0))
     active = np.where(slowed, "rate", problem.names[code])
-    trajectory = Trajectory(TimedMotion(motion, law), scalar)
-    x = np.sqrt(np.maximum(x, 0.0))
-    why = _beyond(use, s, both_ends)
-    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, x, most, active, gap, why)
+    speed, most = (np.sqrt(np.maximum(y, 0.0)) for y in (x, passes.found[:, 4]))
+    trajectory, why = Trajectory(TimedMotion(motion, law), scalar), _beyond(use, s, both_ends)
+    return TimedPath(trajectory, TimingStatus.OPTIMAL, s, speed, most, active, gap, why)
 
 
-def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, inside: Array) -> Array:
+def _uses(
+    problem: PathLimits, motion: Motion, law: PiecewisePolynomial, both_ends: bool
+) -> Array:  # fmt: skip
     """Torques (N, P, n) at places inside the intervals, over their limits."""
     N = law.lengths.size
-    if problem.model is None or not problem.loaded.size:
+    if not problem.loaded.size:
         return np.zeros((N, 1, problem.n))
-    timed, places = TimedMotion(motion, law), np.tile(inside, (N, 1))
+    timed, places = TimedMotion(motion, law), np.tile(_INSIDE[:: 1 if both_ends else 2], (N, 1))
     if problem.drives is not None or problem.friction:  # beside turning points, where it jumps
         (v,) = timed.derivatives(law.breaks[0], (1,))
         turns = v[1:] * v[:-1] < 0.0
         at = np.where(turns, v[:-1] / np.where(turns, v[:-1] - v[1:], 1.0), 0.0).max(axis=1)
         places = np.hstack((places, np.clip(at[:, None] + _BESIDE, 0.0, 1.0 - 1e-9)))
     times = (law.breaks[0, :-1, None] + law.lengths[0][:, None] * places).reshape(-1)
-    q, v, a = timed.derivatives(times, (0, 1, 2))
-    tau = rigid_torques(problem.model, q, v, a) + problem.drag(q, v)
-    if problem.drives is not None:
-        tau = tau + a @ problem.drives.rotor + problem.drives.offset
+    tau = problem.torques(*timed.derivatives(times, (0, 1, 2)))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.nan_to_num(tau / problem.torque, nan=0.0).reshape(N, -1, problem.n)
 

@@ -20,7 +20,7 @@ from ..model import RobotModel, check_model
 from .checks import checked_limits
 from .limits import MotionLimits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
-from .path_limits import checked_torque, not_held
+from .path_limits import PathLimits
 from .trajectory import TimingResult, Trajectory
 
 _FINE, _SHOWN = 4001, 8  # samples, and which of them have windows
@@ -53,9 +53,8 @@ class ScaledTrajectory(TimingResult):
     fraction : ndarray, shape (N,)
         Samples, as fractions of the duration.
     windows : ndarray, shape (N, 2)
-        Least and greatest duration with which each sample keeps the limits, s: the window of the
-        shortest ones if there are several, both infinite if there is none. The greatest is
-        infinite where the robot is held still.
+        Least and greatest duration with which each sample keeps the limits, s: of several windows
+        that of the shortest, both infinite if there is none.
     explanation : str
         Details of the status.
     """
@@ -82,8 +81,8 @@ def time_scaled(
 ) -> ScaledTrajectory:
     """Uniform time scaling: the least duration with which a motion keeps limits.
 
-    Also called dynamic time scaling. Limits of torque are checked at samples of the profile, and
-    between them around those that decide; those of velocity, acceleration and jerk everywhere.
+    Also called dynamic time scaling. Torques are checked at samples of the profile, and between
+    those that decide; velocities, accelerations and jerks everywhere.
 
     Parameters
     ----------
@@ -131,12 +130,9 @@ def time_scaled(
     end, motion = trajectory.duration, trajectory.motion
     if not end > 0.0:
         raise InvalidValueError("trajectory: it has no duration.")
-    bound = checked_torque(torque, model, trajectory.n)
-    least = 0.0
-    if limits is not None:
-        bounds = checked_limits(limits, trajectory.n, *motion.extremes(0))
-        assert bounds is not None
-        least = end * trajectory.check(bounds).stretch
+    problem = PathLimits(trajectory.n, model, limits, torque, True, both_ends=True)
+    checked_limits(problem.limits, trajectory.n, *motion.extremes(0))
+    bound, least = problem.torque, end * trajectory.check(problem.limits).stretch
     if not np.any(motion.extremes(1)):
         raise InvalidValueError("trajectory: it does not move, so it has no least duration.")
     if not (np.isfinite(bound).any() or least > 0.0):
@@ -145,15 +141,17 @@ def time_scaled(
         )
     fraction = np.linspace(0.0, 1.0, _FINE)
     parts = torque_parts(model, motion, fraction)
-    fraction, held = fraction[::_SHOWN], parts[2][::_SHOWN]
-    windows = windows_of((parts[0][::_SHOWN], parts[1][::_SHOWN], held), bound, least)
-    T = (
-        _least_duration(model, motion, parts, bound, least)
-        if _held(model, motion, bound)
-        else np.inf
-    )
+    fraction, (A, B, C) = fraction[::_SHOWN], (part[::_SHOWN] for part in parts)
+    windows = windows_of((A, B, C), bound, least)
+    # torques and dry friction have to hold the robot at the ends where it rests
+    q, v = motion.derivatives(fraction * end, (0, 1))
+    rests = [k for k in (0, -1) if np.abs(v[k]).max() <= _STILL * np.abs(v).max()]
+    T = np.inf
+    if not problem.not_held(q[rests], str, True):
+        T = _least_duration(model, motion, parts, bound, least)
     if np.isinf(T):
-        why = not_held(held, bound, lambda i: f"the fraction {fraction[i]:.4g} of the motion")
+        place = "the fraction {:.4g} of the motion"
+        why = problem.not_held(q, lambda i: place.format(fraction[i]), False)
         status = ScalingStatus.NOT_HELD_STILL if why else ScalingStatus.NO_WINDOW
         return ScaledTrajectory(None, status, fraction, windows, why)
     result = Trajectory(stretched(motion, T * _MARGIN), trajectory.scalar)
@@ -234,17 +232,6 @@ def _least_duration(
     # all samples at once, as limits of one joint each
     least = max(least, float(latest[np.isfinite(latest)].max(initial=0.0)))
     return float(windows_of((A, B, C), np.resize(bound, A.size), least)[0])
-
-
-def _held(model: RobotModel, motion: Motion, bound: Array) -> bool:
-    """Whether the torques and dry friction hold the robot at the ends where it rests."""
-    ends = np.array([0.0, float(motion.duration)])
-    q, v = motion.derivatives(ends, (0, 1))
-    rest = np.abs(v).max(axis=1) <= 1e-12 * max(float(np.abs(motion.extremes(1)).max()), 1e-300)
-    load = rigid_torques(model, q, np.zeros(q.shape), np.zeros(q.shape))
-    if (drives := model.drive_matrices) is not None:
-        load, bound = load + drives.offset, bound + drives.coulomb
-    return bool((np.abs(load) <= bound * (1.0 + 1e-9))[rest].all())
 
 
 def stretched(motion: Motion, duration: float) -> Motion:

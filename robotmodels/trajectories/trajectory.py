@@ -16,8 +16,21 @@ from .limits import RATES, LimitsReport, MotionLimits
 from .motions import FunctionMotion, Motion
 
 
+class Sampled(Frozen, Value):
+    """Base of results at times ``t``. As an array (``np.asarray``) it is its second field."""
+
+    __slots__ = ()
+    t: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(getattr(self, fields(self)[1].name), dtype=dtype, copy=copy)  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples(Value):
+class Samples(Sampled):
     """A trajectory at given times. As an array (``np.asarray``) it is its positions.
 
     Parameters
@@ -40,9 +53,6 @@ class Samples(Value):
             if not isinstance(value, np.ndarray) or value.flags.writeable:
                 object.__setattr__(self, field.name, read_only(value))
 
-    def __len__(self) -> int:
-        return self.t.size
-
     def __repr__(self) -> str:
         k, shape = self.t.ndim, self.q.shape
         scalar = len(shape) <= k or shape[-1 - k : -1] != self.t.shape
@@ -52,9 +62,6 @@ class Samples(Value):
             f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}"
             f"{_motions(batch)}\n  {greatest_shown(zip(RATES, values, strict=True))}>"
         )
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.q, dtype=dtype, copy=copy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,19 +135,19 @@ class Trajectory(Value):
         Leading axes are those of a batch of motions. A time outside of a motion that does not rest
         there is an error.
         """
-        return self._at(as_floats(t, "t"), (0,))[0]
+        return self._at(t, (0,))[0]
 
     def v(self, t: ArrayLike) -> Array:
         """Velocities, rad/s or m/s, as `q`."""
-        return self._at(as_floats(t, "t"), (1,))[0]
+        return self._at(t, (1,))[0]
 
     def a(self, t: ArrayLike) -> Array:
         """Accelerations, rad/s^2 or m/s^2, as `q`; where they jump, the value after the jump."""
-        return self._at(as_floats(t, "t"), (2,))[0]
+        return self._at(t, (2,))[0]
 
     def jerk(self, t: ArrayLike) -> Array:
         """Derivatives of the accelerations, as `q`, without the pulses where those jump."""
-        return self._at(as_floats(t, "t"), (3,))[0]
+        return self._at(t, (3,))[0]
 
     def at(self, t: ArrayLike) -> Samples:
         """Positions and derivatives together at times t."""
@@ -191,17 +198,24 @@ class Trajectory(Value):
         scale = np.abs(self.motion.extremes(1)).max(initial=0.0)
         return bool(np.abs(v).max(initial=0.0) > 1e-9 * scale)
 
-    def _at(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives at times t, those outside of the motion included."""
+    def _at(self, given: ArrayLike, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives at times, those outside of the motion included."""
+        t = as_floats(given, "t")
         batch, end = self.motion.batch, np.asarray(self.motion.duration)[..., None]
         flat = np.broadcast_to(t.reshape(-1), (*batch, t.size))
         outside = None
         if not self.repeats and ((flat < 0.0) | (flat > end)).any():
             # a few roundings beside an end, where sums of steps arrive, are the end
             before, after = flat < -4.0 * np.spacing(end), flat > end + 4.0 * np.spacing(end)
-            if not self.holds:
-                self._refuse_outside(flat, before, np.zeros_like(end), "before the start")
-                self._refuse_outside(flat, after, end, "after the end")
+            for beyond, edge, side in ((before, 0.0 * end, "before the start"),
+                                       (after, end, "after the end")):  # fmt: skip
+                edges = np.broadcast_to(edge, (*batch, 1))
+                if not self.holds and beyond.any() and self._moving(edges):
+                    raise InvalidValueError(
+                        f"t: {float(flat[beyond][0]):g} s is {side} of a motion of "
+                        f"{float(np.max(end)):g} s that does not rest there; ask for times inside "
+                        "it."
+                    )
             flat, outside = np.clip(flat, 0.0, end), before | after
         values = self.motion.derivatives(np.ascontiguousarray(flat), orders)
         for value, order in zip(values, orders, strict=True):
@@ -209,14 +223,6 @@ class Trajectory(Value):
                 value[outside] = 0.0
         shape = (*batch, *t.shape) if self.scalar else (*batch, *t.shape, self.n)
         return [value.reshape(shape) for value in values]
-
-    def _refuse_outside(self, t: Array, outside: Any, edge: Array, side: str) -> None:
-        if outside.any() and self._moving(np.broadcast_to(edge, (*self.motion.batch, 1))):
-            raise InvalidValueError(
-                f"t: {float(t[outside][0]):g} s is {side} of a motion of "
-                f"{float(np.max(self.motion.duration)):g} s that does not rest there; ask for "
-                "times inside it."
-            )
 
     def __repr__(self) -> str:
         peaks = [np.stack(self.motion.extremes(order)) for order in (1, 2, 3)]
