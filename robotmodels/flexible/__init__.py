@@ -26,13 +26,7 @@ from .modes import ReducedModel, craig_bampton, from_modes
 from .references import Elastica, elastica, lumped
 from .robot import FlexibleRobot
 from .shaper import Shaper, input_shaper
-from .simulate import (
-    FlexibleMotion,
-    FlexibleMotionStatus,
-    FreeBodyMotion,
-    free_body,
-    simulate,
-)
+from .simulate import FlexibleMotion, FlexibleMotionStatus, FreeBodyMotion, free_body, simulate
 from .tip import TipStatus, TipTracking, tip_tracking
 
 __all__ = [

@@ -110,15 +110,15 @@ class FlexibleRobot(Value):
         set_(self, "links", MappingProxyType(_checked_links(model, self.links)))
         n, modes = model.n, sum(link.m for link in self.links.values())
         set_(self, "modes", modes)
-        stiffness = _of(self.joint_stiffness, n, "joint_stiffness", np.inf)
+        stiffness = each(self.joint_stiffness, n, "joint_stiffness", np.inf)
         if not (stiffness > 0.0).all():
             raise InvalidValueError(
                 "joint_stiffness: expected positive numbers, N m/rad, infinite for rigid joints, "
                 f"got {stiffness.tolist()}."
             )
         joints = np.flatnonzero(np.isfinite(stiffness))
-        damping = _of(self.joint_damping, n, "joint_damping", 0.0)
-        modal = _of(self.modal_damping, modes, "modal_damping", 0.0)
+        damping = each(self.joint_damping, n, "joint_damping", 0.0)
+        modal = each(self.modal_damping, modes, "modal_damping", 0.0)
         for name, values in (("joint_damping", damping), ("modal_damping", modal)):
             if not ((values >= 0.0) & np.isfinite(values)).all():
                 raise InvalidValueError(
@@ -214,7 +214,7 @@ def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
     return {int(row): links[row] for row in sorted(links)}
 
 
-def _of(value: ArrayLike | None, count: int, name: str, default: float) -> Array:
+def each(value: ArrayLike | None, count: int, name: str, default: float = np.nan) -> Array:
     """One number for all, an array, or the default. Shapes: -> (count,)."""
     array = as_reals(default if value is None else value, name)
     if array.shape not in ((), (count,)):
