@@ -42,6 +42,7 @@ from .._outcomes import Outcome, Result
 from ..errors import SingularMassMatrixError
 from .robot import Arm, FlexibleRobot, check_arm
 
+_NEEDED = ("q", "a", "tau")  # other vectors are zero by default
 Load = Array | None
 Ints = NDArray[np.int64]
 
@@ -229,16 +230,16 @@ def checked_rows(
     sizes = dict.fromkeys(("q", "v", "a", "tau"), check_arm(arm).n) | {"wrench": 6}
     sizes |= dict.fromkeys(("e", "e_v"), arm.m)
     named = dict(zip(("q", "e", "v", "e_v"), [x for pair in pairs for x in pair], strict=False))
-    vectors = tuple(
+    given, k, batch = {**named, **given}, len(named), ()
+    vectors: Any = [
         np.zeros(sizes[name])
-        if value is None and name not in ("q", "a", "tau")
-        else as_vector(value, sizes[name], name)  # type: ignore[arg-type]
-        for name, value in (named | given).items()
-    )
-    batch, k = (), len(named)
+        if x is None and name not in _NEEDED
+        else as_vector(x, sizes[name], name)
+        for name, x in given.items()
+    ]
     if any(vector.ndim > 1 for vector in vectors):
-        batch, vectors = batch_rows(vectors, (*named, *given))
-    rows = [np.concatenate(vectors[i : i + 2], axis=-1) for i in range(0, k, 2)] + [*vectors[k:]]
+        batch, vectors = batch_rows(tuple(vectors), tuple(given))
+    rows = [np.concatenate(vectors[i : i + 2], axis=-1) for i in range(0, k, 2)] + vectors[k:]
     return batch, rows if batch else [np.atleast_2d(row) for row in rows]
 
 
