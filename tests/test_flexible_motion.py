@@ -252,6 +252,17 @@ def test_a_free_body_keeps_its_momenta_and_energy(stiffening):
     np.testing.assert_allclose(found.momentum[0, :3], found.momentum[-1, :3], rtol=1e-7)
 
 
+def test_modes_bent_beyond_the_second_order_of_stiffening_are_named():
+    link = flexible.beam(1.0, (4.0, 6.0), tip=0.2, modes=2, stiffening=True, gyration=0.05)
+    found = flexible.free_body(link, 0.05 * np.ones(4), [0, 0, 0, 0.1, 0.2, 0.3], 1.0)
+    assert found.status == FlexibleMotionStatus.BENT
+    assert "higher modes" in found.reason()
+    arm = flexible.FlexibleRobot(PIVOT, {1: link})
+    e = [[0.0] * 4, [0.3] * 4]
+    status = flexible.ddm(arm, np.zeros((2, 1)), e, np.zeros((2, 1)), None, [0.0]).status
+    assert status.tolist() == [SpinStatus.STIFF, SpinStatus.BENT]
+
+
 def test_an_arm_keeps_the_balance_of_energy_and_momenta():
     model = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], alpha=[0, 1], d=[0, 1]))
     links = {1: flexible.beam(1.0, (20.0, 30.0), modes=1, gyration=0.05), 2: swinging().links[1]}

@@ -17,8 +17,8 @@ O(f + sum m_j^3). Coordinates of a body are the motion of its root without that 
 
 Shapes of `loads`: y, dy, given, out (N, n + m), outer (N, 18): wrench of the tool, twist and
 acceleration of the base, free (n + 2,): of the joints, of all modes, of the base; if it is empty,
-only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, 1 if
-a link is softened; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
+only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, code
+of `SpinStatus`; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
 sample in which a free joint moves no inertia, or -1.
 """
 
@@ -52,6 +52,7 @@ from .robot import Arm
 
 ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
+ROUNDING = 1e-14
 
 
 class Work(NamedTuple):
@@ -375,11 +376,14 @@ def loads(
         for j in range(f, 0, -1):
             s = 7 + arm.start[j] - arm.start[j - 1]
             add_back(A, h, j, I, p, j, work.T, s)
-            eliminate(A, h, j, 6, s, work.given, work.free)
-            if work.free[j, 6] and failed < 0 and not A[j, 6, 6] > 0.0:
-                failed = i
+            own, positive = A[j, 6, 6], eliminate(A, h, j, 6, s, work.given, work.free)
+            if work.free[j, 6] and not abs(A[j, 6, 6]) > ROUNDING * own:
+                failed = i if failed < 0 else failed
+            elif not positive:
+                base[i, 9] = 2.0
             add_back(I, p, arm.chain.antecedent[j - 1], A, h, j, work.X, 6)
-        eliminate(I, p, 0, 0, 6, work.given, work.free)
+        if not eliminate(I, p, 0, 0, 6, work.given, work.free):
+            base[i, 9] = 2.0
         resolve(I, p, 0, 0, 6, work.given, work.free, work.y)
         for x in range(6):
             base[i, x] = work.y[0, x] if free[n + 1] else p[0, x]

@@ -48,13 +48,18 @@ Ints = NDArray[np.int64]
 
 
 class SpinStatus(Outcome):
-    """Whether the elastic stiffness of the spinning links is positive; fits int8."""
+    """Whether the elastic stiffness of the spinning links and the mass are positive; fits int8."""
 
     STIFF = 0, "The elastic stiffness of every link is positive at its angular velocity."
     SOFTENED = (
         1,
         "A link spins above its own critical speed: its linear modes have no stiffness left and "
         "their deflection grows. Make the link with stiffening=True.",
+    )
+    BENT = (
+        2,
+        "The mass matrix is not positive: higher modes are bent beyond the second order of "
+        "stiffening=True. Take fewer modes, or stiffening=False.",
     )
 
 

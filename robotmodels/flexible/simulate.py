@@ -74,6 +74,7 @@ class FlexibleMotionStatus(Outcome):
     NOT_CONVERGED = 1, "The allowed evaluations of the model were used up before the end."
     DIVERGED = 2, "The motion grew without bound."
     SOFTENED = 3, SpinStatus.SOFTENED.sentence
+    BENT = 4, SpinStatus.BENT.sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,13 +177,13 @@ def simulate(
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
     ddm(arm, *start, np.zeros(n))  # type: ignore[reportCallIssue]  # its errors name what is singular
-    k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
+    k, D, drives, spun = n + m, arm.parts.D[n:, n:], model.drive_matrices, [0.0]
 
     def rate(time: float, y: Array) -> Array:
         q, e, v, ev = parts = y[:n], y[n:k], y[k : k + n], y[k + n : 2 * k]
         tau, w, dx = law(time, *parts), push(time, *parts), y[k : 2 * k]
         ddx, base = solved(arm, True, y[None, :k], dx[None], tau[None], w[None])
-        softened[0] = softened[0] or base[0, 9] > 0.0
+        spun.append(base[0, 9])
         power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
         loads = [base[0, :9]]
         if wrench is not None:
@@ -196,7 +197,7 @@ def simulate(
     largest = np.full(len(y0), np.inf)
     largest[n:k] = _LARGEST * scales(arm)[n:]
     options = chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress
-    times, Y, status, count = _followed(rate, y0, t, *options, largest)
+    times, Y, status, count = _followed(rate, y0, t, *options, spun, largest)
     q, e, v, ev, work, load, first, pull = np.split(Y, np.cumsum([n, m, n, m, 1, 6, 3]), axis=1)
     tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
@@ -204,8 +205,6 @@ def simulate(
     momentum, impulse = (in_world(model.base, x) for x in (momentum, load))
     impulse = impulse + np.hstack([weight, cross(first, model.gravity)])
     impulse -= 0.0 if wrench is None else pull
-    if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
-        status = FlexibleMotionStatus.SOFTENED
     energies = kinetic, potential, work[:, 0]
     return FlexibleMotion(arm, times, q, v, tau, e, ev, *energies, momentum, impulse, status, count)
 
@@ -228,9 +227,13 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
 
 def _followed(
     rate: Callable[[float, Array], Array], y: Array, t: ArrayLike, method: Integrator,
-    rtol: float, atol: float, budget: int | None, progress: Any = None, largest: Any = np.inf,
+    rtol: float, atol: float, budget: int | None, progress: Any, spun: list[float],
+    largest: ArrayLike = np.inf,
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:  # fmt: skip
-    """Times, states up to the largest, status and evaluations of an initial value problem."""
+    """Times, states up to the largest, status and evaluations of an initial value problem.
+
+    Each evaluation appends a code of `SpinStatus` to ``spun``.
+    """
     import scipy.integrate
 
     start, end, wanted = times_of(t)
@@ -256,6 +259,9 @@ def _followed(
             before = solver.t
             with suppress(SingularMassMatrixError):  # accelerations that are not finite
                 solver.step()
+            if spun[-1] == SpinStatus.BENT:  # the last evaluation of a step is at its end
+                status = FlexibleMotionStatus.BENT
+                break
             if solver.t == before or (np.abs(solver.y) > largest).any():
                 status = FlexibleMotionStatus.DIVERGED
                 break
@@ -266,6 +272,10 @@ def _followed(
                 inside = wanted[(wanted > found[-1][0]) & (wanted <= solver.t)]
                 found += [(float(x), dense(x)) for x in inside]
             report.done((float(solver.t) - start) / (end - start))
+    if status and SpinStatus.BENT in spun:
+        status = FlexibleMotionStatus.BENT
+    elif status != FlexibleMotionStatus.NOT_CONVERGED and SpinStatus.SOFTENED in spun:
+        status = FlexibleMotionStatus.SOFTENED
     times, states = (np.array(x) for x in zip(*found, strict=True))
     return times, states, status, int(solver.nfev)
 
@@ -359,12 +369,13 @@ def free_body(
             "link: a sum of its modes is a rigid motion, which a free body has without modes."
         )
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
-    none, outer = np.zeros((1, m)), np.zeros((1, 12))
+    none, outer, spun = np.zeros((1, m)), np.zeros((1, 12)), [0.0]
 
     def rate(t: float, y: Array) -> Array:
         ev, v, w = y[m : 2 * m], y[2 * m : 2 * m + 3], y[2 * m + 3 : 2 * m + 6]
         outer[0, :6] = y[2 * m : 2 * m + 6]
         e_a, base, *_ = recursion(parts.chain, y[None, :m], ev[None], none, loose, None, outer)
+        spun.append(base[0, 9])
         u = y[2 * m + 6 : 2 * m + 9]
         (x, y, z), s = u, y[2 * m + 9]
         W = np.array([[s, -z, y], [z, s, -x], [-y, x, s], [-x, -y, -z]])  # quaternion's rate
@@ -372,7 +383,8 @@ def free_body(
         return np.concatenate([ev, e_a[0], base[0, :6], 0.5 * W @ w, moved])
 
     y0 = np.concatenate([*start, [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
-    times, Y, status, _ = _followed(rate, y0, t, Integrator.DOP853, rtol, atol, max_evaluations)
+    options = Integrator.DOP853, rtol, atol, max_evaluations, None
+    times, Y, status, _ = _followed(rate, y0, t, *options, spun)
     e, ev, twist, quaternion, place = (x.copy() for x in np.split(Y, cuts, axis=1))
     pose = np.tile(np.eye(4), (len(times), 1, 1))
     pose[:, :3, :3], pose[:, :3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
