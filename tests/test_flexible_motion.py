@@ -140,7 +140,7 @@ def test_empty_batches_and_functions_of_any_number_of_arguments():
     assert (found.e.shape, found.tau.shape, found.status.shape) == ((0, arm.m), (0, 1), (0,))
     plan = flexible.rest_to_rest(arm, [0.0], [0.1], 1.0)
     assert plan.torque([]).shape == (0, 1)
-    assert len(repr(plan.trajectory).splitlines()) == 1
+    assert len(repr(plan.trajectory).splitlines()) <= 6
     laws = (lambda t: [0.1], lambda t, k=0.1: [k], lambda *x: 0.1 + 0 * x[4][:1])
     ends = [flexible.simulate(arm, [0.0], control=law, t=0.01).q[-1, 0] for law in laws]
     assert ends[0] == ends[1] == ends[2] > 0.0
@@ -250,6 +250,17 @@ def test_a_free_body_keeps_its_momenta_and_energy(stiffening):
     assert found.energy_drift < 1e-8
     assert found.momentum_drift < 1e-8
     np.testing.assert_allclose(found.momentum[0, :3], found.momentum[-1, :3], rtol=1e-7)
+
+
+def test_modes_bent_beyond_the_second_order_of_stiffening_are_named():
+    link = flexible.beam(1.0, (4.0, 6.0), tip=0.2, modes=2, stiffening=True, gyration=0.05)
+    found = flexible.free_body(link, 0.05 * np.ones(4), [0, 0, 0, 0.1, 0.2, 0.3], 1.0)
+    assert found.status == FlexibleMotionStatus.BENT
+    assert "higher modes" in found.reason()
+    arm = flexible.FlexibleRobot(PIVOT, {1: link})
+    e = [[0.0] * 4, [0.3] * 4]
+    status = flexible.ddm(arm, np.zeros((2, 1)), e, np.zeros((2, 1)), None, [0.0]).status
+    assert status.tolist() == [SpinStatus.STIFF, SpinStatus.BENT]
 
 
 def test_an_arm_keeps_the_balance_of_energy_and_momenta():

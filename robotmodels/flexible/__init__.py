@@ -26,54 +26,20 @@ from .modes import ReducedModel, craig_bampton, from_modes
 from .references import Elastica, elastica, lumped
 from .robot import FlexibleRobot
 from .shaper import Shaper, input_shaper
-from .simulate import (
-    FlexibleMotion,
-    FlexibleMotionStatus,
-    FreeBodyMotion,
-    free_body,
-    simulate,
-)
+from .simulate import FlexibleMotion, FlexibleMotionStatus, FreeBodyMotion, free_body, simulate
 from .tip import TipStatus, TipTracking, tip_tracking
 
-__all__ = [
-    "Accelerations",
-    "Deflection",
-    "DeflectionStatus",
-    "Elastica",
-    "FlexibleLink",
-    "FlexibleMotion",
-    "FlexibleMotionStatus",
-    "FlexibleRobot",
-    "FreeBodyMotion",
-    "Invariants",
-    "LinearModel",
-    "ReducedModel",
-    "RestStatus",
-    "RestToRest",
+__all__ = ["FlexibleLink", "FlexibleRobot", "Invariants", "beam", "craig_bampton", "from_modes"]
+__all__ += ["Accelerations", "SpinStatus", "ddm", "dgm", "energies", "idm", "jacobian"]
+__all__ += ["Elastica", "ReducedModel", "elastica", "link_poses", "lumped", "mass_matrix"]
+__all__ += ["Deflection", "DeflectionStatus", "LinearModel", "linearize", "natural_frequencies"]
+__all__ += ["FlexibleMotion", "FlexibleMotionStatus", "FreeBodyMotion", "free_body", "simulate"]
+__all__ += ["RestStatus", "RestToRest", "joint_tracking", "regulator", "rest_to_rest"]
+__all__ += [
     "Shaper",
-    "SpinStatus",
     "TipStatus",
     "TipTracking",
-    "beam",
-    "craig_bampton",
-    "ddm",
-    "dgm",
-    "elastica",
-    "energies",
-    "free_body",
-    "from_modes",
-    "idm",
     "input_shaper",
-    "jacobian",
-    "joint_tracking",
-    "linearize",
-    "link_poses",
-    "lumped",
-    "mass_matrix",
-    "natural_frequencies",
-    "regulator",
-    "rest_to_rest",
-    "simulate",
     "static_deflection",
     "tip_tracking",
 ]

@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss, legint, legval
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_number, as_reals, read_only
+from .._arrays import Array, as_exact, as_number, as_reals
 from .._choices import one_of
 from ..errors import InertiaError, InvalidValueError
 from .link import BeamData, FlexibleLink, Section, integrals
@@ -51,17 +51,16 @@ def beam(
 ) -> FlexibleLink:
     """Flexible link from a uniform Euler-Bernoulli beam along the x axis of its frame.
 
-    Its modes are those of the beam with what it carries, in the order: bending about y
-    (displacement along z), bending about z (along y), torsion. The largest displacement of each is
-    1, so that elastic coordinates are metres, of torsion radians at the tip.
+    Its modes are those of the beam with what it carries: bending about y (displacement along z),
+    about z (along y), torsion. The largest displacement of each is 1, so that elastic coordinates
+    are metres, of torsion radians at the tip.
 
     Parameters
     ----------
     length : float
         From the root to the tip, m.
     EI : array_like, shape (2,) or ()
-        Bending stiffness about y and z, N m^2; infinite where the beam is rigid; one number for
-        both.
+        Bending stiffness about y and z, or both, N m^2; infinite where the beam is rigid.
     GJ : float, optional
         Torsional stiffness, N m^2; default rigid.
     density : float
@@ -90,7 +89,7 @@ def beam(
     Returns
     -------
     FlexibleLink
-        The link, with its invariants and frequencies.
+        The link.
 
     Raises
     ------
@@ -122,47 +121,32 @@ def beam(
     if not isinstance(modes, int | np.integer) or modes < 0:
         raise InvalidValueError(f"modes: expected a number from 0, got {modes!r:.40}.")
     h = 0.0 if hub is None else as_number(hub, "hub", least=0.0)
-    mass, com, J = _tip_body(tip)
-    k = (
-        (_SLENDER * L if GJ is not None else 0.0)
-        if gyration is None
-        else as_number(gyration, "gyration", least=0.0)
-    )
+    slender = 0.0 if GJ is None else _SLENDER * L
+    k = slender if gyration is None else as_number(gyration, "gyration", least=0.0)
     if np.isfinite(torsion) and k == 0.0:
         raise InvalidValueError("gyration: torsion needs a positive radius of gyration, got 0.")
     T = np.eye(4) if pose is None else se3.as_single_pose(pose, "pose")
-
-    kinds, bodies = list[Mode](), [(mass, com, J), _tip_body(carried)]
-    for axis, value in ((1, float(stiff[0])), (2, float(stiff[1])), (0, float(torsion))):
+    own, planes = _tip_body(tip), (float(stiff[0]), float(stiff[1]))
+    kinds = list[Mode]()
+    for axis, value in ((1, planes[0]), (2, planes[1]), (0, float(torsion))):
         loads, across = [], 3 - axis
-        for m, c, I in bodies:  # noqa: E741
+        for m, c, J in (own, _tip_body(carried)):
             if axis:
-                spin = (I[axis, axis] + m * c[across] ** 2) / L**2
+                spin = (J[axis, axis] + m * c[across] ** 2) / L**2
                 loads += [(m, 1.0, c[0] / L), (spin, 0.0, 1.0)]
             else:
-                loads.append((I[0, 0] + m * float(c[1:] @ c[1:]), 1.0, 0.0))
+                loads.append((J[0, 0] + m * float(c[1:] @ c[1:]), 1.0, 0.0))
         if np.isfinite(value):
             free = h / L**2 if ends == "pinned-hub" and axis == 2 else None
-            own = rho * L * (1.0 if axis else k * k)
-            kinds += _modes(int(modes), axis, value / L ** (3 if axis else 1), own, loads, free)
-    body = BeamData(
-        length=L,
-        EI=(float(stiff[0]), float(stiff[1])),
-        GJ=float(torsion),
-        density=rho,
-        gyration=k,
-        tip_mass=mass,
-        tip_com=tuple(com.tolist()),
-        tip_inertia=tuple(J.ravel().tolist()),
-        hub=h,
-        pose=tuple(T.ravel().tolist()),
-    )
+            mass = rho * L * (1.0 if axis else k * k)
+            kinds += _modes(int(modes), axis, value / L ** (3 if axis else 1), mass, loads, free)
+    body = BeamData(L, planes, float(torsion), rho, k, own, h, T)
     return _link(kinds, body, 24 + 8 * int(modes), bool(stiffening))
 
 
 def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> FlexibleLink:
     """Flexible link of modes; integrals by Gauss quadrature with so many points."""
-    L, m, T = body.length, len(kinds), np.array(body.pose).reshape(4, 4)
+    L, m, R, p = body.length, len(kinds), body.pose[:3, :3], body.pose[:3, 3]
     points, weights = leggauss(count)
     points, weights = 0.5 + 0.5 * points, 0.5 * weights
 
@@ -180,23 +164,21 @@ def _link(kinds: list[Mode], body: BeamData, count: int, stiffening: bool) -> Fl
     Gamma, X, share = shortened(x), np.outer(x, _X), body.density * L * weights
     cloud = [(share, X, Phi, Gamma)]
     if body.gyration > 0.0:  # the mass of a section at four points, which torsion turns
-        twist = turn * _X[:, None]
         arms = body.gyration * np.array((_Y, -_Y, _Z, -_Z))
-        cloud = [(share / 4.0, X + r, Phi + _turned(twist, r), Gamma) for r in arms]
+        cloud = [(share / 4.0, X + r, Phi + _turned(turn * _X[:, None], r), Gamma) for r in arms]
     tip, tip_turn, tip_short = (v[0] for v in (*_fields(kinds, L, end), shortened(end)))
-    for mass, r in _points_of(body):
+    for mass, r in _points_of(*body.tip):
         spun = _turned(tip_turn, r)
         both = np.cross(tip_turn[:, :, None], spun[:, None, :], axis=0) * stiffening
         bent = tip_short + 0.5 * (both + both.swapaxes(1, 2))
         cloud.append((np.array([mass]), (L * _X + r)[None], (tip + spun)[None], bent[None]))
     W, X, Phi, Gamma = (np.concatenate(parts) for parts in zip(*cloud, strict=True))
-    R, p = T[:3, :3], T[:3, 3]
     stiffness = np.diag([mode.stiffness for mode in kinds]).reshape(m, m)
     Phi, Gamma = np.einsum("ij,njk->nik", R, Phi), np.einsum("ij,njkl->nikl", R, Gamma)
     found = integrals(W, X @ R.T + p, Phi, Gamma, stiffness)
     found = replace(found, inertia=found.inertia + np.diag([0.0, 0.0, body.hub]))
     curved = np.moveaxis(np.tensordot(R, tip_short, 1), 0, -1)
-    section = Section(*map(read_only, (L * R[:, 0] + p, (R @ tip).T, (R @ tip_turn).T, curved)))
+    section = Section(L * R[:, 0] + p, (R @ tip).T, (R @ tip_turn).T, curved)
     drawn = np.linspace(0.0, L, _DRAWN)
     shapes = np.einsum("ij,njk->nik", R, _fields(kinds, L, drawn)[0])
     frequencies, nodes = np.array([mode.frequency for mode in kinds]), np.outer(drawn, R[:, 0]) + p
@@ -243,23 +225,20 @@ def _tip_body(tip: Any) -> tuple[float, Array, Array]:
     return mass, com, J
 
 
-def _points_of(body: BeamData) -> list[tuple[float, Array]]:
+def _points_of(mass: float, com: Array, J: Array) -> list[tuple[float, Array]]:
     """Point masses with the inertia of the tip body, and their places from the tip."""
-    J, com = np.array(body.tip_inertia).reshape(3, 3), np.array(body.tip_com)
-    if body.tip_mass == 0.0 or not J.any():
-        return [(body.tip_mass, com)] if body.tip_mass else []
+    if mass == 0.0 or not J.any():
+        return [(mass, com)] if mass else []
     moments, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)
-    arms = (np.sqrt(3.0 * np.maximum(moments, 0.0) / body.tip_mass) * axes).T
-    return [(body.tip_mass / 6.0, com + s * r) for r in arms for s in (1.0, -1.0)]
+    arms = (np.sqrt(3.0 * np.maximum(moments, 0.0) / mass) * axes).T
+    return [(mass / 6.0, com + s * r) for r in arms for s in (1.0, -1.0)]
+
+
+Loads = list[tuple[float, float, float]]
 
 
 def _modes(
-    count: int,
-    axis: int,
-    stiffness: float,
-    mass: float,
-    loads: list[tuple[float, float, float]],
-    hub: float | None,
+    count: int, axis: int, stiffness: float, mass: float, loads: Loads, hub: float | None
 ) -> list[Mode]:
     """First modes of a clamped beam, or with a free root and a hub on it, by Galerkin's method.
 

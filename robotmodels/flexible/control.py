@@ -33,18 +33,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import comb
+from math import factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_number, as_reals
+from .._arrays import Array, as_exact, as_floats, as_number
 from .._outcomes import Outcome, Result
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
+from ..trajectories import Trajectory
+from ..trajectories.motions import PiecewisePolynomial
 from .linear import DeflectionStatus, scales, static_deflection
 from .models import idm, mass_matrix, solved
-from .robot import FlexibleRobot, check_arm
+from .robot import FlexibleRobot, check_arm, each
 
 Law = Callable[[float, Array, Array, Array, Array], Array]
 _FACTORS = 2  # free coefficients of each joint, for each elastic condition that one joint has
@@ -137,65 +139,13 @@ def motion_of(reference: Any, n: int) -> Callable[[float], list[Array]]:
 
 
 def _gains(value: ArrayLike, n: int, name: str) -> Array:
-    gains = as_reals(value, name)
-    if gains.shape not in ((), (n,)):
-        raise ShapeError(f"{name}: expected one number or shape ({n},), got {gains.shape}.")
+    gains = each(value, n, name)
     if not (np.isfinite(gains) & (gains > 0.0)).all():
         raise InvalidValueError(f"{name}: expected positive gains, got {gains.tolist()}.")
-    return np.broadcast_to(gains, (n,)).copy()
+    return gains
 
 
 # --- rest to rest --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointPolynomial(Frozen, Value):
-    """Motion of the joints from rest to rest: a polynomial by its Bernstein coefficients.
-
-    Shapes: coefficients (degree + 1, ..., n).
-    """
-
-    duration: float
-    coefficients: Array
-    _weighted: Any = field(default=(), init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        Frozen.__post_init__(self)
-        rows, weighted = self.coefficients, []
-        for _ in range(3):  # derivatives have the differences as coefficients
-            d = len(rows) - 1
-            weights = np.array([[comb(d, k)] for k in range(d + 1)], np.float64)
-            weighted.append((np.arange(d + 1), weights * rows.reshape(d + 1, -1)))
-            rows = np.diff(rows, axis=0) * (d / self.duration)
-        object.__setattr__(self, "_weighted", weighted)
-
-    @property
-    def _values(self) -> tuple[Any, ...]:
-        return self.duration, self.coefficients
-
-    def _at(self, t: ArrayLike, order: int) -> Array:
-        powers, weighted = self._weighted[order]
-        s = np.asarray(t, np.float64)[..., None] / self.duration
-        x = np.minimum(np.maximum(s, 0.0), 1.0)
-        found = (x**powers * (1.0 - x) ** powers[::-1]) @ weighted
-        found = found if order == 0 else found * (x == s)
-        return found.reshape(*s.shape[:-1], *self.coefficients.shape[1:])
-
-    def q(self, t: ArrayLike) -> Array:
-        """Positions (..., n) at times (...), constant before and after the motion."""
-        return self._at(t, 0)
-
-    def v(self, t: ArrayLike) -> Array:
-        """Velocities (..., n) at times (...)."""
-        return self._at(t, 1)
-
-    def a(self, t: ArrayLike) -> Array:
-        """Accelerations (..., n) at times (...)."""
-        return self._at(t, 2)
-
-    def __repr__(self) -> str:
-        d, *_, n = self.coefficients.shape
-        return f"<JointPolynomial: {self.duration:g} s, {n} joints, degree {d - 1}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,8 +156,8 @@ class RestToRest(Result):
     ----------
     arm : FlexibleRobot
         The robot.
-    trajectory : JointPolynomial
-        Motion of the motors, with ``q(t)``, ``v(t)``, ``a(t)`` and ``duration``.
+    trajectory : Trajectory
+        Motion of the motors.
     end : ndarray, shape (2 m,)
         What is left of the elastic coordinates and their velocities at the end, relative to their
         largest values on the way, and at least to 1e-4 of the length.
@@ -216,7 +166,7 @@ class RestToRest(Result):
     """
 
     arm: FlexibleRobot
-    trajectory: JointPolynomial
+    trajectory: Trajectory
     end: Array
     status: RestStatus
     _elastic: Any = field(repr=False)
@@ -227,16 +177,15 @@ class RestToRest(Result):
 
     def elastic(self, t: ArrayLike) -> tuple[Array, Array]:
         """Elastic coordinates and velocities (..., m) at times (...)."""
-        times = np.clip(np.asarray(t, np.float64), 0.0, self.trajectory.duration)
-        m = self.arm.m
+        times = np.clip(as_floats(t, "t"), 0.0, self.trajectory.duration)
         y = self._elastic(times.ravel()).T if times.size else times
-        return tuple(np.split(y.reshape(*times.shape, 2 * m), 2, axis=-1))  # type: ignore[return-value]
+        return tuple(np.split(y.reshape(*times.shape, 2 * self.arm.m), 2, axis=-1))  # type: ignore[return-value]
 
     def torque(self, t: ArrayLike) -> Array:
         """Torques (..., n) at times (...), which hold the arm before and after the motion."""
         e, e_v = self.elastic(t)
-        path = self.trajectory
-        return idm(self.arm, path.q(t), e, path.v(t), e_v, path.a(t))[0]
+        path = self.trajectory.at(t)
+        return idm(self.arm, path.q, e, path.v, e_v, path.a)[0]
 
     def __repr__(self) -> str:
         return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
@@ -245,7 +194,7 @@ class RestToRest(Result):
 def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: float) -> RestToRest:
     """Motion between equilibria in a fixed time, without vibration at the end.
 
-    The motion of the motors is a polynomial with free coefficients, of least change, with which the
+    The motion of the motors is a spline with free coefficients, of least change, with which the
     elastic coordinates, integrated by the inverse model, begin and end at rest.
 
     Returns
@@ -273,46 +222,43 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         )
     start, goal = np.hstack([rest.e, 0.0 * rest.e])
     K = -(-_FACTORS * 2 * m // n) if m else 2
-    d = K + 7  # the first and last four coefficients are those of the ends
-    # the step with four derivatives that vanish at both ends, of a higher degree
-    step = [sum(comb(k, j) * comb(d - k, 9 - j) for j in range(5, 10)) for k in range(d + 1)]
-    base = ends[0] + np.outer(np.array(step) / comb(d, 9), ends[1] - ends[0])
+    pieces = _splines(K)
+    share = np.clip((np.arange(K + 8.0) - 3.0) / (K + 1.0), 0.0, 1.0)
+    base = ends[0] + np.outer(share**2 * (3.0 - 2.0 * share), ends[1] - ends[0])
 
-    def path(factors: Array) -> JointPolynomial:
+    def path(factors: Array) -> PiecewisePolynomial:
         """Motions with other free coefficients, factors (..., K, n)."""
-        moved = np.moveaxis(factors, -2, 0)
-        none = np.zeros((4, *moved.shape[1:]))
-        wide = base.reshape(d + 1, *[1] * (factors.ndim - 2), n)
-        return JointPolynomial(T, wide + np.concatenate([none, moved, none]))
+        none = np.zeros((*factors.shape[:-2], 4, n))
+        values = base + np.concatenate([none, factors, none], axis=-2)
+        breaks = np.broadcast_to(np.linspace(0.0, T, K + 2), (*factors.shape[:-2], 1, K + 2))
+        return PiecewisePolynomial(breaks, pieces @ values[..., None, :, :])
 
     def elastic(factors: Array, rtol: float, dense: bool = False) -> Any:
         """Solutions for several motions, factors (P, K, n)."""
         P, motion = len(factors), path(factors)
 
         def rate(t: float, y: Array) -> Array:
+            q, v, a = (x[:, 0] for x in motion.derivatives(np.full((P, 1), t), (0, 1, 2)))
             e, e_v = y.reshape(P, 2, m).swapaxes(0, 1)
-            x, dx = np.hstack([motion.q(t), e]), np.hstack([motion.v(t), e_v])
-            e_a = solved(arm, False, x, dx, motion.a(t))[0][:, n:]
+            e_a = solved(arm, False, np.hstack([q, e]), np.hstack([v, e_v]), a)[0][:, n:]
             return np.stack([e_v, e_a], axis=1).ravel()
 
-        tolerances = {"rtol": rtol, "atol": 1e-3 * rtol}
-        y0 = np.tile(start, P)
-        return solve_ivp(rate, (0.0, T), y0, "DOP853", dense_output=dense, **tolerances)
+        options = {"rtol": rtol, "atol": 1e-3 * rtol, "dense_output": dense}
+        return solve_ivp(rate, (0.0, T), np.tile(start, P), "DOP853", **options)
 
     floor = _NEGLIGIBLE * scales(arm)[n:]
     rates = np.sqrt(np.diag(arm.parts.K)[n:] / np.diag(mass_matrix(arm, ends[0]))[n:])
 
-    def sizes(y: Array) -> Array:
-        """Largest elastic coordinates (m,), and velocities (m,) of vibrations as large as these."""
-        most = np.abs(y).max(axis=1, initial=0.0)
-        most[:m] = np.maximum(most[:m], floor)
-        return np.concatenate([most[:m], np.maximum(most[m:], rates * most[:m])])
+    def left_over(found: Any) -> tuple[Array, Array]:
+        """What is left at the end (2 m,), relative to the sizes on the way; those sizes."""
+        most = np.abs(found.y).max(axis=1, initial=0.0)
+        e = np.maximum(most[:m], floor)  # velocities: of vibrations as large as these
+        size = np.concatenate([e, np.maximum(most[m:], rates * e)])
+        return (found.y[:, -1] - goal) / size, size
 
     c, slope, before = np.zeros((K, n)), None, np.inf
     for _ in range(_NEWTON if m else 0):
-        found = elastic(c[None], _FINE)
-        size = sizes(found.y)
-        left = (found.y[:, -1] - goal) / size
+        left, size = left_over(elastic(c[None], _FINE))
         error = float(np.abs(left).max())
         if error < _STILL:
             break
@@ -324,7 +270,19 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
         before = error
         c = c + np.linalg.lstsq(slope / size[:, None], -left, rcond=1e-10)[0].reshape(K, n)
     found = elastic(c[None], _FINE, dense=True)
-    end = (found.y[:, -1] - goal) / sizes(found.y)
+    end, _ = left_over(found)
     still = (np.abs(end) < 10.0 * _STILL).all()
     status = RestStatus.AT_REST if still else RestStatus.VIBRATES
-    return RestToRest(arm, path(c), end, status, found.sol)
+    return RestToRest(arm, Trajectory(path(c), holds=True), end, status, found.sol)
+
+
+def _splines(K: int) -> Array:
+    """B-splines of degree 7 in powers; four at each end are those of the state at rest there.
+
+    Shapes: -> (K + 1, 8, K + 8), of pieces of length 1.
+    """
+    from scipy.interpolate import BSpline
+
+    spline = BSpline(np.clip(np.arange(-7.0, K + 9.0), 0.0, K + 1.0), np.eye(K + 8), 7)
+    starts = np.arange(K + 1.0)
+    return np.stack([spline(starts, nu=d) / factorial(d) for d in range(8)], axis=1)

@@ -12,34 +12,22 @@ and all that follows is fixed to that section. With u the acceleration of the ro
 where MS, J, J_k, a_k and b_k depend on e. `loads` finds the accelerations that are not given by
 articulated elastic bodies: forward, velocities and the loads at zero accelerations; backward,
 elimination of the modes and of the joint of each body; forward, the accelerations. Its cost is
-O(f + sum m_j^3). Vectors of six are linear, then angular. Of a row of coordinates y (n + m) the
-first n are those of the joints, the others the modes.
+O(f + sum m_j^3). Coordinates of a body are the motion of its root without that of its joint
+(linear, angular), its joint, its modes. Rows y (n + m) are those of the joints, then of the modes.
 
 Shapes of `loads`: y, dy, given, out (N, n + m), outer (N, 18): wrench of the tool, twist and
 acceleration of the base, free (n + 2,): of the joints, of all modes, of the base; if it is empty,
-only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, 1 if
-a link is softened; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
+only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, code
+of `SpinStatus`; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
 sample in which a free joint moves no inertia, or -1.
 """
 
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from ..kernels._compile import (
-    CHAIN,
-    INT,
-    INTS,
-    MATRIX,
-    OUT2,
-    OUT4,
-    VECTOR,
-    Floats,
-    Ints,
-    compiled,
-)
+from ..kernels._compile import CHAIN, INT, INTS, MATRIX, OUT2, OUT4, VECTOR, Floats, Ints, compiled
 from ..kernels._inertia import inertia_of, inertia_times
 from ..kernels._motion import coordinate, link_acceleration, link_pose, rotation_acceleration
 from ..kernels._vectors import (
@@ -64,10 +52,11 @@ from .robot import Arm
 
 ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
+ROUNDING = 1e-14
 
 
 class Work(NamedTuple):
-    """Arrays of the f + 1 bodies (row 0: base), and of the modes from ``now`` on."""
+    """Arrays of the f + 1 bodies (row 0: base) with s coordinates at most, and of the modes."""
 
     W: Floats  # axes and root in the world
     x: Floats
@@ -76,18 +65,20 @@ class Work(NamedTuple):
     w: Floats  # motion of the body, then of its tip
     dw: Floats
     u: Floats
-    X: Floats  # (6, 6) from motions of the antecedent's tip to the root, and to the own tip
-    T: Floats
-    H: Floats  # (6, 6) inertia of the body at its root, and of all that follows at its tip
-    I: Floats  # noqa: E741
-    h: Floats  # (6,) load of the body, of all that follows, then acceleration of the tip
+    X: Floats  # (6, 6) from motions of the antecedent's tip to the root
+    T: Floats  # (6, s) from coordinates to motions of the tip
+    A: Floats  # (s, s) inertia and (s,) load of the coordinates
+    h: Floats
+    I: Floats  # noqa: E741  # (6, 6) inertia and (6,) load of what follows, then its acceleration
     p: Floats
-    joint: Floats  # column of the inertia, inertia and load of the joint
+    y: Floats  # (s,) accelerations
+    given: Floats  # (s,) loads of coordinates that are free (1), accelerations of others (0)
+    free: Floats
     body: Floats  # inertial parameters
     now: Floats  # J_k, a, b, Phi and velocity of the section, at e
-    E: Floats  # mixed inertia (6), load
-    G: Floats  # E divided by the inertia of the modes
-    mass: Floats
+    K: Floats  # (1, modes, modes) stiffness of a body, with rows of zeros and of ones
+    zeros: Floats
+    ones: Floats
 
 
 ARM = types.NamedTuple(
@@ -124,27 +115,25 @@ def put_pose(poses: Floats, i: int, k: int, R: Matrix, P: Vector) -> None:
 
 
 @compiled()
-def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int) -> None:
-    """Write matrix j of T times row b of a into row j."""
-    for x in range(6):
-        out[j, x] = 0.0
-        for y in range(6):
-            out[j, x] += T[j, x, y] * a[b, y]
-
-
-@compiled()
-def workspace(arm: Arm) -> Work:
-    """Work arrays with the pose of the base in row 0."""
+def workspace(arm: Arm, free: Ints) -> Work:
+    """Work arrays with the pose of the base and the free coordinates."""
     f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
-    pose, row, square = (f, 3, 3), (f, 3), (f, 6, 6)
+    s, pose, row = 7 + most, (f, 3, 3), (f, 3)
     work = Work(
         *(z(pose), z(row), z(pose), z(row), z(row), z(row), z(row)),
-        *(z(square), z(square), z(square), z(square), z((f, 6)), z((f, 6)), z((f, 8)), z((f, 10))),
-        *(z((m, 18)), z((m, 7)), z((m, 7)), z((m, most))),
+        *(z((f, 6, 6)), z((f, 6, s)), z((f, s, s)), z((f, s)), z((f, 6, 6)), z((f, 6))),
+        *(z((f, s)), z((f, s)), z((f, s)), z((f, 10)), z((m, 18))),
+        *(z((1, most, most)), z((1, most)), np.ones((1, most))),
     )
     put_matrix(work.W, 0, whole_matrix(arm.chain.base_rotation))
     put_vector(work.x, 0, whole_vector(arm.chain.base_position))
     put_matrix(work.R, 0, ONE)
+    if len(free):
+        n = arm.rotor.shape[0]
+        work.free[0], work.free[1:, 7:] = free[n + 1], free[n]
+        for k in range(f - 1):
+            if arm.chain.joint[k] >= 0:
+                work.free[k + 1, 6] = free[arm.chain.joint[k]]
     return work
 
 
@@ -220,45 +209,58 @@ def transform(X: Floats, j: int, R: Matrix, P: Vector) -> None:
 
 
 @compiled()
-def add_back(I: Floats, p: Floats, b: int, J: Floats, h: Floats, j: int, X: Floats) -> None:  # noqa: E741
-    """Add inertia and load in row j, behind a transform, to row b."""
-    for c in range(6):
-        for r in range(6):
-            p[b, c] += X[j, r, c] * h[j, r]
-            y = 0.0
-            for x in range(6):
-                y += J[j, r, x] * X[j, x, c]
-            for x in range(6):
-                I[b, x, c] += X[j, r, x] * y
+def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int, size: int) -> None:
+    """Write matrix j of T times row b of a into row j."""
+    for x in range(6):
+        out[j, x] = 0.0
+        for y in range(size):
+            out[j, x] += T[j, x, y] * a[b, y]
 
 
 @compiled()
-def solve(a: Floats, s: int, m: int, x: Floats, columns: int) -> bool:
-    """Solutions in place of columns of x, by Cholesky's factor in place of rows s to s + m of a.
+def add_back(A: Floats, h: Floats, b: int, B: Floats, p: Floats, j: int, T: Floats, m: int) -> None:
+    """Add inertia and load in row j of B and p, behind a transform (6, m), to row b of A and h."""
+    for c in range(m):
+        for r in range(6):
+            h[b, c] += T[j, r, c] * p[j, r]
+            y = 0.0
+            for x in range(6):
+                y += B[j, r, x] * T[j, x, c]
+            for x in range(m):
+                A[b, x, c] += T[j, r, x] * y
 
-    False if the matrix is not positive.
+
+@compiled()
+def eliminate(
+    A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats
+) -> bool:
+    """Remove coordinates from the last on, by their loads if free, else by their accelerations.
+
+    False if the inertia of one that is free is not positive.
     """
-    for i in range(m):
-        for j in range(i + 1):
-            y = a[s + i, j]
-            for k in range(j):
-                y -= a[s + i, k] * a[s + j, k]
-            if i > j:
-                a[s + i, j] = y / a[s + j, j]
-            elif y > 0.0:
-                a[s + i, i] = sqrt(y)
-            else:
-                return False
-    for c in range(columns):
-        for i in range(m):
-            for k in range(i):
-                x[s + i, c] -= a[s + i, k] * x[s + k, c]
-            x[s + i, c] /= a[s + i, i]
-        for i in range(m - 1, -1, -1):
-            for k in range(i + 1, m):
-                x[s + i, c] -= a[s + k, i] * x[s + k, c]
-            x[s + i, c] /= a[s + i, i]
-    return True
+    positive = True
+    for c in range(high - 1, low - 1, -1):
+        a, own = given[j, c], A[j, c, c]
+        if free[j, c]:
+            a, positive = (a - h[j, c]) / own, positive and own > 0.0
+        for r in range(c):
+            h[j, r] += a * A[j, c, r]
+            if free[j, c]:
+                for x in range(c):
+                    A[j, r, x] -= A[j, c, r] / own * A[j, c, x]
+    return positive
+
+
+@compiled()
+def resolve(
+    A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats, y: Floats
+) -> None:
+    """Accelerations and loads of coordinates that were eliminated, from those before them."""
+    for c in range(low, high):
+        for x in range(c):
+            h[j, c] += A[j, c, x] * y[j, x]
+        y[j, c] = (given[j, c] - h[j, c]) / A[j, c, c] if free[j, c] else given[j, c]
+        h[j, c] += A[j, c, c] * y[j, c]
 
 
 @compiled()
@@ -269,124 +271,56 @@ def load_body(
 
     False if it spins so fast that its elastic stiffness is not positive.
     """
-    j, now, second, s = k + 1, work.now, arm.second, arm.start[k]
+    j, now, second, s, A, T = k + 1, work.now, arm.second, arm.start[k], work.A[k + 1], work.T
     w, dw, u, m = vector(work.w, j), vector(work.dw, j), vector(work.u, j), arm.start[j] - s
     J, MS, M = inertia_of(work.body, k)
     U = rotation_acceleration(w, dw)
     F = add(scale(M, u), times(U, MS))
     N = add(add(cross(MS, u), inertia_times(J, dw)), cross(w, inertia_times(J, w)))
     ut = add(u, times(U, vector(work.P, j)))
-    for c in range(s, s + m):
+    for i in range(m):
+        c = s + i
         a, b, turn = part(now, c, 6), part(now, c, 9), moments_times(now, c, 0, w)
         force = dot(a, u) + dot(b, dw) - 0.5 * dot(w, turn)
-        A, B = scale(2.0, cross(w, a)), add(turn, cross(w, b))
+        Ac, Bc = scale(2.0, cross(w, a)), add(turn, cross(w, b))
         G = scale(2.0, cross(w, part(now, c, 12)))
         for n in range(m):
             x, o, gyro = ev[s + n], 18 * n, part(second, c, 18 * n + 9)
-            A = add(A, scale(x, part(second, c, o + 6)))
-            B = add(B, scale(x, gyro))
+            Ac = add(Ac, scale(x, part(second, c, o + 6)))
+            Bc = add(Bc, scale(x, gyro))
             G = add(G, scale(x, part(second, c, o + 12)))
-            force += x * dot(w, subtract(gyro, part(second, s + n, 18 * (c - s) + 9)))
+            force += x * dot(w, subtract(gyro, part(second, s + n, 18 * i + 9)))
             force += second[c, o + 16] * e[s + n] + second[c, o + 17] * x
+            A[7 + i, 7 + n] = second[c, o + 15]
             softer = 0.5 * dot(w, moments_times(second, c, o, w))
-            work.mass[c, n] = second[c, o + 16] - softer
-        F, N = add(F, scale(ev[c], A)), add(N, scale(ev[c], B))
+            work.K[0, i, n] = second[c, o + 16] - softer
+        F, N = add(F, scale(ev[c], Ac)), add(N, scale(ev[c], Bc))
         ut = add(ut, scale(ev[c], G))
-        work.E[c, 6] = force
+        work.h[j, 7 + i] = force
+        for x in range(6):
+            A[x, 7 + i] = A[7 + i, x] = now[c, 6 + x]
+            T[j, x, 7 + i] = now[c, 12 + x]
     h = work.h
     h[j, 0], h[j, 1], h[j, 2], h[j, 3], h[j, 4], h[j, 5] = F + N
     put_vector(work.u, j, ut)
     put_vector(work.w, j, add(w, spin))
     put_vector(work.dw, j, add(dw, add(cross(w, spin), rest)))
+    transform(T, j, ONE, vector(work.P, j))
     for x in range(3):
         lever, column = cross(axis(x), MS), inertia_times(J, axis(x))
         for y in range(3):
-            work.H[j, y, x] = M if x == y else 0.0
-            work.H[j, y, x + 3] = work.H[j, x + 3, y] = lever[y]
-            work.H[j, y + 3, x + 3] = column[y]
-    transform(work.T, j, ONE, vector(work.P, j))
-    return solve(work.mass, s, m, work.G, 0)
-
-
-@compiled()
-def eliminate(arm: Arm, k: int, free: Ints, given: Floats, work: Work) -> None:
-    """Add inertia and load of body k and all that follows, less its coordinates, to its antecedent.
-
-    The load includes the given accelerations of coordinates that are not free.
-    """
-    j, s, E, G, H, h = k + 1, arm.start[k], work.E, work.G, work.H, work.h
-    m, n = arm.start[j] - s, arm.rotor.shape[0]
-    for c in range(s, s + m):
-        for x in range(3):
-            E[c, x], E[c, x + 3] = work.now[c, x + 6], work.now[c, x + 9]
-        for x in range(6):
-            E[c, 6] += work.now[c, x + 12] * work.p[j, x]
-            y = 0.0  # force of what follows by the mode
-            for z in range(6):
-                y += work.I[j, x, z] * work.now[c, z + 12]
-            for z in range(6):
-                E[c, z] += work.T[j, x, z] * y
-            G[c, x] = y
-    for c in range(s, s + m):
-        for i in range(m):
-            work.mass[c, i] = arm.second[c, 18 * i + 15]
-            for x in range(6):
-                work.mass[c, i] += G[c, x] * work.now[s + i, x + 12]
-    add_back(H, h, j, work.I, work.p, j, work.T)
-    for c in range(s, s + m):
-        for x in range(7):
-            G[c, x] = E[c, x] - (given[n + c] if x == 6 else 0.0)
-    if free[n]:
-        solve(work.mass, s, m, G, 7)
-    for c in range(s, s + m):
-        for x in range(6):
-            h[j, x] += E[c, x] * (-G[c, 6] if free[n] else given[n + c])
-            for y in range(6):
-                H[j, x, y] -= E[c, x] * G[c, y] * free[n]
+            A[y, x] = M if x == y else 0.0
+            A[y, x + 3] = A[x + 3, y] = lever[y]
+            A[y + 3, x + 3] = column[y]
     column = arm.chain.joint[k]
-    if column >= 0:
-        z, U, a = 5 - 3 * arm.chain.sigma[k], work.joint, given[column]
+    if column >= 0:  # the joint moves the root along or about z
+        z = 5 - 3 * arm.chain.sigma[k]
+        for x in range(7 + m):
+            A[6, x] = A[x, 6] = A[z, x]
         for x in range(6):
-            U[j, x] = H[j, x, z]
-        U[j, 6], U[j, 7] = H[j, z, z] + arm.rotor[column], h[j, z]
-        if free[column]:
-            a = (a - U[j, 7]) / U[j, 6]
-        for x in range(6):
-            h[j, x] += a * U[j, x]
-            for y in range(6):
-                H[j, x, y] -= U[j, x] * U[j, y] / U[j, 6] * free[column]
-    add_back(work.I, work.p, arm.chain.antecedent[k], H, h, j, work.X)
-
-
-@compiled()
-def accelerate(arm: Arm, k: int, free: Ints, given: Floats, work: Work, out: Floats) -> bool:
-    """Accelerations of the free coordinates of body k and of its tip, loads of the others.
-
-    False if a free joint moves no inertia.
-    """
-    j, b, s, column = k + 1, arm.chain.antecedent[k], arm.start[k], arm.chain.joint[k]
-    a, m, n, U = work.h, arm.start[k + 1] - arm.start[k], arm.rotor.shape[0], work.joint
-    mapped(a, j, work.X, work.p, b)
-    if column >= 0:
-        y, load = given[column], U[j, 7]
-        for x in range(6):
-            load += U[j, x] * a[j, x]
-        if free[column]:
-            y = (y - load) / U[j, 6]
-        out[column] = y if free[column] else load + U[j, 6] * y
-        a[j, 5 - 3 * arm.chain.sigma[k]] += y
-    mapped(work.p, j, work.T, a, j)
-    for c in range(s, s + m):
-        row = work.G if free[n] else work.E
-        y = row[c, 6]
-        for x in range(6):
-            y += row[c, x] * a[j, x]
-        for i in range(0 if free[n] else m):
-            y += work.mass[c, i] * given[n + s + i]
-        out[n + c] = -y if free[n] else y
-        for x in range(6):
-            work.p[j, x] += work.now[c, x + 12] * (-y if free[n] else given[n + c])
-    return column < 0 or not free[column] or U[j, 6] > 0.0
+            T[j, x, 6] = T[j, x, z]
+        A[6, 6], h[j, 6] = A[z, z] + arm.rotor[column], h[j, z]
+    return eliminate(work.K, work.zeros, 0, 0, m, work.zeros, work.ones)
 
 
 @compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, INTS, OUT2, OUT2, OUT4))
@@ -395,11 +329,11 @@ def loads(
     base: Floats, poses: Floats,
 ) -> int:  # fmt: skip
     """Accelerations of free coordinates under given loads, and loads of given accelerations."""
-    f, n, t, work = arm.pi.shape[0], arm.rotor.shape[0], arm.end, workspace(arm)
+    f, n, t, work = arm.pi.shape[0], arm.rotor.shape[0], arm.end, workspace(arm, free)
     g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
-    root, failed = np.zeros((6, 1)), -1
+    A, h, I, p, failed = work.A, work.h, work.I, work.p, -1  # noqa: E741
     for i in range(y.shape[0]):
-        e, ev, value = y[i, n:], dy[i, n:], given[i]
+        e, ev = y[i, n:], dy[i, n:]
         w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
         put_vector(work.w, 0, w)
         put_vector(work.dw, 0, part(outer, i, 15))
@@ -424,6 +358,9 @@ def loads(
                 put_vector(work.w, j, w)
                 put_vector(work.dw, j, dw)
                 put_vector(work.u, j, u)
+                work.given[j, 6] = coordinate(given, i, column)
+                for c in range(arm.start[k], arm.start[j]):
+                    work.given[j, 7 + c - arm.start[k]] = given[i, n + c]
                 if not load_body(arm, k, e, ev, spin, rest, work):
                     base[i, 9] = 1.0
         W, lever = matrix(work.W, t), times(matrix(work.R, t), whole_vector(arm.tool))
@@ -432,20 +369,33 @@ def loads(
         base[i, 6], base[i, 7], base[i, 8] = MS
         if not len(free):
             continue
-        work.p[:], work.I[:] = 0.0, 0.0
+        p[:], I[:] = 0.0, 0.0
         F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
-        N, p = add(N, cross(lever, F)), work.p
+        N = add(N, cross(lever, F))
         p[t, 0], p[t, 1], p[t, 2], p[t, 3], p[t, 4], p[t, 5] = F + N
-        for k in range(f - 1, -1, -1):
-            eliminate(arm, k, free, value, work)
-        if free[n + 1]:
-            for z in range(6):
-                root[z, 0] = -work.p[0, z]
-            solve(work.I[0], 0, 6, root, 1)
-        for z in range(6):
-            base[i, z] = root[z, 0] if free[n + 1] else work.p[0, z]
-            work.p[0, z] = root[z, 0]
-        for k in range(f):
-            if not accelerate(arm, k, free, value, work, out[i]) and failed < 0:
-                failed = i
+        for j in range(f, 0, -1):
+            s = 7 + arm.start[j] - arm.start[j - 1]
+            add_back(A, h, j, I, p, j, work.T, s)
+            own, positive = A[j, 6, 6], eliminate(A, h, j, 6, s, work.given, work.free)
+            if work.free[j, 6] and not abs(A[j, 6, 6]) > ROUNDING * own:
+                failed = i if failed < 0 else failed
+            elif not positive:
+                base[i, 9] = 2.0
+            add_back(I, p, arm.chain.antecedent[j - 1], A, h, j, work.X, 6)
+        if not eliminate(I, p, 0, 0, 6, work.given, work.free):
+            base[i, 9] = 2.0
+        resolve(I, p, 0, 0, 6, work.given, work.free, work.y)
+        for x in range(6):
+            base[i, x] = work.y[0, x] if free[n + 1] else p[0, x]
+            p[0, x] = work.y[0, x]
+        for j in range(1, f + 1):
+            s, column = arm.start[j - 1], arm.chain.joint[j - 1]
+            high = 7 + arm.start[j] - s
+            mapped(work.y, j, work.X, p, arm.chain.antecedent[j - 1], 6)
+            resolve(A, h, j, 6, high, work.given, work.free, work.y)
+            mapped(p, j, work.T, work.y, j, high)
+            if column >= 0:
+                out[i, column] = work.y[j, 6] if free[column] else h[j, 6]
+            for c in range(7, high):
+                out[i, n + s + c - 7] = work.y[j, c] if free[n] else h[j, c]
     return failed

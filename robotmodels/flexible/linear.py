@@ -247,11 +247,9 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     K = tangent(arm, np.concatenate([q, e])[None], None)[0]
     J = jacobian(arm, q, e)
     H = np.zeros((n, arm.m)) if output == "joint" else tip_inverse(J, n) @ J[:, n:]
-    L = _inverse_factor(arm, M)
+    L, E, F = _inverse_factor(arm, M), slice(n, k), slice(0, n)
     inverse = L.T @ L
-    zero, one = np.zeros((k, k)), np.eye(k)
-    A = np.block([[zero, one], [-inverse @ K, -inverse @ D]])
-    E, F = slice(n, k), slice(0, n)
+    A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse @ K, -inverse @ D]])
     return LinearModel(
         A=A,
         B=np.vstack([np.zeros((k, n)), inverse[:, :n]]),
@@ -263,10 +261,10 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     )
 
 
-def _inverse_factor(arm: FlexibleRobot, M: Array) -> Array:
+def _inverse_factor(arm: FlexibleRobot, M: Array) -> Any:
     """Inverse of Cholesky's factor of mass matrices (..., k, k)."""
     try:
-        return np.linalg.inv(np.linalg.cholesky(M))  # type: ignore[return-value]
+        return np.linalg.inv(np.linalg.cholesky(M))
     except np.linalg.LinAlgError:
         raise SingularMassMatrixError(
             f"{arm.model.name!r}: a coordinate moves no inertia. Give inertial parameters with "
@@ -305,15 +303,11 @@ def _roots(M: Array, D: Array, K: Array) -> NDArray[np.complex128]:
     """Finite s with M s^2 + D s + K singular, ordered by imaginary and real parts."""
     from scipy.linalg import eig
 
-    k = len(M)
-    zero, one = np.zeros((k, k)), np.eye(k)
-    if not k:
+    if not len(M):
         return np.zeros(0, np.complex128)
-    pencil = (
-        (-K, M)
-        if not D.any()
-        else (np.block([[zero, one], [-K, -D]]), np.block([[one, zero], [zero, M]]))
-    )
+    zero, one, pencil = np.zeros_like(M), np.eye(len(M)), (-K, M)
+    if D.any():
+        pencil = np.block([[zero, one], [-K, -D]]), np.block([[one, zero], [zero, M]])
     alpha, beta = eig(*pencil, right=False, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-13 * np.abs(alpha)
     s: Any = alpha[finite] / beta[finite]

@@ -6,15 +6,15 @@ the link is clamped to. With foreshortening ``Gamma_kl(X) e_k e_l / 2`` is added
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from .._arrays import Array, Frozen, Value
 
 
-class Section(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Section(Frozen, Value):
     """Undeformed position of the tip section, displacement and rotation of it by the modes.
 
     Shapes: position (3,), Phi, Psi (m, 3), Gamma (m, m, 3).
@@ -26,19 +26,18 @@ class Section(NamedTuple):
     Gamma: Array
 
 
-class BeamData(NamedTuple):
-    """The uniform beam that a link is made of: for its lumped model."""
+@dataclass(frozen=True, slots=True, eq=False)
+class BeamData(Frozen, Value):
+    """The uniform beam that a link is made of, with mass, centre and inertia of its tip body."""
 
     length: float
     EI: tuple[float, float]
     GJ: float
     density: float
     gyration: float
-    tip_mass: float
-    tip_com: tuple[float, ...]
-    tip_inertia: tuple[float, ...]
+    tip: tuple[float, Array, Array]
     hub: float
-    pose: tuple[float, ...]
+    pose: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,11 +132,6 @@ class FlexibleLink(Frozen, Value):
         """Distance from the root to the tip, m."""
         return float(np.linalg.norm(self.tip.position - self.nodes[0]))
 
-    @property
-    def _values(self) -> tuple[object, ...]:
-        rest = tuple(getattr(self, f.name) for f in fields(self) if f.name != "tip")
-        return (*self.tip, *rest)
-
     def __repr__(self) -> str:
         modes = ", ".join(f"{w:.4g}" for w in self.frequencies[:6])
         return f"<FlexibleLink: {self.invariants.mass:g} kg, {self.m} modes, rad/s: {modes}>"
@@ -153,8 +147,7 @@ def integrals(W: Array, X: Array, Phi: Array, Gamma: Array, stiffness: Array) ->
     XX, XP, XG = (np.tensordot(X, np.tensordot(W, b, 1), (0, 0)) for b in (X, Phi, Gamma))
     PP = np.tensordot(Phi, np.tensordot(W, Phi, 1), (0, 0))  # (3, m, 3, m)
 
-    def inertia(S: Array) -> Array:
-        """Inertia tr(S) 1 - S of symmetrised second moments S (..., 3, 3)."""
+    def inertia(S: Array) -> Array:  # of second moments S (..., 3, 3)
         S = 0.5 * (S + np.swapaxes(S, -1, -2))
         return np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
 

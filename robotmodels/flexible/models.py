@@ -38,15 +38,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_vector, batch_rows, read_only
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import SingularMassMatrixError
 from .robot import Arm, FlexibleRobot, check_arm
 
-_NO_FLAGS = np.zeros(0, np.int64)
+_NEEDED = ("q", "a", "tau")  # other vectors are zero by default
+Load = Array | None
+Ints = NDArray[np.int64]
 
 
 class SpinStatus(Outcome):
-    """Whether the elastic stiffness of the spinning links is positive; fits int8."""
+    """Whether the elastic stiffness of the spinning links and the mass are positive; fits int8."""
 
     STIFF = 0, "The elastic stiffness of every link is positive at its angular velocity."
     SOFTENED = (
@@ -54,10 +56,15 @@ class SpinStatus(Outcome):
         "A link spins above its own critical speed: its linear modes have no stiffness left and "
         "their deflection grows. Make the link with stiffening=True.",
     )
+    BENT = (
+        2,
+        "The mass matrix is not positive: higher modes are bent beyond the second order of "
+        "stiffening=True. Take fewer modes, or stiffening=False.",
+    )
 
 
-class Accelerations(tuple[Array, Array]):
-    """Accelerations (a, e_a), shapes (..., n) and (..., m), with a status.
+class Accelerations(Result, tuple[Array, Array]):
+    """Accelerations (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`.
 
     Parameters
     ----------
@@ -68,28 +75,17 @@ class Accelerations(tuple[Array, Array]):
     """
 
     status: NDArray[np.int8]
+    outcomes = SpinStatus
 
     def __new__(cls, pair: tuple[Array, Array], status: NDArray[np.int8]) -> Accelerations:
         """Attach the status to the pair."""
-        made = super().__new__(cls, pair)
+        made = tuple.__new__(cls, pair)
         made.status = status
         return made
 
-    def reason(self, i: Any = ()) -> str:
-        """The sentence of the status of sample i."""
-        return SpinStatus(int(self.status[i])).sentence
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Accelerations):
-            return NotImplemented
-        pairs = zip((*self, self.status), (*other, other.status), strict=True)
-        return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
-
-    def __ne__(self, other: object) -> bool:
-        return not self == other
-
-    def __hash__(self) -> int:
-        return hash(tuple(x.shape for x in self))
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return (*self, self.status)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (tuple(self), self.status)
@@ -236,25 +232,31 @@ def checked_rows(
     arm: FlexibleRobot, *pairs: tuple[ArrayLike | None, ArrayLike | None], **given: Any
 ) -> tuple[tuple[int, ...], list[Array]]:
     """Batch axes, and rows (N, n + m) of pairs, (N, k) of other vectors; None is zero."""
-    n, m = check_arm(arm).n, arm.m
-    names = (("q", "e"), ("v", "e_v"))[: len(pairs)]
-    named = [*(x for pair in zip(names, pairs, strict=True) for x in zip(*pair, strict=True))]
-    vectors = []
-    for name, value in (*named, *given.items()):
-        k = m if name in ("e", "e_v") else 6 if name == "wrench" else n
-        zero = value is None and name not in ("q", "a", "tau")
-        vectors.append(np.zeros(k) if zero else as_vector(value, k, name))  # type: ignore[arg-type]
-    batch, k = (), 2 * len(pairs)
+    sizes = dict.fromkeys(("q", "v", "a", "tau"), check_arm(arm).n) | {"wrench": 6}
+    sizes |= dict.fromkeys(("e", "e_v"), arm.m)
+    named = dict(zip(("q", "e", "v", "e_v"), [x for pair in pairs for x in pair], strict=False))
+    given, k, batch = {**named, **given}, len(named), ()
+    vectors: Any = [
+        np.zeros(sizes[name])
+        if x is None and name not in _NEEDED
+        else as_vector(x, sizes[name], name)
+        for name, x in given.items()
+    ]
     if any(vector.ndim > 1 for vector in vectors):
-        batch, vectors = batch_rows(tuple(vectors), (*(name for name, _ in named), *given))
+        batch, vectors = batch_rows(tuple(vectors), tuple(given))
     rows = [np.concatenate(vectors[i : i + 2], axis=-1) for i in range(0, k, 2)] + vectors[k:]
     return batch, rows if batch else [np.atleast_2d(row) for row in rows]
 
 
 def recursion(
-    chain: Arm, y: Array, dy: Array, given: Array, free: NDArray[np.int64],
-    wrench: Array | None = None, moved: Array | None = None,
-) -> tuple[Array, Array, Array, int]:  # fmt: skip
+    chain: Arm,
+    y: Array,
+    dy: Array,
+    given: Array,
+    free: Ints,
+    wrench: Load = None,
+    moved: Load = None,
+) -> tuple[Array, Array, Array, int]:
     """The compiled recursion: loads or accelerations, rows of the base, poses, first failure."""
     from .kernels import loads
 
@@ -281,7 +283,7 @@ def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
     batch, (x,) = checked_rows(arm, (q, e))
     y = _of_links(arm, x)
     poses = np.zeros((len(x), arm.model.f + 1, 4, 4))
-    poses[:, :, :3] = recursion(arm.parts.chain, y, 0.0 * y, 0.0 * y, _NO_FLAGS)[2]
+    poses[:, :, :3] = recursion(arm.parts.chain, y, 0.0 * y, 0.0 * y, np.zeros(0, np.int64))[2]
     poses[:, :, 3, 3] = 1.0
     return poses.reshape(*batch, *poses.shape[1:])
 
@@ -308,9 +310,14 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def solved(
-    arm: FlexibleRobot, direct: bool, x: Array, dx: Array, given: Array,
-    wrench: Array | None = None, *, drive: bool = True,
-) -> tuple[Array, Array]:  # fmt: skip
+    arm: FlexibleRobot,
+    direct: bool,
+    x: Array,
+    dx: Array,
+    given: Array,
+    wrench: Load = None,
+    drive: bool = True,
+) -> tuple[Array, Array]:
     """Direct or inverse model of rows: accelerations, or torques and elastic accelerations.
 
     Shapes: -> (N, n + m), and rows (N, 10) of the base, see `kernels`.
@@ -320,27 +327,23 @@ def solved(
     chain = parts.chain if drive else parts.chain._replace(rotor=read_only(np.zeros(n)))
     rotor = parts.rotor[joints] if drive else np.zeros(len(joints))
     rest = 0.0 if drives is None else drives.torque(dx[:, :n], None)
-    value = np.zeros((len(x), s))
+    value, spring = np.zeros((len(x), s)), x @ parts.K[:, s:] + dx @ parts.D[:, s:]
     value[:, :n] = given - rest if direct else given
-    if len(joints):  # torque or acceleration of the motor; the spring drives the link
-        motor, spring = value[:, joints], x @ parts.K[:, s:] + dx @ parts.D[:, s:]
-        value[:, joints] = -spring
+    motor = value[:, joints]  # torque or acceleration of the motor; the spring drives the link
+    value[:, joints] = -spring
     y, dy = _of_links(arm, x), _of_links(arm, dx)
     found, base, _, failed = recursion(chain, y, dy, value, parts.free[1 + direct], wrench)
-    if direct and not (rotor > 0.0).all():
+    still = joints[rotor <= 0.0] if direct else joints[:0]
+    if len(still) or failed >= 0:
+        fault = f"a joint moves no inertia (first in sample {failed} of {len(x)})"
+        if len(still):
+            fault = f"flexible joint {int(still[0]) + 1} has no rotor inertia to accelerate"
         raise SingularMassMatrixError(
-            f"{arm.model.name!r}: flexible joint {int(joints[rotor <= 0.0][0]) + 1} has no rotor "
-            "inertia, so its motor has no acceleration. Give Ia with "
-            "model.with_drive(DriveParameters(Ia=...)), and take drive=True."
-        )
-    if failed >= 0:
-        raise SingularMassMatrixError(
-            f"{arm.model.name!r}: a joint moves no inertia (first in sample {failed} of {len(x)}). "
-            "Give inertial parameters with model.with_inertia(...), or rotor inertia with "
-            "with_drive."
+            f"{arm.model.name!r}: {fault}. Give inertial parameters with model.with_inertia(...), "
+            "or rotor inertia with model.with_drive(DriveParameters(Ia=...)) and drive=True."
         )
     if len(joints):
-        moved = (motor + spring) / rotor if direct else motor  # type: ignore[reportOperatorIssue]
+        moved = (motor + spring) / rotor if direct else motor
         found = np.hstack([found, found[:, joints] - moved])
         found[:, joints] = moved if direct else moved * rotor - spring
     if not direct:
@@ -349,9 +352,8 @@ def solved(
 
 
 def forces(
-    arm: FlexibleRobot, x: Array, dx: Array, ddx: Array, wrench: Array | None = None,
-    *, bare: bool = False,
-) -> tuple[Array, Array]:  # fmt: skip
+    arm: FlexibleRobot, x: Array, dx: Array, ddx: Array, wrench: Load = None, bare: bool = False
+) -> tuple[Array, Array]:
     """Forces (N, n + m) that given accelerations need, without friction; rows (N, 10) of the base.
 
     Gravity and elasticity are left out if ``bare``.

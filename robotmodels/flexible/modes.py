@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, read_only
+from .._arrays import Array, Frozen, Value, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .link import FlexibleLink, Section, integrals
 
@@ -18,8 +18,7 @@ _MOVES = 1e-9  # largest displacement of the root, relative to the shape
 def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) -> FlexibleLink:
     """Flexible link from modes of a finite element model, clamped at its first node.
 
-    Integrals linear in the shapes are those of M; quadratic ones take the mass between nodes from
-    its translations along one axis.
+    Integrals linear in the shapes are those of M; quadratic ones take the mass of its translations.
 
     Parameters
     ----------
@@ -39,8 +38,8 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     Raises
     ------
     InvalidValueError, ShapeError
-        Modes that are not orthogonal, or move the first node; more modes than nodes move; matrices
-        of another size, not symmetric, or not positive.
+        Modes that are not orthogonal, or move the first node; more modes than nodes; matrices of
+        another size, not symmetric, or not positive.
 
     References
     ----------
@@ -88,10 +87,9 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
         )
     mass, stiffness = S.T @ M @ S, S.T @ K @ S
     for name, matrix in (("M", mass), ("K", stiffness)):
-        own = np.sqrt(np.abs(np.diag(matrix)))
-        if (np.diag(matrix) <= 0.0).any() or (
-            np.abs(matrix - np.diag(np.diag(matrix))) > _MIXED * np.outer(own, own)
-        ).any():
+        own = np.diag(matrix)
+        mixed = np.abs(matrix - np.diag(own)) > _MIXED * np.sqrt(np.abs(np.outer(own, own)))
+        if (own <= 0.0).any() or mixed.any():
             raise InvalidValueError(
                 f"shapes: the modes are not orthogonal with respect to {name}, or {name} of one "
                 "is not positive (a shape that is zero, or a rigid motion). Take the eigenvectors "
@@ -108,16 +106,14 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
         rigid[:, 3:, 3:] = np.eye(3)
     R = rigid.reshape(c, 6)
     own, mixed = R.T @ M @ R, (R.T @ M @ S).T
-    found = replace(
-        found, inertia=own[3:, 3:], translation=mixed[:, :3], rotation=mixed[:, 3:],
-        modal_mass=np.diag(np.diag(mass)),
-    )  # fmt: skip
+    found = replace(found, inertia=own[3:, 3:], modal_mass=np.diag(np.diag(mass)))
+    found = replace(found, translation=mixed[:, :3], rotation=mixed[:, 3:])
     if free == 6:
         turn = parts[-1, 3:].T
     else:  # of the line to the node before
         along = X[-1] - X[-2]
         turn = np.cross(along, (Phi[-1] - Phi[-2]).T) / (along @ along)
-    section = Section(*map(read_only, (X[-1], Phi[-1].T, turn, np.zeros((m, m, 3)))))
+    section = Section(X[-1], Phi[-1].T, turn, np.zeros((m, m, 3)))
     return FlexibleLink(found, np.sqrt(np.diag(stiffness) / np.diag(mass)), section, X, Phi)
 
 
@@ -171,8 +167,8 @@ def craig_bampton(
     Raises
     ------
     InvalidValueError, ShapeError
-        Matrices that are not symmetric, or singular inside; displacements that do not exist or
-        that are named twice; more modes than there are displacements inside.
+        Matrices that are not symmetric, or singular inside; displacements that do not exist, or
+        twice; more modes than displacements inside.
 
     References
     ----------
@@ -186,9 +182,8 @@ def craig_bampton(
     """
     from scipy.linalg import LinAlgError, eigh
 
-    M = as_floats(M, "M")
-    M, K = _symmetric(M, len(M) if M.ndim else 0, "M"), _symmetric(K, len(M), "K")
-    c = len(M)
+    c = len(np.atleast_1d(as_floats(M, "M")))
+    M, K = _symmetric(M, c, "M"), _symmetric(K, c, "K")
     chosen = [as_floats(x, name) for x, name in ((interface, "interface"), (clamped, "clamped"))]
     named = np.concatenate([x.ravel() for x in chosen])
     if len(set(named)) != len(named) or not np.isin(named, np.arange(c)).all():

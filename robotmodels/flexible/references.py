@@ -15,6 +15,9 @@ from ..model import RobotModel
 from .link import BeamData
 from .robot import FlexibleRobot, check_arm
 
+Row = dict[str, float]
+_ROW = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+_X = np.eye(3)[0]
 _POINTS = 101
 _MOST = 100.0  # greatest load of `elastica`, of the same
 _LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solution is continued
@@ -160,92 +163,74 @@ def lumped(arm: FlexibleRobot, segments: int) -> tuple[RobotModel, Array]:
         raise InvalidValueError(
             "arm: lumped models are made of beams; links from modes and flexible joints have none."
         )
-    model, table = arm.model, arm.model.table
-    rows, inertia, springs, ends = list[dict[str, float]](), [], [], [0]
-    columns = list[int]()
+    model, table, columns = arm.model, arm.model.table, list[int]()
+    rows, inertia, springs, ends = list[Row](), list[Array](), list[float](), [0]
     for k in range(model.f):
-        names = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
-        row = {name: float(getattr(table, name)[k]) for name in names}
+        row = {name: getattr(table, name)[k] for name in _ROW}
         rows.append({**row, "antecedent": ends[int(table.antecedent[k])]})
-        inertia.append(model.inertia.values[k])
         if row["sigma"] < 2:
             columns.append(len(springs))
             springs.append(0.0)
         if link := arm.links.get(k + 1):
-            assert link.source is not None
-            inertia.pop()
-            _append_beam(link.source, int(segments), rows, inertia, springs)
+            _append_beam(link.source, int(segments), rows, inertia, springs)  # type: ignore[arg-type]
+        else:
+            inertia.append(model.inertia.values[k])
         ends.append(len(rows))
-    keys = rows[0]
-    made = DHTable(**{key: np.array([row[key] for row in rows]) for key in keys})  # type: ignore[arg-type]
-    drives = {name: np.zeros(made.n) for name in ("Ia", "Fv", "Fc", "offset")}
+    drives = {name: np.zeros(len(springs)) for name in ("Ia", "Fv", "Fc", "offset")}
     for name, values in drives.items():
         values[columns] = getattr(model.drive, name)
     tool = model.tool
     if model.tip in arm.links and np.array_equal(tool, np.eye(4)):
         tool = se3.translation(*arm.links[model.tip].tip.position)
-    segmented = RobotModel.from_table(
-        made, InertialParameters(np.array(inertia)), replace(model.drive, **drives), model.base,
-        tool, ends[model.tip], model.gravity, name=f"{model.name} in segments",
-    )  # fmt: skip
+    parts = InertialParameters(np.array(inertia)), replace(model.drive, **drives), model.base, tool
+    name = f"{model.name} in segments"
+    made = DHTable.from_rows(rows)
+    segmented = RobotModel.from_table(made, *parts, ends[model.tip], model.gravity, name=name)
     return segmented, np.array(springs)
 
 
 def _append_beam(
-    beam: BeamData, count: int, rows: list[dict[str, float]], inertia: list[Array],
-    springs: list[float],
-) -> None:  # fmt: skip
+    beam: BeamData, count: int, rows: list[Row], inertia: list[Array], springs: list[float]
+) -> None:
     """Append the parts of a beam: their first is the row of the joint, their last where it was."""
     from scipy.spatial.transform import Rotation
 
-    h, T = beam.length / count, np.array(beam.pose).reshape(4, 4)
-    none = dict.fromkeys(("mu", "gamma", "b", "beta", "alpha", "d", "theta", "r"), 0.0)
+    h = beam.length / count
 
-    def append(row: dict[str, float]) -> None:
-        """A row behind the last one."""
-        rows.append({**row, "antecedent": float(len(rows))})
-        inertia.append(np.zeros(10))
+    def append(*added: Row) -> None:
+        """Rows, fixed ones unless they have sigma, each behind the last."""
+        for row in added:
+            rows.append({"sigma": 2, **row})
+            inertia.append(np.zeros(10))
 
-    def fixed(T: Array) -> None:
+    def place(T: Array) -> None:
         """Two fixed rows: a translation, then a rotation, which is the frame of a part."""
         x, y, z = T[:3, 3]
-        turn = float(np.arctan2(y, x))
+        turn, d = float(np.arctan2(y, x)), float(np.hypot(x, y))
         yaw, pitch, roll = Rotation.from_matrix(T[:3, :3]).as_euler("ZYX").tolist()
-        moved = {"gamma": turn, "d": float(np.hypot(x, y)), "theta": -turn, "r": float(z)}
-        for row in (moved, {"gamma": yaw, "beta": pitch, "alpha": roll}):
-            append({**none, "sigma": 2.0, **row})
+        append({"gamma": turn, "d": d, "theta": -turn, "r": z})
+        append({"gamma": yaw, "beta": pitch, "alpha": roll})
 
-    def part(start: float, end: float) -> None:
-        """Inertia of a part of the beam between places from its frame."""
-        length = end - start
-        mass, middle = beam.density * length, 0.5 * (start + end)
-        across = mass * (length**2 / 12.0)
-        spin = mass * beam.gyration**2
-        body = np.diag([spin, across + 0.5 * spin, across + 0.5 * spin])
-        own = InertialParameters.from_com([mass], [[middle, 0.0, 0.0]], [body])
-        inertia[-1] = inertia[-1] + own.values[0]
+    def hold(mass: float, com: Array, J: Array) -> None:
+        """Add inertia to the last part."""
+        inertia[-1] = inertia[-1] + InertialParameters.from_com([mass], [com], [J]).values[0]
 
     # bending about y and z, torsion: the angles that make z the axis of the hinge, and back
-    hinges = [
-        (stiffness / h, there, back)
-        for stiffness, there, back in (
-            (beam.EI[0], {"alpha": -np.pi / 2}, {"alpha": np.pi / 2}),
-            (beam.EI[1], {}, {}),
-            (beam.GJ, {"beta": np.pi / 2}, {"beta": -np.pi / 2}),
-        )
-        if np.isfinite(stiffness)
-    ]
+    turn = np.pi / 2
+    turns = ({"alpha": -turn}, {"alpha": turn}), ({}, {}), ({"beta": turn}, {"beta": -turn})
+    hinges = [x for x in zip((*beam.EI, beam.GJ), turns, strict=True) if np.isfinite(x[0])]
     inertia.append(np.r_[0.0, 0.0, 0.0, 0.0, 0.0, beam.hub, np.zeros(4)])
-    fixed(T)
-    part(0.0, 0.5 * h)
-    for k in range(count):
-        append({**none, "sigma": 2.0, "d": 0.5 * h if k == 0 else h})
-        for stiffness, there, back in hinges:
-            append({**none, "sigma": 0.0, **there})
-            append({**none, "sigma": 2.0, **back})
-            springs.append(stiffness)
-        part(0.0, h if k < count - 1 else 0.5 * h)
-    com = np.array(beam.tip_com) + np.array([0.5 * h, 0.0, 0.0])
-    J = np.array(beam.tip_inertia).reshape(3, 3)
-    inertia[-1] = inertia[-1] + InertialParameters.from_com([beam.tip_mass], [com], [J]).values[0]
-    fixed(se3.translation(0.5 * h - beam.length, 0.0, 0.0) @ np.linalg.inv(T))
+    place(beam.pose)
+    for k in range(count + 1):
+        if k:
+            append({"d": 0.5 * h if k == 1 else h})
+            for stiffness, (there, back) in hinges:
+                append({"sigma": 0, **there}, back)
+                springs.append(stiffness / h)
+        length = h if 0 < k < count else 0.5 * h
+        mass = beam.density * length
+        bent, spin = mass * length**2 / 12.0, 0.5 * mass * beam.gyration**2
+        hold(mass, 0.5 * length * _X, np.diag([2.0 * spin, bent + spin, bent + spin]))
+    tip_mass, com, J = beam.tip
+    hold(tip_mass, com + 0.5 * h * _X, J)
+    place(se3.translation(0.5 * h - beam.length, 0.0, 0.0) @ np.linalg.inv(beam.pose))

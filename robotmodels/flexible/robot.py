@@ -106,19 +106,17 @@ class FlexibleRobot(Value):
     def __post_init__(self) -> None:
         check_model(self.model)
         model = self.model
-        set_ = object.__setattr__
-        set_(self, "links", MappingProxyType(_checked_links(model, self.links)))
-        n, modes = model.n, sum(link.m for link in self.links.values())
-        set_(self, "modes", modes)
-        stiffness = _of(self.joint_stiffness, n, "joint_stiffness", np.inf)
+        links = _checked_links(model, self.links)
+        n, modes = model.n, sum(link.m for link in links.values())
+        stiffness = each(self.joint_stiffness, n, "joint_stiffness", np.inf)
         if not (stiffness > 0.0).all():
             raise InvalidValueError(
                 "joint_stiffness: expected positive numbers, N m/rad, infinite for rigid joints, "
                 f"got {stiffness.tolist()}."
             )
         joints = np.flatnonzero(np.isfinite(stiffness))
-        damping = _of(self.joint_damping, n, "joint_damping", 0.0)
-        modal = _of(self.modal_damping, modes, "modal_damping", 0.0)
+        damping = each(self.joint_damping, n, "joint_damping", 0.0)
+        modal = each(self.modal_damping, modes, "modal_damping", 0.0)
         for name, values in (("joint_damping", damping), ("modal_damping", modal)):
             if not ((values >= 0.0) & np.isfinite(values)).all():
                 raise InvalidValueError(
@@ -133,10 +131,12 @@ class FlexibleRobot(Value):
                 f"model: {model.name!r} has motors that are coupled by its transmission, which "
                 "flexible robots do not support; take model.with_transmission(None)."
             )
-        values = (stiffness, damping, modal, joints)
-        names = ("joint_stiffness", "joint_damping", "modal_damping", "joints")
-        for name, value in zip(names, values, strict=True):
-            set_(self, name, read_only(value, value.dtype.type))
+        for name, value in {
+            "links": MappingProxyType(links), "modes": modes,
+            "joint_stiffness": read_only(stiffness), "joint_damping": read_only(damping),
+            "modal_damping": read_only(modal), "joints": read_only(joints, np.int64),
+        }.items():  # fmt: skip
+            object.__setattr__(self, name, value)
 
     @property
     def n(self) -> int:
@@ -199,11 +199,7 @@ def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
             f"{links!r:.60}."
         )
     for row in links:
-        if (
-            isinstance(row, bool)
-            or not isinstance(row, int | np.integer)
-            or not 1 <= row <= model.f
-        ):
+        if type(row) is bool or row not in range(1, model.f + 1):
             raise InvalidValueError(f"links: expected rows 1 to {model.f}, got {row!r:.20}.")
         if model.table.sigma[row - 1] == 1:
             raise InvalidValueError(
@@ -214,7 +210,7 @@ def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
     return {int(row): links[row] for row in sorted(links)}
 
 
-def _of(value: ArrayLike | None, count: int, name: str, default: float) -> Array:
+def each(value: ArrayLike | None, count: int, name: str, default: float = np.nan) -> Array:
     """One number for all, an array, or the default. Shapes: -> (count,)."""
     array = as_reals(default if value is None else value, name)
     if array.shape not in ((), (count,)):

@@ -24,7 +24,7 @@ class Shaper(Frozen, Value):
     times, amplitudes : ndarray, shape (k,)
         Times, s, and amplitudes, whose sum is 1.
     frequency, damping : float
-        Of the vibration: undamped, rad/s, and ratio.
+        Of the vibration: undamped, rad/s, and damping ratio.
     """
 
     times: Array

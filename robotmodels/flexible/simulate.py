@@ -8,11 +8,10 @@ Parameters
 arm : FlexibleRobot
     The robot, n joints and m elastic coordinates.
 link : FlexibleLink
-    A free body. A line without inertia about its axis, such as a beam without gyration, gets that
-    of a radius of length / 10.
+    A free body. A line without inertia about its axis gets that of a radius of length / 10.
 q0, v0 : array_like, shape (n,)
-    Angles and velocities of the motors at the start; default at rest. Of a free body v0 (6,) is the
-    velocity [v; w] of the root, whose axes are those of the world at the start.
+    Motors at the start; default at rest. Of a free body v0 (6,) is the velocity [v; w] of the root,
+    whose axes are those of the world at the start.
 e0, e_v0 : array_like, shape (m,), optional
     Elastic coordinates and velocities at the start; default zero.
 control : callable or array_like of shape (n,), optional
@@ -49,6 +48,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
+from .._arrays.tasks import Workers
 from .._choices import chosen
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, SingularMassMatrixError
@@ -74,6 +74,7 @@ class FlexibleMotionStatus(Outcome):
     NOT_CONVERGED = 1, "The allowed evaluations of the model were used up before the end."
     DIVERGED = 2, "The motion grew without bound."
     SOFTENED = 3, SpinStatus.SOFTENED.sentence
+    BENT = 4, SpinStatus.BENT.sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +84,7 @@ class FlexibleMotion(Result):
     Parameters
     ----------
     arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
+        The robot.
     t : ndarray, shape (N,)
         Times, s; they end early if the simulation did.
     q, v, tau : ndarray, shape (N, n)
@@ -176,13 +177,13 @@ def simulate(
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
     law, push = _law(control, n, "control"), _law(wrench, 6, "wrench")
     ddm(arm, *start, np.zeros(n))  # type: ignore[reportCallIssue]  # its errors name what is singular
-    k, D, drives, softened = n + m, arm.parts.D[n:, n:], model.drive_matrices, [False]
+    k, D, drives, spun = n + m, arm.parts.D[n:, n:], model.drive_matrices, [0.0]
 
     def rate(time: float, y: Array) -> Array:
         q, e, v, ev = parts = y[:n], y[n:k], y[k : k + n], y[k + n : 2 * k]
         tau, w, dx = law(time, *parts), push(time, *parts), y[k : 2 * k]
         ddx, base = solved(arm, True, y[None, :k], dx[None], tau[None], w[None])
-        softened[0] = softened[0] or base[0, 9] > 0.0
+        spun.append(base[0, 9])
         power = tau @ v - ev @ D @ ev - (0.0 if drives is None else drives.torque(v, None) @ v)
         loads = [base[0, :9]]
         if wrench is not None:
@@ -193,11 +194,10 @@ def simulate(
         return np.concatenate([dx, ddx[0], [power], *loads])
 
     y0 = np.concatenate([*start, np.zeros(10 if wrench is None else 16)])
-    options = (chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress)
-    largest = _LARGEST * scales(arm)[n:]
-    times, Y, status, count = _followed(
-        rate, y0, t, *options, lambda y: bool((np.abs(y[n:k]) > largest).any())
-    )
+    largest = np.full(len(y0), np.inf)
+    largest[n:k] = _LARGEST * scales(arm)[n:]
+    options = chosen(Integrator, method, "method"), rtol, atol, max_evaluations, progress
+    times, Y, status, count = _followed(rate, y0, t, *options, spun, largest)
     q, e, v, ev, work, load, first, pull = np.split(Y, np.cumsum([n, m, n, m, 1, 6, 3]), axis=1)
     tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
@@ -205,8 +205,6 @@ def simulate(
     momentum, impulse = (in_world(model.base, x) for x in (momentum, load))
     impulse = impulse + np.hstack([weight, cross(first, model.gravity)])
     impulse -= 0.0 if wrench is None else pull
-    if status != FlexibleMotionStatus.NOT_CONVERGED and softened[0]:
-        status = FlexibleMotionStatus.SOFTENED
     energies = kinetic, potential, work[:, 0]
     return FlexibleMotion(arm, times, q, v, tau, e, ev, *energies, momentum, impulse, status, count)
 
@@ -219,39 +217,30 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     for count in (5, 3, 1):
         with suppress(TypeError, ValueError):  # another number of arguments
             signature(law).bind(*range(count))
-            break
-    else:
-        raise InvalidValueError(
-            f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v)."
-        )
-
-    def value(t: float, q: Array, e: Array, v: Array, ev: Array) -> Array:
-        answer: Any = law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1]))
-        return as_exact(answer, (size,), f"{name} at t = {t:.9g} s")
-
-    return value
+            return lambda t, q, e, v, ev: as_exact(
+                law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1])),
+                (size,),
+                f"{name} at t = {t:.9g} s",
+            )
+    raise InvalidValueError(f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v).")
 
 
 def _followed(
-    rate: Callable[[float, Array], Array],
-    y: Array,
-    t: ArrayLike,
-    method: Integrator,
-    rtol: float,
-    atol: float,
-    budget: int | None,
-    progress: Callable[[float], None] | None = None,
-    beyond: Callable[[Array], bool] = lambda y: False,
-) -> tuple[Array, Array, FlexibleMotionStatus, int]:
-    """Times, states, status and evaluations of an initial value problem."""
+    rate: Callable[[float, Array], Array], y: Array, t: ArrayLike, method: Integrator,
+    rtol: float, atol: float, budget: int | None, progress: Any, spun: list[float],
+    largest: ArrayLike = np.inf,
+) -> tuple[Array, Array, FlexibleMotionStatus, int]:  # fmt: skip
+    """Times, states up to the largest, status and evaluations of an initial value problem.
+
+    Each evaluation appends a code of `SpinStatus` to ``spun``.
+    """
     import scipy.integrate
 
     start, end, wanted = times_of(t)
     rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
     most = _PER_SECOND * (1.0 + end - start) if budget is None else budget
     most = as_number(most, "max_evaluations", least=1.0)
-    if progress is not None and not callable(progress):
-        raise InvalidValueError(f"progress: expected a function, got {progress!r:.40}.")
+    report = Workers(progress=progress)
     kind: Any = getattr(scipy.integrate, method.value)
 
     def finite(t: float, y: Array) -> Array:
@@ -267,11 +256,13 @@ def _followed(
             if solver.nfev >= most:
                 status = FlexibleMotionStatus.NOT_CONVERGED
                 break
-            try:
+            before = solver.t
+            with suppress(SingularMassMatrixError):  # accelerations that are not finite
                 solver.step()
-            except SingularMassMatrixError:  # accelerations that are not finite
-                solver.status = "failed"
-            if solver.status == "failed" or beyond(solver.y):
+            if spun[-1] == SpinStatus.BENT:  # the last evaluation of a step is at its end
+                status = FlexibleMotionStatus.BENT
+                break
+            if solver.t == before or (np.abs(solver.y) > largest).any():
                 status = FlexibleMotionStatus.DIVERGED
                 break
             if wanted is None:
@@ -280,8 +271,11 @@ def _followed(
                 dense = solver.dense_output()
                 inside = wanted[(wanted > found[-1][0]) & (wanted <= solver.t)]
                 found += [(float(x), dense(x)) for x in inside]
-            if progress is not None:
-                progress((float(solver.t) - start) / (end - start))
+            report.done((float(solver.t) - start) / (end - start))
+    if status and SpinStatus.BENT in spun:
+        status = FlexibleMotionStatus.BENT
+    elif status != FlexibleMotionStatus.NOT_CONVERGED and SpinStatus.SOFTENED in spun:
+        status = FlexibleMotionStatus.SOFTENED
     times, states = (np.array(x) for x in zip(*found, strict=True))
     return times, states, status, int(solver.nfev)
 
@@ -298,7 +292,7 @@ def _relative(error: Array, *sizes: Array) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeBodyMotion(Result):
-    """Motion of an elastic body without loads (section 7.2.2).
+    """Motion of an elastic body without loads (section 7.2.2), at times t (N,).
 
     Pose (N, 4, 4) and twist (N, 6) are those of the root, the twist in its own axes; energy (N,)
     and momentum (N, 6) about the origin of the world are constant.
@@ -375,12 +369,13 @@ def free_body(
             "link: a sum of its modes is a rigid motion, which a free body has without modes."
         )
     cuts, loose = np.cumsum([m, m, 6, 4]), np.ones(2, np.int64)
-    none, outer = np.zeros((1, m)), np.zeros((1, 12))
+    none, outer, spun = np.zeros((1, m)), np.zeros((1, 12)), [0.0]
 
     def rate(t: float, y: Array) -> Array:
         ev, v, w = y[m : 2 * m], y[2 * m : 2 * m + 3], y[2 * m + 3 : 2 * m + 6]
         outer[0, :6] = y[2 * m : 2 * m + 6]
         e_a, base, *_ = recursion(parts.chain, y[None, :m], ev[None], none, loose, None, outer)
+        spun.append(base[0, 9])
         u = y[2 * m + 6 : 2 * m + 9]
         (x, y, z), s = u, y[2 * m + 9]
         W = np.array([[s, -z, y], [z, s, -x], [-y, x, s], [-x, -y, -z]])  # quaternion's rate
@@ -388,7 +383,8 @@ def free_body(
         return np.concatenate([ev, e_a[0], base[0, :6], 0.5 * W @ w, moved])
 
     y0 = np.concatenate([*start, [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
-    times, Y, status, _ = _followed(rate, y0, t, Integrator.DOP853, rtol, atol, max_evaluations)
+    options = Integrator.DOP853, rtol, atol, max_evaluations, None
+    times, Y, status, _ = _followed(rate, y0, t, *options, spun)
     e, ev, twist, quaternion, place = (x.copy() for x in np.split(Y, cuts, axis=1))
     pose = np.tile(np.eye(4), (len(times), 1, 1))
     pose[:, :3, :3], pose[:, :3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
