@@ -139,6 +139,7 @@ def test_two_configurations_of_a_node_reach_one_point():
     assert np.abs(found.q[:, 0] - found.q[:, 1]).max() > 1e-3
 
 
+@pytest.mark.nightly
 def test_curves_that_lie_on_each_other_have_no_nodes():
     for alpha in ((0, np.pi / 2, 0), (0, 0, np.pi / 2), (0, np.pi / 2, np.pi / 2)):
         for d in ((0, 0, 0.5), (0, 1, 0.5)):

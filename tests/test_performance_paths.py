@@ -279,6 +279,7 @@ def test_means_over_joints_and_workspace():
     assert over == pytest.approx(0.6 * np.pi / 4, rel=3e-3)
 
 
+@pytest.mark.nightly
 def test_maps_of_other_arms():
     arm = rm.load("puma560")
     w = pf.workspace(arm, limits=False, resolution=20)
@@ -288,6 +289,9 @@ def test_maps_of_other_arms():
     R = np.eye(3)
     w = pf.workspace(arm, "orientation", orientation=R, resolution=6, limits=False)
     assert np.isfinite(pf.dexterity_map(arm, w).best).sum() == (w.count > 0).sum()
+
+
+def test_an_empty_workspace_has_no_index():
     empty = pf.workspace(TWO, "free", free=lambda q: q[:, 0] > 9, resolution=4)
     with pytest.raises(InvalidValueError, match="nothing is reached"):
         pf.global_index(TWO, over=empty)
