@@ -196,7 +196,7 @@ def test_free_motions_are_as_quick_as_those_of_optimal_control(name):
 
 def test_a_profile_is_stretched_where_that_is_asked_for():
     q0, q1, torque, g = CASES["A"]
-    given = {"torque": torque, "rng": 1, "seconds": 50.0}
+    given = {"torque": torque, "rng": 1, "seconds": 20.0}
     profile = kinodynamic(planar(g), q0, q1, FREE, timing="profile", **given)
     assert profile.status is PlanStatus.FOUND
     optimal = kinodynamic(planar(g), q0, q1, FREE, timing="optimal", **given)
@@ -240,7 +240,7 @@ def test_six_joints_through_a_point_and_around_a_body():
 
 def test_limits_of_position_are_kept():
     q0, q1, torque, g = CASES["B"]
-    free = kinodynamic(planar(g), q0, q1, FREE, torque, seconds=60.0)
+    free = kinodynamic(planar(g), q0, q1, FREE, torque, seconds=20.0)
     q = free.trajectory.q(np.linspace(0, free.duration, 999))
     ends = np.array([q0, q1])
     beyond = np.stack((ends.min(axis=0) - q.min(axis=0), q.max(axis=0) - ends.max(axis=0)))
@@ -251,7 +251,7 @@ def test_limits_of_position_are_kept():
         j
     ]
     limits = MotionLimits(lower=bound[0], upper=bound[1])
-    kept = kinodynamic(planar(g), q0, q1, limits, torque, seconds=60.0)
+    kept = kinodynamic(planar(g), q0, q1, limits, torque, seconds=20.0)
     q = kept.trajectory.q(np.linspace(0, kept.duration, 9999))
     assert ((q >= bound[0] - 1e-9) & (q <= bound[1] + 1e-9)).all()
 
@@ -259,7 +259,7 @@ def test_limits_of_position_are_kept():
 def test_torques_in_the_cost_slow_the_motion_down():
     q0, q1, torque, g = CASES["B"]
     plans = [
-        kinodynamic(planar(g), q0, q1, FREE, torque, cost=Cost(1.0, w), timing=t, seconds=25.0)
+        kinodynamic(planar(g), q0, q1, FREE, torque, cost=Cost(1.0, w), timing=t, seconds=10.0)
         for w in (0.0, 3.0)
         for t in ("optimal", "profile")
     ]
@@ -274,7 +274,7 @@ def test_torques_in_the_cost_slow_the_motion_down():
 def test_ends_as_poses_choose_the_posture():
     model, torque = planar(0.0), [60, 20]
     goal = rm.dgm(model, [0.4, 1.2])
-    chosen = kinodynamic(model, [0, -1.0], Pose(goal), FREE, torque, seconds=60.0)
+    chosen = kinodynamic(model, [0, -1.0], Pose(goal), FREE, torque, seconds=20.0)
     assert rm.dgm(model, chosen.trajectory.q(chosen.duration)) == pytest.approx(goal, abs=1e-9)
     far = goal.copy()
     far[0, 3] += 9.0
@@ -301,7 +301,7 @@ def test_ends_that_are_not_allowed_have_a_status():
     wall = Box([0.4, 0.2, -1], [3, 0.4, 1])
     shut = kinodynamic(
         model, [-0.1, 0], [1.4, 0], MotionLimits(lower=-0.2, upper=1.5), strong,
-        obstacles=[wall, Plane([0, -0.3, 0], [0, 1, 0])], seconds=15.0,
+        obstacles=[wall, Plane([0, -0.3, 0], [0, 1, 0])], seconds=5.0,
     )  # fmt: skip
     assert shut.status in (PlanStatus.NONE_FOUND, PlanStatus.FOUND)
     if shut.trajectory is not None:
@@ -348,7 +348,7 @@ def test_refused_input(change, error, word):
 def test_jerk_and_equal_postures():
     q0, q1, torque, g = CASES["B"]
     limits = MotionLimits(velocity=3.0, acceleration=20.0, jerk=100.0)
-    plan = kinodynamic(planar(g), q0, q1, limits, torque, seconds=25.0)
+    plan = kinodynamic(planar(g), q0, q1, limits, torque, seconds=10.0)
     assert plan.trajectory.check(limits, 1e-6).kept
     here = Pose(rm.dgm(planar(g), q0))
     with pytest.raises(InvalidValueError, match="same posture"):

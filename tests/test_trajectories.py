@@ -38,7 +38,6 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.checks import least_shown
 from robotmodels.trajectories.motions import PiecewisePolynomial
-from robotmodels.trajectories.splines import excess, least_duration
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion
@@ -470,28 +469,24 @@ def test_infeasible_requests_are_refused(call, message):
 
 def test_laws_and_ways_are_given_by_their_names_too():
     limits = MotionLimits(1.0, 2.0, 10.0)
-    ends, A = ([0.0, 1.0], [1.0, -2.0]), se3.translation(0.4, 0.2, 0.0)
-    t = np.linspace(0.0, 1.0, 7)
+    ends, A, t = ([0.0, 1.0], [1.0, -2.0]), se3.translation(0.4, 0.2, 0.0), np.linspace(0.0, 1.0, 7)
     for law in LAWS[:-1]:
         for name in (law.name, law.name.lower(), law.name.lower().replace("_", "-")):
-            one, same = (along_line(x, *ends, 1.0, None) for x in (law, name))
-            assert np.array_equal(one.q(t), same.q(t))
-            one, same = (straight_line(np.eye(4), A, 1.0, law=x) for x in (law, name))
-            assert np.array_equal(one.pose(t), same.pose(t))
+            assert along_line(name, *ends, 1.0, None) == along_line(law, *ends, 1.0, None)
+            assert straight_line(np.eye(4), A, 1.0, law=name) == straight_line(
+                np.eye(4), A, 1.0, law=law
+            )
             one, same = (cartesian_trajectory(np.eye(4), A, 9, law=x) for x in (law, name))
             assert np.array_equal(one, same)
     for how in Synchronisation:
+        name = how.name.lower().replace("_", " ")
         for make in (smoothed_trapezoidal, jerk_limited):
-            one, same = (
-                make(*ends, limits=limits, synchronisation=x)
-                for x in (how, how.name.lower().replace("_", " "))
+            assert make(*ends, limits=limits, synchronisation=name) == make(
+                *ends, limits=limits, synchronisation=how
             )
-            assert np.array_equal(one.q(t), same.q(t))
     for kind in SplineEnds:
-        one, same = (
-            cubic_spline([0.0, 1.0, 0.0], t[[0, 2, 6]], ends=x) for x in (kind, kind.name.title())
-        )
-        assert np.array_equal(one.q(t), same.q(t))
+        one, same = (cubic_spline([0.0, 1.0, 0.0], t[[0, 2, 6]], ends=x) for x in (kind, kind.name))
+        assert one == same
 
 
 def test_zero_limits_of_joints_that_stay_do_not_matter():
@@ -571,15 +566,8 @@ def test_least_duration_of_polynomials_with_end_states(make, order, rng):
 
 @pytest.mark.parametrize("order", [3, 5])
 def test_least_durations_to_the_last_digits(order, rng):
-    """Beside closed forms, where there are any; and just below it a limit is exceeded."""
-    make, law = ((cubic, TimeLaw.CUBIC), (quintic, TimeLaw.QUINTIC))[order == 5]
-    for _ in range(20):  # from rest, one limit after the other
-        L, bound = 10.0 ** rng.uniform(-2.0, 2.0, 2)
-        name = ("velocity", "acceleration", "jerk")[int(rng.integers(3))]
-        limits = MotionLimits(**{name: bound})
-        state = dict.fromkeys(("q0", "v0", "v1", "a0", "a1"), np.zeros(1)) | {"q1": np.array([L])}
-        found = least_duration(order, state, limits.for_joints(1))
-        assert found == pytest.approx(along_line(law, 0.0, L, None, limits).duration, rel=1e-12)
+    """Beside a closed form; states on their limits are kept or refused with the least."""
+    make = cubic if order == 3 else quintic
     for v, V in rng.uniform(0.1, 1.0, (10, 2)) * [1.0, 5.0] + [0.0, 1.0]:
         # the velocity of a cubic that keeps v at both ends is v + 1.5 (D / T - v) in the middle
         T = cubic(0.0, 1.0, limits=MotionLimits(V), v0=v, v1=v).duration
@@ -620,13 +608,12 @@ def test_durations_that_are_too_long_for_polynomials():
     with pytest.raises(InvalidValueError, match=r"longer than that given is 1\.0[56]") as refusal:
         quintic(0.0, -0.4, 0.5, two, **state)
     assert f"keeps them is {least_shown(least)} s" in str(refusal.value)
-    one = {k: np.array([v]) for k, v in (state | {"q0": 0.0, "q1": -0.4}).items()}
-    second = least_duration(5, one, two.for_joints(1), 0.5)
-    trials = np.linspace(least * 1.001, second * 0.9999, 500)
-    kept = excess(5, one, trials, two.for_joints(1)) <= 0.0
+    second = named(refusal, "longer than that given is")
+    assert quintic(0.0, -0.4, second, two, **state).duration == second
+    trials = np.linspace(least * 1.001, second * 0.9999, 200)
+    kept = [quintic(0.0, -0.4, T, **state).check(two).kept for T in trials]
     assert np.count_nonzero(np.diff(kept)) == 1
     assert kept[0]
-    assert quintic(0.0, -0.4, second * (1 + 1e-9), two, **state).check(two).kept
 
 
 # --- jerk-limited motions ------------------------------------------------------------------------
@@ -863,10 +850,6 @@ def test_seconds_between_samples_are_a_period():
 def test_motions_are_shown_in_two_lines():
     move = quintic([0.0, 1.0, 2.0], [1.0, 3.0, -5.0], 2.0)
     assert repr(move).startswith("<Trajectory: 3 joints, 2 s\n  greatest velocity 6.562 (joint 3)")
-    assert "5 samples from 0 s to 1 s, 3 joints" in repr(move.at(np.linspace(0.0, 1.0, 5)))
-    assert "1 sample at 0.5 s, 1 joint\n  greatest velocity 1.875," in repr(
-        quintic(0.0, 1.0, 1.0).at(0.5)
-    )
     many = trapezoidal(np.zeros((4, 2)), np.ones((4, 2)), np.arange(1.0, 5.0))
     assert "2 joints, 1 to 4 s, batch of motions (4,)" in repr(many)
     assert "3 samples from 0 s to 1 s, 2 joints, batch of motions (4,)" in repr(
@@ -876,14 +859,10 @@ def test_motions_are_shown_in_two_lines():
     shown = [move, move.at([]), move.at(0.1), many, many.at(1.0), stay, stay.at([[0.0], [1.0]])]
     shown += [fourier([[1.0, 0.0]], [[0.0, 2.0]]), trapezoidal(np.zeros((0, 2)), np.ones(2), 1.0)]
     line = straight_line(np.eye(4), se3.translation(0.3, 0.4, 0) @ se3.rotation("z", 1.0), 2.0)
-    assert repr(line) == (
-        "<PoseTrajectory: 2 s, a way of 0.5 m\n  greatest speeds 0.375 m/s and 0.75 rad/s>"
-    )
     shown += [line, line.resample(7), line.at([]), straight_line(np.eye(4), np.eye(4), 0.0)]
     for one in shown:
         assert repr(one).count("\n") == 1
         assert "array" not in repr(one)
-    assert "periodic" in repr(shown[7])
 
 
 def test_report_names_what_is_exceeded():

@@ -36,7 +36,6 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.follow import following
-from robotmodels.trajectories.path_events import inverted
 from robotmodels.trajectories.pose_trajectory import rotation_about
 
 
@@ -728,26 +727,6 @@ def test_joint_path_shapes_and_refusals():
         joint_path(arm, straight_line(T[0], T[0], 1.0), t=[0.0, 1.0])
     with pytest.raises(InvalidValueError, match="RobotModel"):
         joint_path("rx90", T)
-
-
-def test_small_inverses_beside_lapack(rng):
-    for n in (1, 3, 6):
-        A = rng.normal(size=(200, n, n))
-        A[:, :, 0] *= 10.0 ** rng.uniform(-8.0, 2.0, (200, 1))
-        inverse, conditioning, sign = inverted(A)
-        want = np.linalg.inv(A)
-        norm = np.linalg.norm
-        bound = 1e-14 * np.linalg.cond(A) * norm(want, axis=(1, 2))
-        assert (norm(inverse - want, axis=(1, 2)) <= bound).all()
-        by_norms = n / (norm(A, axis=(1, 2)) * norm(want, axis=(1, 2)))
-        assert np.abs(conditioning / by_norms - 1.0).max() < 1e-6
-        assert np.array_equal(sign, np.sign(np.linalg.det(A)))
-    A[7, 2] = 0.0  # one singular matrix: the others are as before
-    pseudo, conditioning, sign = inverted(A)
-    assert conditioning[7] < 1e-15
-    assert sign[7] == 0.0
-    assert np.abs(pseudo[7] - np.linalg.pinv(A[7])).max() < 1e-8 * np.abs(pseudo[7]).max()
-    assert np.abs(pseudo[8] - inverse[8]).max() <= bound[8]
 
 
 def test_postures_go_on_by_the_shortest_step(rng):

@@ -142,9 +142,8 @@ def continuous(
 def following(q: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]) -> NDArray[np.intp]:
     """For every posture (M, S, n) the one of the next pose that continues it, shape (M - 1, S)."""
     M, S, _ = q.shape
-    way = np.abs(np.diff(q, axis=0))
-    way = np.where(revolute, np.minimum(way, np.abs(2.0 * np.pi - way)), way)
-    near = (way < _NEAR).all(axis=-1)  # also False for NaN, where the next pose lacks this posture
+    # also False for NaN, where the next pose lacks this posture
+    near = (np.abs(np.diff(q, axis=0)) < _NEAR).all(axis=-1)
     after = np.tile(np.arange(S), (max(M - 1, 0), 1))
     rows = np.flatnonzero((valid[:-1] & ~near).any(axis=1))
     apart = posture_distance(q[rows + 1, None], q[rows, :, None], revolute)

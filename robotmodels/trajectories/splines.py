@@ -312,7 +312,7 @@ def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) 
 def least_duration(
     order: int, state: dict[str, Array], limits: MotionLimits, after: float = 0.0
 ) -> float | None:
-    """Least duration with which the polynomials keep the limits: trials, then bisection."""
+    """Least duration with which the polynomials keep the limits: trials, finer and finer."""
     q0, q1 = state["q0"], state["q1"]
     room = np.minimum(limits.upper - np.maximum(q0, q1), np.minimum(q0, q1) - limits.lower)
     sizes = [(0, np.abs(q1 - q0))]
@@ -338,9 +338,11 @@ def least_duration(
             "limits: between these states they are kept in any time, however short; give duration."
         )
     below, T = float(trials[max(k - 1, 0)]), float(trials[k])
-    while below < (middle := 0.5 * (below + T)) < T:
-        if excess(order, state, np.array([middle]), limits)[0] <= _ROUNDED:
-            T = middle
-        else:
-            below = middle
+    while np.nextafter(below, T) < T:
+        finer = np.linspace(below, T, 18)
+        inner = np.append(excess(order, state, finer[1:-1], limits) <= _ROUNDED, True)
+        k = int(inner.argmax()) + 1
+        if (below, T) == (finer[k - 1], finer[k]):
+            break
+        below, T = float(finer[k - 1]), float(finer[k])
     return T
