@@ -184,8 +184,10 @@ class RestToRest(Result):
     def torque(self, t: ArrayLike) -> Array:
         """Torques (..., n) at times (...), which hold the arm before and after the motion."""
         e, e_v = self.elastic(t)
-        path = self.trajectory.at(t)
-        return idm(self.arm, path.q, e, path.v, e_v, path.a)[0]
+        times = np.clip(as_floats(t, "t"), 0.0, self.trajectory.duration)
+        path = self.trajectory.motion.derivatives(times.ravel(), (0, 1, 2))
+        q, v, a = (x.reshape(*times.shape, self.arm.n) for x in path)
+        return idm(self.arm, q, e, v, e_v, a)[0]
 
     def __repr__(self) -> str:
         return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
