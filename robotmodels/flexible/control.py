@@ -25,8 +25,7 @@ InvalidValueError, ShapeError
 References
 ----------
 Seed book section 7.3.3; A. De Luca and B. Siciliano, "Regulation of flexible arms under gravity",
-IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, "Joint trajectory tracking
-for planar multi-link flexible manipulator", ICRA 2002.
+IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, ICRA 2002.
 """
 
 from __future__ import annotations
