@@ -16,6 +16,11 @@ reference : Trajectory, RestToRest, or callable
 duration : float
     Time, s.
 
+Returns
+-------
+callable or RestToRest
+    The law; the motion with its torques and its status.
+
 Raises
 ------
 InvalidValueError, ShapeError
@@ -67,11 +72,6 @@ def regulator(
 ) -> Law:
     """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal.
 
-    Returns
-    -------
-    callable
-        The law.
-
     Examples
     --------
     >>> from robotmodels import RobotModel, DHTable, flexible
@@ -92,11 +92,6 @@ def regulator(
 
 def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
     """Tracking of joint motions: the inverse model with the errors of the motors.
-
-    Returns
-    -------
-    callable
-        The law, which uses e and e_v.
 
     Examples
     --------
@@ -197,11 +192,6 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
 
     The motion of the motors is a spline with free coefficients, of least change, with which the
     elastic coordinates, integrated by the inverse model, begin and end at rest.
-
-    Returns
-    -------
-    RestToRest
-        The motion, its torques and its status.
 
     Examples
     --------
