@@ -64,6 +64,15 @@ def close(found, wanted, tolerance):
     assert np.abs(np.asarray(found) - wanted).max(initial=0.0) <= tolerance * scale
 
 
+def element(h, EI, rho):
+    """Stiffness and mass of a finite element of a beam: displacement and slope of both ends."""
+    k = [[12, 6*h, -12, 6*h], [6*h, 4*h*h, -6*h, 2*h*h], [-12, -6*h, 12, -6*h],
+         [6*h, 2*h*h, -6*h, 4*h*h]]  # fmt: skip
+    m = [[156, 22*h, 54, -13*h], [22*h, 4*h*h, 13*h, -3*h*h], [54, 13*h, 156, -22*h],
+         [-13*h, -3*h*h, -22*h, 4*h*h]]  # fmt: skip
+    return EI / h**3 * np.array(k), rho * h / 420 * np.array(m)
+
+
 # --- beams ---------------------------------------------------------------------------------------
 
 
@@ -91,16 +100,8 @@ def test_modes_of_a_tip_off_the_axis_are_those_of_finite_elements():
     link = flexible.beam(
         0.7, EI=(3.0, 2.0), density=0.4, tip=(0.3, [0, 0.1, 0], [0.002] * 3), modes=3
     )
-    N, EI, rho = 30, 2.0, 0.4
-    h = 0.7 / N
-    k = EI / h**3 * np.array(
-        [[12, 6*h, -12, 6*h], [6*h, 4*h*h, -6*h, 2*h*h], [-12, -6*h, 12, -6*h],
-         [6*h, 2*h*h, -6*h, 4*h*h]]
-    )  # fmt: skip
-    m = rho * h / 420 * np.array(
-        [[156, 22*h, 54, -13*h], [22*h, 4*h*h, 13*h, -3*h*h], [54, 13*h, 156, -22*h],
-         [-13*h, -3*h*h, -22*h, 4*h*h]]
-    )  # fmt: skip
+    N = 30
+    k, m = element(0.7 / N, 2.0, 0.4)
     K, M = np.zeros((2, 2 * N + 2, 2 * N + 2))
     for i in range(0, 2 * N, 2):
         K[i : i + 4, i : i + 4] += k
@@ -318,12 +319,7 @@ def test_finite_elements_and_their_reduction_are_the_beam():
     count, L, EI, rho = 12, 1.0, 2.0, 1.5
     h, c = L / count, 6 * (count + 1)
     M, K = np.zeros((2, c, c))
-    Me = rho * h / 420 * np.array(
-        [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h * h, 13 * h, -3 * h * h],
-         [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h * h, -22 * h, 4 * h * h]])  # fmt: skip
-    Ke = EI / h**3 * np.array(
-        [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h],
-         [-12, -6 * h, 12, -6 * h], [6 * h, 2 * h * h, -6 * h, 4 * h * h]])  # fmt: skip
+    Ke, Me = element(h, EI, rho)
     for i in range(count):
         for axis, turn, sign in ((1, 5, 1.0), (2, 4, -1.0)):
             rows = [6 * i + axis, 6 * i + turn, 6 * i + 6 + axis, 6 * i + 6 + turn]

@@ -16,6 +16,11 @@ reference : Trajectory, RestToRest, or callable
 duration : float
     Time, s.
 
+Returns
+-------
+callable or RestToRest
+    The law; the motion with its torques and its status.
+
 Raises
 ------
 InvalidValueError, ShapeError
@@ -25,8 +30,7 @@ InvalidValueError, ShapeError
 References
 ----------
 Seed book section 7.3.3; A. De Luca and B. Siciliano, "Regulation of flexible arms under gravity",
-IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, "Joint trajectory tracking
-for planar multi-link flexible manipulator", ICRA 2002.
+IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, ICRA 2002.
 """
 
 from __future__ import annotations
@@ -68,11 +72,6 @@ def regulator(
 ) -> Law:
     """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal.
 
-    Returns
-    -------
-    callable
-        The law.
-
     Examples
     --------
     >>> from robotmodels import RobotModel, DHTable, flexible
@@ -93,11 +92,6 @@ def regulator(
 
 def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
     """Tracking of joint motions: the inverse model with the errors of the motors.
-
-    Returns
-    -------
-    callable
-        The law, which uses e and e_v.
 
     Examples
     --------
@@ -184,8 +178,10 @@ class RestToRest(Result):
     def torque(self, t: ArrayLike) -> Array:
         """Torques (..., n) at times (...), which hold the arm before and after the motion."""
         e, e_v = self.elastic(t)
-        path = self.trajectory.at(t)
-        return idm(self.arm, path.q, e, path.v, e_v, path.a)[0]
+        times = np.clip(as_floats(t, "t"), 0.0, self.trajectory.duration)
+        path = self.trajectory.motion.derivatives(times.ravel(), (0, 1, 2))
+        q, v, a = (x.reshape(*times.shape, self.arm.n) for x in path)
+        return idm(self.arm, q, e, v, e_v, a)[0]
 
     def __repr__(self) -> str:
         return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
@@ -196,11 +192,6 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
 
     The motion of the motors is a spline with free coefficients, of least change, with which the
     elastic coordinates, integrated by the inverse model, begin and end at rest.
-
-    Returns
-    -------
-    RestToRest
-        The motion, its torques and its status.
 
     Examples
     --------

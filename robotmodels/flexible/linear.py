@@ -13,10 +13,18 @@ joints : str
 output : str
     ``"joint"`` or ``"tip"``.
 
+Returns
+-------
+Deflection, ndarray or LinearModel
+    Equilibrium; frequencies, rad/s; matrices, poles and zeros.
+
 Raises
 ------
 ShapeError, InvalidValueError
-    Arguments of the wrong length, or with NaN or infinity; unknown words.
+    Arguments of the wrong length, or with NaN or infinity; unknown words; `linearize`: no
+    equilibrium at q, a singular posture for the tip.
+SingularMassMatrixError
+    A motor that moves no inertia.
 
 References
 ----------
@@ -67,10 +75,8 @@ class Deflection(Result):
 
     Parameters
     ----------
-    e : ndarray, shape (..., m)
-        Elastic coordinates; NaN where no equilibrium was found.
-    tau : ndarray, shape (..., n)
-        Torques that hold the joints, N m.
+    e, tau : ndarray, shape (..., m) and (..., n)
+        Elastic coordinates, and torques that hold the joints; NaN where none was found.
     deflection : ndarray, shape (...)
         Largest displacement of a link's tip, relative to its length.
     status : ndarray of int8, shape (...)
@@ -91,11 +97,6 @@ def static_deflection(
     arm: FlexibleRobot, q: ArrayLike, wrench: ArrayLike | None = None
 ) -> Deflection:
     """Deflection of an arm at rest under gravity and a wrench, joints held.
-
-    Returns
-    -------
-    Deflection
-        Elastic coordinates and status.
 
     Examples
     --------
@@ -144,17 +145,9 @@ def static_deflection(
 
 
 def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked") -> Array:
-    """Natural frequencies of the undeformed arm at rest, without gravity.
+    """Natural frequencies (..., m) of the undeformed arm at rest, without gravity, ascending.
 
-    Returns
-    -------
-    ndarray, shape (..., m) or (..., n + m)
-        Ascending, rad/s; with free joints the n motions without vibration are zero.
-
-    Raises
-    ------
-    SingularMassMatrixError
-        A motor that moves no inertia.
+    With free joints (..., n + m): those of the n motions without vibration are zero.
 
     Examples
     --------
@@ -215,16 +208,6 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     The output ``"joint"`` is q; ``"tip"`` the motion of the joints that would move the tool of the
     rigid arm as the flexible one moves: ``q + J_q^+ J_e e``, of positions where they determine it,
     else of poses. Its zeros on the right side are the reason why a tip is not tracked causally.
-
-    Returns
-    -------
-    LinearModel
-        Matrices, poles and zeros.
-
-    Raises
-    ------
-    InvalidValueError
-        No equilibrium at q, a singular posture for the tip.
 
     Examples
     --------

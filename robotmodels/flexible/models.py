@@ -17,6 +17,11 @@ wrench : array_like, shape (..., 6), optional
 drive : bool
     Whether rotor inertia, friction and offsets of the model's drives take part.
 
+Returns
+-------
+ndarray, shape (..., *core)
+    Or a pair of them; each function states its core.
+
 Raises
 ------
 ShapeError, InvalidValueError
@@ -92,12 +97,7 @@ class Accelerations(Result, tuple[Array, Array]):
 
 
 def dgm(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Direct geometric model: world pose of the tool.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        Its pose.
+    """Direct geometric model: world pose (..., 4, 4) of the tool.
 
     Examples
     --------
@@ -111,24 +111,12 @@ def dgm(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
 
 
 def link_poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """World poses of the frames R_1 to R_f, the roots of the links, on the deformed arm.
-
-    Returns
-    -------
-    ndarray, shape (..., f, 4, 4)
-        Poses.
-    """
+    """World poses (..., f, 4, 4) of the frames R_1 to R_f, roots of the links, on a bent arm."""
     return _poses(arm, q, e)[..., :-1, :, :]
 
 
 def jacobian(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Jacobian of the tool by (q, e), rows [v; w] at the tool point in world axes.
-
-    Returns
-    -------
-    ndarray, shape (..., 6, n + m)
-        The columns of the joints, then of the elastic coordinates.
-    """
+    """Jacobian (..., 6, n + m) of the tool by (q, e), rows [v; w] at the tool point, world axes."""
     batch, (x,) = checked_rows(arm, (q, e))
     unit, x = np.tile(np.eye(6), (len(x), 1)), np.repeat(x, 6, axis=0)
     return forces(arm, x, 0.0 * x, 0.0 * x, unit, bare=True)[0].reshape(*batch, 6, x.shape[1])
@@ -141,13 +129,7 @@ def energies(
     v: ArrayLike | None = None,
     e_v: ArrayLike | None = None,
 ) -> tuple[Array, Array]:
-    """Kinetic energy, and potential energy of gravity and deformation, rotors included.
-
-    Returns
-    -------
-    kinetic, potential : ndarray, shape (...)
-        J.
-    """
+    """Kinetic energy, and potential energy of gravity and deformation, (...) each, J."""
     batch, (x, dx) = checked_rows(arm, (q, e), (v, e_v))
     kinetic, potential, _ = states(arm, x, dx)
     return kinetic.reshape(batch), potential.reshape(batch)
@@ -165,14 +147,8 @@ def idm(
 ) -> tuple[Array, Array]:
     """Inverse dynamic model: torques of given joint accelerations.
 
-    The elastic accelerations follow from the state: integrate them along a motion.
-
-    Returns
-    -------
-    tau : ndarray, shape (..., n)
-        Torques, N m or N.
-    e_a : ndarray, shape (..., m)
-        Elastic accelerations.
+    They are tau (..., n), N m or N, with the elastic accelerations (..., m), which follow from the
+    state: integrate them along a motion.
     """
     batch, rows = checked_rows(arm, (q, e), (v, e_v), a=a, wrench=wrench)
     found = solved(arm, False, *rows, drive=drive)[0].reshape(*batch, arm.n + arm.m)
@@ -191,10 +167,7 @@ def ddm(
 ) -> Accelerations:
     """Direct dynamic model: accelerations under given torques.
 
-    Returns
-    -------
-    Accelerations
-        The pair (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`.
+    They are the pair (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`.
 
     Examples
     --------
@@ -212,13 +185,7 @@ def ddm(
 
 
 def mass_matrix(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Mass matrix of (q, e), with rotor inertia.
-
-    Returns
-    -------
-    ndarray, shape (..., n + m, n + m)
-        Symmetric.
-    """
+    """Mass matrix (..., n + m, n + m) of (q, e), with rotor inertia."""
     batch, (x,) = checked_rows(arm, (q, e))
     size = x.shape[1]
     unit, x = np.tile(np.eye(size), (len(x), 1)), np.repeat(x, size, axis=0)

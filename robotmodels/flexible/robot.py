@@ -54,9 +54,9 @@ class FlexibleRobot(Value):
     """A robot with flexible links and joints. Immutable, picklable.
 
     Its coordinates are q (n,), the angles of the motors, and e (m,): the modes of the flexible
-    links by row, then the deflections of the flexible joints, so that a link turns by the sum of
-    both. The tip section of a flexible link carries what follows; where the last link is flexible
-    and the model has no tool, the tool is the end of the beam. Trees are supported.
+    links by row, then the deflections of the flexible joints. The tip section of a flexible link
+    carries what follows; where the last link is flexible and the model has no tool, the tool is the
+    end of the beam. Trees are supported.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ class FlexibleRobot(Value):
     Raises
     ------
     InvalidValueError, ShapeError
-        Rows that do not exist, or that are prismatic; stiffness that is not positive; negative
-        damping; motors that are coupled by a transmission.
+        Rows that do not exist, or are prismatic; stiffness that is not positive; negative damping;
+        motors coupled by a transmission.
 
     References
     ----------
@@ -181,12 +181,9 @@ class FlexibleRobot(Value):
 
 def check_arm(arm: Any) -> FlexibleRobot:
     """The argument, if it is a flexible robot."""
-    if not isinstance(arm, FlexibleRobot):
-        raise InvalidValueError(
-            f"arm: expected a FlexibleRobot, got {type(arm).__name__}; make one of the model and "
-            "its flexible links."
-        )
-    return arm
+    if isinstance(arm, FlexibleRobot):
+        return arm
+    raise InvalidValueError(f"arm: expected a FlexibleRobot, got {type(arm).__name__}.")
 
 
 def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
@@ -246,10 +243,9 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
     K[deflections, deflections] = arm.joint_stiffness[joints]  # type: ignore[index]
     D[deflections, deflections] = arm.joint_damping[joints]  # type: ignore[index]
     at_end = model.tip in arm.links and np.array_equal(model.tool, np.eye(4))
+    position = read_only(model.chain.position - tip[model.chain.antecedent])
     chain = Arm(
-        chain=model.chain._replace(
-            position=read_only(model.chain.position - tip[model.chain.antecedent])
-        ),
+        chain=model.chain._replace(position=position),
         pi=read_only(pi),
         start=read_only(start, np.int64),
         tip=read_only(tip[1:]),
@@ -261,9 +257,8 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
         end=int(model.tip),
     )
     second[..., 16:] = 0.0
-    bare = chain._replace(
-        second=read_only(second.reshape(m, 18 * most)), gravity=read_only(np.zeros(3))
-    )
+    none = read_only(np.zeros(3))
+    bare = chain._replace(second=read_only(second.reshape(m, 18 * most)), gravity=none)
     free = np.zeros((3, n + 2), np.int64)
     free[1:, joints], free[1:, n], free[2, :n] = 1, 1, 1
     return Parts(chain, bare, *map(read_only, (K, D, rotor)), read_only(free, np.int64))  # type: ignore[reportCallIssue]

@@ -30,6 +30,11 @@ max_evaluations : int, optional
 progress : callable, optional
     A function of the fraction done.
 
+Returns
+-------
+FlexibleMotion or FreeBodyMotion
+    The motion with its energies, momenta and status.
+
 Raises
 ------
 ShapeError, InvalidValueError, SingularMassMatrixError
@@ -157,11 +162,6 @@ def simulate(
     progress: Callable[[float], None] | None = None,
 ) -> FlexibleMotion:
     """Simulate a flexible arm under torques.
-
-    Returns
-    -------
-    FlexibleMotion
-        The motion, its energies and momenta, and the status.
 
     Examples
     --------
@@ -333,11 +333,6 @@ def free_body(
     max_evaluations: int | None = None,
 ) -> FreeBodyMotion:
     """Motion of an elastic body that floats without loads (section 7.2.2).
-
-    Returns
-    -------
-    FreeBodyMotion
-        The motion with its energy and momenta.
 
     Examples
     --------

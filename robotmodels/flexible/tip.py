@@ -48,7 +48,7 @@ class TipTracking(Result):
     Parameters
     ----------
     arm : FlexibleRobot
-        The robot, n joints and m elastic coordinates.
+        The robot.
     t : ndarray, shape (N,)
         Times, s, from ``-preview`` on; empty if refused.
     q, v, tau : ndarray, shape (N, n)
@@ -119,8 +119,8 @@ def tip_tracking(
     """Torques that move the tip as the rigid arm would be moved by a reference of its joints.
 
     The output is ``y = q + J_q^+ J_e e``, corrected until the tip is on the path in the directions
-    in which the joints move it (one joint does not correct a shortened beam). Its zero dynamics are
-    solved as a boundary value problem, which needs a preview of the motion.
+    in which the joints move it. Its zero dynamics are a boundary value problem, which needs a
+    preview of the motion.
 
     Parameters
     ----------
@@ -130,8 +130,7 @@ def tip_tracking(
         Motion of the joints of the rigid arm: its tip is the reference. A function of t returns
         (q, v, a) and needs ``duration``.
     method : str
-        ``"stable_inversion"``, or ``"causal"``, which is refused by status where a zero is
-        unstable.
+        ``"stable_inversion"``, or ``"causal"``, refused by status where a zero is unstable.
     duration : float, optional
         Of the reference, s; default that of the trajectory.
     preview : float, optional
@@ -149,8 +148,7 @@ def tip_tracking(
 
     References
     ----------
-    Seed book section 7.3.3.4; E. Bayo, "A finite-element approach to control the end-point motion
-    of a single-link flexible robot", J. Robotic Systems 4 (1987); S. Devasia, D. Chen, B. Paden,
+    Seed book section 7.3.3.4; E. Bayo, J. Robotic Systems 4 (1987); S. Devasia, D. Chen, B. Paden,
     "Nonlinear inversion-based output tracking", IEEE Trans. Automatic Control 41 (1996).
 
     Examples
@@ -162,7 +160,7 @@ def tip_tracking(
     >>> tip_tracking(arm, motion, method="causal").status
     <TipStatus.NON_MINIMUM_PHASE: 1>
     """
-    one_of(method, _METHODS, "method")
+    causal = one_of(method, _METHODS, "method") == "causal"
     if len(check_arm(arm).joints) or not arm.m:
         raise InvalidValueError(
             "arm: tip tracking is for flexible links with rigid joints. Take rest_to_rest or "
@@ -171,17 +169,17 @@ def tip_tracking(
     at, motion = motion_of(reference, arm.n), getattr(reference, "trajectory", reference)
     given = getattr(motion, "duration", None) if duration is None else duration
     T = as_number(np.nan if given is None else given, "duration", above=0.0)
-    zeros = linearize(arm, at(0.0)[0], "tip").zeros
-    last = linearize(arm, at(T)[0], "tip").zeros
+    zeros, last = (linearize(arm, at(t)[0], "tip").zeros for t in (0.0, T))
     unstable = [x.real[x.real > _UNSTABLE * np.abs(x)] for x in (zeros, last)]
-    margins = [_TIME_CONSTANTS / x.min() if x.size else 0.0 for x in unstable]
-    before = margins[0] if preview is None else as_number(preview, "preview", least=0.0)
+    before, after = (_TIME_CONSTANTS / x.min() if x.size else 0.0 for x in unstable)
+    before = before if preview is None else as_number(preview, "preview", least=0.0)
     status, found = TipStatus.NON_MINIMUM_PHASE, None
-    grid, before = np.zeros(0), 0.0 if method == "causal" and unstable[0].size else before
-    if method != "causal" or not unstable[0].size:
-        h = max(T / _SAMPLES, (T + before + margins[1]) / _MOST)
+    if causal and unstable[0].size:
+        before = 0.0
+    else:
+        h = max(T / _SAMPLES, (T + before + after) / _MOST)
         h = T / np.ceil(T / h)
-        grid = h * np.arange(-np.ceil(before / h), np.ceil((T + margins[1]) / h) + 1.0)
+        grid = h * np.arange(-np.ceil(before / h), np.ceil((T + after) / h) + 1.0)
         path = np.array([at(t)[0] for t in np.clip(grid, 0.0, T)]).reshape(-1, arm.n)
         found = _inverted(arm, h, path)
         status = TipStatus.NOT_FOUND if found is None else TipStatus.FOUND
@@ -208,17 +206,11 @@ def _inverted(arm: FlexibleRobot, h: float, path: Array) -> list[Array] | None:
         """Residuals (N, k), and their derivatives (N, k, k) by x, dx and ddx."""
         q, e = x[:, :n], x[:, n:]
         left, steps = forces(arm, x, dx, ddx)[0], _STEP * size
-        rows = [np.repeat(r, k, axis=0) for r in (x, dx, ddx)]
+        y, dy, ddy = (np.repeat(r, k, axis=0) for r in (x, dx, ddx))
         unit = np.tile(np.diag(steps), (N, 1))
-        moved = (
-            forces(arm, rows[0] + unit, *rows[1:]),
-            forces(arm, rows[0], rows[1] + unit, rows[2]),
-        )
-        K, C = (
-            ((Q.reshape(N, k, k) - left[:, None]) / steps[:, None]).swapaxes(1, 2) for Q, _ in moved
-        )
-        M = mass_matrix(arm, q, e)
-        T = dgm(arm, q, e)
+        moved = forces(arm, y + unit, dy, ddy)[0], forces(arm, y, dy + unit, ddy)[0]
+        K, C = ((Q.reshape(N, k, k) - left[:, None]) / steps[:, None] for Q in moved)
+        K, C, M, T = K.swapaxes(1, 2), C.swapaxes(1, 2), mass_matrix(arm, q, e), dgm(arm, q, e)
         R, W = T[:, :3, :3], wanted[:, :3, :3]
         turn = 0.5 * sum(cross(W[:, :, i], R[:, :, i]) for i in range(3))
         away = np.hstack([T[:, :3, 3] - wanted[:, :3, 3], turn])
