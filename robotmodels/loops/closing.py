@@ -148,6 +148,7 @@ def attempt(
 
 def without_turns(robot: LoopedRobot, q: Array, start: Array) -> Array:
     """The same postures (N, n), without whole turns that iterations added to the start."""
-    turns = np.round((q - start) / (2.0 * np.pi)) * (robot.cuts.chain.sigma != PRISMATIC)
+    table = robot.tree.table
+    turns = np.round((q - start) / (2.0 * np.pi)) * (table.sigma[table.joint_rows] != PRISMATIC)
     turns[:, robot.actuated] = 0.0
     return q - 2.0 * np.pi * turns

@@ -67,6 +67,7 @@ from .._arrays import Array, as_vector, batch_rows
 from ..drive import check_all_or_none
 from ..dynamics.inverse import rigid_torques, wrench_torque
 from ..errors import LoopError, SingularMassMatrixError
+from ..minimal_parameters.rules import reach
 from .constraints import checked, closure_rows, maps, row_rates
 from .robot import LoopedRobot, acting_rows, check_looped, scaled
 
@@ -216,7 +217,7 @@ class Engine:
         self.model: Any = twin.model.copy()
         self.model.armature = np.diag(self.rotor)[self.order].copy()
         models, self.datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-        along = pin.SE3(np.eye(3), np.array([0.0, 0.0, float(robot.cuts.length[0])]))
+        along = pin.SE3(np.eye(3), np.array([0.0, 0.0, reach(tree)]))
         acts = acting_rows(robot)
         for closure in robot.closures:
             tilts = [acts[robot.rows.index(row)] for row in closure.rows[3:5]]

@@ -26,25 +26,24 @@ from ..kernels.mass import POSITIVE, solve_definite
 
 
 class Cuts(NamedTuple):
-    """Closures as kernels take them: moving joints, the two frames of each closure, its joints.
+    """Closures as kernels take them: the tree, the two frames of each closure, its joints.
 
-    Shapes: first, second, rows (k,); rotation (2 k, 3, 3), position (2 k, 3); side (k n,), 1 or -1
-    for joints that move the second or the first frame alone; length (1,) of the robot; weight (c,).
+    Shapes: parent (2 k,), rotation (2 k, 3, 3), position (2 k, 3); rows (k,); side (k n,), 1 or -1
+    for joints that move the second or the first frame alone; units (n,); weight (c,).
     """
 
     chain: Chain
-    first: Ints
-    second: Ints
-    rows: Ints
+    parent: Ints
     rotation: Floats
     position: Floats
+    rows: Ints
     side: Ints
-    length: Floats
+    units: Floats
     weight: Floats
 
 
 CUTS = types.NamedTuple(
-    (nb.CHAIN, nb.INTS, nb.INTS, nb.INTS, nb.STACK, nb.MATRIX, nb.INTS, nb.VECTOR, nb.VECTOR), Cuts
+    (nb.CHAIN, nb.INTS, nb.STACK, nb.MATRIX, nb.INTS, nb.INTS, nb.VECTOR, nb.VECTOR), Cuts
 )
 CLOSED, CANNOT_CLOSE, NOT_CONVERGED, SINGULAR_THERE = 0, 1, 2, 3
 _CLOSED = 1e-13  # largest residual of closed loops, relative to the robot's size, or rad
@@ -56,10 +55,10 @@ _NEAR, _STRIDE = 0.01, 1.0  # squared error up to which actuated joints move on;
 
 
 @compiled(inlined=True)
-def frame_pose(cuts: Cuts, k: int, parent: int, R: Floats, p: Floats) -> tuple[Matrix, Vector]:
+def frame_pose(cuts: Cuts, k: int, R: Floats, p: Floats) -> tuple[Matrix, Vector]:
     """Pose of frame k of the closures."""
-    Rb = vec.matrix(R, parent)
-    at = vec.add(vec.vector(p, parent), vec.times(Rb, vec.vector(cuts.position, k)))
+    Rb = vec.matrix(R, cuts.parent[k])
+    at = vec.add(vec.vector(p, cuts.parent[k]), vec.times(Rb, vec.vector(cuts.position, k)))
     return vec.product(Rb, vec.matrix(cuts.rotation, k)), at
 
 
@@ -83,13 +82,13 @@ def rotation_error(rows: int, Ra: Matrix, Rb: Matrix) -> Vector:
 def closure_rows(q: Floats, i: int, cuts: Cuts, R: Floats, p: Floats, e: Floats, J: Floats) -> None:
     """Residuals e (c,) and Jacobian J (c, n) of all closures in sample i; R, p are scratch."""
     n, at = J.shape[1], 0
-    for j in range(n):
-        Rj, Pj = link_pose(cuts.chain, j, q, i)
-        carry_pose(cuts.chain, j, Rj, Pj, R, p)
+    for f in range(cuts.chain.sigma.shape[0]):
+        Rj, Pj = link_pose(cuts.chain, f, q, i)
+        carry_pose(cuts.chain, f, Rj, Pj, R, p)
     for k in range(cuts.rows.shape[0]):
         rows = cuts.rows[k]
-        Ra, pa = frame_pose(cuts, 2 * k, cuts.first[k], R, p)
-        Rb, pb = frame_pose(cuts, 2 * k + 1, cuts.second[k], R, p)
+        Ra, pa = frame_pose(cuts, 2 * k, R, p)
+        Rb, pb = frame_pose(cuts, 2 * k + 1, R, p)
         d = vec.transpose_times(Ra, vec.subtract(pb, pa))
         for x in range(3):
             e[at + x] = d[x]
@@ -97,14 +96,17 @@ def closure_rows(q: Floats, i: int, cuts: Cuts, R: Floats, p: Floats, e: Floats,
             d = rotation_error(rows, Ra, Rb)
             for x in range(3, rows):
                 e[at + x] = d[x - 3]
-        for j in range(n):
+        for f in range(cuts.chain.sigma.shape[0]):
+            j = cuts.chain.joint[f]
+            if j < 0:
+                continue
             side = float(cuts.side[k * n + j])
             linear = angular = (0.0, 0.0, 0.0)
             if side != 0.0:
-                axis = (R[j + 1, 0, 2], R[j + 1, 1, 2], R[j + 1, 2, 2])
+                axis = (R[f + 1, 0, 2], R[f + 1, 1, 2], R[f + 1, 2, 2])
                 linear = axis
-                if cuts.chain.sigma[j] == 0:
-                    linear = vec.cross(axis, vec.subtract(pb, vec.vector(p, j + 1)))
+                if cuts.chain.sigma[f] == 0:
+                    linear = vec.cross(axis, vec.subtract(pb, vec.vector(p, f + 1)))
                     angular = vec.scale(side, vec.transpose_times(Ra, axis))
                 linear = vec.scale(side, vec.transpose_times(Ra, linear))
             for x in range(3):
@@ -117,14 +119,14 @@ def closure_rows(q: Floats, i: int, cuts: Cuts, R: Floats, p: Floats, e: Floats,
 @compiled(nb.NOTHING(nb.MATRIX, CUTS, nb.OUT2, nb.OUT3))
 def closure_jacobians(q: Floats, cuts: Cuts, e: Floats, J: Floats) -> None:
     """Residuals e (N, c) of the closures and their Jacobians J (N, c, n) at q (N, n)."""
-    R, p = base_poses(q.shape[1])
+    R, p = base_poses(cuts.chain.sigma.shape[0])
     for i in range(q.shape[0]):
         closure_rows(q, i, cuts, R, p, e[i], J[i])
 
 
 @compiled()
 def base_poses(n: int) -> tuple[Floats, Floats]:
-    """Poses of the base in row 0, and space for n joints."""
+    """Pose of the base in row 0, and space for n frames."""
     R, p = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3))
     for x in range(3):
         R[0, x, x] = 1.0
@@ -180,8 +182,8 @@ def move_along(
     """Move the actuated joints of sample i towards the target; add what this opens to e (c,)."""
     furthest = 0.0
     for a in range(actuated.shape[0]):
-        unit = 1.0 if cuts.chain.sigma[actuated[a]] == 0 else cuts.length[0]
-        furthest = max(furthest, abs(target[i, a] - q[i, actuated[a]]) / unit)
+        by = abs(target[i, a] - q[i, actuated[a]]) / cuts.units[actuated[a]]
+        furthest = max(furthest, by)
     share = min(1.0, _STRIDE / furthest) if furthest > 0.0 else 1.0
     for a in range(actuated.shape[0]):
         j = actuated[a]
@@ -209,7 +211,7 @@ def closed_postures(
     move from the row to the target, else they are there from the start.
     """
     m, c = passive.shape[0], cuts.weight.shape[0]
-    R, p = base_poses(q.shape[1])
+    R, p = base_poses(cuts.chain.sigma.shape[0])
     e, J = np.empty(c), np.empty((c, q.shape[1]))
     N, L, x = np.empty((m, m)), np.empty((1, m, m)), np.empty((1, m))
     g, D, start, diagonal = np.empty(m), np.empty(m), np.empty(m), np.empty(m)

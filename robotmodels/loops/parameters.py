@@ -54,7 +54,7 @@ from ..estimation.columns import NOTHING
 from ..estimation.factor import triangles_of
 from ..minimal_parameters import BaseMethod, BaseParameters
 from ..minimal_parameters.numeric import TorqueColumns, residual_warning
-from ..minimal_parameters.rules import EARTH
+from ..minimal_parameters.rules import EARTH, reach
 from ..regressors.columns import Columns
 from .closing import ClosingStatus, attempt, close, without_turns
 from .constraints import checked, maps
@@ -203,6 +203,6 @@ def _motion(
         )
     G = maps(robot, q)[0]  # without the half that is nearest to dead points
     best = np.argsort(np.abs(G / robot.units[:, None]).max(axis=(1, 2)))[:count]
-    rate = np.sqrt(EARTH / robot.cuts.length[0])
+    rate = np.sqrt(EARTH / reach(robot.tree))
     v_a, a_a = rng.uniform(-1.0, 1.0, (2, count, len(actuated))) * units
     return lifted(robot, q[best], rate * v_a, rate**2 * a_a)[:3]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Value, as_floats, read_only
 from ..errors import InvalidValueError, LoopError
-from ..geometry import FIXED, PRISMATIC, constant_factors
-from ..kernels import Chain
+from ..geometry import PRISMATIC
 from ..minimal_parameters.rules import reach
 from ..model import RobotModel
 
@@ -141,7 +140,7 @@ class LoopedRobot(Value):
             "closures": closures,
             "actuated": actuated,
             "passive": read_only(np.setdiff1d(np.arange(tree.n), actuated), np.int64),
-            "units": read_only(np.where(cuts.chain.sigma == PRISMATIC, cuts.length, 1.0)),
+            "units": cuts.units,
             "rows": tuple(row for closure in closures for row in closure.rows),
             "cuts": cuts,
             "scratch": threading.local(),
@@ -204,42 +203,20 @@ def _cuts(tree: RobotModel, closures: tuple[Closure, ...]) -> Any:
     """Arrays of closures."""
     from .kernels import Cuts
 
-    size, moving = reach(tree), tree.table.joint_rows + 1
-    chain, body, pose = _moving_chain(tree)
+    size, table = reach(tree), tree.table
     places = [tree.twin.frame(frame) for closure in closures for frame in closure.frames]
-    parents = [body[x.parent] for x in places]
-    R = [pose[x.parent][:3, :3] @ x.rotation for x in places]
-    p = [pose[x.parent][:3, :3] @ x.position + pose[x.parent][:3, 3] for x in places]
-    paths = [np.isin(moving, x.path).astype(int) for x in places]
+    paths = [np.isin(table.joint_rows + 1, x.path).astype(int) for x in places]
     weight = [[1.0 / size**2] * 3 + [1.0] * (ROWS[c.kind] - 3) for c in closures]
     return Cuts(
-        chain=chain,
-        first=read_only(parents[::2], np.int64),
-        second=read_only(parents[1::2], np.int64),
+        chain=tree.chain,
+        parent=read_only([x.parent for x in places], np.int64),
+        rotation=read_only(np.reshape([x.rotation for x in places], (-1, 3, 3))),
+        position=read_only(np.reshape([x.position for x in places], (-1, 3))),
         rows=read_only([ROWS[c.kind] for c in closures], np.int64),
-        rotation=read_only(np.reshape(R, (-1, 3, 3))),
-        position=read_only(np.reshape(p, (-1, 3))),
         side=read_only(np.ravel(np.subtract(paths[1::2], paths[::2])), np.int64),
-        length=read_only([size]),
+        units=read_only(np.where(table.sigma[table.joint_rows] == PRISMATIC, size, 1.0)),
         weight=read_only(np.concatenate([[], *weight])),
     )
-
-
-def _moving_chain(tree: RobotModel) -> tuple[Chain, list[int], list[Array]]:
-    """Chain of the moving joints alone; of each frame, R_0 first, its joint and its pose on it."""
-    body, pose, antecedent, constants = [0], [np.eye(4)], [], []
-    table = tree.table
-    for sigma, a, C in zip(table.sigma, table.antecedent, constant_factors(table), strict=True):
-        at = pose[a] @ C
-        if sigma != FIXED:
-            antecedent.append(body[a])
-            constants.append(at)
-        body.append(body[a] if sigma == FIXED else len(constants))
-        pose.append(at if sigma == FIXED else np.eye(4))
-    T, sigma = np.array(constants).reshape(-1, 4, 4), table.sigma[table.joint_rows]
-    structure = [read_only(x, np.int64) for x in (antecedent, sigma, np.arange(tree.n))]
-    places = [read_only(x) for x in (T[:, :3, :3], T[:, :3, 3], np.eye(3), np.zeros(3))]
-    return Chain(*structure, *places), body, pose  # type: ignore[arg-type]
 
 
 def acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
