@@ -112,8 +112,8 @@ def as_number(
         and (below is None or number < below)
     )
     if not fits:
-        words = " and ".join(text.format(bound) for bound, text in bounds if bound is not None)
-        raise InvalidValueError(f"{name}: expected a finite number {words}, got {value!r:.80}.")
+        words = " and".join(f" {text.format(x)}" for x, text in bounds if x is not None)
+        raise InvalidValueError(f"{name}: expected a finite number{words}, got {value!r:.80}.")
     return number
 
 
