@@ -206,7 +206,7 @@ def checked_rows(
     vectors: Any = [
         np.zeros(sizes[name])
         if x is None and name not in _NEEDED
-        else as_vector(x, sizes[name], name)
+        else as_vector(x, sizes[name], name)  # type: ignore[arg-type]
         for name, x in given.items()
     ]
     if any(vector.ndim > 1 for vector in vectors):

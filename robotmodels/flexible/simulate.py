@@ -218,7 +218,7 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
         with suppress(TypeError, ValueError):  # another number of arguments
             signature(law).bind(*range(count))
             return lambda t, q, e, v, ev: as_exact(
-                law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1])),
+                law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1])),  # type: ignore[reportArgumentType]
                 (size,),
                 f"{name} at t = {t:.9g} s",
             )
