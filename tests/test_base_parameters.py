@@ -118,7 +118,7 @@ DRIVES = (
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
 def test_rules_and_numbers_agree_on_random_robots(build):
     rng = np.random.default_rng(7)
-    for k in range(100):
+    for k in range(70):
         model = build(rng)
         rules, _ = by_both(model, rng, drive=DRIVES[k % len(DRIVES)])
         if k % 5 == 0:
@@ -145,7 +145,7 @@ def moved(model, rng, angles, lengths=0.0, share=1.0):
 def test_methods_agree_on_what_is_nearly_aligned():
     """Angles and lengths from rounding to a hundredth decide nothing about the torques."""
     rng = np.random.default_rng(11)
-    for _ in range(40):
+    for _ in range(20):
         off = 10.0 ** rng.uniform(-13.0, -2.0)
         model = moved(right_angled_robot(rng), rng, off, off, 0.4)
         for tolerance in (None, 1e-11):
@@ -157,7 +157,7 @@ def test_methods_agree_on_what_is_nearly_aligned():
 def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
     rng = np.random.default_rng(12)
     apart = 0
-    for _ in range(20):
+    for _ in range(10):
         model = right_angled_robot(rng)
         rounded = moved(model, rng, 9e-6)
         for meant, base in zip(by_both(model, rng), by_both(rounded, rng), strict=True):
@@ -174,7 +174,7 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
         exact, _ = by_both(rounded, rng, tolerance=1e-11, within=3e-10)
         assert turned(exact) < 1e-10
         apart += len(exact) > len(meant)
-    assert apart > 5
+    assert apart > 2
 
 
 def test_gravity_and_the_first_axis_are_aligned_in_any_base(rng):

@@ -187,7 +187,7 @@ def test_the_wrong_one_of_two_distances_is_named(seed):
     assert "point:0 to point:2" in note
 
 
-@pytest.mark.parametrize("seed", [0, 3, 7])
+@pytest.mark.parametrize("seed", [0, 7])
 def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)
     q, labels = [], []

@@ -240,7 +240,10 @@ def test_instruments_and_didim_recover_exact_parameters(kind):
         assert not any(array.flags.writeable for array in arrays)
 
 
-@pytest.mark.parametrize(("kind", "output"), [("prismatic", "both"), ("tree", "torque")])
+@pytest.mark.parametrize(
+    ("kind", "output"),
+    [("prismatic", "both"), pytest.param("tree", "torque", marks=pytest.mark.nightly)],
+)
 def test_output_error_recovers_exact_parameters(kind, output):
     arm, control, log, width = recorded(kind, 1.2, 4e-3, substeps=2)
     system, factors, truth = problem(arm, log, width)
