@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from robotmodels import parallel as pr
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.parallel import kernels_homotopy
 
 TURN = np.deg2rad([-90.0, 30.0, 150.0])
 RING = np.c_[np.cos(TURN), np.sin(TURN), 0.0 * TURN]
@@ -208,6 +209,30 @@ def test_forty_assembly_modes_of_dietmaier():
     apart = np.abs(modes.T[:, None] - modes.T).max(axis=(-1, -2)) + 9.0 * np.eye(40)
     assert apart.min() > 1e-3
     assert modes.status == pr.AssemblyStatus.ALL
+
+
+def test_paths_that_jumped_are_tracked_again(monkeypatch):
+    attempts, paths = [], kernels_homotopy.paths
+
+    def jumping(*arguments):
+        paths(*arguments)
+        if not attempts:  # a real end, whose conjugate is itself, is found twice and another lost
+            arguments[-2][0, 0] = arguments[-2][0, 1]
+        attempts.append(len(arguments[0]))
+
+    monkeypatch.setattr(kernels_homotopy, "paths", jumping)
+    base, platform, lengths = map(np.array, DIETMAIER)
+    assert pr.assembly_modes(pr.gough(base, platform), lengths).count == 40
+    assert sum(attempts) == 2
+
+
+def test_robots_that_are_singular_everywhere_are_degenerate():
+    rng = np.random.default_rng(0)
+    line = rng.normal(size=(6, 1)) * rng.normal(size=3)
+    ring = GOOD.base
+    for base, platform in ((line, rng.normal(size=(6, 3))), (ring, ring), (ring, 0.5 * ring)):
+        modes = pr.assembly_modes(pr.gough(base, platform), [1.0, 1.0, 1.0, 1.0, 1.0, 1.1])
+        assert modes.status == pr.AssemblyStatus.DEGENERATE
 
 
 def test_stored_solutions_are_forty_of_one_member():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -43,8 +44,14 @@ class Frozen(Rebuilt):
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        for field in fields(self):  # type: ignore[arg-type]
-            object.__setattr__(self, field.name, _kept(getattr(self, field.name)))
+        for name in _names(type(self)):
+            object.__setattr__(self, name, _kept(getattr(self, name)))
+
+
+@cache
+def _names(kind: type) -> tuple[str, ...]:
+    """Names of the fields of a dataclass."""
+    return tuple(field.name for field in fields(kind))  # type: ignore[arg-type]
 
 
 def _kept(value: Any) -> Any:

@@ -120,19 +120,20 @@ def ddm(
         Accelerations, rad/s^2 or m/s^2.
     """
     try:  # one sample given as arrays, of a robot without drives whose engine is made: no calls
-        model, data, models, datas, settings, full, places, order, back = robot.scratch.quick
+        model, data, models, datas, settings, full, places, order, back, n, n_a = (
+            robot.scratch.quick
+        )
         if (
-            q.shape == v.shape == full.shape  # type: ignore[union-attr]
-            and tau.shape == places.shape  # type: ignore[union-attr]
+            q.shape == v.shape == n  # type: ignore[union-attr]
+            and tau.shape == n_a  # type: ignore[union-attr]
             and q.dtype is v.dtype is tau.dtype is _FLOAT64  # type: ignore[union-attr]
             and drive is True
             and wrench is None
         ):
             full[places] = tau
-            x, y = (q, v) if order is None else (q[order], v[order])  # type: ignore[index]
-            a = _solve(model, data, x, y, full, models, datas, settings)
+            a = _solve(model, data, q[order], v[order], full, models, datas, settings)  # type: ignore[index]
             if settings.relative_residual <= _LEFT and isfinite(sum(a.tolist())):
-                return a if order is None else a[back]
+                return a[back]
     except AttributeError:
         pass
     check_looped(robot)
@@ -262,10 +263,10 @@ def engine_of(robot: LoopedRobot, drive: bool = True) -> Engine:
         engine = Engine(robot, drive)
         setattr(scratch, name, engine)
         if drive and engine.serves and robot.tree.drive_matrices is None:
-            order, places = (engine.order, engine.back), engine.back[robot.actuated]
             parts = engine.model, engine.data, engine.models, engine.datas, engine.settings
-            turned = (None, None) if robot.tree.twin.in_table_order else order
-            scratch.quick = (*parts, np.zeros(robot.n), places, *turned)
+            full, places = np.zeros(robot.n), engine.back[robot.actuated]
+            orders, shapes = (engine.order, engine.back), (full.shape, places.shape)
+            scratch.quick = (*parts, full, places, *orders, *shapes)
     engine: Engine = getattr(scratch, name)
     return engine
 

@@ -31,48 +31,13 @@ from .velocities import (
 )
 from .workspace import PlatformWorkspace, workspace
 
-__all__ = [
-    "AssemblyModes",
-    "AssemblyStatus",
-    "Family",
-    "ForceStatus",
-    "LegForces",
-    "LegSolutions",
-    "LegStatus",
-    "LoopedPlatform",
-    "MotionStatus",
-    "ParallelMotion",
-    "ParallelRobot",
-    "PlatformPoses",
-    "PlatformWorkspace",
-    "PoseStatus",
-    "Singularity",
-    "SingularityKind",
-    "assembly_modes",
-    "classify_singularity",
-    "condition",
-    "ddm",
-    "delta",
-    "determinant",
-    "dgm",
-    "dkm",
-    "dkm_second_order",
-    "energies",
-    "five_bar",
-    "from_loops",
-    "gough",
-    "gough_symmetric",
-    "idm",
-    "igm",
-    "ikm",
-    "ikm_second_order",
-    "inverse_jacobian",
-    "inverse_jacobian_rate",
-    "leg_forces",
-    "maneuverability",
-    "planar_3rpr",
-    "planar_3rrr",
-    "simulate",
-    "stiffness",
-    "workspace",
-]
+__all__ = ["Family", "ParallelRobot", "LoopedPlatform", "gough", "gough_symmetric", "planar_3rpr"]
+__all__ += ["planar_3rrr", "five_bar", "delta", "from_loops"]
+__all__ += ["igm", "dgm", "assembly_modes", "LegSolutions", "LegStatus", "PlatformPoses"]
+__all__ += ["PoseStatus", "AssemblyModes", "AssemblyStatus"]
+__all__ += ["inverse_jacobian", "inverse_jacobian_rate", "ikm", "dkm", "ikm_second_order"]
+__all__ += ["dkm_second_order", "determinant"]
+__all__ += ["leg_forces", "LegForces", "ForceStatus", "stiffness", "maneuverability", "condition"]
+__all__ += ["classify_singularity", "Singularity", "SingularityKind", "workspace"]
+__all__ += ["PlatformWorkspace"]
+__all__ += ["idm", "ddm", "energies", "simulate", "ParallelMotion", "MotionStatus"]

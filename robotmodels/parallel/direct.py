@@ -67,6 +67,8 @@ from .families import height_above
 from .legs import Found, Robot, is_looped, rods
 from .robot import Family, ParallelRobot, PlatformResult
 
+_PLANE = np.array(Family.PLANAR_3RPR.value[1])  # components of a twist in the plane
+
 
 class PoseStatus(Outcome):
     """Outcome of an iterative direct model."""
@@ -148,34 +150,35 @@ def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
     """All assembly modes (all solutions of the direct geometric model)."""
     looped = is_looped(robot)
     q = as_vector(q, robot.m, "q") if looped else checked_actuators(robot, q)
-    batch, rows = q.shape[:-1], np.ascontiguousarray(q.reshape(-1, robot.m))
+    T, residual, det, status, complex_count = _found(robot, q.reshape(-1, robot.m))
+    batch = q.shape[:-1]
+    valid = residual == residual  # NaN where there is none
+    count = int(valid.sum(axis=1).max(initial=0))
+    cut: Any = (x[:, :count] for x in (T, valid, residual, det))
+    if len(batch) != 1:
+        cut = (x.reshape(*batch, *x.shape[1:]) for x in cut)
+    return AssemblyModes(*cut, status.reshape(batch), complex_count.reshape(batch))
+
+
+def _found(robot: Robot, q: Array) -> Found:
+    """Assembly modes of rows q (N, m), by the method of the family."""
     if is_looped(robot):
-        found = robot.assemblies(rows)
-    elif robot.family is Family.GOUGH:
+        return robot.assemblies(q)
+    if robot.family is Family.GOUGH:
         from .homotopy import spatial
 
-        found = spatial(robot, rows)
-    else:
-        found = (_planar if robot.m == 3 and 5 in robot.columns else _spheres)(robot, rows)
-    T, residual, det, status, complex_count = found
-    valid = ~np.isnan(residual)
-    count = int(valid.sum(axis=1).max(initial=0))
-    cut: Any = [
-        x[:, :count].reshape(*batch, count, *x.shape[2:]) for x in (T, valid, residual, det)
-    ]
-    poses, valid, residual, det = cut
-    count, status = complex_count.reshape(batch), status.reshape(batch)
-    return AssemblyModes(poses, valid, residual, det, status, count)
+        return spatial(robot, q)
+    turns = robot.family in (Family.PLANAR_3RPR, Family.PLANAR_3RRR)
+    return _planar(robot, q) if turns else _spheres(robot, q)
 
 
 def _planar(robot: ParallelRobot, q: Array) -> Found:
     """Three legs in the plane."""
     from .kernels import planar
 
-    N = len(q)
-    T, residual, det, out = (np.empty((N, *shape)) for shape in ((6, 4, 4), (6,), (6,), (2,)))
-    planar(*rods(robot, q), robot.home, np.array(robot.columns), T, residual, det, out)
-    return T, residual, det, out[:, 0].astype(np.int8), out[:, 1].astype(np.int64)
+    T, values, out = np.empty((len(q), 6, 4, 4)), np.empty((2, len(q), 6)), np.empty((len(q), 2))
+    planar(*rods(robot, q), robot.home, _PLANE, T, *values, out)
+    return T, *values, out[:, 0].astype(np.int8), out[:, 1].astype(np.int64)
 
 
 def _spheres(robot: ParallelRobot, q: Array) -> Found:
@@ -216,10 +219,10 @@ def _spheres(robot: ParallelRobot, q: Array) -> Found:
 def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
     """Actuated lengths or angles, lengths not negative. Shapes: -> (..., m)."""
     q = as_bounded(as_vector(q, robot.m, "q"), "q", LARGEST)
-    if not robot.has_cranks and (q < 0.0).any():
+    if not robot.has_cranks and (least := q.min(initial=0.0)) < 0.0:
         raise InvalidValueError(
             f"q: expected lengths of legs in metres that are not negative (not strokes), got "
-            f"{q.min():.6g}."
+            f"{least:.6g}."
         )
     return q
 

@@ -132,9 +132,9 @@ def knees(robot: ParallelRobot, q: Array) -> Array:
 
 def rods(robot: ParallelRobot, q: Array) -> tuple[Array, Array, Array]:
     """Ends and lengths of the rods with locked actuators. Shapes: (N, m) -> (N, m, 3), ..."""
-    c = np.ascontiguousarray(knees(robot, q))
-    lengths = np.broadcast_to(robot.rod, q.shape) if robot.has_cranks else q
-    return c, robot.platform, np.ascontiguousarray(lengths)
+    if not robot.has_cranks:
+        return robot.base[None].repeat(len(q), axis=0), robot.platform, np.ascontiguousarray(q)
+    return knees(robot, q), robot.platform, robot.rod[None].repeat(len(q), axis=0)
 
 
 def _radial(robot: ParallelRobot, q: Array) -> Array:
@@ -199,13 +199,13 @@ def within(robot: ParallelRobot, q: Array) -> NDArray[np.bool_]:
 
 def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
     """Whether a parallel robot is one of loops; raises for other objects and modes of loops."""
-    if not isinstance(robot, ParallelRobot | LoopedPlatform):
+    if isinstance(robot, ParallelRobot):
+        return False
+    if not isinstance(robot, LoopedPlatform):
         raise InvalidValueError(
             "robot: expected a parallel robot, as made by parallel.gough and others, got "
             f"{type(robot).__name__}."
         )
-    if isinstance(robot, ParallelRobot):
-        return False
     if mode is not None and np.any(as_reals(mode, "mode") != 0):
         raise InvalidValueError(
             f"mode: a robot from from_loops has the working mode of its home alone, got "
@@ -216,10 +216,8 @@ def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
 
 def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArray[np.int64]:
     """Checked working modes of N poses. Shapes: -> (N,)."""
-    given, most = (
-        as_reals(0 if mode is None else mode, "mode"),
-        2**robot.m if robot.has_cranks else 1,
-    )
+    given = as_reals(0 if mode is None else mode, "mode")
+    most = 2**robot.m if robot.has_cranks else 1
     if not np.isin(given, np.arange(most)).all():
         raise InvalidValueError(
             f"mode: expected whole numbers from 0 to {most - 1}, as igm(robot, T).mode numbers the "
