@@ -1019,7 +1019,7 @@ MUTATIONS = [
         "tests/test_calibration_mistakes.py -k missing"),
     Mutation("calibration: measurements", "lengths are scaled to the wrong side", "class UnitError",
         "1.0 / _SLIPS[self.unit, self.taken]", "_SLIPS[self.unit, self.taken]",
-        "tests/test_calibration_mistakes.py -k unit_of_lengths"),
+        "tests/test_calibration_mistakes.py -k (unit_of_lengths and 1000)"),
     Mutation("calibration: measurements", "upper limits are not looked at", "def beyond_limits(",
         "np.maximum(lower - q, q - upper)", "lower - q",
         "tests/test_calibration_mistakes.py -k limits"),
