@@ -1007,7 +1007,7 @@ MUTATIONS = [
         "tests/test_calibration_next_term.py -k posture_share"),
     Mutation("calibration: structure of residuals", "the term with the least gain is the first",
         "def trials_of(", "-trial.gain", "trial.gain",
-        "tests/test_calibration_next_term.py -k (named_first and compliance)"),
+        "tests/test_calibration_next_term.py -k (named_first and eccentricity)", True),
     Mutation("calibration: measurements", "residuals move the wrong way without a measurement",
         "def toggle(self, blocks", "self.r -= sign *", "self.r += sign *",
         "tests/test_calibration_mistakes.py -k outliers_under_squares"),
