@@ -360,6 +360,8 @@ def test_velocities_that_no_acceleration_continues_are_refused(rng):
         with pytest.raises(LoopError, match="velocities violate"):
             loops.ddm(robot, q, v, np.ones(1))
     assert np.isfinite(loops.ddm(robot, q, 0.0 * q, np.ones(1))).all()
+    with pytest.raises(InvalidValueError, match="check the units"):
+        loops.ddm(robot, q, np.full(robot.n, 1e200), np.ones(1))
 
 
 def test_massless_links_and_singular_masses(rng):

@@ -66,7 +66,7 @@ from .. import dynamics
 from .._arrays import Array, as_vector, batch_rows
 from ..drive import check_all_or_none
 from ..dynamics.inverse import rigid_torques, wrench_torque
-from ..errors import LoopError, SingularMassMatrixError
+from ..errors import InvalidValueError, LoopError, SingularMassMatrixError
 from ..minimal_parameters.rules import reach
 from .constraints import checked, closure_rows, maps, row_rates
 from .robot import LoopedRobot, acting_rows, check_looped, scaled
@@ -316,5 +316,11 @@ def accelerations(robot: LoopedRobot, engine: Engine, q: Array, v: Array, tau: A
             out[i] = a
     if left:
         q, v, tau = (x[left] for x in rows)
-        out[left] = projected(robot, q, v, tau, engine)
+        with np.errstate(over="ignore", invalid="ignore"):
+            out[left] = projected(robot, q, v, tau, engine)
+    if not np.isfinite(out).all():
+        most = max(float(np.abs(x).max()) for x in rows)
+        raise InvalidValueError(
+            f"q, v, tau: entries up to {most:.3g} give no finite accelerations; check the units."
+        )
     return out.reshape(*batch, robot.n)
