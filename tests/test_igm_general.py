@@ -190,7 +190,7 @@ def test_the_sixteen_postures_of_manocha_and_canny():
 def test_random_arms_give_back_every_configuration(slide):
     chain = random_arm(10, tuple(int(k == slide) for k in range(6)))
     solver = solver_of(chain)
-    assert solver is not None
+    assert solver.well_conditioned
     q0 = draw(chain, 300, np.random.default_rng(3))
     U = poses(chain, q0)
     q, valid, double = elimination_solutions(solver, U)
@@ -245,7 +245,7 @@ def test_no_root_is_missing_on_random_arms():
 def test_offset_wrists(name, most):
     chain = arm(name)
     solver = solver_of(chain)
-    assert solver is not None
+    assert solver.well_conditioned
     q0 = draw(chain, 500, np.random.default_rng(4))
     U = poses(chain, q0)
     q, valid, double = elimination_solutions(solver, U)
@@ -253,6 +253,12 @@ def test_offset_wrists(name, most):
     assert lost(chain, q0, q, valid) == 0
     assert np.all((valid.sum(axis=1) + double.sum(axis=1)) % 2 == 0)
     assert valid.sum(axis=1).max() >= most
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "ur10e", "rx90", "irb120", "stanford_arm"])
+def test_arms_with_structure_are_recognised(name):
+    solver = solver_of(arm(name))
+    assert solver is None or not solver.well_conditioned
 
 
 # --- singular poses ------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from .._arrays import Array
 from .check import checked
 from .loop import JointChain
 from .postures import Postures, assembled
-from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
+from .solver import Tolerances, postures
 from .structure import Family, LoopPlan, plan_loop
 
 MOST = 8  # postures of one pose
@@ -37,11 +37,6 @@ def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
     """The closed form of a six-joint arm, None if it has none."""
     plan = plan_loop(chain)
     return None if plan is None else ClosedForm(chain, plan)
-
-
-@prepare_alike.register
-def _(known: ClosedForm, chain: JointChain, prepare: Prepare) -> Solver | None:
-    return prepare_closed_form(chain) or prepare(chain)
 
 
 @postures.register

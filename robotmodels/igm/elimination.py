@@ -2,8 +2,8 @@
 
 The method needs no special axes, and is the worse the more special they are: with a spherical
 wrist or three parallel axes its equations become dependent. Pieper's and Paul's methods serve
-those arms, and a self-test refuses them here. Near singular poses solutions may be missing: the
-partner of a fold is predicted, self-motions are not followed.
+those arms; `EliminationArm.well_conditioned` tests whether this one may. Near singular poses
+solutions may be missing: the partner of a fold is predicted, self-motions are not followed.
 
 References
 ----------
@@ -23,13 +23,12 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, read_only
 from .chain import canonical_frames
 from .check import checked
-from .closed_form import prepare_closed_form
 from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
-from .postures import Postures, difference
+from .postures import Postures
 from .singular import singular_postures
-from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
+from .solver import Tolerances, postures
 
 MOST = 16  # solutions a six-joint arm can have at one pose
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
@@ -38,12 +37,18 @@ TESTS = 48  # random poses of the self-test
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EliminationArm:
-    """Six-joint arm; ``scaled``: the chain with frames slid together, in units of ``unit`` m."""
+    """Six-joint arm solved by elimination, with the results of its self-test.
+
+    ``scaled`` is the chain with frames slid together, in units of ``unit`` metres.
+    """
 
     chain: JointChain
     scaled: JointChain
     unit: float
     forms: tuple[Form, ...]
+    conditioning: float = np.inf
+    doubtful: int = 0
+    missed: int = 0
 
     @property
     def method(self) -> str:
@@ -52,21 +57,35 @@ class EliminationArm:
             "six joints, at most one prismatic: elimination, up to 16 solutions (Raghavan and Roth)"
         )
 
+    @property
+    def well_conditioned(self) -> bool:
+        """Whether the self-test missed nothing, seldom needed other forms, and moved little."""
+        return self.missed == 0 and 4 * self.doubtful <= TESTS and self.conditioning < 1e-6
+
 
 def prepare_elimination(chain: JointChain) -> EliminationArm | None:
-    """The best forms of a six-joint arm; None if they miss one of some random configurations."""
+    """Choose the best forms of a six-joint arm and test them on random configurations."""
     if chain.k != 6 or int(np.sum(chain.sigma == 1)) > 1:
         return None
     rng = np.random.default_rng(0)
     arm = with_forms_of((), chain)
     few, many = (random_postures(arm.scaled, N, rng) for N in (8, TESTS))
-    arm = replace(arm, forms=ranked_forms(arm.scaled, arm.unit, tool_poses(arm.scaled, few)))
-    found = _solved(arm, tool_poses(arm.scaled, many))
-    away = np.abs(difference(chain.sigma, found.q, many[:, None])).max(axis=2)
-    nearest = np.min(np.where(found.present, away, np.inf), axis=1)
+    forms = ranked_forms(arm.scaled, arm.unit, tool_poses(arm.scaled, few))
+    if not forms:
+        return None
+    arm, poses = replace(arm, forms=forms), tool_poses(arm.scaled, many)
+    doubtful, moved = solve_form(arm.scaled, arm.unit, forms[0], poses, Roots(TESTS))
+    found = _solved(arm, poses)
+    away = found.q - many[:, None]
+    away -= 2.0 * np.pi * np.where(chain.sigma == 0, np.rint(away / (2.0 * np.pi)), 0.0)
+    nearest = np.min(np.where(found.present, np.abs(away).max(axis=2), np.inf), axis=1)
     odd = (found.count + np.sum(found.double, axis=1)) % 2 == 1
-    # accepted also where most poses need further forms: it is slow but complete
-    return None if np.any((nearest > 1e-5) | odd) else arm
+    return replace(
+        arm,
+        conditioning=float(np.sort(moved)[(9 * TESTS) // 10]),
+        doubtful=int(np.sum(doubtful)),
+        missed=int(np.sum((nearest > 1e-5) | odd)),
+    )
 
 
 def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
@@ -98,11 +117,6 @@ def elimination_solutions(
         q[rows][present] = found.q[:, :MOST][present]
     q[:, :, arm.chain.sigma == 1] *= arm.unit
     return q, valid, double
-
-
-@prepare_alike.register
-def _(known: EliminationArm, chain: JointChain, prepare: Prepare) -> Solver | None:
-    return prepare_closed_form(chain) or with_forms_of(known.forms, chain)
 
 
 @postures.register

@@ -18,7 +18,7 @@ from .loop import JointChain
 from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
-from .relations import prepare_related
+from .relations import Related, prepare_related
 from .request import Task
 from .search import ManyStarts, prepare_many_starts
 from .solver import Solver
@@ -67,8 +67,14 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
 
 def _of_six_joints(chain: JointChain) -> Solver | None:
     """Closed forms first, then elimination and search."""
-    solver = prepare_closed_form(chain) or prepare_elimination(chain)
-    return solver or prepare_many_starts(constraints(chain))
+    solver = prepare_closed_form(chain)
+    if solver is not None:
+        return solver
+    elimination = prepare_elimination(chain)
+    # accepted also where most poses need further forms: it is slow but complete
+    if elimination is not None and elimination.missed == 0:
+        return elimination
+    return prepare_many_starts(constraints(chain))
 
 
 def may_miss_solutions(
@@ -96,4 +102,4 @@ def _searches(solver: Solver) -> bool:
         return _searches(solver.inner)
     if isinstance(solver, FewerJoints):
         return any(_searches(way.solver) for way in solver.ways)
-    return isinstance(solver, (ManyStarts, OneAxis, Redundant))
+    return isinstance(solver, (ManyStarts, Related, OneAxis, Redundant))

@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from .. import se3
 from .._arrays import Array
 from ..se3.orientation import quaternions_of
+from .alike import prepare_alike
 from .chain import VirtualJoint, with_virtual_joints
 from .check import checked
 from .constraints import WHOLE, Components, constraints, mask_axes
@@ -31,7 +32,7 @@ from .motion import jacobians, lever, random_postures, scaled, singular_rows, to
 from .position import prepare_position
 from .postures import MERGE, Postures, assembled, difference, no_postures, side_by_side
 from .search import classified, prepare_many_starts
-from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
+from .solver import Prepare, Solver, Tolerances, postures
 from .virtual_joints import Placement, loose_placements, placements, virtual_joints
 
 KEPT = 3  # extensions kept

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .._arrays import Array
+from .alike import prepare_alike
 from .chain import locked_chain, without_end
 from .constraints import WHOLE, Components, constraints
 from .loop import JointChain
 from .motion import poses_and_jacobians, random_postures
 from .postures import Postures, assembled, difference, side_by_side
 from .search import PATH, collected, nearest_value, refined
-from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
+from .solver import Prepare, Solver, Tolerances, postures
 
 DEPENDENT = 1e-9  # singular values beside the largest that count as zero at any configuration
 SHARE = 1e-6  # part of a joint in a null direction that counts

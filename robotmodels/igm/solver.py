@@ -50,9 +50,3 @@ Prepare = Callable[[JointChain], "Solver | None"]
 def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     """All postures of poses by a prepared solver. Shapes: U (N, 4, 4), references (N, k)."""
     raise TypeError(f"no solver is registered for {type(solver).__name__}")
-
-
-@singledispatch
-def prepare_alike(known: Solver, chain: JointChain, prepare: Prepare) -> Solver | None:
-    """Prepare a solver for a chain that differs in numbers only: no choice and test anew."""
-    return prepare(chain)
