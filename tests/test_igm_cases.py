@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
 from robotmodels import se3
-from robotmodels.igm.closed_form import prepare_closed_form
+from robotmodels.igm.closed_form import closed_form_postures, plan_loop
 from robotmodels.igm.kernels.elimination import eigenproblems
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.pose_search import SearchTask, pose_search, search_space
-from robotmodels.igm.solver import Tolerances, postures
+from robotmodels.igm.solver import Tolerances
 
 SERVED = ("rx90", "stanford_arm", "irb140", "ur5", "ur10e", "gantry")
 
@@ -42,20 +42,20 @@ def check(model, rng):
     q = rng.uniform(-2.0, 2.0, 6)
     q[chain.sigma == 1] *= 0.2
     T = rm.dgm(model, q)
-    found = postures(prepare_closed_form(chain), T[None], q[None], Tolerances())
-    rows = found.q[found.valid]
-    assert len(rows) > 1
-    assert not found.free.any()
-    np.testing.assert_allclose(rm.dgm(model, rows), np.broadcast_to(T, (len(rows), 4, 4)),
+    found, valid, free = closed_form_postures(plan_loop(chain), chain, T[None], q[None])
+    postures = found[0][valid[0]]
+    assert len(postures) > 1
+    assert not free.any()
+    np.testing.assert_allclose(rm.dgm(model, postures), np.broadcast_to(T, (len(postures), 4, 4)),
                                rtol=0, atol=1e-9)  # fmt: skip
-    apart = rows - q
+    apart = postures - q
     turning = chain.sigma == 0
     apart[:, turning] = (apart[:, turning] + np.pi) % (2.0 * np.pi) - np.pi
     assert np.abs(apart).max(axis=1).min() < 1e-8
     # none is found twice
-    between = rows[:, None] - rows
+    between = postures[:, None] - postures
     between[..., turning] = (between[..., turning] + np.pi) % (2.0 * np.pi) - np.pi
-    assert np.abs(between).max(axis=-1)[np.triu_indices(len(rows), 1)].min() > 1e-6
+    assert np.abs(between).max(axis=-1)[np.triu_indices(len(postures), 1)].min() > 1e-6
 
 
 @pytest.mark.parametrize("swapped", [0, 1])

@@ -9,9 +9,8 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import robotmodels as rm
-from robotmodels.igm.closed_form import prepare_closed_form
+from robotmodels.igm.closed_form import closed_form_postures, plan_loop
 from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.igm.structure import Family
 from robotmodels.robots import load
 
@@ -33,7 +32,7 @@ ORACLES = Path(__file__).parent / "oracles"
 @cache
 def arm(name):
     chain = joint_chain(load(name))
-    return chain, prepare_closed_form(chain)
+    return chain, plan_loop(chain)
 
 
 def poses(chain, q):
@@ -74,31 +73,18 @@ def gaps(chain, found, q):
     return np.abs(np.where(chain.sigma == 0, (d + np.pi) % (2 * np.pi) - np.pi, d)).max(axis=-1)
 
 
-def solved(name, q):
-    """Postures of the poses of q by the closed form; every one of them meets its pose."""
-    chain, solver = arm(name)
-    found = postures(solver, poses(chain, q), np.zeros_like(q), Tolerances())
-    return checked(chain, q, found.q, found.valid)
-
-
-def checked(chain, q, found, valid):
-    error = np.abs(poses(chain, found) - poses(chain, q)[:, None]).max(axis=(-1, -2))
+def solved(name, q, references=None):
+    """Postures of the poses of q; every one of them meets its pose."""
+    chain, plan = arm(name)
+    U = poses(chain, q)
+    found, valid, free = closed_form_postures(plan, chain, U, references)
+    error = np.abs(poses(chain, found) - U[:, None]).max(axis=(-1, -2))
     assert np.all(np.isnan(found) == ~valid[..., None])
     assert np.all(np.diff(valid.astype(int), axis=1) <= 0)
     turns = found[..., chain.sigma == 0]
     assert not np.any(turns[valid] > np.pi)
     assert not np.any(turns[valid] <= -np.pi)
-    assert np.where(valid, error, 0.0).max() <= 1e-12
-    return found, valid
-
-
-def public(name, q, references):
-    """The same by `igm`, with the free joints."""
-    model = load(name).with_base(np.eye(4))
-    chain = joint_chain(model)
-    found = rm.igm(model, poses(chain, q), q_ref=references)
-    checked(chain, q, found.q, found.valid)
-    return chain, found
+    return found, valid, free, np.where(valid, error, 0.0)
 
 
 # --- anywhere ------------------------------------------------------------------------------------
@@ -106,17 +92,19 @@ def public(name, q, references):
 
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_every_posture_of_random_poses(name):
-    chain, solver = arm(name)
-    assert solver.plan.family is (Family.CONCURRENT if name in CONCURRENT else Family.PARALLEL)
+    chain, plan = arm(name)
+    assert plan.family is (Family.CONCURRENT if name in CONCURRENT else Family.PARALLEL)
     q = random_postures(chain, 300)
-    found, valid = solved(name, q)
+    found, valid, free, error = solved(name, q)
+    assert error.max() <= 1e-12
     assert np.nanmin(gaps(chain, found, q), axis=1).max() < 1e-6
     assert np.all(valid.sum(axis=1) % 2 == 0)
+    assert not free.any()
     # the postures of one pose are the same set from whichever of them the pose was made
-    for k in (0, 5):
+    for k in range(8):
         there = valid[:, k]
         if there.any():
-            again, count = solved(name, found[there, k])
+            again, count, _, _ = solved(name, found[there, k])
             np.testing.assert_array_equal(count.sum(axis=1), valid[there].sum(axis=1))
             assert np.nanmin(gaps(chain, again, q[there]), axis=1).max() < 1e-5
 
@@ -151,56 +139,89 @@ def test_a_wrist_behind_or_before_any_three_joints(sigma, mirrored):
     if mirrored:
         D, kinds = np.ascontiguousarray(np.linalg.inv(D)[::-1]), kinds[::-1].copy()
     chain = JointChain(np.arange(6), kinds, D, np.eye(4))
-    solver = prepare_closed_form(chain)
-    assert solver.plan.family is Family.CONCURRENT
+    plan = plan_loop(chain)
+    assert plan is not None
+    assert plan.family is Family.CONCURRENT
     q = random_postures(chain, 200)
-    found = postures(solver, poses(chain, q), np.zeros_like(q), Tolerances())
-    assert found.residual[found.valid].max() < 1e-11
-    assert np.nanmin(gaps(chain, found.q, q), axis=1).max() < 1e-6
-    assert np.all(found.valid.sum(axis=1) % 2 == 0)
+    U = poses(chain, q)
+    found, valid, _ = closed_form_postures(plan, chain, U)
+    error = np.abs(poses(chain, found) - U[:, None]).max(axis=(-1, -2))
+    assert error[valid].max() < 1e-11
+    assert np.nanmin(gaps(chain, found, q), axis=1).max() < 1e-6
+    assert np.all(valid.sum(axis=1) % 2 == 0)
 
 
 # --- singular postures ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SPHERICAL_WRISTS)
-@pytest.mark.parametrize("tiny", TINY)
-def test_both_branches_beside_an_aligned_wrist(name, tiny):
+def branches(name, tiny):
+    """Whether the wrist angles ``tiny`` and ``-tiny`` are found with the first joints of q."""
     chain, _ = arm(name)
     q = well_placed(chain, random_postures(chain, 200, seed=1))
-    assert len(q) >= 20
     q[:, 4] = tiny
-    found, valid = solved(name, q)
+    found, valid, _, error = solved(name, q)
+    assert error.max() <= 1e-12
     d = np.abs(found - q[:, None])
     d = np.where(chain.sigma == 0, np.minimum(d, 2 * np.pi - d), d)
-    same = valid & (d[..., :3].max(axis=-1) < 1e-6)
-    for sign in (1.0, -1.0):
-        # the wrist angle is met to rounding, which is all the pose says about it
-        there = np.abs(found[..., 4] - sign * tiny) < 1e-3 * tiny + 3e-13
-        assert (same & there).any(axis=1).all()
+    # the three of a triangle move with the wrist's other branch; joint 0 does not
+    same_arm = valid & (d[..., [0, 1, 2] if name in SPHERICAL_WRISTS else [0]].max(axis=-1) < 1e-6)
+    # the wrist angle is met to rounding, which is all the pose says about it
+    return [
+        (same_arm & (np.abs(found[..., 4] - sign * tiny) < 1e-3 * tiny + 3e-13)).any(axis=1)
+        for sign in (1.0, -1.0)
+    ]
 
 
 @pytest.mark.parametrize("name", SPHERICAL_WRISTS + SQUARE_WRISTS)
-def test_an_aligned_axis_takes_the_reference(name):
-    """Joint 4 of a spherical wrist; joint 2 where axis 6 is parallel to the three of a triangle."""
+@pytest.mark.parametrize("tiny", TINY)
+def test_both_branches_beside_an_aligned_wrist(name, tiny):
+    own, other = branches(name, tiny)
+    assert own.size >= 20
+    assert own.all()
+    if name in SPHERICAL_WRISTS:
+        assert other.all()
+    else:
+        # the other branch may be out of the triangle's reach, as it is at a regular pose nearby
+        assert other.sum() >= own.size // 2
+        assert np.sum(other != branches(name, 2e-3)[1]) <= 1
+
+
+@pytest.mark.parametrize("name", SPHERICAL_WRISTS)
+def test_an_aligned_wrist_takes_the_reference(name):
     chain, _ = arm(name)
     q = well_placed(chain, random_postures(chain, 200, seed=2))
-    q[:, 4] = 0.0 if name in SPHERICAL_WRISTS else np.where(np.arange(len(q)) % 2, 0.0, np.pi)
-    chain, found = public(name, q, q)
-    gap = gaps(chain, found.q, q)
+    q[:, 4] = 0.0
+    found, _, free, error = solved(name, q, references=q)
+    assert error.max() <= 1e-12
+    gap = gaps(chain, found, q)
+    assert np.nanmin(gap, axis=1).max() < 1e-6
+    assert free[np.arange(len(q)), np.nanargmin(gap, axis=1), 3].all()
+
+
+@pytest.mark.parametrize("name", SQUARE_WRISTS)
+def test_an_axis_parallel_to_the_three_takes_the_reference(name):
+    chain, _ = arm(name)
+    q = well_placed(chain, random_postures(chain, 200, seed=3))
+    q[:, 4] = np.where(np.arange(len(q)) % 2, 0.0, np.pi)
+    found, _, free, error = solved(name, q, references=q)
+    assert error.max() <= 1e-12
+    gap = gaps(chain, found, q)
     assert np.nanmin(gap, axis=1).max() < 1e-5
-    free = found.free_joints[np.arange(len(q)), np.nanargmin(gap, axis=1)]
-    assert free[:, 3 if name in SPHERICAL_WRISTS else 1].all()
+    assert free[np.arange(len(q)), np.nanargmin(gap, axis=1), 1].all()
+    # a reference out of reach is replaced by the nearest angle that is not
+    _, valid, _, _ = solved(name, q, references=q + np.array([0, 2.5, 0, 0, 0, 0]))
+    assert valid.any(axis=1).all()
 
 
 def test_a_wrist_centre_on_the_first_axis_takes_the_reference():
     chain, _ = arm("rx90")
     q = random_postures(chain, 40, seed=4)
     q[:, 1] = 0.5 * (0.5 * np.pi - q[:, 2])  # 0.45 cos(q2) = 0.45 sin(q2 + q3)
-    chain, found = public("rx90", q, q)
-    gap = gaps(chain, found.q, q)
+    found, _, free, error = solved("rx90", q, references=q)
+    assert error.max() <= 1e-12
+    gap = gaps(chain, found, q)
     assert np.nanmin(gap, axis=1).max() < 1e-6
-    assert found.free_joints[np.arange(40), np.nanargmin(gap, axis=1), 0].all()
+    assert free[np.arange(40), np.nanargmin(gap, axis=1), 0].all()
 
 
 def farthest(place):
@@ -228,18 +249,49 @@ def test_a_stretched_elbow(name):
 
     q = random_postures(chain, 40, seed=6)
     q[:, 2] = farthest(distance)
-    chain, found = public(name, q, None)
-    assert found.valid.any(axis=1).all()
-    assert np.nanmin(gaps(chain, found.q, q), axis=1).max() < 1e-4
+    found, valid, _, error = solved(name, q)
+    assert error.max() <= 1e-9
+    assert valid.any(axis=1).all()
+    assert np.nanmin(gaps(chain, found, q), axis=1).max() < 1e-4
+
+
+# --- far, wrong and unusual ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rx90", "ur5", "gantry", "stanford_arm"])
+def test_poses_that_are_not_finite_have_no_posture_and_do_not_disturb_others(name):
+    chain, plan = arm(name)
+    U = poses(chain, random_postures(chain, 5000, seed=7))
+    whole, valid, _ = closed_form_postures(plan, chain, U)
+    U[17, 0, 3] = np.nan
+    U[4000, 1, 1] = np.inf
+    found, there, _ = closed_form_postures(plan, chain, U)
+    assert not there[[17, 4000]].any()
+    rest = np.setdiff1d(np.arange(5000), [17, 4000])
+    np.testing.assert_array_equal(there[rest], valid[rest])
+    np.testing.assert_array_equal(found[rest], whole[rest])
+
+
+@pytest.mark.parametrize("name", ["rx90", "ur5"])
+def test_out_of_reach(name):
+    chain, plan = arm(name)
+    U = poses(chain, random_postures(chain, 20, seed=8))
+    U[:, :3, 3] += 50.0
+    found, valid, free = closed_form_postures(plan, chain, U)
+    assert not valid.any()
+    assert np.isnan(found).all()
+    assert not free.any()
+    empty = closed_form_postures(plan, chain, np.zeros((0, 4, 4)))
+    assert [part.shape for part in empty] == [(0, 8, 6), (0, 8), (0, 8, 6)]
 
 
 @pytest.mark.parametrize(("name", "file"), [("rx90", "igm_rx90"), ("ur5", "igm_ur5")])
 def test_the_oracles_postures(name, file):
-    chain, solver = arm(name)
+    chain, plan = arm(name)
     oracle = json.loads((ORACLES / f"{file}.json").read_text())
     for case in oracle["cases"]:
-        found = postures(solver, np.array([case["T"]]), np.zeros((1, 6)), Tolerances())
+        found, valid, _ = closed_form_postures(plan, chain, np.array([case["T"]]))
         wanted = np.array(case["solutions"])
-        assert found.valid.sum() == case["n_solutions"] == len(wanted)
+        assert valid.sum() == case["n_solutions"] == len(wanted)
         for posture in wanted:
-            assert np.nanmin(gaps(chain, found.q, posture[None])) < 1e-6
+            assert np.nanmin(gaps(chain, found, posture[None])) < 1e-6

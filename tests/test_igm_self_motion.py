@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from robotmodels.igm.by_plan import prepare_by_plan
 from robotmodels.igm.families import prepare
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.postures import no_postures
@@ -28,9 +27,7 @@ def arm(name, backwards=False):
             np.ascontiguousarray(inverse(chain.D)[::-1]),
             chain.base,
         )
-    # Pieper's method or elimination; three parallel axes by Paul's plan, as `igm` does
-    solver = prepare(chain)
-    return chain, prepare_by_plan(chain, solver) if name.startswith("ur") else solver
+    return chain, prepare(chain)
 
 
 def poses_and_jacobians(chain, q):
@@ -158,6 +155,7 @@ def test_the_wrist_of_a_ur_frees_joint_two(rng):
     q = draw(chain, 6, rng)
     q[:, 4] = 0.0
     U, found, out = settled(chain, solver, q, 0.3)
+    np.testing.assert_array_equal(found.q, out.q)
     np.testing.assert_array_equal(np.unique(out.free[out.family], axis=0), [[0, 1, 0, 0, 0, 0]])
     np.testing.assert_array_equal(np.unique(out.moving[out.family], axis=0), [[0, 1, 1, 1, 0, 1]])
     # walking the curves from members elsewhere comes to the same postures
@@ -254,7 +252,7 @@ def test_the_nearest_value_where_the_reference_is_out_of_reach(rng):
     U, _, out = settled(chain, solver, q, 2.5)
     nearest = np.abs(np.remainder(out.q[..., 0] - 2.5 + np.pi, 2 * np.pi) - np.pi)
     short = np.argwhere(out.family & (nearest > 1e-6))
-    assert len(short) > 0
+    assert len(short) > 1
     for n, r in short:
         # at a turning point the Jacobian of the other joints is singular
         J = poses_and_jacobians(chain, out.q[n, r])[1]

@@ -2,13 +2,12 @@
 
 `inverse` documents the call, `call` checks it (`request`). `loop` writes the arm as a chain of
 joints, `chain` makes other chains of it; `families` chooses once which solver serves it: a plan of
-Paul's equations (`paul`, `by_plan`), three axes that meet or are parallel (`closed_form`),
-elimination for other arms of six joints, calibrated ones among them (`elimination`), fewer joints
-or components (`reduced`, `position`), more of them (`redundant`, `relations`, `arm_angle`), numeric
-search for the rest (`search`). Candidates are refined and checked on the chain itself (`check`),
-self-motions are completed at the reference (`singular`), and the solutions are labelled
-(`branches`), sorted and held in `solutions`; `unreachable` says why a pose has none. `numeric` is
-the iterative inverse.
+Paul's equations (`paul`, `closed_form`, `by_plan`), elimination for other arms of six joints,
+calibrated ones among them (`elimination`), fewer joints or components
+(`reduced`, `position`), more of them (`redundant`, `relations`, `arm_angle`), numeric search for
+the rest (`search`). Candidates are refined and checked on the chain itself (`check`), self-motions
+are completed at the reference (`singular`), and the solutions are labelled (`branches`), sorted and
+held in `solutions`; `unreachable` says why a pose has none. `numeric` is the iterative inverse.
 """
 
 from .inverse import igm
@@ -16,4 +15,9 @@ from .numeric import igm_numeric
 from .solutions import IGMSolutions
 from .status import IGMStatus
 
-__all__ = ["IGMSolutions", "IGMStatus", "igm", "igm_numeric"]
+__all__ = [
+    "IGMSolutions",
+    "IGMStatus",
+    "igm",
+    "igm_numeric",
+]

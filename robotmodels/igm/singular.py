@@ -39,7 +39,11 @@ Candidates = Callable[[Array, Array], tuple[Array, NDArray[np.bool_], NDArray[np
 
 
 def solve_singular(
-    chain: JointChain, candidates: Candidates, U: Array, references: Array, tolerances: Tolerances
+    chain: JointChain,
+    candidates: Candidates,
+    U: Array,
+    references: Array,
+    tolerances: Tolerances,
 ) -> Postures:
     """All postures of poses that are singular or nearly so, from a solver's candidates.
 

@@ -160,4 +160,15 @@ def _parallel(plan: LoopPlan) -> LoopPlan | None:
             return None  # four parallel axes
     if plan.slot != 4 and np.hypot(E[4][0, 2], E[4][1, 2]) < ANGLE_TOLERANCE:
         return None
-    return replace(plan, family=Family.PARALLEL)
+    if plan.slot == 4:
+        return replace(plan, family=Family.PARALLEL)
+    # the frame of joint 5 slides along its axis towards axis 4: where the axes meet it is then seen
+    constants, left = plan.constants.copy(), plan.left
+    slide = np.eye(4)
+    slide[2, 3] = constants[4, :3, 3] @ constants[4, :3, 2]
+    constants[4, :3, 3] -= slide[2, 3] * constants[4, :3, 2]
+    if plan.slot == 5:
+        left = slide @ left
+    else:
+        constants[5] = slide @ constants[5]
+    return replace(plan, family=Family.PARALLEL, constants=constants, left=left)

@@ -29,7 +29,13 @@ from ...kernels._compile import (
     compiled,
 )
 from .chain import wrapped
-from .equations import ANY, polynomial_roots, quadratic_roots, trigonometric_roots, type_2
+from .equations import (
+    ANY,
+    polynomial_roots,
+    quadratic_roots,
+    trigonometric_roots,
+    type_2,
+)
 
 LINKS = types.Array(types.float64, 4, "C", readonly=True)
 COUNTS, MARKS = types.Array(types.int64, 1, "C"), types.Array(types.int64, 2, "C")
