@@ -7,6 +7,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, OUT3, STACK, Floats, Ints, compiled
+from ..kernels.svd import orthogonal_rows
 from .kernels.chain import forward, jacobian, wrapped
 
 EXACT = 5e-13  # error above which a candidate is improved [m, rad]
@@ -32,9 +33,9 @@ def chain_error(U: Floats, sigma: Ints, D: Floats, q: Floats, P: Floats, axes: F
 
 
 @compiled()
-def newton_step(U: Floats, sigma: Ints, P: Floats, axes: Floats) -> Floats:
+def newton_step(U: Floats, sigma: Ints, P: Floats, axes: Floats, step: Floats) -> None:
     """Shortest step in the joints that closes the error to first order."""
-    J, e = np.zeros((6, 6)), np.zeros(6)
+    J, e, rows, s = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 12)), np.zeros(6)
     jacobian(sigma, P, axes, J)
     for i in range(3):
         e[i] = U[i, 3] - P[i, 3]
@@ -43,9 +44,19 @@ def newton_step(U: Floats, sigma: Ints, P: Floats, axes: Floats) -> Floats:
         e[3] += 0.5 * (P[1, j] * U[2, j] - P[2, j] * U[1, j])
         e[4] += 0.5 * (P[2, j] * U[0, j] - P[0, j] * U[2, j])
         e[5] += 0.5 * (P[0, j] * U[1, j] - P[1, j] * U[0, j])
-    step = np.zeros(6)
-    step[:] = np.linalg.lstsq(J, e, DEPENDENT)[0]
-    return step
+    for m in range(6):
+        step[m], rows[m, 6 + m] = 0.0, 1.0
+        for i in range(6):
+            rows[m, i] = J[i, m]
+    orthogonal_rows(rows, 6, 6, 12, s)
+    for i in range(6):
+        if not s[i] > DEPENDENT * s[0]:
+            break
+        part = 0.0
+        for j in range(6):
+            part += rows[i, j] * e[j]
+        for m in range(6):
+            step[m] += part / (s[i] * s[i]) * rows[i, 6 + m]
 
 
 @compiled(
@@ -91,11 +102,15 @@ def verified_postures(
                 # a candidate that is far off is a false one, not a rough one
                 if not EXACT < error < 1e-2:
                     break
-                trial[:] = x + newton_step(poses[n], sigma, P, axes)
+                newton_step(poses[n], sigma, P, axes, trial)
+                for m in range(6):
+                    trial[m] += x[m]
                 improved = chain_error(poses[n], sigma, D, trial, P, axes)
                 if not improved < error:
                     break
-                x[:], error = trial, improved
+                error = improved
+                for m in range(6):
+                    x[m] = trial[m]
             if not error <= accepted:
                 continue
             for m in range(6):
@@ -110,8 +125,8 @@ def verified_postures(
                 known = known or gap < MERGE
             if known:
                 continue
-            q[n, count] = x
             for m in range(6):
+                q[n, count, m] = x[m]
                 free[n, count, order[m]] = (marks[n, i] >> m) & 1 == 1
             valid[n, count] = True
             count += 1
