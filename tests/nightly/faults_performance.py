@@ -51,7 +51,7 @@ MUTATIONS = [
     fault("only the first factor counts", "return np.asarray((self.values(q) > 0.0)",
           "(1 << np.arange(len(self.joints)))", "(1 >> np.arange(len(self.joints)))",
           PATHS + "joint_motion"),
-    fault("the torus does not close", "def _components(", "np.flatnonzero(closed)",
+    fault("the torus does not close", "ndimage.label(code == value)", "np.flatnonzero(closed)",
           "np.flatnonzero(~closed)", SECTIONS + "known_arms"),
     fault("the wrong side of a singular position", "wanted = (values[:, self.factors]",
           "> 0.0", "< 0.0", SECTIONS + "eight_aspects"),
