@@ -50,6 +50,7 @@ def fleet():
 
 
 FLEET = [(robot, loops.close(robot, q_a, guess).q) for robot, q_a, guess in fleet()]
+NIGHTLY = pytest.mark.nightly
 ids = [f"{k}-{robot.n} joints" for k, (robot, _) in enumerate(FLEET)]
 every_robot = pytest.mark.parametrize(("robot", "q_ref"), FLEET, ids=ids)
 
@@ -392,7 +393,10 @@ def test_massless_links_and_singular_masses(rng):
 # --- simulation ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("k", "until"), [(0, 10.0), (3, 10.0), (4, 10.0), (5, 3.0)])
+@pytest.mark.parametrize(
+    ("k", "until"),
+    [(0, 10.0), (3, 10.0), *(pytest.param(*long, marks=NIGHTLY) for long in ((4, 10.0), (5, 3.0)))],
+)
 def test_simulated_loops_stay_closed_and_keep_their_energy(k, until):
     robot, q = FLEET[k]
     found = loops.simulate(robot, q, t=np.linspace(0.0, until, 101))
@@ -441,7 +445,11 @@ def test_a_simulation_ends_where_the_closures_become_singular(rng):
 
 
 # the one motion of the loop of seven joints is short: its parameters have no clear rank
-@pytest.mark.parametrize(("robot", "q_ref"), FLEET[:-2], ids=ids[:-2])
+@pytest.mark.parametrize(
+    ("robot", "q_ref"),
+    [*FLEET[:6], *(pytest.param(*large, marks=NIGHTLY) for large in FLEET[6:-2])],
+    ids=ids[:-2],
+)
 def test_base_parameters_span_the_reduced_regressor(robot, q_ref, rng):
     q, v, a = motion(robot, q_ref, rng, N=60)
     drive = ("Ia",) if robot.n > 20 else ("Ia", "Fv", "Fc")

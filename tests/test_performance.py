@@ -149,6 +149,42 @@ def test_curves_that_lie_on_each_other_have_no_nodes():
             assert len(pf.nodes(arm)) <= 4
 
 
+def random_arm(sigma, seed):
+    """An arm whose slides have narrow limits."""
+    rng, n, slides = np.random.default_rng(seed), len(sigma), np.array(sigma) == 1
+    ends = np.where(slides, 0.15, np.pi)
+    table = DHTable(
+        antecedent=range(n), sigma=sigma, alpha=[0, *rng.uniform(-1.6, 1.6, n - 1)],
+        d=[0, *rng.uniform(0.1, 1.0, n - 1)], theta=np.where(slides, rng.uniform(-3, 3, n), 0.0),
+        r=np.where(slides, 0.0, rng.uniform(-0.5, 0.5, n)), lower=-ends, upper=ends,
+    )  # fmt: skip
+    return rm.RobotModel.from_table(table, tool=translation(0.8, 0.1, 0.0))
+
+
+@pytest.mark.parametrize("sigma", [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1, 0, 0, 0)])
+def test_changes_of_posture_keep_the_limits_of_slides(sigma):
+    slides = np.array(sigma) == 1
+    for seed in range(3):
+        arm = random_arm(sigma, seed)
+        found = pf.cuspidality(arm, poses=10)
+        path = found.path[:, slides]
+        assert (np.abs(path) <= 0.15 + 1e-8).all()
+        if found.status == pf.CuspidalityStatus.CUSPIDAL:
+            np.testing.assert_allclose(*rm.dgm(arm, found.ends)[:, :3, 3], atol=1e-9)
+
+
+def test_few_postures_prove_nothing():
+    """An arm with a wrist that is cuspidal: by one pose its signs seem to be labels."""
+    table = DHTable(
+        antecedent=range(6), sigma=[0] * 6, alpha=np.array([0, -1, 1, 1, -1, 1]) * np.pi / 2,
+        d=[0, 1, 2, 0, 0, 0], theta=[0] * 6, r=[0, 1, 0, 1.5, 0, 0],
+    )  # fmt: skip
+    arm, status = rm.RobotModel.from_table(table), pf.CuspidalityStatus
+    for seed in range(4):
+        assert pf.cuspidality(arm, seed, poses=1).status != status.NOT_CUSPIDAL
+    assert pf.cuspidality(arm).status == status.CUSPIDAL
+
+
 def test_curves_are_singular_and_their_kind_holds():
     curves = pf.singular_curves(WENGER)
     assert sorted(k.value for k in curves.kind) == ["boundary", "internal"]
@@ -740,9 +776,10 @@ def test_workers_of_the_wrong_kind_are_refused(option):
 
 
 def test_caches_keep_no_model_alive():
-    arm = three(2, 1.5, 1)
+    """Of this room; the formulas of the last sixteen robots are kept by `explain_singularities`."""
+    arm = three(2, 1.5, 1.01)
     assert pf.workspace(arm, resolution=5).area > 0.0
-    pf.aspects(arm, resolution=30)
+    pf.free_components(arm, resolution=30)
     pf.nodes(arm)
     gone = weakref.ref(arm)
     del arm

@@ -157,7 +157,8 @@ def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
     cut: Any = (x[:, :count] for x in (T, valid, residual, det))
     if len(batch) != 1:
         cut = (x.reshape(*batch, *x.shape[1:]) for x in cut)
-    return AssemblyModes(*cut, status.reshape(batch), complex_count.reshape(batch))
+    more = status.reshape(batch), complex_count.reshape(batch)
+    return AssemblyModes(*cut, *more)  # type: ignore[reportCallIssue]
 
 
 def _found(robot: Robot, q: Array) -> Found:
@@ -178,7 +179,7 @@ def _planar(robot: ParallelRobot, q: Array) -> Found:
 
     T, values, out = np.empty((len(q), 6, 4, 4)), np.empty((2, len(q), 6)), np.empty((len(q), 2))
     planar(*rods(robot, q), robot.home, _PLANE, T, *values, out)
-    return T, *values, out[:, 0].astype(np.int8), out[:, 1].astype(np.int64)
+    return T, values[0], values[1], out[:, 0].astype(np.int8), out[:, 1].astype(np.int64)
 
 
 def _spheres(robot: ParallelRobot, q: Array) -> Found:

@@ -33,9 +33,7 @@ class AspectStatus(Outcome):
     FOUND = 0, "The joint space was divided."
     NOT_SEPARATED = 1, "The grid does not separate all parts: raise the resolution."
     NO_FREE_SPACE = 2, "No configuration is free."
-    NOT_DEFINED = (
-        3, "Aspects are not defined: the Jacobian of the task is not square, or never regular.",
-    )  # fmt: skip
+    NOT_DEFINED = 3, "Not defined: the Jacobian of the task is not square, or never regular."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -364,8 +362,7 @@ def _components(code: Ints, closed: Flags) -> Ints:
     labels, count = np.zeros(code.shape, np.int64), 0
     for value in np.flatnonzero(np.bincount(code[code >= 0])):
         part, more = ndimage.label(code == value)
-        labels += np.where(part > 0, part + count, 0)
-        count += more
+        labels, count = labels + np.where(part > 0, part + count, 0), count + more
     ends = [np.zeros((2, 0), np.int64)]
     for axis in np.flatnonzero(closed):
         values, numbers = (np.moveaxis(x, axis, 0)[[-1, 0]].reshape(2, -1) for x in (code, labels))

@@ -20,7 +20,7 @@ from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
-from .arms import PLACE, SectionArm, section_arm, turning, wrapped
+from .arms import PLACE, Flags, SectionArm, section_arm, turning, wrapped
 from .arrangement import counted_cut, cut, lines_of
 from .aspects import aspects
 from .curves import cusps_of
@@ -32,6 +32,7 @@ _KNOTS = 33
 _VIAS = 24
 _APART = 1e-3  # rad or m, between different postures
 _CHUNK = 4096
+_POSTURES = 50  # from which equal signs in all of them are no chance
 
 
 class CuspidalityStatus(Outcome):
@@ -150,14 +151,12 @@ def cuspidality(
         return _result(arm, CuspidalityStatus.NOT_DEFINED)
     if not factors.joints:  # the determinant is constant
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL)
-    bounds = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
-    bound = bound_of(arm, factors.rows, np.where(np.isfinite(bounds), bounds, 0.0))
     if section is not None and len(cusps_of(section, lines_of(arm, False)[0])[0]) == 0:
         apart = _all_apart(arm, section)
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL if apart else _NONE)
-    found = _by_search(arm, factors, bound, rng, int(poses), work)
+    found = _by_search(arm, factors, rng, int(poses), work)
     for path in _level_paths(arm, section) if section is not None and found.status == _NONE else ():
-        margin = certified(bound, path)
+        margin = _proved(arm, factors, path)
         if margin > 0.0:
             return _result(arm, CuspidalityStatus.CUSPIDAL, path, margin, found.tried + 1)
     return found
@@ -231,15 +230,29 @@ def _all_apart(arm: RobotModel, section: SectionArm) -> bool:
     return True
 
 
+def _within_strokes(arm: RobotModel, q: Array) -> Flags:
+    """Whether the slides of configurations (..., n) are within their limits, up to rounding."""
+    slides = ~turning(arm)
+    over = np.maximum(arm.lower - q, q - arm.upper)[..., slides]
+    return np.asarray((over <= 1e-9 * (1.0 + np.abs(q[..., slides]))).all(axis=-1))
+
+
+def _proved(arm: RobotModel, factors: Factors, path: Array) -> float:
+    """Margin of a path that is proved regular, with levers for its longest strokes; else 0."""
+    if not _within_strokes(arm, path).all():
+        return 0.0
+    return certified(bound_of(arm, factors.rows, np.abs(path).max(axis=0)), path)
+
+
 def _by_search(
-    arm: RobotModel, factors: Factors, bound: Bound, rng: np.random.Generator, poses: int,
-    work: Workers,
-) -> Cuspidality:  # fmt: skip
+    arm: RobotModel, factors: Factors, rng: np.random.Generator, poses: int, work: Workers
+) -> Cuspidality:
     """Labels of a closed form, else straight lines between postures with equal signs."""
     mask = None if factors.rows.sum() == 6 else factors.rows
     found = igm(arm, dgm(arm, spread_configurations(arm, poses, rng)),
                 mask=mask if section_arm(arm) is None else PLACE)  # fmt: skip
     several = found.valid & ~found.double & ~found.free_joints.any(axis=-1)
+    several &= _within_strokes(arm, found.q)
     codes = np.full(found.valid.shape, -1)
     codes[several] = factors.codes(found.q[several])
     apart = all(np.unique(c[c >= 0]).size == np.sum(c >= 0) for c in codes)
@@ -254,6 +267,8 @@ def _by_search(
     start, step = np.moveaxis(pairs[np.abs(pairs[:, 1]).max(axis=1) > _APART], 1, 0)
     if not len(start):
         return _result(arm, _NONE)
+
+    bound = bound_of(arm, factors.rows)
 
     def tasks() -> Iterator[Callable[[], tuple[Array, float]]]:
         for via in range(1 + _VIAS):
@@ -271,7 +286,8 @@ def _by_search(
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
     """Whether each word of the labels is the sign of a factor, the same way in all postures."""
     words = [str(label).split() for label in labels]
-    if not words or not all(words) or len({len(w) for w in words}) != 1:
+    # few postures agree with labels by chance
+    if len(words) < _POSTURES or not all(words) or len({len(w) for w in words}) != 1:
         return False
     count = len(words[0])
     if any(word[-1] not in "+-" for row in words for word in row):
@@ -295,11 +311,12 @@ def _most_regular(
     q = start + t * step + (1.0 - np.abs(2.0 * t - 1.0)) * offset
     n = q.shape[-1]
     codes = factors.codes(q.reshape(-1, n)).reshape(q.shape[:2])
-    same = np.flatnonzero((codes == codes[0]).all(axis=0))
+    inside = _within_strokes(bound.model, q).all(axis=0)
+    same = np.flatnonzero((codes == codes[0]).all(axis=0) & inside)
     least = bound.least(q[:, same].reshape(-1, n)).reshape(_KNOTS, -1).min(axis=0)
     for k in np.argsort(-least)[:6]:
         knots = q[[0, _KNOTS // 2, _KNOTS - 1], same[k]]
-        margin = certified(bound, knots) if least[k] > 1e-4 else 0.0
+        margin = _proved(bound.model, factors, knots) if least[k] > 1e-4 else 0.0
         if margin > 0.0:
             return knots, margin
     return q[:0, 0], 0.0
