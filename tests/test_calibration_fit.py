@@ -429,6 +429,7 @@ def test_a_prior_pulls_to_the_nominal_robot_where_data_are_few():
     assert np.abs(tight.corrections[of_table]).max() < 1e-9
 
 
+@pytest.mark.nightly
 def test_the_strength_of_a_prior_follows_the_data():
     # a prior that is ten times too narrow is weakened where there are many data
     s = Scene(seed=12, count=60)

@@ -467,6 +467,7 @@ def test_impedance_of_the_orientation_and_of_another_frame():
             assert -(K[3:] * e[3:]) @ de / 1e-6 == pytest.approx(moment @ axis, abs=1e-4)
 
 
+@pytest.mark.nightly
 def test_force_of_a_mass_on_a_spring():
     m, ke, kp, push = 2.0, 500.0, 100.0, -1.5
     spring = control.SpringWall([0, 0, 0], [0, 0, -1], ke, bilateral=True)
@@ -646,6 +647,7 @@ def test_statuses_name_what_happened():
     assert still.status == ControlStatus.FOLLOWED
 
 
+@pytest.mark.nightly
 def test_growth_of_the_reference_is_no_divergence_and_slow_growth_is():
     rail = slider(2.0)
 

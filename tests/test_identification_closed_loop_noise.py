@@ -99,6 +99,7 @@ def test_the_test_names_parameters_whose_bias_matters_and_no_others():
     assert (named[bias < 0.5] == 0.0).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("position", "decimation"), [(0.0, 10), (3e-6, 1), (3e-5, 10)])
 def test_noise_whose_bias_does_not_matter_is_not_rejected(position, decimation):
     _, verdicts, off = studied(10, position, 0.5, decimation, (Instrumental,))

@@ -202,6 +202,7 @@ def test_a_relation_of_one_joint_is_a_lock(name, joint):
     assert np.all(found.status == rm.IGMStatus.REACHED)
 
 
+@pytest.mark.nightly
 def test_two_relations_of_eight_joints():
     baxter = rm.load("erd:baxter")  # with a finger as the tip, which is the eighth joint
     model = baxter.with_tool(np.eye(4), tip=baxter.tip + 2)
@@ -348,6 +349,7 @@ def test_unreachable_poses_of_an_arm_with_parallel_slides(mask, axes):
         assert rm.igm(model, T, mask=mask, mask_axes=axes).count == 0
 
 
+@pytest.mark.nightly
 def test_a_free_coordinate_may_have_any_value():
     model = rm.load("rx90")
     T = np.tile(rm.dgm(model, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]), (2, 1, 1))

@@ -55,6 +55,7 @@ def test_gradients_are_those_of_the_values(model, seed):
         np.testing.assert_allclose(g, d, rtol=0, atol=1e-8 * (1 + np.abs(g).max()))
 
 
+@pytest.mark.nightly
 @given(model=models(), seed=seeds)
 def test_gradients_of_criteria_that_set_in(model, seed):
     """Values with kinks in the second derivative, by small differences."""

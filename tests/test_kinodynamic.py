@@ -194,6 +194,7 @@ def test_free_motions_are_as_quick_as_those_of_optimal_control(name):
     assert plan.duration < straight.duration
 
 
+@pytest.mark.nightly
 def test_a_profile_is_stretched_where_that_is_asked_for():
     q0, q1, torque, g = CASES["A"]
     given = {"torque": torque, "rng": 1, "seconds": 20.0}
@@ -238,6 +239,7 @@ def test_six_joints_through_a_point_and_around_a_body():
     assert (np.abs(torques(puma, around.trajectory)) <= 1.001 * PUMA_TORQUE).all()
 
 
+@pytest.mark.nightly
 def test_limits_of_position_are_kept():
     q0, q1, torque, g = CASES["B"]
     free = kinodynamic(planar(g), q0, q1, FREE, torque, seconds=20.0)
@@ -256,6 +258,7 @@ def test_limits_of_position_are_kept():
     assert ((q >= bound[0] - 1e-9) & (q <= bound[1] + 1e-9)).all()
 
 
+@pytest.mark.nightly
 def test_torques_in_the_cost_slow_the_motion_down():
     q0, q1, torque, g = CASES["B"]
     plans = [
@@ -345,6 +348,7 @@ def test_refused_input(change, error, word):
         Cost(0.0, 0.0)
 
 
+@pytest.mark.nightly
 def test_jerk_and_equal_postures():
     q0, q1, torque, g = CASES["B"]
     limits = MotionLimits(velocity=3.0, acceleration=20.0, jerk=100.0)

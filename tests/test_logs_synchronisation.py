@@ -57,6 +57,7 @@ def test_a_delay_that_is_removed_is_not_found_again(robot):
     assert abs(again.delay) < 0.05e-3
 
 
+@pytest.mark.nightly
 def test_delays_of_the_tx40_are_found():
     tx40 = load_tx40()
     before = synchronisation(tx40.log, tx40.model)

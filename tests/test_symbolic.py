@@ -134,6 +134,7 @@ def test_catalogue(name, rng):
         check_factors(model, J, q, *(int(frame[2:]) for frame in (J.projection, J.intermediate)))
 
 
+@pytest.mark.nightly
 @settings(max_examples=15)
 @given(model=models(max_frames=5, inertia="physical"))
 def test_random_robots(model):
@@ -153,6 +154,7 @@ def test_random_robots(model):
             assert len(re.findall(left, latex)) == len(re.findall(right, latex))
 
 
+@pytest.mark.nightly
 def test_pairs_of_frames(rng):
     model = rm.load("puma560").with_base(from_rpy([0.1, 0.2, 0.3], [1, 2, 3]))
     model = model.with_tool(from_rpy([0.3, 0.1, -0.2], [0.1, 0, 0.2]))
