@@ -81,7 +81,7 @@ def test_a_beam_pushed_beyond_its_load_of_buckling_is_unstable():
 @pytest.mark.nightly
 def test_an_arm_that_stays_where_it_is_ends_at_rest():
     heavy = PIVOT.with_gravity((0, -9.81, 0))
-    arm = flexible.FlexibleRobot(heavy, {1: flexible.beam(1.0, EI=(INF, 30.0), hub=0.1, modes=1)})
+    arm = flexible.FlexibleRobot(heavy, {1: flexible.beam(1.0, EI=(INF, 30.0), hub=0.1)})
     assert flexible.rest_to_rest(arm, [0.3], [0.3], 1.0).status == RestStatus.AT_REST
     assert flexible.rest_to_rest(arm, [0.3], [0.8], 0.05).status == RestStatus.VIBRATES
 

@@ -566,8 +566,14 @@ def test_least_duration_of_polynomials_with_end_states(make, order, rng):
 
 @pytest.mark.parametrize("order", [3, 5])
 def test_least_durations_to_the_last_digits(order, rng):
-    """Beside a closed form; states on their limits are kept or refused with the least."""
-    make = cubic if order == 3 else quintic
+    """Beside closed forms, where there are any; and just below it a limit is exceeded."""
+    make, law = ((cubic, TimeLaw.CUBIC), (quintic, TimeLaw.QUINTIC))[order == 5]
+    for _ in range(20):  # from rest, one limit after the other
+        L, bound = 10.0 ** rng.uniform(-2.0, 2.0, 2)
+        name = ("velocity", "acceleration", "jerk")[int(rng.integers(3))]
+        limits = MotionLimits(**{name: bound})
+        found = make(0.0, L, limits=limits).duration
+        assert found == pytest.approx(along_line(law, 0.0, L, None, limits).duration, rel=1e-12)
     for v, V in rng.uniform(0.1, 1.0, (10, 2)) * [1.0, 5.0] + [0.0, 1.0]:
         # the velocity of a cubic that keeps v at both ends is v + 1.5 (D / T - v) in the middle
         T = cubic(0.0, 1.0, limits=MotionLimits(V), v0=v, v1=v).duration

@@ -36,6 +36,7 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.follow import following
+from robotmodels.trajectories.path_events import inverted
 from robotmodels.trajectories.pose_trajectory import rotation_about
 
 
@@ -729,6 +730,26 @@ def test_joint_path_shapes_and_refusals():
         joint_path("rx90", T)
 
 
+def test_small_inverses_beside_lapack(rng):
+    for n in (1, 3, 6):
+        A = rng.normal(size=(200, n, n))
+        A[:, :, 0] *= 10.0 ** rng.uniform(-8.0, 2.0, (200, 1))
+        inverse, conditioning, sign = inverted(A)
+        want = np.linalg.inv(A)
+        norm = np.linalg.norm
+        bound = 1e-14 * np.linalg.cond(A) * norm(want, axis=(1, 2))
+        assert (norm(inverse - want, axis=(1, 2)) <= bound).all()
+        by_norms = n / (norm(A, axis=(1, 2)) * norm(want, axis=(1, 2)))
+        assert np.abs(conditioning / by_norms - 1.0).max() < 1e-6
+        assert np.array_equal(sign, np.sign(np.linalg.det(A)))
+    A[7, 2] = 0.0  # one singular matrix: the others are as before
+    pseudo, conditioning, sign = inverted(A)
+    assert conditioning[7] < 1e-15
+    assert sign[7] == 0.0
+    assert np.abs(pseudo[7] - np.linalg.pinv(A[7])).max() < 1e-8 * np.abs(pseudo[7]).max()
+    assert np.abs(pseudo[8] - inverse[8]).max() <= bound[8]
+
+
 def test_postures_go_on_by_the_shortest_step(rng):
     q = rng.uniform(-np.pi, np.pi, (1, 5, 4)) + np.zeros((40, 1, 1))
     q[:, :, 0] += np.linspace(0.0, 1.0, 40)[:, None]  # all turn through the half turn
@@ -743,6 +764,22 @@ def test_postures_go_on_by_the_shortest_step(rng):
             if valid[k, s] and valid[k + 1, list(order[k + 1]).index(order[k, s])]:
                 assert order[k + 1, after[k, s]] == order[k, s]
     assert following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)
+
+
+def test_postures_go_on_where_they_change_least():
+    """A way through a half turn is short, and beside a length of metres angles count by chords."""
+    revolute, valid = np.array([True, False]), np.ones((2, 3), np.bool_)
+    now = [[3.0, 0.0], [-1.0, 0.2], [0.5, -0.3]]
+    later = np.array([[-3.1, 0.0], [-0.9, 0.2], [0.6, -0.3]])
+    for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2]):
+        after = following(np.array([now, later[order]]), valid, revolute)
+        np.testing.assert_array_equal(after[0], np.argsort(order))
+    # the nearest by the chord is another one than by twice the chord's angle, or by signed lengths
+    q = np.array([[[0.0, 0.0]] * 3, [[3.0, 0.0], [0.0, 1.5], [1.0, -3.0]]])
+    np.testing.assert_array_equal(following(q, valid, revolute)[0], [1, 1, 1])
+    # near enough for all: nothing is compared, though another one would be nearer
+    q = np.array([[[0.0, 0.0], [0.01, 0.0], [1.0, 1.0]], [[0.04, 0.0], [0.0, 0.0], [1.0, 1.04]]])
+    np.testing.assert_array_equal(following(q, valid, revolute)[0], [0, 1, 2])
 
 
 def test_a_guess_chooses_the_branch_and_is_no_posture_of_the_path():

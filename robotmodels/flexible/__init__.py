@@ -30,16 +30,11 @@ from .simulate import FlexibleMotion, FlexibleMotionStatus, FreeBodyMotion, free
 from .tip import TipStatus, TipTracking, tip_tracking
 
 __all__ = ["FlexibleLink", "FlexibleRobot", "Invariants", "beam", "craig_bampton", "from_modes"]
+__all__ += ["ReducedModel"]
 __all__ += ["Accelerations", "SpinStatus", "ddm", "dgm", "energies", "idm", "jacobian"]
-__all__ += ["Elastica", "ReducedModel", "elastica", "link_poses", "lumped", "mass_matrix"]
+__all__ += ["link_poses", "mass_matrix"]
 __all__ += ["Deflection", "DeflectionStatus", "LinearModel", "linearize", "natural_frequencies"]
+__all__ += ["static_deflection", "Elastica", "elastica", "lumped"]
 __all__ += ["FlexibleMotion", "FlexibleMotionStatus", "FreeBodyMotion", "free_body", "simulate"]
 __all__ += ["RestStatus", "RestToRest", "joint_tracking", "regulator", "rest_to_rest"]
-__all__ += [
-    "Shaper",
-    "TipStatus",
-    "TipTracking",
-    "input_shaper",
-    "static_deflection",
-    "tip_tracking",
-]
+__all__ += ["Shaper", "input_shaper", "TipStatus", "TipTracking", "tip_tracking"]

@@ -132,10 +132,13 @@ class FlexibleRobot(Value):
                 "flexible robots do not support; take model.with_transmission(None)."
             )
         for name, value in {
-            "links": MappingProxyType(links), "modes": modes,
-            "joint_stiffness": read_only(stiffness), "joint_damping": read_only(damping),
-            "modal_damping": read_only(modal), "joints": read_only(joints, np.int64),
-        }.items():  # fmt: skip
+            "links": MappingProxyType(links),
+            "modes": modes,
+            "joint_stiffness": read_only(stiffness),
+            "joint_damping": read_only(damping),
+            "modal_damping": read_only(modal),
+            "joints": read_only(joints, np.int64),
+        }.items():
             object.__setattr__(self, name, value)
 
     @property

@@ -226,10 +226,17 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
 
 
 def _followed(
-    rate: Callable[[float, Array], Array], y: Array, t: ArrayLike, method: Integrator,
-    rtol: float, atol: float, budget: int | None, progress: Any, spun: list[float],
+    rate: Callable[[float, Array], Array],
+    y: Array,
+    t: ArrayLike,
+    method: Integrator,
+    rtol: float,
+    atol: float,
+    budget: int | None,
+    progress: Any,
+    spun: list[float],
     largest: ArrayLike = np.inf,
-) -> tuple[Array, Array, FlexibleMotionStatus, int]:  # fmt: skip
+) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """Times, states up to the largest, status and evaluations of an initial value problem.
 
     Each evaluation appends a code of `SpinStatus` to ``spun``.

@@ -152,7 +152,7 @@ def assembly_modes(robot: Robot, q: ArrayLike) -> AssemblyModes:
     q = as_vector(q, robot.m, "q") if looped else checked_actuators(robot, q)
     T, residual, det, status, complex_count = _found(robot, q.reshape(-1, robot.m))
     batch = q.shape[:-1]
-    valid = residual == residual  # NaN where there is none
+    valid = ~np.isnan(residual)
     count = int(valid.sum(axis=1).max(initial=0))
     cut: Any = (x[:, :count] for x in (T, valid, residual, det))
     if len(batch) != 1:

@@ -32,7 +32,7 @@ _KNOTS = 33
 _VIAS = 24
 _APART = 1e-3  # rad or m, between different postures
 _CHUNK = 4096
-_POSTURES = 50  # from which equal signs in all of them are no chance
+_POSTURES = 50  # fewer may agree with the signs of factors by chance
 
 
 class CuspidalityStatus(Outcome):
@@ -98,8 +98,8 @@ def cuspidality(
 ) -> Cuspidality:
     """Cuspidality: whether an arm can change its posture without meeting a singular position.
 
-    Limits of revolute joints do not count. Of an arm whose position three joints determine (or
-    two in a plane) the position counts, of others the pose.
+    Limits of revolute joints do not count, those of slides do. Of an arm whose position three
+    joints determine (or two in a plane) the position counts, of others the pose.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def cuspidality(
     Cuspidality
         CUSPIDAL with a path on which the least singular value is proved to stay above ``margin``
         between samples too; NOT_CUSPIDAL if the signs of the factors of the determinant are the
-        labels of the postures, or, in a section, if all postures of every region lie in different
-        aspects; NONE_FOUND after a search without success.
+        labels of the postures (of 50 or more), or, in a section, if all postures of every region
+        lie in different aspects; NONE_FOUND after a search without success.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def cuspidality(
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL if apart else _NONE)
     found = _by_search(arm, factors, rng, int(poses), work)
     for path in _level_paths(arm, section) if section is not None and found.status == _NONE else ():
-        margin = _proved(arm, factors, path)
+        margin = _certified_margin(arm, factors, path)
         if margin > 0.0:
             return _result(arm, CuspidalityStatus.CUSPIDAL, path, margin, found.tried + 1)
     return found
@@ -237,8 +237,8 @@ def _within_strokes(arm: RobotModel, q: Array) -> Flags:
     return np.asarray((over <= 1e-9 * (1.0 + np.abs(q[..., slides]))).all(axis=-1))
 
 
-def _proved(arm: RobotModel, factors: Factors, path: Array) -> float:
-    """Margin of a path that is proved regular, with levers for its longest strokes; else 0."""
+def _certified_margin(arm: RobotModel, factors: Factors, path: Array) -> float:
+    """Certified lower bound of the least singular value along a path (N, n); 0 if none is."""
     if not _within_strokes(arm, path).all():
         return 0.0
     return certified(bound_of(arm, factors.rows, np.abs(path).max(axis=0)), path)
@@ -286,7 +286,6 @@ def _by_search(
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
     """Whether each word of the labels is the sign of a factor, the same way in all postures."""
     words = [str(label).split() for label in labels]
-    # few postures agree with labels by chance
     if len(words) < _POSTURES or not all(words) or len({len(w) for w in words}) != 1:
         return False
     count = len(words[0])
@@ -316,7 +315,7 @@ def _most_regular(
     least = bound.least(q[:, same].reshape(-1, n)).reshape(_KNOTS, -1).min(axis=0)
     for k in np.argsort(-least)[:6]:
         knots = q[[0, _KNOTS // 2, _KNOTS - 1], same[k]]
-        margin = _proved(bound.model, factors, knots) if least[k] > 1e-4 else 0.0
+        margin = _certified_margin(bound.model, factors, knots) if least[k] > 1e-4 else 0.0
         if margin > 0.0:
             return knots, margin
     return q[:0, 0], 0.0

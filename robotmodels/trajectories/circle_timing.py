@@ -30,14 +30,18 @@ def circle_law(law: TimeLaw, path: FixedAxisPath, limits: MotionLimits) -> Piece
         smooth = law is TimeLaw.SMOOTHED_TRAPEZOIDAL
         shape[0] = minimize_scalar(
             lambda part: _stretch(_of_shape(law, part, 0.0), path, limits, smooth),
-            bounds=(1e-6, 0.5), method="bounded", options={"xatol": 1e-13},
-        ).x  # fmt: skip
+            bounds=(1e-6, 0.5),
+            method="bounded",
+            options={"xatol": 1e-13},
+        ).x
     elif law is TimeLaw.JERK_LIMITED:
         shape = minimize(
-            lambda x: _stretch(_of_shape(law, *x), path, limits), (0.3, 0.3),
-            bounds=((1e-6, 0.5), (1e-6, 0.5)), method="Nelder-Mead",
+            lambda x: _stretch(_of_shape(law, *x), path, limits),
+            (0.3, 0.3),
+            bounds=((1e-6, 0.5), (1e-6, 0.5)),
+            method="Nelder-Mead",
             options={"xatol": 1e-7, "fatol": 1e-10},
-        ).x  # fmt: skip
+        ).x
     pieces = _of_shape(law, *shape)
     stretch = _stretch(pieces, path, limits, exact=True) * _MARGIN
     return Pieces(pieces.durations * stretch, pieces.coefficients)

@@ -37,9 +37,11 @@ def revolute_joints(model: RobotModel) -> NDArray[np.bool_]:
 
 
 def follow(
-    model: RobotModel, found: IGMSolutions, start: Array | None,
+    model: RobotModel,
+    found: IGMSolutions,
+    start: Array | None,
     solve: Callable[[int, Array], IGMSolutions],
-) -> Followed:  # fmt: skip
+) -> Followed:
     """Choose the posture of every pose that continues the one before. Shapes: start (n,)."""
     names, revolute = np.array((*found.labels, "")), revolute_joints(model)
     reached = np.atleast_1d(found.valid.any(axis=-1))
@@ -77,9 +79,12 @@ def _nearest(q: Array, valid: NDArray[np.bool_], near: Array, revolute: NDArray[
 
 
 def follow_singly(
-    model: RobotModel, N: int, start: Array | None,
-    solve: Callable[[int, Array | None], IGMSolutions], go_on: Callable[[int, Array], IGMSolutions],
-) -> Followed:  # fmt: skip
+    model: RobotModel,
+    N: int,
+    start: Array | None,
+    solve: Callable[[int, Array | None], IGMSolutions],
+    go_on: Callable[[int, Array], IGMSolutions],
+) -> Followed:
     """Solve pose by pose, each from the posture before: for arms with a choice of postures."""
     revolute = revolute_joints(model)
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
@@ -153,9 +158,12 @@ def following(q: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]) -
 
 
 def _best_start(
-    postures: Array, valid: NDArray[np.bool_], inside: NDArray[np.bool_],
-    after: NDArray[np.intp], revolute: NDArray[np.bool_],
-) -> int:  # fmt: skip
+    postures: Array,
+    valid: NDArray[np.bool_],
+    inside: NDArray[np.bool_],
+    after: NDArray[np.intp],
+    revolute: NDArray[np.bool_],
+) -> int:
     """The first posture whose branch goes through best."""
     M, S = valid.shape
     chains = np.tile(np.arange(S), (M, 1))

@@ -159,8 +159,10 @@ def joint_path(
             raise InvalidValueError("t: expected times that ascend.")
     mask = None if mask is None else as_mask(mask)
     singular_below = as_number(singular_below, "singular_below")
-    tolerances: dict[str, Any] = {"position_tolerance": position_tolerance,
-                                  "orientation_tolerance": orientation_tolerance}  # fmt: skip
+    tolerances: dict[str, Any] = {
+        "position_tolerance": position_tolerance,
+        "orientation_tolerance": orientation_tolerance,
+    }
 
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
         return igm(model, targets, near, mask, mask_axes, **tolerances)

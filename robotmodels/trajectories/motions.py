@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial, prod
@@ -21,7 +22,7 @@ _JUMP = 1e-6  # of the largest value: smaller jumps are put down to rounding
 _INSIDE = np.linspace(0.0, 1.0 - 1e-7, 6)  # of a piece of a law: where extremes are sought
 
 
-class Motion(Value):
+class Motion(Value, ABC):
     """Functions of time for n joints, of which a `Trajectory` is made."""
 
     __slots__ = ()
@@ -35,9 +36,9 @@ class Motion(Value):
         """Leading axes: one motion each."""
         return ()
 
+    @abstractmethod
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
         """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
-        raise NotImplementedError
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value (..., n) of a derivative, here of samples."""

@@ -78,9 +78,15 @@ class Task:
     """
 
     def __init__(
-        self, model: RobotModel, T: Array, q: Array, reached: NDArray[np.bool_],
-        mask: ArrayLike | None, mask_axes: str, columns: NDArray[np.int64],
-    ) -> None:  # fmt: skip
+        self,
+        model: RobotModel,
+        T: Array,
+        q: Array,
+        reached: NDArray[np.bool_],
+        mask: ArrayLike | None,
+        mask_axes: str,
+        columns: NDArray[np.int64],
+    ) -> None:
         self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         self._tool, self._poses = mask_axes == "tool", T
         J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
@@ -137,9 +143,15 @@ def inverted(J: Array) -> tuple[Any, Any, Any]:
 
 
 def path_events(
-    model: RobotModel, times: Array, q: Array, v: Array, rows: Followed, task: Task,
-    singular_below: float, start: Array | None = None,
-) -> list[PathEvent]:  # fmt: skip
+    model: RobotModel,
+    times: Array,
+    q: Array,
+    v: Array,
+    rows: Followed,
+    task: Task,
+    singular_below: float,
+    start: Array | None = None,
+) -> list[PathEvent]:
     """Events along a path, in order. Shapes: times (N,); q, v (N, n); start (n,)."""
     reached = rows.reached
     events: list[PathEvent] = []

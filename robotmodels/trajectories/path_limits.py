@@ -129,30 +129,30 @@ class PathLimits:
         return drag
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Torques (N, n) of a motion; none without limits of torque."""
+        """Torques (N, n) of a motion; zeros without limits of torque."""
         if self.model is None or not self.loaded.size:
             return np.zeros(q.shape)
         tau = rigid_torques(self.model, q, v, a) + self.drag(q, v)
         return tau if self.drives is None else tau + a @ self.drives.rotor + self.drives.offset
 
     def not_held(self, q: Array, place: Callable[[int], str], stuck: bool) -> str:
-        """Where torques at rest (N, n) exceed their limits most, as a sentence; or nothing.
+        """Sentence on the posture (N, n) whose torques at rest exceed their limits most, if any.
 
-        ``stuck``: whether dry friction helps.
+        ``stuck``: whether dry friction helps to hold it.
         """
         if not self.loaded.size or not q.size:
             return ""
         none = np.zeros(q.shape)
         load = self.torques(q, none, none)
-        help_ = np.abs(self.drag(q, none + SLOWEST)) if stuck else none
-        margin = self.torque * (1.0 + 1e-9) - np.abs(load) + help_
+        dry = np.abs(self.drag(q, none + SLOWEST)) if stuck else none
+        margin = self.torque * (1.0 + 1e-9) - np.abs(load) + dry
         if (margin >= 0.0).all():
             return ""
         i, j = np.unravel_index(int(margin.argmin()), margin.shape)
         return (
             f"Gravity exceeds the torques at {place(int(i))}: joint {j + 1} needs "
             f"{abs(load[i, j]):.6g} to be held still and has {self.torque[j]:.6g}"
-            f"{' and dry friction' if help_.any() else ''}, margin of {margin[i, j]:.4g} "
+            f"{' and dry friction' if dry.any() else ''}, margin of {margin[i, j]:.4g} "
             "(N m or N)."
         )
 
@@ -300,9 +300,7 @@ def path_of(path: object, model: RobotModel | None, points: int) -> tuple[Motion
     return _by_length(motion, np.linspace(0.0, end, 10 * _KNOTS + 1)), path.scalar
 
 
-def _through_poses(
-    path: PoseTrajectory, model: RobotModel | None, points: int
-) -> Trajectory | str:  # fmt: skip
+def _through_poses(path: PoseTrajectory, model: RobotModel | None, points: int) -> Trajectory | str:
     """Joints along a path of poses, at even steps of its own parameter."""
     if model is None:
         raise InvalidValueError("model: a path of poses needs the robot that follows it.")

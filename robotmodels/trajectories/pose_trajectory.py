@@ -244,9 +244,12 @@ PosePath = FixedAxisPath | BlendedPoses
 
 
 def arc(
-    T0: Array, T1: Array, centre: Array | None = None, normal: Array | None = None,
+    T0: Array,
+    T1: Array,
+    centre: Array | None = None,
+    normal: Array | None = None,
     sweep: float = 0.0,
-) -> FixedAxisPath:  # fmt: skip
+) -> FixedAxisPath:
     """Line or circular arc between checked poses, with the shorter rotation about a fixed axis."""
     axis, angle = axis_and_angle(rotation_vectors_of(T1[:3, :3] @ T0[:3, :3].T))
     turn, zero, z = float(angle), np.zeros(3), np.array([0.0, 0.0, 1.0])

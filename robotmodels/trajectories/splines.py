@@ -142,9 +142,12 @@ class _Knots:
     """Points, times and rates as given, checked; and the end of the work, common to all splines."""
 
     def __init__(
-        self, points: ArrayLike, times: ArrayLike | None, limits: MotionLimits | None,
+        self,
+        points: ArrayLike,
+        times: ArrayLike | None,
+        limits: MotionLimits | None,
         rates: dict[str, ArrayLike],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.points, self.scalar = as_points(points)
         m, n = self.points.shape
         try:

@@ -153,8 +153,10 @@ def time_optimal(
     (1.5, 'velocity of joint 1')
     """
     points = sample_count(points, "points", 2, _MOST)
-    first, last = (as_number(r, k, least=0.0, below=1e150) for r, k in
-                   ((start_rate, "start_rate"), (end_rate, "end_rate")))  # fmt: skip
+    first, last = (
+        as_number(r, k, least=0.0, below=1e150)
+        for r, k in ((start_rate, "start_rate"), (end_rate, "end_rate"))
+    )
     if not isinstance(both_ends, bool | np.bool_):
         raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
@@ -228,9 +230,7 @@ def time_optimal(
     return TimedPath(trajectory, TimingStatus.OPTIMAL, s, speed, most, active, gap, why)
 
 
-def _uses(
-    problem: PathLimits, motion: Motion, law: PiecewisePolynomial, both_ends: bool
-) -> Array:  # fmt: skip
+def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, both_ends: bool) -> Array:
     """Torques (N, P, n) at places inside the intervals, over their limits."""
     N = law.lengths.size
     if not problem.loaded.size:

@@ -207,8 +207,10 @@ class Trajectory(Value):
         if not self.repeats and ((flat < 0.0) | (flat > end)).any():
             # a few roundings beside an end, where sums of steps arrive, are the end
             before, after = flat < -4.0 * np.spacing(end), flat > end + 4.0 * np.spacing(end)
-            for beyond, edge, side in ((before, 0.0 * end, "before the start"),
-                                       (after, end, "after the end")):  # fmt: skip
+            for beyond, edge, side in (
+                (before, 0.0 * end, "before the start"),
+                (after, end, "after the end"),
+            ):
                 edges = np.broadcast_to(edge, (*batch, 1))
                 if not self.holds and beyond.any() and self._moving(edges):
                     raise InvalidValueError(
