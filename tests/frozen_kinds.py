@@ -16,8 +16,7 @@ CONTACT = {"known_lengths": ["r4"]}
 class Scene:
     """The nominal robot, its real brother, 60 readings and the noisy poses there."""
 
-    def __init__(self, noise=1.0):
-        self.noise = noise
+    def __init__(self):
         self.rng = rng = np.random.default_rng(3)
         self.nominal = rm.load("rx90").with_tool(rm.se3.translation(0.05, -0.03, 0.11))
         table = self.nominal.table
@@ -31,10 +30,10 @@ class Scene:
         tool = rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12])
         self.real = self.nominal.with_table(table.replace(**columns)).with_tool(tool)
         self.q = rng.uniform(-2.0, 2.0, (60, 6))
-        turns = [rm.se3.from_rpy(*(1e-4 * noise * rng.normal(size=(2, 3)))) for _ in self.q]
+        noise = [rm.se3.from_rpy(*(1e-4 * rng.normal(size=(2, 3)))) for _ in self.q]
         T = rm.dgm(self.real, self.q)
-        self.T = T @ turns
-        self.T[:, :3, 3] = T[:, :3, 3] + np.array(turns)[:, :3, 3]
+        self.T = T @ noise
+        self.T[:, :3, 3] = T[:, :3, 3] + np.array(noise)[:, :3, 3]
         self.p = self.T[:, :3, 3]
 
     def met(self, rows, count: int):
@@ -55,7 +54,7 @@ class Scene:
                 if np.abs(e).max() < 1e-10 and np.abs(x).max() < 4.0:
                     break
             q[k] = x
-        return q + 1e-4 * self.noise * self.rng.normal(size=q.shape)
+        return q + 1e-4 * self.rng.normal(size=q.shape)
 
 
 def linear(B, at):
@@ -86,9 +85,9 @@ ALONG = np.array([[0.0, 0.6, 0.8], [0.8, 0.0, 0.6], [0.0, 1.0, 0.0]])
 
 
 @cache
-def measured(kind: str, noise: float = 1.0):
+def measured(kind: str):
     """Nominal robot, measurements of a kind, and options of the fit."""
-    s, c = Scene(noise), calibration
+    s, c = Scene(), calibration
     options: dict = {}
     if kind == "pose":
         found = [c.Pose(s.q, s.T)]

@@ -18,7 +18,7 @@ from robotmodels.errors import InvalidValueError, UrdfError, UrdfWarning
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
 
 EXACT = 1e-9
-SEEDS = range(4)
+SEEDS = range(6)
 
 
 # --- robots as people write them ------------------------------------------------------------------
@@ -172,7 +172,15 @@ def test_the_named_tip_is_the_calibrated_one_and_only_origins_change(seed):
     own = {f"l{k}_l{k + 1}" for k in range(1, 4)} | {"flange_tip"}
     own |= {"base_mount", "mount_l1"} if seed % 2 == 0 else {"base_l1"}
     assert changed_joints(text, written) == own
-    # links beside the chain keep their place in their bodies
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_links_beside_the_chain_keep_their_place_in_their_bodies(seed):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    robot = calibrated(model, rng, base=False)
+    written = calibrated_urdf(robot)
     bodies = {"camera": "l3", "lens": "l3", "flange": "l4", "cover": "l2", "plate": "base",
               "lamp": "base", "hand": "tip", "finger_2": "tip"}  # fmt: skip
     for q in rng.uniform(-2.0, 2.0, (2, model.n)):

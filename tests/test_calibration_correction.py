@@ -360,7 +360,7 @@ def test_the_slope_of_a_robot_that_bends(rng):
 # --- controllers that keep their model ----------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["rx90", "erd:ur10"])
+@pytest.mark.parametrize("name", ["rx90", "erd:ur10", "gantry"])
 def test_false_targets_lead_to_the_true_ones(name, rng):
     model = rm.load(name)
     robot = off(model, rng, **LAWS)

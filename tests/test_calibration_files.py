@@ -110,7 +110,6 @@ def test_millimetres_and_degrees_give_the_same_as_metres_and_radians(tmp_path):
         ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Use joint_angles='rad'"),
         ((1.0, 1e3), {}, "look like millimetres. Use lengths='mm'"),
         ((1.0, 1.0), {"lengths": "mm"}, "look like metres. Use lengths='m'"),
-        ((1.0, 1e2), {"lengths": "mm"}, "look like centimetres. Multiply them by 10"),
         ((1.0, 1.0), {"lengths": "inch"}, "lengths: expected 'm' or 'mm', got 'inch'"),
         ((1.0, 1.0), {"label": "x"}, "label: position does not use it"),
         ((1.0, 1.0), {"other_joints": NAMES}, "other_joints: position does not use it"),
@@ -202,6 +201,15 @@ def test_contacts_with_labels_of_a_column_or_of_files(tmp_path, kind, built, fie
     np.testing.assert_allclose(found.q, Q, rtol=1e-11)
     with pytest.raises(InvalidValueError, match=r"no file 'pin_\*'"):
         read_measurements(folder, kind, RX90, pattern="pin_*")
+
+
+def test_the_same_file_name_in_two_folders_is_two_points(tmp_path):
+    files = []
+    for name in ("front", "back"):
+        (tmp_path / name).mkdir()
+        files.append(written(tmp_path / name / "hole.csv", None, rows_of(Q)))
+    found = read_measurements(files, "point_contact", RX90)
+    assert set(found.point) == {"front/hole", "back/hole"}
 
 
 def test_files_of_a_folder_with_other_contents_are_refused(tmp_path):

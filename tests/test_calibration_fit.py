@@ -5,17 +5,22 @@ import pickle
 
 import numpy as np
 import pytest
-from frozen_kinds import KINDS, POINTS
-from frozen_kinds import measured as measurements_of
 
 import robotmodels as rm
 from robotmodels.calibration import (
+    AxisPosition,
+    CameraPose,
+    Distance,
+    FrameContact,
     KnownDistance,
+    LaserLine,
     ParameterPrior,
+    PlaneContact,
     PointContact,
     Pose,
     Position,
     Reason,
+    RelativePose,
     calibrated_pose,
     candidate_parameters,
     differential_model,
@@ -115,6 +120,9 @@ def scene():
     return Scene()
 
 
+POINTS = np.array([[0.5, 0.1, 0.1], [0.1, -0.45, 0.3], [0.4, -0.3, 0.35]])
+
+
 @pytest.fixture(scope="module")
 def contacts():
     """The robot touches three points; the length r4 is right."""
@@ -123,25 +131,6 @@ def contacts():
 
 
 # --- exact measurements, by every method, determine what they can ---------------------------------
-
-COUNTS = {"pose": 30, "position": 27, "relative": 24, "point": 20}
-"""Of parameters; contacts do not show the base, and r4 is given."""
-
-
-@pytest.mark.filterwarnings("ignore:q. joint")  # on the way to where a contact holds
-@pytest.mark.parametrize("kind", KINDS)
-def test_exact_measurements_determine_the_others_of_their_kind(kind):
-    nominal, (whole,), options = measurements_of(kind, noise=0.0)
-    aside = np.arange(whole.blocks) % 6 == 0
-    train, test = (whole.subset(np.flatnonzero(rows)) for rows in (~aside, aside))
-    result = fit(nominal, train, folds=0, held_out=test, **options)
-    assert result.status is FitStatus.CONVERGED
-    assert len(result.names) == COUNTS.get(kind, len(result.names))
-    assert result.known == tuple(options.get("known_lengths", ()))
-    assert set(result.units) - {"1"} == ({"rad"} if kind == "orientation" else {"m", "rad"})
-    errors = result.validation
-    assert max(errors.in_sample.max.values()) < EXACT < max(errors.given.rms.values())
-    assert max(errors.held_out.max.values()) < EXACT
 
 
 def pose_error(s, model):
@@ -152,6 +141,20 @@ def position_error(s, model):
     return np.abs(s.gap(model)[:, :3, 3]).max()
 
 
+def height_error(s, model):
+    return np.abs(s.gap(model)[:, 2, 3]).max()
+
+
+def angle_error(s, model):
+    return np.abs(s.gap(model)[:, :3, :3]).max()
+
+
+def step_error(s, model):
+    """Largest error of the steps between successive poses, which do not depend on the base."""
+    T, real = rm.dgm(model, s.fresh), rm.dgm(s.real, s.fresh)
+    return np.abs(rm.se3.inverse(T[:-1]) @ T[1:] - rm.se3.inverse(real[:-1]) @ real[1:]).max()
+
+
 def shape_error(s, model):
     """Largest distance of two robots' positions, where one may stand anywhere."""
     p, goal = (rm.dgm(x, s.fresh)[:, :3, 3] for x in (model, s.real))
@@ -159,7 +162,47 @@ def shape_error(s, model):
     return np.abs(apart[0] - apart[1]).max()
 
 
-def test_contacts_need_a_known_length_and_take_their_scale_from_it(contacts):
+PIVOTS = np.array([[1.5, 0.2, -0.5], [-0.4, 1.6, 0.3], [0.1, -1.2, 1.4]])
+LABEL = np.arange(60) % 3
+EXPECTED = {
+    "pose": (30, pose_error), "position": (27, position_error), "height": (None, height_error),
+    "orientation": (None, angle_error), "pair": (None, shape_error), "pivot": (None, shape_error),
+    "known pivot": (27, position_error), "steps": (24, step_error), "camera": (None, step_error),
+}  # fmt: skip
+
+
+def seen(kind, s):
+    """Exact measurements of a kind."""
+    far = np.linalg.norm(s.p - PIVOTS[LABEL], axis=1)
+    known = dict(enumerate(PIVOTS))
+    target = rm.se3.from_rpy([0.3, -0.4, 1.0], [0.8, 0.1, -0.2])
+    apart = np.linalg.norm(s.p - np.roll(s.p, 1, axis=0), axis=1)
+    return {
+        "pose": lambda: Pose(s.q, s.T), "position": lambda: Position(s.q, s.p),
+        "height": lambda: Pose(s.q, s.T, rows=[0, 0, 1, 0, 0, 0]),
+        "orientation": lambda: Pose(s.q, s.T, rows=[0, 0, 0, 1, 1, 1]),
+        "pair": lambda: Distance(s.q, apart, q_other=np.roll(s.q, 1, axis=0)),
+        "pivot": lambda: Distance(s.q, far, pivot=LABEL),
+        "known pivot": lambda: Distance(s.q, far, pivot=LABEL, known=known),
+        "steps": lambda: RelativePose.successive(s.q, rm.se3.inverse(s.T[:-1]) @ s.T[1:]),
+        "camera": lambda: CameraPose(s.q, rm.se3.inverse(s.T) @ target),
+    }[kind]()  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", EXPECTED)
+def test_exact_measurements_determine_the_robot(scene, kind):
+    result = fit(scene.nominal, seen(kind, scene), **ALONE)
+    count, error = EXPECTED[kind]
+    assert result.status is FitStatus.CONVERGED
+    assert count is None or len(result.names) == count
+    assert error(scene, result.model) < EXACT
+    assert set(result.units) == ({"rad"} if kind == "orientation" else {"m", "rad"})
+    errors = result.validation
+    assert errors.folds is errors.held_out is None
+    assert max(errors.in_sample.max.values()) < EXACT < max(errors.given.rms.values())
+
+
+def test_contacts_with_a_known_length_determine_the_shape(contacts):
     s, q, labels = contacts
     apart = np.linalg.norm(POINTS[0] - POINTS[1])
     known = KnownDistance("point:0", "point:1", apart, sigma=1e-9)
@@ -169,14 +212,42 @@ def test_contacts_need_a_known_length_and_take_their_scale_from_it(contacts):
     found = np.array([[result.fixtures[f"point:{k}.{a}"] for a in "xyz"] for k in range(3)])
     between = np.linalg.norm(found[[0, 1, 0]] - found[[1, 2, 2]], axis=1)
     assert between == pytest.approx(np.linalg.norm(POINTS[[0, 1, 0]] - POINTS[[1, 2, 2]], axis=1))
+    result = fit(s.nominal, PointContact(q, labels), known_lengths=["r4"], **ALONE)
+    assert shape_error(s, result.model) < EXACT
+    assert result.known == ("r4",)
+    assert "r4" not in result.names
     known = PointContact(q, labels, known=dict(enumerate(POINTS)))
     assert position_error(s, fit(s.nominal, known, **ALONE).model) < EXACT
     wrong = KnownDistance("point:0", "point:1", 1.01 * apart)
     long = fit(s.nominal, [PointContact(q, labels), wrong], prior=None, **ALONE)
     assert long.model.table.r[3] == pytest.approx(1.01 * s.real.table.r[3], rel=1e-9)
-    for names in (None, ["r1"], ["alpha3"], ["b0"]):  # zero is no length, and neither is an angle
-        with pytest.raises(InvalidValueError, match=r"contain no length.*known_lengths"):
-            fit(s.nominal, PointContact(q, labels), **({"known_lengths": names} if names else {}))
+    with pytest.raises(InvalidValueError, match=r"contain no length.*known_lengths"):
+        fit(s.nominal, PointContact(q, labels))
+    for name in ("r1", "alpha3", "b0"):  # zero is no length, and neither is an angle
+        with pytest.raises(InvalidValueError, match="contain no length"):
+            fit(s.nominal, PointContact(q, labels), known_lengths=[name])
+
+
+def test_planes_lines_and_configurations_of_one_pose_determine_the_shape(contacts):
+    s, *_ = contacts
+    normals = np.array([[0.0, 0.0, 1.0], [0.8, 0.0, 0.6], [0.0, 0.8, 0.6], [-0.6, -0.48, 0.64]])
+    offsets, label = np.array([0.1, 0.2, 0.15, 0.1]), np.arange(120) % 4
+    n, x = normals[label], s.rng.uniform(-0.45, 0.45, (120, 3))
+    there = x + (offsets[label] - (n * x).sum(axis=1))[:, None] * n
+    planes = PlaneContact(reaching(s.real, there, s.rng), label)
+    assert shape_error(s, fit(s.nominal, planes, known_lengths=["r4"], **ALONE).model) < 1e-8
+    at = np.array([[0.4, 0.1, 0.0], [0.1, 0.4, 0.2], [-0.3, 0.1, 0.3]])
+    along = np.array([[0.0, 0.6, 0.8], [0.8, 0.0, 0.6], [0.0, 1.0, 0.0]])
+    there = at[LABEL] + s.rng.uniform(-0.3, 0.3, (60, 1)) * along[LABEL]
+    known = {k: [at[k], along[k]] for k in range(3)}
+    lines = LaserLine(reaching(s.real, there, s.rng), LABEL, known=known)
+    gauge = AxisPosition(s.q, s.p @ along[0], along[0])
+    assert position_error(s, fit(s.nominal, [lines, gauge], **ALONE).model) < EXACT
+    found = rm.igm(s.real, rm.dgm(s.real, readings(s.nominal, s.rng, 12)))
+    q, label = found.q[found.valid], np.nonzero(found.valid)[0]
+    result = fit(s.nominal, FrameContact(q, label), known_lengths=["r4"], **ALONE)
+    for k in np.unique(label):  # the calibrated robot brings each to one pose
+        assert np.abs(np.ptp(rm.dgm(result.model, q[label == k]), axis=0)).max() < EXACT
 
 
 def test_kinds_and_ends_mix_in_one_fit(contacts):
@@ -352,6 +423,27 @@ def test_outliers_do_not_move_a_robust_fit():
     assert set(bad) <= set(robust.solution.fit.outliers)
 
 
+@pytest.mark.parametrize("states_noise", [True, False])
+def test_millimetres_and_metres_give_the_same_answer(states_noise):
+    s = Scene(seed=6, count=40)
+    T, unit = s.noisy(), 1000.0
+    table, tool, big = s.nominal.table, s.nominal.tool.copy(), T.copy()
+    large = dataclasses.replace(table, d=unit * table.d, r=unit * table.r, b=unit * table.b)
+    tool[:3, 3] *= unit
+    big[:, :3, 3] *= unit
+    sigma = np.array([1e-4] * 3 + [2e-4] * 3)
+    noise = [sigma, sigma * ([unit] * 3 + [1.0] * 3)] if states_noise else [None, None]
+    metres = fit(s.nominal, Pose(s.q, T, sigma=noise[0]), **ALONE)
+    millimetres = fit(
+        s.nominal.with_table(large).with_tool(tool), Pose(s.q, big, sigma=noise[1]),
+        prior=ParameterPrior(length=unit * 1e-3), **ALONE,
+    )  # fmt: skip
+    assert millimetres.names == metres.names
+    scale = np.where(np.array(metres.units) == "m", unit, 1.0)
+    assert np.abs(metres.values - millimetres.values / scale).max() < EXACT
+    assert np.abs(metres.standard_errors - millimetres.standard_errors / scale).max() < EXACT
+
+
 # --- data held out --------------------------------------------------------------------------------
 
 
@@ -516,6 +608,11 @@ def test_notes_name_what_is_strange(scene):
     ):
         assert any(words in note for note in fit(scene.nominal, measured, **ALONE).notes)
     assert not fit(scene.nominal, Pose(scene.q, scene.T), **ALONE).notes
+    T = scene.T[:14].copy()  # a nominal robot, and noise alone
+    T[:, :3, 3] = rm.dgm(scene.nominal, scene.q[:14])[:, :3, 3]
+    T[:, :3, 3] += 2e-3 * np.random.default_rng(3).normal(size=(14, 3))
+    result = fit(scene.nominal, Position(scene.q[:14], T[:, :3, 3]))
+    assert any("does not lower the position error" in note for note in result.notes)
 
 
 def test_a_result_pickles_prints_and_counts_its_fits(scene):

@@ -196,6 +196,15 @@ def test_contacts_without_a_known_length_are_refused_with_names(kind):
         identifiable_parameters(rm.load("rx90"), kind, known_lengths=["theta2", "d5"])
 
 
+def test_small_corrections_make_parameters_identifiable_but_badly():
+    model = rm.load("rx90")
+    nominal = identifiable_parameters(model, "position")
+    calibrated = identifiable_parameters(model, "position", corrections={"d7": 1e-3})
+    assert nominal.reasons["theta5"] is Reason.NO_EFFECT
+    assert "theta5" in calibrated.names
+    assert calibrated.gap[0] < 1e-2 * nominal.gap[0]
+
+
 def test_contacts_are_judged_where_the_corrected_robot_meets_them():
     model = rm.load("ur10e")
     rng = np.random.default_rng(3)
@@ -223,6 +232,17 @@ def test_data_identify_no_more_than_the_structure():
     q[:, 4:] = 0.3  # two joints at rest
     still = identifiable_parameters(model, Pose(q, rm.dgm(model, q)))
     assert still.count < structure.count
+
+
+def test_subsets_of_parameters_and_known_ones():
+    model = rm.load("rx90")
+    some = ["theta2", "theta3", "d3", "r4"]
+    assert list(identifiable_parameters(model, "pose", parameters=some).names) == some
+    basis = identifiable_parameters(model, "pose", known=["theta2"])
+    assert basis.of_reason(Reason.KNOWN) == ("theta2",)
+    assert basis.count == 29
+    bare = identifiable_parameters(model, "pose", base=False, tool=False)
+    assert all(1 <= row <= 6 for row in bare.candidates.rows)
 
 
 def test_mistakes_are_named():

@@ -195,6 +195,45 @@ def test_residuals_vanish_for_the_robot_that_was_measured_and_the_guess_finds_it
     assert np.abs(linearised(problem, xi * 0, guess)[0].residual).max() > 1e-3
 
 
+def two_arms():
+    """Two arms of five joints on a turning trunk, their ends, and the poses of these at q."""
+    rng = np.random.default_rng(3)
+    table = rm.DHTable(
+        antecedent=[0, 1, 2, 3, 4, 5, 1, 7, 8, 9, 10],
+        sigma=[0] * 11,
+        **{name: rng.uniform(0.1, 1.4, 11) for name in ("alpha", "d", "r")},
+    )
+    ends = (6, 11)
+    candidates = candidate_parameters(rm.RobotModel.from_table(table), ends)
+    q, xi = rng.uniform(-1.0, 1.0, 11), 1e-3 * rng.normal(size=len(candidates))
+    at, other = (differential_model(candidates, q[None], xi, end).T[0] for end in ends)
+    return candidates, xi, q, ends, at, np.linalg.inv(at) @ other
+
+
+@pytest.mark.parametrize("kind", ["line", "point", "plane", "frame", "linked", "linked_point"])
+def test_readings_are_moved_to_where_a_constraint_holds(kind):
+    candidates, xi, q, (e, f), at, X = two_arms()
+    rng = np.random.default_rng(8)
+    readings = q + 0.02 * rng.normal(size=(6, 11))
+    line, plane = (cls.target_at(at, rng) for cls in (LaserLine, PlaneContact))
+    m, fixtures = {
+        "line": (LaserLine(readings, known={0: line}, frame=e), []),
+        "point": (PointContact(readings, frame=e), at[:3, 3]),
+        "plane": (PlaneContact(readings, known={0: plane}, frame=e), []),
+        "frame": (FrameContact(readings, known={0: at}, frame=e), []),
+        "linked": (LinkedFrames(readings, e, f, known={0: X}), []),
+        "linked_point": (LinkedFrames(readings, e, f, orientation=False), X[:3, 3]),
+    }[kind]
+    problem, fixtures = problem_of(candidates, [m]), np.array(fixtures)
+    assert np.abs(linearised(problem, xi, fixtures)[0].residual).max() > 1e-3
+    exact = satisfying(problem, xi, fixtures)
+    moved = exact.measurements[0]
+    assert moved.is_constraint
+    assert moved.blocks == 6
+    assert np.abs(linearised(exact, xi, fixtures)[0].residual).max() < 1e-12
+    assert 1e-6 < np.abs(moved.q - readings).max() < 0.5
+
+
 # --- parts, copies, names -------------------------------------------------------------------------
 
 

@@ -88,9 +88,6 @@ def named(text):
     return found and (found[1], 1e-3 * float(found[2]), 1e-3 * float(found[3]))
 
 
-CAUSES = {"compliance": "joint compliance", "eccentricity": "gear eccentricity"}
-
-
 @cache
 def fitted(seed, kind, masses=True):
     scene = Scene(seed, kind, masses=masses)
@@ -98,20 +95,29 @@ def fitted(seed, kind, masses=True):
     return scene, measured, fit(scene.arm, measured, prior=ParameterPrior(), folds=3, held_out=0)
 
 
-def test_noise_has_no_structure():
+@pytest.mark.parametrize("prior", [None, ParameterPrior()])
+def test_noise_has_no_structure(prior):
     found = []
     for seed in range(20):
-        prior = None if seed % 2 else ParameterPrior()
         scene = Scene(seed)
         result = fit(scene.arm, scene.measured(50), prior=prior, folds=0, held_out=0)
         found.append(bool(note(result)))
     assert np.mean(found) <= 0.05
 
 
+@pytest.mark.parametrize(
+    ("kind", "term"), [("compliance", "joint compliance"), ("eccentricity", "gear eccentricity")]
+)
+@pytest.mark.nightly
+def test_the_cause_is_named_first(kind, term):
+    found = [named(note(fitted(seed, kind)[2])) for seed in range(9)]
+    assert sum(f is not None and f[0] == term for f in found) >= 8
+
+
 @pytest.mark.parametrize("kind", ["compliance", "eccentricity", "backlash"])
 @pytest.mark.nightly
-def test_the_cause_is_named_first_and_brings_on_fresh_data_what_it_promises(kind):
-    ratios, names = [], []
+def test_the_term_brings_on_fresh_data_what_it_promises(kind):
+    ratios = []
     for seed in range(6):
         scene, measured, result = fitted(seed, kind)
         text = note(result)
@@ -120,7 +126,6 @@ def test_the_cause_is_named_first_and_brings_on_fresh_data_what_it_promises(kind
         promise = named(text)
         if promise is None:
             continue
-        names.append(promise[0])
         fresh = scene.measured(200)
         without, with_it = (
             fit(scene.arm, measured, prior=ParameterPrior(), folds=0, held_out=fresh, **options)
@@ -132,7 +137,7 @@ def test_the_cause_is_named_first_and_brings_on_fresh_data_what_it_promises(kind
         assert len(ratios) <= 3
         assert all(ratio > 0.0 for ratio in ratios)
     else:
-        assert sum(name == CAUSES[kind] for name in names) >= 5
+        assert len(ratios) >= 5
         assert 0.7 < np.median(ratios) < 1.3
 
 
@@ -197,7 +202,7 @@ def test_what_a_prior_holds_back_is_geometry():
 
 def test_an_error_that_all_measurements_of_a_posture_share_is_noise():
     found = []
-    for seed in range(5):
+    for seed in range(10):
         scene = Scene(seed)
         q = np.repeat(scene.readings(40), 3, axis=0)
         shared = np.repeat(3e-4 * scene.rng.normal(size=(40, 3)), 3, axis=0)

@@ -15,7 +15,7 @@ from robotmodels.calibration import (
     observability,
     select_configurations,
 )
-from robotmodels.calibration.exchange import exchanged, greedy
+from robotmodels.calibration.exchange import exchanged, greedy, nested
 from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
 from robotmodels.calibration.observability import Criterion
 from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacked
@@ -119,6 +119,17 @@ def test_exchange_finds_what_exhaustive_search_finds(criterion):
         assert found == pytest.approx(best, rel=1e-9)
 
 
+def test_first_members_of_a_nested_order_are_good_sets():
+    rng = np.random.default_rng(7)
+    rows = rng.normal(size=(60, 3, 5)) * rng.uniform(0.1, 2.0, size=(60, 1, 1))
+    chosen = rng.permutation(60)[:20]
+    order = nested(rows, chosen, Criterion.O1)
+    assert sorted(order) == sorted(chosen)
+    for c in (4, 8, 12):
+        at_random = [value(rows, rng.permutation(chosen)[:c], Criterion.O1) for _ in range(50)]
+        assert value(rows, order[:c], Criterion.O1) > max(at_random)
+
+
 # --- rows of groups ----------------------------------------------------------------------------
 
 
@@ -204,6 +215,9 @@ def test_the_curve_gives_the_count_that_is_enough(chosen):
     assert "not yet enough" in chosen.enough_sentence(0.001)
     with pytest.raises(InvalidValueError, match="gain"):
         chosen.enough(2.0)
+
+
+def test_a_choice_prints_and_pickles(chosen):
     assert "15 chosen of 150 candidates" in str(chosen)
     again = pickle.loads(pickle.dumps(chosen))
     assert np.array_equal(again.q, chosen.q)

@@ -138,6 +138,7 @@ def test_too_few_places_are_named(count):
     assert not any(note.startswith("Measured at") for note in both.notes)
 
 
+@pytest.mark.nightly
 def test_the_note_is_right_about_one_place():
     """Folds at one place state less than another place errs: that is why they are named."""
     assert np.mean([stated_over_true(lambda arm: sockets(arm, 1), s)[0] for s in range(6)]) < 0.7

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from identities.random_robots import (
+    any_models,
     random_angle,
     random_length,
     random_model,
+    random_state,
     random_table,
+    robot_size,
     seeds,
+    table_poses,
 )
 
 import robotmodels as rm
@@ -115,6 +119,16 @@ def test_a_factor_is_the_product_of_its_seven_motions(seed):
     assert np.abs(rm.link_transforms(table, np.zeros(table.n)) - constant_factors(table)).max() == (
         pytest.approx(0, abs=1e-15)
     )
+
+
+@given(any_models())
+def test_poses_are_the_plain_product_of_the_factors(model):
+    """The oracle here, the compiled kernels and Pinocchio agree on every random robot."""
+    rng = np.random.default_rng(0)
+    q, _, _ = random_state(model, rng)
+    poses, size = table_poses(model, q), robot_size(model, q)
+    assert np.abs(rm.link_poses(model, q) - poses).max() < 1e-12 * size
+    assert np.abs(rm.dgm(model, q) - poses[model.tip - 1] @ model.tool).max() < 1e-12 * size
 
 
 @pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,)])

@@ -28,6 +28,7 @@ from robotmodels.identification import (
 from robotmodels.identification.closed_loop import method as method_module
 from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates, robot_of
 from robotmodels.identification.closed_loop.method import instrument_step
+from robotmodels.identification.closed_loop.simulation import SimulationDivergedError
 from robotmodels.identification.fit import _identifiable
 from robotmodels.identification.forms import Block
 from robotmodels.identification.signals import central_differences
@@ -217,6 +218,38 @@ def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
     back = np.linalg.inv(z.T @ w)
     expected = sigma * np.sqrt(np.diag(back @ (z.T @ z) @ back.T))
     np.testing.assert_allclose(found.standard_errors, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("instruments", [False, True])
+@pytest.mark.parametrize(("apart", "refused"), [(1e-4, False), (1e-7, False), (1e-12, True)])
+def test_nearly_equal_columns_have_large_standard_errors_or_are_refused(
+    rng, apart, refused, instruments
+):
+    W = rng.normal(size=(2000, 1, 4))
+    W[:, :, 3] = W[:, :, 0] + apart * rng.normal(size=(2000, 1))
+    Z = W @ rng.normal(size=(4, 4)) if instruments else W
+    y = W.sum(axis=2) + 1e-3 * rng.normal(size=(2000, 1))
+    block = Block(np.arange(2000.0), W, y, np.ones(y.shape, bool), np.ones(y.shape))
+    size = np.ones(4)
+
+    def step(start):
+        return instrument_step(tuple("abcd"), start, lambda: [(Z, block)], size)
+
+    if refused:
+        with pytest.raises(SimulationDivergedError):
+            step(size)
+        return
+    # from the solution, so that the scale is that of the noise
+    R = np.linalg.qr(np.column_stack((W[:, 0], y)), mode="r")
+    whole = np.linalg.solve(R[:4, :4], R[:4, 4])
+    found = step(whole)
+    noise = abs(R[4, 4]) / np.sqrt(2000 - 4)
+    expected = noise * np.linalg.norm(np.linalg.inv(R[:4, :4]), axis=1)
+    np.testing.assert_allclose(found.standard_errors, expected, rtol=1e-5)
+    assert (np.abs(found.values - whole) < 1e-2 * expected).all()
+    lengths = np.linalg.norm(W[:, 0], axis=0)
+    if not instruments:
+        assert found.condition == pytest.approx(np.linalg.cond(W[:, 0] / lengths), rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -24,6 +24,7 @@ from robotmodels.identification.report_tables import (
     group_names,
     group_units,
     intervals,
+    regrouped_text,
     standard_error_ratio,
 )
 from robotmodels.identification.residuals import residual_diagnostics
@@ -189,6 +190,17 @@ def test_lists_of_parameters_agree_with_the_covariance(found):
     np.testing.assert_allclose(standard_error_ratio(found) * white, found.standard_errors)
     ends = intervals(found.estimate)
     np.testing.assert_allclose(ends.mean(axis=1), found.values, atol=1e-12)
+
+
+def test_what_a_parameter_stands_for_fits_and_counts_its_terms():
+    base = rm.base_parameters(rm.load("rx90"))
+    for name, row in zip(base.names, base.matrix, strict=True):
+        text = regrouped_text(base, name, 29)
+        assert len(text) <= 29
+        assert text.startswith(name)
+        left = int(text.split("... ")[1].split()[0]) if "..." in text else 0
+        shown = text.split(" ...")[0].replace(" - ", " + ").split(" + ")
+        assert len(shown) + left == np.count_nonzero(row)
 
 
 # --- report ---------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import time
 import tracemalloc
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,6 +22,8 @@ from robotmodels.errors import InvalidValueError
 from robotmodels.estimation.factor import merged
 from robotmodels.estimation.linear import weighted
 from robotmodels.identification import choose_processing, equations, fit, reduce_equations
+from robotmodels.identification.common_equations import CommonEquations
+from robotmodels.identification.forms import EquationForm
 from robotmodels.logs import Log
 from robotmodels.minimal_parameters import base_parameters
 
@@ -110,11 +113,12 @@ class Counting(Executor):
 
     def __init__(self, fails_at=None):
         self.waiting, self.most, self.done, self.cancelled = 0, 0, 0, 0
-        self.fails_at = fails_at
+        self.fails_at, self.bytes = fails_at, 0
 
     def submit(self, fn, /, *args, **kwargs):
         self.waiting += 1
         self.most = max(self.most, self.waiting)
+        self.bytes = max(self.bytes, len(pickle.dumps((fn, args, kwargs))))
         return Later(self, lambda: fn(*args, **kwargs))
 
 
@@ -147,6 +151,15 @@ def test_no_more_pieces_wait_than_the_window_and_none_after_an_error():
     assert failing.cancelled == 4
     with pytest.raises(InvalidValueError, match="window"):
         reduce_equations(whole, failing, window=0)
+
+
+def test_common_equations_are_sent_piece_by_piece():
+    whole = system()
+    every = CommonEquations((whole, whole), whole.names, (None, 2.0 * np.eye(len(whole.names))))
+    pool = Counting()
+    assert bits(every.reduced(pool)) == bits(every.reduced())
+    assert pool.done == 2 * len(whole.pieces()) > 2 * pool.most
+    assert pool.bytes < len(pickle.dumps(whole.log)) / 4
 
 
 def test_progress_never_falls_and_ends_at_one():
@@ -217,6 +230,37 @@ def test_memory_is_that_of_a_piece_whatever_the_length():
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.02 * peaks[0]
+
+
+def test_blocks_are_kept_as_far_as_memory_allows_of_their_log_and_choices_alone(monkeypatch):
+    whole = system(4).cached()
+    first = bits(reduce_equations(whole))
+    assert len(whole.cache.blocks) == len(whole.pieces())
+    assert next(whole.blocks()) is next(whole.blocks())
+    assert bits(reduce_equations(whole)) == first
+    fewer = whole.with_names(whole.names[1:])
+    assert bits(reduce_equations(fewer)) == bits(reduce_equations(fewer.uncached()))
+    log = whole.log
+    table = replace(whole.model.table, d=2.0 * whole.model.table.d)
+    base = base_parameters(whole.model.with_table(table), drive=whole.base.drive)
+    assert base.names == whole.names
+    others = {
+        "base": base,
+        "log": Log(log.dt, log.q, 2.0 * log.tau),
+        "form": EquationForm.POWER,
+        "processing": choose_processing(log, decimation=7),
+    }
+    for name, value in others.items():
+        other = replace(whole, **{name: value})
+        for kept, made in zip(other.blocks(), other.uncached().blocks(), strict=True):
+            assert np.array_equal(kept.W, made.W)
+            assert np.array_equal(kept.y, made.y)
+    assert pickle.loads(pickle.dumps(whole)).cache is None
+    monkeypatch.setattr(sys.modules["robotmodels.identification.equations"], "_KEPT_BYTES", 10**6)
+    some = system(4).cached()
+    assert bits(reduce_equations(some)) == first
+    assert 0 < some.cache.size <= 10**6
+    assert some.with_log(some.log.rows(0, 20_000)).cache is None
 
 
 def test_a_result_keeps_no_blocks():

@@ -98,6 +98,15 @@ def test_random_trees_keep_their_poses_and_their_size(seed, f, branching):
         assert np.abs(lengths).max() < 60 * size
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(4))
+def test_many_random_trees(seed):
+    """The same as above on more robots than hypothesis draws in an ordinary run."""
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        assert_same_robot(random_tree(rng, int(rng.integers(1, 9))))
+
+
 @pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -1)), 0.019, 0.021, 0.1])
 @pytest.mark.parametrize("flip", [False, True], ids=["parallel", "antiparallel"])
 @pytest.mark.parametrize("about", ["x", "y", "xy"])

@@ -472,3 +472,10 @@ def test_numbers_whose_squares_are_not_finite_are_refused():
         columns[word][4] = -1e200 if word == "t" else 1e200
         with pytest.raises(InvalidValueError, match="check the units"):
             read_log(columns)
+
+
+def test_a_pose_with_huge_numbers_is_refused_without_warnings():
+    from robotmodels import se3
+
+    with pytest.raises(ValueError, match="not a rotation"):
+        se3.as_pose(np.diag([1e200, 1e200, 1e200, 1.0]))

@@ -258,6 +258,40 @@ def test_planar_arms():
 # --- the seed documents -------------------------------------------------------------------------
 
 
+def rx90_closed_form(q, D3=0.45, RL4=0.45):
+    """Seed book, example 1.2."""
+    C1, C2, _, C4, C5, C6 = np.cos(q)
+    S1, S2, _, S4, S5, S6 = np.sin(q)
+    C23, S23 = np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
+    s = [
+        C1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) - S1 * (S4 * C5 * C6 + C4 * S6),
+        S1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) + C1 * (S4 * C5 * C6 + C4 * S6),
+        S23 * (C4 * C5 * C6 - S4 * S6) + C23 * S5 * C6,
+    ]
+    n = [
+        C1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) + S1 * (S4 * C5 * S6 - C4 * C6),
+        S1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) - C1 * (S4 * C5 * S6 - C4 * C6),
+        -S23 * (C4 * C5 * S6 + S4 * C6) - C23 * S5 * S6,
+    ]
+    a = [
+        -C1 * (C23 * C4 * S5 + S23 * C5) + S1 * S4 * S5,
+        -S1 * (C23 * C4 * S5 + S23 * C5) - C1 * S4 * S5,
+        -S23 * C4 * S5 + C23 * C5,
+    ]
+    p = [
+        -C1 * (S23 * RL4 - C2 * D3),
+        -S1 * (S23 * RL4 - C2 * D3),
+        C23 * RL4 + S2 * D3,
+    ]
+    return np.vstack([np.column_stack([s, n, a, p]), [0, 0, 0, 1]])
+
+
+def test_rx90_is_the_books(rng):
+    model = load("rx90")
+    for q in rng.uniform(-pi, pi, (20, 6)):
+        np.testing.assert_allclose(rm.dgm(model, q), rx90_closed_form(q), rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize("name", ["rx90", "ur5"])
 def test_every_known_posture_reaches_its_pose(name):
     data = oracle(f"igm_{name}")
@@ -269,6 +303,19 @@ def test_every_known_posture_reaches_its_pose(name):
         assert len(solutions) == case["n_solutions"]
         T = rm.dgm(model, solutions)
         np.testing.assert_allclose(T, np.broadcast_to(case["T"], T.shape), rtol=0, atol=1e-9)
+
+
+def test_lab_rr_is_equation_4_5(rng):
+    model = load("lab_rr")
+    for q1, q2 in rng.uniform(-pi, pi, (5, 2)):
+        c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
+        expected = [
+            [c1 * c2, -s1, c1 * s2, c1 * c2 * 0.2],
+            [s1 * c2, c1, s1 * s2, s1 * c2 * 0.2],
+            [-s2, 0, c2, 0.5 - s2 * 0.2],
+            [0, 0, 0, 1],
+        ]
+        np.testing.assert_allclose(rm.dgm(model, [q1, q2]), expected, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(("name", "file"), [("lab_rr", "lab_RR"), ("lab_trr", "lab_TRR")])
@@ -305,8 +352,15 @@ def test_puma_is_the_toolbox_one():
         q, v, a = (np.array(sample[key]) for key in ("q", "qd", "qdd"))
         for value, key in (
             (rm.dgm(model, q), "fkine"),
+            (rm.jacobian(model, q), "jacob0"),
+            (rm.jacobian(model, q, reference="local"), "jacobe"),
+            (rm.jacobian_rate(model, q, v), "jacob0_dot"),
             (rm.idm(model, q, v, a), "tau"),
             (rm.idm(model, q, v, a, drive=False), "tau_rigid"),
+            (rm.mass_matrix(model, q), "inertia"),
+            (rm.mass_matrix(model, q, drive=False), "inertia_rigid"),
+            (rm.gravity_torque(model, q), "gravload"),
+            (rm.coriolis_matrix(model, q, v), "coriolis"),
         ):
             expected = np.array(sample[key])
             scale = max(1.0, np.abs(expected).max())
