@@ -262,6 +262,9 @@ def test_modes_bent_beyond_the_second_order_of_stiffening_are_named():
     e = [[0.0] * 4, [0.3] * 4]
     status = flexible.ddm(arm, np.zeros((2, 1)), e, np.zeros((2, 1)), None, [0.0]).status
     assert status.tolist() == [SpinStatus.STIFF, SpinStatus.BENT]
+    for law in (None, lambda t: [0.0]):
+        bent = flexible.simulate(arm, [0.0], control=law, e0=0.1 * np.ones(4))
+        assert bent.status == FlexibleMotionStatus.BENT
 
 
 def test_an_arm_keeps_the_balance_of_energy_and_momenta():
@@ -284,6 +287,49 @@ def test_an_arm_keeps_the_balance_of_energy_and_momenta():
     few = flexible.simulate(arm, [0.0, 0.0], t=1.0, max_evaluations=50)
     assert few.status == FlexibleMotionStatus.NOT_CONVERGED
     assert few.t[-1] < 1.0
+
+
+def test_constant_torques_move_an_arm_as_functions_of_time_do(rng):
+    """Compiled steps beside SciPy's, with springs, friction and damping, at steps and at times."""
+    for _ in range(3):
+        arm = random_arm(rng, joint_stiffness=[INF, 30.0, INF], joint_damping=0.2)
+        q0, v0, tau = rng.normal(size=(3, 3))
+        start = {"e0": 0.02 * rng.normal(size=arm.m), "e_v0": rng.normal(size=arm.m)}
+        for t in (0.1, np.linspace(0.3, 0.4, 23), [0.0, 0.1], [0.2]):
+            done = []
+            runs = [
+                flexible.simulate(arm, q0, v0, law, t, **start, progress=done.append)
+                for law in (tau, lambda t, tau=tau: tau)
+            ]
+            assert [run.status for run in runs] == [FlexibleMotionStatus.FINISHED] * 2
+            assert done[-1:] == ([1.0] if np.ptp(t) or np.ndim(t) == 0 else [])
+            if np.ndim(t):
+                np.testing.assert_array_equal(runs[0].t, t)
+                for name in ("q", "v", "e", "e_v", "tau", "work", "impulse"):
+                    close(getattr(runs[0], name), getattr(runs[1], name), 1e-6)
+            assert runs[0].t[-1] == runs[1].t[-1]
+            close(runs[0].e[-1], runs[1].e[-1], 1e-6)
+            assert runs[0].energy_drift < 1e-6
+            assert runs[0].momentum_drift < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("options", "v0", "torque", "more", "status"),
+    [
+        ({}, 3.0, 1.0, {"max_evaluations": 500}, FlexibleMotionStatus.NOT_CONVERGED),
+        ({}, 15.0, 0.1, {"t": 3.0}, FlexibleMotionStatus.SOFTENED),
+        ({}, 0.0, 1e5, {}, FlexibleMotionStatus.SOFTENED),
+        ({"stiffening": True}, 0.0, 500.0, {"rtol": 1e-6}, FlexibleMotionStatus.DIVERGED),
+    ],
+)
+def test_constant_torques_end_with_the_status_of_functions(options, v0, torque, more, status):
+    arm = swinging(**options)
+    runs = [
+        flexible.simulate(arm, [0.0], [v0], law, **more) for law in ([torque], lambda t: [torque])
+    ]
+    assert [run.status for run in runs] == [status] * 2
+    assert abs(runs[0].t[-1] - runs[1].t[-1]) < 0.05
+    assert np.isfinite(runs[0].e).all()
 
 
 def test_spin_up_of_kane_ryan_and_banerjee():

@@ -13,21 +13,20 @@ where MS, J, J_k, a_k and b_k depend on e. `loads` finds the accelerations that 
 articulated elastic bodies: forward, velocities and the loads at zero accelerations; backward,
 elimination of the modes and of the joint of each body; forward, the accelerations. Its cost is
 O(f + sum m_j^3). Coordinates of a body are the motion of its root without that of its joint
-(linear, angular), its joint, its modes. Rows y (n + m) are those of the joints, then of the modes.
+(linear, angular), its joint, its modes. Rows y (n + m) are those of the motors, of the modes, and
+of the deflections of flexible joints, whose springs load motor and link with opposite torques.
 
 Shapes of `loads`: y, dy, given, out (N, n + m), outer (N, 18): wrench of the tool, twist and
-acceleration of the base, free (n + 2,): of the joints, of all modes, of the base; if it is empty,
-only poses are found -> base (N, 10): its load (acceleration if free), first moment of the arm, code
-of `SpinStatus`; poses (N, f + 1, 3, 4), the last of the tip section at the tool; the first
-sample in which a free joint moves no inertia, or -1.
+acceleration of the base, free (n + 3,): of the links' joints, of all modes, of the base, of the
+motors; if it is empty, only poses are found -> base (N, 10): its load (acceleration if free), first
+moment of the arm, code of `SpinStatus`; poses (N, f + 1, 3, 4), the last of the tip section at the
+tool; the first sample in which a free joint moves no inertia, or -1.
 """
 
-from typing import NamedTuple
-
-import numpy as np
 from numba import types
 
-from ..kernels._compile import CHAIN, INT, INTS, MATRIX, OUT2, OUT4, VECTOR, Floats, Ints, compiled
+from ..kernels import _compile as kinds
+from ..kernels._compile import INT, MATRIX, OUT2, OUT3, VECTOR, Floats, Ints, compiled
 from ..kernels._inertia import inertia_of, inertia_times
 from ..kernels._motion import coordinate, link_acceleration, link_pose, rotation_acceleration
 from ..kernels._vectors import (
@@ -49,63 +48,49 @@ from ..kernels._vectors import (
     whole_vector,
 )
 from .robot import Arm
+from .work import ONE, Work, to_links, to_motors, workspace
 
-ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
 ROUNDING = 1e-14
-
-
-class Work(NamedTuple):
-    """Arrays of the f + 1 bodies (row 0: base) with s coordinates at most, and of the modes."""
-
-    W: Floats  # axes and root in the world
-    x: Floats
-    R: Floats  # tip section in the axes of the body: rotation, position
-    P: Floats
-    w: Floats  # motion of the body, then of its tip
-    dw: Floats
-    u: Floats
-    X: Floats  # (6, 6) from motions of the antecedent's tip to the root
-    T: Floats  # (6, s) from coordinates to motions of the tip
-    A: Floats  # (s, s) inertia and (s,) load of the coordinates
-    h: Floats
-    I: Floats  # noqa: E741  # (6, 6) inertia and (6,) load of what follows, then its acceleration
-    p: Floats
-    y: Floats  # (s,) accelerations
-    given: Floats  # (s,) loads of coordinates that are free (1), accelerations of others (0)
-    free: Floats
-    body: Floats  # inertial parameters
-    now: Floats  # J_k, a, b, Phi and velocity of the section, at e
-    K: Floats  # (1, modes, modes) stiffness of a body, with rows of zeros and of ones
-    zeros: Floats
-    ones: Floats
-
-
 ARM = types.NamedTuple(
-    (CHAIN, MATRIX, INTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, INT), Arm
+    (
+        kinds.CHAIN,
+        MATRIX,
+        kinds.INTS,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        kinds.INTS,
+        VECTOR,
+        VECTOR,
+        INT,
+    ),
+    Arm,
 )
+WORK = types.NamedTuple(tuple(OUT3 if name in "WRXTAIK" else OUT2 for name in Work._fields), Work)
 
 
-@compiled()
+@compiled(counted=False)
 def part(a: Floats, i: int, c: int) -> Vector:
     """Three entries of row i from column c on."""
     return (a[i, c], a[i, c + 1], a[i, c + 2])
 
 
-@compiled()
+@compiled(counted=False)
 def axis(i: int) -> Vector:
     """Unit vector."""
     return (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
 
 
-@compiled()
+@compiled(counted=False)
 def moments_times(a: Floats, i: int, c: int, w: Vector) -> Vector:
     """Symmetric matrix of the six entries of row i from column c on, times a vector."""
     J = (a[i, c], a[i, c + 1], a[i, c + 2], a[i, c + 3], a[i, c + 4], a[i, c + 5])
     return inertia_times(J, w)
 
 
-@compiled()
+@compiled(counted=False)
 def put_pose(poses: Floats, i: int, k: int, R: Matrix, P: Vector) -> None:
     """Write a pose into ``poses[i, k]``."""
     for x in range(3):
@@ -114,30 +99,7 @@ def put_pose(poses: Floats, i: int, k: int, R: Matrix, P: Vector) -> None:
             poses[i, k, x, y] = R[3 * x + y]
 
 
-@compiled()
-def workspace(arm: Arm, free: Ints) -> Work:
-    """Work arrays with the pose of the base and the free coordinates."""
-    f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
-    s, pose, row = 7 + most, (f, 3, 3), (f, 3)
-    work = Work(
-        *(z(pose), z(row), z(pose), z(row), z(row), z(row), z(row)),
-        *(z((f, 6, 6)), z((f, 6, s)), z((f, s, s)), z((f, s)), z((f, 6, 6)), z((f, 6))),
-        *(z((f, s)), z((f, s)), z((f, s)), z((f, 10)), z((m, 18))),
-        *(z((1, most, most)), z((1, most)), np.ones((1, most))),
-    )
-    put_matrix(work.W, 0, whole_matrix(arm.chain.base_rotation))
-    put_vector(work.x, 0, whole_vector(arm.chain.base_position))
-    put_matrix(work.R, 0, ONE)
-    if len(free):
-        n = arm.rotor.shape[0]
-        work.free[0], work.free[1:, 7:] = free[n + 1], free[n]
-        for k in range(f - 1):
-            if arm.chain.joint[k] >= 0:
-                work.free[k + 1, 6] = free[arm.chain.joint[k]]
-    return work
-
-
-@compiled()
+@compiled(counted=False)
 def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
     """Write inertial parameters, tip and rows of now of deformed body k."""
     put_vector(work.P, k + 1, vector(arm.tip, k))
@@ -155,14 +117,14 @@ def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
             work.P[k + 1, x] += 0.5 * e[c] * (arm.first[c, x + 12] + work.now[c, x + 12])
 
 
-@compiled()
+@compiled(counted=False)
 def turned(a: float, b: float, t: Vector, x: Vector) -> Vector:
     """x + a t x x + b t x (t x x)."""
     tx = cross(t, x)
     return add(x, add(scale(a, tx), scale(b, cross(t, tx))))
 
 
-@compiled()
+@compiled(counted=False)
 def section_at(arm: Arm, k: int, e: Floats, ev: Floats, work: Work) -> tuple[Vector, Vector]:
     """Angular velocity of the tip section in the body, and the rest of its acceleration.
 
@@ -198,7 +160,7 @@ def section_at(arm: Arm, k: int, e: Floats, ev: Floats, work: Work) -> tuple[Vec
     return turned(a, b, t, dt), add(rest, scale(b, cross(dt, tdt)))
 
 
-@compiled()
+@compiled(counted=False)
 def transform(X: Floats, j: int, R: Matrix, P: Vector) -> None:
     """Write the matrix from motions of a frame to those of one with pose (R, P) in it."""
     for x in range(3):
@@ -208,7 +170,7 @@ def transform(X: Floats, j: int, R: Matrix, P: Vector) -> None:
             X[j, y, x + 3], X[j, y + 3, x] = b[y], 0.0
 
 
-@compiled()
+@compiled(counted=False)
 def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int, size: int) -> None:
     """Write matrix j of T times row b of a into row j."""
     for x in range(6):
@@ -217,20 +179,27 @@ def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int, size: int) -> None
             out[j, x] += T[j, x, y] * a[b, y]
 
 
-@compiled()
-def add_back(A: Floats, h: Floats, b: int, B: Floats, p: Floats, j: int, T: Floats, m: int) -> None:
+@compiled(counted=False)
+def add_back(
+    A: Floats, h: Floats, b: int, B: Floats, p: Floats, j: int, T: Floats, m: int, BT: Floats
+) -> None:
     """Add inertia and load in row j of B and p, behind a transform (6, m), to row b of A and h."""
-    for c in range(m):
-        for r in range(6):
-            h[b, c] += T[j, r, c] * p[j, r]
+    for r in range(6):
+        for c in range(m):
             y = 0.0
             for x in range(6):
                 y += B[j, r, x] * T[j, x, c]
-            for x in range(m):
-                A[b, x, c] += T[j, r, x] * y
+            BT[r, c] = y
+    for r in range(6):
+        for c in range(m):
+            t = T[j, r, c]
+            if t != 0.0:  # most are zero
+                h[b, c] += t * p[j, r]
+                for x in range(m):
+                    A[b, c, x] += t * BT[r, x]
 
 
-@compiled()
+@compiled(counted=False)
 def eliminate(
     A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats
 ) -> bool:
@@ -251,7 +220,7 @@ def eliminate(
     return positive
 
 
-@compiled()
+@compiled(counted=False)
 def resolve(
     A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats, y: Floats
 ) -> None:
@@ -263,7 +232,7 @@ def resolve(
         h[j, c] += A[j, c, c] * y[j, c]
 
 
-@compiled()
+@compiled(counted=False)
 def load_body(
     arm: Arm, k: int, e: Floats, ev: Floats, spin: Vector, rest: Vector, work: Work
 ) -> bool:
@@ -314,88 +283,109 @@ def load_body(
             A[y + 3, x + 3] = column[y]
     column = arm.chain.joint[k]
     if column >= 0:  # the joint moves the root along or about z
-        z = 5 - 3 * arm.chain.sigma[k]
+        z, rotor = 5 - 3 * arm.chain.sigma[k], arm.drive[column, 0]
+        if arm.deflection[column] >= 0:  # behind the spring
+            rotor = 0.0
         for x in range(7 + m):
             A[6, x] = A[x, 6] = A[z, x]
         for x in range(6):
             T[j, x, 6] = T[j, x, z]
-        A[6, 6], h[j, 6] = A[z, z] + arm.rotor[column], h[j, z]
+        A[6, 6], h[j, 6] = A[z, z] + rotor, h[j, z]
     return eliminate(work.K, work.zeros, 0, 0, m, work.zeros, work.ones)
 
 
-@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, INTS, OUT2, OUT2, OUT4))
+@compiled(
+    types.boolean(
+        ARM, MATRIX, MATRIX, MATRIX, MATRIX, INT, kinds.INTS, OUT2, OUT2, kinds.OUT4, WORK
+    ),
+    counted=False,
+)
+def accelerate(
+    arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, i: int, free: Ints, out: Floats,
+    base: Floats, poses: Floats, work: Work,
+) -> bool:  # fmt: skip
+    """The recursion for row i; whether a free joint moves no inertia."""
+    f, n, t = arm.pi.shape[0], arm.deflection.shape[0], arm.end
+    g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
+    A, h, I, p, failed = work.A, work.h, work.I, work.p, False  # noqa: E741
+    to_links(arm, y, dy, given, i, free, work)
+    e, ev = work.q[0, n:], work.v[0, n:]
+    w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
+    put_vector(work.w, 0, w)
+    put_vector(work.dw, 0, part(outer, i, 15))
+    put_vector(work.u, 0, subtract(add(cross(w, part(outer, i, 6)), part(outer, i, 12)), g))
+    for k in range(f):
+        j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
+        R, P = link_pose(arm.chain, k, work.q, 0)
+        R, P = product(matrix(work.R, b), R), times(matrix(work.R, b), P)
+        W = product(matrix(work.W, b), R)
+        x = add(vector(work.x, b), times(matrix(work.W, b), add(vector(work.P, b), P)))
+        put_matrix(work.W, j, W)
+        put_vector(work.x, j, x)
+        put_pose(poses, i, k, W, x)
+        body_at(arm, k, e, work)
+        spin, rest = section_at(arm, k, e, ev, work)
+        MS = add(MS, add(times(W, part(work.body, k, 6)), scale(work.body[k, 9], x)))
+        if len(free):
+            transform(work.X, j, R, P)
+            wb, dwb, ub = vector(work.w, b), vector(work.dw, b), vector(work.u, b)
+            U, rate = rotation_acceleration(wb, dwb), coordinate(work.v, 0, column)
+            w, dw, u = link_acceleration(arm.chain.sigma[k], R, P, rate, 0.0, wb, dwb, U, ub)
+            put_vector(work.w, j, w)
+            put_vector(work.dw, j, dw)
+            put_vector(work.u, j, u)
+            work.given[j, 6] = coordinate(work.load, 0, column)
+            for c in range(arm.start[k], arm.start[j]):
+                work.given[j, 7 + c - arm.start[k]] = work.load[0, n + c]
+            if not load_body(arm, k, e, ev, spin, rest, work):
+                base[i, 9] = 1.0
+    W, lever = matrix(work.W, t), times(matrix(work.R, t), whole_vector(arm.tool))
+    end = add(vector(work.x, t), times(W, add(vector(work.P, t), lever)))
+    put_pose(poses, i, f, product(W, matrix(work.R, t)), end)
+    base[i, 6], base[i, 7], base[i, 8] = MS
+    if not len(free):
+        return False
+    p[:], I[:] = 0.0, 0.0
+    F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
+    N = add(N, cross(lever, F))
+    p[t, 0], p[t, 1], p[t, 2], p[t, 3], p[t, 4], p[t, 5] = F + N
+    for j in range(f, 0, -1):
+        s = 7 + arm.start[j] - arm.start[j - 1]
+        add_back(A, h, j, I, p, j, work.T, s, work.BT)
+        own, positive = A[j, 6, 6], eliminate(A, h, j, 6, s, work.given, work.free)
+        if work.free[j, 6] and not abs(A[j, 6, 6]) > ROUNDING * own:
+            failed = True
+        elif not positive:
+            base[i, 9] = 2.0
+        add_back(I, p, arm.chain.antecedent[j - 1], A, h, j, work.X, 6, work.BT)
+    if not eliminate(I, p, 0, 0, 6, work.given, work.free):
+        base[i, 9] = 2.0
+    resolve(I, p, 0, 0, 6, work.given, work.free, work.y)
+    for x in range(6):
+        base[i, x] = work.y[0, x] if free[n + 1] else p[0, x]
+        p[0, x] = work.y[0, x]
+    for j in range(1, f + 1):
+        s, column = arm.start[j - 1], arm.chain.joint[j - 1]
+        high = 7 + arm.start[j] - s
+        mapped(work.y, j, work.X, p, arm.chain.antecedent[j - 1], 6)
+        resolve(A, h, j, 6, high, work.given, work.free, work.y)
+        mapped(p, j, work.T, work.y, j, high)
+        if column >= 0:
+            out[i, column] = work.y[j, 6] if free[column] else h[j, 6]
+        for c in range(7, high):
+            out[i, n + s + c - 7] = work.y[j, c] if free[n] else h[j, c]
+    to_motors(arm, y, dy, given, i, free, out)
+    return failed
+
+
+@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, kinds.INTS, OUT2, OUT2, kinds.OUT4))
 def loads(
     arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, free: Ints, out: Floats,
     base: Floats, poses: Floats,
 ) -> int:  # fmt: skip
     """Accelerations of free coordinates under given loads, and loads of given accelerations."""
-    f, n, t, work = arm.pi.shape[0], arm.rotor.shape[0], arm.end, workspace(arm, free)
-    g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
-    A, h, I, p, failed = work.A, work.h, work.I, work.p, -1  # noqa: E741
+    work, failed = workspace(arm, free), -1
     for i in range(y.shape[0]):
-        e, ev = y[i, n:], dy[i, n:]
-        w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
-        put_vector(work.w, 0, w)
-        put_vector(work.dw, 0, part(outer, i, 15))
-        put_vector(work.u, 0, subtract(add(cross(w, part(outer, i, 6)), part(outer, i, 12)), g))
-        for k in range(f):
-            j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
-            R, P = link_pose(arm.chain, k, y, i)
-            R, P = product(matrix(work.R, b), R), times(matrix(work.R, b), P)
-            W = product(matrix(work.W, b), R)
-            x = add(vector(work.x, b), times(matrix(work.W, b), add(vector(work.P, b), P)))
-            put_matrix(work.W, j, W)
-            put_vector(work.x, j, x)
-            put_pose(poses, i, k, W, x)
-            body_at(arm, k, e, work)
-            spin, rest = section_at(arm, k, e, ev, work)
-            MS = add(MS, add(times(W, part(work.body, k, 6)), scale(work.body[k, 9], x)))
-            if len(free):
-                transform(work.X, j, R, P)
-                wb, dwb, ub = vector(work.w, b), vector(work.dw, b), vector(work.u, b)
-                U, rate = rotation_acceleration(wb, dwb), coordinate(dy, i, column)
-                w, dw, u = link_acceleration(arm.chain.sigma[k], R, P, rate, 0.0, wb, dwb, U, ub)
-                put_vector(work.w, j, w)
-                put_vector(work.dw, j, dw)
-                put_vector(work.u, j, u)
-                work.given[j, 6] = coordinate(given, i, column)
-                for c in range(arm.start[k], arm.start[j]):
-                    work.given[j, 7 + c - arm.start[k]] = given[i, n + c]
-                if not load_body(arm, k, e, ev, spin, rest, work):
-                    base[i, 9] = 1.0
-        W, lever = matrix(work.W, t), times(matrix(work.R, t), whole_vector(arm.tool))
-        end = add(vector(work.x, t), times(W, add(vector(work.P, t), lever)))
-        put_pose(poses, i, f, product(W, matrix(work.R, t)), end)
-        base[i, 6], base[i, 7], base[i, 8] = MS
-        if not len(free):
-            continue
-        p[:], I[:] = 0.0, 0.0
-        F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
-        N = add(N, cross(lever, F))
-        p[t, 0], p[t, 1], p[t, 2], p[t, 3], p[t, 4], p[t, 5] = F + N
-        for j in range(f, 0, -1):
-            s = 7 + arm.start[j] - arm.start[j - 1]
-            add_back(A, h, j, I, p, j, work.T, s)
-            own, positive = A[j, 6, 6], eliminate(A, h, j, 6, s, work.given, work.free)
-            if work.free[j, 6] and not abs(A[j, 6, 6]) > ROUNDING * own:
-                failed = i if failed < 0 else failed
-            elif not positive:
-                base[i, 9] = 2.0
-            add_back(I, p, arm.chain.antecedent[j - 1], A, h, j, work.X, 6)
-        if not eliminate(I, p, 0, 0, 6, work.given, work.free):
-            base[i, 9] = 2.0
-        resolve(I, p, 0, 0, 6, work.given, work.free, work.y)
-        for x in range(6):
-            base[i, x] = work.y[0, x] if free[n + 1] else p[0, x]
-            p[0, x] = work.y[0, x]
-        for j in range(1, f + 1):
-            s, column = arm.start[j - 1], arm.chain.joint[j - 1]
-            high = 7 + arm.start[j] - s
-            mapped(work.y, j, work.X, p, arm.chain.antecedent[j - 1], 6)
-            resolve(A, h, j, 6, high, work.given, work.free, work.y)
-            mapped(p, j, work.T, work.y, j, high)
-            if column >= 0:
-                out[i, column] = work.y[j, 6] if free[column] else h[j, 6]
-            for c in range(7, high):
-                out[i, n + s + c - 7] = work.y[j, c] if free[n] else h[j, c]
+        if accelerate(arm, y, dy, given, outer, i, free, out, base, poses, work) and failed < 0:
+            failed = i
     return failed

@@ -233,24 +233,15 @@ def recursion(
     outer = np.zeros((N, 18))
     outer[:, :6] = 0.0 if wrench is None else wrench
     outer[:, 6:] = 0.0 if moved is None else moved
+    y, dy, given = map(np.ascontiguousarray, (y, dy, given))
     failed = loads(chain, y, dy, given, outer, free, out, base, poses)
     return out, base, poses, failed
 
 
-def _of_links(arm: FlexibleRobot, x: Array) -> Array:
-    """Turns of the links, and modes (N, n + modes), of coordinates."""
-    if not len(arm.joints):
-        return np.ascontiguousarray(x)
-    y = np.array(x[:, : arm.n + arm.modes], order="C")
-    y[:, arm.joints] += x[:, arm.n + arm.modes :]
-    return y
-
-
 def _poses(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None) -> Array:
     batch, (x,) = checked_rows(arm, (q, e))
-    y = _of_links(arm, x)
     poses = np.zeros((len(x), arm.model.f + 1, 4, 4))
-    poses[:, :, :3] = recursion(arm.parts.chain, y, 0.0 * y, 0.0 * y, np.zeros(0, np.int64))[2]
+    poses[:, :, :3] = recursion(arm.parts.chain, x, 0.0 * x, 0.0 * x, np.zeros(0, np.int64))[2]
     poses[:, :, 3, 3] = 1.0
     return poses.reshape(*batch, *poses.shape[1:])
 
@@ -289,18 +280,12 @@ def solved(
 
     Shapes: -> (N, n + m), and rows (N, 10) of the base, see `kernels`.
     """
-    n, joints, s, parts = arm.n, arm.joints, arm.n + arm.modes, arm.parts
-    drives = arm.model.drive_matrices if drive else None
-    chain = parts.chain if drive else parts.chain._replace(rotor=read_only(np.zeros(n)))
-    rotor = parts.rotor[joints] if drive else np.zeros(len(joints))
-    rest = 0.0 if drives is None else drives.torque(dx[:, :n], None)
-    value, spring = np.zeros((len(x), s)), x @ parts.K[:, s:] + dx @ parts.D[:, s:]
-    value[:, :n] = given - rest if direct else given
-    motor = value[:, joints]  # torque or acceleration of the motor; the spring drives the link
-    value[:, joints] = -spring
-    y, dy = _of_links(arm, x), _of_links(arm, dx)
-    found, base, _, failed = recursion(chain, y, dy, value, parts.free[1 + direct], wrench)
-    still = joints[rotor <= 0.0] if direct else joints[:0]
+    n, parts = arm.n, arm.parts
+    chain = parts.chain if drive else _without_drive(parts.chain)
+    value = np.zeros((len(x), n + arm.m))
+    value[:, :n] = given
+    found, base, _, failed = recursion(chain, x, dx, value, parts.free[1 + direct], wrench)
+    still = arm.joints[chain.drive[arm.joints, 0] <= 0.0] if direct else arm.joints[:0]
     if len(still) or failed >= 0:
         fault = f"a joint moves no inertia (first in sample {failed} of {len(x)})"
         if len(still):
@@ -309,13 +294,14 @@ def solved(
             f"{arm.model.name!r}: {fault}. Give inertial parameters with model.with_inertia(...), "
             "or rotor inertia with model.with_drive(DriveParameters(Ia=...)) and drive=True."
         )
-    if len(joints):
-        moved = (motor + spring) / rotor if direct else motor
-        found = np.hstack([found, found[:, joints] - moved])
-        found[:, joints] = moved if direct else moved * rotor - spring
-    if not direct:
-        found[:, :n] += rest
     return found, base
+
+
+def _without_drive(chain: Arm) -> Arm:
+    """The chain without rotor inertia, friction and offsets of its drives."""
+    drive = chain.drive.copy()
+    drive[:, :4] = 0.0
+    return chain._replace(drive=read_only(drive))
 
 
 def forces(
@@ -325,11 +311,5 @@ def forces(
 
     Gravity and elasticity are left out if ``bare``.
     """
-    joints, s, parts = arm.joints, arm.n + arm.modes, arm.parts
-    rows = (_of_links(arm, row) for row in (x, dx, ddx))
-    Q, base, *_ = recursion(parts.bare if bare else parts.chain, *rows, parts.free[0], wrench)  # type: ignore[reportCallIssue]
-    if len(joints):
-        spring = 0.0 if bare else x @ parts.K[:, s:] + dx @ parts.D[:, s:]
-        Q = np.hstack([Q, Q[:, joints] + spring])
-        Q[:, joints] += parts.rotor[joints] * ddx[:, joints]
-    return Q, base
+    parts = arm.parts
+    return recursion(parts.bare if bare else parts.chain, x, dx, ddx, parts.free[0], wrench)[:2]

@@ -30,7 +30,8 @@ class Arm(NamedTuple):
     tip: Array
     first: Array
     second: Array
-    rotor: Array
+    drive: Array  # (n, 6): Ia, Fv, Fc, offset, stiffness and damping of the joint if flexible
+    deflection: NDArray[np.int64]  # (n,), index of the deflection of the joint; -1 if rigid
     tool: Array  # (3,), from the undeformed tip of row `end`
     gravity: Array
     end: int
@@ -44,9 +45,8 @@ class Parts(NamedTuple):
     """The chain without gravity and elasticity."""
     K: Array
     D: Array
-    rotor: Array
     free: NDArray[np.int64]
-    """Rows of flags for loads, the inverse and the direct model."""
+    """Rows of flags (n + 3,) for loads, the inverse and the direct model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,9 +227,9 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
     pi, tip = model.inertia.values.copy(), np.zeros((f + 1, 3))
     first, second = np.zeros((m, 18)), np.zeros((m, most, 18))
     K, D = np.zeros((2, n + arm.m, n + arm.m))
-    rotor, six = np.zeros(n), np.triu_indices(3)
+    drive, six = np.zeros((n, 6)), np.triu_indices(3)
     if (drives := model.drive_matrices) is not None:
-        rotor, D[:n, :n] = np.diag(drives.rotor), drives.viscous
+        drive[:, :4], D[:n, :n] = drives.rows, drives.viscous
     for row, link in arm.links.items():
         inv, end, k = link.invariants, link.tip, link.m
         pi[row - 1] = (*inv.inertia[six], *inv.first_moment, inv.mass)
@@ -245,6 +245,9 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
     joints, deflections = arm.joints, np.arange(n + m, n + arm.m)
     K[deflections, deflections] = arm.joint_stiffness[joints]  # type: ignore[index]
     D[deflections, deflections] = arm.joint_damping[joints]  # type: ignore[index]
+    deflection = np.full(n, -1)
+    drive[joints, 4], drive[joints, 5] = np.diag(K)[deflections], np.diag(D)[deflections]
+    deflection[joints] = deflections
     at_end = model.tip in arm.links and np.array_equal(model.tool, np.eye(4))
     position = read_only(model.chain.position - tip[model.chain.antecedent])
     chain = Arm(
@@ -254,17 +257,20 @@ def _parts_of(arm: FlexibleRobot) -> Parts:
         tip=read_only(tip[1:]),
         first=read_only(first),
         second=read_only(second.reshape(m, 18 * most)),
-        rotor=read_only(np.where(np.isin(np.arange(n), joints), 0.0, rotor)),
+        drive=read_only(drive),
+        deflection=read_only(deflection, np.int64),
         tool=read_only(np.zeros(3) if at_end else model.tool[:3, 3] - tip[model.tip]),
         gravity=model.gravity,
         end=int(model.tip),
     )
-    second[..., 16:] = 0.0
+    second[..., 16:] = drive[:, 4:] = 0.0
     none = read_only(np.zeros(3))
-    bare = chain._replace(second=read_only(second.reshape(m, 18 * most)), gravity=none)
-    free = np.zeros((3, n + 2), np.int64)
-    free[1:, joints], free[1:, n], free[2, :n] = 1, 1, 1
-    return Parts(chain, bare, *map(read_only, (K, D, rotor)), read_only(free, np.int64))  # type: ignore[reportCallIssue]
+    bare = chain._replace(
+        second=read_only(second.reshape(m, 18 * most)), drive=read_only(drive), gravity=none
+    )
+    free = np.zeros((3, n + 3), np.int64)
+    free[1:, joints], free[1:, n], free[2, :n], free[2, n + 2] = 1, 1, 1, 1
+    return Parts(chain, bare, *map(read_only, (K, D)), read_only(free, np.int64))  # type: ignore[reportCallIssue]
 
 
 def modal_damping_matrix(invariants: Any, ratios: Array) -> Array:

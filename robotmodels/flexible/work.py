@@ -1,0 +1,117 @@
+"""Work arrays of the recursion, and the coordinates of motors and links.
+
+A flexible joint has the coordinates of its motor and of its deflection, whose spring loads motor
+and link with opposite torques; the link turns by their sum. Shapes as for `kernels.loads`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..kernels._compile import Floats, Ints, compiled
+from ..kernels._vectors import Matrix, put_matrix, put_vector, whole_matrix, whole_vector
+from .robot import Arm
+
+ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class Work(NamedTuple):
+    """Arrays of the f + 1 bodies (row 0: base) with s coordinates at most, and of the modes."""
+
+    W: Floats  # axes and root in the world
+    x: Floats
+    R: Floats  # tip section in the axes of the body: rotation, position
+    P: Floats
+    w: Floats  # motion of the body, then of its tip
+    dw: Floats
+    u: Floats
+    X: Floats  # (6, 6) from motions of the antecedent's tip to the root
+    T: Floats  # (6, s) from coordinates to motions of the tip
+    A: Floats  # (s, s) inertia and (s,) load of the coordinates
+    h: Floats
+    I: Floats  # noqa: E741  # (6, 6) inertia and (6,) load of what follows, then its acceleration
+    p: Floats
+    BT: Floats  # (6, s) inertia times T
+    y: Floats  # (s,) accelerations
+    given: Floats  # (s,) loads of coordinates that are free (1), accelerations of others (0)
+    free: Floats
+    body: Floats  # inertial parameters
+    now: Floats  # J_k, a, b, Phi and velocity of the section, at e
+    K: Floats  # (1, modes, modes) stiffness of a body, with rows of zeros and of ones
+    zeros: Floats
+    ones: Floats
+    q: Floats  # (1, n + modes) coordinates of the links, velocities and loads
+    v: Floats
+    load: Floats
+
+
+@compiled()
+def workspace(arm: Arm, free: Ints) -> Work:
+    """Work arrays with the pose of the base and the free coordinates."""
+    f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
+    n = arm.deflection.shape[0]
+    s, pose, row, links = 7 + most, (f, 3, 3), (f, 3), (1, n + m)
+    work = Work(
+        *(z(pose), z(row), z(pose), z(row), z(row), z(row), z(row)),
+        *(z((f, 6, 6)), z((f, 6, s)), z((f, s, s)), z((f, s)), z((f, 6, 6)), z((f, 6))),
+        *(z((6, s)), z((f, s)), z((f, s)), z((f, s)), z((f, 10)), z((m, 18))),
+        *(z((1, most, most)), z((1, most)), np.ones((1, most)), z(links), z(links), z(links)),
+    )
+    put_matrix(work.W, 0, whole_matrix(arm.chain.base_rotation))
+    put_vector(work.x, 0, whole_vector(arm.chain.base_position))
+    put_matrix(work.R, 0, ONE)
+    if len(free):
+        work.free[0], work.free[1:, 7:] = free[n + 1], free[n]
+        for k in range(f - 1):
+            if arm.chain.joint[k] >= 0:
+                work.free[k + 1, 6] = free[arm.chain.joint[k]]
+    return work
+
+
+@compiled(counted=False)
+def friction(arm: Arm, c: int, v: float) -> float:
+    """Viscous and dry friction and offset of the drive of joint c."""
+    return arm.drive[c, 1] * v + arm.drive[c, 2] * np.sign(v) + arm.drive[c, 3]
+
+
+@compiled(counted=False)
+def to_links(
+    arm: Arm, y: Floats, dy: Floats, given: Floats, i: int, free: Ints, work: Work
+) -> None:
+    """Write the coordinates of the links and what is given of them."""
+    n = arm.deflection.shape[0]
+    for c in range(work.q.shape[1]):
+        work.q[0, c], work.v[0, c], work.load[0, c] = y[i, c], dy[i, c], given[i, c]
+    for c in range(n):
+        s = arm.deflection[c]
+        if len(free) and free[n + 2]:
+            work.load[0, c] -= friction(arm, c, dy[i, c])
+        if s >= 0:
+            work.q[0, c] += y[i, s]
+            work.v[0, c] += dy[i, s]
+            spring = arm.drive[c, 4] * y[i, s] + arm.drive[c, 5] * dy[i, s]
+            work.load[0, c] = -spring if len(free) and free[c] else given[i, c] + given[i, s]
+
+
+@compiled(counted=False)
+def to_motors(
+    arm: Arm, y: Floats, dy: Floats, given: Floats, i: int, free: Ints, out: Floats
+) -> None:
+    """Complete loads and accelerations of the motors and of the deflections of their joints."""
+    n = arm.deflection.shape[0]
+    for c in range(n):
+        s, motor, rotor = arm.deflection[c], given[i, c], arm.drive[c, 0]
+        drag = friction(arm, c, dy[i, c]) if free[n] else 0.0
+        if s < 0:
+            if not free[n + 2]:
+                out[i, c] += drag
+            continue
+        spring = arm.drive[c, 4] * y[i, s] + arm.drive[c, 5] * dy[i, s]
+        if not free[c]:
+            out[i, s] = out[i, c] + spring
+            out[i, c] += rotor * motor
+        elif free[n + 2]:
+            motor = (motor - drag + spring) / rotor
+            out[i, s], out[i, c] = out[i, c] - motor, motor
+        else:
+            out[i, s], out[i, c] = out[i, c] - motor, rotor * motor - spring + drag
