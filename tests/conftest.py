@@ -37,6 +37,21 @@ def pytest_configure(config):
         compile_module(name)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave all but some of the parameters of tests marked ``sampled`` to the nightly run."""
+    tests = {}
+    for item in items:
+        if item.get_closest_marker("sampled"):
+            tests.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for cases in tests.values():
+        count = cases[0].get_closest_marker("sampled").args[0]
+        kept = {(2 * k + 1) * len(cases) // (2 * count) for k in range(count)}
+        for k, item in enumerate(cases):
+            if k not in kept:
+                item.add_marker(pytest.mark.nightly)
+
+
 @pytest.fixture
 def rng():
     return np.random.default_rng(0)

@@ -195,6 +195,7 @@ CASES += [("puma560", LAWS), ("stanford_arm", {}), ("cobra_s600", LAWS)]
 CASES += [("panda", {"compliance": "joints", "gains": True})]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(("name", "laws"), CASES)
 def test_every_posture_of_the_calibrated_robot(name, laws):
     rng = np.random.default_rng(3)

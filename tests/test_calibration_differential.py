@@ -43,6 +43,7 @@ def every_parameter(model, frames):
     return GeometricParameters(table, tuple(entries))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("structure", "corrected"), [*((name, True) for name in STRUCTURES), ("tree", False)]
 )

@@ -71,6 +71,7 @@ def listed(arm, bad, prior=None):
     return set(result.solution.fit.outliers.tolist()), set(wrong.tolist())
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
 @pytest.mark.parametrize("bad", [1, 2, 4])
 def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
@@ -150,6 +151,7 @@ REACHED = [0, 2, 3, 4, 5, 7, 8, 9]
 """Seeds of arms that reach their points."""
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("seed", REACHED)
 def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
     arm, touched = contacts(seed)
@@ -199,6 +201,7 @@ def test_the_prediction_of_a_wrong_distance_uses_the_other_distances(seed):
     assert stated == pytest.approx((300.7 - mean) / np.hypot(error, 0.1), abs=0.6)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("seed", [0, 3, 7])
 def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)

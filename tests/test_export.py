@@ -72,6 +72,7 @@ def close(actual, expected, tolerance=1e-12):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * size)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("turn", [*range(1, 6), *TURNS[:1], *TURNS[6:]])
 @pytest.mark.parametrize("drive", [True, False])
 def test_the_tape_is_the_library(turn, drive):
@@ -392,6 +393,7 @@ OTHERS = {
 }  # fmt: skip
 
 
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("name", [*ARMS, *OTHERS])
 def test_all_postures(name):
     model = OTHERS[name] if name in OTHERS else rm.load(name)

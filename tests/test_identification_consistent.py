@@ -362,11 +362,6 @@ def test_without_the_solver(monkeypatch, rng):
 # --- noisy logs ----------------------------------------------------------------------------------
 
 
-def some_nightly(count, first):
-    """Seeds, of which the first ones run each time."""
-    return [pytest.param(k, marks=[pytest.mark.nightly] * (k >= first)) for k in range(count)]
-
-
 def heavy_arm(rng):
     """An arm of a tonne with heavy drives, and the same without parameters (6 joints)."""
     s = rng.uniform(0.7, 1.3, 6)
@@ -416,7 +411,8 @@ def measured(rng, model, motion, noise, unmodelled):
     return tau + rms * (noise * rng.normal(size=tau.shape) + unmodelled * wrong), rms * noise
 
 
-@pytest.mark.parametrize("seed", some_nightly(30, 6))
+@pytest.mark.sampled(6)
+@pytest.mark.parametrize("seed", range(30))
 def test_noisy_logs_of_heavy_arms_converge(seed):
     """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times light."""
     rng = np.random.default_rng(seed)
@@ -440,7 +436,8 @@ def test_noisy_logs_of_heavy_arms_converge(seed):
         assert found.residual_increase < 12.0
 
 
-@pytest.mark.parametrize("seed", some_nightly(24, 8))
+@pytest.mark.sampled(8)
+@pytest.mark.parametrize("seed", range(24))
 def test_robots_of_any_structure_converge_on_slow_motion(seed):
     """Priors 100 times too light or too heavy, motion that hardly shows the inertias."""
     rng = np.random.default_rng(seed)

@@ -46,6 +46,7 @@ def as_it_is(log, decimation):
     return choose_processing(log, decimation=decimation, dead_band=1e-3, filtered=False)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_exact_parameters_without_noise(name):
     model = ROBOTS[name]

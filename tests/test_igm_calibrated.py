@@ -64,6 +64,7 @@ def multi_start(model, T, starts, seed=1):
     return roots
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_solutions_are_found_again_and_nothing_else_is_returned(name):
     for seed in range(5):
@@ -81,6 +82,7 @@ def test_solutions_are_found_again_and_nothing_else_is_returned(name):
         assert np.all((found.valid.sum(axis=1) + found.double.sum(axis=1)) % 2 == 0)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_as_many_solutions_as_from_two_hundred_starts(name):
     model = changed(name, 1)
@@ -95,6 +97,7 @@ def test_as_many_solutions_as_from_two_hundred_starts(name):
     assert 0 <= missing <= 4
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ["rx90", "ur5e", "stanford_arm"])
 @pytest.mark.parametrize("digits", [4, 5, 6])
 def test_rounded_urdf_numbers(name, digits):

@@ -203,6 +203,7 @@ THREE = {
 }
 
 
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize("name", THREE)
 @pytest.mark.parametrize("rotated", [False, True])
 def test_short_arms_of_every_kind(name, rotated):
@@ -221,6 +222,7 @@ def test_short_arms_of_every_kind(name, rotated):
 WRIST = ({"alpha": -RIGHT, "r": 0.4}, {"alpha": RIGHT}, {"alpha": -RIGHT})
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("kinds", ["RRR", "RPR", "PRR", "RRP", "PPR", "RPP", "PPP"])
 def test_six_joint_arms_with_a_wrist(kinds):
     rng = np.random.default_rng(len(kinds) + ord(kinds[0]) + 2 * ord(kinds[1]) + 3 * ord(kinds[2]))
@@ -494,6 +496,7 @@ def angle_gap(a, b):
     return abs((a - b + pi) % (2 * pi) - pi)
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("name", COMPLETE)
 def test_printed_equations_and_formulas_hold(name):
     """Every equation printed is true of the arm, and every formula gives the joint it names."""

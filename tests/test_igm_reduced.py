@@ -140,6 +140,7 @@ def independent(model, T, mask, axes, starts=60):
     return distinct
 
 
+@pytest.mark.sampled(16)
 @pytest.mark.parametrize(
     ("word", "mask", "axes"), [(word, WHOLE, "world") for word in FEWER] + list(MASKED)
 )

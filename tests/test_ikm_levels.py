@@ -257,6 +257,7 @@ def a_case(rng, kind, m, n):
     return J, rate, lower, upper, wish
 
 
+@pytest.mark.sampled(20)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("m", "n"), [(6, 6), (6, 7), (6, 9), (3, 7), (3, 3), (1, 8), (2, 1)])
 def test_the_scale_is_the_largest_and_the_motion_the_least(kind, m, n):
@@ -294,6 +295,7 @@ def test_the_least_motion_is_weighted(rng):
         assert optimality_error(J, v, wish, lower, upper, weights) < 1e-8
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("sizes", [(3, 3), (3, 2, 2), (2, 6), (6, 3)])
 @pytest.mark.parametrize("n", [7, 9])
 def test_levels_under_bounds(sizes, n):

@@ -77,6 +77,7 @@ def test_torques_of_a_stretched_profile_are_quadratic_in_the_inverse_duration(se
         assert error.max() <= 1e-12 * np.abs(tau).max() * max(1.0, 1.0 / T**2)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_the_least_duration_is_the_root_that_bisection_finds(seed):
     rng = np.random.default_rng(seed)
@@ -176,6 +177,7 @@ def test_random_profiles():
 # --- the planner --------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("name", CASES)
 def test_free_motions_are_as_quick_as_those_of_optimal_control(name):
     q0, q1, torque, g = CASES[name]

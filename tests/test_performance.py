@@ -161,6 +161,7 @@ def random_arm(sigma, seed):
     return rm.RobotModel.from_table(table, tool=translation(0.8, 0.1, 0.0))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("sigma", [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1, 0, 0, 0)])
 def test_changes_of_posture_keep_the_limits_of_slides(sigma):
     slides = np.array(sigma) == 1
@@ -516,6 +517,7 @@ def test_cuspidality_of_a_redundant_arm_is_not_defined():
 # --- regions -------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("arm", "free"),
     [(LIMITED, None), (WENGER, None), (LIMITED, Sphere([1.2, 0.3, 0], 0.2))],
@@ -750,6 +752,7 @@ LONG = {
 }
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", LONG)
 def test_long_calls_are_the_same_with_many_workers_and_report_progress(name, pools):
     done = []
