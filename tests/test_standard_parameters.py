@@ -148,6 +148,22 @@ def test_it_prints_as_a_table(rng):
     assert "EXACT" in repr(found)
 
 
+def test_values_that_are_rounding_weigh_as_zeros(rng):
+    """First moments of 1e-18 to 1e-9 of an arm that cannot have them: the same nearest robot."""
+    model = rm.load("ur5e")
+    base = base_parameters(model)
+    values = base.values(model.with_inertia(uniform_bodies(model, 5.0)))
+    first = [k for k, name in enumerate(base.names) if name.startswith("M")]
+    nearest = []
+    for size in (0.0, 1e-18, 1e-12, 1e-9):
+        values[first] = size * rng.normal(size=len(first))
+        found = standard_parameters(base, values)
+        assert found.is_usable
+        nearest.append(np.abs(found.deviation).max())
+    np.testing.assert_allclose(nearest, nearest[0], rtol=0.01)
+    assert nearest[0] < 0.01
+
+
 def test_the_nearest_of_no_robot_stays_near_the_prior(rng):
     """Parameters without effect are the prior's also where the base parameters are not met."""
     model = rm.load("rx90")

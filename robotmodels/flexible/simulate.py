@@ -319,7 +319,7 @@ def _compiled_steps(
         report.done((clock[0] - start) / span)
     if not every:
         samples.append(found[1 : int(clock[3])])
-    status = _ended(FlexibleMotionStatus(int(clock[4])), clock[5:])
+    status = _ended(FlexibleMotionStatus(int(clock[4])), [clock[5]])
     t, *states = np.vstack(samples).T
     return t, np.array(states).T.copy(), status, int(clock[2])
 

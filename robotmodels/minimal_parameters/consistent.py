@@ -100,6 +100,7 @@ def standard_parameters(
     b = as_exact(values, (len(base),), "values")
     if weights is None:  # relative to the values, at least a thousandth of the largest of a kind
         sizes = np.maximum(np.abs(b), 1e-3 * largest_of_kind(base.names, np.abs(b)))
+        sizes = np.maximum(sizes, 1e-4 * sizes.max(initial=0.0))  # a kind may hold rounding only
         weights = np.diag(1.0 / np.where(sizes > 0.0, sizes, 1.0))
     W = as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
