@@ -309,7 +309,7 @@ def _compiled_steps(
 
     parts, rows, slopes, state = arm.parts, table(), np.zeros((16, len(y))), y.copy()
     every, span, first = len(times) == 1, times[-1] - start, np.append(start, y)
-    clock = np.array([start, 1e-3 * span, 0.0, 1.0, 0.0, 0.0])
+    clock = np.array([start, 1e-3 * span, 0.0, 1.0, 0.0, 0.0, 0.0])
     found, samples = np.empty((500 if every else len(times), len(first))), [first[None]]
     while clock[0] < times[-1] and not clock[4]:
         fixed = parts.chain, parts.free[2], parts.D, torque, rows, times, bounds, largest
@@ -319,7 +319,7 @@ def _compiled_steps(
         report.done((clock[0] - start) / span)
     if not every:
         samples.append(found[1 : int(clock[3])])
-    status = _ended(FlexibleMotionStatus(int(clock[4])), [clock[5]])
+    status = _ended(FlexibleMotionStatus(int(clock[4])), clock[5:].tolist())
     t, *states = np.vstack(samples).T
     return t, np.array(states).T.copy(), status, int(clock[2])
 

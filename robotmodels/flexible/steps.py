@@ -7,8 +7,9 @@ A state has k = n + m coordinates, their velocities, the work, and the integrals
 (6) and of the arm's first moment (3). Shapes of `follow`: free, damping (k, k), torques (1, k);
 table (22, 16) of coefficients, as `table` gives it; times (N,), of samples, or only the last with a
 sample after each step; bounds (4,): rtol, atol, evaluations, steps of this call; largest (s,); y
-(s,); slopes (16, s); clock (6,): time, next step, evaluations, samples that are passed, code of
-`FlexibleMotionStatus`, worst code of `SpinStatus` -> found (., 1 + s): time and state of samples.
+(s,); slopes (16, s); clock (7,): time, next step, evaluations, samples that are passed, code of
+`FlexibleMotionStatus`, codes 1 and 2 of `SpinStatus` once they occur -> found (., 1 + s): time and
+state of samples.
 """
 
 from typing import Any
@@ -72,7 +73,8 @@ def stages(
                 moved += rows[s, r] * slopes[r, c]
             z[c] = y[c] + h * moved
         code = derivative(arm, free, damping, tau, z, slopes[s], a, outer, base, poses, work)
-        clock[5] = max(clock[5], code)
+        if code > 0.0:
+            clock[4 + int(code)] = code
     clock[2] += end - first
     return code
 

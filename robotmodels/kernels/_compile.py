@@ -51,11 +51,12 @@ def compiled(
 ) -> Any:
     """Decorator: compile a kernel for its declared signature at the first call.
 
-    Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
-    puts its code into its callers, ``cached=False`` is for functions made for a function.
-    ``counted=False`` leaves the counting of references to arrays out, a third of the time of small
-    functions: only for inner ones that make and return no arrays, nor call others that do.
+    Without a signature it is an inner function, compiled with the kernels that call it.
     """
+    # ``inlined`` puts its code into its callers, ``cached=False`` is for functions made for a
+    # function. ``counted=False`` leaves the counting of references to arrays out, a third of the
+    # time of small functions: only for inner ones that make and return no arrays and call none
+    # that do.
 
     def decorate(function: Any) -> Any:
         options: dict[str, Any] = {

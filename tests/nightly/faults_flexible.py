@@ -241,8 +241,8 @@ MUTATIONS = [
         "flexible",
         "softened stiffness forgotten by compiled steps",
         "Write slopes first to end - 1",
-        "clock[5] = max(clock[5], code)",
-        "clock[5] = max(clock[5], 0.0)",
+        "clock[4 + int(code)] = code",
+        "clock[4 + int(code)] = 0.0",
         f"{TWO} -k constant_torques",
     ),
 ]
