@@ -12,6 +12,7 @@ from robotmodels.estimation.factor import TriangularFactors, factors_of
 from robotmodels.estimation.linear import first_weights, ordinary, ridge, weighted
 from robotmodels.estimation.total import TotalStatus, total
 from robotmodels.identification import (
+    Instrumental,
     Log,
     Recursive,
     Ridge,
@@ -106,6 +107,7 @@ def test_names_and_options_of_methods():
         assert (kind.name, bool(kind.title)) == (name, True)
     given = method_of("wls:essential=30, shrinkage=False").options()
     assert given == {"essential": 30, "shrinkage": False}
+    assert method_of("recursive:forgetting=1.0").options() == {}
     for text, words in (("gls", "expected one of ols"), ("robust:loss", "given as name=value")):
         with pytest.raises(InvalidValueError, match=words):
             method_of(text)
@@ -405,6 +407,21 @@ def test_residuals_grow_by_a_tenth_at_most_or_by_chance():
     for wrong in (0.5, "guess"):
         with pytest.raises(InvalidValueError, match="essential"):
             essential(factors, first, wrong)
+
+
+def test_options_by_parameter_follow_the_essential_parameters():
+    arm, log = rm.datasets.example_log()
+    free = fit(arm, log)
+    prior = free.values * (1.0 + 1e-3 * np.arange(len(free.names)))
+    found = fit(arm, log, Ridge(prior, 1e-11 + 1e-11 * np.abs(prior), essential=3.0))
+    assert found.details.dropped
+    kept = [free.names.index(name) for name in found.names]
+    np.testing.assert_allclose(found.values, prior[kept], rtol=1e-6)
+    by_simulation = fit(arm, log, Instrumental(start=free.values, essential=3.0))
+    assert by_simulation.status is EstimateStatus.SOLVED
+    assert by_simulation.details.dropped
+    assert Total([0.1, 0.2, 0.3, 4.0]).without([1]).noise.tolist() == [0.1, 0.3, 4.0]
+    assert (Total(0.1).without([1]).noise, Ridge(arm).without([1]).prior) == (0.1, arm)
 
 
 # Essential parameters of the TX40's log as published with it (FIGAROH, file of 25 essential

@@ -12,6 +12,7 @@ from robotmodels.errors import InvalidValueError
 from robotmodels.estimation.correlation import correlated_pairs
 from robotmodels.identification import (
     Log,
+    Ridge,
     choose_processing,
     consistent_robot,
     equations,
@@ -274,6 +275,13 @@ def test_json_holds_everything_to_the_bit_and_no_nan(found, tmp_path):
     assert log_data(Log(DT, log.q, tau))["sha256"] != data["data"]["sha256"]
     with pytest.raises(InvalidValueError, match=r"\.json or \.urdf"):
         write_result(found, tmp_path / "result.txt")
+
+
+def test_json_has_the_parameters_of_a_robot_that_is_a_prior():
+    arm, log = rm.datasets.example_log()
+    found = fit(arm, log, Ridge(arm), drive=("Fv",))
+    prior = result_data(found)["method"]["options"]["prior"]
+    assert prior == dict(zip(found.base.names, found.base.values(arm).tolist(), strict=True))
 
 
 @pytest.mark.filterwarnings("ignore::robotmodels.errors.UrdfWarning")

@@ -20,6 +20,7 @@ import robotmodels as rm
 from robotmodels import loops
 from robotmodels.errors import InvalidValueError, LoopError, ShapeError
 from robotmodels.logs import Log
+from robotmodels.logs.log import RefusedRows
 from robotmodels.loops import ClosingStatus
 from robotmodels.loops.constraints import row_rates
 from robotmodels.loops.dynamics import engine_of, projected
@@ -510,7 +511,8 @@ def test_a_simulated_log_of_a_palletiser_gives_its_base_parameters_back(rng):
     found = np.linalg.lstsq(W, tau.ravel(), rcond=None)[0]
     assert np.abs(found - beta).max() < 1e-8 * np.abs(beta).max()
     noise = 0.002 * np.abs(tau).max(axis=0) * rng.normal(size=tau.shape)
-    log = Log(0.004, q[:, robot.actuated], tau + noise)
+    refused = [RefusedRows("run.csv", (3, 4), "not a number")]
+    log = Log(0.004, q[:, robot.actuated], tau + noise, refused=refused)
     for method in ("ols", "wls", "irls"):
         result = rm.identification.fit(robot, log.rows(0, 3000), method, base=base, test=log)
         assert result.status.name == "SOLVED"
@@ -518,6 +520,7 @@ def test_a_simulated_log_of_a_palletiser_gives_its_base_parameters_back(rng):
         assert (np.abs(errors) < 4.5 * result.standard_errors).all()
         assert result.standard_error("MX2") < 0.02 * result.value("MX2")
         assert (result.validation.held_out.relative[robot.actuated] < 0.05).all()
+        assert result.equations.log.refused == log.refused
     predicted = rm.identification.predicted_torque(result, q[500:800], v[500:800], a[500:800])
     assert np.allclose(predicted[:, robot.actuated], tau[500:800], atol=0.01 * np.abs(tau).max())
     assert not predicted[:, robot.passive].any()

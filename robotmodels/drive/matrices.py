@@ -30,12 +30,12 @@ class DriveMatrices:
         """Torque of the drives at v, a (..., n); None for a leaves the rotor term out."""
         if self.rows and a is not None and v.ndim == a.ndim == 1:
             # one sample of uncoupled drives: floats are three times faster than small arrays
-            return np.array([
+            joints = zip(self.rows, v.tolist(), a.tolist(), strict=True)
+            torques = [
                 Ia * acc + Fv * vel + offset + (Fc if vel > 0.0 else -Fc if vel < 0.0 else 0.0)
-                for (Ia, Fv, Fc, offset), vel, acc in zip(
-                    self.rows, v.tolist(), a.tolist(), strict=True
-                )
-            ])  # fmt: skip
+                for (Ia, Fv, Fc, offset), vel, acc in joints
+            ]
+            return np.array(torques)
         if self.rows and a is not None and v.ndim == a.ndim == 2 and v.shape == a.shape:
             # many samples of them: one pass through the arrays instead of seven
             from ..kernels.torques import drive_torques

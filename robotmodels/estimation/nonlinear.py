@@ -270,9 +270,14 @@ def fit_nonlinear(
 
 
 def _minimised(
-    problem: Problem, loss: Loss, point: Point, threshold: float, tolerance: float, limit: int,
+    problem: Problem,
+    loss: Loss,
+    point: Point,
+    threshold: float,
+    tolerance: float,
+    limit: int,
     sigma_known: bool,
-) -> tuple[Terms, float, Point, Linear, FitStatus, int]:  # fmt: skip
+) -> tuple[Terms, float, Point, Linear, FitStatus, int]:
     """Minimum of the loss; robust ones alternate between the estimate and the scale."""
     known = sigma_known or loss is Loss.SQUARES
     scale, used = 1.0 if known else _scale(problem, point, 0.0), 0

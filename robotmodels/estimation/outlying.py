@@ -1,9 +1,9 @@
 """Outliers of a least-squares fit by deleted residuals, one measurement at a time, without refits.
 
-An outlier distorts the fit and all residuals. A deleted
-residual is that of the fit without the measurement. All follow from the last linearisation: with
-rows T that are orthonormal together with those of the prior, a measurement of rows T_b has the
-deleted residual ``(I - T_b T_b')^-1 r_b`` of covariance ``(I - T_b T_b')^-1``.
+An outlier distorts the fit and all residuals. A deleted residual is that of the fit without the
+measurement. All follow from the last linearisation: with rows T that are orthonormal together with
+those of the prior, a measurement of rows T_b has the deleted residual ``(I - T_b T_b')^-1 r_b`` of
+covariance ``(I - T_b T_b')^-1``.
 
 Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 2.2.
 """

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .._arrays.tasks import Task, results
 from ..errors import InvalidValueError
 from ..estimation.estimate import NamedValues
 from ..estimation.factor import TriangularFactors, merged_all, reduced
@@ -25,7 +26,7 @@ from ..table_text import boxed
 from .equations import Block, Equations, equations
 from .forms import RowForm, torque_block
 from .processing import checked_processing, choose_processing
-from .reduction import Task, parts, results
+from .reduction import parts
 from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7

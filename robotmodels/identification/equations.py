@@ -35,8 +35,7 @@ class _Cache:
 class Equations(EquationSource):
     """Equations of a log in b parameters of a robot, made piece by piece; `cached` keeps blocks.
 
-    ``names`` are the base parameters that have columns, ``form`` is the quantity that is
-    balanced.
+    ``names`` are the base parameters that have columns, ``form`` is the balanced quantity.
     """
 
     form: EquationForm = EquationForm.TORQUE

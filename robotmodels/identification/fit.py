@@ -158,8 +158,9 @@ def fit(
     if method.essential is not False and estimate.status is not EstimateStatus.UNSTABLE:
         names, dropped, rule = essential(factors, estimate, method.essential)
         if dropped:
+            others = method.without([factors.names.index(name) for name in dropped])
             system, factors = system.with_names(names), factors.with_names(names)
-            estimate = method.solve(system, factors)
+            estimate = others.solve(system, factors)
     estimate, iid, lags = with_uncertainty(method, system, factors, estimate)
     validation, ramp = _validation(system, estimate, log, test)
     if estimate.status is EstimateStatus.UNSTABLE:

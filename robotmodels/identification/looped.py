@@ -118,5 +118,6 @@ def with_all_joints(base: LoopedParameters, log: Log) -> Log:
     tau = np.zeros(q.shape)
     tau[:, robot.actuated] = log.tau
     measured = {"v": None if log.v is None else v, "a": None if log.a is None else a}
-    kept = {"starts": log.starts, "delay": log.delay, "sources": log.sources, "notes": log.notes}
+    names = ("starts", "delay", "sources", "refused", "notes")
+    kept = {name: getattr(log, name) for name in names}
     return Log(log.dt, q, tau, names=robot.tree.table.joint_names, **measured, **kept)

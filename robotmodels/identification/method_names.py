@@ -19,13 +19,11 @@ _OBJECTS = ("prior", "controller")
 """Options that are objects and have no text form."""
 _WORDS = {"true": "True", "false": "False", "none": "None"}
 
+_OF_MEASURED_MOTION = (Ols, Wls, Irls, Robust, Total, Ridge, Sequential, Recursive)
+_OF_SIMULATED_MOTION = (Instrumental, Didim, OutputError)
 METHODS: dict[str, type[Method]] = {
-    kind.name: kind
-    for kind in (
-        Ols, Wls, Irls, Robust, Total, Ridge, Sequential, Recursive, Instrumental, Didim,
-        OutputError,
-    )
-}  # fmt: skip
+    kind.name: kind for kind in (*_OF_MEASURED_MOTION, *_OF_SIMULATED_MOTION)
+}
 
 
 def method_of(choice: Method | str) -> Method:

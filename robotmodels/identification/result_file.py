@@ -16,7 +16,7 @@ from .._json_data import json_data
 from ..drive import drive_kinds
 from ..errors import InvalidValueError
 from ..logs import Log
-from ..model import to_urdf
+from ..model import RobotModel, to_urdf
 from .consistent import consistent_robot
 from .report_tables import group_names, intervals, parameter_units, standard_error_ratio
 from .residuals import residual_diagnostics
@@ -24,7 +24,7 @@ from .result import IdentificationResult, check_result
 from .weak_parameters import correlated_estimates, negative_parameters, weak_parameters
 
 if TYPE_CHECKING:
-    from ..minimal_parameters import StandardParameters
+    from ..minimal_parameters import BaseParameters, StandardParameters
 
 FORMAT = 2
 """Version of the format, increased when the meaning of an entry changes."""
@@ -113,7 +113,7 @@ def result_data(
         "method": {
             "name": result.method.name,
             "title": result.method.title,
-            "options": result.method.options(),
+            "options": {name: _option(base, x) for name, x in result.method.options().items()},
             "iterations": estimate.iterations,
             "correlation_lags": details.correlation_lags,
             "notes": estimate.notes,
@@ -169,6 +169,13 @@ def result_data(
         "notes": result.notes,
     }
     return json_data(data)
+
+
+def _option(base: BaseParameters, value: Any) -> Any:
+    """An option of a method; of a robot its parameters."""
+    if isinstance(value, RobotModel):
+        return dict(zip(base.names, base.values(value), strict=True))
+    return value
 
 
 def log_data(log: Log) -> dict[str, Any]:

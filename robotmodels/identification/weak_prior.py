@@ -60,13 +60,13 @@ def plausible_sizes(
 def shrunk(
     factors: TriangularFactors,
     estimate: Estimate,
-    deviations: Array,
+    standard_errors: Array,
     inflation: Array,
     sizes: Array,
     always: bool = False,
 ) -> Estimate | None:
     """Shrink an estimate towards zero where the log determines some parameters poorly."""
-    weak = np.flatnonzero(deviations > _WEAK * sizes)
+    weak = np.flatnonzero(standard_errors > _WEAK * sizes)
     if not (weak.size or always):
         return None
     correlated = max(1.0, float(np.median(inflation)))
@@ -75,7 +75,7 @@ def shrunk(
     alike = {kind: group[0] for group in _ALIKE for kind in group}
     _, groups = np.unique([alike.get(kind, kind) for kind in kinds], return_inverse=True)
     shrunk_values = ridge(factors, None, _likely_sizes(R, y, sizes, groups), correlated**2)
-    order = weak[np.argsort(-(deviations / sizes)[weak])]
+    order = weak[np.argsort(-(standard_errors / sizes)[weak])]
     names = ", ".join(factors.names[k] for k in order[:_NAMED])
     more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
     few = (

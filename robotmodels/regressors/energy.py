@@ -287,10 +287,8 @@ def _times(t: ArrayLike) -> Array:
 def _knots(knots: ArrayLike | None, N: int) -> NDArray[np.int64]:
     """Ascending numbers (k,) of samples between which the rows lie."""
     at = np.arange(N) if knots is None else np.asarray(knots)
-    if (
-        at.ndim != 1 or at.size < 2 or at.dtype.kind not in "iu"
-        or at[0] < 0 or at[-1] >= N or (np.diff(at.astype(np.int64)) <= 0).any()
-    ):  # fmt: skip
+    good = at.ndim == 1 and at.size > 1 and at.dtype.kind in "iu"
+    if not good or at[0] < 0 or at[-1] >= N or (np.diff(at.astype(np.int64)) <= 0).any():
         raise InvalidValueError(
             f"knots: expected two or more ascending numbers of samples from 0 to {N - 1}, got "
             f"{knots!r:.80}."

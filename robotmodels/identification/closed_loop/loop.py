@@ -116,7 +116,7 @@ def closed_loop(
         )
     if controller.n != n:
         raise ShapeError(f"controller: expected {n} joints, got {controller.n}.")
-    targets = log.q if log.q_ref is None else log.q_ref
+    references = log.q if log.q_ref is None else log.q_ref
     if log.q_ref is None:
         notes.append(
             "The log has no references: the simulated robot follows the filtered measured "
@@ -125,7 +125,7 @@ def closed_loop(
     given = None if width is None else as_floats(width, "width")
     if given is not None and (given.shape not in ((), (n,)) or (given < 0.0).any()):
         raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
-    goal = _goal(system, targets) if given is None else np.broadcast_to(given, (n,))
+    goal = _goal(system, references) if given is None else np.broadcast_to(given, (n,))
     needed = rates.steps(log.dt, goal)
     parts, hold = steps_of(controller, log.dt, min(needed, MOST) if substeps is None else substeps)
     step = log.dt / parts
@@ -141,7 +141,7 @@ def closed_loop(
         )
     if given is None:
         given = np.where(rest > 0.0, np.maximum(processing.dead_band, rest), 0.0)
-    limit = np.maximum(np.ptp(targets, axis=0), _NEAR)
+    limit = np.maximum(np.ptp(references, axis=0), _NEAR)
     return ClosedLoop(controller, np.broadcast_to(given, (n,)), limit, hold, parts, tuple(notes))
 
 
@@ -193,11 +193,11 @@ def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int
     )
 
 
-def _goal(system: Equations, targets: Array) -> Array:
+def _goal(system: Equations, references: Array) -> Array:
     """Default friction regularisation velocities: dead band, or a part of the speed."""
     log, motion = system.log, system.processing.motion
     stride = max(1, min(int(0.1 / max(motion * log.dt, 1e-9)), len(log) - 1))
-    speeds = np.abs(targets[stride:] - targets[:-stride]) / (stride * log.dt)
+    speeds = np.abs(references[stride:] - references[:-stride]) / (stride * log.dt)
     # differences across two recordings are negligible
     fast = np.percentile(speeds[:: max(1, len(log) // 2000)], 95, axis=0)
     return np.maximum(system.processing.dead_band, _SLOW * fast)

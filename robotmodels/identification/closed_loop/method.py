@@ -87,6 +87,7 @@ class SimulatingMethod(Method):
     width: ArrayLike | None = None
     substeps: int | None = None
     covariance: ClassVar[Covariance] = "given"
+    by_parameter: ClassVar[tuple[str, ...]] = ("start",)
     _memory: ClassVar[int] = 0  # steps of the Anderson mixing
     _descends: ClassVar[bool] = False  # whether each step must reduce the residuals
     _advice: ClassVar[tuple[str, ...]] = ()  # where the iteration does not converge

@@ -199,7 +199,7 @@ class OutputError(SimulatingMethod):
             rows, inner = simulator.window(piece)
             out = self._outputs(np.array(log.tau[rows]), np.array(log.q[rows]))
             y = _decimated(system, piece, out) - x + S @ values
-            v = _decimated(system, piece, simulator.targets[piece.begin].v[:-1][inner])
+            v = _decimated(system, piece, simulator.references[piece.begin].v[:-1][inner])
             use = self._outputs(simulator.use(v), np.ones(v.shape, dtype=bool))
             t = log.dt * np.arange(piece.start, piece.stop, step, dtype=np.float64)
             pairs.append((S, Block(t, S, y, use, v)))

@@ -25,7 +25,7 @@ class SimulationDivergedError(Exception):
     """The simulation diverged, or its mass matrix was not positive definite."""
 
 
-class Targets(NamedTuple):
+class References(NamedTuple):
     """References from a row of the log on, the last one repeated. Shapes: q, v, feed (N + 1, n)."""
 
     first: int
@@ -39,12 +39,12 @@ class ClosedLoopSimulator:
 
     def __init__(self, system: Equations, loop: ClosedLoop) -> None:
         self.system, self.loop = system, loop
-        self.targets: dict[int, Targets] = {}
+        self.references: dict[int, References] = {}
         for piece in system.pieces():
-            if piece.begin not in self.targets:
-                self.targets[piece.begin] = self._references(piece)
+            if piece.begin not in self.references:
+                self.references[piece.begin] = self._references(piece)
 
-    def _references(self, piece: Piece) -> Targets:
+    def _references(self, piece: Piece) -> References:
         """References of the recording of a piece: those of the log, or its filtered positions."""
         log, processing, loop = self.system.log, self.system.processing, self.loop
         ahead = loop.controller.feed_forward
@@ -53,10 +53,10 @@ class ClosedLoopSimulator:
             v_ref = None if log.v_ref is None else np.array(log.v_ref[rows])
             q_ref = np.array(log.q_ref[rows])
             signals = _derivatives(q_ref, v_ref, log.dt, processing.accuracy)
-            return targets(piece.begin, *signals, ahead, loop.width)
+            return references_from(piece.begin, *signals, ahead, loop.width)
         whole = replace(piece, start=piece.low, stop=piece.high)
         filtered = piece_signals(log, processing, whole, 0)
-        return targets(piece.low, filtered.q, filtered.v, filtered.a, ahead, loop.width)
+        return references_from(piece.low, filtered.q, filtered.v, filtered.a, ahead, loop.width)
 
     def signals(self, values: Array) -> dict[int, Signals]:
         """Signals of the simulated robot for each recording, by its first row."""
@@ -64,14 +64,14 @@ class ClosedLoopSimulator:
         robot = robot_of(self.system, values)
         loop = with_enough_steps(robot, self.loop, log)
         signals = {}
-        for begin, references in self.targets.items():
+        for begin, references in self.references.items():
             t = log.dt * (references.first + np.arange(len(references.q) - 1.0))
             signals[begin] = Signals(t, *follow(robot, loop, log.dt, references))
         return signals
 
     def window(self, piece: Piece) -> tuple[slice, slice]:
         """Rows that the equations of a piece use, of the log and of its recording's arrays."""
-        reach, offset = self.system.processing.reach, self.targets[piece.begin].first
+        reach, offset = self.system.processing.reach, self.references[piece.begin].first
         first, last = max(piece.start - reach, piece.low), min(piece.stop + reach, piece.high)
         return slice(first, last), slice(first - offset, last - offset)
 
@@ -91,9 +91,9 @@ class ClosedLoopSimulator:
         return moving_joints(self.system.model, band, v)
 
 
-def targets(
+def references_from(
     first: int, q: Array, v: Array, a: Array, ahead: RobotModel | None, width: Array
-) -> Targets:
+) -> References:
     """References with feed-forward torques, and the last sample repeated."""
     q, v, a = (np.ascontiguousarray(np.vstack((x, x[-1:]))) for x in (q, v, a))
     feed = np.zeros(q.shape)
@@ -106,7 +106,7 @@ def targets(
                 motors = np.array(ahead.transmission.coupled_motors) - 1
                 turns = _direction(v @ drives.coupling.T, width[motors])
                 feed += (turns * drives.coupled_coulomb) @ drives.coupling
-    return Targets(first, q, v, feed)
+    return References(first, q, v, feed)
 
 
 def _derivatives(q: Array, v: Array | None, dt: float, accuracy: int) -> tuple[Array, Array, Array]:
@@ -121,7 +121,7 @@ def _direction(v: Array, width: Array) -> Array:
     return np.where(np.abs(v) > width, np.sign(v), v / np.where(width > 0.0, width, 1.0))
 
 
-def follow(robot: RobotModel, loop: ClosedLoop, dt: float, references: Targets) -> Array:
+def follow(robot: RobotModel, loop: ClosedLoop, dt: float, references: References) -> Array:
     """Positions, velocities, accelerations and torques along references, shape (4, N, n)."""
     from ...kernels.closed_loop import follow_references
 
@@ -227,7 +227,8 @@ def simulated_log(
     least = np.zeros(n) if rates is None else dt / parts * rates.dry
     wide = np.broadcast_to(np.asarray(least if width is None else width, np.float64), (n,))
     loop = ClosedLoop(controller, wide, np.full(n, np.inf), hold, parts)
-    references = targets(0, *_derivatives(q_ref, v_ref, dt, 4), controller.feed_forward, wide)
+    signals = _derivatives(q_ref, v_ref, dt, 4)
+    references = references_from(0, *signals, controller.feed_forward, wide)
     try:
         q, v, a, tau = follow(model, loop, dt, references)
     except SimulationDivergedError:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
 
 from ...errors import InvalidValueError
 from ...estimation.estimate import Estimate, EstimateStatus
@@ -27,6 +30,7 @@ class Method(ABC):
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
     covariance: ClassVar[Covariance] = "scaled"
+    by_parameter: ClassVar[tuple[str, ...]] = ()  # options that may be arrays in this order
 
     @abstractmethod
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
@@ -35,7 +39,12 @@ class Method(ABC):
     def options(self) -> dict[str, Any]:
         """Options that differ from their defaults."""
         given = ((field.name, getattr(self, field.name), field.default) for field in fields(self))
-        return {name: value for name, value, default in given if value is not default}
+        return {name: value for name, value, default in given if not np.array_equal(value, default)}
+
+    def without(self, dropped: Sequence[int]) -> Self:
+        """The method for the other parameters; ``dropped`` are numbers from 0."""
+        arrays = ((name, getattr(self, name)) for name in self.by_parameter)
+        return replace(self, **{name: np.delete(x, dropped) for name, x in arrays if np.ndim(x)})
 
 
 def check_solved(estimate: Estimate) -> None:

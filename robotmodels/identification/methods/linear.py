@@ -123,6 +123,7 @@ class Ridge(Method):
     strength: float | None = None
     name: ClassVar[str] = "ridge"
     title: ClassVar[str] = "least squares with a prior (ridge)"
+    by_parameter: ClassVar[tuple[str, ...]] = ("prior", "prior_errors")
 
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters."""
@@ -147,6 +148,7 @@ class Total(Method):
     noise: ArrayLike = 0.001
     name: ClassVar[str] = "tls"
     title: ClassVar[str] = "total least squares"
+    by_parameter: ClassVar[tuple[str, ...]] = ("noise",)
 
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters."""
