@@ -12,7 +12,7 @@ from .._arrays import Array
 from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
 from .loop import JointChain
-from .motion import axes_of
+from .motion import axes_of, cross
 from .postures import Postures
 from .reduced import FewerJoints
 from .solver import Solver
@@ -72,13 +72,13 @@ def sides(chain: JointChain, order: list[int], parallel: bool, q: Array) -> tupl
     a, b, c, d, e, f = order
 
     def velocity(j: int, point: Array) -> Array:
-        return z[j] if chain.sigma[j] else _cross(z[j], point - p[j])
+        return z[j] if chain.sigma[j] else cross(z[j], point - p[j])
 
     if parallel:
         centre = _nearest_point(z[f], p[f], z[e], p[e])
         elbow = _triple(z[b], p[c] - p[b], p[d] - p[c])
         wrist = _triple(z[e], z[b], z[f])
-        return _dot(_cross(z[a], centre - p[a]), z[b]), elbow, wrist
+        return _dot(cross(z[a], centre - p[a]), z[b]), elbow, wrist
     centre = _nearest_point(z[d], p[d], z[e], p[e])
     wrist = _triple(z[d], z[e], z[f])
     u, v, w = (velocity(j, centre) for j in (a, b, c))
@@ -117,19 +117,14 @@ def _dot(a: Array, b: Array) -> Array:
     return np.einsum("ij,ij->i", a, b)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    i, j = [1, 2, 0], [2, 0, 1]
-    return a[:, i] * b[:, j] - a[:, j] * b[:, i]
-
-
 def _triple(a: Array, b: Array, c: Array) -> Array:
     """``a . (b x c)``."""
-    return _dot(a, _cross(b, c))
+    return _dot(a, cross(b, c))
 
 
 def _nearest_point(z: Array, p: Array, other_z: Array, other_p: Array) -> Array:
     """Point of a line that is nearest to another; its origin if they are parallel."""
-    n = _cross(z, other_z)
+    n = cross(z, other_z)
     size = _dot(n, n)
     along = _triple(other_p - p, other_z, n) / np.where(size > 1e-12, size, np.inf)
     return p + along[:, None] * z

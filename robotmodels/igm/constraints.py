@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..se3.orientation import quaternions_of, rotation_vectors_of
 from .loop import JointChain
-from .motion import jacobians, lever, poses_and_jacobians, tool_poses
+from .motion import cross, jacobians, lever, poses_and_jacobians, tool_poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +86,9 @@ class Constraints:
 
     def relation_errors(self, q: Array) -> Array:
         """``b - A q`` modulo the periods, shape (N, m)."""
-        r = self.b - q @ self.A.T
-        turn = np.where(self.period > 0.0, self.period, 1.0)
-        return np.where(self.period > 0.0, r - turn * np.round(r / turn), r)
+        r, period = self.b - q @ self.A.T, self.period
+        turn = np.where(period > 0.0, period, 1.0)
+        return np.where(period > 0.0, r - turn * np.round(r / turn), r)
 
     def linearised(self, U: Array, q: Array) -> tuple[Array, Array]:
         """Errors (N, r) and their Jacobians (N, r, k): lengths in units of the arm.
@@ -104,7 +104,7 @@ class Constraints:
         Q = quaternions_of(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
         turned = 2.0 * (about @ Q[:, 1:, None])[..., 0]
         # (c, v) becomes (c, v) (1, -w/2) where the tool turns by w
-        rows = Q[:, :1, None] * about + np.cross(about, Q[:, None, 1:])
+        rows = Q[:, :1, None] * about + cross(about, Q[:, None, 1:])
         linear = np.broadcast_to(self.A, (len(q), *self.A.shape))
         return (
             np.concatenate([away, turned, self.relation_errors(q)], axis=1),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from .loop import JointChain
-from .motion import jacobians, tool_poses
+from .motion import cross, jacobians, tool_poses
 from .solver import Tolerances
 from .status import IGMStatus
 
@@ -340,7 +340,7 @@ class _Search:
         velocity, axis = J[..., :3], J[..., 3:]
         # the axis passes the line at z x (z x (P - O)) from the tool; a parallel axis is left out
         slope = 1.0 - np.einsum("nki,ni->nk", axis, ahead) ** 2
-        along = np.einsum("nki,ni->nk", np.cross(axis, velocity), ahead)
+        along = np.einsum("nki,ni->nk", cross(axis, velocity), ahead)
         turning = (self.space.chain.sigma == 0) & ~held & (slope > 0.01)
         near = turning & (along > 0.5 * slope * distance[:, None])
         return np.where(near.any(axis=1), IGMStatus.TOO_NEAR, IGMStatus.TOO_FAR).astype(np.int8)
