@@ -16,7 +16,7 @@ from .loop import JointChain
 
 def tool_poses(chain: JointChain, q: Array) -> Array:
     """Poses of the tool in R_0. Shapes: q (N, k) -> (N, 4, 4)."""
-    return _frames(chain, q)[0]
+    return _joint_frames(chain, q)[0]
 
 
 def jacobians(chain: JointChain, q: Array) -> Array:
@@ -26,7 +26,7 @@ def jacobians(chain: JointChain, q: Array) -> Array:
 
 def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
     """Poses of the tool (N, 4, 4) and Jacobians (N, 6, k), axes of R_0."""
-    U, axes, origins = _frames(chain, q)
+    U, axes, origins = _joint_frames(chain, q)
     turning = (chain.sigma == 0)[:, None, None]
     columns = np.where(turning, cross(axes, U[:, :3, 3] - origins), axes), axes * turning
     return U, np.ascontiguousarray(np.concatenate(columns, axis=2).transpose(1, 2, 0))
@@ -34,7 +34,7 @@ def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
 
 def axes_of(chain: JointChain, q: Array) -> tuple[Array, Array]:
     """Directions and origins of the axes in R_0. Shapes: q (N, k) -> (k, N, 3) each."""
-    return _frames(chain, q)[1:]
+    return _joint_frames(chain, q)[1:]
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -88,7 +88,7 @@ def singular_rows(J: Array, relative: float) -> tuple[NDArray[np.int64], Array]:
     return doubtful[small], rows[small, -1]
 
 
-def _frames(chain: JointChain, q: Array) -> tuple[Array, Array, Array]:
+def _joint_frames(chain: JointChain, q: Array) -> tuple[Array, Array, Array]:
     """Poses of the tool (N, 4, 4), and directions and origins of the axes, each (k, N, 3)."""
     T = np.broadcast_to(chain.D[0], (len(q), 4, 4))
     joints = np.empty((chain.k, len(q), 4, 4))
