@@ -129,6 +129,7 @@ def independent(model, T, mask, axes, starts=60):
         Jt = np.swapaxes(J, 1, 2)
         normal = Jt @ J + damping[:, None, None] * np.eye(model.n)
         trial = q - np.linalg.solve(normal, Jt @ e[..., None])[..., 0]
+        trial = np.where(turns(model), np.angle(np.exp(1j * trial)), trial)
         next_e = error(model, T, trial, mask, axes)
         better = np.sum(next_e**2, axis=1) < np.sum(e**2, axis=1)
         q, e = np.where(better[:, None], trial, q), np.where(better[:, None], next_e, e)
