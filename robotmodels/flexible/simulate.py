@@ -16,7 +16,7 @@ e0, e_v0 : array_like, shape (m,), optional
     Elastic coordinates and velocities at the start; default zero.
 control : callable or array_like of shape (n,), optional
     Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none. A
-    simulation under constant torques without a wrench is compiled, some twenty times as fast.
+    simulation under constant torques without a wrench is compiled, ten times as fast.
 wrench : callable or array_like of shape (6,), optional
     Of the tool on the environment, in world axes, given as ``control``.
 t : array_like
