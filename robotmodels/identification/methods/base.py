@@ -39,7 +39,7 @@ class Method(ABC):
     def options(self) -> dict[str, Any]:
         """Options that differ from their defaults."""
         given = ((field.name, getattr(self, field.name), field.default) for field in fields(self))
-        return {name: value for name, value, default in given if not np.array_equal(value, default)}
+        return {name: value for name, value, default in given if not np.array_equal(value, default)}  # type: ignore[reportArgumentType]
 
     def without(self, dropped: Sequence[int]) -> Self:
         """The method for the other parameters; ``dropped`` are numbers from 0."""
