@@ -12,7 +12,7 @@ import numpy as np
 
 from ..kernels import _compile
 from ..kernels._compile import INTS, MATRIX, NOTHING, OUT2, OUT3, OUT4, STACK, Floats, Ints
-from ..kernels.continuation import factor, solve
+from ..kernels.linear_systems import factor, solve
 
 compiled = _compile.compiled
 
@@ -106,7 +106,7 @@ def newton(T: Floats, c: Floats, b: Floats, rods: Floats, columns: Ints, room: R
         for i in range(m):
             work[i] = rods[i] - work[i]
             rest = max(rest, abs(work[i]))
-        solve(J, pivots, work, False)
+        solve(J, pivots, work)
         step = 0.0
         for j in range(m):
             step = max(step, abs(work[j]) / (size if columns[j] < 3 else 1.0))
