@@ -42,10 +42,10 @@ def check(model, rng):
     q = rng.uniform(-2.0, 2.0, 6)
     q[chain.sigma == 1] *= 0.2
     T = rm.dgm(model, q)
-    found, valid, free = closed_form_postures(plan_loop(chain), chain, T[None], q[None])
-    postures = found[0][valid[0]]
+    found = closed_form_postures(plan_loop(chain), chain, T[None], q[None])
+    postures = found.q[found.valid]
     assert len(postures) > 1
-    assert not free.any()
+    assert not found.free.any()
     np.testing.assert_allclose(rm.dgm(model, postures), np.broadcast_to(T, (len(postures), 4, 4)),
                                rtol=0, atol=1e-9)  # fmt: skip
     apart = postures - q

@@ -73,11 +73,18 @@ def gaps(chain, found, q):
     return np.abs(np.where(chain.sigma == 0, (d + np.pi) % (2 * np.pi) - np.pi, d)).max(axis=-1)
 
 
+def closed_form(plan, chain, U, references=None):
+    """Postures, which of them there are, and which of their joints are free."""
+    wanted = np.broadcast_to(0.0 if references is None else references, (len(U), 6))
+    found = closed_form_postures(plan, chain, U, wanted)
+    return found.q, found.valid, found.free
+
+
 def solved(name, q, references=None):
     """Postures of the poses of q; every one of them meets its pose."""
     chain, plan = arm(name)
     U = poses(chain, q)
-    found, valid, free = closed_form_postures(plan, chain, U, references)
+    found, valid, free = closed_form(plan, chain, U, references)
     error = np.abs(poses(chain, found) - U[:, None]).max(axis=(-1, -2))
     assert np.all(np.isnan(found) == ~valid[..., None])
     assert np.all(np.diff(valid.astype(int), axis=1) <= 0)
@@ -144,7 +151,7 @@ def test_a_wrist_behind_or_before_any_three_joints(sigma, mirrored):
     assert plan.family is Family.CONCURRENT
     q = random_postures(chain, 200)
     U = poses(chain, q)
-    found, valid, _ = closed_form_postures(plan, chain, U)
+    found, valid, _ = closed_form(plan, chain, U)
     error = np.abs(poses(chain, found) - U[:, None]).max(axis=(-1, -2))
     assert error[valid].max() < 1e-11
     assert np.nanmin(gaps(chain, found, q), axis=1).max() < 1e-6
@@ -262,10 +269,10 @@ def test_a_stretched_elbow(name):
 def test_poses_that_are_not_finite_have_no_posture_and_do_not_disturb_others(name):
     chain, plan = arm(name)
     U = poses(chain, random_postures(chain, 5000, seed=7))
-    whole, valid, _ = closed_form_postures(plan, chain, U)
+    whole, valid, _ = closed_form(plan, chain, U)
     U[17, 0, 3] = np.nan
     U[4000, 1, 1] = np.inf
-    found, there, _ = closed_form_postures(plan, chain, U)
+    found, there, _ = closed_form(plan, chain, U)
     assert not there[[17, 4000]].any()
     rest = np.setdiff1d(np.arange(5000), [17, 4000])
     np.testing.assert_array_equal(there[rest], valid[rest])
@@ -277,11 +284,11 @@ def test_out_of_reach(name):
     chain, plan = arm(name)
     U = poses(chain, random_postures(chain, 20, seed=8))
     U[:, :3, 3] += 50.0
-    found, valid, free = closed_form_postures(plan, chain, U)
+    found, valid, free = closed_form(plan, chain, U)
     assert not valid.any()
     assert np.isnan(found).all()
     assert not free.any()
-    empty = closed_form_postures(plan, chain, np.zeros((0, 4, 4)))
+    empty = closed_form(plan, chain, np.zeros((0, 4, 4)))
     assert [part.shape for part in empty] == [(0, 8, 6), (0, 8), (0, 8, 6)]
 
 
@@ -290,7 +297,7 @@ def test_the_oracles_postures(name, file):
     chain, plan = arm(name)
     oracle = json.loads((ORACLES / f"{file}.json").read_text())
     for case in oracle["cases"]:
-        found, valid, _ = closed_form_postures(plan, chain, np.array([case["T"]]))
+        found, valid, _ = closed_form(plan, chain, np.array([case["T"]]))
         wanted = np.array(case["solutions"])
         assert valid.sum() == case["n_solutions"] == len(wanted)
         for posture in wanted:

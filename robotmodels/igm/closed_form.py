@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
 from .._arrays import Array
@@ -22,8 +21,7 @@ from .structure import Family, LoopPlan, plan_loop
 __all__ = ["MOST", "ClosedForm", "closed_form_postures", "plan_loop"]
 
 MOST = 8  # postures of one pose
-CHUNK = 2048  # poses worked on at a time: 1 MB of candidates
-ACCEPTED = 1e-9  # largest error of a posture [m, rad]
+DEFAULT = Tolerances()
 SLACK = 1e-9  # overshoot beside the length of the arm that is tried as a double root
 
 
@@ -48,65 +46,48 @@ def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
 
 @postures.register
 def _(solver: ClosedForm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
-    slack = max(SLACK, tolerances.position / solver.plan.size, tolerances.orientation)
-    accepted = max(ACCEPTED, *tolerances)
-    q, valid, free = closed_form_postures(
-        solver.plan, solver.chain, U, references, slack=slack, accepted=accepted
-    )
-    return checked(solver.chain, U, q, valid, tolerances, free=free)
+    return closed_form_postures(solver.plan, solver.chain, U, references, tolerances)
 
 
 def closed_form_postures(
     plan: LoopPlan,
     chain: JointChain,
-    U: ArrayLike,
-    references: ArrayLike | None = None,
-    slack: float = SLACK,
-    accepted: float = ACCEPTED,
-) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    U: Array,
+    references: Array,
+    tolerances: Tolerances = DEFAULT,
+) -> Postures:
     """All real postures of a six-joint arm that has a closed form.
 
-    Shapes: U (N, 4, 4), references (N, 6) or (6,) -> q, free (N, 8, 6); valid (N, 8).
+    Shapes: U (N, 4, 4), references (N, 6).
     """
     from ._parallel import parallel_postures
-    from ._verify import verified_postures
     from .kernels.pieper import concurrent_postures
 
-    poses = np.array(U, dtype=np.float64, order="C")
-    N = poses.shape[0]
-    wanted = np.zeros((N, 6))
-    if references is not None:
-        wanted[:] = references
-    loop_references = np.ascontiguousarray(plan.sense * wanted[:, plan.order])
-    finite = np.all(np.isfinite(poses), axis=(1, 2)) & np.all(np.isfinite(wanted), axis=1)
-    # eigenvalues are not asked of numbers that are none
-    poses[~finite], loop_references[~finite] = np.eye(4), 0.0
-    q = np.full((N, MOST, 6), np.nan)
-    valid = np.zeros((N, MOST), np.bool_)
-    free = np.zeros((N, MOST, 6), np.bool_)
-    first_three = np.ascontiguousarray(plan.sigma[:3])
-    for start in range(0, N, CHUNK):
-        rows = slice(start, start + CHUNK)
-        size = poses[rows].shape[0]
-        found = np.zeros((size, MOST, 6))
-        marks = np.zeros((size, MOST), np.int64)
-        counts = np.zeros(size, np.int64)
-        loop = (poses[rows], plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted))
-        if plan.family is Family.CONCURRENT:
-            links = np.tile(plan.constants, (size, 1, 1, 1))
-            pose = se3.inverse(poses[rows]) if plan.inverted else poses[rows]
-            links[:, plan.slot] = plan.left @ pose @ plan.right
-            concurrent_postures(
-                links, se3.inverse(plan.constants[1::-1]), int(plan.backwards), first_three,
-                plan.meeting, plan.size, slack,
-                loop_references[rows], found, marks, counts,
-            )  # fmt: skip
-        else:
-            parallel_postures(*loop, plan.size, slack, loop_references[rows], found, marks, counts)
-        counts[~finite[rows]] = 0
-        verified_postures(
-            poses[rows], chain.sigma, chain.D, plan.order, plan.sense, accepted,
+    N = len(U)
+    slack = max(SLACK, tolerances.position / plan.size, tolerances.orientation)
+    finite = np.all(np.isfinite(U), axis=(1, 2)) & np.all(np.isfinite(references), axis=1)
+    # the kernels take finite numbers only
+    poses = np.where(finite[:, None, None], U, np.eye(4))
+    wanted = np.where(finite[:, None], plan.sense * references, 0.0)
+    wanted = np.ascontiguousarray(wanted[:, plan.order])
+    found, counts = np.zeros((N, MOST, 6)), np.zeros(N, np.int64)
+    marks = np.zeros((N, MOST), np.int64)
+    if plan.family is Family.CONCURRENT:
+        links = np.tile(plan.constants, (N, 1, 1, 1))
+        pose = se3.inverse(poses) if plan.inverted else poses
+        links[:, plan.slot] = plan.left @ pose @ plan.right
+        concurrent_postures(
+            links, se3.inverse(plan.constants[1::-1]), int(plan.backwards),
+            np.ascontiguousarray(plan.sigma[:3]), plan.meeting, plan.size, slack, wanted,
             found, marks, counts,
-            q[rows], valid[rows], free[rows],
         )  # fmt: skip
-    return q, valid, free
+    else:
+        parallel_postures(
+            poses, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted),
+            plan.size, slack, wanted, found, marks, counts,
+        )  # fmt: skip
+    there = (np.arange(MOST) < counts[:, None]) & finite[:, None]
+    q, free = np.empty(found.shape), np.empty(found.shape, np.bool_)
+    q[..., plan.order] = plan.sense * found
+    free[..., plan.order] = (marks[..., None] >> np.arange(6)) & 1 == 1
+    return checked(chain, poses, q, there, tolerances, free=free & there[..., None])
