@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import se3
 from .._arrays import Array
-from .check import checked
+from .check import CHUNK, checked
 from .loop import JointChain
 from .postures import Postures
 from .solver import Tolerances, postures
@@ -73,14 +73,16 @@ def closed_form_postures(
     found, counts = np.zeros((N, MOST, 6)), np.zeros(N, np.int64)
     marks = np.zeros((N, MOST), np.int64)
     if plan.family is Family.CONCURRENT:
-        links = np.tile(plan.constants, (N, 1, 1, 1))
         pose = se3.inverse(poses) if plan.inverted else poses
-        links[:, plan.slot] = plan.left @ pose @ plan.right
-        concurrent_postures(
-            links, se3.inverse(plan.constants[1::-1]), int(plan.backwards),
-            np.ascontiguousarray(plan.sigma[:3]), plan.meeting, plan.size, slack, wanted,
-            found, marks, counts,
-        )  # fmt: skip
+        meet, first = se3.inverse(plan.constants[1::-1]), np.ascontiguousarray(plan.sigma[:3])
+        for start in range(0, N, CHUNK):
+            rows = slice(start, start + CHUNK)
+            links = np.tile(plan.constants, (len(pose[rows]), 1, 1, 1))
+            links[:, plan.slot] = plan.left @ pose[rows] @ plan.right
+            concurrent_postures(
+                links, meet, int(plan.backwards), first, plan.meeting, plan.size, slack,
+                wanted[rows], found[rows], marks[rows], counts[rows],
+            )  # fmt: skip
     else:
         parallel_postures(
             poses, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted),
