@@ -1,6 +1,6 @@
 """Change one sign, index or factor of the numeric core at a time: a test must fail each time.
 
-    python tests/nightly/mutations.py              # all of them; tests/mutations.md is written
+    python tests/nightly/mutations.py              # all of them; each run writes tests/mutations.md
     python tests/nightly/mutations.py --sample 5   # some, chosen at random: for every change
     python tests/nightly/mutations.py --only dry   # those whose room or fault has this word
     python tests/nightly/mutations.py --jobs 1     # one after the other; default: as processors
@@ -215,30 +215,39 @@ class Trial:
         return {0: SURVIVED, 1: KILLED}.get(code, BROKEN), by
 
 
-def page(outcomes: list[Outcome], minutes: float, jobs: int) -> str:
-    """The list as a table, with the number of faults of each room and the time of the run."""
-    killed = sum(o.verdict == KILLED for o in outcomes)
-    rooms = Counter(o.mutation.room.split(":")[0] for o in outcomes)
+def table_of(path: Path) -> dict[tuple[str, str], tuple[str, str]]:
+    """What earlier runs wrote: by room and fault, the outcome and the test."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    cells = [re.split(r"(?<!\\) \| ", line[2:-2]) for line in lines if line.startswith("| ")]
+    return {(room, fault): (verdict, by) for room, fault, verdict, by in cells[1:]}
+
+
+def page(outcomes: list[Outcome], earlier: dict[tuple[str, str], tuple[str, str]]) -> str:
+    """All faults of the list as a table: these outcomes, those of earlier runs for the others."""
+    rows = {(m.room, m.fault): ("not tried", "none") for m in MUTATIONS}
+    rows |= {key: row for key, row in earlier.items() if key in rows}
+    for o in outcomes:
+        by = f"`{o.by.removeprefix('tests/')}`" if o.verdict == KILLED else "none"
+        rows[o.mutation.room, o.mutation.fault] = o.verdict, by.replace("|", "\\|")
+    rooms = Counter(room.split(":")[0] for room, _ in rows)
+    killed = sum(verdict == KILLED for verdict, _ in rows.values())
     counts = ", ".join(f"{room} {count}" for room, count in sorted(rooms.items()))
     lines = [
         "# Faults that were tried",
         "",
         "One sign, index, factor or term of the numeric core is changed at a time; a test must",
-        "fail. Written by `python tests/nightly/mutations.py`; the changes themselves, text by",
-        "text, are in `tests/nightly/mutation_list.py`.",
+        "fail. Each run of `python tests/nightly/mutations.py` writes the rows of the faults it",
+        "tried; the changes, text by text, stand in the lists beside that file.",
         "",
-        f"{len(outcomes)} faults, {killed} found, in {minutes:.0f} minutes ({jobs} at a time, "
-        f"{sum(o.seconds for o in outcomes) / 60.0:.0f} minutes one after the other).",
+        f"{len(rows)} faults, {killed} found.",
         "",
         *textwrap.wrap(f"By room: {counts}.", 100),
         "",
         "| room | fault | outcome | first test that fails |",
         "|---|---|---|---|",
-    ]
-    for o in outcomes:
-        by = o.by.removeprefix("tests/") if o.verdict == KILLED else "none"
-        by = by.replace("|", "\\|")
-        lines.append(f"| {o.mutation.room} | {o.mutation.fault} | {o.verdict} | `{by}` |")
+        *(f"| {room} | {fault} | {verdict} | {by} |"
+          for (room, fault), (verdict, by) in rows.items()),
+    ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
@@ -251,7 +260,8 @@ def main() -> int:
     jobs = os.cpu_count() or 1
     parser.add_argument("--jobs", type=int, default=jobs, metavar="N", help=f"default: {jobs}")
     parser.add_argument("--places", action="store_true", help="only look for the texts")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="where the table goes")
+    table = CHECKOUT / "tests" / "mutations.md"
+    parser.add_argument("--write", type=Path, default=table, metavar="FILE", help="the table")
     given = parser.parse_args()
     word = given.only or ""
     chosen = [m for m in MUTATIONS if word in f"{m.room} {m.fault} {m.tests}"]
@@ -268,7 +278,6 @@ def main() -> int:
     if given.places:
         print(f"{len(chosen)} texts are found")
         return 0
-    whole = given.sample is None and not given.only
     if given.sample is not None:
         seed = random.randrange(10**6) if given.seed is None else given.seed
         print(f"--seed {seed}")
@@ -284,12 +293,8 @@ def main() -> int:
         folders = [Path(temporary, str(job)) for job in range(max(1, given.jobs))]
         for folder in folders:
             copied(folder)
-        start = time.monotonic()
         outcomes = Trial(folders, chosen).outcomes()
-        minutes = (time.monotonic() - start) / 60.0
-    target = given.write or (CHECKOUT / "tests" / "mutations.md" if whole else None)
-    if target:
-        target.write_text(page(outcomes, minutes, len(folders)), encoding="utf-8")
+    given.write.write_text(page(outcomes, table_of(given.write)), encoding="utf-8")
     bad = [o for o in outcomes if o.verdict != KILLED]
     print(f"{len(outcomes) - len(bad)} of {len(outcomes)} faults were found")
     return 1 if bad else 0
