@@ -109,7 +109,7 @@ def slope(function, x, k, h=1e-3):
     return (16 * first[1] - first[0]) / 15
 
 
-@pytest.mark.sampled(23)
+@pytest.mark.sampled(14)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_derivatives_by_parameters_and_fixtures_are_those_of_finite_differences(kind, seed):

@@ -67,6 +67,7 @@ def critically_damped(t, e0, de0, w):
 # --- free space --------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_computed_torque_makes_the_error_linear(seed):
     rng, model = random_robot(seed, drive=seed % 2 == 1, transmission=seed == 3)

@@ -332,6 +332,7 @@ def test_constant_torques_end_with_the_status_of_functions(options, v0, torque, 
     assert np.isfinite(runs[0].e).all()
 
 
+@pytest.mark.nightly
 def test_spin_up_of_kane_ryan_and_banerjee():
     """Their beam of 8 m, brought to 6 rad/s in 15 s; its first frequency is 2.9 rad/s."""
     plain, stiff = (

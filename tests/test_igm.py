@@ -105,7 +105,7 @@ def test_branches_keep_their_label_along_a_path(name):
         assert all(len(set(row)) == len(row) for row in found.code[:, : found.count[0]])
 
 
-@pytest.mark.sampled(9)
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("eps", TINY)
 @pytest.mark.parametrize("name", ["rx90", "puma560", "ur5e"])
 def test_no_branch_is_lost_at_a_singular_wrist(name, eps):

@@ -129,6 +129,7 @@ def test_one_pose_is_solved_as_many_are(name):
     assert not rm.igm(model, rm.se3.translation(30.0, 0.0, 0.0) @ T).count.any()
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ["rx90", "kr6_r900", "ur5e"])
 @pytest.mark.parametrize("share", [1.0, 0.1, 1e-3])
 def test_isolated_solutions_beside_singular_wrists(name, share):

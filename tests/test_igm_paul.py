@@ -496,7 +496,7 @@ def angle_gap(a, b):
     return abs((a - b + pi) % (2 * pi) - pi)
 
 
-@pytest.mark.sampled(8)
+@pytest.mark.sampled(7)
 @pytest.mark.parametrize("name", COMPLETE)
 def test_printed_equations_and_formulas_hold(name):
     """Every equation printed is true of the arm, and every formula gives the joint it names."""

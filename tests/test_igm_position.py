@@ -57,7 +57,7 @@ def searched(model, p, rng, starts=400):
     return np.array(found)
 
 
-@pytest.mark.sampled(20)
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("order", ORDERS, ids=str)
 def test_all_solutions_are_found(order, structure):

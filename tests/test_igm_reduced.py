@@ -141,7 +141,7 @@ def independent(model, T, mask, axes, starts=60):
     return distinct
 
 
-@pytest.mark.sampled(16)
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize(
     ("word", "mask", "axes"), [(word, WHOLE, "world") for word in FEWER] + list(MASKED)
 )

@@ -349,7 +349,7 @@ def wandering(rng, count, size=1.0):
     return se3.as_pose(T)
 
 
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(5)
 @every_kind
 @pytest.mark.parametrize("with_near", [False, True])
 def test_a_sequence_is_each_sample_near_the_one_before(kind, with_near, rng):

@@ -84,6 +84,7 @@ def random_arms(count, seed=7):
 # --- singular curves, cusps, nodes ---------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_numbers_of_cusps_of_orthogonal_arms():
     for p in (*random_arms(25), *SWEEP, *BESIDE_A_SURFACE):
         found = pf.cusps(three(*p))

@@ -537,7 +537,7 @@ KINDS = (
 )  # fmt: skip
 
 
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("name", KINDS)
 def test_kinds_are_those_of_the_factors_that_vanish(name):
     """At zeros of each factor alone, and of those of each condition together."""

@@ -124,7 +124,7 @@ def test_rx90_has_the_third_matrix_of_the_book():
 # --- numbers -------------------------------------------------------------------------------------
 
 
-@pytest.mark.sampled(12)
+@pytest.mark.sampled(10)
 @pytest.mark.parametrize("name", [*CATALOGUE, *FOREIGN])
 def test_catalogue(name, rng):
     model = rm.load(name)

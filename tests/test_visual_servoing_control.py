@@ -86,7 +86,7 @@ def test_matrices_of_the_law():
     )
 
 
-@pytest.mark.sampled(11)
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize(
     "feature",
     [
