@@ -325,6 +325,18 @@ def test_names_that_scripts_read():
     assert missing == []
 
 
+def test_progress_means_the_same_everywhere():
+    calls = {
+        function
+        for room in rooms().values()
+        for function in map(vars(room).get, public_names(room))
+        if inspect.isfunction(function) and "progress" in inspect.signature(function).parameters
+    }
+    assert len(calls) >= 16
+    kinds = {inspect.signature(function).parameters["progress"].annotation for function in calls}
+    assert kinds == {"Progress"}
+
+
 if __name__ == "__main__":
     SNAPSHOT.write_text(listed(), encoding="utf-8")
     sys.stdout.write(f"{SNAPSHOT.name} is written\n")

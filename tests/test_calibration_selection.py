@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
+from robotmodels._arrays.tasks import Workers
 from robotmodels.calibration import (
     PointContact,
     candidate_parameters,
@@ -115,7 +116,9 @@ def test_exchange_finds_what_exhaustive_search_finds(criterion):
         best = max(value(rows, s, criterion) for s in combinations(range(9), 4))
         starts = [greedy(rows, 4, criterion)]
         starts += [rng.permutation(9)[:4] for _ in range(8)]
-        found = max(value(rows, exchanged(rows, s, criterion), criterion) for s in starts)
+        found = max(
+            value(rows, exchanged(rows, s, criterion, Workers()), criterion) for s in starts
+        )
         assert found == pytest.approx(best, rel=1e-9)
 
 
@@ -239,7 +242,7 @@ def test_limits_and_obstacles_are_respected_also_when_configurations_are_moved()
     free, first, moved = (
         select_configurations(
             RX90, "position", 9, drawn=60, starts=1, rng=np.random.default_rng(0),
-            progress=lambda *a: calls.append(a), **options,
+            progress=calls.append, **options,
         )
         for options in (
             {}, {"obstacles": bodies, "radius": 0.06},
@@ -249,8 +252,8 @@ def test_limits_and_obstacles_are_respected_also_when_configurations_are_moved()
     for found in (first, moved):
         assert_allowed(found.q, bodies, 0.06)
         assert any("obstacle" in note for note in found.left_out)
-    assert all(0 < done <= total for done, total in calls)
-    assert calls[-1][0] == calls[-1][1]
+    assert all(0 < done <= 1 for done in calls)
+    assert calls[-1] == 1.0
     assert moved.observability.o1 > 1.02 * first.observability.o1
     assert (moved.candidates == -1).any()
     # without the obstacles some configurations touch

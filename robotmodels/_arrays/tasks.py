@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -15,9 +16,12 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidValueError
 
+_LOG = logging.getLogger("robotmodels")
 T = TypeVar("T")
 Task = tuple[Callable[[], T], float]
 """A piece of work, and the fraction of all work that is done after it."""
+Progress = bool | Callable[[float], None] | None
+"""Who is told the fraction done: nobody, the log of Python (True), or a function."""
 
 
 def results(
@@ -46,21 +50,24 @@ def results(
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """An executor, and who is called with the fraction done, between ``low`` and ``high``."""
+    """An executor, and who is told the fraction done, between ``low`` and ``high``."""
 
     executor: Executor | None = None
-    progress: Callable[[float], None] | None = None
+    progress: Progress = None
     low: float = 0.0
     high: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, given, method in (
-            ("executor", self.executor, "submit"),
-            ("progress", self.progress, "__call__"),
-        ):
-            if given is not None and not hasattr(given, method):
-                kind = "a concurrent.futures.Executor" if name == "executor" else "a function"
-                raise InvalidValueError(f"{name}: expected {kind} or None, got {given!r:.60}.")
+        executor, progress = self.executor, self.progress
+        if executor is not None and not hasattr(executor, "submit"):
+            raise InvalidValueError(
+                f"executor: expected a concurrent.futures.Executor or None, got {executor!r:.60}."
+            )
+        if not (progress is None or isinstance(progress, bool) or callable(progress)):
+            raise InvalidValueError(
+                "progress: expected a flag or a function of the fraction done, got "
+                f"{progress!r:.60}."
+            )
 
     def part(self, low: float, high: float) -> Workers:
         """The same workers for a part of the work, from one fraction of it to another."""
@@ -69,8 +76,11 @@ class Workers:
 
     def done(self, fraction: float = 1.0) -> None:
         """Report a fraction of the work."""
-        if self.progress is not None:
-            self.progress(self.low + fraction * (self.high - self.low))
+        fraction = self.low + fraction * (self.high - self.low)
+        if callable(self.progress):
+            self.progress(fraction)
+        elif self.progress:
+            _LOG.info("%.0f %% done", 100.0 * fraction)
 
     def each(self, calls: Iterable[Callable[[], T]], count: int) -> Iterator[T]:
         """Results of ``count`` calls in their order."""

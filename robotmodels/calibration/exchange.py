@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .._arrays.tasks import Workers
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from .observability import Criterion
 
-Progress = Callable[[int, int], None]
 _RIDGE = 1e-12
 """Added to the information, relative to its mean, so that sets that are too small compare too."""
 _GAIN = 1e-10
@@ -81,7 +81,7 @@ def greedy(rows: Array, count: int, criterion: Criterion) -> NDArray[np.int64]:
 
 
 def exchanged(
-    rows: Array, start: NDArray[np.int64], criterion: Criterion, progress: Progress | None = None
+    rows: Array, start: NDArray[np.int64], criterion: Criterion, work: Workers
 ) -> NDArray[np.int64]:
     """Exchange algorithm: swap members while the criterion improves.
 
@@ -106,10 +106,9 @@ def exchanged(
             if after > value + _GAIN:
                 free[members[k]], free[best] = True, False
                 members[k], value, unchanged = best, after, 0
-        if progress is not None:
-            progress(done, total)
-    if progress is not None and done < total:
-        progress(total, total)
+        work.done(done / total)
+    if done < total:
+        work.done()
     return members
 
 
@@ -133,7 +132,7 @@ def moved_configurations(
     rows_of: Callable[[Array], Array],
     is_allowed: Callable[[Array], NDArray[np.bool_]],
     model: RobotModel,
-    progress: Progress | None = None,
+    work: Workers,
 ) -> Array:
     """Local optimisation of the configurations, one after the other.
 
@@ -176,12 +175,10 @@ def moved_configurations(
                 if after > value:
                     groups[g], rows[g], value = trial[0], new[0], after
                     break
-            if progress is not None:
-                progress(sweep * count + g + 1, total)
+            work.done((sweep * count + g + 1) / total)
         if value - before < _MOVE_GAIN:
             break
-    if progress is not None:
-        progress(total, total)
+    work.done()
     return groups
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
@@ -35,7 +36,6 @@ from .validation import (
     settled_prior,
 )
 
-Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
 
 _PRIOR = ParameterPrior()
@@ -65,7 +65,7 @@ def fit(
     folds: int = 5,
     held_out: float | Measurement | Sequence[Measurement] = 0.2,
     rng: np.random.Generator | int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> CalibrationResult:
     """Estimate the geometric parameters of a robot, also called kinematic calibration.
 
@@ -106,8 +106,8 @@ def fit(
         measurements for that, which never take part.
     rng : numpy.random.Generator or int, optional
         For the folds; default a fixed seed.
-    progress : callable, optional
-        ``progress(done, total, task)`` after each fit.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
@@ -196,21 +196,20 @@ def fit(
         )
     trials_to_fit = len(structure.indicated) if structure and fits else 0
     step = _Steps(progress, 1 + fits + len(last.splits) + trials_to_fit * (1 + fits))
-    step("all measurements")
+    step()
     in_folds = in_test = None
     if fits:
-        in_folds = cross_validated(solution, parts, nominal, partial(step, "cross-validation"))
+        in_folds = cross_validated(solution, parts, nominal, step)
     if test:
         in_test = errors_on(solution, test)
     elif last.splits:
-        in_test = cross_validated(solution, last, nominal, partial(step, "held-out measurements"))
+        in_test = cross_validated(solution, last, nominal, step)
     if structure is not None:
         trials = []
         if in_folds is not None:
-            done = partial(step, "terms to try next")
             preferred, identify = estimate.preferred, estimate.identify
             trials = trials_of(
-                structure, solution, preferred, identify, parts, in_folds, nominal, done
+                structure, solution, preferred, identify, parts, in_folds, nominal, step
             )
         notes.append(note_of_structure(structure, trials, in_folds))
     in_sample = errors_of(solution.problem, solution.corrections, solution.fixtures)
@@ -307,15 +306,14 @@ def _identifiable_at(
 
 
 class _Steps:
-    """Counts fits for a progress callback."""
+    """Counts fits and tells the fraction done."""
 
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, total, 0
+    def __init__(self, progress: Progress, total: int) -> None:
+        self._work, self._total, self._done = Workers(progress=progress), total, 0
 
-    def __call__(self, task: str) -> None:
+    def __call__(self) -> None:
         self._done += 1
-        if self._progress is not None:
-            self._progress(self._done, self._total, task)
+        self._work.done(self._done / self._total)
 
 
 def _held_out(

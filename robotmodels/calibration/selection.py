@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import ceil
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_floats, read_only
+from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.lengths import characteristic_length
@@ -20,7 +20,6 @@ from ..obstacles.clearance import checked_obstacles, clearance, links
 from ..obstacles.shapes import Obstacle
 from .candidates import candidate_parameters
 from .exchange import (
-    Progress,
     exchanged,
     greedy,
     index_of,
@@ -38,7 +37,6 @@ from .problem import guessed_fixtures, linearised, problem_of
 
 LENGTH_NOISE = 1e-4
 """Standard error of a length where none is given, m."""
-_LOG = logging.getLogger(__name__)
 _RANKED = 150
 """Number of candidate configurations used for the rank test."""
 _DRAWS = 12
@@ -181,7 +179,7 @@ def select_configurations(
     optimise: bool = False,
     starts: int = 3,
     rng: np.random.Generator | int | None = None,
-    progress: bool | Progress = False,
+    progress: Progress = False,
 ) -> SelectedConfigurations:
     """Select configurations for a calibration (optimal experiment design, exciting postures).
 
@@ -230,8 +228,8 @@ def select_configurations(
         Sets to start from: a greedy one, the others random.
     rng : numpy.random.Generator or int, optional
         Source of randomness; default a fresh one.
-    progress : bool or callable
-        True logs, a callable gets (done, total).
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
@@ -263,7 +261,7 @@ def select_configurations(
     criterion = chosen(Criterion, criterion, "criterion")
     count, starts = _whole(count, "count"), _whole(starts, "starts")
     rng = np.random.default_rng(rng)
-    report = _progress(progress)
+    work = Workers(progress=progress)
     if optimise and kind.is_constraint:
         raise InvalidValueError(
             "optimise: the postures of a contact cannot be moved one by one; draw more candidates."
@@ -313,12 +311,12 @@ def select_configurations(
         )
     effect = np.sqrt((rows**2).sum(axis=(0, 1)) / len(rows))
     scaled = rows / effect
-    best = _best(scaled, count, criterion, starts, rng, report)
+    best = _best(scaled, count, criterion, starts, rng, work.part(0.0, 0.5 if optimise else 1.0))
     groups, members, part = pool[best], numbers[best], scaled[best]
     if optimise:
         groups = moved_configurations(
             groups, part, criterion, lambda q: group_rows(kept, kind, q, sigma, frame) / effect,
-            lambda q: _within_limits(model, q) & is_clear(q), model, report,
+            lambda q: _within_limits(model, q) & is_clear(q), model, work.part(0.5, 1.0),
         )  # fmt: skip
         members = np.where((groups == pool[best]).all(axis=(1, 2)), members, -1)
         part = group_rows(kept, kind, groups, sigma, frame) / effect
@@ -454,16 +452,13 @@ def _best(
     criterion: Criterion,
     starts: int,
     rng: np.random.Generator,
-    progress: Progress | None,
+    work: Workers,
 ) -> NDArray[np.int64]:
     """The best of several sets, each a local optimum."""
     best, value = np.zeros(0, dtype=np.int64), -np.inf
     for k in range(starts):
         start = rng.permutation(len(rows))[:count] if k else greedy(rows, count, criterion)
-        part = None
-        if progress is not None:
-            part = lambda done, total, k=k: progress(k * total + done, starts * total)  # noqa: E731
-        members = exchanged(rows, start, criterion, part)
+        members = exchanged(rows, start, criterion, work.part(k / starts, (k + 1) / starts))
         after = float(index_of(information(rows[members]), criterion))
         if after > value or not len(best):
             best, value = members, after
@@ -494,16 +489,3 @@ def _whole(value: Any, name: str) -> int:
     if isinstance(value, bool) or int(value) != value or value < 1:
         raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
     return int(value)
-
-
-def _progress(progress: bool | Callable[[int, int], None] | None) -> Progress | None:
-    """A function of (done, total), or None."""
-    if progress is False or progress is None:
-        return None
-    if progress is True:
-        return lambda done, total: _LOG.info("%d of at most %d members examined", done, total)
-    if callable(progress):
-        return progress
-    raise InvalidValueError(
-        f"progress: expected a flag or a function of (done, total), got {progress!r:.60}."
-    )

@@ -99,11 +99,11 @@ def run(arguments: argparse.Namespace) -> Report:
     if arguments.test is not None:
         aside = read(arguments, model, arguments.test, name="test")
     try:
-        with progress(arguments, "fits") as bar:
+        with progress(arguments, "fitting") as bar:
             result = fit(
                 model, [measured, *known], base=not arguments.fixed_base,
                 tool=not arguments.fixed_tool, prior=prior, held_out=aside,
-                progress=bar and bar.steps,
+                progress=bar and bar.fraction,
                 **given(arguments, "parameters", "known", "known_lengths", "gains",
                         "eccentricity", "compliance", "loss", "folds"),
             )  # fmt: skip

@@ -92,14 +92,14 @@ def run(arguments: argparse.Namespace) -> Report:
         most = _each(getattr(arguments, name), n, f"--{name}")
         if most is not None:
             limits = replace(limits, **{name: most, f"{name}_lower": -most})
-    with progress(arguments, "stages of the search") as bar:
+    with progress(arguments, "searching") as bar:
         found = exciting_trajectory(
             model, drive=tuple(arguments.drive) or False, limits=limits,
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
             sigma=_each(arguments.sigma, n, "--sigma"), workspace=workspace,
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
             baseline=arguments.random, rng=arguments.seed,
-            progress=False if bar is None else bar.steps,
+            progress=bar and bar.fraction,
             **given(arguments, "duration", "harmonics", "points", "kind", "criterion", "starts",
                     "iterations"),
         )  # fmt: skip

@@ -28,8 +28,8 @@ rtol, atol : float
     Tolerances of a step.
 max_evaluations : int, optional
     Default 60 000 for each second and as many more.
-progress : callable, optional
-    A function of the fraction done.
+progress : bool or callable, optional
+    A function is called with the fraction done; True writes it to the log of Python.
 
 Returns
 -------
@@ -55,7 +55,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, SingularMassMatrixError
@@ -161,7 +161,7 @@ def simulate(
     rtol: float = 1e-9,
     atol: float = 1e-11,
     max_evaluations: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> FlexibleMotion:
     """Simulate a flexible arm under torques.
 
@@ -240,7 +240,7 @@ def _followed(
     rtol: float,
     atol: float,
     budget: int | None,
-    progress: Any,
+    progress: Progress,
     spun: list[float],
     largest: ArrayLike = np.inf,
     steps: Any = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from time import perf_counter
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._arrays import Array
+from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError, RobotModelsWarning
 from ..logs import Log
@@ -106,7 +107,7 @@ def compare_methods(
     methods: Iterable[Method | str] = ("ols", "wls", "irls"),
     forms: Iterable[EquationForm | str] = ("torque",),
     test: Log | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
     **options: Any,
 ) -> MethodComparison:
     """Identify a robot by several methods and forms of equations, and compare.
@@ -123,8 +124,8 @@ def compare_methods(
         Forms of the equations; each method with each form.
     test : Log, optional
         Held out; errors of predicted torques are then on it.
-    progress : callable, optional
-        Called with the fraction done.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
     **options
         Other arguments of `fit`, the same for all.
 
@@ -159,6 +160,7 @@ def compare_methods(
         raise InvalidValueError("methods, forms: expected at least one of each, got none.")
     rows: list[ComparedFit] = []
     last: InvalidValueError | None = None
+    work = Workers(progress=progress)
     for k, (form, method) in enumerate(pairs):
         start = perf_counter()
         result, why = None, ""
@@ -169,8 +171,7 @@ def compare_methods(
         except InvalidValueError as error:
             last, why = error, str(error)
         rows.append(ComparedFit(method, form, result, perf_counter() - start, why))
-        if progress is not None:
-            progress((k + 1) / len(pairs))
+        work.done((k + 1) / len(pairs))
     if last is not None and all(row.result is None for row in rows):
         raise last
     return MethodComparison(tuple(rows), test is not None)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from typing import Any
 
 from .._arrays import Array
+from .._arrays.tasks import Progress
 from .._choices import chosen
 from ..drive import Drives
 from ..errors import InvalidValueError, RobotModelsWarning
@@ -59,7 +60,7 @@ def fit(
     test: Log | None = None,
     checked: bool = True,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> IdentificationResult:
     """Identify the base parameters, frictions and rotor inertias of a robot from a log.
 
@@ -96,8 +97,8 @@ def fit(
         frozen samples are interpolated or left out. False uses the log unchanged.
     executor : concurrent.futures.Executor, optional
         Computes the pieces of the log; the result does not depend on it.
-    progress : callable, optional
-        Called with the fraction done.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
@@ -187,7 +188,7 @@ def _equations(
     form: EquationForm,
     processing: Processing | Mapping[str, Any] | None,
     executor: Executor | None,
-    progress: Callable[[float], None] | None,
+    progress: Progress,
 ) -> tuple[Equations, TriangularFactors]:
     """Equations with the given or chosen processing, and their triangular factors.
 
@@ -222,7 +223,7 @@ def _equations(
 def reduced(
     system: Equations,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> TriangularFactors:
     """Factors of equations, refused if there are none."""
     factors = reduce_equations(system, executor, progress)

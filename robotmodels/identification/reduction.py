@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Iterable, Iterator, Sized
 from concurrent.futures import Executor
 from functools import partial
 
 import numpy as np
 
-from .._arrays.tasks import Task, results
+from .._arrays.tasks import Progress, Task, Workers, results
 from ..errors import InvalidValueError
 from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from .equations import Equations
@@ -18,7 +18,7 @@ from .signals import Piece, slice_with_margin
 def reduce_equations(
     system: Equations | Iterable[Equations],
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
     window: int | None = None,
 ) -> TriangularFactors:
     """Reduce equations to one triangular factor for each group (joint).
@@ -35,8 +35,9 @@ def reduce_equations(
         Threads, processes, or a cluster with this interface (such as ``client.get_executor()`` of
         Dask) that computes the pieces; default this thread. A task contains the samples of its
         piece and the margin of the filters, not the whole log.
-    progress : callable, optional
-        Called with the fraction done; for an iterator without length only at the end.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python. Without a
+        length of the iterator only at the end.
     window : int, optional
         Largest number of pieces in work at a time, default twice the processors and 2.
 
@@ -71,14 +72,16 @@ def reduce_equations(
     if window is not None and window < 1:
         raise InvalidValueError(f"window: expected at least one piece at a time, got {window}.")
 
+    work = Workers(executor, progress)
+
     def leaves() -> Iterator[TriangularFactors]:
         fraction = 0.0
         for factors, fraction in results(_tasks(systems, executor is not None), executor, window):
             yield factors
-            if progress is not None and fraction > 0.0:
-                progress(fraction)
-        if progress is not None and fraction < 1.0:
-            progress(1.0)
+            if fraction > 0.0:
+                work.done(fraction)
+        if fraction < 1.0:
+            work.done()
 
     return merged_all(leaves())
 

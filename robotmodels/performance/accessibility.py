@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_mask
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..igm import IGMStatus, igm
@@ -72,7 +71,7 @@ def accessibility(
     free: Any = None,
     mask: ArrayLike | str | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Accessibility:
     """Accessibility of poses: can the tool be brought there, and if not, why.
 
@@ -94,8 +93,8 @@ def accessibility(
         180 angles about its axis, from the orientation of zero joints, stand for every one.
     executor : concurrent.futures.Executor, optional
         Threads or processes that compute; the results do not depend on their number.
-    progress : callable, optional
-        Called with the fraction done.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------

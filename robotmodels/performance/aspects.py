@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, Value, as_vector
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._outcomes import Outcome, Result
 from ..igm.loop import joint_chain
 from ..model import RobotModel
@@ -161,7 +160,7 @@ def aspects(
     free: Any = None,
     resolution: int | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Aspects:
     """Aspects: the largest connected parts of the joint space without singular positions.
 
@@ -218,7 +217,7 @@ def free_components(
     limits: bool = True,
     resolution: int | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Aspects:
     """Connected components of the free joint space, singular positions included.
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from ..igm import igm
@@ -94,7 +94,7 @@ def cuspidality(
     rng: int | np.random.Generator | None = None,
     poses: int = 200,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Cuspidality:
     """Cuspidality: whether an arm can change its posture without meeting a singular position.
 

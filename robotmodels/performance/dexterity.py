@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_mask, as_vector
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from ..errors import InvalidValueError
 from ..kinematics import dgm, jacobian
@@ -135,7 +135,7 @@ def dexterity_map(
     mask: ArrayLike | str | None = None,
     length: float | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> DexterityMap:
     """Index of dexterity at the cells of a workspace.
 
@@ -205,7 +205,7 @@ def global_index(
     mask: ArrayLike | str | None = None,
     length: float | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> GlobalIndex:
     """Mean of an index of dexterity over the workspace or over the joint ranges.
 

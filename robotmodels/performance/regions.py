@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
@@ -86,7 +86,7 @@ def regions(
     limits: bool = True,
     free: Any = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Regions:
     """Regions of a workspace in which points are joined, or in which every path can be followed.
 

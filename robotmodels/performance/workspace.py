@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_mask, as_reals
-from .._arrays.tasks import Workers
+from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
@@ -230,7 +229,7 @@ def workspace(
     orientation: ArrayLike | None = None,
     mask: ArrayLike | str | None = None,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Workspace:
     """Workspace of an arm: which positions it reaches, and in how many postures.
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._arrays import Array
+from .._arrays.tasks import Progress, Workers
 from ..errors import RobotModelsError
 from .dry_friction import Mode
 from .motion import Motion
@@ -46,9 +47,10 @@ class Integration:
         method: Integrator,
         tolerances: Mapping[str, float],
         max_evaluations: int,
-        progress: Callable[[float], None] | None,
+        progress: Progress,
     ) -> None:
-        self.motion, self.dry, self.times, self.progress = motion, motion.dry, times, progress
+        self.motion, self.dry, self.times = motion, motion.dry, times
+        self.work = Workers(progress=progress)
         self.method, self.tolerances = method, tolerances
         self.max_evaluations, n = max_evaluations, motion.n
         # limits as rows of G y + c, which is negative beyond them
@@ -121,9 +123,9 @@ class Integration:
                 if self.times is None and self.t[-1] < t != self._open:
                     self._sample(t, y)
                 done = (t - self._start) / (self._end - self._start)
-                if self.progress is not None and (done >= self._reported + 0.01 or done >= 1.0):
+                if done >= self._reported + 0.01 or done >= 1.0:
                     self._reported = done
-                    self.progress(done)
+                    self.work.done(done)
                 if event is not None:
                     return t, np.array(y), event
         except ValueError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_floats, as_reals
+from .._arrays.tasks import Progress
 from .._choices import chosen
 from ..drive import check_all_or_none
 from ..dynamics import ddm, kinetic_energy, potential_energy
@@ -22,7 +22,6 @@ from .integration import Integration
 from .motion import Law, Motion
 from .result import Integrator, Simulation
 
-_LOG = logging.getLogger(__name__)
 _FINEST = 100 * float(np.finfo(np.float64).eps)
 
 
@@ -44,7 +43,7 @@ def simulate(
     atol: float = 1e-12,
     max_step: float = np.inf,
     max_evaluations: int | None = None,
-    progress: bool | Callable[[float], None] = False,
+    progress: Progress = False,
     period: float | None = None,
     delay: float = 0.0,
     disturbance: Callable[..., ArrayLike] | ArrayLike | None = None,
@@ -96,8 +95,8 @@ def simulate(
         Evaluations of the model after which the simulation ends with a status. Default 100 000, and
         10 000 for each second and 200 for each break or row of ``control``; free motion of an arm
         needs about 1000 a second.
-    progress : bool or callable
-        A function of the fraction done, called for about every hundredth; True logs it.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
     period : float, optional
         Sampling period of the control, s: its torques are held between samples, its state advances
         by Euler steps. Default: continuous.
@@ -173,8 +172,7 @@ def simulate(
     motion = Motion(model, law, tool, drive, friction, width, push)
     check_dissipates(motion.dry)
     _check_start(model, q, v, drive)
-    report = _log_progress if progress is True else progress or None
-    run = Integration(motion, times, limits, integrator, tolerances, budget, report)
+    run = Integration(motion, times, limits, integrator, tolerances, budget, progress)
     return followed(run, model, q, v, cuts, drive)
 
 
@@ -201,10 +199,6 @@ def followed(
         steps=run.steps,
         state=state,
     )
-
-
-def _log_progress(done: float) -> None:
-    _LOG.info("simulated %.0f %%", 100.0 * done)
 
 
 def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:

@@ -7,7 +7,7 @@ Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import product
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays.tasks import Progress
 from .._choices import chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
@@ -144,7 +145,7 @@ def kinodynamic(
     timing: Timing | str = Timing.OPTIMAL,
     rng: np.random.Generator | int | None = None,
     seconds: float = 10.0,
-    progress: bool | Callable[[int, float], Any] = False,
+    progress: Progress = False,
 ) -> Plan:
     """Kinodynamic planning: the best motion from rest to rest without a given path.
 
@@ -183,8 +184,8 @@ def kinodynamic(
     seconds : float
         Greatest duration of the search, of up to 500 evaluations for each second; results with one
         seed differ only where the clock ends it.
-    progress : bool or callable
-        Called with the number of evaluations and the least cost; True prints both.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------

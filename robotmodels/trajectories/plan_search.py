@@ -7,16 +7,15 @@ Seed book section 4.4.1 and the appendix of chapter 4.
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .._arrays import Array
+from .._arrays.tasks import Progress, Workers
 from .candidates import Candidates, Evaluated
 from .descent import descended
 from .limits import MotionLimits, ranges_of
@@ -55,12 +54,12 @@ class Restart(NamedTuple):
 class Search:
     """Counts evaluations, keeps their costs and ends the search."""
 
-    def __init__(self, seconds: float, progress: bool | Callable[[int, float], Any]) -> None:
+    def __init__(self, seconds: float, progress: Progress) -> None:
         self.start, self.seconds, self.best = time.monotonic(), seconds, np.inf
         self.share(1.0)
         self.allowed = int(RATE * seconds) + 1
         self.history: list[tuple[int, float, float]] = []
-        self.report = progress if callable(progress) else (_printed if progress else None)
+        self.work = Workers(progress=progress)
 
     def share(self, part: float) -> None:
         """Let the search go on until a part of its time is over."""
@@ -73,13 +72,9 @@ class Search:
         found = task.evaluated(free)
         self.best = min(self.best, found.penalized)
         self.history.append((len(self.history) + 1, found.penalized, self.best))
-        if self.report is not None and len(self.history) % 50 == 0:
-            self.report(len(self.history), self.best)
+        if len(self.history) % 50 == 0:
+            self.work.done(min(len(self.history) / self.allowed, 1.0))
         return found
-
-
-def _printed(evaluations: int, cost: float) -> None:
-    sys.stderr.write(f"{evaluations} evaluations, least cost {cost:.6g}\n")
 
 
 def _annealed(

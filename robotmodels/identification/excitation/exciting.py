@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_floats
+from ..._arrays.tasks import Progress, Workers
 from ...drive import Drives
 from ...errors import InvalidValueError, ShapeError
 from ...minimal_parameters import BaseParameters, base_parameters
@@ -25,11 +25,8 @@ from .motions import KINDS, MotionBasis
 from .objective import CRITERIA, Distances, ExcitationProblem
 from .result import ExcitationStart, ExcitationStatus, ExcitingTrajectory
 
-_LOG = logging.getLogger(__name__)
 _DENSE = 5
 """Samples for the final quality, times those of the search."""
-
-Progress = Callable[[int, int], None]
 
 
 def exciting_trajectory(
@@ -56,7 +53,7 @@ def exciting_trajectory(
     baseline: int | None = None,
     iterations: int | None = None,
     rng: np.random.Generator | int | None = None,
-    progress: bool | Progress = False,
+    progress: Progress = False,
 ) -> ExcitingTrajectory:
     """Optimal exciting trajectory for the identification of the base parameters.
 
@@ -114,8 +111,8 @@ def exciting_trajectory(
         that searches repeat exactly.
     rng : Generator or int, optional
         Random generator, or its seed; default a fresh one.
-    progress : bool or callable
-        A function of (done, total) stages; True logs them.
+    progress : bool or callable, optional
+        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
@@ -177,7 +174,7 @@ def exciting_trajectory(
     budget: tuple[int, float] = (search.ITERATIONS, evaluations)
     if iterations is not None:
         budget = (_whole(iterations, "iterations"), np.inf)
-    report, stages, total = _progress(progress), len(search.STAGES), count * len(search.STAGES)
+    work, stages, total = Workers(progress=progress), len(search.STAGES), count * len(search.STAGES)
     generator = np.random.default_rng(rng)
     times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)
 
@@ -189,7 +186,7 @@ def exciting_trajectory(
     ends: list[tuple[ExcitationStart, Array]] = []
     for s, k in enumerate(best):
         X, history, counts, status = search.improved(
-            problem, drawn[k], *budget, lambda stage, b=s * stages: report(b + stage, total)
+            problem, drawn[k], *budget, lambda stage, b=s * stages: work.done((b + stage) / total)
         )
         after = search.quality(problem, basis.trajectory(X), times)
         worse = after.of(criterion) > before[k].of(criterion)
@@ -275,10 +272,3 @@ def _whole(value: Any, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
     return int(value)
-
-
-def _progress(progress: bool | Progress) -> Callable[[int, int], Any]:
-    """A function of (done, total)."""
-    if callable(progress):
-        return progress
-    return partial(_LOG.log, logging.INFO if progress else logging.DEBUG, "%d of %d stages done")
