@@ -83,7 +83,7 @@ MUTATIONS = [
     fault("rows of a task from its start", "calls = (partial(function,", "a[k : k + size]",
           "a[:size]",
           SECTIONS + "long_calls or orientation_workspace or annulus"),
-    fault("progress of a part is that of all", "self.progress(self.low + fraction",
+    fault("progress of a part is that of all", "fraction = self.low + fraction",
           "self.low + fraction", "fraction",
           SECTIONS + "long_calls"),
     fault("a cache keeps its models", "known: WeakKeyDictionary", "= WeakKeyDictionary()", "= {}",
