@@ -293,7 +293,7 @@ def resting_first_joint(seed, noise):
     log = Log(1e-2, q, tau + noise * rng.normal(size=tau.shape), v, a)
     base = base_parameters(model, drive=True)
     every, factors = system_of(base, log)
-    kept = column_basis(factors.stacked()[0], nothing=1e-7).kept.tolist()
+    kept = column_basis(factors.stacked()[0], negligible=1e-7).kept.tolist()
     system = every.with_names(tuple(base.names[k] for k in kept))
     return system, reduce_equations(system)
 

@@ -403,7 +403,7 @@ def _angle_basis(W: Array, dependent: float, unit: Array) -> ColumnBasis:
     length = np.linalg.norm(W * unit, axis=0)
     longest = length.max(initial=0.0) or 1.0
     size = np.where(length > _EMPTY * longest, length, longest)
-    return column_basis(W, scale=unit / size, nothing=dependent)
+    return column_basis(W, scale=unit / size, negligible=dependent)
 
 
 def _all_rows(problem: Problem, xi: Array, fixtures: Array) -> Array:

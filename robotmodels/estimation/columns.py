@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Frozen, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
 
-NOTHING = 1e-11
+NEGLIGIBLE = 1e-11
 """Rank tolerance: residual column norm relative to the largest."""
 _LEVELS = (1e-4, 1e-8)
 """Residual column norms, relative to the largest, below which a column is postponed."""
@@ -78,13 +78,13 @@ class ColumnBasis(Frozen):
 
 
 def column_basis(
-    W: ArrayLike, *, scale: ArrayLike | None = None, nothing: float = NOTHING
+    W: ArrayLike, *, scale: ArrayLike | None = None, negligible: float = NEGLIGIBLE
 ) -> ColumnBasis:
     """Choose independent columns, the earlier ones first.
 
     A column is kept if its residual after projection on the columns kept before is longer than
-    ``nothing``. Lengths are in the units that ``scale`` gives, relative to the longest column: the
-    error of any product is at most that part of the largest. Columns with residuals below 1e-4
+    ``negligible``. Lengths are in the units that ``scale`` gives, relative to the longest column:
+    the error of any product is at most that part of the largest. Columns with residuals below 1e-4
     (then 1e-8) are considered after the others, so that coefficients stay bounded.
 
     Parameters
@@ -94,7 +94,7 @@ def column_basis(
     scale : array_like, shape (p,), optional
         Natural size of the parameter of each column, so that ``W * scale`` has comparable columns;
         default 1.
-    nothing : float
+    negligible : float
         Rank tolerance relative to the longest column; also that of coefficients.
 
     Returns
@@ -129,17 +129,17 @@ def column_basis(
     U, length = W * (scale / longest), length / longest
     if U.shape[0] > _TALL * p:
         U = np.asarray(np.linalg.qr(U, mode="r"))
-    kept, parts, left = _kept_columns(U, np.flatnonzero(length > nothing), nothing)
-    left[length <= nothing] = length[length <= nothing]
-    combinations = _combinations(parts, kept, left, nothing)
+    kept, parts, left = _kept_columns(U, np.flatnonzero(length > negligible), negligible)
+    left[length <= negligible] = length[length <= negligible]
+    combinations = _combinations(parts, kept, left, negligible)
     rows = np.argsort(kept)
     kept = kept[rows]
     coefficients = combinations[rows] * scale[kept][:, None] / scale
-    return ColumnBasis(kept, np.flatnonzero(length <= nothing), coefficients, left)
+    return ColumnBasis(kept, np.flatnonzero(length <= negligible), coefficients, left)
 
 
 def _kept_columns(
-    U: Array, order: NDArray[np.int64], nothing: float
+    U: Array, order: NDArray[np.int64], negligible: float
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Orthogonalisation: kept columns, all columns in their basis, residual norms."""
     p = U.shape[1]
@@ -148,7 +148,7 @@ def _kept_columns(
     left = np.zeros(p)
     kept: list[int] = []
     rest = U.T.copy()
-    for level in (*(x for x in _LEVELS if x > nothing), nothing):
+    for level in (*(x for x in _LEVELS if x > negligible), negligible):
         waiting: list[int] = []
         for k in order.tolist():
             basis = Q[: len(kept)]
@@ -168,7 +168,7 @@ def _kept_columns(
     return np.array(kept, dtype=np.int64), parts[: len(kept)], left
 
 
-def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: float) -> Array:
+def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, negligible: float) -> Array:
     """All columns as combinations of the kept ones, without coefficients that are rounding."""
     b, p = parts.shape
     if not b:
@@ -181,13 +181,13 @@ def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: f
     coefficients: Array = whole.copy()
     # rounding is magnified in coefficients of kept columns with small residuals
     slight = _ROUNDING / left[kept]
-    coefficients[np.abs(coefficients) <= np.minimum(slight, nothing)[:, None]] = 0.0
-    fewer = np.abs(coefficients) <= np.maximum(slight, nothing)[:, None]
+    coefficients[np.abs(coefficients) <= np.minimum(slight, negligible)[:, None]] = 0.0
+    fewer = np.abs(coefficients) <= np.maximum(slight, negligible)[:, None]
     for k in np.flatnonzero((fewer & (coefficients != 0.0)).any(axis=0)):
         # least-squares compensation by the other columns
         terms = np.flatnonzero(~fewer[:, k])
         again = np.linalg.lstsq(triangle[:, terms], parts[:, k], rcond=None)[0]
-        if np.linalg.norm(parts[:, k] - triangle[:, terms] @ again) <= nothing:
+        if np.linalg.norm(parts[:, k] - triangle[:, terms] @ again) <= negligible:
             coefficients[:, k] = 0.0
             coefficients[terms, k] = again
     coefficients[:, kept] = np.eye(b)

@@ -182,7 +182,7 @@ def identify_drive_gains(
     every = CommonEquations(systems, *common_unknowns(base, loads), form)
     whole = every.reduced(executor)
     noise = residual_noise(whole)
-    basis = column_basis(whole.stacked(1.0 / noise)[0], nothing=UNIDENTIFIABLE)
+    basis = column_basis(whole.stacked(1.0 / noise)[0], negligible=UNIDENTIFIABLE)
     kept, last = basis.kept, len(every.names) - 1
     names = [every.names[k] for k in kept if k != last] + [f"gain {m + 1}" for m in range(n)]
     values = np.full(len(names), np.nan)

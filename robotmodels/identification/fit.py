@@ -241,7 +241,7 @@ def _identifiable(
     system: Equations, factors: TriangularFactors
 ) -> tuple[Equations, TriangularFactors, tuple[float, float], tuple[str, ...]]:
     """Equations in the identifiable parameters, into which the others are regrouped."""
-    basis = column_basis(factors.stacked()[0], nothing=_NO_EFFECT)
+    basis = column_basis(factors.stacked()[0], negligible=_NO_EFFECT)
     if basis.rank == len(factors.names):
         return system, factors, basis.gap, ()
     base, kept = system.base, basis.kept

@@ -164,7 +164,7 @@ def fit_friction(
     (system,) = equations_of(base, (log,), processing)
     factors = reduce_equations(system)
     check_count(factors)
-    identifiable = column_basis(factors.stacked()[0], nothing=UNIDENTIFIABLE).kept
+    identifiable = column_basis(factors.stacked()[0], negligible=UNIDENTIFIABLE).kept
     system = system.with_names(tuple(base.names[k] for k in identifiable))
     return _fit_load(system) if curve == "load" else _fit_stribeck(system, powers)
 
@@ -220,7 +220,7 @@ class _Point:
         from scipy.optimize import least_squares
 
         _, weights, R, _ = self.linear()
-        basis = column_basis(R / column_lengths(R), nothing=UNIDENTIFIABLE)
+        basis = column_basis(R / column_lengths(R), negligible=UNIDENTIFIABLE)
         point = replace(self, free=self.free[basis.kept])
 
         @lru_cache(maxsize=1)

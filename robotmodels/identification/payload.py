@@ -227,7 +227,7 @@ def identify_payload(
     every = CommonEquations(systems, *unknowns)
     whole = every.reduced(executor)
     sigma = residual_noise(whole)
-    basis = column_basis(whole.stacked(1.0 / sigma)[0], nothing=UNIDENTIFIABLE)
+    basis = column_basis(whole.stacked(1.0 / sigma)[0], negligible=UNIDENTIFIABLE)
     factors = whole.with_names(tuple(whole.names[k] for k in basis.kept))
     check_count(factors)
     values, inverse, _ = solved(factors, 1.0 / sigma)

@@ -50,7 +50,7 @@ from .. import regressors
 from .._arrays import Array, Value, as_exact, as_number, batch_rows
 from ..drive import Drives, drive_kinds
 from ..errors import LoopError
-from ..estimation.columns import NOTHING
+from ..estimation.columns import NEGLIGIBLE
 from ..estimation.factor import triangles_of
 from ..minimal_parameters import BaseMethod, BaseParameters
 from ..minimal_parameters.numeric import TorqueColumns, residual_warning
@@ -165,7 +165,7 @@ def base_parameters(
     return LoopedParameters(
         robot.tree, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, None,
         tolerance, (*notes, *columns.notes, *residual_warning(error, tolerance)),
-        columns.neglected(basis.coefficients), error, NOTHING, robot, reference,
+        columns.neglected(basis.coefficients), error, NEGLIGIBLE, robot, reference,
     )  # fmt: skip
 
 

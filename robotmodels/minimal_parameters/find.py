@@ -13,7 +13,7 @@ from .._choices import chosen
 from ..drive import Drives, Transmission, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..estimation import column_basis
-from ..estimation.columns import NOTHING
+from ..estimation.columns import NEGLIGIBLE
 from ..friction import Friction, check_friction, check_linear
 from ..model import RobotModel, check_model
 from .alignment import ALIGNED, aligned_robot
@@ -104,7 +104,7 @@ def base_parameters(
     check_model(model)
     kind = chosen(BaseMethod, method, "method")
     kinds = drive_kinds(drive)
-    angle, least = (ALIGNED, NOTHING) if tolerance is None else (_part(tolerance),) * 2
+    angle, least = (ALIGNED, NEGLIGIBLE) if tolerance is None else (_part(tolerance),) * 2
     if friction is not None:
         check_linear(check_friction(friction, model.n))
     if kind is BaseMethod.SYMBOLIC:
@@ -164,7 +164,7 @@ def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int6
     small = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
     small = np.append(small, np.linalg.norm(model.gravity) / EARTH)
     has_rules = len(sizes) == 10 * model.f + model.n * len(drive)
-    clear = has_rules and zero <= NOTHING and fine.keys() == coarse.keys()
+    clear = has_rules and zero <= NEGLIGIBLE and fine.keys() == coarse.keys()
     clear = clear and not ((small > _FINEST) & (small < _COARSEST)).any()
     terms = fine if clear else terms_at(zero)
     kept = np.array(sorted(terms), dtype=np.int64)

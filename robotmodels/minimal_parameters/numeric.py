@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..drive import DriveKind
 from ..estimation import ColumnBasis, column_basis
-from ..estimation.columns import NOTHING
+from ..estimation.columns import NEGLIGIBLE
 from ..estimation.factor import triangles_of
 from ..friction import Friction, check_linear
 from ..friction.protocols import basis_at
@@ -55,7 +55,7 @@ class TorqueColumns:
     model: RobotModel
     drive: tuple[DriveKind, ...]
     friction: Friction | None = None
-    tolerance: float = NOTHING
+    tolerance: float = NEGLIGIBLE
     samples: Samples | None = None
     constraint: Array | None = None
 
@@ -122,7 +122,7 @@ class TorqueColumns:
     @cached_property
     def basis(self) -> ColumnBasis:
         """Independent columns; on samples the tolerance moves to the widest gap near it."""
-        basis = column_basis(self.factor, scale=self.sizes, nothing=self.tolerance)
+        basis = column_basis(self.factor, scale=self.sizes, negligible=self.tolerance)
         if self.samples is None or _ratio(basis) >= _CLEAR:
             return basis
         left = np.maximum(np.append(np.sort(basis.distance)[::-1], 0.0), _ROUNDING)
@@ -133,7 +133,7 @@ class TorqueColumns:
             if above > lowest and below < highest and above >= _CLEAR * below
         ]
         for _, cut in sorted(cuts, reverse=True):
-            again = column_basis(self.factor, scale=self.sizes, nothing=cut)
+            again = column_basis(self.factor, scale=self.sizes, negligible=cut)
             if _ratio(again) >= _CLEAR:
                 return again
         return basis
@@ -141,7 +141,7 @@ class TorqueColumns:
     def neglected(self, matrix: Array) -> tuple[str, ...]:
         """Parameters with an effect on the torques that have no coefficient. Shapes: (b, p)."""
         length = np.sqrt((self.factor * self.factor).sum(axis=0)) * self.sizes
-        acting = length > NOTHING * length.max(initial=0.0)
+        acting = length > NEGLIGIBLE * length.max(initial=0.0)
         return tuple(self.names[k] for k in np.flatnonzero(acting & ~matrix.any(axis=0)))
 
     def torque_error(self, kept: NDArray[np.int64], matrix: Array) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_exact, as_floats, read_only
 from ..drive import Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError
-from ..estimation.columns import NOTHING
+from ..estimation.columns import NEGLIGIBLE
 from ..friction import Friction
 from ..geometry import PRISMATIC, REVOLUTE
 from ..latex_text import markdown
@@ -106,11 +106,11 @@ class BaseParameters:
     method: BaseMethod
     gap: tuple[float, float] | None = None
     friction: Friction | None = None
-    tolerance: float = NOTHING
+    tolerance: float = NEGLIGIBLE
     notes: tuple[str, ...] = ()
     neglected: tuple[str, ...] = ()
     torque_error: float | None = None
-    angle: float = NOTHING
+    angle: float = NEGLIGIBLE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "drive", drive_kinds(self.drive))
