@@ -773,7 +773,7 @@ def pools():
         yield threads, processes
 
 
-@pytest.mark.parametrize("option", [{"executor": 4}, {"progress": True}])
+@pytest.mark.parametrize("option", [{"executor": 4}, {"progress": 3}])
 def test_workers_of_the_wrong_kind_are_refused(option):
     with pytest.raises(InvalidValueError, match="expected a"):
         pf.aspects(TWO, **option)

@@ -106,13 +106,15 @@ def as_number(
         number = nan
     bounds = [(above, "above {:g}"), (least, "of at least {:g}"), (below, "below {:g}")]
     fits = (
-        isfinite(number)
+        abs(number) <= LARGEST  # not NaN
         and (above is None or number > above)
         and (least is None or number >= least)
         and (below is None or number < below)
     )
     if not fits:
         words = " and".join(f" {text.format(x)}" for x, text in bounds if x is not None)
+        if isfinite(number) and abs(number) > LARGEST:
+            words = f" up to {LARGEST:g}"
         raise InvalidValueError(f"{name}: expected a finite number{words}, got {value!r:.80}.")
     return number
 

@@ -42,7 +42,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_rows, read_only
+from .._arrays import LARGEST, Array, as_bounded, as_vector, batch_rows, read_only
 from .._outcomes import Outcome, Result
 from ..errors import SingularMassMatrixError
 from .robot import Arm, FlexibleRobot, check_arm
@@ -206,7 +206,7 @@ def checked_rows(
     vectors: Any = [
         np.zeros(sizes[name])
         if x is None and name not in _NEEDED
-        else as_vector(x, sizes[name], name)  # type: ignore[arg-type]
+        else as_bounded(as_vector(x, sizes[name], name), name, LARGEST)  # type: ignore[arg-type]
         for name, x in given.items()
     ]
     if any(vector.ndim > 1 for vector in vectors):

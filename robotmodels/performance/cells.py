@@ -164,10 +164,9 @@ def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2
         )
     most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
     if value > most:
-        need = _CELL_BYTES * float(value) ** dimensions / 1e9
         raise InvalidValueError(
-            f"resolution: {value} cells along each of {dimensions} axes need {need:.3g} GB, more "
-            f"than 1 GB; at most {most} fit."
+            f"resolution: {value!r:.20} cells along each of {dimensions} axes do not fit into "
+            f"1 GB; at most {most} do."
         )
     return int(value)
 

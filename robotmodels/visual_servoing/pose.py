@@ -195,7 +195,7 @@ def _cones(chords: Array, sides: Array) -> Array:
     """
     # si = s0 (1 + angle vi), where small angles do not cancel: three quadrics in (v1, v2, 1)
     angle = np.sqrt(chords.max(axis=-1))
-    k = chords / angle[:, None] ** 2
+    k = chords / np.maximum(angle[:, None] ** 2, 1e-300)  # 0 where all rays coincide
     M, mixed = np.zeros((len(k), 3, 3, 3)), 0.5 * angle[:, None] * k
     M[:, (0, 1, 2, 2), (0, 1, 0, 1), (0, 1, 0, 1)] = 1.0
     mixed = mixed[:, (0, 1, 2, 2)]
@@ -262,9 +262,9 @@ def _fitted(s: Array, chords: Array, sides: Array, rounds: int) -> tuple[Array, 
 def _triad(P: Array) -> Array:
     """Right-handed axes on three points, as columns. Shapes: (..., 3, 3) -> same."""
     x = P[..., 1, :] - P[..., 0, :]
-    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-300)
     z = np.cross(x, P[..., 2, :] - P[..., 0, :])
-    z = z / np.linalg.norm(z, axis=-1, keepdims=True)
+    z = z / np.maximum(np.linalg.norm(z, axis=-1, keepdims=True), 1e-300)
     return np.stack((x, np.cross(z, x), z), axis=-1)
 
 
