@@ -3,9 +3,11 @@
 import hashlib
 
 import numpy as np
+from looped_robots import four_bar
 
 import robotmodels as rm
-from robotmodels import calibration, identification
+from robotmodels import calibration, control, flexible, identification, loops, parallel, se3
+from robotmodels import visual_servoing as vs
 
 SERIAL = ("rx90", "planar_2r", "stanford_arm", "puma560")
 
@@ -90,7 +92,29 @@ def identified(model, seed=0):
     return digest(found.values)
 
 
-WORK = (models_of_motion, inverse_models, minimal_parameters, motion, calibrated, identified)
+def later_chapters(model, seed=0):
+    """A platform, a controlled arm, a camera, flexible links and a loop, all of this seed."""
+    rng = np.random.default_rng(seed + model.n)
+    hexapod = parallel.gough_symmetric(1.0 + 0.01 * model.n)
+    T = hexapod.pose([*0.1 * rng.normal(size=2), 1.0, *0.1 * rng.normal(size=3)])
+    legs = parallel.igm(hexapod, T).q[0]
+    q, v, _, tau = states(model, seed, 1)[:, 0]
+    law = control.ComputedTorque(q, omega=8.0, model=model)
+    run = control.run(model, law, q + 0.1, v, t=np.linspace(0.0, 0.02, 3)).simulation
+    square = np.array([[-1, -1, 0.0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.1 * model.n]])
+    seen = se3.translation(0.1, 0.2, 6.0) @ se3.rotation("x", 0.1 + 0.01 * seed)
+    points = square @ seen[:3, :3].T + seen[:3, 3]
+    pose = vs.pnp(square, points[:, :2] / points[:, 2:])
+    link = flexible.beam(0.5, EI=(np.inf, 1.0), density=0.2, hub=0.1)
+    arm = flexible.FlexibleRobot(rm.load("planar_2r"), {1: link, 2: link})
+    bent = flexible.simulate(arm, q[:2], None, 0.1 * tau[:2], t=np.linspace(0.0, 0.02, 3))
+    bar = four_bar(np.random.default_rng(0))
+    closed = loops.close(bar, [0.5 + 0.1 * rng.random()])
+    return digest(legs, parallel.dgm(hexapod, legs).T, run.q, pose.T, bent.q, bent.e, closed.q)
+
+
+WORK = (models_of_motion, inverse_models, minimal_parameters, motion, calibrated, identified,
+        later_chapters)  # fmt: skip
 
 
 def everything(name_of_work, model, seed=0):
