@@ -53,6 +53,8 @@ def tables(results: Path = RESULTS) -> str:
         *main_table(peers["rows"]),
         "",
         missed(results),
+        "",
+        (results / "first_calls.md").read_text(encoding="utf-8").rstrip(),
     ]
     return "\n".join(lines)
 
