@@ -114,7 +114,7 @@ def as_number(
     if not fits:
         words = " and".join(f" {text.format(x)}" for x, text in bounds if x is not None)
         if isfinite(number) and abs(number) > LARGEST:
-            words = f" up to {LARGEST:g}"
+            words = f" of at most {LARGEST:g} in size"
         raise InvalidValueError(f"{name}: expected a finite number{words}, got {value!r:.80}.")
     return number
 

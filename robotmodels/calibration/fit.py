@@ -36,8 +36,6 @@ from .validation import (
     settled_prior,
 )
 
-"""Called with the number of finished fits, their total, and the current task."""
-
 _PRIOR = ParameterPrior()
 _SEED = 1
 _TRIES = 6

@@ -36,8 +36,8 @@ def reduce_equations(
         Dask) that computes the pieces; default this thread. A task contains the samples of its
         piece and the margin of the filters, not the whole log.
     progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python. Without a
-        length of the iterator only at the end.
+        A function is called with the fraction done; True writes it to the log of Python. An
+        iterator without a length is reported only at its end.
     window : int, optional
         Largest number of pieces in work at a time, default twice the processors and 2.
 

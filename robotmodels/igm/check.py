@@ -15,6 +15,7 @@ EXACT = 2e-13
 FINE = 2e-15
 """The same at singular positions, where postures beside each other are compared."""
 CHUNK = 4096
+"""Poses worked on at a time."""
 
 
 def checked(

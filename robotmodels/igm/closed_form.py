@@ -74,13 +74,13 @@ def closed_form_postures(
     marks = np.zeros((N, MOST), np.int64)
     if plan.family is Family.CONCURRENT:
         pose = se3.inverse(poses) if plan.inverted else poses
-        meet, first = se3.inverse(plan.constants[1::-1]), np.ascontiguousarray(plan.sigma[:3])
+        pair, kinds = se3.inverse(plan.constants[1::-1]), np.ascontiguousarray(plan.sigma[:3])
         for start in range(0, N, CHUNK):
             rows = slice(start, start + CHUNK)
             links = np.tile(plan.constants, (len(pose[rows]), 1, 1, 1))
             links[:, plan.slot] = plan.left @ pose[rows] @ plan.right
             concurrent_postures(
-                links, meet, int(plan.backwards), first, plan.meeting, plan.size, slack,
+                links, pair, int(plan.backwards), kinds, plan.meeting, plan.size, slack,
                 wanted[rows], found[rows], marks[rows], counts[rows],
             )  # fmt: skip
     else:

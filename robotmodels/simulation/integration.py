@@ -50,7 +50,7 @@ class Integration:
         progress: Progress,
     ) -> None:
         self.motion, self.dry, self.times = motion, motion.dry, times
-        self.work = Workers(progress=progress)
+        self.report = Workers(progress=progress)
         self.method, self.tolerances = method, tolerances
         self.max_evaluations, n = max_evaluations, motion.n
         # limits as rows of G y + c, which is negative beyond them
@@ -125,7 +125,7 @@ class Integration:
                 done = (t - self._start) / (self._end - self._start)
                 if done >= self._reported + 0.01 or done >= 1.0:
                     self._reported = done
-                    self.work.done(done)
+                    self.report.done(done)
                 if event is not None:
                     return t, np.array(y), event
         except ValueError as error:

@@ -96,7 +96,8 @@ def simulate(
         10 000 for each second and 200 for each break or row of ``control``; free motion of an arm
         needs about 1000 a second.
     progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+        A function is called with the fraction done, about every hundredth; True writes it to the
+        log of Python.
     period : float, optional
         Sampling period of the control, s: its torques are held between samples, its state advances
         by Euler steps. Default: continuous.

@@ -264,6 +264,7 @@ def kinodynamic(
     results.sort(key=lambda result: result.found.penalized)
     restarts = np.array([result.found.penalized for result in results])
     best, history = best_motion(search, results, limits), np.reshape(search.history, (-1, 3))
+    search.work.done()  # also where the clock ended it
     if best is None:
         return replace(_without(PlanStatus.NONE_FOUND, ""), history=history, restarts=restarts)
     motion, cost_of_best, use, times = best
