@@ -15,7 +15,7 @@ from numba import types
 from ..kernels._compile import INT, MATRIX, OUT3, STACK, Floats, Ints, compiled
 from .kernels.chain import wrapped
 from .kernels.equations import ANY, DOUBLE, NONE, type_2
-from .kernels.pieper import advance, roots_of_linear, turning_pair
+from .kernels.pieper import SCRATCH, Scratch, advance, roots_of_linear, turning_pair
 
 _COUNTS = types.Array(types.int64, 1, "C")
 _MARKS = types.Array(types.int64, 2, "C")
@@ -134,24 +134,14 @@ def direction_seen(E: Floats, x0: float, alpha: Floats) -> float:
 
 
 @compiled()
-def _square_pairs(
-    E: Floats,
-    row: Floats,
-    b: Floats,
-    f: Floats,
-    slack: float,
-    reference: float,
-    alpha: Floats,
-    found: Floats,
-    marks: Ints,
-) -> int:
+def _square_pairs(E: Floats, work: Scratch, slack: float, reference: float, alpha: Floats) -> int:
     """Joints 0 and 4 where axis 4 is square to both neighbours and axes 4 and 5 meet.
 
     Joint 0 is of type 2; the angle of joint 4 comes from both parts of the direction, because its
     cosine alone would lose half of the digits where axis 5 is nearly parallel to the three.
     """
-    roots = np.zeros(4)
-    outer, mark = roots_of_linear(b[1], True, roots, slack, 1e-11), 0
+    row, f, roots, found, marks = work.row, work.f, work.roots, work.found, work.marks
+    outer, mark = roots_of_linear(work.b, 1, True, roots, slack, 1e-11), 0
     if outer < 0:
         roots[0], outer, mark = reference, 1, 4
     phase = atan2(
@@ -222,6 +212,7 @@ def _undo(T: Floats, c: float, s: float, E: Floats, out: Floats) -> None:
         types.float64,
         types.float64,
         MATRIX,
+        SCRATCH,
         OUT3,
         _MARKS,
         _COUNTS,
@@ -237,6 +228,7 @@ def parallel_postures(
     size: float,
     slack: float,
     references: Floats,
+    work: Scratch,
     q: Floats,
     free: Ints,
     counts: Ints,
@@ -244,8 +236,8 @@ def parallel_postures(
     """Candidate postures ``q (N, 8, 6)`` of each pose, in the order of the loop."""
     E = constants.copy()
     identity = np.eye(4)
-    row, b, f = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros((3, 3))
-    found, marks = np.zeros((8, 2)), np.zeros(8, dtype=np.int64)
+    row, b, f, found, marks = work.row, work.b, work.f, work.found, work.marks
+    f[:] = 0.0
     reference, planar = np.zeros(3), np.zeros(3)
     x, planar_marks = np.zeros((2, 3)), np.zeros(2, dtype=np.int64)
     P, Q, T, S = np.zeros((3, 4)), np.zeros((3, 4)), np.eye(4), np.eye(4)
@@ -281,10 +273,10 @@ def parallel_postures(
             and hypot(row[1, 0], row[1, 1]) < _SQUARE
         )  # fmt: skip
         if square:
-            pairs = _square_pairs(E, row, b, f, slack, references[n, 0], alpha, found, marks)
+            pairs = _square_pairs(E, work, slack, references[n, 0], alpha)
         else:
             reference[1], reference[2] = -references[n, 4], references[n, 0]
-            pairs = turning_pair(row, b, f, True, 1.0, slack, 1e-11, reference, found, marks)
+            pairs = turning_pair(True, 1.0, slack, 1e-11, reference, work)
         count = 0
         for i in range(pairs):
             x0, x4 = found[i, 0], -found[i, 1]

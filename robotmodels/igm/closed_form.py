@@ -61,7 +61,7 @@ def closed_form_postures(
     Shapes: U (N, 4, 4), references (N, 6).
     """
     from ._parallel import parallel_postures
-    from .kernels.pieper import concurrent_postures
+    from .kernels.pieper import concurrent_postures, scratch
 
     N = len(U)
     slack = max(SLACK, tolerances.position / plan.size, tolerances.orientation)
@@ -71,7 +71,7 @@ def closed_form_postures(
     wanted = np.where(finite[:, None], plan.sense * references, 0.0)
     wanted = np.ascontiguousarray(wanted[:, plan.order])
     found, counts = np.zeros((N, MOST, 6)), np.zeros(N, np.int64)
-    marks = np.zeros((N, MOST), np.int64)
+    marks, work = np.zeros((N, MOST), np.int64), scratch()
     if plan.family is Family.CONCURRENT:
         pose = se3.inverse(poses) if plan.inverted else poses
         pair, kinds = se3.inverse(plan.constants[1::-1]), np.ascontiguousarray(plan.sigma[:3])
@@ -81,12 +81,12 @@ def closed_form_postures(
             links[:, plan.slot] = plan.left @ pose[rows] @ plan.right
             concurrent_postures(
                 links, pair, int(plan.backwards), kinds, plan.meeting, plan.size, slack,
-                wanted[rows], found[rows], marks[rows], counts[rows],
+                wanted[rows], work, found[rows], marks[rows], counts[rows],
             )  # fmt: skip
     else:
         parallel_postures(
             poses, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted),
-            plan.size, slack, wanted, found, marks, counts,
+            plan.size, slack, wanted, work, found, marks, counts,
         )  # fmt: skip
     there = (np.arange(MOST) < counts[:, None]) & finite[:, None]
     q, free = np.empty(found.shape), np.empty(found.shape, np.bool_)

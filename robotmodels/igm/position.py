@@ -46,7 +46,7 @@ def prepare_position(chain: JointChain) -> PositionArm | None:
 
 @postures.register
 def _(solver: PositionArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
-    from .kernels.pieper import position_solutions
+    from .kernels.pieper import position_solutions, scratch
 
     chain = solver.chain
     found = no_postures(len(U), MOST, 3)
@@ -58,6 +58,7 @@ def _(solver: PositionArm, U: Array, references: Array, tolerances: Tolerances) 
         solver.size,
         max(1e-12, tolerances.position / solver.size),
         tolerances.position,
+        scratch(),
         found.q,
         found.valid,
         found.residual,

@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from numba import njit, types
 from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
+from numba.core.targetconfig import ConfigStack
 from numpy.typing import NDArray
 
 from . import Chain
@@ -86,7 +89,7 @@ def compiled(
 
             def compile_declared(given: Any) -> Any:
                 """Compile the declared signature, and refuse other types as later calls do."""
-                with global_compiler_lock:
+                with global_compiler_lock, _operations_remembered():
                     if not kernel.signatures:
                         compile_for(*signature)
                         kernel.disable_compile()
@@ -101,6 +104,30 @@ def compiled(
         return kernel
 
     return decorate
+
+
+@contextmanager
+def _operations_remembered() -> Iterator[None]:
+    """Within it numba finds the type of each kind of operation once, not at every occurrence.
+
+    That is a fifth of the time of compilation. What it finds depends on the types of the arguments,
+    and on the flags of the compilation, of which kernels differ in one only (``counted``).
+    """
+    known: dict[Any, Any] = {}
+    find = types.Function.get_call_type
+
+    def remembered(function: Any, context: Any, args: Any, kws: Any) -> Any:
+        counted = getattr(ConfigStack.top_or_none(), "nrt", True)
+        key = function, context, tuple(args), tuple(kws.items()), counted
+        if key not in known:
+            known[key] = find(function, context, args, kws)
+        return known[key]
+
+    types.Function.get_call_type = remembered
+    try:
+        yield
+    finally:
+        types.Function.get_call_type = find
 
 
 def _converts(given: Any, declared: Any) -> bool:

@@ -166,7 +166,7 @@ class SectionArm:
 
     def postures(self, positions: Array) -> tuple[Array, Flags]:
         """All postures of world positions (N, 3): q (N, 4, 3), valid (N, 4)."""
-        from ..igm.kernels.pieper import position_solutions
+        from ..igm.kernels.pieper import position_solutions, scratch
 
         N = len(positions)
         local = np.ascontiguousarray(positions)
@@ -174,7 +174,7 @@ class SectionArm:
         double, free = np.zeros((N, 4), np.bool_), np.zeros((N, 4, 3), np.bool_)
         position_solutions(
             self.kinds, self.D, local, np.zeros((N, 3)), self.size, 1e-12, 1e-9 * self.size,
-            q, valid, np.zeros((N, 4)), double, free,
+            scratch(), q, valid, np.zeros((N, 4)), double, free,
         )  # fmt: skip
         if self.columns[0] < 0:
             valid &= np.abs(q[..., 0]) <= 1e-7 * self.size

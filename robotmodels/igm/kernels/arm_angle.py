@@ -232,10 +232,12 @@ def arm_angle_candidates(
                 times_transposed(R, D[3], G)
                 transposed_times(D[0], G, M)
                 shoulders = wrist_postures(
-                    D[1], D[2], M, slack_angle, reference[:3], x_shoulder, free_shoulder
+                    D[1], D[2], M, slack_angle, reference[0], x_shoulder, free_shoulder, G
                 )
             wrist_target(R, q4, D, U, G, M)
-            wrists = wrist_postures(D[5], D[6], M, slack_angle, reference[4:], x_wrist, free_wrist)
+            wrists = wrist_postures(
+                D[5], D[6], M, slack_angle, reference[4], x_wrist, free_wrist, G
+            )
             for i in range(shoulders):
                 for j in range(wrists):
                     for m in range(3):

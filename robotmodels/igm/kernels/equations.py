@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from math import atan, atan2, cos, hypot, pi, sin, sqrt
 
-import numpy as np
-
 from ...kernels._compile import Floats, compiled
 
 NONE, DOUBLE, TWO, ANY = 0, 1, 2, 3
 ROUNDING = 1e-13  # value beside the terms of a polynomial that rounding leaves at a root
 
 
-@compiled()
+@compiled(counted=False)
 def type_2(X: float, Y: float, Z: float, slack: float, zero: float) -> tuple[int, float, float]:
     """Roots of ``X sin + Y cos = Z``, type 2 of Paul's method.
 
@@ -37,7 +35,7 @@ def type_2(X: float, Y: float, Z: float, slack: float, zero: float) -> tuple[int
     return TWO, middle + half, middle - half
 
 
-@compiled()
+@compiled(counted=False)
 def quadratic_roots(a: float, b: float, c: float, roots: Floats) -> int:
     """Real roots of ``a r^2 + b r + c`` without cancellation; a double one within rounding."""
     room = b * b - 4.0 * a * c
@@ -53,7 +51,7 @@ def quadratic_roots(a: float, b: float, c: float, roots: Floats) -> int:
     return 2
 
 
-@compiled()
+@compiled(counted=False)
 def value_at(c: Floats, degree: int, x: float) -> tuple[float, float]:
     """Value and derivative of a polynomial at x."""
     value, slope = c[degree], 0.0
@@ -63,7 +61,7 @@ def value_at(c: Floats, degree: int, x: float) -> tuple[float, float]:
     return value, slope
 
 
-@compiled()
+@compiled(counted=False)
 def root_between(c: Floats, degree: int, a: float, b: float, rises: bool) -> float:
     """Root of a polynomial between a and b, where it has opposite signs: Newton and bisection."""
     x = 0.5 * (a + b)
@@ -83,18 +81,19 @@ def root_between(c: Floats, degree: int, a: float, b: float, rises: bool) -> flo
     return x
 
 
-@compiled()
-def real_roots(c: Floats, degree: int, slack: float, roots: Floats) -> int:
+@compiled(counted=False)
+def real_roots(c: Floats, degree: int, slack: float, roots: Floats, work: Floats) -> int:
     """Real roots of ``c[0] + ... + c[degree] x^degree``; double roots once. Returns their number.
 
     Between the roots of its derivative a polynomial has one root at most. An extremum of the other
     sign that reaches zero but for ``slack (1 + x^2)^(degree / 2)`` is a double root.
+    Shapes: roots (4,), and work (3, 6), which holds derivatives and the ends of intervals.
     """
     bound, size = 0.0, 0.0
     for i in range(degree):
         bound = max(bound, abs(c[i] / c[degree]))
     bound += 1.0
-    ends, d, count = np.empty(6), np.empty(5), 0
+    ends, d, count = work[0], work[1], 0
     if degree > 2:
         # the quadratic derivative, but for the factor degree - 2
         count = quadratic_roots(
@@ -142,8 +141,8 @@ def real_roots(c: Floats, degree: int, slack: float, roots: Floats) -> int:
     return count
 
 
-@compiled()
-def polynomial_roots(g: Floats, roots: Floats) -> int:
+@compiled(counted=False)
+def polynomial_roots(g: Floats, roots: Floats, work: Floats) -> int:
     """Real roots of ``g0 + g1 r + g2 r^2 + g3 r^3 + g4 r^4``. Returns how many."""
     size = 0.0
     for i in range(5):
@@ -153,11 +152,11 @@ def polynomial_roots(g: Floats, roots: Floats) -> int:
         degree -= 1
     if degree == 2:
         return quadratic_roots(g[2], g[1], g[0], roots)
-    return real_roots(g, degree, 1e-9 * size, roots)
+    return real_roots(g, degree, 1e-9 * size, roots, work)
 
 
-@compiled()
-def trigonometric_roots(g: Floats, roots: Floats, slack: float) -> int:
+@compiled(counted=False)
+def trigonometric_roots(g: Floats, roots: Floats, work: Floats, slack: float) -> int:
     """Real roots of a trigonometric polynomial of degree two: Pieper's quartic. Returns how many.
 
     The quartic is in the tangent of half the angle, measured from a direction opposite to which
@@ -177,10 +176,10 @@ def trigonometric_roots(g: Floats, roots: Floats, slack: float) -> int:
     c, s, c2, s2 = cos(turn), sin(turn), cos(2.0 * turn), sin(2.0 * turn)
     h1, h2 = g[1] * c + g[2] * s, g[2] * c - g[1] * s
     h3, h4 = g[3] * c2 + g[4] * s2, g[4] * c2 - g[3] * s2
-    q = np.empty(5)
+    q = work[2]
     q[0], q[1], q[2] = g[0] + h1 + h3, 2.0 * h2 + 4.0 * h4, 2.0 * g[0] - 6.0 * h3
     q[3], q[4] = 2.0 * h2 - 4.0 * h4, g[0] - h1 + h3
-    count = real_roots(q, 4, max(slack, 1e-9 * size), roots)
+    count = real_roots(q, 4, max(slack, 1e-9 * size), roots, work)
     for i in range(count):
         roots[i] = turn + 2.0 * atan(roots[i])
     return count

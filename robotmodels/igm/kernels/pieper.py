@@ -10,6 +10,7 @@ D. L. Pieper, "The kinematics of manipulators under computer control", 1968.
 from __future__ import annotations
 
 from math import atan2, cos, hypot, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -20,6 +21,7 @@ from ...kernels._compile import (
     INTS,
     MATRIX,
     NOTHING,
+    OUT1,
     OUT2,
     OUT3,
     STACK,
@@ -47,7 +49,46 @@ STEPS = 8  # at most
 MERGE = 1e-6  # solutions closer than this in every joint are the same [rad, m]
 
 
-@compiled()
+class Scratch(NamedTuple):
+    """Arrays that the solution of one pose works in, made once for all poses."""
+
+    f: Floats  # (3, 3): coordinates of the point, functions of the last joint
+    length: Floats  # (5,): their squared length
+    row: Floats  # (2, 3): two equations free of the first joint
+    k: Floats  # (2,): their right sides
+    b: Floats  # (2, 3): what is left of them, functions of the last joint
+    h: Floats  # (3, 3): other functions of the last joint
+    g: Floats  # (5,): a product of two
+    roots: Floats  # (8,)
+    lengths: Floats  # (4,): roots for the joint in the middle
+    work: Floats  # (3, 6): of the roots of a polynomial
+    found: Floats  # (8, 2): values of the last joint and of the one in the middle
+    marks: Ints  # (8,): 2 and 4 where these are free
+    x: Floats  # (8, 3): the three joints
+    free: Ints  # (8,): bits 1, 2, 4 for those that took their reference
+    T: Floats  # (4, 3, 4): poses of the links
+    error: Floats  # (3,): of the point
+    trial: Floats  # (3,): the next joints
+
+
+def scratch() -> Scratch:
+    """Room to work in, for `position_solutions` and its like."""
+    shapes = (3, 3), 5, (2, 3), 2, (2, 3), (3, 3), 5, 8, 4, (3, 6), (8, 2)
+    marks = np.zeros((2, 8), np.int64)
+    last = np.zeros((4, 3, 4)), np.zeros(3), np.zeros(3)
+    return Scratch(*map(np.zeros, shapes), marks[0], np.zeros((8, 3)), marks[1], *last)
+
+
+SCRATCH = types.NamedTuple(
+    (
+        *(OUT2, OUT1, OUT2, OUT1, OUT2, OUT2, OUT1, OUT1, OUT1, OUT2, OUT2, COUNTS),
+        *(OUT2, COUNTS, OUT3, OUT1, OUT1),
+    ),
+    Scratch,
+)
+
+
+@compiled(counted=False)
 def advance(P: Floats, turning: bool, x: float, E: Floats, out: Floats) -> None:
     """``out = P M(x) E`` for poses as 3x4 arrays."""
     c, s = (cos(x), sin(x)) if turning else (1.0, 0.0)
@@ -59,54 +100,60 @@ def advance(P: Floats, turning: bool, x: float, E: Floats, out: Floats) -> None:
         out[i, 3] += r * d + P[i, 3]
 
 
-@compiled()
-def add_product(a: Floats, b: Floats, turning: bool, out: Floats) -> None:
-    """Add the product of two functions of the last joint to ``out``.
+@compiled(counted=False)
+def add_product(
+    a: Floats, i: int, b: Floats, j: int, turning: bool, sign: float, out: Floats
+) -> None:
+    """Add the product of row i of a and row j of b, functions of the last joint, to ``out``.
 
     Over 1, cos, sin they give 1, cos, sin, cos 2, sin 2; over 1, r, r^2 the powers up to r^4.
     """
     if turning:
-        cc, ss, cs = a[1] * b[1], a[2] * b[2], a[1] * b[2] + a[2] * b[1]
-        out[0] += a[0] * b[0] + 0.5 * (cc + ss)
-        out[1] += a[0] * b[1] + a[1] * b[0]
-        out[2] += a[0] * b[2] + a[2] * b[0]
-        out[3] += 0.5 * (cc - ss)
-        out[4] += 0.5 * cs
+        a0, a1, a2, b0, b1, b2 = a[i, 0], a[i, 1], a[i, 2], b[j, 0], b[j, 1], b[j, 2]
+        out[0] += sign * (a0 * b0 + 0.5 * (a1 * b1 + a2 * b2))
+        out[1] += sign * (a0 * b1 + a1 * b0)
+        out[2] += sign * (a0 * b2 + a2 * b0)
+        out[3] += sign * 0.5 * (a1 * b1 - a2 * b2)
+        out[4] += sign * 0.5 * (a1 * b2 + a2 * b1)
     else:
-        for i in range(3):
-            for j in range(3):
-                out[i + j] += a[i] * b[j]
+        for m in range(3):
+            for n in range(3):
+                out[m + n] += sign * a[i, m] * b[j, n]
 
 
-@compiled()
-def value(a: Floats, turning: bool, x: float) -> float:
-    """Value at x of a function of the last joint."""
+@compiled(counted=False)
+def value(a: Floats, i: int, turning: bool, x: float) -> float:
+    """Value at x of row i, a function of the last joint."""
     if turning:
-        return a[0] + a[1] * cos(x) + a[2] * sin(x)
-    return a[0] + x * (a[1] + x * a[2])
+        return a[i, 0] + a[i, 1] * cos(x) + a[i, 2] * sin(x)
+    return a[i, 0] + x * (a[i, 1] + x * a[i, 2])
 
 
-@compiled()
-def roots_of_product(g: Floats, turning: bool, roots: Floats, slack: float) -> int:
-    """Roots of a product of two functions of the last joint."""
-    return trigonometric_roots(g, roots, slack) if turning else polynomial_roots(g, roots)
-
-
-@compiled()
-def roots_of_linear(a: Floats, turning: bool, roots: Floats, slack: float, zero: float) -> int:
-    """Roots of a function of the last joint itself; -1 if every value is one."""
+@compiled(counted=False)
+def roots_of_product(work: Scratch, turning: bool, slack: float) -> int:
+    """Roots of ``work.g``, a product of two functions of the last joint."""
     if turning:
-        kind, roots[0], roots[1] = type_2(a[2], a[1], -a[0], slack, zero)
+        return trigonometric_roots(work.g, work.roots, work.work, slack)
+    return polynomial_roots(work.g, work.roots, work.work)
+
+
+@compiled(counted=False)
+def roots_of_linear(
+    a: Floats, i: int, turning: bool, roots: Floats, slack: float, zero: float
+) -> int:
+    """Roots of row i, a function of the last joint itself; -1 if every value is one."""
+    if turning:
+        kind, roots[0], roots[1] = type_2(a[i, 2], a[i, 1], -a[i, 0], slack, zero)
         return -1 if kind == ANY else kind
-    if abs(a[2]) > zero:
-        return quadratic_roots(a[2], a[1], a[0], roots)
-    if abs(a[1]) > zero:
-        roots[0] = -a[0] / a[1]
+    if abs(a[i, 2]) > zero:
+        return quadratic_roots(a[i, 2], a[i, 1], a[i, 0], roots)
+    if abs(a[i, 1]) > zero:
+        roots[0] = -a[i, 0] / a[i, 1]
         return 1
-    return -1 if abs(a[0]) <= slack else 0
+    return -1 if abs(a[i, 0]) <= slack else 0
 
 
-@compiled()
+@compiled(counted=False)
 def point_solutions(
     kinds: Ints,
     E1: Floats,
@@ -116,18 +163,19 @@ def point_solutions(
     size: float,
     slack: float,
     reference: Floats,
-    x: Floats,
-    free: Ints,
+    work: Scratch,
 ) -> int:
-    """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``. Returns how many.
+    """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``, in ``work``. Returns how many.
 
     ``size``: length of the arm; ``slack``: relative overshoot of a double root; ``free[i]`` gets a
     bit (1, 2, 4) for each joint whose value was taken from ``reference``.
     """
     last, middle, first = kinds[2] == 0, kinds[1] == 0, kinds[0] == 0
     zero = 1e-11 * size
+    f, length, row, k, b, x = work.f, work.length, work.row, work.k, work.b, work.x
     # f = E_2 M_c w and its squared length, functions of the last joint
-    f, length = np.zeros((3, 3)), np.zeros(5)
+    for i in range(5):
+        length[i] = 0.0
     for i in range(3):
         f[i, 0] = E2[i, 2] * w[2] + E2[i, 3]
         if last:
@@ -135,51 +183,44 @@ def point_solutions(
             f[i, 2] = E2[i, 1] * w[0] - E2[i, 0] * w[1]
         else:
             f[i, 0] += E2[i, 0] * w[0] + E2[i, 1] * w[1]
-            f[i, 1] = E2[i, 2]
-        add_product(f[i], f[i], last, length)
+            f[i, 1], f[i, 2] = E2[i, 2], 0.0
+        add_product(f, i, f, i, last, 1.0, length)
     # two equations row.y + lam |y|^2 = k in y = M_b f, free of the first joint
-    row, k, lam = np.zeros((2, 3)), np.zeros(2), 0.0
-    if first:
-        lam, k[0] = 1.0 / (2.0 * size), p[2] - E1[2, 3]
-        for i in range(3):
-            row[0, i] = E1[2, i]
+    lam = 1.0 / (2.0 * size) if first else 0.0
+    k[0], k[1] = p[2] - E1[2, 3] if first else p[0] - E1[0, 3], 0.0 if first else p[1] - E1[1, 3]
+    for i in range(3):
+        row[0, i], row[1, i] = E1[2, i] if first else E1[0, i], 0.0 if first else E1[1, i]
+        if first:
             k[1] += (p[i] * p[i] - E1[i, 3] * E1[i, 3]) * lam
             for j in range(3):
-                row[1, j] += E1[i, j] * E1[i, 3] / size
-    else:
-        for i in range(2):
-            k[i] = p[i] - E1[i, 3]
-            for j in range(3):
-                row[i, j] = E1[i, j]
+                row[1, i] += E1[j, i] * E1[j, 3] / size
     # what is left of k without the parts that the middle joint does not change
-    b = np.zeros((2, 3))
     for i in range(2):
-        b[i, 0] = k[i]
         for m in range(3):
-            b[i, m] -= row[i, 2] * f[2, m] + (lam * length[m] if i == 1 else 0.0)
-    found, marks = np.zeros((8, 2)), np.zeros(8, np.int64)
-    if middle:
-        count = turning_pair(row, b, f, last, size, slack, zero, reference, found, marks)
-    else:
-        for i in range(2):
-            for m in range(3):
+            b[i, m] = (k[i] if m == 0 else 0.0) - row[i, 2] * f[2, m]
+            if i == 1:
+                b[i, m] -= lam * length[m]
+            if not middle:
                 b[i, m] -= row[i, 0] * f[0, m] + row[i, 1] * f[1, m]
-        count = sliding_pair(row, b, lam, f, last, size, slack, zero, reference, found, marks)
+    if middle:
+        count = turning_pair(last, size, slack, zero, reference, work)
+    else:
+        count = sliding_pair(lam, last, size, slack, zero, reference, work)
     for i in range(count):
-        xc, xb = found[i, 0], found[i, 1]
-        y0, y1, y2 = value(f[0], last, xc), value(f[1], last, xc), value(f[2], last, xc)
+        xc, xb = work.found[i, 0], work.found[i, 1]
+        y0, y1, y2 = value(f, 0, last, xc), value(f, 1, last, xc), value(f, 2, last, xc)
         if middle:
             c, s = cos(xb), sin(xb)
             y0, y1 = c * y0 - s * y1, s * y0 + c * y1
         else:
             y2 += xb
-        x[i, 1], x[i, 2], free[i] = xb, xc, marks[i]
+        x[i, 1], x[i, 2], work.free[i] = xb, xc, work.marks[i]
         if not first:
             x[i, 0] = p[2] - (E1[2, 0] * y0 + E1[2, 1] * y1 + E1[2, 2] * y2 + E1[2, 3])
         elif hypot(p[0], p[1]) <= zero:
             # asked of the goal: there two solutions merge, and joints are good to half the digits
             x[i, 0] = reference[0]
-            free[i] |= 1
+            work.free[i] |= 1
         else:
             h0 = E1[0, 0] * y0 + E1[0, 1] * y1 + E1[0, 2] * y2 + E1[0, 3]
             h1 = E1[1, 0] * y0 + E1[1, 1] * y1 + E1[1, 2] * y2 + E1[1, 3]
@@ -187,44 +228,37 @@ def point_solutions(
     return count
 
 
-@compiled()
+@compiled(counted=False)
 def turning_pair(
-    row: Floats,
-    b: Floats,
-    f: Floats,
-    last: bool,
-    size: float,
-    slack: float,
-    zero: float,
-    reference: Floats,
-    found: Floats,
-    marks: Ints,
+    last: bool, size: float, slack: float, zero: float, reference: Floats, work: Scratch
 ) -> int:
     """Two equations in two joints, ``row_i . Rot(x_b) (f_x, f_y) = b_i``: eliminate the turn x_b.
 
     ``b`` and ``f`` are functions of the other joint x_c. Writes pairs (x_c, x_b) to ``found``,
     bits 4 and 2 to ``marks`` where they are free; returns how many.
     """
+    f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
+    roots, found, marks = work.roots, work.found, work.marks
     n0, n1 = hypot(row[0, 0], row[0, 1]), hypot(row[1, 0], row[1, 1])
     det = row[0, 0] * row[1, 1] - row[0, 1] * row[1, 0]
-    roots, count = np.zeros(8), 0
+    count = 0
     if abs(det) > RANK * max(n0, n1):
         # |B b|^2 = f_x^2 + f_y^2 with B the inverse of the two rows: Pieper's quartic
-        u, v, g, minus = np.zeros(3), np.zeros(3), np.zeros(5), np.zeros(5)
         for m in range(3):
-            u[m] = (row[1, 1] * b[0, m] - row[0, 1] * b[1, m]) / det
-            v[m] = (row[0, 0] * b[1, m] - row[1, 0] * b[0, m]) / det
-        for i in range(2):
-            add_product(u if i == 0 else v, u if i == 0 else v, last, g)
-            add_product(f[i], f[i], last, minus)
+            h[0, m] = (row[1, 1] * b[0, m] - row[0, 1] * b[1, m]) / det
+            h[1, m] = (row[0, 0] * b[1, m] - row[1, 0] * b[0, m]) / det
         for m in range(5):
-            g[m] -= minus[m]
-        for i in range(roots_of_product(g, last, roots, slack * size * size)):
+            g[m] = 0.0
+        for i in range(2):
+            add_product(h, i, h, i, last, 1.0, g)
+            add_product(f, i, f, i, last, -1.0, g)
+        for i in range(roots_of_product(work, last, slack * size * size)):
             xc = roots[i]
-            fx, fy = value(f[0], last, xc), value(f[1], last, xc)
+            fx, fy = value(f, 0, last, xc), value(f, 1, last, xc)
             found[count, 0], found[count, 1], marks[count] = xc, reference[1], 2
             if hypot(fx, fy) > zero:
-                found[count, 1] = atan2(value(v, last, xc), value(u, last, xc)) - atan2(fy, fx)
+                found[count, 1] = atan2(value(h, 1, last, xc), value(h, 0, last, xc))
+                found[count, 1] -= atan2(fy, fx)
                 marks[count] = 0
             count += 1
         return count
@@ -236,20 +270,18 @@ def turning_pair(
     if amplitude <= RANK:
         return 0  # the first two axes coincide: the arm is redundant here
     ratio = (row[other, 0] * row[main, 0] + row[other, 1] * row[main, 1]) / amplitude**2
-    a = np.zeros(3)
     for m in range(3):
-        a[m] = b[other, m] - ratio * b[main, m]
-    outer = roots_of_linear(a, last, roots, slack * size, zero)
-    mark = 0
+        h[0, m] = b[other, m] - ratio * b[main, m]
+    outer, mark = roots_of_linear(h, 0, last, roots, slack * size, zero), 0
     if outer < 0:
         roots[0], outer, mark = reference[2], 1, 4
     for i in range(outer):
         xc = roots[i]
-        fx, fy = value(f[0], last, xc), value(f[1], last, xc)
+        fx, fy = value(f, 0, last, xc), value(f, 1, last, xc)
         # row . (c f_x - s f_y, s f_x + c f_y) = b
         X = row[main, 1] * fx - row[main, 0] * fy
         Y = row[main, 0] * fx + row[main, 1] * fy
-        kind, t0, t1 = type_2(X, Y, value(b[main], last, xc), slack * size, zero)
+        kind, t0, t1 = type_2(X, Y, value(b, main, last, xc), slack * size, zero)
         for j in range(1 if kind == ANY else kind):
             found[count, 0], found[count, 1], marks[count] = xc, t0 if j == 0 else t1, mark
             if kind == ANY:
@@ -258,82 +290,78 @@ def turning_pair(
     return count
 
 
-@compiled()
+@compiled(counted=False)
 def sliding_pair(
-    row: Floats,
-    b: Floats,
     lam: float,
-    f: Floats,
     last: bool,
     size: float,
     slack: float,
     zero: float,
     reference: Floats,
-    found: Floats,
-    marks: Ints,
+    work: Scratch,
 ) -> int:
     """The same with a sliding joint x_b: ``row_i z x_b + lam_i (2 f_z x_b + x_b^2) = b_i``.
 
     Only the second equation has the quadratic term, and only if the first joint turns.
     """
-    roots, lengths = np.zeros(8), np.zeros(4)
+    f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
+    roots, lengths, found, marks = work.roots, work.lengths, work.found, work.marks
     count, mark = 0, 0
     main = 0 if lam > 0.0 or abs(row[0, 2]) >= abs(row[1, 2]) else 1
     other = 1 - main
     if abs(row[main, 2]) > RANK:
-        # the slide from the main equation into the other one
-        slide, linear, scaled, g = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(5)
+        # the slide (row 0 of h) from the main equation into the other one
         for m in range(3):
-            slide[m] = b[main, m] / row[main, 2]
-            linear[m] = 2.0 * lam * f[2, m] + (row[other, 2] if m == 0 else 0.0)
-            scaled[m] = lam * slide[m]
-            g[m] = -b[other, m]
+            h[0, m] = b[main, m] / row[main, 2]
+            if lam > 0.0:
+                h[1, m] = lam * (2.0 * f[2, m] + h[0, m]) + (row[other, 2] if m == 0 else 0.0)
+            else:
+                h[1, m] = b[other, m] - row[other, 2] * h[0, m]
         if lam > 0.0:
-            add_product(linear, slide, last, g)
-            add_product(scaled, slide, last, g)
-            outer = roots_of_product(g, last, roots, slack * size)
+            for m in range(5):
+                g[m] = -b[other, m] if m < 3 else 0.0
+            add_product(h, 1, h, 0, last, 1.0, g)
+            outer = roots_of_product(work, last, slack * size)
         else:
-            for m in range(3):
-                linear[m] = b[other, m] - row[other, 2] * slide[m]
-            outer = roots_of_linear(linear, last, roots, slack * size, zero)
+            outer = roots_of_linear(h, 1, last, roots, slack * size, zero)
         if outer < 0:
             roots[0], outer, mark = reference[2], 1, 4
         for i in range(outer):
-            found[i, 0], found[i, 1], marks[i] = roots[i], value(slide, last, roots[i]), mark
+            found[i, 0], found[i, 1], marks[i] = roots[i], value(h, 0, last, roots[i]), mark
         return outer
     if lam == 0.0:
         return 0  # both joints slide along the same line: redundant
     # the first equation is free of the slide: it gives the last joint, the second the slide
-    outer = roots_of_linear(b[main], last, roots, slack * size, zero)
+    outer = roots_of_linear(b, main, last, roots, slack * size, zero)
     if outer < 0:
         roots[0], outer, mark = reference[2], 1, 4
     for i in range(outer):
         xc = roots[i]
-        linear_z = row[other, 2] + 2.0 * lam * value(f[2], last, xc)
-        for j in range(quadratic_roots(lam, linear_z, -value(b[other], last, xc), lengths)):
+        linear = row[other, 2] + 2.0 * lam * value(f, 2, last, xc)
+        for j in range(quadratic_roots(lam, linear, -value(b, other, last, xc), lengths)):
             found[count, 0], found[count, 1], marks[count] = xc, lengths[j], mark
             count += 1
     return count
 
 
-@compiled()
+@compiled(counted=False)
 def wrist_postures(
-    A: Floats, B: Floats, M: Floats, slack: float, reference: Floats, x: Floats, free: Ints
+    A: Floats, B: Floats, M: Floats, slack: float, first: float, x: Floats, free: Ints, R: Floats
 ) -> int:
     """The (at most two) ``x (m, 3)`` with ``Rz(x_0) A Rz(x_1) B Rz(x_2) = M``. Returns how many.
 
     The first angle comes from the last axis, the others by substitution, so that any first angle is
-    exact where it is free (``free[i] = 1``, value from ``reference``): first and last axis aligned.
+    exact where it is free (``free[i] = 1``): first and last axis aligned.
+    It is ``first`` then. Shapes: M, R (3, 3); R is room to work in.
     """
     m0, m1, m2 = M[0, 2], M[1, 2], M[2, 2]
     n0, n1, n2 = B[0, 2], B[1, 2], B[2, 2]
     X = A[0, 2] * m1 - A[1, 2] * m0
     Y = A[0, 2] * m0 + A[1, 2] * m1
-    kind, first, second = type_2(X, Y, n2 - A[2, 2] * m2, max(slack, 1e-9), ALIGNED)
+    kind, one, two = type_2(X, Y, n2 - A[2, 2] * m2, max(slack, 1e-9), ALIGNED)
     count = 1 if kind == ANY else kind
-    R = np.empty((3, 3))
     for i in range(count):
-        a = reference[0] if kind == ANY else (first if i == 0 else second)
+        a = first if kind == ANY else (one if i == 0 else two)
         free[i] = 1 if kind == ANY else 0
         c, s = cos(a), sin(a)
         # R = A^T Rz(-a) M, whose last column is Rz(b) n
@@ -356,7 +384,9 @@ def wrist_postures(
 FLOAT = types.float64
 
 
-@compiled(NOTHING(LINKS, STACK, INT, INTS, VECTOR, FLOAT, FLOAT, MATRIX, OUT3, MARKS, COUNTS))
+@compiled(
+    NOTHING(LINKS, STACK, INT, INTS, VECTOR, FLOAT, FLOAT, MATRIX, SCRATCH, OUT3, MARKS, COUNTS)
+)
 def concurrent_postures(
     links: Floats,
     pair: Floats,
@@ -366,6 +396,7 @@ def concurrent_postures(
     size: float,
     slack: float,
     references: Floats,
+    work: Scratch,
     q: Floats,
     free: Ints,
     counts: Ints,
@@ -375,7 +406,7 @@ def concurrent_postures(
     Shapes: links (N, 6, 4, 4); ``meeting`` holds the height of the point on axis 3 and on axis 5.
     ``backwards`` solves the first three joints from the other end, with the links ``pair``.
     """
-    x, marks = np.zeros((8, 3)), np.zeros(8, np.int64)
+    x, marks = work.x, work.free
     y, wrist_marks = np.zeros((2, 3)), np.zeros(2, np.int64)
     order, reference = np.zeros(3, np.int64), np.zeros(3)
     w, p = np.zeros(3), np.zeros(3)
@@ -394,9 +425,9 @@ def concurrent_postures(
             order[i] = kinds[2 - i if backwards else i]
             reference[i] = -references[n, 2 - i] if backwards else references[n, i]
         if backwards:
-            m = point_solutions(order, pair[0], pair[1], p, w, size, slack, reference, x, marks)
+            m = point_solutions(order, pair[0], pair[1], p, w, size, slack, reference, work)
         else:
-            m = point_solutions(order, E[0], E[1], w, p, size, slack, reference, x, marks)
+            m = point_solutions(order, E[0], E[1], w, p, size, slack, reference, work)
         count = 0
         for i in range(m):
             if backwards:
@@ -408,7 +439,8 @@ def concurrent_postures(
             for r in range(3):
                 for s in range(3):
                     M[r, s] = P[0, r] * E[5, s, 0] + P[1, r] * E[5, s, 1] + P[2, r] * E[5, s, 2]
-            for j in range(wrist_postures(E[3], E[4], M, slack, references[n, 3:], y, wrist_marks)):
+            first = references[n, 3]
+            for j in range(wrist_postures(E[3], E[4], M, slack, first, y, wrist_marks, work.h)):
                 if count == 8:
                     break
                 for r in range(3):
@@ -418,13 +450,12 @@ def concurrent_postures(
         counts[n] = count
 
 
-@compiled()
+@compiled(counted=False)
 def improved_point(
-    D: Floats, kinds: Ints, p: Floats, size: float, x: Floats
+    D: Floats, kinds: Ints, p: Floats, size: float, n: int, work: Scratch
 ) -> tuple[float, float]:
-    """Newton steps on the position of a point, in place; error, and determinant of the Jacobian."""
-    T, trial = np.empty((4, 3, 4)), np.empty(3)
-    J, e = np.empty((3, 3)), np.empty(3)
+    """Newton steps on solution n, in place: error, and determinant of the Jacobian."""
+    T, trial, J, e, x = work.T, work.trial, work.h, work.error, work.x[n]
     least, least_det = np.inf, 0.0
     for i in range(3):
         trial[i] = x[i]
@@ -466,7 +497,10 @@ def improved_point(
 
 
 @compiled(
-    NOTHING(INTS, STACK, MATRIX, MATRIX, FLOAT, FLOAT, FLOAT, OUT3, FLAGS, OUT2, FLAGS, JOINT_FLAGS)
+    NOTHING(
+        *[INTS, STACK, MATRIX, MATRIX, FLOAT, FLOAT, FLOAT, SCRATCH],
+        *[OUT3, FLAGS, OUT2, FLAGS, JOINT_FLAGS],
+    )
 )
 def position_solutions(
     kinds: Ints,
@@ -476,6 +510,7 @@ def position_solutions(
     size: float,
     slack: float,
     tolerance: float,
+    work: Scratch,
     q: Floats,
     valid: NDArray[np.bool_],
     residual: Floats,
@@ -486,9 +521,7 @@ def position_solutions(
 
     Shapes: D (4, 4, 4), references (N, 3) -> q, free (N, 4, 3); valid, residual, double (N, 4).
     """
-    x, marks = np.zeros((8, 3)), np.zeros(8, np.int64)
-    w, p = np.zeros(3), np.zeros(3)
-    turning = 0
+    x, marks, w, p, turning = work.x, work.free, np.zeros(3), np.zeros(3), 0
     for i in range(3):
         w[i] = D[3, i, 3]
         turning += 1 - kinds[i]
@@ -498,9 +531,9 @@ def position_solutions(
             for j in range(3):
                 p[i] += D[0, j, i] * (points[n, j] - D[0, j, 3])
         count = 0
-        found = point_solutions(kinds, D[1], D[2], w, p, size, slack, references[n], x, marks)
+        found = point_solutions(kinds, D[1], D[2], w, p, size, slack, references[n], work)
         for i in range(found):
-            error, det = improved_point(D, kinds, points[n], size, x[i])
+            error, det = improved_point(D, kinds, points[n], size, i, work)
             if not error <= tolerance:
                 continue
             same = -1

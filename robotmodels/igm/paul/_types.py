@@ -260,19 +260,19 @@ def polynomial(
     code: int, g: Floats, eps: Tolerances, wanted: Pair, found: Floats, o: int, lane: int
 ) -> Result:
     """``g0 + g1 r + ... + g4 r^4 = 0``, or ``g0 + g1 C + g2 S + g3 cos(2 x) + g4 sin(2 x) = 0``."""
-    roots, size, count, flags = np.empty(4), 0.0, 0, 0
+    roots, work, size, count, flags = np.empty(4), np.empty((3, 6)), 0.0, 0, 0
     for i in range(5):
         size = max(size, abs(g[i]))
     if size == 0.0:
         put_free(found, o, lane, wanted[0])
         return 1, layout.FREE_1
     if code == layout.QUARTIC:
-        count = trigonometric_roots(g, roots, eps[0] * size)
+        count = trigonometric_roots(g, roots, work, eps[0] * size)
         flags = layout.DOUBLE * (count % 2)
     elif g[3] == 0.0 and g[4] == 0.0 and g[2] != 0.0:
         count, flags = quadratic(g[2], 0.5 * g[1], g[0], eps[0], roots)
     else:
-        count = polynomial_roots(g, roots)
+        count = polynomial_roots(g, roots, work)
     for i in range(count):
         put_free(found, o + 6 * i, lane, roots[i])
         for m in range(i):
