@@ -48,7 +48,7 @@ from ..kernels._vectors import (
     whole_vector,
 )
 from .robot import Arm
-from .work import ONE, Work, to_links, to_motors, workspace
+from .work import ONE, Work, to_links, to_motors
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 ROUNDING = 1e-14
@@ -378,13 +378,13 @@ def accelerate(
     return failed
 
 
-@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, kinds.INTS, OUT2, OUT2, kinds.OUT4))
+@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, kinds.INTS, WORK, OUT2, OUT2, kinds.OUT4))
 def loads(
-    arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, free: Ints, out: Floats,
-    base: Floats, poses: Floats,
+    arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, free: Ints, work: Work,
+    out: Floats, base: Floats, poses: Floats,
 ) -> int:  # fmt: skip
     """Accelerations of free coordinates under given loads, and loads of given accelerations."""
-    work, failed = workspace(arm, free), -1
+    failed = -1
     for i in range(y.shape[0]):
         if accelerate(arm, y, dy, given, outer, i, free, out, base, poses, work) and failed < 0:
             failed = i

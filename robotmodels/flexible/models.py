@@ -226,6 +226,7 @@ def recursion(
 ) -> tuple[Array, Array, Array, int]:
     """The compiled recursion: loads or accelerations, rows of the base, poses, first failure."""
     from .kernels import loads
+    from .work import workspace
 
     N = len(y)
     out, base = np.empty((N, y.shape[1])), np.empty((N, 10))
@@ -234,7 +235,8 @@ def recursion(
     outer[:, :6] = 0.0 if wrench is None else wrench
     outer[:, 6:] = 0.0 if moved is None else moved
     y, dy, given = map(np.ascontiguousarray, (y, dy, given))
-    failed = loads(chain, y, dy, given, outer, free, out, base, poses)
+    work = workspace(chain, free)
+    failed = loads(chain, y, dy, given, outer, free, work, out, base, poses)
     return out, base, poses, failed
 
 

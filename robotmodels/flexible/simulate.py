@@ -306,14 +306,16 @@ def _compiled_steps(
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """`_followed` under constant torques, by `follow`."""
     from .steps import follow, table
+    from .work import workspace
 
     parts, rows, slopes, state = arm.parts, table(), np.zeros((16, len(y))), y.copy()
     every, span, first = len(times) == 1, times[-1] - start, np.append(start, y)
     clock = np.array([start, 1e-3 * span, 0.0, 1.0, 0.0, 0.0, 0.0])
     found, samples = np.empty((500 if every else len(times), len(first))), [first[None]]
+    fixed = parts.chain, parts.free[2], parts.D, torque, rows, times, bounds, largest
+    work = workspace(parts.chain, parts.free[2])
     while clock[0] < times[-1] and not clock[4]:
-        fixed = parts.chain, parts.free[2], parts.D, torque, rows, times, bounds, largest
-        count = follow(*fixed, state, slopes, clock, found)
+        count = follow(*fixed, work, state, slopes, clock, found)
         if every:
             samples.append(found[:count].copy())
         report.done((clock[0] - start) / span)

@@ -6,20 +6,21 @@ Norsett and G. Wanner, "Solving Ordinary Differential Equations I", section II.5
 A state has k = n + m coordinates, their velocities, the work, and the integrals of the base's load
 (6) and of the arm's first moment (3). Shapes of `follow`: free, damping (k, k), torques (1, k);
 table (22, 16) of coefficients, as `table` gives it; times (N,), of samples, or only the last with a
-sample after each step; bounds (4,): rtol, atol, evaluations, steps of this call; largest (s,); y
-(s,); slopes (16, s); clock (7,): time, next step, evaluations, samples that are passed, code of
-`FlexibleMotionStatus`, codes 1 and 2 of `SpinStatus` once they occur -> found (., 1 + s): time and
-state of samples.
+sample after each step; bounds (4,): rtol, atol, evaluations, steps of this call; largest (s,); work
+as `workspace` gives it; y (s,); slopes (16, s); clock (7,): time, next step, evaluations, samples
+that are passed, code of `FlexibleMotionStatus`, codes 1 and 2 of `SpinStatus` once they occur ->
+found (., 1 + s): time and state of samples.
 """
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from ..kernels._compile import INT, INTS, MATRIX, OUT1, OUT2, VECTOR, Floats, Ints, compiled
-from .kernels import ARM, accelerate
+from .kernels import ARM, WORK, accelerate
 from .robot import Arm
-from .work import Work, friction, workspace
+from .work import Work, friction
 
 NOT_CONVERGED, DIVERGED, BENT = 1.0, 2.0, 4.0
 STAGES = 12
@@ -35,48 +36,6 @@ def table() -> Any:
     rows[:12, :12], rows[12, :12], rows[13:16] = DOP853.A, DOP853.B, DOP853.A_EXTRA
     rows[16:20], rows[20, :13], rows[21, :13] = DOP853.D, DOP853.E5, DOP853.E3
     return rows
-
-
-@compiled(inlined=True)
-def derivative(
-    arm: Arm, free: Ints, damping: Floats, tau: Floats, y: Floats, dy: Floats, a: Floats,
-    outer: Floats, base: Floats, poses: Floats, work: Work,
-) -> float:  # fmt: skip
-    """Write the derivative of a state; its code of `SpinStatus`."""
-    k, n, power = damping.shape[0], arm.deflection.shape[0], 0.0
-    x, v = y[:k].reshape(1, k), y[k : 2 * k].reshape(1, k)
-    accelerate(arm, x, v, tau, outer, 0, free, a, base, poses, work)
-    for c in range(k):
-        dy[c], dy[k + c] = v[0, c], a[0, c]
-        if c < n:
-            power += v[0, c] * (tau[0, c] - friction(arm, c, v[0, c]))
-        for b in range(n, k):
-            power -= v[0, c] * damping[c, b] * v[0, b]
-    dy[2 * k] = power
-    for c in range(9):
-        dy[2 * k + 1 + c] = base[0, c]
-    return base[0, 9]
-
-
-@compiled(counted=False)
-def stages(
-    arm: Arm, free: Ints, damping: Floats, tau: Floats, y: Floats, z: Floats, h: float,
-    rows: Floats, slopes: Floats, first: int, end: int, a: Floats, outer: Floats, base: Floats,
-    poses: Floats, work: Work, clock: Floats,
-) -> float:  # fmt: skip
-    """Write slopes first to end - 1, and the last state z; its code of `SpinStatus`."""
-    code = 0.0
-    for s in range(first, end):
-        for c in range(len(y)):
-            moved = 0.0
-            for r in range(s):
-                moved += rows[s, r] * slopes[r, c]
-            z[c] = y[c] + h * moved
-        code = derivative(arm, free, damping, tau, z, slopes[s], a, outer, base, poses, work)
-        if code > 0.0:
-            clock[4 + int(code)] = code
-    clock[2] += end - first
-    return code
 
 
 @compiled(counted=False)
@@ -105,57 +64,109 @@ def put_sample(found: Floats, i: int, t: float, y: Floats, dense: Floats, x: flo
         found[i, 1 + c] = y[c] + value
 
 
-@compiled(INT(ARM, INTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, OUT1, OUT2, OUT1, OUT2))
+@compiled(counted=False)
+def combination(y: Floats, h: float, rows: Floats, s: int, slopes: Floats, z: Floats) -> None:
+    """Write the state of stage s."""
+    for c in range(len(y)):
+        moved = 0.0
+        for r in range(s):
+            moved += rows[s, r] * slopes[r, c]
+        z[c] = y[c] + h * moved
+
+
+@compiled(counted=False)
+def put_slope(
+    arm: Arm, damping: Floats, tau: Floats, v: Floats, a: Floats, base: Floats, slopes: Floats,
+    s: int,
+) -> None:  # fmt: skip
+    """Write the derivative of a state of velocities v and accelerations a into row s."""
+    k, n, power = damping.shape[0], arm.deflection.shape[0], 0.0
+    for c in range(k):
+        slopes[s, c], slopes[s, k + c] = v[0, c], a[0, c]
+        if c < n:
+            power += v[0, c] * (tau[0, c] - friction(arm, c, v[0, c]))
+        for b in range(n, k):
+            power -= v[0, c] * damping[c, b] * v[0, b]
+    slopes[s, 2 * k] = power
+    for c in range(9):
+        slopes[s, 2 * k + 1 + c] = base[0, c]
+
+
+@compiled(counted=False)
+def step_error(
+    y: Floats, z: Floats, h: float, rows: Floats, slopes: Floats, bounds: Floats
+) -> float:
+    """Error of a step from y to z beside what is allowed, by the estimates of orders 5 and 3."""
+    third = fifth = 0.0
+    for c in range(len(y)):
+        scale = bounds[1] + bounds[0] * max(abs(y[c]), abs(z[c]))
+        five = three = 0.0
+        for s in range(STAGES + 1):
+            five += rows[20, s] * slopes[s, c]
+            three += rows[21, s] * slopes[s, c]
+        fifth += (five / scale) ** 2
+        third += (three / scale) ** 2
+    if fifth == 0.0 and third == 0.0:
+        return 0.0
+    return h * fifth / sqrt((fifth + 0.01 * third) * len(y))
+
+
+@compiled(
+    INT(
+        *(ARM, INTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, WORK),
+        *(OUT1, OUT2, OUT1, OUT2),
+    )
+)
 def follow(
     arm: Arm, free: Ints, damping: Floats, tau: Floats, rows: Floats, times: Floats,
-    bounds: Floats, largest: Floats, y: Floats, slopes: Floats, clock: Floats, found: Floats,
+    bounds: Floats, largest: Floats, work: Work, y: Floats, slopes: Floats, clock: Floats,
+    found: Floats,
 ) -> int:  # fmt: skip
     """Steps until the last time, the bounds or a fault; the number of steps."""
-    size, k, end, rejected = len(y), damping.shape[0], times[-1], False
-    work, poses = workspace(arm, free), np.zeros((1, arm.pi.shape[0] + 1, 3, 4))
-    a, outer, base = np.zeros((1, k)), np.zeros((1, 18)), np.zeros((1, 10))
-    x, z, dense, steps = np.empty(size), np.empty(size), np.empty((7, size)), 0
+    size, k, end, rejected, steps = len(y), damping.shape[0], times[-1], False, 0
+    poses, base = np.zeros((1, arm.pi.shape[0] + 1, 3, 4)), np.zeros((1, 10))
+    q, v, a, outer = np.zeros((1, k)), np.zeros((1, k)), np.zeros((1, k)), np.zeros((1, 18))
+    x, z, dense = np.zeros(size), np.zeros(size), np.zeros((7, size))
     while clock[0] < end and steps < bounds[3] and clock[4] == 0.0:
         if clock[2] >= bounds[2]:
             clock[4] = NOT_CONVERGED
             break
         t, h = clock[0], min(clock[1], end - clock[0])
-        code = stages(
-            arm, free, damping, tau, y, z, h, rows, slopes, 1 if clock[2] else 0, STAGES + 1,
-            a, outer, base, poses, work, clock,
-        )  # fmt: skip
-        third = fifth = 0.0
-        for c in range(size):
-            scale = bounds[1] + bounds[0] * max(abs(y[c]), abs(z[c]))
-            five = three = 0.0
-            for s in range(STAGES + 1):
-                five += rows[20, s] * slopes[s, c]
-                three += rows[21, s] * slopes[s, c]
-            fifth += (five / scale) ** 2
-            third += (three / scale) ** 2
-        error = 0.0
-        if fifth != 0.0 or third != 0.0:
-            error = h * fifth / np.sqrt((fifth + 0.01 * third) * size)
-        factor = MOST if error == 0.0 else max(LEAST, min(MOST, SAFETY * error**-0.125))
-        if not error < 1.0:  # also where it is not a number
-            clock[1], rejected = h * (factor if error >= 1.0 else LEAST), True
-            if clock[1] < TINY * max(abs(t), 1.0):
-                clock[4] = DIVERGED
+        now, s, last = end if h == end - t else t + h, 1 if clock[2] else 0, STAGES + 1
+        while s < last:
+            state = z if s <= STAGES else x  # z is the end of the step, x beyond it
+            combination(y, h, rows, s, slopes, state)
+            for c in range(k):
+                q[0, c], v[0, c] = state[c], state[k + c]
+            accelerate(arm, q, v, tau, outer, 0, free, a, base, poses, work)
+            put_slope(arm, damping, tau, v, a, base, slopes, s)
+            code = base[0, 9]
+            if code > 0.0:
+                clock[4 + int(code)] = code
+            clock[2] += 1
+            s += 1
+            if s != STAGES + 1:
+                continue
+            error = step_error(y, z, h, rows, slopes, bounds)
+            factor = MOST if error == 0.0 else max(LEAST, min(MOST, SAFETY * error**-0.125))
+            if not error < 1.0:  # also where it is not a number
+                clock[1], rejected = h * (factor if error >= 1.0 else LEAST), True
+                if clock[1] < TINY * max(abs(t), 1.0):
+                    clock[4] = DIVERGED
+                continue
+            clock[1], rejected = h * (min(factor, 1.0) if rejected else factor), False
+            if code == 2.0:
+                clock[4] = BENT
+            for c in range(size):
+                if abs(z[c]) > largest[c]:
+                    clock[4] = DIVERGED
+            if clock[4] == 0.0 and len(times) > 1 and times[int(clock[3])] <= now:
+                last = 16  # samples within the step need more stages
+        if rejected:
             continue
-        clock[1], rejected = h * (min(factor, 1.0) if rejected else factor), False
-        if code == 2.0:
-            clock[4] = BENT
-        for c in range(size):
-            if abs(z[c]) > largest[c]:
-                clock[4] = DIVERGED
         if clock[4] != 0.0:
             break
-        now = end if h == end - t else t + h
-        if len(times) > 1 and times[int(clock[3])] <= now:
-            stages(
-                arm, free, damping, tau, y, x, h, rows, slopes, STAGES + 1, 16,
-                a, outer, base, poses, work, clock,
-            )  # fmt: skip
+        if last == 16:
             prepare_dense(y, z, h, rows, slopes, dense)
             while clock[3] < len(times) and times[int(clock[3])] <= now:
                 i = int(clock[3])
@@ -166,6 +177,4 @@ def follow(
             if len(times) == 1:
                 found[steps, 0], found[steps, 1 + c] = now, z[c]
         clock[0], steps = now, steps + 1
-        for c in range(size):
-            y[c], slopes[0, c] = z[c], slopes[STAGES, c]
     return steps

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..kernels._compile import Floats, Ints, compiled
-from ..kernels._vectors import Matrix, put_matrix, put_vector, whole_matrix, whole_vector
+from ..kernels._vectors import Matrix
 from .robot import Arm
 
 ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -45,7 +45,6 @@ class Work(NamedTuple):
     load: Floats
 
 
-@compiled()
 def workspace(arm: Arm, free: Ints) -> Work:
     """Work arrays with the pose of the base and the free coordinates."""
     f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
@@ -57,14 +56,11 @@ def workspace(arm: Arm, free: Ints) -> Work:
         *(z((6, s)), z((f, s)), z((f, s)), z((f, s)), z((f, 10)), z((m, 18))),
         *(z((1, most, most)), z((1, most)), np.ones((1, most)), z(links), z(links), z(links)),
     )
-    put_matrix(work.W, 0, whole_matrix(arm.chain.base_rotation))
-    put_vector(work.x, 0, whole_vector(arm.chain.base_position))
-    put_matrix(work.R, 0, ONE)
+    work.W[0], work.x[0], work.R[0] = arm.chain.base_rotation, arm.chain.base_position, np.eye(3)
     if len(free):
         work.free[0], work.free[1:, 7:] = free[n + 1], free[n]
-        for k in range(f - 1):
-            if arm.chain.joint[k] >= 0:
-                work.free[k + 1, 6] = free[arm.chain.joint[k]]
+        joint = arm.chain.joint
+        work.free[1:, 6] = np.where(joint < 0, 0, free[joint])
     return work
 
 

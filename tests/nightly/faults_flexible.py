@@ -208,7 +208,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "power without friction in compiled steps",
-        "Write the derivative of a state; its code",
+        "Write the derivative of a state of velocities v",
         "tau[0, c] - friction(arm, c, v[0, c])",
         "tau[0, c]",
         f"{TWO} -k constant_torques",
@@ -216,7 +216,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "error of order 3 left out of compiled steps",
-        "Steps until the last time, the bounds or a fault",
+        "Error of a step from y to z beside",
         "third += (three / scale) ** 2",
         "third += 0.0 * (three / scale) ** 2",
         f"{TWO} -k constant_torques",
@@ -240,7 +240,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "softened stiffness forgotten by compiled steps",
-        "Write slopes first to end - 1",
+        "Steps until the last time, the bounds or a fault",
         "clock[4 + int(code)] = code",
         "clock[4 + int(code)] = 0.0",
         f"{TWO} -k constant_torques",
