@@ -478,6 +478,17 @@ def test_arms_whose_factors_are_labels_are_not_cuspidal(name):
     assert len(found.path) == 0
 
 
+def test_labels_are_a_proof_only_where_they_are_signs_of_factors():
+    from robotmodels.performance.cuspidality import _signs_are_labels, sign_factors
+
+    arm, rng = rm.load("puma560"), np.random.default_rng(0)
+    found = rm.igm(arm, rm.dgm(arm, rng.uniform(-3, 3, (40, 6))))
+    regular = found.valid & ~found.double
+    q, labels = found.q[regular], found.branch[regular]
+    assert _signs_are_labels(sign_factors(arm), q, labels)
+    assert not _signs_are_labels(sign_factors(arm), q, rng.permutation(labels))
+
+
 @pytest.mark.parametrize("name", ["crx10ia", "xarm6"])
 def test_cuspidal_arms_with_six_joints(name):
     arm = rm.load(name)

@@ -58,10 +58,8 @@ def spatial(robot: ParallelRobot, q: Array) -> Found:
         complex_count[s] = len(y)
         T[s, : len(y)][real] = _poses(robot, y.real[real], unit[s])
     columns, size = np.array(robot.columns), robot.size + unit[:, None]
-    polish(*rods(robot, q), columns, T, residual, det)
-    for s, k in np.argwhere(residual > 1e-14 * size):
-        T[s, k] = _settled(robot, q[s], T[s, k])
-    polish(*rods(robot, q), columns, T, residual, det)
+    for _ in range(2):  # at a singular pose Newton's method is slow: a second round
+        polish(*rods(robot, q), columns, T, residual, det)
     residual[~(residual <= 1e-11 * size)] = np.nan
     cosine = 0.5 * (np.einsum("skij,ij->sk", T[..., :3, :3], robot.home[:3, :3]) - 1.0)
     away = np.linalg.norm(T[..., :3, 3] - robot.home[:3, 3], axis=-1) / robot.length
@@ -143,20 +141,6 @@ def _poses(robot: ParallelRobot, x: Array, unit: float) -> Array:
     p = 2.0 * (g * w - x[:, 4:5] * v - np.cross(g, v)) / (x[:, :4] ** 2).sum(axis=1)[:, None]
     T = pose_at(np.concatenate((unit * p, turn), axis=1))
     T[:, :3, 3] += robot.base[0] - T[:, :3, :3] @ robot.platform[0]
-    return T
-
-
-def _settled(robot: ParallelRobot, q: Array, T: Array) -> Array:
-    """Levenberg-Marquardt iterations at a singular pose, which stops Newton's method early."""
-    for _ in range(40):
-        legs = leg_states(robot, T[None])
-        error, J = q - legs.q[0], legs.rows[0]
-        off = np.abs(error).max()
-        if off <= 1e-15 * robot.size:
-            break
-        step = pose_at(J.T @ np.linalg.solve(J @ J.T + off * np.eye(6), error))
-        step[:3, 3] += T[:3, 3] - step[:3, :3] @ T[:3, 3]
-        T = step @ T
     return T
 
 
