@@ -71,7 +71,7 @@ MUTATIONS = [
     Mutation("loops", "a regressor of a log without the torques of passive joints",
         "rows[:, actuated] =", "G.swapaxes(1, 2) @ W", "W[:, actuated]", LOOPS + "palletiser"),
     Mutation("loops", "accelerations of a log without the rate of the velocity map",
-        "return q, v, (G @ a_a +", "maps(robot, q, v)[1]", "0.0 * G", LOOPS + "span_the_reduced"),
+        "return q, v, (G @ a_a +", "maps(robot, q, v)[1]", "0.0 * G", LOOPS + "(span_the_reduced and 0-3)"),
     Mutation("loops", "a passive joint of a file is actuated",
         "driven = {element.get(", 'if name in driven', "if name not in driven",
         FILES + "root_bodies"),
