@@ -225,51 +225,35 @@ def fold_at(sigma: Ints, D: Floats, root: Floats, v: Floats) -> tuple[float, flo
 
 
 @compiled()
-def add_fold_partners(
+def mark_double_roots(
     sigma: Ints,
     D: Floats,
-    U: Floats,
     tolerance: Floats,
     found: Floats,
     count: int,
     double: NDArray[np.bool_],
-) -> int:
-    """Find the other root of pairs that nearly merged, and flag those that did; the new number.
+) -> None:
+    """Mark roots whose partner is not told apart from them, or not found beside them.
 
     Along the null direction v the error is ``s sigma + s^2 h / 2``, sigma the smallest singular
     value (left vector u), h = u . d(J v)/ds, so the partner is at ``s = -2 sigma / h``.
     """
-    v, start, q = np.empty(6), np.empty(6), np.empty(6)
-    k = 0
-    while k < count:
-        root = found[k]
-        small, h = fold_at(sigma, D, root, v)
+    v, partner = np.empty(6), np.empty(6)
+    for k in range(count):
+        small, h = fold_at(sigma, D, found[k], v)
         double[k] = False
-        k += 1
         # without curvature there is no fold: an infinite family, or a root of higher order
         if small > SMALL or abs(h) < FLAT or abs(h) * CLOSE < 2.0 * small:
             continue
-        s = -2.0 * small / h
         for i in range(6):
-            start[i] = root[i] + s * v[i]
-        apart = distance(sigma, root, start)
-        if apart <= MERGE:
-            double[k - 1] = True
-            continue
+            partner[i] = found[k, i] - 2.0 * small / h * v[i]
+        apart = distance(sigma, found[k], partner)
         # where all between the two meets the pose as well, one may be all there is to find
-        merged = small * small < 2.0 * abs(h) * min(tolerance[0], tolerance[1])
-        known = False
-        for j in range(count):
-            near = distance(sigma, found[j], start) < (1.5 if merged else 0.3) * apart
-            known = known or (j != k - 1 and near)
-        before = count
-        for trial in range(0 if known else 2):
-            for i in range(6):
-                q[i] = root[i] + s * (1.0 + 0.3 * trial) * v[i]
-            if count == before and newton(sigma, D, U, tolerance, q):
-                count = keep(sigma, q, found, count)
-        double[k - 1] = merged and not known and count == before
-    return count
+        double[k] = apart <= MERGE or small * small < 2.0 * abs(h) * min(tolerance[0], tolerance[1])
+        if apart > MERGE:
+            for j in range(count):
+                near = distance(sigma, found[j], partner) < 1.5 * apart
+                double[k] = double[k] and (j == k or not near)
 
 
 @compiled(
@@ -363,5 +347,5 @@ def solutions_of_eigenvalues(
                 count[n] = keep(sigma, q, found[n], count[n])
             elif t.imag == 0.0:
                 moved = np.inf
-        count[n] = add_fold_partners(sigma, D, poses[n], tolerance, found[n], count[n], double[n])
+        mark_double_roots(sigma, D, tolerance, found[n], count[n], double[n])
         report[n, 0], report[n, 1] = real, moved
