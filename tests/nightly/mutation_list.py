@@ -591,7 +591,7 @@ MUTATIONS = [
     Mutation("igm: general", "roots of one sign are left out", "def solutions_of_eigenvalues(",
         "if t.imag < 0.0 or", "if t.real < 0.0 or", "tests/test_igm_general.py -k sixteen"),
     Mutation("igm: general", "roots that merged are not double",
-        "def mark_double_roots(", "2.0 * abs(h) * min(", "0.0 * abs(h) * min(",
+        "def mark_double_roots(", "apart <= MERGE or", "False and",
         "tests/test_igm_general.py -k near_singular", True),
     Mutation("igm: numeric", "half of the rotation's curvature is lost",
         "def error_jacobian(\n    sigma", "x + 0.5 * wx + c * ux", "x + 0.25 * wx + c * ux",
