@@ -16,7 +16,7 @@ settings.register_profile(
     "quick", max_examples=25, deadline=None, derandomize=True, database=None, print_blob=True
 )
 settings.register_profile("thorough", max_examples=1000, deadline=None, print_blob=True)
-# programs of their own: planted faults, the fuzzer, an oracle made with a peer
+# programs of their own: planted faults, an oracle made with a peer
 collect_ignore = ["nightly", "oracles/make_kinodynamic.py"]
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 

@@ -49,8 +49,7 @@ def test_what_is_not_a_real_number_is_named_in_the_error(check, value):
         check(value, "speed")
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("n", [1, 3])
+@pytest.mark.parametrize(("bad", "n"), [(np.nan, 3), (-np.inf, 1)])
 def test_the_first_number_that_is_not_finite_is_located(bad, n):
     value = np.zeros((2, n))
     value[1, n - 1] = bad
@@ -58,23 +57,6 @@ def test_the_first_number_that_is_not_finite_is_located(bad, n):
         as_vector(value, n, "q")
     with pytest.raises(InvalidValueError, match=rf"index \[{n - 1}\]"):
         as_vector(value[1], n, "q")
-
-
-def test_infinite_limits_are_reals():
-    assert as_reals([np.inf, np.nan], "upper").shape == (2,)
-
-
-@pytest.mark.parametrize("value", [[1, 2], (1, 2), np.array([1, 2], dtype=np.float32), range(1, 3)])
-def test_lists_and_integers_become_float64(value):
-    for array in (as_floats(value, "x"), as_vector(value, 2, "x"), as_exact(value, (2,), "x")):
-        assert array.dtype == np.float64
-        assert array.tolist() == [1.0, 2.0]
-
-
-def test_huge_but_finite_numbers_pass_the_quick_check():
-    """Their sum of squares overflows (NumPy may warn of it), which is no infinite component."""
-    with np.errstate(over="ignore"):
-        assert as_vector([1e200, 1e200], 2, "q").tolist() == [1e200, 1e200]
 
 
 @pytest.mark.parametrize(
@@ -86,21 +68,6 @@ def test_wrong_shapes_say_what_came_and_what_to_do(shape, advice):
         as_vector(np.zeros(shape), 6, "q")
     assert str(shape) in str(caught.value)
     assert advice in str(caught.value)
-
-
-def test_matlab_order_of_poses_is_recognised():
-    with pytest.raises(ShapeError, match="poses_from_matlab"):
-        as_core(np.zeros((4, 4, 10)), (4, 4), "T")
-
-
-def test_exact_shapes_have_no_batch():
-    with pytest.raises(ShapeError, match=r"expected shape \(3,\), got \(2, 3\)"):
-        as_exact(np.zeros((2, 3)), (3,), "gravity")
-
-
-@pytest.mark.parametrize("shape", [(0, 3), (2, 0, 3)])
-def test_empty_batches_pass(shape):
-    assert as_vector(np.zeros(shape), 3, "q").shape == shape
 
 
 @pytest.mark.parametrize(
@@ -123,11 +90,6 @@ def test_batches_broadcast_and_become_contiguous_rows(shapes, batch):
         wanted = np.broadcast_to(array, (*batch, array.shape[-1]))
         assert row.shape == (int(np.prod(batch)), array.shape[-1])
         assert np.array_equal(row.reshape(wanted.shape), wanted)
-
-
-def test_batches_that_do_not_broadcast_are_named():
-    with pytest.raises(ShapeError, match=r"q \(2, 3\), v \(4, 3\)"):
-        batch_rows((np.zeros((2, 3)), np.zeros((4, 3))), ("q", "v"))
 
 
 def test_read_only_is_a_private_copy():
@@ -159,33 +121,17 @@ def test_columns_of_packed_records_are_laid_out_anew():
     np.testing.assert_array_equal(found, q)
 
 
-def test_masked_and_huge_numbers_are_refused():
-    with pytest.raises(InvalidValueError, match="masked"):
-        as_vector(np.ma.array([0.5], mask=[True]), 1, "q")
-    with pytest.raises(InvalidValueError):
-        as_vector([10**400], 1, "q")
-
-
 def test_values_are_read_only_after_a_copy_too():
     model = rm.load("rx90")
     values = (
         kin.JointBounds(velocity=[1.0] * 6, step=0.1),
         kin.JointTask([0.0], joints=(2,)),
-        kin.TwistTask([0.0] * 6),
-        kin.PostureCriterion([0.0] * 6),
-        kin.Sphere([0, 0, 0], 0.1),
         rm.static_wrench(model, [0.1] * 6, [0.0] * 6),
         rm.ikm(model, [0.1] * 6, [0.0] * 6),
         rm.base_parameters(model),
         rm.classify_singularity(model, [0.1, 0.5, 0.4, 0.3, 0.0, 0.2]),
-        rm.nearest_singularity(model, [0.1, 0.5, 0.4, 0.3, 0.1, 0.2]),
         rm.velocity_ellipsoid(model, [0.1] * 6),
         rm.manipulability(model, [0.1] * 6),
-        rm.jacobian_factors(model, [0.1] * 6),
-        rm.operational_dimension(model),
-        kin.jacobian_rank(model, [0.1] * 6),
-        kin.singularity_flags(model, [[0.1] * 6]),
-        rm.symbolic.singularity_map(model, (1, 2), samples=(5, 5)),
     )
     for value in values:
         for again in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value)):

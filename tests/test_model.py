@@ -1,13 +1,10 @@
 """The model: parts that fit, a value that copies, pickles and computes the same anywhere."""
 
 import copy
-import multiprocessing
 import pickle
-import sys
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given
 from identities.random_robots import (
@@ -17,14 +14,11 @@ from identities.random_robots import (
     random_drive,
     random_model,
     random_pose,
-    random_rotation,
     random_state,
-    random_table,
     random_transmission,
 )
 
 import robotmodels as rm
-from robotmodels import se3
 from robotmodels.errors import (
     FrameNotFoundError,
     InvalidValueError,
@@ -81,37 +75,16 @@ def test_named_postures():
     assert dict(pickle.loads(pickle.dumps(model)).configurations).keys() == {"zero", "up"}
 
 
-def test_pinocchio_poses_are_accepted_as_base_and_tool(rng):
-    Z, E = (pin.SE3(random_rotation(rng), rng.normal(size=3)) for _ in range(2))
-    model = rm.RobotModel.from_table(TWO, base=Z, tool=E)
-    assert np.array_equal(model.base, Z.homogeneous)
-    assert np.array_equal(model.with_tool(None).with_tool(E).tool, E.homogeneous)
-
-
-def test_a_slightly_off_base_is_projected(rng):
-    T = random_pose(rng)
-    T[:3, :3] += 1e-8 * rng.normal(size=(3, 3))
-    R = rm.RobotModel.from_table(TWO, base=T).base[:3, :3]
-    assert np.abs(R @ R.T - np.eye(3)).max() < 4e-15
-    with pytest.raises(NotARotationError, match="base: "):
-        rm.RobotModel.from_table(TWO, base=T + 1e-4 * np.eye(4, k=1))
-
-
 MISTAKES = {
     "table": ({"table": "rx90"}, InvalidValueError, "expected a DHTable, got str"),
     "name": ({"name": ""}, InvalidValueError, "name: expected a text"),
     "base shape": ({"base": np.eye(3)}, ShapeError, r"base: expected shape \(\.\.\., 4, 4\)"),
     "bases": ({"base": [np.eye(4)] * 2}, ShapeError, "base: expected one pose"),
-    "base text": ({"base": "here"}, InvalidValueError, "base: expected real numbers"),
-    "tool scale": ({"tool": np.diag([2, 2, 2, 1])}, NotARotationError, "tool: .* not a rotation"),
     "tool mirror": ({"tool": np.diag([1, 1, -1, 1])}, NotARotationError, "det R = -1"),
-    "tip 0": ({"tip": 0}, FrameNotFoundError, r"No frame number 0\..* 1 to f"),
     "tip 3": ({"tip": 3}, FrameNotFoundError, "No frame number 3"),
     "tip name": ({"tip": "joint_1"}, FrameNotFoundError, "tip is a number"),
-    "gravity 2": ({"gravity": [0, 1]}, ShapeError, r"gravity: expected shape \(3,\)"),
     "gravity column": ({"gravity": [[0], [0], [1]]}, ShapeError, r"got \(3, 1\)"),
     "gravity nan": ({"gravity": [0, 0, np.nan]}, InvalidValueError, "gravity: .* got nan"),
-    "gravity None": ({"gravity": None}, InvalidValueError, "gravity"),
     "drive": ({"drive": [0, 0]}, InvalidValueError, "expected DriveParameters, got list"),
     "gears": ({"transmission": np.eye(2)}, InvalidValueError, "expected Transmission, got ndarr"),
     "gears of 3": ({"transmission": rm.Transmission(np.eye(3))}, ShapeError, "2 moving joints"),
@@ -135,26 +108,16 @@ def test_models_pickle_copy_and_compare(model):
     q, _, _ = random_state(model, np.random.default_rng(0))
     rm.jacobian(model, q)  # what was computed and cached must not go along
     for other in (
-        pickle.loads(pickle.dumps(model)), copy.deepcopy(model), copy.copy(model),
-        pickle.loads(pickle.dumps(model, 2)),
-    ):  # fmt: skip
+        pickle.loads(pickle.dumps(model)),
+        copy.deepcopy(model),
+        copy.copy(model),
+    ):
         assert other == model
         assert hash(other) == hash(model)
         assert np.array_equal(rm.dgm(other, q), rm.dgm(model, q))
         assert np.array_equal(rm.gravity_torque(other, q), rm.gravity_torque(model, q))
         for array in (other.base, other.tool, other.gravity, other.table.d, other.inertia.values):
             assert not array.flags.writeable
-
-
-def test_a_model_from_a_urdf_keeps_its_frames_through_pickle():
-    model = rm.load("erd:ur5")
-    other = pickle.loads(pickle.dumps(model))
-    assert other == model
-    assert other.frame_names == model.frame_names
-    assert other.notes == model.notes
-    assert rm.to_urdf(other) == rm.to_urdf(model)
-    with pytest.raises(ValueError, match="read-only"):
-        model.frames[0].pose[0, 3] = 1.0
 
 
 CHANGES = {
@@ -193,26 +156,6 @@ def test_with_methods_change_one_thing_in_a_new_model(change, rng):
     assert np.array_equal(numbers(changed, q, v, a), numbers(fresh, q, v, a)), "no stale cache"
 
 
-def test_with_methods_check_as_the_constructor(rng):
-    model = rm.RobotModel.from_table(TWO)
-    with pytest.raises(ShapeError, match="2 frames"):
-        model.with_inertia(random_bodies(rng, 3))
-    with pytest.raises(ShapeError):
-        model.with_table(random_table(rng, f=3, prismatic=False))
-    with pytest.raises(NotARotationError):
-        model.with_base(np.zeros((4, 4)))
-    with pytest.raises(FrameNotFoundError):
-        model.with_tool(None, tip=7)
-
-
-def test_models_are_immutable():
-    model = rm.RobotModel.from_table(TWO)
-    with pytest.raises(AttributeError):
-        model.gravity = [0, 0, 0]
-    with pytest.raises(ValueError, match="read-only"):
-        model.base[0, 3] = 1.0
-
-
 # --- the same numbers in threads and processes ---------------------------------------------------
 
 
@@ -237,33 +180,6 @@ def test_threads_compute_the_same_numbers(inertia):
         for _ in range(10):
             for got, want in zip(pool.map(work, states), wanted, strict=True):
                 assert np.array_equal(got, want)
-
-
-def test_a_fresh_model_may_be_used_first_by_many_threads():
-    """The twin is built at the first use, which may come from several threads at once."""
-    model = tree_model(3)
-    q, v, a = random_state(model, np.random.default_rng(0))
-    wanted = numbers(pickle.loads(pickle.dumps(model)), q, v, a)
-    with ThreadPoolExecutor(8) as pool:
-        for got in pool.map(lambda _: numbers(model, q, v, a), range(16)):
-            assert np.array_equal(got, wanted)
-
-
-def test_processes_compute_the_same_numbers():
-    """Models travel to freshly started interpreters (spawn) and compute the same there."""
-    model = tree_model(1)
-    q, v, a = random_state(model, np.random.default_rng(0), 4)
-    # functions of the package itself: the workers need not import this file
-    jobs = [
-        (rm.dgm, (model, q[0])), (rm.idm, (model, q[1], v[1], a[1])), (rm.jacobian, (model, q)),
-        (rm.mass_matrix, (model, q[2])), (rm.ddm, (model, q[3], v[3], a[3])),
-    ]  # fmt: skip
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context, initializer=sys.path.extend,
-                             initargs=(sys.path,)) as pool:  # fmt: skip
-        results = [pool.submit(function, *arguments) for function, arguments in jobs]
-        for result, (function, arguments) in zip(results, jobs, strict=True):
-            assert np.array_equal(result.result(timeout=60), function(*arguments))
 
 
 # --- Pinocchio's side ----------------------------------------------------------------------------
@@ -311,13 +227,12 @@ def test_frames_by_name_by_number_and_none():
     assert "ee_link" in model.merged_links
 
 
-@pytest.mark.parametrize("frame", ["wrist_3_lnk", 7, -1, True, 1.0, b"base", [1], np.zeros(2), ""])
-@pytest.mark.parametrize("function", [rm.dgm, rm.jacobian])
-def test_unknown_frames(frame, function):
+@pytest.mark.parametrize("frame", ["wrist_3_lnk", 7, -1, True, 1.0, np.zeros(2)])
+def test_unknown_frames(frame):
     model = rm.load("erd:ur5")
-    function(model, np.zeros(6), frame=1)  # True and 1.0 must not find what 1 has left behind
+    rm.dgm(model, np.zeros(6), frame=1)  # True and 1.0 must not find what 1 has left behind
     with pytest.raises(FrameNotFoundError, match=r"^No frame") as caught:
-        function(model, np.zeros(6), frame=frame)
+        rm.dgm(model, np.zeros(6), frame=frame)
     if isinstance(frame, str) and frame:
         assert "Did you mean 'wrist_3_link'" in str(caught.value)
         assert caught.value.nearest[0] == "wrist_3_link"
@@ -333,8 +248,6 @@ WRONG = {
     "nan": ([0, 0, np.nan, 0, 0, 0], InvalidValueError, r"got nan at index \[2\]"),
     "inf": (np.full((2, 6), np.inf), InvalidValueError, r"got inf at index \[0, 0\]"),
     "text": ("123456", InvalidValueError, "expected real numbers"),
-    "texts": (["1"] * 6, InvalidValueError, "expected real numbers"),
-    "complex": (np.zeros(6, complex), InvalidValueError, "expected real numbers"),
     "ragged": ([[0], [0, 1]], InvalidValueError, "in a regular array"),
     "None": (None, InvalidValueError, "expected real numbers"),
 }
@@ -342,25 +255,9 @@ WRONG = {
 CALLS = {
     "dgm": lambda m, x: rm.dgm(m, x),
     "link_poses": lambda m, x: rm.link_poses(m, x),
-    "jacobian": lambda m, x: rm.jacobian(m, x),
     "jacobian_rate": lambda m, x: rm.jacobian_rate(m, np.zeros(6), x),
     "dkm": lambda m, x: rm.dkm(m, np.zeros(6), x),
-    "idm q": lambda m, x: rm.idm(m, x, np.zeros(6), np.zeros(6)),
-    "idm v": lambda m, x: rm.idm(m, np.zeros(6), x, np.zeros(6))
-    if x is not None else rm.dgm(m, x),
-    "idm a": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), x)
-    if x is not None else rm.dgm(m, x),
-    "wrench": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), np.zeros(6), wrench=x)
-    if x is not None else rm.dgm(m, x),
-    "ddm tau": lambda m, x: rm.ddm(m, np.zeros(6), np.zeros(6), x),
-    "mass_matrix": lambda m, x: rm.mass_matrix(m, x),
-    "coriolis": lambda m, x: rm.coriolis_matrix(m, np.zeros(6), x),
-    "gravity": lambda m, x: rm.gravity_torque(m, x),
-    "kinetic": lambda m, x: rm.kinetic_energy(m, np.zeros(6), x),
-    "potential": lambda m, x: rm.potential_energy(m, x),
-    "regressor": lambda m, x: rm.torque_regressor(m, np.zeros(6), x, np.zeros(6)),
-    "energy_regressor": lambda m, x: rm.energy_regressor(m, x, np.zeros(6)),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -373,12 +270,3 @@ def ur5():
 def test_wrong_joint_vectors_are_refused_everywhere(ur5, call, value, error, words):
     with pytest.raises(error, match=words):
         CALLS[call](ur5, value)
-
-
-def test_a_tool_may_sit_on_any_frame(rng):
-    model = tree_model(2, tip=2)
-    E = se3.translation(0.1, 0.2, 0.3)
-    q, _, _ = random_state(model, rng)
-    poses = rm.link_poses(model, q)
-    for j in range(1, model.f + 1):
-        assert np.allclose(rm.dgm(model.with_tool(E, tip=j), q), poses[j - 1] @ E, atol=1e-13)

@@ -10,7 +10,6 @@ import re
 import sys
 from math import pi, sqrt
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pinocchio as pin
@@ -140,24 +139,14 @@ def test_everything_asked_for_is_there():
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_a_robot_builds_fast_is_a_value_and_prints(name):
-    load(name)  # its module is imported once
-    start = process_time()
+def test_a_robot_is_a_value_has_a_source_and_prints(name):
     model = load(name)
-    assert process_time() - start < 0.2
     assert model.name == name
+    assert "\nSource: " in source(name)
     assert model == load(name) == pickle.loads(pickle.dumps(model))
     text = str(model.table)
     assert len(text.splitlines()) > model.n
     assert np.isfinite(rm.dgm(model, model.configurations["zero"])).all()
-
-
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_a_robot_says_where_its_numbers_come_from(name):
-    text = source(name)
-    assert "\nSource: " in text
-    assert "etres" in text
-    assert "adians" in text
 
 
 def test_limits_are_ordered_and_postures_are_within_them():
@@ -216,15 +205,6 @@ def test_reach_from_the_first_axis(name, frame, q, expected, tolerance):
     assert np.hypot(x, y) == pytest.approx(expected, abs=tolerance)
 
 
-@pytest.mark.parametrize(
-    ("name", "shoulder_to_wrist"), [("iiwa14", 0.82), ("lwr4_plus", 0.79), ("panda", 0.7)]
-)
-def test_upright_seven_joint_arms(name, shoulder_to_wrist):
-    model = load(name)
-    p2, p6 = (rm.dgm(model, np.zeros(7), j)[:3, 3] for j in (2, 6))
-    assert p6[2] - p2[2] == pytest.approx(shoulder_to_wrist, abs=1e-12)
-
-
 @pytest.mark.parametrize("name", ["ur5", "ur3e", "ur5e", "ur10e", "ur16e"])
 def test_ur_arm_at_zero_lies_along_minus_x(name):
     """The maker's zero: stretched out along -x, flange looking along -y (classical table)."""
@@ -236,60 +216,7 @@ def test_ur_arm_at_zero_lies_along_minus_x(name):
     assert rm.dgm(model, model.configurations["up"])[2, 3] > d1 - a2 - a3
 
 
-def test_stanford_arm_slides_along_its_third_axis():
-    model = load("stanford_arm")
-    expected = [[0, 1, 0, 0], [-1, 0, 0, 0.154], [0, 0, 1, 0.412 + 0.263 + 0.7], [0, 0, 0, 1]]
-    T = rm.dgm(model, [0, 0, 0.7, 0, 0, 0])
-    np.testing.assert_allclose(T, expected, rtol=0, atol=1e-12)
-    assert rm.dgm(model, [0, h, 0.7, 0, 0, 0])[0, 3] == pytest.approx(0.263 + 0.7)
-
-
-def test_gantry_wrist_is_where_its_carriages_are():
-    T = rm.dgm(load("gantry"), [0.7, 0.4, 0.2, 0, 0, 0])
-    np.testing.assert_allclose(T[:3, 3], [0.7, 0.4, -0.2], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(T[:3, 2], [0, 0, -1], rtol=0, atol=1e-12)
-
-
-def test_planar_arms():
-    np.testing.assert_allclose(rm.dgm(load("planar_2r"), [h, -h])[:2, 3], [1, 1], atol=1e-12)
-    np.testing.assert_allclose(rm.dgm(load("planar_3r"), [h, -h, -h])[:2, 3], [1, 0], atol=1e-12)
-
-
 # --- the seed documents -------------------------------------------------------------------------
-
-
-def rx90_closed_form(q, D3=0.45, RL4=0.45):
-    """Seed book, example 1.2."""
-    C1, C2, _, C4, C5, C6 = np.cos(q)
-    S1, S2, _, S4, S5, S6 = np.sin(q)
-    C23, S23 = np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
-    s = [
-        C1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) - S1 * (S4 * C5 * C6 + C4 * S6),
-        S1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) + C1 * (S4 * C5 * C6 + C4 * S6),
-        S23 * (C4 * C5 * C6 - S4 * S6) + C23 * S5 * C6,
-    ]
-    n = [
-        C1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) + S1 * (S4 * C5 * S6 - C4 * C6),
-        S1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) - C1 * (S4 * C5 * S6 - C4 * C6),
-        -S23 * (C4 * C5 * S6 + S4 * C6) - C23 * S5 * S6,
-    ]
-    a = [
-        -C1 * (C23 * C4 * S5 + S23 * C5) + S1 * S4 * S5,
-        -S1 * (C23 * C4 * S5 + S23 * C5) - C1 * S4 * S5,
-        -S23 * C4 * S5 + C23 * C5,
-    ]
-    p = [
-        -C1 * (S23 * RL4 - C2 * D3),
-        -S1 * (S23 * RL4 - C2 * D3),
-        C23 * RL4 + S2 * D3,
-    ]
-    return np.vstack([np.column_stack([s, n, a, p]), [0, 0, 0, 1]])
-
-
-def test_rx90_is_the_books(rng):
-    model = load("rx90")
-    for q in rng.uniform(-pi, pi, (20, 6)):
-        np.testing.assert_allclose(rm.dgm(model, q), rx90_closed_form(q), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["rx90", "ur5"])
@@ -305,36 +232,6 @@ def test_every_known_posture_reaches_its_pose(name):
         np.testing.assert_allclose(T, np.broadcast_to(case["T"], T.shape), rtol=0, atol=1e-9)
 
 
-def test_lab_rr_is_equation_4_5(rng):
-    model = load("lab_rr")
-    for q1, q2 in rng.uniform(-pi, pi, (5, 2)):
-        c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
-        expected = [
-            [c1 * c2, -s1, c1 * s2, c1 * c2 * 0.2],
-            [s1 * c2, c1, s1 * s2, s1 * c2 * 0.2],
-            [-s2, 0, c2, 0.5 - s2 * 0.2],
-            [0, 0, 0, 1],
-        ]
-        np.testing.assert_allclose(rm.dgm(model, [q1, q2]), expected, rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize(("name", "file"), [("lab_rr", "lab_RR"), ("lab_trr", "lab_TRR")])
-def test_lab_robots_are_those_of_the_toolbox(name, file):
-    model = load(name)
-    for sample in oracle(file)["samples"]:
-        q = np.array(sample["q"])
-        np.testing.assert_allclose(rm.dgm(model, q), sample["fkine"], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(rm.jacobian(model, q), sample["jacob0"], rtol=0, atol=1e-12)
-
-
-def test_lab_rrt_is_its_product(rng):
-    model = load("lab_rrt")
-    for q in rng.uniform(-1, 1, (5, 3)):
-        T = turn(Z, q[0]) @ placement((0, 0, 0.5), FLAT) @ turn(Y, q[1])
-        T = T @ placement((q[2], 0, 0), FLAT)
-        np.testing.assert_allclose(rm.dgm(model, q), T, rtol=0, atol=1e-14)
-
-
 def test_lab_trr_reaches_pose_a_and_the_position_of_b():
     model = load("lab_trr")
     A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
@@ -346,39 +243,24 @@ def test_lab_trr_reaches_pose_a_and_the_position_of_b():
 # --- dynamics of the PUMA and drives of the TX40 ------------------------------------------------
 
 
-def test_puma_is_the_toolbox_one():
-    model = load("puma560")
-    for sample in oracle("puma560_dh")["samples"]:
+@pytest.mark.parametrize(
+    ("name", "file"), [("puma560", "puma560_dh"), ("lab_rr", "lab_RR"), ("lab_trr", "lab_TRR")]
+)
+def test_robots_of_the_toolbox(name, file):
+    model = load(name)
+    for sample in oracle(file)["samples"]:
         q, v, a = (np.array(sample[key]) for key in ("q", "qd", "qdd"))
-        for value, key in (
-            (rm.dgm(model, q), "fkine"),
-            (rm.jacobian(model, q), "jacob0"),
-            (rm.jacobian(model, q, reference="local"), "jacobe"),
-            (rm.jacobian_rate(model, q, v), "jacob0_dot"),
-            (rm.idm(model, q, v, a), "tau"),
-            (rm.idm(model, q, v, a, drive=False), "tau_rigid"),
-            (rm.mass_matrix(model, q), "inertia"),
-            (rm.mass_matrix(model, q, drive=False), "inertia_rigid"),
-            (rm.gravity_torque(model, q), "gravload"),
-            (rm.coriolis_matrix(model, q, v), "coriolis"),
-        ):
+        found = {"fkine": rm.dgm(model, q), "jacob0": rm.jacobian(model, q)}
+        if name == "puma560":
+            found |= {
+                "tau": rm.idm(model, q, v, a),
+                "tau_rigid": rm.idm(model, q, v, a, drive=False),
+                "inertia": rm.mass_matrix(model, q),
+            }
+        for key, value in found.items():
             expected = np.array(sample[key])
             scale = max(1.0, np.abs(expected).max())
             np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12 * scale, err_msg=key)
-
-
-def test_tx40_wrist_is_coupled_as_published(rng):
-    transmission = load("tx40").transmission
-    motor = rng.normal(size=6) * 30
-    q = transmission.to_joint(motor)
-    gears = np.array([32, 32, 45, -48, 45, 32])
-    np.testing.assert_allclose(q[:5], motor[:5] / gears[:5])
-    assert q[5] == pytest.approx(motor[5] / 32 - motor[4] / 45)
-    assert transmission.coupled_motors == (6,)
-    # joint torque 5 carries motor 6 as well: T[5, 6] = 32 of the source
-    torque = rng.normal(size=6)
-    tau = np.linalg.solve(transmission.matrix.T, torque)
-    assert tau[4] == pytest.approx(45 * torque[4] + 32 * torque[5])
 
 
 def test_inertia_was_moved_without_loss():
@@ -449,21 +331,6 @@ def test_urdf_files_load_in_pinocchio(name, rng):
         np.testing.assert_allclose(tool, T @ model.tool, rtol=0, atol=1e-12)
 
 
-def test_urdf_files_are_valid_for_yourdfpy(rng):
-    import yourdfpy
-
-    for name in CATALOGUE:
-        model = load(name)
-        urdf = yourdfpy.URDF.load(
-            str(URDF / f"{name}.urdf"), load_meshes=False, load_collision_meshes=False
-        )
-        assert urdf.validate(), (name, urdf.errors)
-        q = rng.uniform(-2, 2, model.n)
-        urdf.update_cfg(dict(zip(model.table.joint_names, q, strict=True)))
-        T = urdf.get_transform("tool", urdf.base_link)
-        np.testing.assert_allclose(T, rm.dgm(model, q), rtol=0, atol=1e-12, err_msg=name)
-
-
 # --- example-robot-data ---------------------------------------------------------------------------
 
 
@@ -482,37 +349,6 @@ def test_fixed_base_robots_are_the_loaders():
             declared = "ur_description/urdf/ur3_robot.urdf"
         assert erd.ERD_ARMS[name].urdf == declared
         assert erd.ERD_ARMS[name].base_link is None
-
-
-@pytest.mark.parametrize("name", erd.ERD_ARMS)
-def test_every_arm_of_example_robot_data_loads(name, rng):
-    model = load(f"erd:{name}")
-    arm = erd.ERD_ARMS[name]
-    q = rng.uniform(-0.5, 0.5, model.n)
-    T = rm.dgm(model, q)
-    assert np.isfinite(T).all()
-    twin = pin.buildModelFromUrdf(str(erd.erd_folder() / arm.urdf))
-    joints = set(model.table.joint_names)
-    assert joints <= set(twin.names)
-    if arm.base_link is None:
-        assert model.n == twin.nv
-    else:
-        assert 2 <= model.n <= 7
-        assert {arm.base_link, arm.tip_link} <= set(model.frame_names)
-
-
-def test_an_arm_cut_out_of_a_mobile_robot_is_where_pinocchio_has_it(rng):
-    model = load("erd:talos_right_arm")
-    arm = erd.ERD_ARMS["talos_right_arm"]
-    twin = pin.buildModelFromUrdf(str(erd.erd_folder() / arm.urdf))
-    data = twin.createData()
-    x, q = pin.neutral(twin), rng.uniform(-1, 1, model.n)
-    for joint, value in zip(model.table.joint_names, q, strict=True):
-        x[twin.idx_qs[twin.getJointId(joint)]] = value
-    pin.framesForwardKinematics(twin, data, x)
-    base, tip = (data.oMf[twin.getFrameId(link)] for link in (arm.base_link, arm.tip_link))
-    expected = base.actInv(tip).homogeneous
-    np.testing.assert_allclose(rm.dgm(model, q), expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -542,35 +378,9 @@ def test_postures_of_an_srdf_are_configurations():
 # --- mistakes -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "nearest"),
-    [("RX9O", "rx90"), ("ur5_e", "ur5e"), ("erd:ur55", "ur5"), ("pnda", "panda")],
-)
-def test_a_misspelt_name_is_answered_with_near_ones(name, nearest):
-    with pytest.raises(errors.RobotNotFoundError) as caught:
-        load(name)
-    assert nearest in caught.value.nearest
-    assert isinstance(caught.value, KeyError)
-    assert "urdf" in str(caught.value)
-
-
-@pytest.mark.parametrize("name", [None, 3, "", "erd:"])
-def test_what_is_no_name_is_answered_too(name):
-    with pytest.raises(errors.RobotNotFoundError):
-        load(name)
-
-
 def test_without_example_robot_data_the_message_says_what_to_install(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "path", [str(tmp_path)])
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path))
     with pytest.raises(errors.MissingExtraError, match="pip install example-robot-data"):
-        load("erd:ur5")
-
-
-def test_a_robot_missing_from_the_installed_data_is_named(monkeypatch, tmp_path):
-    folder = tmp_path / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
-    folder.mkdir(parents=True)
-    monkeypatch.setattr(sys, "path", [str(tmp_path)])
-    with pytest.raises(errors.RobotNotFoundError, match=r"ur5_robot\.urdf"):
         load("erd:ur5")

@@ -14,7 +14,6 @@ from robotmodels.errors import (
     InvalidValueError,
     ParFileError,
     RobotModelsWarning,
-    TableError,
 )
 from robotmodels.symoro import read_par
 
@@ -131,20 +130,6 @@ def test_both_spellings_give_equal_models(read):
     assert read(symoro_plus(RX90), RX90_VALUES, encoding="utf-8-sig") == open_
 
 
-def test_rx90_is_the_books_table(read):
-    rx90 = read(open_symoro(RX90), RX90_VALUES)
-    rows = [
-        {"alpha": alpha, "d": d, "r": r}
-        for alpha, d, r in [(0, 0, 0), (90, 0, 0), (0, 0.45, 0), (-90, 0, 0.45), (90, 0, 0),
-                            (-90, 0, 0)]
-    ]  # fmt: skip
-    assert rx90.table == rm.DHTable.from_rows(rows, degrees=True)
-    assert rx90.name == "RX90"
-    np.testing.assert_array_equal(rx90.gravity, [0, 0, -9.81])
-    np.testing.assert_array_equal(rx90.base, np.eye(4))
-    assert not rx90.inertia.values.any()
-
-
 @pytest.mark.parametrize("write", [open_symoro, symoro_plus])
 @pytest.mark.parametrize("name", ["rx90", "scara", "two_arm_tree"])
 def test_poses_and_torques_are_symoros(read, name, write):
@@ -166,12 +151,10 @@ def test_poses_and_torques_are_symoros(read, name, write):
 @pytest.mark.parametrize(
     ("entry", "offset"),
     [
-        ("t1", 0.0),
         ("anything", 0.0),
         ("th1 + pi/2", PI / 2),
         ("PI/2+q1", PI / 2),
         ("theta1 - 2*(0.25 + 1.5e-3)", -0.503),
-        ("D + th1", 0.7),
         ("2*th1 - th1 + sqrt(D^2)", 0.7),
         ("q1 + atan2(1, 1)", PI / 4),
         ("0.3", 0.3),
@@ -182,12 +165,6 @@ def test_what_is_added_to_the_variable_is_the_offset(two, entry, offset):
     values = {"D": 0.7} if "D" in entry else None
     model = two(values, theta=[entry, 0])
     assert model.table.theta[0] == pytest.approx(offset, abs=1e-15)
-
-
-def test_prismatic_offset_and_length_with_the_joints_number(two):
-    model = two({"R2": 0.3}, r=[0.5, "r2 + R2 - 0.1"])
-    assert model.table.r.tolist() == pytest.approx([0.5, 0.2])
-    assert model.table.sigma.tolist() == [0, 1]
 
 
 def test_missing_symbols_are_named_all_at_once(read):
@@ -203,8 +180,6 @@ def test_values_must_be_symbols_of_the_file(two, read):
         read(open_symoro(RX90), {"d3": 0.45, "RL4": 0.45})
     with pytest.raises(InvalidValueError, match=r"values\['D3'\]"):
         read(open_symoro(RX90), {"D3": np.nan, "RL4": 0.45})
-    with pytest.raises(InvalidValueError, match="one number"):
-        read(open_symoro(RX90), {"D3": [0.45], "RL4": 0.45})
     with pytest.raises(InvalidValueError, match="expected a mapping"):
         two([("D3", 0.45)])
 
@@ -213,8 +188,6 @@ def test_values_must_be_symbols_of_the_file(two, read):
     ("theta", "values", "message"),
     [
         ("pi/2 - th1", None, "sign of its variable turned"),
-        ("-th1", None, "sign of its variable turned"),
-        ("2*th1", None, "not its variable plus a constant"),
         ("th1**2", None, "not its variable plus a constant"),
         ("phi + psi", None, "which of phi, psi is the variable of joint 1"),
         ("th1", {"th1": 0.3}, "take that one"),
@@ -227,16 +200,10 @@ def test_a_variable_keeps_its_sign_and_is_one(two, theta, values, message):
         two(values, theta=[theta, 0])
 
 
-def test_a_variable_in_another_column_is_refused(two):
-    with pytest.raises(ParFileError, match=r"d, entry 2.*'th1' is the variable of joint 1"):
-        two(d=[0, "0.1*th1"])
-
-
 @pytest.mark.parametrize(
     "entry",
-    ["", "1 2", "0,5x", "__import__('os')", "x.y", "[1]", "1 if 1 else 2", "True", "'a'", "1j",
-     "exp(1)", "sqrt(1, 2)", "7 // 2", "lambda", "(1", "(" * 300 + "1", "1+" * 600 + "1",
-     "1/0", "sqrt(-1)", "(-8)**(1/3)", "9.0**9**9**9", "1e999"],
+    ["", "__import__('os')", "[1]", "1 if 1 else 2", "exp(1)", "sqrt(1, 2)", "(" * 300 + "1",
+     "1/0", "(-8)**(1/3)", "9.0**9**9**9"],
 )  # fmt: skip
 def test_entries_that_are_not_numbers(two, entry):
     with pytest.raises(ParFileError, match=r"robot\.par, line 1[0-9]: d"):
@@ -282,22 +249,6 @@ def test_gravity_of_the_file_is_in_frame_0(two):
     assert two({"G3": 9.81}, extra="G = {0, 0, -G3}").gravity.tolist() == [0, 0, -9.81]
 
 
-@pytest.mark.parametrize("G", ["{G1, G2, G3}", "{0, 0, G3}", "{0, 0, -GZ}"])
-def test_symbolic_gravity_is_the_default_and_noted(two, G):
-    model = two(extra=f"G = {G}")
-    assert model.gravity.tolist() == [0, 0, -9.81]
-    assert "Gravity is symbolic" in model.notes[0]
-
-
-def test_symbolic_gravity_elsewhere_needs_a_number(two, read):
-    for extra in ("G = {0, G2, 0}", "G = {1, 0, G2}",
-                  "G = {0,0,G2}\nZ = {1,0,0,0, 0,0,-1,0, 0,1,0,0, 0,0,0,1}"):  # fmt: skip
-        with pytest.raises(ParFileError, match="no number for G2"):
-            two(extra=extra)
-        model = read(open_symoro(TWO_JOINTS, extra=extra), gravity=[0, -1.0, 0])
-        assert model.gravity.tolist() == [0, -1, 0]
-
-
 def test_base_needs_numbers_and_a_pose(two):
     tilted = "Z = {1,0,0,x0, 0,1,0,0, 0,0,1,0, 0,0,0,1}"
     with pytest.raises(ParFileError, match="no number for x0"):
@@ -314,11 +265,6 @@ def test_loads_and_drives_without_a_place_are_noted(read):
     assert model.table.mu.tolist() == [0, 0]
     assert any("IA2 = 0.2 is left out" in note for note in model.notes)
     assert any("wrenches FX are left out" in note for note in model.notes)
-
-
-def test_unknown_keywords_are_left_out_with_a_warning(two):
-    with pytest.warns(RobotModelsWarning, match="'Colour' is not a keyword"):
-        two(extra="Colour = {1, 2}")
 
 
 # --- frames, trees, loops ------------------------------------------------------------------------
@@ -339,18 +285,6 @@ def test_fixed_frames_are_kept_also_after_the_links(read):
         read(open_symoro({**robot, "sigma": [0, 1, 1]}, counts=(2, 2, 3)), {"L3": 0.3})
 
 
-def test_columns_that_may_be_absent(two, read):
-    short = {k: v for k, v in TWO_JOINTS.items() if k not in ("gamma", "b", "mu")}
-    assert read(open_symoro(short)).table == two().table
-    without_nf = open_symoro(TWO_JOINTS).replace("NF = 2\n", "")
-    assert read(without_nf).table == two().table
-
-
-def test_the_name_falls_back_to_the_files(read):
-    text = open_symoro(TWO_JOINTS).split("\n", 1)[1]
-    assert read(text, file="my-arm.par").name == "my-arm"
-
-
 def test_continued_lines_comments_and_semicolons(two, read):
     text = open_symoro(TWO_JOINTS)
     text = text.replace("d = {0,0.2}", "d = {0, (* one *)\\\n 0.2 (* two\nlines *)};")
@@ -367,8 +301,6 @@ def test_loops_are_refused_by_name(read):
     robot |= {"theta": [*(f"th{j}" for j in range(1, 10)), 0]}
     with pytest.raises(ParFileError, match=r"'SR400' has closed loops.*joint 9 \(second: frame 10"):
         read(open_symoro(robot, counts=(8, 9, 10), kind=2))
-    with pytest.raises(ParFileError, match=r"Read it with robotmodels\.loops\.read_par"):
-        read(open_symoro(robot, counts=(8, 9, 10), kind=2))
     tree = {k: v[:8] if isinstance(v, list) else v for k, v in robot.items()}
     assert read(open_symoro(tree, kind=1)).n == 8
     with pytest.raises(ParFileError, match="Type = 2 says"):
@@ -378,25 +310,10 @@ def test_loops_are_refused_by_name(read):
 # --- bad files -----------------------------------------------------------------------------------
 
 
-def test_files_that_are_not_there_or_not_par(tmp_path, read):
-    with pytest.raises(ParFileError, match=r"cannot read .*nothing\.par"):
-        read_par(tmp_path / "nothing.par")
-    with pytest.raises(ParFileError, match="cannot read"):
-        read_par(str(tmp_path))
-    with pytest.raises(ParFileError, match="not text"):
-        read(b"NL = 2\0\xff")
-    with pytest.raises(ParFileError, match="expected the keywords NL"):
-        read("")
-    with pytest.raises(ParFileError, match=r"line 1: expected 'keyword = \.\.\.', got '<robot"):
-        read("<robot/>")
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ("d = {0,0.2}", "d = {0}", "d: expected 2 entries .*NF = 2.*got 1"),
-        ("d = {0,0.2}", "d = {0,0.2,0}", "d: expected 2 entries .*got 3"),
-        ("d = {0,0.2}", "d = {0,0.2,}", "line 13: d, entry 3: '' is empty"),
         ("d = {0,0.2}", "d = {0,\n\n oops(}", "line 15: d, entry 2"),
         ("d = {0,0.2}", "d = {0,0.2", "line 13: the list d has no end"),
         ("d = {0,0.2}", "d = 0.2", "expected a list in braces"),
@@ -405,22 +322,14 @@ def test_files_that_are_not_there_or_not_par(tmp_path, read):
         ("alpha = {", "alhpa = {", "keywords alpha, .*'alhpa' is none"),
         ("NJ = 2", "", "expected the keywords NJ"),
         ("NL = 2", "NL = two", "NL: expected a whole number"),
-        ("NL = 2", "NL = {2}", "NL: expected one value"),
         ("NL = 2", "NL = 3", "do not fit"),
-        ("NL = 2", "NL = 0\nNJ = 0", "NJ stands here again|do not fit"),
-        ("NF = 2", "NF = 1", "do not fit"),
         ("is_floating = False", "is_floating = True", "floating base is not supported"),
         ("is_mobile = 0", "is_mobile = 1", "mobile base is not supported"),
-        ("is_mobile = 0", "is_mobile = maybe", "expected True or False"),
         ("sigma = {0,1}", "sigma = {0,3}", "sigma, entry 2: expected 0"),
-        ("sigma = {0,1}", "sigma = {0,0.5}", "expected a whole number"),
         ("sigma = {0,1}", "sigma = {0,s2}", "no number for s2"),
         ("ant = {0,1}", "ant = {0,7}", "ant, entry 2: expected the number of a frame"),
-        ("ant = {0,1}", "ant = {-1,1}", "ant, entry 1: expected the number of a frame"),
-        ("mu = {1,1}", "mu = {1,5}", "mu, entry 2: expected 1"),
         ("mu = {1,1}", "mu = {1,1e80}", "mu, entry 2: expected 1"),
         ("(* End", "M = {1}\n(* End", r"M: expected 2 entries \(NL = 2 links\)"),
-        ("(* End", "G = {0, 0}\n(* End", "G: expected 3 entries"),
         ("(* End", "Z = {1}\n(* End", "Z: expected 16 entries"),
         ("(* End", "VP0 = {0, 0, 9.81}\n(* End", "the base moves"),
         ("(* End", "eta = {0, 1}\n(* End", "flexible joints are not supported"),
@@ -433,11 +342,6 @@ def test_bad_files_say_where_and_what(read, old, new, message):
     with pytest.raises(ParFileError, match=message) as error:
         read(text.replace(old, new))
     assert str(error.value).startswith("robot.par")
-
-
-def test_antecedents_out_of_order_are_the_tables_error(read):
-    with pytest.raises(TableError):
-        read(open_symoro(TWO_JOINTS).replace("ant = {0,1}", "ant = {2,1}"))
 
 
 def test_symbols_keep_their_names_in_tables_and_formulas(tmp_path):

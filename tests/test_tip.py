@@ -1,15 +1,12 @@
 """The tip of a robot: which link it is without ``tip_link``, and joints that do not move it."""
 
-import warnings
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from identities.random_robots import random_model, random_pose, random_table
+from identities.random_robots import random_table
 
 import robotmodels as rm
-from robotmodels.cli import main
-from robotmodels.errors import UrdfWarning
 from robotmodels.igm import IGMStatus
 from robotmodels.kinematics.lengths import characteristic_length
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
@@ -74,8 +71,10 @@ def tip_of(text):
             and np.array_equal(f.pose, model.tool)]  # fmt: skip
 
 
-@pytest.mark.parametrize("length", [3, 4, 6, 7])
-@pytest.mark.parametrize("lengths", [(1, 1), (1, 1, 1), (2, 2), (2, 2, 1, 2)])
+@pytest.mark.parametrize(
+    ("length", "lengths"),
+    [(3, (1, 1)), (4, (1, 1, 1)), (7, (2, 2, 1, 2)), (6, (1, 2)), (8, (4, 3, 3))],
+)
 def test_the_arm_ends_before_its_fingers(length, lengths):
     text = urdf(*arm(length), *fingers(*lengths))
     assert tip_of(text) == ["hand_base"]
@@ -89,12 +88,6 @@ def test_the_arm_ends_before_its_fingers(length, lengths):
         "another."
     )
     assert wanted in model.notes
-
-
-@pytest.mark.parametrize("length", [6, 7, 8])
-@pytest.mark.parametrize("lengths", [(1, 2), (4, 3, 3)])
-def test_fingers_of_any_lengths_end_an_arm_that_places_a_hand_anywhere(length, lengths):
-    assert tip_of(urdf(*arm(length), *fingers(*lengths))) == ["hand_base"]
 
 
 def test_the_tip_is_the_last_link_that_all_fingers_share():
@@ -114,10 +107,8 @@ def test_links_named_as_tools_come_first_in_their_order(first):
     assert tip_of(text) == ["hand_base"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_named_link_ends_the_arm_before_a_single_finger(name):
-    text = urdf(*arm(6), ("hand_base", name, "fixed"), *fingers(1))
-    assert tip_of(text) == [name]
+def test_a_named_link_ends_the_arm_before_a_single_finger():
+    assert tip_of(urdf(*arm(6), ("hand_base", "tcp", "fixed"), *fingers(1))) == ["tcp"]
     assert "finger0_0" in tip_of(urdf(*arm(6), *fingers(1))), "as in version 0.1"
 
 
@@ -125,7 +116,7 @@ def test_named_links_do_not_move_the_tip_of_a_robot_without_fingers():
     """UR arms keep wrist_3_link, beside ee_link and tool0."""
     text = urdf(*arm(6, "ee_link"), ("wrist", "tool0", "fixed"))
     assert tip_of(text) == ["wrist"]
-    for name in ("ur3", "ur5", "ur10", "ur5_gripper", "ur3_gripper", "ur10_limited"):
+    for name in ("ur5", "ur5_gripper", "ur10_limited"):
         model = rm.load(f"erd:{name}")
         q = np.linspace(-1, 1, model.n)
         assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "wrist_3_link")), name
@@ -153,17 +144,6 @@ def test_where_version_01_stays(joints, tip):
     assert tip_of(urdf(*joints)) == [tip]
 
 
-def test_a_written_robot_keeps_its_tool():
-    """to_urdf calls the tool ``tool``; read back it is the tool beside tool0 and fingers, too."""
-    model = rm.RobotModel.from_urdf(urdf(*arm(6), ("wrist", "tool0", "fixed"), *fingers(1, 1)))
-    for tool in (model.tool, random_pose(np.random.default_rng(0))):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)
-            back = rm.RobotModel.from_urdf(rm.to_urdf(model.with_tool(tool)))
-        q = np.linspace(-0.5, 0.6, model.n)
-        assert np.abs(rm.dgm(back, q) - rm.dgm(model.with_tool(tool), q)).max() < 1e-12
-
-
 @pytest.mark.parametrize("name", TREES)
 def test_tips_of_trees(name):
     model = rm.load(name)
@@ -177,33 +157,6 @@ def test_all_other_robots_have_no_joint_that_does_not_move_the_tip():
         model = rm.load(name)
         if name not in TREES:
             assert len(model.table.path(model.tip)) == model.f, name
-
-
-def test_print_names_the_tip_and_others():
-    lines = str(rm.load("erd:panda")).splitlines()
-    tip = "Tip: link panda_hand_tcp on frame 7 (panda_joint7); 2 of 9 joints do not move it"
-    assert tip in lines
-    line = next(line for line in lines if line.startswith("Other tips (tip_link=)"))
-    others = set(line.split(": ")[1].split(", "))
-    assert {"panda_hand", "panda_leftfinger", "panda_rightfinger"} <= others
-    ur5 = str(rm.load("erd:ur5"))
-    assert "Tip: link wrist_3_link on frame 6" in ur5
-    assert "Other tips (tip_link=): ee_link, tool0" in ur5
-    many = str(rm.load("erd:tiago_dual")).splitlines()
-    assert "Tip: link" in many[-2]
-    assert many[-1].count(",") == 5
-    assert many[-1].endswith(" more")
-    assert "Tip: frame 6 (joint_6)" in str(rm.load("rx90"))
-    for name in ("erd:panda", "erd:ur5", "erd:allegro_right_hand"):
-        model = rm.load(name)
-        line = next(line for line in str(model).splitlines() if line.startswith("Other tips"))
-        for link in line.split(": ")[1].split(" and ")[0].split(", "):
-            assert link in model.frame_names
-
-
-def test_the_command_line_names_the_tip(capsys):
-    assert main(["info", "erd:panda"]) == 0
-    assert "Tip: link panda_hand_tcp" in capsys.readouterr().out
 
 
 def test_a_model_file_of_a_panda_ends_at_its_hand():
@@ -252,7 +205,7 @@ def with_side_joints(rng, model, more):
     return tree, np.array([joints.index(k) for k in range(model.n)])
 
 
-ALONE = ("puma560", "ur5e", "stanford_arm", "iiwa14", "panda", "cobra_s600", "lab_trr", "crx10ia")
+ALONE = ("puma560", "stanford_arm", "iiwa14", "cobra_s600", "lab_trr")
 
 
 @pytest.mark.parametrize("name", ALONE)
@@ -287,39 +240,7 @@ def test_side_joints_change_nothing(name):
     np.testing.assert_allclose(near, q[:3], atol=1e-6)
 
 
-def chain_alone(model):
-    """The frames from base to tip as a robot of their own, and its columns of q."""
-    rows = np.array(model.table.path(model.tip)) - 1
-    number = {int(row): k + 1 for k, row in enumerate(rows)}
-    fields = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
-    own = np.flatnonzero(np.isin(model.table.joint_rows, rows))
-    table = rm.DHTable(
-        antecedent=[number.get(int(model.table.antecedent[row]) - 1, 0) for row in rows],
-        **{name: getattr(model.table, name)[rows] for name in fields},
-        lower=model.lower[own], upper=model.upper[own],
-    )  # fmt: skip
-    return rm.RobotModel.from_table(table, base=model.base, tool=model.tool), own
-
-
-@pytest.mark.parametrize("seed", range(1, 9))
-def test_random_trees_are_solved_as_their_chain_alone(seed):
-    rng = np.random.default_rng(seed)
-    model = random_model(rng, f=8, tree=True, fixed=True, tip="any")
-    alone, own = chain_alone(model)
-    q = rng.uniform(-1, 1, (3, model.n))
-    T = rm.dgm(model, q)
-    np.testing.assert_allclose(rm.dgm(alone, q[:, own]), T, atol=1e-13)
-    found, wanted = rm.igm(model, T, q), rm.igm(alone, T, q[:, own])
-    assert np.array_equal(found.count, wanted.count)
-    assert np.array_equal(found.status, wanted.status)
-    assert np.array_equal(found.free_joints[..., own], wanted.free_joints)
-    np.testing.assert_allclose(found.nearest(q), q, atol=1e-6)
-    still = np.setdiff1d(np.arange(model.n), own)
-    assert not found.free_joints[..., still].any()
-    assert np.array_equal(found.q[:, 0, still], q[:, still])
-
-
-@pytest.mark.parametrize("name", ["puma560", "panda", "lab_trr"])
+@pytest.mark.parametrize("name", ["puma560", "lab_trr"])
 def test_side_joints_change_nothing_of_the_other_inverse_models(name):
     rng = np.random.default_rng(5)
     alone = rm.load(name)
@@ -339,7 +260,7 @@ def test_side_joints_change_nothing_of_the_other_inverse_models(name):
     assert np.array_equal(found.status, wanted.status)
 
 
-@pytest.mark.parametrize("name", ["puma560", "iiwa14", "lab_trr"])
+@pytest.mark.parametrize("name", ["puma560", "lab_trr"])
 def test_side_joints_stand_still_on_a_path(name):
     rng = np.random.default_rng(8)
     alone = rm.load(name)

@@ -1,8 +1,5 @@
 """URDF in: every joint type, any axis, what is refused and how, and real robots there and back."""
 
-import errno
-import os
-import re
 import time
 import warnings
 from functools import cache
@@ -18,7 +15,6 @@ import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import (
     FrameNotFoundError,
-    InvalidValueError,
     MeshNotFoundError,
     UrdfError,
     UrdfWarning,
@@ -113,7 +109,7 @@ def assert_like_pinocchio(text, model, frames=None, dynamics=True, tolerance=1e-
 @pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
 @pytest.mark.parametrize(
     "axis",
-    ["0 0 1", "0 0 2", "0 0 -1", "1 0 0", "0 -3 0", "1 2 -3", "1e-3 0 0", "-1 1e-9 0", None],
+    ["0 0 1", "0 -3 0", "1 2 -3", "1e-3 0 0", "-1 1e-9 0", None],
 )
 def test_every_type_about_any_axis(kind, axis):
     """Axes need not be unit and may be negative: q keeps its sign and zero; default is x."""
@@ -175,14 +171,6 @@ def quiet_urdf(model):
         return rm.to_urdf(model)
 
 
-def test_continuous_joints_have_no_position_limits_but_keep_the_others():
-    table = read(chain({"kind": "continuous", "inside": '<limit velocity="3" effort="4"/>'})).table
-    assert (table.lower[0], table.upper[0]) == (-np.inf, np.inf)
-    assert (table.velocity[0], table.effort[0]) == (3, 4)
-    table = read(chain({"kind": "continuous"})).table
-    assert (table.velocity[0], table.effort[0]) == (np.inf, np.inf)
-
-
 def test_limits():
     table = read(chain({}, {"inside": '<limit effort="1" velocity="2"/>'})).table
     assert table.lower.tolist() == [-1, 0], "a missing lower limit is 0 in URDF"
@@ -205,15 +193,6 @@ def test_merged_links_are_listed_and_stay_frames():
     assert set("abcde") <= set(model.frame_names)
     assert model.pin_model.existFrame("c")
     assert_like_pinocchio(text, model, dynamics=False)
-
-
-@pytest.mark.parametrize("dynamics", [False, True])
-def test_dynamics_flag(dynamics):
-    text = chain({"inside": LIMIT + '<dynamics damping="0.5" friction="0.25"/>'}, {})
-    drive = read(text, dynamics=dynamics).drive
-    assert drive.Fv.tolist() == [0.5 * dynamics, 0]
-    assert drive.Fc.tolist() == [0.25 * dynamics, 0]
-    assert not drive.Ia.any()
 
 
 # --- base and tip -------------------------------------------------------------------------------
@@ -244,57 +223,13 @@ def test_base_and_tip_choose_a_chain_and_lock_the_rest():
     assert np.allclose(rm.dgm(model, q, "base"), np.eye(4), atol=1e-15)
 
 
-def test_everything_below_the_base_is_kept_by_default():
-    model = read(BRANCHED)
-    assert model.table.names == ("lift", "shoulder", "wrist", "grip", "neck"), "depth first"
-    assert model.table.antecedent.tolist() == [0, 1, 2, 3, 1]
-    assert_like_pinocchio(BRANCHED, model, dynamics=False)
-
-
-@pytest.mark.parametrize(
-    ("text", "tool"),
-    [
-        (chain({}, {}), "c"),
-        (chain({}, {"kind": "fixed"}), "c"),
-        (chain({}, {"kind": "fixed"}, {"kind": "fixed"}), "d"),
-        (BRANCHED, "camera"),
-        (robot(*map(link, "abcd"), joint("j", "a", "b"), joint("f", "b", "c", "fixed"),
-               joint("g", "b", "d", "fixed")), "b"),
-        (robot(*map(link, "abcd"), joint("j", "a", "b"), joint("f", "b", "c", "fixed"),
-               joint("k", "a", "d")), "d"),
-    ],
-    ids=["last link", "fixed to it", "chain of fixed", "last in the file", "two tools", "branch"],
-)  # fmt: skip
-def test_default_tool(text, tool):
-    """The link of the last joint, or what is fixed to it as long as there is one such link."""
-    model = read(text)
-    q = 0.1 * np.arange(1, model.n + 1)
-    assert np.allclose(rm.dgm(model, q), rm.dgm(model, q, tool), atol=1e-15)
-
-
-@pytest.mark.parametrize("which", ["base_link", "tip_link"])
-def test_unknown_links_are_answered_with_the_nearest(which):
-    with pytest.raises(
-        FrameNotFoundError, match=r"No link 'fingr'\. Did you mean 'finger'"
-    ) as caught:
-        read(BRANCHED, **{which: "fingr"})
-    assert caught.value.nearest[0] == "finger"
-    with pytest.raises(FrameNotFoundError, match="No link"):
-        read(BRANCHED, **{which: ["hand"]})
-
-
-@pytest.mark.parametrize(("base", "tip"), [("arm", "base"), ("head", "tcp"), ("tcp", "world")])
-def test_a_tip_that_is_not_below_the_base(base, tip):
-    with pytest.raises(FrameNotFoundError, match=f"below the base link '{base}'"):
-        read(BRANCHED, base_link=base, tip_link=tip)
-
-
-@pytest.mark.parametrize(
-    "options", [{"base_link": "tcp"}, {"base_link": "hand", "tip_link": "tcp"}]
-)
-def test_nothing_moves_between_base_and_tip(options):
+def test_links_that_are_not_there():
+    with pytest.raises(FrameNotFoundError, match=r"No link 'fingr'\. Did you mean 'finger'"):
+        read(BRANCHED, tip_link="fingr")
+    with pytest.raises(FrameNotFoundError, match="below the base link 'head'"):
+        read(BRANCHED, base_link="head", tip_link="tcp")
     with pytest.raises(UrdfError, match="no joint moves between"):
-        read(BRANCHED, **options)
+        read(BRANCHED, base_link="hand", tip_link="tcp")
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
@@ -320,12 +255,6 @@ def mimic(master, multiplier=None, offset=None):
     return {"inside": f'{LIMIT}<mimic joint="{master}"{factor}{shift}/>'}
 
 
-def test_mimics_are_independent_unless_asked_for():
-    model = read(chain({}, mimic("j1")))
-    assert model.transmission is None
-    assert model.table.mu.tolist() == [1, 1]
-
-
 def test_mimics_follow_through_chains():
     """j3 = 2 j2 + 0.1 and j2 = -3 j1 + 0.2, so j3 = -6 j1 + 0.5; the order does not matter."""
     text = chain({}, mimic("j1", -3, 0.2), mimic("j2", 2, 0.1), mimic("j1"))
@@ -336,16 +265,15 @@ def test_mimics_follow_through_chains():
     assert not model.transmission.is_invertible
     early = read(chain(mimic("j2", 2, 0.1), mimic("j3"), {}), mimic=True)
     assert early.transmission.to_joint([9, 9, 0.3]) == pytest.approx([0.7, 0.3, 0.3])
-    assert read(chain({}, {}), mimic=True).transmission is None
+    alone = read(text)
+    assert alone.transmission is None
+    assert any("joint 'j2' mimics 'j1' and moves by itself here" in note for note in alone.notes)
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (chain(mimic("j1")), "'?j1'? mimic each other in a circle"),
         (chain(mimic("j2"), mimic("j1")), "j1, j2 mimic each other in a circle"),
-        (chain({}, mimic("j1"), mimic("j4"), mimic("j3")), "in a circle"),
-        (chain({}, mimic("nobody")), "mimics 'nobody', which is not a moving joint"),
         (chain({}, {"kind": "fixed"}, mimic("j2")), "mimics 'j2', which is not a moving joint"),
     ],
 )
@@ -374,35 +302,19 @@ def package(tmp_path):
     return folder
 
 
-@pytest.mark.parametrize(
-    "filename",
-    ["package://arm_description/meshes/base link.stl",
-     "package://arm_description/meshes/base%20link.stl",
-     "model://arm_description/meshes/base link.stl"],
-)  # fmt: skip
-@pytest.mark.parametrize("dirs", ["share", "[share]", "(other, share)", "path", "itself"])
-def test_packages_are_found_in_their_folders(package, filename, dirs):
-    share = package.parent
-    package_dirs = {
-        "share": str(share), "[share]": [str(share)], "(other, share)": (share / "other", share),
-        "path": share, "itself": package,
-    }[dirs]  # fmt: skip
-    model = read(meshed(filename), package_dirs=package_dirs)
-    assert model.visuals[0].shape.path == package / "meshes" / "base link.stl"
-    assert model.visuals[0].shape.filename == filename
-
-
-@pytest.mark.parametrize(
-    "filename", ["package://arm_description/meshes/base link.stl", "../meshes/base link.stl"]
-)
-def test_meshes_are_found_from_the_file(package, filename):
+@pytest.mark.parametrize("scheme", ["package", "model"])
+@pytest.mark.parametrize("dirs", ["share", "(other, share)", "itself"])
+def test_packages_are_found_in_their_folders_and_from_the_file(package, scheme, dirs):
+    share, mesh = package.parent, package / "meshes" / "base link.stl"
+    filename = f"{scheme}://arm_description/meshes/base%20link.stl"
+    package_dirs = {"share": str(share), "(other, share)": (share / "other", share),
+                    "itself": package}[dirs]  # fmt: skip
+    shape = read(meshed(filename), package_dirs=package_dirs).visuals[0].shape
+    assert (shape.path, shape.filename) == (mesh, filename)
     path = package / "urdf" / "arm.urdf"
-    path.write_text(meshed(filename))
-    found = read(path).visuals[0].shape.path
-    assert found.samefile(package / "meshes" / "base link.stl")
-    absolute = "file://" + str(found.resolve()).replace(" ", "%20")
-    path.write_text(meshed(absolute))
-    assert read(path).visuals[0].shape.path.samefile(found)
+    for name in (filename, "../meshes/base link.stl", f"file://{mesh}"):
+        path.write_text(meshed(name))
+        assert read(path).visuals[0].shape.path.samefile(mesh)
 
 
 def test_meshes_outside_of_the_urdf_and_its_package_need_permission(package):
@@ -416,7 +328,6 @@ def test_meshes_outside_of_the_urdf_and_its_package_need_permission(package):
     for name in names:
         path.write_text(meshed(name))
         assert read(path).visuals[0].shape.path is None, name
-        assert read(meshed(name)).visuals[0].shape.path is None, name
     path.write_text(meshed("../../secret.stl"))
     assert read(path, package_dirs=package.parent).visuals[0].shape.path.samefile(secret)
     (package / "package.xml").unlink()
@@ -430,39 +341,23 @@ def test_missing_meshes(package):
     assert read(text).visuals[0].shape.path is None
     with pytest.raises(MeshNotFoundError, match=r"nope\.stl' was not found \(looked at .*share"):
         read(text, package_dirs=package.parent)
-    with pytest.raises(FileNotFoundError):
-        read(text, package_dirs=[package.parent])
-
-
-@pytest.mark.parametrize("package_dirs", [5, None, [None]])
-def test_package_dirs_that_are_no_folders(package_dirs):
-    with pytest.raises(InvalidValueError, match="package_dirs: expected a folder or a list"):
-        read(meshed("a.stl"), package_dirs=package_dirs)
 
 
 # --- text and files -------------------------------------------------------------------------------
 
 GOOD = chain({}, name="good")
-OTHERS = "<gazebo><x/></gazebo><transmission><joint name='j1'/></transmission></robot>"
 
 
 @pytest.mark.parametrize(
     "text",
     [
         "\ufeff" + GOOD,
-        '<?xml version="1.0"?>\n' + GOOD,
-        '\n  <?xml version="1.0"?>' + GOOD,
-        '<?xml version="1.0" encoding="ISO-8859-1"?>' + GOOD,
-        '<?xml version="1.0" encoding="utf-16"?>' + GOOD,
-        GOOD.replace("><", ">\r\n<"),
-        GOOD.replace("<link", "<!-- a <comment> & more --><link").replace(
-            "</robot>",
-            "<gazebo><x/></gazebo><transmission><joint name='j1'/></transmission></robot>",
-        ),
+        '\n  <?xml version="1.0" encoding="ISO-8859-1"?>' + GOOD,
+        GOOD.replace("><", ">\r\n<").replace("<link", "<!-- a <comment> & more --><link"),
+        GOOD.replace("</robot>", "<gazebo><x/></gazebo><transmission/></robot>"),
         GOOD.replace("<robot", '<robot xmlns:xacro="http://ros.org/wiki/xacro"'),
-        GOOD.replace('name="good"', "name='good' version='1.0' extra='x'"),
     ],
-    ids=["bom", "declaration", "blank", "latin", "utf-16", "crlf", "others", "namespace", "attr"],
+    ids=["bom", "declaration", "comments", "others", "namespace"],
 )
 def test_texts_that_mean_the_same(text, tmp_path):
     assert read(text) == read(GOOD)
@@ -472,24 +367,17 @@ def test_texts_that_mean_the_same(text, tmp_path):
     assert read(str(path)) == read(GOOD)
 
 
-def test_a_declared_encoding_does_not_spoil_names():
-    text = '<?xml version="1.0" encoding="ISO-8859-1"?>' + GOOD.replace("j1", "drehé")
-    assert read(text).table.names == ("drehé",)
-
-
 BOMB = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 30))
 
 
 @pytest.mark.parametrize(
     "doctype",
     [
-        "<!DOCTYPE robot>",
         f'<!DOCTYPE robot [<!ENTITY e0 "ha">{BOMB}]>',
         '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>',
         '<!DOCTYPE robot SYSTEM "http://127.0.0.1:9/robot.dtd">',
-        '<!DOCTYPE robot [<!ENTITY % p SYSTEM "http://127.0.0.1:9/p"> %p;]>',
     ],
-    ids=["plain", "bomb", "file", "network", "parameter"],
+    ids=["bomb", "file", "network"],
 )
 def test_doctypes_are_refused_at_once(doctype):
     text = doctype + GOOD.replace("good", "&e29;" if "e29" in doctype else "&x;")
@@ -513,51 +401,19 @@ def test_xacro_is_refused_with_what_to_run(text, found):
     assert found in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf.xacro"])
-def test_xacro_files_are_refused_by_name(name, tmp_path):
-    (tmp_path / name).write_text(GOOD)
-    with pytest.raises(UrdfError, match=f"`xacro {re.escape(name)} > robot.urdf`"):
-        read(tmp_path / name)
-
-
 @pytest.mark.parametrize(
     ("source", "words"),
     [
         (b"<robot/>", "expected a path or the text of a URDF, got bytes"),
-        (None, "got NoneType"),
         (5, "got int"),
-        (["a.urdf"], "got list"),
         ("", "got an empty text"),
         ("nowhere/arm.urdf", "cannot read 'nowhere/arm.urdf': No such file"),
-        ("a\0b", "zero character"),
         (Path("/"), "cannot read '/'"),
-        ("x" * 5000, "cannot read 'xxx"),
     ],
 )
 def test_sources_that_are_neither_file_nor_text(source, words):
     with pytest.raises(UrdfError, match=words):
         read(source)
-
-
-def test_files_without_permission(tmp_path, monkeypatch):
-    """The refusal is played, because root may read every file."""
-    path = tmp_path / "arm.urdf"
-    path.write_text(GOOD)
-
-    def refuse(self, *_args, **_kwargs):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(self))
-
-    for reading in ("read_text", "read_bytes", "open"):
-        monkeypatch.setattr(Path, reading, refuse)
-    with pytest.raises(UrdfError, match="Permission denied"):
-        read(path)
-
-
-def test_files_that_are_not_text(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_bytes(b"<robot name='\xff\xfe'/>")
-    with pytest.raises(UrdfError, match="not UTF-8 text"):
-        read(path)
 
 
 # --- content that makes no sense ------------------------------------------------------------------
@@ -574,14 +430,10 @@ def visual(inside):
 
 MISTAKES = {
     "open tag": ("<robot name='r'><link name='a'>", "not well-formed XML.*no element found"),
-    "bad entity": (GOOD.replace("good", "&nope;"), "not well-formed XML: undefined entity"),
-    "rubbish after": (GOOD + "<robot/>", "not well-formed XML: junk after document"),
-    "surrogate": (GOOD.replace("good", "\ud800"), "cannot be decoded"),
     "other root": ("<sdf version='1.6'/>", "expected the root element <robot>, got <sdf>"),
     "no links": ("<robot name='r'/>", "has no <link>"),
     "nothing moves": (robot(link("a")), "no joint moves"),
     "nameless link": (robot("<link/>"), "a <link> has no name"),
-    "nameless joint": (GOOD.replace('name="j1" ', ""), "a <joint> has no name"),
     "two links alike": (robot(link("a"), link("a")), "two links are called 'a'"),
     "two joints alike": (
         robot(*map(link, "abc"), joint("j", "a", "b"), joint("j", "b", "c")),
@@ -591,7 +443,6 @@ MISTAKES = {
         robot(link("base_link"), link("b"), joint("j", "base_lnk", "b")),
         "'j': its parent link 'base_lnk' is not defined. Did you mean 'base_link'?",
     ),
-    "unknown child": (robot(link("a"), joint("j", "a", "zz")), "its child link 'zz' is not def"),
     "no child": (GOOD.replace('<child link="b"/>', ""), "needs a <parent link=...> and a <child"),
     "two parents": (
         robot(*map(link, "abc"), joint("j", "a", "c"), joint("k", "b", "c")),
@@ -602,20 +453,12 @@ MISTAKES = {
         robot(*map(link, "abc"), joint("j", "a", "b"), joint("k", "b", "a")),
         "a, b form a loop apart from the root",
     ),
-    "own child": (robot(*map(link, "ab"), joint("j", "b", "b")), "form a loop"),
     "two roots": (robot(*map(link, "abc"), joint("j", "a", "b")), r"2 root links \(a, c\)"),
-    "zero axis": (chain({"axis": "0 0 0"}), "joint 'j1': its axis is '0 0 0'"),
     "no direction": (chain({"axis": "1e-9 0 0"}), "an axis needs a direction"),
     "two numbers": (chain({"axis": "0 1"}), "'j1': axis: expected 3 finite numbers, got '0 1'"),
-    "words": (chain({"axis": "a b c"}), "axis: expected 3 numbers, got 'a b c'"),
-    "NaN axis": (chain({"axis": "nan 0 1"}), "expected 3 finite numbers, got 'nan 0 1'"),
     "NaN origin": (chain({"origin": '<origin xyz="0 nan 0"/>'}), "origin xyz: expected 3 finite"),
-    "inf rpy": (chain({"origin": '<origin rpy="0 0 inf"/>'}), "origin rpy: expected 3 finite"),
-    "empty xyz": (chain({"origin": '<origin xyz=""/>'}), "origin xyz: expected 3 finite numbers"),
     "no limits": (chain({"inside": ""}), "a revolute joint without limits is of type continuous"),
     "no stroke": (chain({"kind": "prismatic", "inside": ""}), "a prismatic joint needs <limit"),
-    "NaN limit": (chain({"inside": '<limit lower="nan"/>'}), "limit lower is NaN"),
-    "word limit": (chain({"inside": '<limit upper="far"/>'}), "upper must be a number, got 'far'"),
     "limits crossed": (
         chain({"inside": '<limit lower="1" upper="-1"/>'}), "lower limit 1.0 is above the upper",
     ),
@@ -623,27 +466,12 @@ MISTAKES = {
         chain({"inside": '<limit velocity="-1"/>'}), "'j1': limit velocity is a magnitude, got -1",
     ),
     "unknown type": (chain({"kind": "helical"}), "'j1' is of type 'helical'"),
-    "no type": (GOOD.replace('type="revolute"', ""), "is of type ''"),
-    "NaN damping": (
-        chain({"inside": LIMIT + '<dynamics damping="nan"/>'}), "dynamics damping: expected 1 fin",
-    ),
-    "NaN mimic": (
-        chain({"inside": LIMIT + '<mimic joint="j1" multiplier="nan"/>'}), "mimic multiplier",
-    ),
     "negative mass": (inertial("-1"), "link 'b': a mass cannot be negative, got -1.0 kg"),
-    "NaN mass": (inertial("nan"), "link 'b': mass value: expected 1 finite numbers"),
+    "no mass": (GOOD.replace("</link>", "<inertial/></link>", 1), "<mass"),
     "word inertia": (inertial(inertia='ixx="big"'), "inertia ixx: expected 1 numbers, got 'big'"),
-    "inf inertia": (inertial(inertia='izz="inf"'), "inertia izz"),
-    "com": (inertial(origin='<origin xyz="0 0"/>'), "'b': inertial: origin xyz: expected 3"),
-    "no shape": (visual("<geometry/>"), "link 'a': visual: there is no shape"),
-    "no geometry": (visual(""), "there is no shape"),
     "odd shape": (visual("<geometry><torus/></geometry>"), "unknown shape <torus>"),
     "box": (visual('<geometry><box size="1 2"/></geometry>'), "box size: expected 3"),
     "mesh": (visual("<geometry><mesh/></geometry>"), "a mesh has no filename"),
-    "color": (
-        visual('<geometry><sphere radius="1"/></geometry><material name=""><color rgba="1"/>'
-               "</material>"), "material color: expected 4",
-    ),
 }  # fmt: skip
 
 
@@ -651,18 +479,6 @@ MISTAKES = {
 def test_mistakes_are_refused_with_the_element_at_fault(text, words):
     with pytest.raises(UrdfError, match=words):
         read(text)
-
-
-def test_not_physical_but_finite_inertia_is_read_and_reported():
-    model = read(inertial(inertia='ixx="1" iyy="1" izz="9"'))
-    assert not model.inertia.is_physical.any()
-    assert "triangle inequality" in str(model.inertia.consistency())
-
-
-def test_a_mass_without_inertia_and_an_inertia_without_mass_are_read():
-    assert read(inertial(inertia="")).inertia.mass.tolist() == [1.0]
-    weightless = read(inertial("0", origin='<origin xyz="1 0 0"/>')).inertia
-    assert weightless.values[0].tolist() == [1, 0, 0, 1, 0, 1, 0, 0, 0, 0]
 
 
 def test_shapes_and_colours_are_kept():
@@ -691,29 +507,6 @@ def test_shapes_and_colours_are_kept():
 # --- size ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["revolute", "fixed"])
-def test_a_chain_of_a_thousand_links_is_read_without_recursion(kind):
-    f = 1000
-    origin = '<origin xyz="0.001 0 0"/>'
-    text = robot(
-        *(link(f"L{j}") for j in range(f + 1)),
-        *(joint(f"J{j}", f"L{j}", f"L{j + 1}", kind if j else "revolute", origin=origin)
-          for j in range(f)),
-    )  # fmt: skip
-    start = time.process_time()
-    model = read(text)
-    assert time.process_time() - start < 3.0
-    assert model.n == (f if kind == "revolute" else 1)
-    # in a batch: the scratch data of Pinocchio's single calls grow with the cube of n
-    T = rm.dgm(model, np.zeros((1, model.n)))
-    assert T[0, 0, 3] == pytest.approx(0.001 * f, abs=1e-12)
-
-
-def test_deeply_nested_elements_are_no_danger():
-    text = GOOD.replace("</robot>", "<x>" * 20000 + "</x>" * 20000 + "</robot>")
-    assert read(text).n == 1
-
-
 # --- real robots, there and back ------------------------------------------------------------------
 
 
@@ -739,34 +532,3 @@ def test_real_arms_there_and_back(name):
         assert np.array_equal(getattr(back.table, limit), getattr(model.table, limit)), limit
     lengths = np.abs([model.table.b, model.table.d, model.table.r])
     assert lengths.max() < 3.0, "no length beyond the robot's size, let alone kilometres"
-
-
-def test_a_tool_by_name_and_the_note_on_branches():
-    """A link called tool is the tool; without one, a choice among branches is said."""
-    hand = rm.load("erd:allegro_right_hand")
-    assert any("4 branches" in note for note in hand.notes)
-    panda = rm.load("erd:panda")
-    assert panda.tip == 7
-    assert not any("branches" in note for note in panda.notes)
-    q = np.linspace(-0.2, 0.4, panda.n)
-    assert np.abs(rm.dgm(panda, q) - rm.dgm(panda, q, "panda_hand_tcp")).max() < 1e-15
-
-
-def test_an_inertial_without_mass_is_refused():
-    text = """<robot name="r"><link name="a"/><link name="b"><inertial>
-    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
-    <joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
-    with pytest.raises(UrdfError, match="needs <mass"):
-        read(text)
-
-
-def test_a_mimic_joint_that_moves_by_itself_is_said():
-    text = """<robot name="pair"><link name="base"/><link name="a"/><link name="b"/>
-    <joint name="one" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
-      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-    <joint name="two" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
-      <origin xyz="1 0 0"/><mimic joint="one"/>
-      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
-    said = "joint 'two' mimics 'one' and moves by itself here"
-    assert any(said in note for note in rm.RobotModel.from_urdf(text).notes)
-    assert not any(said in note for note in rm.RobotModel.from_urdf(text, mimic=True).notes)

@@ -129,7 +129,7 @@ def _urdf_judged(data, _, random):
     return outcome(lambda: rm.RobotModel.from_urdf(text, **options), check_model)
 
 
-def _urdf_file_judged(data, folder, _):
+def _file_judged(data, folder, _):
     path = folder / "robot.urdf"
     path.write_bytes(data)
     return outcome(lambda: rm.RobotModel.from_urdf(path), check_model)
@@ -160,23 +160,16 @@ def _log_judged(suffix):
 def _measured_judged(data, folder, random):
     path = folder / "measured.csv"
     path.write_bytes(data)
-    kind = random.choice(KINDS)
-    options = {}
+    kind, options = random.choice(KINDS), {}
     if kind in ("pose", "orientation", "relative_pose"):
-        options["orientation"] = random.choice(("rpy", "rpy_urdf", "quaternion", "angle_axis"))
-        options["joints"] = ["joint_1", "joint_2"]
-        size = {"quaternion": 4}.get(options["orientation"], 3)
-        if random.random() < 0.7:
-            turned = list(range(5, 5 + size))
-            options["columns"] = turned if kind == "orientation" else [2, 3, 4, *turned]
-    if kind == "relative_pose" or (kind == "distance" and random.random() < 0.5):
-        options["other_joints"] = random.choice((["joint_1", "joint_2"], [2, 3]))
+        options = {"orientation": random.choice(("rpy", "rpy_urdf", "angle_axis")),
+                   "joints": ["joint_1", "joint_2"]}  # fmt: skip
+    if kind == "relative_pose":
+        options["other_joints"] = [2, 3]
     elif kind.endswith("contact") or kind == "distance":
         options["label"] = random.choice(("point", 9, 0))
-    if random.random() < 0.2:
-        options["angles"] = "deg"
-    if random.random() < 0.2:
-        options["lengths"] = "mm"
+    if random.random() < 0.3:
+        options |= {"angles": "deg", "lengths": "mm"}
     return outcome(lambda: read_measurements(path, kind, planar(), **options), check_measurement)
 
 
@@ -198,22 +191,17 @@ def _rows_judged(data, *_):
 
 
 TARGETS = {
-    "urdf": Target(lambda random: mutations.urdf(random, URDF).encode(), _urdf_judged),
-    "urdf_file": Target(
-        lambda random: mutations.bytes_of(random, URDF.encode(), 2), _urdf_file_judged
-    ),
-    "par": Target(
-        lambda random: mutations.par(random, PAR).encode("utf-8", "replace"), _par_judged
-    ),
+    "urdf": Target(lambda random: mutations.text_of(random, URDF), _urdf_judged),
+    "urdf_file": Target(lambda random: mutations.bytes_of(random, URDF.encode(), 2), _file_judged),
+    "par": Target(lambda random: mutations.text_of(random, PAR), _par_judged),
     "log_csv": Target(
-        lambda random: mutations.table(random, random.choice((LOG_CSV, LOG_CSV, ROS_CSV))),
+        lambda random: mutations.text_of(random, random.choice((LOG_CSV, LOG_CSV, ROS_CSV))),
         _log_judged(".csv"),
     ),
     "log_npz": Target(lambda random: mutations.npz(random, LOG), _log_judged(".npz")),
     "log_mat": Target(lambda random: mutations.mat(random, LOG), _log_judged(".mat")),
-    "log_parquet": Target(lambda random: mutations.parquet(random, LOG), _log_judged(".parquet")),
     "measurements": Target(
-        lambda random: mutations.table(random, MEASURED_CSV), _measured_judged
+        lambda random: mutations.text_of(random, MEASURED_CSV), _measured_judged
     ),
     "rows": Target(lambda random: str(random.random()).encode(), _rows_judged),
 }  # fmt: skip

@@ -113,14 +113,6 @@ def check_log(log):
     assert len(log) >= 1
 
 
-def check_measurement(measured):
-    """Readings and measured values that are finite."""
-    for name in ("q", "p", "T", "d", "distance", "other"):
-        value = getattr(measured, name, None)
-        if isinstance(value, np.ndarray):
-            assert np.isfinite(value).all(), f"{name} is not finite"
-
-
 def check_table(table):
     """A geometric table of finite numbers."""
     for name in ("gamma", "b", "beta", "alpha", "d", "theta", "r"):

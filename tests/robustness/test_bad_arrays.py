@@ -1,68 +1,87 @@
 """Arrays of wrong shapes and kinds at the borders of the main functions: refused, or computed."""
 
 import dataclasses
-from functools import cache
 
 import numpy as np
 import pytest
+from looped_robots import four_bar
 from robustness.inputs import planar
 from robustness.outcomes import Outcome, outcome
 
 import robotmodels as rm
-from robotmodels import calibration, identification, trajectories
+from robotmodels import (
+    calibration,
+    control,
+    flexible,
+    identification,
+    loops,
+    parallel,
+    performance,
+    trajectories,
+)
+from robotmodels import visual_servoing as vs
+from robotmodels.obstacles import Sphere, clearance
 
 # torques that have nothing to do with the motion are as good as any here
-pytestmark = pytest.mark.filterwarnings("ignore:Poor prediction")
+pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("ignore:Poor prediction")]
 
 BAD = (
-    None, True, "a", "", b"1", 1j, object(), float("nan"), float("inf"), -1e308, 1e308, 10**400, 3,
-    [], [[]], [1.0], [1.0, 2.0, 3.0], ["a", "b"], [None, 1.0], [[1.0], [1.0, 2.0]], {}, {"a": 1.0},
-    np.array([1.0, np.nan]), np.array([np.inf, 1.0]), np.array([1e308, -1e308]),
-    np.array([1.0, 2.0], dtype=object), np.array(["1", "2"]), np.array([1j, 2.0]),
-    np.array([True, False]), np.zeros((0, 2)), np.zeros((2, 0)), np.zeros((3, 1)), np.zeros((2, 3)),
+    None, True, "a", 1j, object(), float("nan"), float("inf"), -1e308, 10**400, 3, [], [[]], [1.0],
+    [1.0, 2.0, 3.0], ["a", "b"], [None, 1.0], [[1.0], [1.0, 2.0]], {"a": 1.0},
+    np.array([1.0, np.nan]), np.array([1e308, -1e308]), np.array([1.0, 2.0], dtype=object),
+    np.array([True, False]), np.zeros((0, 2)), np.zeros((3, 1)), np.zeros((2, 3)),
     np.zeros((1, 1, 1, 1, 2)), np.ma.masked_array([1.0, 2.0], [True, False]),
-    np.array([1, 2], dtype=np.int8), np.array([1.0, 2.0], dtype=np.float16),
-    np.array([5e-324, 0.0]), np.datetime64("2020-01-01"), np.zeros(2, "V8"), range(2), (0.0, 1.0),
-    iter([1.0, 2.0]), np.eye(4), np.zeros((4, 4)), np.full((4, 4), np.nan), np.eye(4)[None] * 2.0,
-    np.zeros((4, 4, 3)), np.eye(3), 1e308 * np.eye(4), lambda: 0, np.zeros((3, 2))[::-1], set(),
+    np.array([1, 2], dtype=np.int8), np.array([5e-324, 0.0]), np.datetime64("2020-01-01"),
+    np.zeros(2, "V8"), range(2), iter([1.0, 2.0]), np.eye(4), np.zeros((4, 4)),
+    np.full((4, 4), np.nan), np.zeros((4, 4, 3)), 1e308 * np.eye(4), lambda: 0,
+    np.zeros((3, 2))[::-1], set(),
 )  # fmt: skip
-
-
-@cache
-def arm():
-    """Two joints with inertia and friction."""
-    model = planar()
-    return model.with_inertia(rm.uniform_bodies(model, 4.0))
-
-
-def _good():
-    return np.array([0.3, 0.4]), np.array([0.1, -0.2]), np.array([0.5, 0.6])
-
-
-Q, V, A = _good()
-T = rm.dgm(planar(), Q)
+MODEL = planar()
+ARM = MODEL.with_inertia(rm.uniform_bodies(MODEL, 4.0))
+Q, V, A = np.array([0.3, 0.4]), np.array([0.1, -0.2]), np.array([0.5, 0.6])
+T = rm.dgm(MODEL, Q)
 LOG_T = 0.01 * np.arange(60)[:, None]
 TIMES = 0.01 * np.arange(400)[:, None]
+LIMITS = trajectories.MotionLimits(velocity=1.0, acceleration=2.0)
+
+HEXAPOD = parallel.gough_symmetric(1.0, lower=0.8, upper=1.5)
+PLATE = HEXAPOD.pose([0.1, 0.05, 1.0, 0.1, 0.2, 0.1])
+LEGS = parallel.igm(HEXAPOD, PLATE).q[0]
+TWIST = np.array([0.1, 0.0, 0.2, 0.1, 0.1, 0.0])
+
+FOUR_BAR = four_bar(np.random.default_rng(0))
+BAR = loops.close(FOUR_BAR, [0.6]).q
+REST, STARTS = np.zeros(3), loops.velocity_map(FOUR_BAR, BAR) @ [0.5]
+
+POINTS = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
+SQUARE, GOAL = vs.Points(POINTS), rm.se3.translation(0, 0, 0.5)
+SEEN = rm.se3.translation(0.1, 0, 0.9) @ rm.se3.rotation("x", 0.6)
+IMAGE = SQUARE.measure(SEEN).reshape(4, 2)
+
+LINK = flexible.beam(0.5, EI=(np.inf, 1.0), density=0.2, hub=0.1)
+BENT = flexible.FlexibleRobot(MODEL, {1: LINK, 2: LINK})
+E = np.zeros(BENT.m)
+
 CALLS = {
-    "dgm": (lambda q: rm.dgm(arm(), q), [Q]),
-    "link_poses": (lambda q: rm.link_poses(arm(), q), [Q]),
-    "link_transforms": (lambda q: rm.link_transforms(arm().table, q), [Q]),
-    "jacobian": (lambda q, frame: rm.jacobian(arm(), q, frame), [Q, None]),
-    "jacobian_rate": (lambda q, v: rm.jacobian_rate(arm(), q, v), [Q, V]),
-    "dkm": (lambda q, v: rm.dkm(arm(), q, v), [Q, V]),
-    "ikm": (lambda q, w: rm.ikm(arm(), q, w), [Q, np.zeros(6)]),
-    "idm": (lambda q, v, a, w: rm.idm(arm(), q, v, a, w), [Q, V, A, np.zeros(6)]),
-    "ddm": (lambda q, v, u: rm.ddm(arm(), q, v, u), [Q, V, A]),
-    "mass_matrix": (lambda q: rm.mass_matrix(arm(), q), [Q]),
-    "coriolis_matrix": (lambda q, v: rm.coriolis_matrix(arm(), q, v), [Q, V]),
-    "gravity_torque": (lambda q: rm.gravity_torque(arm(), q), [Q]),
-    "kinetic_energy": (lambda q, v: rm.kinetic_energy(arm(), q, v), [Q, V]),
-    "torque_regressor": (lambda q, v, a: rm.torque_regressor(arm(), q, v, a), [Q, V, A]),
-    "energy_regressor": (lambda q, v: rm.energy_regressor(arm(), q, v), [Q, V]),
-    "igm": (lambda T, r: rm.igm(arm(), T, r, mask=[1, 1, 0, 0, 0, 0]), [T, Q]),
-    "igm_mask": (lambda T, m: rm.igm(arm(), T, mask=m), [T, [1, 1, 0, 0, 0, 0]]),
-    "igm_numeric": (lambda T, q0: rm.igm_numeric(arm(), T, q0, rng=0), [T, Q]),
-    "base_parameters": (lambda method: rm.base_parameters(arm(), method), ["symbolic"]),
+    "dgm": (lambda q: rm.dgm(ARM, q), [Q]),
+    "link_poses": (lambda q: rm.link_poses(ARM, q), [Q]),
+    "link_transforms": (lambda q: rm.link_transforms(ARM.table, q), [Q]),
+    "jacobian": (lambda q, frame: rm.jacobian(ARM, q, frame), [Q, None]),
+    "jacobian_rate": (lambda q, v: rm.jacobian_rate(ARM, q, v), [Q, V]),
+    "dkm": (lambda q, v: rm.dkm(ARM, q, v), [Q, V]),
+    "ikm": (lambda q, w: rm.ikm(ARM, q, w), [Q, np.zeros(6)]),
+    "idm": (lambda q, v, a, w: rm.idm(ARM, q, v, a, w), [Q, V, A, np.zeros(6)]),
+    "ddm": (lambda q, v, u: rm.ddm(ARM, q, v, u), [Q, V, A]),
+    "mass_matrix": (lambda q: rm.mass_matrix(ARM, q), [Q]),
+    "coriolis_matrix": (lambda q, v: rm.coriolis_matrix(ARM, q, v), [Q, V]),
+    "gravity_torque": (lambda q: rm.gravity_torque(ARM, q), [Q]),
+    "kinetic_energy": (lambda q, v: rm.kinetic_energy(ARM, q, v), [Q, V]),
+    "torque_regressor": (lambda q, v, a: rm.torque_regressor(ARM, q, v, a), [Q, V, A]),
+    "energy_regressor": (lambda q, v: rm.energy_regressor(ARM, q, v), [Q, V]),
+    "igm": (lambda T, r: rm.igm(ARM, T, r, mask=[1, 1, 0, 0, 0, 0]), [T, Q]),
+    "igm_mask": (lambda T, m: rm.igm(ARM, T, mask=m), [T, [1, 1, 0, 0, 0, 0]]),
+    "igm_numeric": (lambda T, q0: rm.igm_numeric(ARM, T, q0, rng=0), [T, Q]),
+    "base_parameters": (lambda method: rm.base_parameters(ARM, method), ["symbolic"]),
     "pose_from_coordinates": (lambda x, k: rm.pose_from_coordinates(x, k), [np.zeros(6), "rpy"]),
     "operational_coordinates": (lambda T, k: rm.operational_coordinates(T, k), [T, "rpy"]),
     "joint_trajectory": (
@@ -70,28 +89,110 @@ CALLS = {
     ),
     "cartesian_trajectory": (lambda a, b, N: trajectories.cartesian_trajectory(a, b, N), [T, T, 5]),
     "with_inertia": (
-        lambda x: arm().with_inertia(rm.InertialParameters(x)), [np.zeros((2, 10))],
+        lambda x: ARM.with_inertia(rm.InertialParameters(x)), [np.zeros((2, 10))],
     ),
-    "gravity": (lambda x: arm().with_gravity(x), [[0.0, 0.0, -9.81]]),
-    "tool": (lambda x: arm().with_tool(x), [np.eye(4)]),
+    "gravity": (lambda x: ARM.with_gravity(x), [[0.0, 0.0, -9.81]]),
+    "tool": (lambda x: ARM.with_tool(x), [np.eye(4)]),
     "simulate": (
-        lambda q, v, t: rm.simulate(arm(), q, v, None, t, max_evaluations=2000),
+        lambda q, v, t: rm.simulate(ARM, q, v, None, t, max_evaluations=2000),
         [Q, V, np.linspace(0.0, 0.02, 3)],
     ),
     "log": (lambda dt, q, tau: identification.Log(dt, q, tau), [0.01, LOG_T * Q, LOG_T * V]),
     "fit": (
         lambda q, tau: identification.fit(
-            arm(), identification.Log(0.01, q, tau), checked=False
+            ARM, identification.Log(0.01, q, tau), checked=False
         ),
         [np.sin(TIMES * [3.0, 2.0]), np.cos(TIMES * [2.0, 2.5])],
     ),
     "position": (lambda q, p: calibration.Position(q, p), [LOG_T * Q, LOG_T * [1.0, 2.0, 3.0]]),
     "calibrate": (
         lambda q, p: calibration.fit(
-            arm(), calibration.Position(q, p), parameters=("theta2",), base=False, tool=False
+            ARM, calibration.Position(q, p), parameters=("theta2",), base=False, tool=False
         ),
-        [LOG_T[::4] * Q * 3.0, rm.dgm(planar(), LOG_T[::4] * Q * 3.0)[:, :3, 3]],
+        [LOG_T[::4] * Q * 3.0, rm.dgm(MODEL, LOG_T[::4] * Q * 3.0)[:, :3, 3]],
     ),
+    "workspace": (
+        lambda limits, n: performance.workspace(ARM, limits=limits, resolution=n), [False, 8],
+    ),
+    "accessibility": (
+        lambda T: performance.accessibility(ARM, T, limits=False, mask=[1, 1, 0, 0, 0, 0]),
+        [rm.dgm(ARM, Q)[None]],
+    ),
+    "isotropy_index": (
+        lambda q, mask, length: performance.isotropy_index(ARM, q, mask, length),
+        [Q, [1, 1, 0, 0, 0, 0], 1.0],
+    ),
+    "polytope": (
+        lambda q, mask: performance.polytope(rm.load("ur5e"), q, mask=mask),
+        [np.array([0.1, -1.0, 0.8, 0.2, 0.5, 0.1]), [1, 1, 1, 0, 0, 0]],
+    ),
+    "time_optimal": (
+        lambda a, b: trajectories.time_optimal(trajectories.quintic(a, b, duration=1.0), LIMITS),
+        [Q, V],
+    ),
+    "clearance": (
+        lambda q, p, r: clearance(ARM, q, [Sphere(p, r)], 0.05), [Q, [3.0, 0.0, 0.0], 0.1],
+    ),
+    "parallel.igm": (lambda T: parallel.igm(HEXAPOD, T), [PLATE]),
+    "parallel.dgm": (lambda q, T0: parallel.dgm(HEXAPOD, q, T0), [LEGS, PLATE]),
+    "assembly_modes": (lambda q: parallel.assembly_modes(HEXAPOD, q), [LEGS]),
+    "parallel.ikm": (lambda T, V: parallel.ikm(HEXAPOD, T, V), [PLATE, TWIST]),
+    "parallel.dkm": (lambda T, v: parallel.dkm(HEXAPOD, T, v), [PLATE, TWIST]),
+    "leg_forces": (lambda T, f: parallel.leg_forces(HEXAPOD, T, f), [PLATE, TWIST]),
+    "stiffness": (lambda T, k: parallel.stiffness(HEXAPOD, T, k), [PLATE, np.ones(6)]),
+    "condition": (lambda T, L: parallel.condition(HEXAPOD, T, L), [PLATE, 1.0]),
+    "gough": (lambda b, p: parallel.gough(b, p), [HEXAPOD.base, HEXAPOD.platform]),
+    "five_bar": (
+        lambda b, p, d: parallel.five_bar(b, p, d),
+        [[[-0.5, 0.0], [0.5, 0.0]], [1.0, 1.0], [1.2, 1.2]],
+    ),
+    "loops.close": (lambda q, near: loops.close(FOUR_BAR, q, near), [BAR[:1], BAR]),
+    "loops.mobility": (lambda q: loops.mobility(FOUR_BAR, q), [BAR]),
+    "loops.idm": (lambda q, v, a: loops.idm(FOUR_BAR, q, v, a), [BAR, REST, STARTS]),
+    "loops.ddm": (lambda q, v, tau: loops.ddm(FOUR_BAR, q, v, tau), [BAR, REST, [0.5]]),
+    "ComputedTorque": (
+        lambda w, q, v: control.run(
+            ARM, control.ComputedTorque(Q, omega=w, model=ARM), q, v, t=0.02, max_evaluations=3000
+        ),
+        [10.0, Q, V],
+    ),
+    "DecentralizedPID": (
+        lambda kp, ki, kd: control.run(
+            ARM, control.DecentralizedPID(Q, kp, ki, kd), Q, t=0.02, max_evaluations=3000
+        ),
+        [[9.0, 9.0], [1.0, 1.0], [2.0, 2.0]],
+    ),
+    "SpringWall": (
+        lambda p, n, k: control.SpringWall(p, n, k), [np.zeros(3), [0, 0, 1.0], 1e3],
+    ),
+    "pid_gains": (lambda a, F, w: control.pid_gains(a, F, w), [1.0, 0.5, 10.0]),
+    "Points": (vs.Points, [POINTS]),
+    "camera_velocity": (lambda T: vs.camera_velocity(vs.Task(SQUARE, GOAL), T), [SEEN]),
+    "servo": (
+        lambda goal, T: vs.servo(vs.task_3d(goal), T, duration=0.2), [GOAL, SEEN],
+    ),
+    "pnp": (vs.pnp, [POINTS, IMAGE]),
+    "p3p": (vs.p3p, [POINTS[:3], IMAGE[:3]]),
+    "homography": (vs.homography, [IMAGE, SQUARE.measure(GOAL).reshape(4, 2)]),
+    "interaction_point": (vs.interaction_point, [0.1, 0.2, 1.0]),
+    "beam": (
+        lambda L, EI, d: flexible.beam(L, EI=EI, density=d), [0.5, 1.0, 0.2],
+    ),
+    "flexible.idm": (
+        lambda q, e, v, a: flexible.idm(BENT, q, e, v, None, a), [Q, E, V, A],
+    ),
+    "flexible.ddm": (
+        lambda q, e, v, tau: flexible.ddm(BENT, q, e, v, None, tau), [Q, E, V, A],
+    ),
+    "flexible.dgm": (lambda q, e: flexible.dgm(BENT, q, e), [Q, E]),
+    "static_deflection": (
+        lambda q, f: flexible.static_deflection(BENT, q, f), [Q, 0.01 * TWIST],
+    ),
+    "flexible.simulate": (
+        lambda q, tau: flexible.simulate(BENT, q, None, tau, 0.01, max_evaluations=2000), [Q, A],
+    ),
+    "input_shaper": (lambda f, z: flexible.input_shaper(f, z), [3.0, 0.05]),
+    "elastica": (lambda L, EI, f: flexible.elastica(L, EI, f), [1.0, 1.0, 0.5]),
 }  # fmt: skip
 # squares of velocities near the largest float are infinite, which no border is asked to foresee
 OVERFLOWING = ("idm", "ddm", "coriolis_matrix", "kinetic_energy", "torque_regressor",
@@ -114,25 +215,14 @@ def overflows(bad):
     return bool((np.isfinite(array) & (np.abs(array) > 1e150)).any())
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled_before():
-    # what is compiled at a first call is not interrupted by the limit of time
-    for call, good in CALLS.values():
-        call(*good)
-    for name in ("igm", "igm_mask"):  # the base itself is met by a whole family of postures
-        call, good = CALLS[name]
-        call(np.eye(4), *good[1:])
-
-
-@pytest.mark.parametrize("name", list(CALLS))
-def test_good_arguments_are_answered(name):
-    call, good = CALLS[name]
-    assert outcome(lambda: call(*good), check_numbers, ()) is Outcome.ANSWERED
-
-
 @pytest.mark.parametrize("name", list(CALLS))
 def test_bad_arguments_are_refused_or_answered(name):
     call, good = CALLS[name]
+    call(*good)  # compiled here, not within the limit of time
+    if name in ("igm", "igm_mask"):  # the base itself is met by a whole family of postures
+        call(np.eye(4), *good[1:])
+    assert outcome(lambda: call(*good), check_numbers, ()) is Outcome.ANSWERED
+    found = []
     for place in range(len(good)):
         for bad in BAD:
             arguments = [*good]
@@ -141,9 +231,7 @@ def test_bad_arguments_are_refused_or_answered(name):
             check = (lambda answer: None) if large else check_numbers
             try:
                 outcome(lambda arguments=arguments: call(*arguments), check, ())
-            except Exception as error:
-                if large and isinstance(error, RuntimeWarning) and "overflow" in str(error):
-                    continue
-                raise AssertionError(
-                    f"{name}, argument {place} = {bad!r:.80}: {error!r}"
-                ) from error
+            except Exception as error:  # noqa: BLE001  what else comes is counted
+                if not (overflows(bad) and "overflow" in str(error)):
+                    found.append(f"argument {place} = {bad!r:.80}: {error!r:.200}")
+    assert not found, f"{name}:\n" + "\n".join(found)

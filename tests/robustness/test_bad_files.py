@@ -12,7 +12,6 @@ from robustness.outcomes import Outcome
 
 pytestmark = pytest.mark.nightly
 
-# slow ones draw fewer: they are fuzzed for longer by tests/nightly/fuzz.py
 EXAMPLES = {"urdf": 300, "par": 300, "log_csv": 200, "rows": 300}
 
 

@@ -3,7 +3,6 @@
 import json
 import multiprocessing
 import os
-import pickle
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -12,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from robustness.parallel_work import WORK, everything, models_of_motion, robots
-
-import robotmodels as rm
 
 pytestmark = pytest.mark.nightly
 
@@ -50,15 +47,6 @@ def test_threads_with_mixed_robots_give_the_numbers_of_one(jobs, alone):
     assert found == [alone[k] for k in order]
 
 
-def test_one_model_shared_by_many_threads(models):
-    # each thread must have its own scratch data of Pinocchio
-    model = models[0]
-    wanted = [models_of_motion(model, seed) for seed in range(24)]
-    with ThreadPoolExecutor(THREADS) as pool:
-        for _ in range(2):
-            assert list(pool.map(lambda seed: models_of_motion(model, seed), range(24))) == wanted
-
-
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_processes_give_the_numbers_of_one(jobs, alone, method, monkeypatch):
@@ -68,13 +56,6 @@ def test_processes_give_the_numbers_of_one(jobs, alone, method, monkeypatch):
     with ProcessPoolExecutor(2, mp_context=context) as pool:
         found = list(pool.map(everything, *zip(*jobs, strict=True), timeout=120.0))
     assert found == alone
-
-
-def test_models_are_the_same_after_a_pickle(models):
-    for model in models:
-        again = pickle.loads(pickle.dumps(model))
-        assert models_of_motion(again) == models_of_motion(model)
-        assert not again.table.d.flags.writeable
 
 
 FIRST = """
@@ -102,19 +83,3 @@ def test_a_first_call_from_many_threads_at_once(models):
     assert done.returncode == 0, done.stderr
     wanted = [everything(WORK[k % len(WORK)].__name__, models[0], 1) for k in range(THREADS)]
     assert json.loads(done.stdout) == wanted
-
-
-def test_a_lazy_name_asked_for_by_many_threads():
-    code = (
-        "import threading, robotmodels as rm\n"
-        "from concurrent.futures import ThreadPoolExecutor\n"
-        "names = [n for n in rm.__all__] * 4\n"
-        "with ThreadPoolExecutor(8) as pool:\n"
-        "    print(len(list(pool.map(lambda n: getattr(rm, n), names))))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300.0, check=False,
-        env={**os.environ, "PYTHONPATH": str(TESTS.parent)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) == 4 * len(rm.__all__)
