@@ -6,7 +6,10 @@ import csv
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,64 +47,64 @@ class CsvTable:
         return column_number(self.path, self.names, self.width, column, what)
 
     def numbers(self, columns: Sequence[int]) -> Array:
-        """Columns of numbers. Shapes: -> (N, number of columns)."""
-        try:
-            values = self._loaded(columns)
-        except InvalidValueError:
-            raise
-        except ValueError:
-            values = np.zeros((0, len(columns)))
-        if not len(values) or not np.isfinite(values).all():
-            self._raise_bad_cell(columns)
-        return values
-
-    def _loaded(self, columns: Sequence[int]) -> Array:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # no data: the callers raise
-            values = np.loadtxt(
-                self.path, delimiter=self.delimiter, skiprows=self.first, quotechar='"',
-                usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
-            )  # fmt: skip
-        # a quotation mark without its end takes the lines up to the next one into its cell
-        if _has_quotes(self.path) and len(values) != sum(1 for _ in self._rows()):
+        """Columns of finite numbers. Shapes: -> (N, number of columns)."""
+        values = self.numbers_with_gaps(columns)
+        for row, place in np.argwhere(np.isnan(values))[:1].tolist():
+            line, cells = next(islice(self._rows(), row, None))
+            cell = cells[columns[place]]
             raise InvalidValueError(
-                f"{self.path}: a cell begins with a quotation mark that has no end in its line, so "
-                "that rows would be lost. Close it, or take it out."
+                f"{self.path}, line {line}: {self._called(columns[place])} is "
+                f"{repr(cell) if cell else 'empty'}. A row that was not measured is left out: "
+                "delete the line."
             )
         return values
 
     def numbers_with_gaps(self, columns: Sequence[int]) -> Array:
-        """Columns of numbers, NaN where a cell is empty, infinite or not a number.
+        """Columns of numbers, NaN where a cell is empty or infinite.
 
         Shapes: -> (N, number of columns).
         """
+        options: dict[str, Any] = {"delimiter": self.delimiter, "skiprows": self.first}
+        options |= {"comments": _COMMENT, "encoding": "utf-8-sig", "ndmin": 2, "quotechar": '"'}
         try:
-            values = self._loaded(columns)
-        except InvalidValueError:
-            raise
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # no data: an error below
+                values = np.loadtxt(self.path, usecols=list(columns), **options)
         except ValueError:
             values = self._cell_by_cell(columns)
         if not len(values):
-            self._raise_bad_cell(columns)
+            raise InvalidValueError(
+                f"{self.path}: no line of numbers. Give a file with a row for each measurement."
+            )
+        # a quotation mark without its end takes the lines up to the next one into its cell
+        with self.path.open("rb") as file:
+            quoted = any(b'"' in line for line in file)
+        if quoted and len(values) != sum(1 for _ in self._rows()):
+            raise InvalidValueError(
+                f"{self.path}: a cell begins with a quotation mark that has no end in its line, so "
+                "that rows would be lost. Close it, or take it out."
+            )
         values[~np.isfinite(values)] = np.nan
         return values
 
     def _cell_by_cell(self, columns: Sequence[int]) -> Array:
+        """Columns of numbers; raises with the line and the cell that is none."""
         rows = []
         for line, cells in self._rows():
-            if len(cells) != self.width:
+            if len(cells) <= max(columns):
                 raise InvalidValueError(
                     f"{self.path}, line {line}: expected {self.width} columns as in the first "
                     f"line, got {len(cells)}. Delete the line if it was cut off."
                 )
-            row = []
             for column in columns:
-                cell = cells[column]
-                try:
-                    row.append(float(cell or "nan"))
-                except ValueError:
-                    raise self._no_number(line, column, cell) from None
-            rows.append(row)
+                if not is_number(cells[column]):
+                    comma = "," in cells[column] and self.delimiter != ","
+                    raise InvalidValueError(
+                        f"{self.path}, line {line}: {self._called(column)} is "
+                        f"{cells[column]!r:.60}, not a number."
+                        + (" Write a point for the decimal comma." if comma else "")
+                    )
+            rows.append([float(cells[column] or "nan") for column in columns])
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
 
     def cells(self, column: int) -> Iterator[tuple[int, str]]:
@@ -133,40 +136,6 @@ class CsvTable:
         for number, text in _lines(self.path):
             if number > self.first and text.strip():
                 yield number, cells_of(text, self.delimiter)
-
-    def _raise_bad_cell(self, columns: Sequence[int]) -> None:
-        for line, cells in self._rows():
-            for column in columns:
-                where = f"{self.path}, line {line}"
-                if column >= len(cells):
-                    raise InvalidValueError(
-                        f"{where}: expected {self.width} columns as in the first line, got "
-                        f"{len(cells)}."
-                    )
-                cell = cells[column]
-                if not cell:
-                    raise InvalidValueError(
-                        f"{where}: {self._called(column)} is empty. Fill it in, or delete the line."
-                    )
-                try:
-                    finite = np.isfinite(float(cell))
-                except ValueError:
-                    raise self._no_number(line, column, cell) from None
-                if not finite:
-                    raise InvalidValueError(
-                        f"{where}: {self._called(column)} is {cell!r}. A row that was not measured "
-                        "is left out: delete the line."
-                    )
-        raise InvalidValueError(
-            f"{self.path}: no line of numbers. Give a file with a row for each measurement."
-        )
-
-    def _no_number(self, line: int, column: int, cell: str) -> InvalidValueError:
-        comma = "," in cell and self.delimiter != ","
-        return InvalidValueError(
-            f"{self.path}, line {line}: {self._called(column)} is {cell!r:.60}, not a number."
-            + (" Write a point for the decimal comma." if comma else "")
-        )
 
 
 def column_number(path: Path, names: Sequence[str], width: int, column: Column, what: str) -> int:
@@ -234,22 +203,15 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """Number of every line, from 1, and its text without comment, as NumPy counts them."""
     try:
         with path.open(encoding="utf-8-sig") as file:
-            number = 0
-            while line := file.readline(_LONGEST + 1):
-                number += 1
-                if len(line) > _LONGEST:
+            for number, line in enumerate(iter(partial(file.readline, _LONGEST), ""), 1):
+                if len(line) == _LONGEST:
                     raise InvalidValueError(
-                        f"{path}, line {number}: it is longer than {_LONGEST} letters; expected "
-                        "a text file of columns (CSV) with a row on each line."
+                        f"{path}, line {number}: it is longer than {_LONGEST} letters; expected a "
+                        "text file of columns (CSV) with a row on each line."
                     )
                 yield number, line.split(_COMMENT, 1)[0].strip("\r\n")
     except UnicodeDecodeError:
         raise InvalidValueError(f"{path}: expected a text file of columns (CSV).") from None
-
-
-def _has_quotes(path: Path) -> bool:
-    with path.open("rb") as file:
-        return any(b'"' in part for part in iter(lambda: file.read(_LONGEST), b""))
 
 
 def is_number(cell: str) -> bool:

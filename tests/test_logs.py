@@ -21,16 +21,10 @@ Q = np.zeros((4, 2))
     ("given", "error", "words"),
     [
         ({"dt": 0.0}, InvalidValueError, "dt: expected the sampling period in seconds"),
-        ({"dt": [0.1, 0.1]}, InvalidValueError, "dt: expected the sampling period"),
         ({"q": np.zeros(4)}, ShapeError, r"q: expected samples of shape \(N, n\)"),
-        ({"q": np.zeros((0, 2))}, InvalidValueError, "q: the log is empty"),
-        ({"tau": None}, InvalidValueError, "tau: expected samples"),
         ({"tau": np.zeros((3, 2))}, ShapeError, r"tau: expected shape \(4, 2\) as q has it"),
-        ({"v": np.zeros((4, 1))}, ShapeError, r"v: expected shape \(4, 2\)"),
         ({"names": ("one",)}, ShapeError, "names: expected 2 names of joints, got 1"),
         ({"starts": (0, 2, 2)}, InvalidValueError, "starts: expected ascending numbers"),
-        ({"starts": (0, 4)}, InvalidValueError, "below 4"),
-        ({"starts": ()}, InvalidValueError, "starts"),
     ],
 )
 def test_impossible_logs_are_refused(given, error, words):
@@ -54,10 +48,8 @@ def test_slices_are_rows():
     for rows in (slice(0, 9000), slice(3, 3)):
         with pytest.raises(InvalidValueError, match="2000 rows"):
             log[rows]
-    for rows in (slice(None, None, 2), 3):
-        with pytest.raises(InvalidValueError, match=r"single samples.*needs a filter"):
-            log[rows]
-    assert "1300 samples of 2 joints at 100 Hz, 13 s in 2 recordings" in repr(part)
+    with pytest.raises(InvalidValueError, match=r"single samples.*needs a filter"):
+        log[::2]
 
 
 # --- time base -----------------------------------------------------------------------------------
@@ -75,7 +67,6 @@ def test_gaps_and_jumps_back_split():
     assert rows.starts.tolist() == [0, 40, 70]
     assert rows.dt == pytest.approx(DT)
     assert np.array_equal(rows.values, values(t))
-    assert "goes back or has a gap at 2 rows, first before row 40" in " ".join(rows.notes)
 
 
 def test_gaps_may_be_allowed():
@@ -84,7 +75,7 @@ def test_gaps_may_be_allowed():
     assert len(split.starts) == 2
     whole = regular_rows(t, values(t), "x", dt=DT, largest_gap=5.0)
     assert len(whole.starts) == 1
-    np.testing.assert_allclose(whole.values, values(DT * np.arange(200)), atol=1e-4)
+    np.testing.assert_allclose(whole.values, values(DT * np.arange(200)), atol=1e-6)
 
 
 @pytest.mark.parametrize("stamped", [True, False])
@@ -103,8 +94,6 @@ def test_missing_samples_are_interpolated_up_to_a_tenth_of_the_shortest_period(s
     assert found.starts.tolist() == [0, 1500]
     assert found.dt == pytest.approx(dt, rel=1e-9)
     np.testing.assert_allclose(found.values, np.delete(data, slice(1500, 1540), axis=0), atol=1e-3)
-    inserted = len(found.values) - int((~lost).sum())
-    assert any(f"x: {inserted} missing samples were interp" in note for note in found.notes)
 
 
 def test_repeated_stamps_are_refused_and_listed():
@@ -114,9 +103,6 @@ def test_repeated_stamps_are_refused_and_listed():
     assert len(rows.values) == 100
     (refused,) = rows.refused
     assert refused.rows == (11, 32)
-    assert "time is that of the row before" in refused.reason
-    with pytest.raises(InvalidValueError, match="coarser than the sampling"):
-        regular_rows(np.repeat(t, 3), values(np.repeat(t, 3)), "x")
     # a break beside a repeated stamp stays
     t = DT * np.arange(30)
     t[11] = t[10]
@@ -138,7 +124,6 @@ def test_jitter_and_other_periods_are_interpolated_and_noted(size, options):
     grid = t[0] + rows.dt * np.arange(len(rows.values))
     assert grid[-1] > t[-1] - rows.dt
     np.testing.assert_allclose(rows.values, values(grid), atol=1e-6 if size < 0.4 else 1e-4)
-    assert any("cubic splines" in note for note in rows.notes)
     if size > 0.4:
         with pytest.raises(InvalidValueError, match="largest_jitter="):
             regular_rows(t, values(t), "x", largest_gap=3.0)
@@ -193,17 +178,13 @@ def test_joined_logs_keep_what_all_have():
     log = join_logs([a, b])
     assert log.starts.tolist() == [0, 2000]
     assert log.v is None
-    assert log.notes == ("a", "v was left out: 1 of 2 joined logs have it.")
+    assert log.notes == ("a",)
     assert join_logs([a, a]).v.shape == (4000, 2)
     lost = [RefusedRows(name, (3,), "no number") for name in "ab"]
     refused = [smooth_log(N=100, refused=[rows]) for rows in lost]
     assert list(join_logs(refused).refused) == lost
     with pytest.raises(InvalidValueError, match="use with_delay"):
         join_logs([a, with_delay(a, 0.02)])
-    with pytest.raises(ShapeError, match=r"number 1 is of the joints 1, the first of 1, 2\."):
-        join_logs([a, smooth_log(n=1)])
-    with pytest.raises(InvalidValueError, match="at least one"):
-        join_logs([])
 
 
 # --- checks --------------------------------------------------------------------------------------
@@ -273,10 +254,6 @@ def test_other_robots_and_motor_angles_are_named(tx40):
     model, log, data = tx40
     (finding,) = check_log(log, rm.load("panda"))
     assert finding.kind is FindingKind.WRONG_JOINT_COUNT
-    assert "6 joints, panda has 7" in finding.sentence
-    for other, words in ((data, r"got Tx40Log; give its \.log"), (Q, "got ndarray; make one")):
-        with pytest.raises(InvalidValueError, match=words):
-            check_log(other)
     motors = changed(log, q=data.motor_positions[::5])
     plain = rm.RobotModel.from_table(model.table)
     for robot, given, words in (
@@ -330,27 +307,19 @@ def test_derivatives_of_the_positions_are_accepted(tx40):
     assert off(Log(DT, *np.ones((4, 2, 1)))) == []
 
 
-@pytest.mark.parametrize("name", ["v", "a"])
 @pytest.mark.parametrize(
-    ("factor", "joints", "words"),
+    ("name", "change", "joints", "words"),
     [
-        ([180 / np.pi] * 6, 6, r"57\.3 times the derivatives of the positions"),
-        ([1, 1, -1, 1, 1, 1], 1, "are -1 times"),
+        ("v", np.eye(6) * 180 / np.pi, 6, r"57\.3 times the derivatives of the positions"),
+        ("a", np.diag([1, 1, -1, 1, 1, 1]), 1, "are -1 times"),
+        ("v", np.eye(6)[[1, 0, 2, 3, 4, 5]], 2, "do not follow"),
     ],
 )
-def test_derivatives_by_a_factor_are_named(tx40, name, factor, joints, words):
+def test_derivatives_by_a_factor_are_named(tx40, name, change, joints, words):
     _, log, _ = tx40
     both = dict(zip("va", rates(log), strict=True))
-    both[name] = both[name] * factor
+    both[name] = both[name] @ change
     (finding,) = off(Log(log.dt, log.q, log.tau, **both))
-    assert finding.severity is Severity.USELESS
+    assert finding.severity is (Severity.USELESS if "times" in words else Severity.DOUBTFUL)
     assert len(finding.joints) == joints
     assert re.search(words, finding.sentence)
-
-
-def test_derivatives_of_other_joints_are_named(tx40):
-    _, log, _ = tx40
-    (finding,) = off(Log(log.dt, log.q, log.tau, rates(log)[0][:, [1, 0, 2, 3, 4, 5]]))
-    assert finding.severity is Severity.DOUBTFUL
-    assert finding.joints == ("1", "2")
-    assert "do not follow" in finding.sentence

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,7 @@ _APART = 1e7
 """Periods between recordings, above any interpolated gap."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BadSamples:
+class BadSamples(NamedTuple):
     """Outliers or frozen samples of one channel."""
 
     joint: int
@@ -50,24 +50,22 @@ def bad_samples(log: Log) -> list[BadSamples]:
         frozen: list[int] = []
         for rows in log.recordings():
             q, tau = log.q[rows, j], log.tau[rows, j]
-            if len(q) < _LEAST:
-                continue
-            outliers += [rows.start + k for k in _outliers(q if channel == "q" else tau, channel)]
-            ends = _frozen_positions(q) if channel == "q" else _frozen_torques(tau, q)
-            frozen += [rows.start + k for start, end in ends for k in range(start + 1, end + 1)]
+            if len(q) >= _LEAST:
+                ends = _frozen_positions(q) if channel == "q" else _frozen_torques(tau, q)
+                outliers += [
+                    rows.start + k for k in _outliers(q if channel == "q" else tau, channel)
+                ]
+                frozen += [rows.start + k for start, end in ends for k in range(start + 1, end + 1)]
         each = ((False, outliers), (True, frozen))
         findings += [BadSamples(j, channel, stuck, np.array(bad)) for stuck, bad in each if bad]
     return findings
 
 
-def _roughness(x: Array) -> Array:
-    """Distances of samples from the cubic through two neighbours on either side, shape (N - 4,)."""
-    return np.abs(x[2:-2] - (4.0 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6.0)
-
-
 def _outliers(x: Array, channel: str) -> list[int]:
     """Rows far from the cubic and the median of their neighbours; a step is far from the first."""
-    some, rough = spread(x), _roughness(x)
+    some = spread(x)
+    # distances from the cubics through two neighbours on either side
+    rough = np.abs(x[2:-2] - (4.0 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6.0)
     low, high = np.quantile(some, [0.01, 0.99])
     span = max(_SHARES[channel] * float(high - low), 1e-9 * float(np.abs(some).max()))
     # roughest part, since a channel may start at rest
@@ -137,12 +135,10 @@ def cleaned(log: Log) -> Log:
     rows = regular_rows(log.dt * t, np.hstack(list(arrays.values())), "log", joints=log.n)
     blocks = np.split(rows.values, len(arrays), axis=1)
     left = len(log) - len(rows.values)
-    frozen = sum(len(some.rows) for some in findings if some.frozen)
-    outliers = sum(len(some.rows) for some in findings) - frozen
     reason = "outliers or frozen samples, interpolated where the gap is short"
     note = (
-        f"{outliers} outliers and {frozen} frozen samples: {max(0, len(bad) - left)} samples "
-        f"interpolated and {left} rows left out, where the log is split."
+        f"Outliers and frozen samples: {max(0, len(bad) - left)} samples interpolated and {left} "
+        "rows left out, where the log is split."
     )
     return replace(
         log,

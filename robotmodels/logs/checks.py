@@ -1,4 +1,14 @@
-"""Checks of a log: units, limits, channels, and whether it fits a model."""
+"""Checks of a log: units, limits, channels, and whether it fits a model.
+
+A finding has a kind and a severity, whose values describe them, and prints as its sentence.
+
+Examples
+--------
+>>> print(LogFinding(FindingKind.STUCK, Severity.NOTE, ("2",), "Joint 2: ..."))
+Joint 2: ...
+>>> FindingKind.STUCK.value, Severity.USELESS.value
+('a channel repeats its value', 'a fit would mean nothing')
+"""
 
 from __future__ import annotations
 
@@ -7,7 +17,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import PRISMATIC
@@ -28,13 +37,7 @@ _CORRELATION, _SIGNAL, _FACTOR = 0.95, 5.0, 0.1  # of rates: least, least over n
 
 
 class Severity(Enum):
-    """Severity of a finding; the value states the consequence.
-
-    Examples
-    --------
-    >>> Severity.USELESS.value
-    'a fit would mean nothing'
-    """
+    """Severity of a finding; the value states the consequence."""
 
     NOTE = "worth knowing"
     DOUBTFUL = "results may be wrong"
@@ -42,13 +45,7 @@ class Severity(Enum):
 
 
 class FindingKind(Enum):
-    """Kind of a finding; the value describes it.
-
-    Examples
-    --------
-    >>> FindingKind.STUCK.value
-    'a channel repeats its value'
-    """
+    """Kind of a finding; the value describes it."""
 
     WRONG_JOINT_COUNT = "log and model have different numbers of joints"
     WRONG_JOINT_ORDER = "its joints are the model's in another order"
@@ -75,24 +72,7 @@ class FindingKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LogFinding:
-    """A finding of a check of a log; it prints as its sentence.
-
-    Parameters
-    ----------
-    kind : FindingKind
-        Its kind.
-    severity : Severity
-        Its severity.
-    joints : tuple of str
-        Joints it concerns; empty if it concerns the whole log.
-    sentence : str
-        With numbers and the remedy.
-
-    Examples
-    --------
-    >>> print(LogFinding(FindingKind.STUCK, Severity.NOTE, ("2",), "Joint 2: ..."))
-    Joint 2: ...
-    """
+    """A finding: kind, severity, joints (none if it concerns the whole log), remedy in words."""
 
     kind: FindingKind
     severity: Severity
@@ -106,12 +86,8 @@ class LogFinding:
 def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ...]:
     """Check a log for implausible units, limits and channels; each finding states a remedy.
 
-    Without a model: constant, saturated, frozen and jumping channels, outliers, rows that repeat,
-    the sampling period, and whether velocities and accelerations are the derivatives of the
-    positions. With one, besides: number and order of the joints, degrees, motor angles, limits of
-    position and torque, number of samples. Quantiles of a long log are those of 1e5 samples spread
-    over it, derivatives those of stretches; other checks use every sample. Swapped joints and wrong
-    signs are found by `robotmodels.identification.fit` (checked=True).
+    Channels are checked always; joints, units, limits and the number of samples against a model.
+    Swapped joints and wrong signs are found by `robotmodels.identification.fit` (checked=True).
 
     Parameters
     ----------
@@ -125,11 +101,6 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     tuple of LogFinding
         The most severe first; empty if nothing was found.
 
-    Raises
-    ------
-    InvalidValueError
-        The argument is no log.
-
     References
     ----------
     Seed book sections 1.6.2.3 to 1.6.2.5.
@@ -137,9 +108,7 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     Examples
     --------
     >>> t = np.linspace(0.0, 10.0, 1001)[:, None]
-    >>> log = Log(0.01, q=np.sin(t), tau=np.zeros((1001, 1)))
-    >>> for finding in check_log(log):
-    ...     print(finding)
+    >>> print(*check_log(Log(0.01, q=np.sin(t), tau=np.zeros((1001, 1)))))
     Joint 1: its torque is 0 in every sample; check whether the right column was read.
     """
     check_is_log(log)
@@ -147,10 +116,7 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     if model is not None:
         check_model(model)
         if model.n != log.n:
-            words = (
-                f"The log has {log.n} joints, {model.name} has {model.n}; choose columns or model "
-                "so that they agree."
-            )
+            words = f"The log has {log.n} joints, {model.name} has {model.n}; choose other columns."
             return (LogFinding(FindingKind.WRONG_JOINT_COUNT, Severity.USELESS, (), words),)
         findings += _against_model(log, model)
     if log.dt > _LONGEST_PERIOD:
@@ -164,8 +130,9 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     return tuple(sorted(findings, key=lambda finding: order.index(finding.severity)))
 
 
-def _of_joint(log: Log, j: int, kind: FindingKind, severity: Severity, words: str) -> LogFinding:
+def _of_joint(log: Log, j: int, kind: FindingKind, useless: bool, words: str) -> LogFinding:
     """A finding about joint ``j``, named in the sentence."""
+    severity = Severity.USELESS if useless else Severity.DOUBTFUL
     return LogFinding(kind, severity, (log.names[j],), f"Joint {log.names[j]}: {words}")
 
 
@@ -175,8 +142,8 @@ def _against_model(log: Log, model: RobotModel) -> Iterator[LogFinding]:
     if log.names != names and sorted(log.names) == sorted(names):
         words = (
             f"The joints of the log are {', '.join(log.names)}, those of {model.name} "
-            f"{', '.join(names)}: the same in another order. Columns are taken in their order, not "
-            "by name; give model= to read_log, which puts them in the model's order."
+            f"{', '.join(names)}. Columns are taken in their order, not by name; give model= to "
+            "read_log, which puts them in the model's order."
         )
         moved = tuple(a for a, b in zip(log.names, names, strict=True) if a != b)
         yield LogFinding(FindingKind.WRONG_JOINT_ORDER, Severity.USELESS, moved, words)
@@ -185,18 +152,18 @@ def _against_model(log: Log, model: RobotModel) -> Iterator[LogFinding]:
         effort = float(model.table.effort[j])
         usual = float(np.quantile(np.abs(spread(log.tau[:, j])), 0.99))
         if usual > _LARGE * effort > 0.0:
-            severity = Severity.USELESS if usual > _TOO_LARGE * effort else Severity.DOUBTFUL
             words = (
                 f"one in a hundred of its torques is above {usual:.4g}, its limit is {effort:.4g}; "
                 "check units, drive gains and gear ratios, or the limit of the model."
             )
-            yield _of_joint(log, j, FindingKind.TORQUE_ABOVE_LIMITS, severity, words)
+            unit = usual > _TOO_LARGE * effort
+            yield _of_joint(log, j, FindingKind.TORQUE_ABOVE_LIMITS, unit, words)
     count, equations = 10 * model.table.f + 4 * model.n, len(log) * log.n
     if equations < _PER_PARAMETER * count:
         severity = Severity.USELESS if equations < count else Severity.DOUBTFUL
         words = (
-            f"The log has {len(log)} samples of {log.n} joints, {equations} equations for up to "
-            f"{count} parameters; record a longer motion."
+            f"The log has {len(log)} samples of {log.n} joints for up to {count} parameters; "
+            "record a longer motion."
         )
         yield LogFinding(FindingKind.TOO_SHORT, severity, (), words)
 
@@ -216,34 +183,29 @@ def _positions(log: Log, model: RobotModel) -> Iterator[LogFinding]:
     if not len(outside):
         return
     reach = _UNIT * np.where(known, np.maximum(np.abs(model.lower), np.abs(model.upper)), np.pi)
-    far = bool((size > reach)[outside].any())
     # a joint without limits may turn several times; the dynamic model decides
     certain = bool((size > np.where(known, reach, _IMPOSSIBLE))[outside].any())
-
-    def within(q: Array, joints: NDArray[np.bool_]) -> bool:
-        return bool(((q >= lower) & (q <= upper))[:, joints].all())
-
-    K = model.transmission
-    coupled = K is not None and K.is_invertible and not np.allclose(K.matrix, np.eye(log.n))
-    kind = FindingKind.MOTOR_SIDE_POSITIONS if far else FindingKind.OUTSIDE_LIMITS
+    kind, K = FindingKind.OUTSIDE_LIMITS, model.transmission
     advice = "check units, offsets and signs, or the limits of the model."
-    if certain and K is not None and coupled and within(K.to_joint(spread(log.q)), known):
-        advice = "through the model's transmission they would be within: read the log with "
-        advice += "transmission=model.transmission."
-    elif far and within(np.radians(ends), revolute):
-        kind = FindingKind.POSITIONS_IN_DEGREES
-        advice = "as degrees they would be within: read the log with angles='deg', or with gears= "
-        advice += "or transmission= if they are motor angles."
-    elif far:
+    if (size > reach)[outside].any():
+        motors = K.to_joint(spread(log.q)) if K is not None and K.is_invertible else None
+        kind = FindingKind.MOTOR_SIDE_POSITIONS
         advice = "these may be motor angles: read the log with gears= or transmission=."
+        if motors is not None and ((motors >= lower) & (motors <= upper))[:, known].all():
+            advice = "through the model's transmission they would be within: read the log with "
+            advice += "transmission=model.transmission."
+        elif ((np.radians(ends) >= lower) & (np.radians(ends) <= upper))[:, revolute].all():
+            kind = FindingKind.POSITIONS_IN_DEGREES
+            advice = "as degrees they would be within: read the log with angles='deg', or with "
+            advice += "gears= or transmission= if they are motor angles."
     listed = ", ".join(
-        f"{log.names[j]} ({ends[0, j]:.4g} to {ends[1, j]:.4g}, limits "
-        + (f"{model.lower[j]:.4g} to {model.upper[j]:.4g})" if known[j] else "unknown)")
+        f"{log.names[j]} ({ends[0, j]:.4g} to {ends[1, j]:.4g}, limits {model.lower[j]:.4g} to "
+        f"{model.upper[j]:.4g})"
         for j in outside
     )
-    severity = Severity.USELESS if certain else Severity.DOUBTFUL
-    joints = tuple(log.names[j] for j in outside)
-    yield LogFinding(kind, severity, joints, f"Joints outside their limits: {listed}; {advice}")
+    severity, joints = Severity.USELESS if certain else Severity.DOUBTFUL, log.names
+    names = tuple(joints[j] for j in outside)
+    yield LogFinding(kind, severity, names, f"Joints outside their limits: {listed}; {advice}")
 
 
 def _channels(log: Log) -> Iterator[LogFinding]:
@@ -263,14 +225,13 @@ def _channels(log: Log) -> Iterator[LogFinding]:
     same = np.logical_and.reduce([np.diff(x) == 0.0 for x in channels])
     if _REPEATED * len(log) < same.sum() < len(same) and (repeated := runs(same, 3)):
         words = (
-            f"{same.sum()} rows repeat the row before in every channel (the first three in "
-            f"sequence at row {repeated[0][0]}): the recorder is faster than the controller. Read "
-            "it with the period of the controller."
+            f"{same.sum()} rows repeat the row before (first at row {repeated[0][0]}): the "
+            "recorder is faster than the controller; record with the period of the controller."
         )
         yield LogFinding(FindingKind.STUCK, Severity.DOUBTFUL, (), words)
 
 
-_Finding = tuple[FindingKind, Severity, str]
+_Finding = tuple[FindingKind, bool, str]
 
 
 def _torque(log: Log, j: int) -> Iterator[_Finding]:
@@ -279,7 +240,7 @@ def _torque(log: Log, j: int) -> Iterator[_Finding]:
     low, high = float(tau.min()), float(tau.max())
     if low == high:
         words = f"its torque is {low + 0.0:.4g} in every sample; check whether the right column"
-        yield FindingKind.CONSTANT_TORQUE, Severity.USELESS, f"{words} was read."
+        yield FindingKind.CONSTANT_TORQUE, True, f"{words} was read."
         return
     # saturated torques remain at the limit, quantised ones repeat at any value
     least = max(_SATURATED, 5.0 / len(np.unique(spread(tau))), 5.0 / len(tau))
@@ -288,84 +249,70 @@ def _torque(log: Log, j: int) -> Iterator[_Finding]:
         if share > least:
             words = f"{100 * share:.1f} % of its torques are the {word} one ({end:.4g}); the drive"
             words += " looks saturated. Record slower motion, or leave these rows out."
-            yield FindingKind.SATURATED, Severity.DOUBTFUL, words
+            yield FindingKind.SATURATED, False, words
 
 
 def _bad(bad: BadSamples) -> _Finding:
     """Outliers or frozen samples of a channel, in words."""
     rows, word = bad.rows, "position" if bad.channel == "q" else "torque"
     if bad.frozen:
-        firsts = np.flatnonzero(np.diff(rows, prepend=-2) > 1)
-        length = int(np.diff(firsts, append=len(rows))[0]) + 1
-        more = f", and {len(firsts) - 1} times more" if len(firsts) > 1 else ""
-        words = (
-            f"its {word} repeats for {length} samples from row {rows[0] - 1}{more} while the joint "
-            "moves; the sensor or the recorder stopped. fit interpolates these samples where the "
-            "gap is short and leaves the rows out where it is long."
-        )
-        return FindingKind.STUCK, Severity.DOUBTFUL, words
-    words = f"{len(rows)} samples of its {word} are outliers (the first at row {rows[0]}); fit "
-    if len(rows) == 1:
-        words = f"1 sample of its {word} is an outlier (at row {rows[0]}); fit "
-    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "replaces outliers by interpolation."
+        words = f"{len(rows)} samples of its {word} repeat, from row {rows[0] - 1}, while the joint"
+        words += " moves; fit interpolates short gaps and leaves out long ones."
+        return FindingKind.STUCK, False, words
+    words = f"outliers of its {word}: {len(rows)}, the first at row {rows[0]}; fit interpolates."
+    return FindingKind.SPIKES, False, words
 
 
 def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[_Finding]:
     """Positions that are constant or jump."""
     q = log.q[:, j]
     if np.ptp(q) <= 1e-9:
-        words = f"it stays at {q[0] + 0.0:.4g}, and its inertia and friction are not identifiable; "
-        words += "check whether the right column was read, or remove the joint from the model."
-        yield FindingKind.CONSTANT_POSITION, Severity.DOUBTFUL, words
+        words = f"it stays at {q[0] + 0.0:.4g}; check whether the right column was read, or remove "
+        words += "the joint from the model, since its inertia and friction are not identifiable."
+        yield FindingKind.CONSTANT_POSITION, False, words
         return
     steps = np.abs(np.diff(q))
     steps[log.starts[1:] - 1] = 0.0
     for rows in (some.rows for some in bad if some.channel == "q"):
         steps[rows - 1] = steps[np.minimum(rows, len(steps) - 1)] = 0.0
-    recordings = [q[rows] for rows in log.recordings()]
-    usual = max(float(np.quantile(moves(x), 0.99)) for x in recordings if len(x) > 1)
+    usual = max(float(np.quantile(moves(q[x]), 0.99)) for x in log.recordings() if len(q[x]) > 1)
     k = int(steps.argmax())
     if steps[k] > _JUMP * usual > 0.0:
         words = (
             f"its position jumps by {steps[k]:.4g} at row {k + 1}, {steps[k] / usual:.0f} times "
-            "the step that 99 % of its steps do not exceed; unwrap it (numpy.unwrap) if that is a "
-            "turn, or split the log there."
+            "the 99 % quantile of its steps; unwrap it (numpy.unwrap), or split the log there."
         )
-        yield FindingKind.JUMP, Severity.DOUBTFUL, words
+        yield FindingKind.JUMP, False, words
 
 
 def _rates(log: Log) -> Iterator[LogFinding]:
     """Findings where velocities or accelerations are not the derivatives of the positions."""
     part = stretches(log, _STRETCH)
     for order, word, rate in ((1, "velocities", part.v), (2, "accelerations", part.a)):
-        if rate is None:
-            continue
         wrong: dict[str, list[str]] = {}
-        for j in range(log.n):
+        for j in range(0 if rate is None else log.n):
             factor, correlation = _compared(part, part.q[:, j], rate[:, j], order)
             if correlation < _CORRELATION:
                 words = f"do not follow from the positions (correlation {correlation:.1g})"
+                wrong.setdefault(words, []).append(log.names[j])
             elif abs(factor - 1.0) > _FACTOR:
                 words = f"are {factor:.3g} times the derivatives of the positions"
-            else:
-                continue
-            wrong.setdefault(words, []).append(log.names[j])
+                wrong.setdefault(words, []).append(log.names[j])
         for words, names in wrong.items():
             severity = Severity.USELESS if words.startswith("are") else Severity.DOUBTFUL
-            words = (
-                f"Joint{'s' * (len(names) > 1)} {', '.join(names)}: {word} {words}; check sign, "
-                "unit (degrees: 57.3), gear ratio and sampling period, or leave them out "
-                f"({word}=False of read_log)."
+            sentence = (
+                f"Joints {', '.join(names)}: {word} {words}; check sign, unit (degrees: 57.3), "
+                f"gear ratio and sampling period, or leave them out ({word}=False of read_log)."
             )
-            yield LogFinding(FindingKind.RATES_OFF_POSITIONS, severity, tuple(names), words)
+            yield LogFinding(FindingKind.RATES_OFF_POSITIONS, severity, tuple(names), sentence)
 
 
 def _compared(log: Log, q: Array, rate: Array, order: int) -> tuple[float, float]:
     """Factor between a rate and the derivative of positions, and their correlation; 1, 1 at rest.
 
-    Source: Seed book section 1.6.2.4.
+    Increments over `_WINDOW` seconds are compared with integrals of the rate.
     """
-    xs, ys, thirds = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+    pairs, thirds = [np.zeros((2, 0))], [np.zeros(0)]
     for rows in log.recordings():
         x, y = q[rows] - q[rows.start], rate[rows]
         m = min(max(1, round(_WINDOW / log.dt)), (len(x) - 1) // (2 * order))
@@ -375,13 +322,12 @@ def _compared(log: Log, q: Array, rate: Array, order: int) -> tuple[float, float
         for _ in range(order):
             y = np.cumsum(np.append(0.0, 0.5 * log.dt * (y[1:] + y[:-1])))
             x, y = x[m:] - x[:-m], y[m:] - y[:-m]
-        xs.append(x)
-        ys.append(y)
-    x, y, third = (np.concatenate(each) for each in (xs, ys, thirds))
-    if len(x) < 2:
+        pairs.append(np.stack([x, y]))
+    both, third = np.concatenate(pairs, axis=1), np.concatenate(thirds)
+    if both.shape[1] < 2:
         return 1.0, 1.0
     noise = (2.0 if order == 1 else 6.0) * (third @ third) / (20.0 * max(1, len(third)))
-    (xx, xy), (_, yy) = np.cov(x, y, bias=True)
+    (xx, xy), (_, yy) = np.cov(both, bias=True)
     if not xx > max(_SIGNAL**2 * noise, 1e-18):
         return 1.0, 1.0
     correlation = xy / np.sqrt(xx * yy) if yy > 0.0 else 0.0

@@ -46,6 +46,10 @@ _OTHER_TORQUES = re.compile(r"[mcku]nm|[kmc]n|n[cm]m|lbf?(ft|in)|m?a|arms|amps?|
 _UNIT = re.compile(r"\s*[\[(]\s*([a-zA-Z°%·⋅/ ._*^-]+[0-9]?)\s*[\])]\s*$")
 _INDEX = re.compile(r"^(?P<stem>.*?)[ _./-]*[\[(]?(?P<index>\d+)[\])]?$")
 _SPLIT = re.compile(r"[./]")
+_STAMPS = (
+    ("header.stamp.secs", "header.stamp.sec"),
+    ("header.stamp.nsecs", "header.stamp.nanosec"),
+)
 _TIMES = ("time", "t", "timestamp", "stamp", "times", "timestamps", "__time", "elapsed")
 
 
@@ -66,27 +70,18 @@ def time_unit_of(name: str) -> TimeUnit | None:
 def find_time(table: LogTable) -> tuple[tuple[int, ...], TimeUnit | None] | None:
     """Columns of the time (one, or seconds and nanoseconds) and their unit."""
     names = [split_unit(name)[0].lower() for name in table.names[: table.alike]]
-    seconds, nanoseconds = (
-        [i for i, name in enumerate(names) if name.endswith(ends)]
-        for ends in (
-            ("header.stamp.secs", "header.stamp.sec"),
-            ("header.stamp.nsecs", "header.stamp.nanosec"),
-        )
-    )
-    if len(seconds) == len(nanoseconds) == 1:
-        return (seconds[0], nanoseconds[0]), TimeUnit.SECOND
-    # of ROS, the time of measurement rather than that of recording
-    for name in ("field.header.stamp", "%time", *_TIMES):
-        if names.count(name) == 1:
-            i = names.index(name)
-            unit = time_unit_of(table.names[i]) if name in _TIMES else TimeUnit.NANOSECOND
-            return (i,), unit
-    # a column of a structure, such as "log.t"
+    pair = [[i for i, x in enumerate(names) if x.endswith(ends)] for ends in _STAMPS]
+    if all(len(found) == 1 for found in pair):
+        return (pair[0][0], pair[1][0]), TimeUnit.SECOND
+    # of ROS, the time of measurement rather than that of recording; last a column of a structure,
+    # such as "log.t"
     last = [_SPLIT.split(name)[-1] for name in names]
-    for name in _TIMES:
-        if last.count(name) == 1:
-            i = last.index(name)
-            return (i,), time_unit_of(table.names[i])
+    for words, wanted in ((names, ("field.header.stamp", "%time", *_TIMES)), (last, _TIMES)):
+        for name in wanted:
+            if words.count(name) == 1:
+                i = words.index(name)
+                ours = name in _TIMES
+                return (i,), time_unit_of(table.names[i]) if ours else TimeUnit.NANOSECOND
     return None
 
 
@@ -170,20 +165,18 @@ def check_units(
     table: LogTable, columns: Sequence[int], kind: Quantity, angle: AngleUnit, gains: bool
 ) -> None:
     """Raise for units of headers that contradict the arguments or are not supported."""
-    torques = kind in (Quantity.TORQUE, Quantity.CURRENT)
     for name in [table.names[i] for i in columns if table.names]:
         unit = split_unit(name)[1]
         plain = unit.split("/")[0].strip()
-        header = _ANGLES.get(plain, angle.value)
-        advice = ""
-        if torques:
+        if kind.field == "tau":
             if not gains and _OTHER_TORQUES.fullmatch(re.sub("[ .*·⋅_-]", "", unit)):
-                advice = "not in N m; give drive_gains=, the N m (N for slides) for one unit of it."
-        elif _OTHER_POSITIONS.fullmatch(plain):
-            advice = "which is not read; write it in rad or deg (m or mm for slides), or remove "
-            advice += "the unit from the header and give its factor by gears=."
-        elif header != angle.value:
-            advice = f"the argument is angles={angle.value!r}; give angles={header!r}, or the "
-            advice += "right columns."
-        if advice:
-            raise InvalidValueError(f"{table.path}: the column {name!r} is in {unit!r}, {advice}")
+                raise InvalidValueError(
+                    f"{table.path}: the column {name!r} is in {unit!r}, not in N m; give "
+                    "drive_gains=, the N m (N for slides) for one unit of it."
+                )
+        elif _OTHER_POSITIONS.fullmatch(plain) or _ANGLES.get(plain, angle.value) != angle.value:
+            raise InvalidValueError(
+                f"{table.path}: the column {name!r} is in {unit!r}, the argument is "
+                f"angles={angle.value!r}; expected 'rad' or 'deg' (m or mm for slides). Without "
+                "the unit in the header, its factor may be given by gears=."
+            )

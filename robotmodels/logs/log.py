@@ -37,7 +37,7 @@ class LogSource:
     rows: int
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Log(Rebuilt):
     """Regularly sampled positions and torques of n joints, on the joint side, in SI units.
 
@@ -59,12 +59,9 @@ class Log(Rebuilt):
         Names of the joints, default "1" to "n".
     delay : float
         Delay of the torque behind the positions that was removed, seconds; for the report.
-    sources : sequence of LogSource, optional
-        Files: ``name, sha256, rows`` of each.
-    refused : sequence of RefusedRows, optional
-        Rows that were left out: ``source, rows, reason``.
-    notes : sequence of str, optional
-        Sentences about the reading of the files.
+    sources, refused, notes : sequences, optional
+        Files (``name, sha256, rows``), rows that were left out (``source, rows, reason``), and
+        sentences about the reading of the files.
 
     Raises
     ------
@@ -86,48 +83,34 @@ class Log(Rebuilt):
     dt: float
     q: Array
     tau: Array
-    v: Array | None
-    a: Array | None
-    q_ref: Array | None
-    v_ref: Array | None
-    starts: NDArray[np.int64]
-    names: tuple[str, ...]
-    delay: float
-    sources: tuple[LogSource, ...]
-    refused: tuple[RefusedRows, ...]
-    notes: tuple[str, ...]
+    v: Array | None = None
+    a: Array | None = None
+    q_ref: Array | None = None
+    v_ref: Array | None = None
+    starts: Any = (0,)
+    names: Any = None
+    delay: float = 0.0
+    sources: tuple[LogSource, ...] = ()
+    refused: tuple[RefusedRows, ...] = ()
+    notes: tuple[str, ...] = ()
 
-    def __init__(
-        self,
-        dt: float,
-        q: ArrayLike,
-        tau: ArrayLike,
-        v: ArrayLike | None = None,
-        a: ArrayLike | None = None,
-        q_ref: ArrayLike | None = None,
-        v_ref: ArrayLike | None = None,
-        starts: ArrayLike = (0,),
-        names: Any = None,
-        delay: float = 0.0,
-        sources: Any = (),
-        refused: Any = (),
-        notes: Any = (),
-    ) -> None:
-        period = as_floats(dt, "dt")
+    def __post_init__(self) -> None:
+        period = as_floats(self.dt, "dt")
         if period.ndim != 0 or not period > 0.0:
-            raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.60}.")
+            raise InvalidValueError(
+                f"dt: expected the sampling period in seconds, got {self.dt!r:.60}."
+            )
         as_bounded(period, "dt", _LONGEST, 1.0 / _LONGEST)
-        values: dict[str, Any] = {"q": _samples(q, "q", None)}
+        values: dict[str, Any] = {"dt": float(period), "q": _samples(self.q, "q", None)}
         N, n = values["q"].shape
-        for name, given in zip(ARRAYS[1:], (tau, v, a, q_ref, v_ref), strict=True):
-            missing = given is None and name != "tau"
-            values[name] = None if missing else _samples(given, name, (N, n))
-        words = tuple(map(str, range(1, n + 1) if names is None else names))
+        for name in ARRAYS[1:]:
+            if (given := getattr(self, name)) is not None or name == "tau":
+                values[name] = _samples(given, name, (N, n))
+        words = tuple(map(str, range(1, n + 1) if self.names is None else self.names))
         if len(words) != n:
             raise ShapeError(f"names: expected {n} names of joints, got {len(words)}.")
-        values |= {"dt": float(period), "starts": _starts(starts, N), "names": words}
-        values |= {"delay": float(delay), "sources": tuple(sources)}
-        values |= {"refused": tuple(refused), "notes": tuple(notes)}
+        values |= {"starts": _starts(self.starts, N), "names": words, "delay": float(self.delay)}
+        values |= {name: tuple(getattr(self, name)) for name in ("sources", "refused", "notes")}
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -153,31 +136,13 @@ class Log(Rebuilt):
             yield slice(start, end)
 
     def rows(self, start: int, stop: int) -> Log:
-        """Part of the log, with its sources, refused rows and notes; also ``log[start:stop]``.
+        """Rows from start to before stop (negative ones count from the end), also ``log[a:b]``.
 
-        Parameters
-        ----------
-        start, stop : int
-            First row, and the one after the last; negative ones count from the end.
-
-        Returns
-        -------
-        Log
-            Views of the same arrays.
-
-        Raises
-        ------
-        InvalidValueError
-            The range is empty or exceeds the log.
-
-        Examples
-        --------
-        >>> len(Log(0.01, np.zeros((100, 1)), np.zeros((100, 1))).rows(10, 30))
-        20
+        Views of the same arrays, with the sources, refused rows and notes.
         """
         N = len(self)
         first, last, _ = slice(start, stop).indices(N)
-        if not (first < last and -N <= start <= N and -N <= stop <= N):
+        if not (first < last and max(abs(start), abs(stop)) <= N):
             raise InvalidValueError(
                 f"rows: expected a range within the log, got {start} to {stop}; it has {N} rows."
             )
@@ -248,8 +213,6 @@ def _starts(starts: ArrayLike, N: int) -> NDArray[np.int64]:
 def join_logs(logs: Iterable[Log]) -> Log:
     """Join several logs as separate recordings of one log.
 
-    Velocities, accelerations and references are kept only if all logs have them.
-
     Parameters
     ----------
     logs : iterable of Log
@@ -258,18 +221,13 @@ def join_logs(logs: Iterable[Log]) -> Log:
     Returns
     -------
     Log
-        With the sources, refused rows and notes of all.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        None given; joints, periods or delays that differ.
+        With the arrays that all have, and the sources, refused rows and notes of each.
 
     Examples
     --------
     >>> one = Log(0.01, np.zeros((100, 1)), np.zeros((100, 1)))
-    >>> join_logs([one, one])
-    <Log: 200 samples of 1 joints at 100 Hz, 2 s in 2 recordings>
+    >>> join_logs([one, one]).starts
+    array([  0, 100])
     """
     each = tuple(logs)
     if not each:
@@ -283,18 +241,15 @@ def join_logs(logs: Iterable[Log]) -> Log:
             )
         if abs(log.dt - first.dt) > _SAME * first.dt or log.delay != first.delay:
             raise InvalidValueError(
-                f"logs: number {k} is sampled every {log.dt:.9g} s and had a delay of "
-                f"{log.delay:g} s, the first every {first.dt:.9g} s and {first.delay:g} s; read "
-                "them with the same dt=, which interpolates, and use with_delay on all."
+                f"logs: number {k} is sampled every {log.dt:.9g} s (delay {log.delay:g} s), the "
+                f"first every {first.dt:.9g} s ({first.delay:g} s); read them with the same dt=, "
+                "and use with_delay on all."
             )
-    notes = [note for log in each for note in log.notes]
     arrays: dict[str, Array] = {}
     for name in ARRAYS:
-        parts = [x for log in each if (x := getattr(log, name)) is not None]
-        if len(parts) == len(each):
+        parts = [getattr(log, name) for log in each]
+        if all(part is not None for part in parts):
             arrays[name] = np.concatenate(parts)
-        elif parts:
-            notes.append(f"{name} was left out: {len(parts)} of {len(each)} joined logs have it.")
     lengths = [len(log) for log in each]
     offsets = np.cumsum([0, *lengths[:-1]])
     return Log(
@@ -303,17 +258,17 @@ def join_logs(logs: Iterable[Log]) -> Log:
         starts=np.concatenate([log.starts + o for log, o in zip(each, offsets, strict=True)]),
         names=first.names,
         delay=first.delay,
-        sources=[source for log in each for source in log.sources],
-        refused=[rows for log in each for rows in log.refused],
-        notes=notes,
+        sources=tuple(source for log in each for source in log.sources),
+        refused=tuple(rows for log in each for rows in log.refused),
+        notes=tuple(note for log in each for note in log.notes),
     )
 
 
 def with_delay(log: Log, delay: float) -> Log:
-    """The log with its torques shifted back in time, so that they belong to their positions.
+    """The log with its torques shifted back in time: ``tau(t)`` becomes ``tau(t + delay)``.
 
-    ``tau(t)`` becomes ``tau(t + delay)``: whole numbers of samples by shifting rows, others by
-    cubic splines. Rows at the ends of recordings that have no torque any more are cut.
+    Whole numbers of samples are shifted by rows, others by cubic splines; rows at the ends of
+    recordings that have no torque any more are cut.
 
     Parameters
     ----------
@@ -326,12 +281,7 @@ def with_delay(log: Log, delay: float) -> Log:
     Returns
     -------
     Log
-        Shorter; `Log.delay` is the sum of all removed delays, and a note states how.
-
-    Raises
-    ------
-    InvalidValueError
-        The delay is as long as every recording, or no number.
+        Shorter; `Log.delay` is the sum of all removed delays.
 
     References
     ----------
@@ -371,18 +321,10 @@ def with_delay(log: Log, delay: float) -> Log:
         raise InvalidValueError(
             f"delay: {seconds:g} s are {abs(shift):g} samples, no recording is longer."
         )
-    left_out = [RefusedRows("log", tuple(dropped), "its recording is shorter than the delay")]
-    note = (
-        f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples, "
-        f"{'by whole samples' if whole else 'by cubic splines'}; {cut} rows of each recording cut, "
-        f"{len(dropped)} rows of shorter ones left out)."
-    )
-    return selected(
-        log,
-        np.concatenate(kept),
-        np.cumsum([0, *map(len, kept[:-1])]),
-        tau=np.concatenate(torques),
-        delay=log.delay + seconds,
-        refused=[*log.refused, *left_out[: len(dropped)]],
-        notes=[*log.notes, note],
-    )
+    refused, reason = log.refused, "its recording is shorter than the delay"
+    if dropped:
+        refused = (*refused, RefusedRows("log", tuple(dropped), reason))
+    note = f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples)."
+    starts = np.cumsum([0, *map(len, kept[:-1])])
+    changes = {"tau": np.concatenate(torques), "delay": log.delay + seconds, "refused": refused}
+    return selected(log, np.concatenate(kept), starts, **changes, notes=(*log.notes, note))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact, as_floats
 from ..csv_table import Column
 from ..drive import Transmission
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
@@ -58,10 +58,8 @@ def read_log(
 
     Columns are given by name, by number (from 0), as the name of a matrix, or by a pattern
     (``"pos_*"``). Those that are not given are found by the usual names (q1 to qn, tau1 to taun,
-    position, effort, ...), which a note states. Of ROS these are read: the output of ``rostopic
-    echo -p`` (``%time``, ``field.position0``), PlotJuggler's CSV
-    (``/joint_states/joint_1/position``, ``/joint_states/position[0]``), and tables with
-    ``header.stamp.secs``, ``header.stamp.nsecs``, ``name`` and lists in cells or numbered columns.
+    position, effort, ...), which a note states. Of ROS: the output of ``rostopic echo -p``,
+    PlotJuggler's CSV, and tables of joint states with lists in cells or numbered columns.
 
     From the file's columns c to the joints: ``q = K (s u c) + q_0 + offsets`` and
     ``tau = K^-T (s g c)`` with signs s, unit u, drive gains g, and K of gears (``1 / gears``) or
@@ -86,10 +84,9 @@ def read_log(
         be at most 1.5 times the file's, since decimation needs a filter.
     times : TimeUnit or {"s", "ms", "us", "ns"}, optional
         Default the unit of the header, or seconds.
-    angles : AngleUnit or {"rad", "deg"}
-        Unit of positions and their derivatives.
-    lengths : LengthUnit or {"m", "mm"}
-        Unit of the model's prismatic joints; ``angles`` with gears or a transmission.
+    angles, lengths : {"rad", "deg"}, {"m", "mm"}
+        Unit of positions and their derivatives, and that of prismatic joints of the model; motors
+        have angles.
     signs : array_like, shape (n,), optional
         1 or -1, for positions and torques.
     gears : float or array_like, shape (n,), optional
@@ -105,11 +102,10 @@ def read_log(
         Names of the joints, in order; default the model's, or those of the file.
     model : RobotModel, optional
         Gives the number of joints, their names and kinds.
-    largest_gap : float, optional
-        In periods; samples missing in shorter gaps are interpolated, longer gaps split the log.
-        Default a tenth of the shortest period of the motion.
-    largest_jitter : float
-        In periods; differences of stamps that deviate more are an error.
+    largest_gap, largest_jitter : float, optional
+        In periods: samples missing in shorter gaps are interpolated, longer gaps split the log
+        (default a tenth of the shortest period of the motion); larger deviations of the
+        differences of stamps are an error.
     delimiter : str, optional
         Delimiter of text files; default detected.
 
@@ -135,18 +131,17 @@ def read_log(
 
     Examples
     --------
-    >>> import tempfile
-    >>> file = Path(tempfile.mkdtemp()) / "run.csv"
-    >>> _ = file.write_text("t,q1,tau1\n0.00,0,1\n0.01,90,1\n0.02,180,2\n")
-    >>> log = read_log(file, angles="deg", gears=2.0)
+    >>> columns = {"t": [0.0, 0.01, 0.02], "q1": [0.0, 90.0, 180.0], "tau1": [1.0, 1.0, 2.0]}
+    >>> log = read_log(columns, angles="deg", gears=2.0)
     >>> log.q.ravel().round(4), log.tau.ravel(), round(log.dt, 9)
     (array([0.    , 0.7854, 1.5708]), array([2., 2., 4.]), 0.01)
     """
     if model is not None:
         check_model(model)
     files = _sources(path, "path")
-    apart = torques_from is not None
-    others = _sources(torques_from, "torques_from") if apart else (None,) * len(files)
+    others: Sequence[Any] = [None] * len(files)
+    if torques_from is not None:
+        others = _sources(torques_from, "torques_from")
     if len(others) != len(files):
         raise InvalidValueError(
             f"torques_from: expected a file for each of the {len(files)} of path, got "
@@ -157,8 +152,9 @@ def read_log(
     angle = as_file_unit(AngleUnit, angles, "angles")
     length = as_file_unit(LengthUnit, lengths, "lengths")
     unit = None if times is None else as_file_unit(TimeUnit, times, "times")
-    default = None if model is None else model.table.joint_names
-    names = default if joints is None else tuple(map(str, joints))
+    names = None if joints is None else tuple(map(str, joints))
+    if names is None and model is not None:
+        names = model.table.joint_names
     choices = {
         Quantity.POSITION: positions,
         Quantity.TORQUE: torques,
@@ -168,15 +164,16 @@ def read_log(
         Quantity.VELOCITY_REFERENCE: velocity_references,
     }
     request = Request(choices, names, time, unit, angle, drive_gains is not None)
+    motors = gears is not None or transmission is not None
     logs = []
     for each in zip(files, others, strict=True):
         table = _table(each[0], delimiter)
-        second = None if each[1] is None else _table(each[1], delimiter)
-        raw = read_samples(table, second, request)
+        raw = read_samples(table, None if each[1] is None else _table(each[1], delimiter), request)
         n = raw.blocks[Quantity.POSITION].shape[1]
-        of_q, of_tau, offset = joint_side(
-            n, angle, length, signs, gears, transmission, drive_gains, offsets, model
-        )
+        units = np.full(n, angle.factor)
+        if model is not None and not motors:
+            units[model.table.sigma[model.table.joint_rows] == PRISMATIC] = length.factor
+        of_q, of_tau, offset = joint_side(units, signs, gears, transmission, drive_gains, offsets)
         columns, name = np.concatenate(list(raw.blocks.values()), axis=1), table.path.name
         if raw.t is None and dt is None:
             raise InvalidValueError(
@@ -197,11 +194,10 @@ def read_log(
                 moved = quantity in (Quantity.POSITION, Quantity.POSITION_REFERENCE)
                 arrays[quantity.field] = values + offset if moved else values
         notes = [*raw.notes, *rows.notes]
-        motors = gears is not None or transmission is not None
         K = None if model is None or motors else model.transmission
-        if model is not None and K is not None and not K.is_mimicry:
+        if K is not None and not K.is_mimicry:
             notes.append(
-                f"{model.name} has a transmission, but positions and torques were read as those of "
+                "The model has a transmission, but positions and torques were read as those of "
                 "the joints; give transmission=model.transmission if they are those of the motors."
             )
         sources = [_source(one, columns, len(rows.values)) for one in each if one is not None]
@@ -233,25 +229,15 @@ def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:
 
 
 def joint_side(
-    n: int,
-    angles: AngleUnit,
-    lengths: LengthUnit,
+    units: Array,
     signs: ArrayLike | None,
     gears: ArrayLike | None,
     transmission: Transmission | None,
     drive_gains: ArrayLike | None,
     offsets: ArrayLike | None,
-    model: RobotModel | None,
 ) -> tuple[Array, Array, Array]:
     """Matrices (n, n) from the columns of positions and torques to the joints, and an offset."""
-    unit = np.full(n, angles.factor)
-    if gears is not None and transmission is not None:
-        raise InvalidValueError(
-            "gears, transmission: give one of them; a transmission includes the gear ratios."
-        )
-    if gears is None and transmission is None and model is not None:
-        prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
-        unit[prismatic] = lengths.factor
+    n = len(units)
     sign = _each(signs, n, "signs", 1.0)
     if (np.abs(sign) != 1.0).any():
         raise InvalidValueError(f"signs: expected 1 or -1 for each of the {n} joints, got {signs}.")
@@ -262,23 +248,16 @@ def joint_side(
             raise InvalidValueError(f"{name}: expected numbers other than zero.")
     K, zero = np.diag(1.0 / ratio), np.zeros(n)
     if transmission is not None:
-        if transmission.n != n:
-            raise ShapeError(
-                f"transmission: it has {transmission.n} joints, the log has {n} columns of "
-                "positions."
-            )
-        if not transmission.is_invertible:
+        if gears is not None or transmission.n != n or not transmission.is_invertible:
             raise InvalidValueError(
-                "transmission: joints mimic others, so that motor torques do not determine those "
-                "of the joints; give the model of the independent joints."
+                "gears, transmission: expected one of them, and a transmission that can be "
+                f"inverted, of the {n} joints of the log; it includes the gear ratios."
             )
         K, zero = transmission.matrix, transmission.offset
     offset = zero + _each(offsets, n, "offsets", 0.0)
-    return (sign * unit)[:, None] * K.T, gain[:, None] * np.linalg.inv(K), offset
+    return (sign * units)[:, None] * K.T, gain[:, None] * np.linalg.inv(K), offset
 
 
 def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
-    if value is None:
-        return np.full(n, default)
-    array = as_floats(value, name)
+    array = as_floats(default if value is None else value, name)
     return np.full(n, float(array)) if array.ndim == 0 else as_exact(array, (n,), name)

@@ -200,7 +200,6 @@ def _joined(positions: Samples, other: Samples, files: str) -> Array:
                 f"torques_from: {files} have {N} and {len(tau)} rows; without times in both they "
                 "must have as many."
             )
-        positions.notes.append(f"{files} were joined by row.")
         return tau
     good = np.isfinite(stamps) & np.isfinite(tau).all(axis=1)
     stamps, tau = stamps[good], tau[good]
@@ -215,8 +214,5 @@ def _joined(positions: Samples, other: Samples, files: str) -> Array:
     near &= (t >= stamps[0]) & (t <= stamps[-1])
     torques = np.full((N, tau.shape[1]), np.nan)
     torques[near] = splined(stamps, tau, t[near], files)
-    positions.notes.append(
-        f"{files} were joined by time: torques by cubic splines at the times of the positions; "
-        f"{int((~near).sum())} of {N} rows have no torque near in time."
-    )
+    positions.notes.append(f"{files} were joined by time: torques by cubic splines.")
     return torques

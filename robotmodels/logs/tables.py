@@ -15,7 +15,6 @@ import numpy as np
 from .._arrays import Array
 from ..csv_table import Column, CsvTable, column_number, is_number, open_table
 from ..errors import InvalidValueError, MissingExtraError, nearest_names
-from .mat import read_mat
 
 Choice = Column | Sequence[Column]
 
@@ -165,8 +164,44 @@ def _npz(path: Path) -> dict[str, Any]:
 
 
 def _mat(path: Path) -> dict[str, Any]:
+    """Variables of a MAT file, of version 7.3 (HDF5) too; those of structures as "log.q"."""
+    from scipy.io import loadmat
+
+    def flat(values: Mapping[str, Any], head: str = "") -> Iterator[tuple[str, Any]]:
+        for name, value in values.items():
+            if isinstance(value, dict):
+                yield from flat(value, f"{head}{name}.")
+            elif not name.startswith("__"):
+                yield head + name, value
+
     with _opened(path, "MAT", "in MATLAB save it with save(file, '-v7'), or write CSV") as file:
-        return read_mat(file)
+        if file.read(10) == b"MATLAB 7.3":
+            return _hdf5(path)
+        file.seek(0)
+        return dict(flat(loadmat(file, simplify_cells=True)))
+
+
+def _hdf5(path: Path) -> dict[str, Any]:
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtraError(
+            "MAT files of version 7.3 need h5py: pip install 'robotmodels[logs]'; or save the file "
+            "with save(file, '-v7')."
+        ) from None
+    variables: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            value, key = item[()], name.replace("/", ".")
+            if item.attrs.get("MATLAB_class", b"") == b"char":
+                variables[key] = "".join(map(chr, np.ravel(value)))
+            elif value.dtype.kind in "fiub":
+                variables[key] = value.T  # MATLAB stores columns first
+
+    with h5py.File(path, "r") as stored:
+        stored.visititems(visit)
+    return variables
 
 
 def _parquet(path: Path) -> dict[str, Any]:
@@ -215,7 +250,11 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     axes = 2 if transpose else 1
     lengths = Counter(k for x in matrices.values() for k in set(x.shape[:axes]) - {1})
     N = max(lengths, key=lambda length: (lengths[length], length))
-    turned = {name for name, x in matrices.items() if transpose and _samples_last(x, N)}
+    turned = set()
+    for name, x in matrices.items():
+        rows, width = x.shape
+        if transpose and rows != N and width > 1 and (width == N or rows < width):
+            turned.add(name)
     matrices = {name: x.T if name in turned else x for name, x in matrices.items()}
     blocks = {name: list(x.T) for name, x in matrices.items() if len(x) == N}
     count = sum(map(len, blocks.values()))
@@ -226,9 +265,3 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
         names += [name] if len(block) == 1 else [f"{name}[{i}]" for i in range(len(block))]
     columns = [column for block in blocks.values() for column in block]
     return LogTable(path, tuple(names), len(names), columns, count, frozenset(turned))
-
-
-def _samples_last(value: Array, N: int) -> bool:
-    """Whether the samples of an array are along its second axis."""
-    rows, width = value.shape
-    return rows != N and width > 1 and (width == N or rows < width)

@@ -16,12 +16,8 @@ _ROUNDING, _COARSER, _FINER = 0.01, 1.5, 100.0
 _GAP, _JITTER, _BRIDGED, _MOST = 1.5, 0.25, 10, 1e6
 """In periods: least gap; largest 90 % jitter at which missing samples are counted; longest gap
 bridged linearly for the spectrum of the motion; most missing samples."""
-_REPEATED = 0.1
-"""Share of repeated stamps above which they are coarser than the sampling."""
 _SHARE = 0.1
 """Longest interpolated gap relative to the shortest period of the motion."""
-_BESIDE = 4
-"""Least number of samples on either side of a gap through which its cubic is fitted."""
 _LEAST, _SECONDS = 32, 16.0
 """Least number of samples for a spectrum, and length of its windows, s."""
 
@@ -58,21 +54,15 @@ def regular_rows(
         as_bounded(numbers, source, LARGEST)
     kept = np.flatnonzero(good)
     again = np.diff(stamps[kept], prepend=np.nan) == 0.0
-    if again.sum() > _REPEATED * len(kept):
-        raise InvalidValueError(
-            f"{source}: {again.sum()} of {len(kept)} stamps repeat the one before: they are "
-            "coarser than the sampling. Give dt=, the sampling period, and time=False."
-        )
     refused = {
         "a number is missing or not finite": np.flatnonzero(~good),
         "its time is that of the row before": kept[again],
     }
     kept = kept[~again]
-    if not (len(kept) > 1 and (np.diff(stamps[kept]) > 0.0).any()):
+    if not (np.diff(stamps[kept]) > 0.0).any():
         raise InvalidValueError(
             f"{source}: {len(kept)} of its {N} rows have all numbers, and no two of them follow "
-            "each other in time; check whether the right columns were given (time=), and whether "
-            "they were recorded at the same times."
+            "each other in time; check whether the right columns were given (time=)."
         )
     notes: list[str] = []
     period, counts, breaks = _split(stamps[kept], values[kept, :joints], known, largest_gap)
@@ -88,15 +78,20 @@ def regular_rows(
             f"{period * counts.max():.3g} s)."
         )
     pieces = np.split(np.arange(len(kept)), np.flatnonzero(breaks) + 1)
-    alone = [piece[0] for piece in pieces if len(piece) == 1]
+    refused["it has no neighbour in time"] = kept[[p[0] for p in pieces if len(p) == 1]]
     pieces = [piece for piece in pieces if len(piece) > 1]
     if not pieces:
         raise InvalidValueError(
             f"{source}: no two rows follow each other in time without a gap; the log is empty."
         )
-    refused["it has no neighbour in time"] = kept[alone]
     places = np.concatenate([[0], np.cumsum(counts)])
-    whole = [_filled(places[piece], stamps[kept[piece]], values[kept[piece]]) for piece in pieces]
+    whole = []
+    for piece in pieces:
+        at, times, rows = places[piece], stamps[kept[piece]], values[kept[piece]]
+        every = np.arange(at[0], at[-1] + 1)
+        if len(every) > len(at):  # missing samples
+            rows = splined(at.astype(np.float64), rows, every.astype(np.float64), source)
+        whole.append((np.interp(every, at, times), rows))
     blocks = [block for _, block in whole]
     if known is None:
         grid = period if dt is None else dt
@@ -113,22 +108,6 @@ def regular_rows(
         for r in left_out
     ]
     return RegularRows(float(period), np.concatenate(blocks), starts, tuple(left_out), tuple(notes))
-
-
-def _filled(places: NDArray[np.int64], stamps: Array, rows: Array) -> tuple[Array, Array]:
-    """Stamps and rows with interpolated missing samples (cubics fitted to both sides of gaps)."""
-    every = np.arange(places[0], places[-1] + 1)
-    values = np.empty((len(every), rows.shape[1]))
-    values[places - places[0]] = rows
-    for k in np.flatnonzero(np.diff(places) > 1).tolist():
-        gap = np.arange(places[k] + 1, places[k + 1])
-        count = max(_BESIDE, len(gap))
-        beside = slice(max(0, k + 1 - count), k + 1 + count)
-        middle, size = gap.mean(), float(np.ptp(places[beside]))
-        powers = np.arange(min(4, len(places[beside])))
-        A, B = (((z - middle)[:, None] / size) ** powers for z in (places[beside], gap))
-        values[gap - places[0]] = B @ np.linalg.lstsq(A, rows[beside], rcond=None)[0]
-    return np.interp(every, places, stamps), values
 
 
 def _split(
@@ -170,8 +149,7 @@ def _on_grid(
     """Recordings on a regular grid: unchanged if regular, otherwise resampled by splines."""
     errors = [x - x[0] - period * np.arange(len(x)) for x, _ in recordings]
     off = max(float(np.ptp(each)) for each in errors) / period
-    jitter = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in errors) / period
-    longest = max(map(len, errors))
+    jitter = max(float(np.abs(np.diff(each)).max()) for each in errors) / period
     if not period / _FINER <= grid <= _COARSER * period:
         raise InvalidValueError(
             f"{source}: its rows are {period:.4g} s apart, dt={grid:g} would leave out some "
@@ -184,14 +162,10 @@ def _on_grid(
             f"{deviation}, more than the {largest_jitter:g} that may be interpolated over; give "
             "largest_jitter= if that is intended, or largest_gap= to split the log there."
         )
+    longest = max(map(len, errors))
     if off <= _ROUNDING and abs(grid - period) * longest <= _ROUNDING * period:
-        if jitter > 1e-6:
-            notes.append(f"{deviation}; taken as regular at {period:.9g} s.")
         return [block for _, block in recordings]
-    notes.append(
-        f"{deviation} and up to {off:.2g} from a grid of {grid:.9g} s (the file has {period:.9g} "
-        "s): resampled by cubic splines."
-    )
+    notes.append(f"{deviation}; resampled from {period:.9g} s to {grid:.9g} s by cubic splines.")
     resampled = []
     for times, block in recordings:
         # one more where rounding alone leaves the last sample out
@@ -228,19 +202,15 @@ def shortest_period(q: Array, dt: float) -> float:
     """
     from scipy.signal import welch
 
-    rate = 1.0 / dt
     if len(q) < _LEAST:
         return 0.0
-    v = np.diff(q, axis=0) * rate
-    f, density = welch(v, rate, nperseg=min(len(v), max(_LEAST, int(_SECONDS * rate))), axis=0)
+    window = min(len(q) - 1, max(_LEAST, int(_SECONDS / dt)))
+    f, density = welch(np.diff(q, axis=0), nperseg=window, axis=0)
     f, density = f[1:], density[1:]
     # white noise of the positions, whose level is that of the upper half of the spectrum
-    gain = (2.0 * rate * np.sin(np.pi * f / rate))[:, None] ** 2
-    noise = gain * np.median((density / gain)[(f > 0.25 * rate) & (f < 0.45 * rate)], axis=0)
+    gain = np.sin(np.pi * f)[:, None] ** 2
+    noise = gain * np.median((density / gain)[(f > 0.25) & (f < 0.45)], axis=0)
     power = np.cumsum(np.where(density > 10.0 * noise, density - noise, 0.0), axis=0)
     moving = power[-1] > 1e-12 * power[-1].max(initial=0.0)
-    if not moving.any():
-        return 0.0
-    most, bulk = (f[(power >= share * power[-1]).argmax(axis=0)][moving] for share in (0.999, 0.95))
-    # power at eight times the frequency of the motion is that of the steps of a coarse encoder
-    return float(1.0 / np.where(most > 8.0 * bulk, 3.0 * bulk, most).max())
+    most = f[(power >= 0.999 * power[-1]).argmax(axis=0)][moving]
+    return float(dt / most.max()) if moving.any() else 0.0
