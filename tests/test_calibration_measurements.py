@@ -34,7 +34,7 @@ from robotmodels.calibration.measurements import (
     whitened,
 )
 from robotmodels.calibration.measurements.kinds import drawn_groups
-from robotmodels.calibration.measurements.positions import as_point, pivot_of, target_points
+from robotmodels.calibration.measurements.positions import pivot_of, target_points
 from robotmodels.calibration.problem import guessed_fixtures, linearised, problem_of, satisfying
 from robotmodels.calibration.read import read_measurements
 from robotmodels.calibration.selection import select_configurations
@@ -436,7 +436,7 @@ class BallContact(Contact):
 
     q: np.ndarray = field(metadata=fields.READINGS)
     ball: fields.Given = field(default=None, metadata=fields.LABELS)
-    known: fields.Given = field(default=None, metadata=fields.targets(as_point))
+    known: fields.Given = field(default=None, metadata=fields.targets(fields.as_point))
     sigma: fields.Given = field(default=None, metadata=fields.NOISE)
     covariance: fields.Given = field(default=None, metadata=fields.NOISE)
     frame: str | int | None = None

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
 
 from .. import se3
 from .._arrays import Array, as_vector
@@ -18,7 +19,6 @@ from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from ..se3 import skew
 from .candidates import candidate_parameters
 from .extended_table import Frame
 from .identifiable import identifiable_on
@@ -33,9 +33,6 @@ _NEAR = 0.2
 """Mean residual, in lengths of the robot, above which base and tool are aligned first."""
 _ALIKE = 1.0 + 2.0 * np.cos(0.5)
 """Mean trace of the rotations from nominal to measured poses below which they are too."""
-_STEPS = 50
-_ROUNDING = 1e-13
-"""Relative step at which Gauss-Newton has converged."""
 
 
 def best_motion(points: Array, targets: Array) -> Array:
@@ -131,52 +128,33 @@ class TrueErrors(NamedTuple):
 
 
 def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> TrueErrors:
-    """Absolute accuracy: position errors of a robot model against the real robot.
+    """Absolute accuracy: position errors of a model, calibrated robot or result of a fit.
 
-    ``robot``: a model, a calibrated robot or the result of a fit; ``q``: three or more readings
-    (N, n), other ones than those of the fit; ``frame``: the end, None is the tool.
+    ``real``: the true one; ``q (N, n)``: three or more readings that the fit did not have.
     """
-    models = [x if isinstance(x, RobotModel) else as_calibrated(x).model for x in (robot, real)]
-    model, real_model = models
-    if model.n != real_model.n:
-        raise InvalidValueError(
-            f"real: expected a robot with the {model.n} joints of robot, got {real_model.n} joints."
-        )
-    readings = np.atleast_2d(as_vector(q, model.n, "q")).reshape(-1, model.n)
+    models = [x if isinstance(x, RobotModel) else as_calibrated(x) for x in (robot, real)]
+    n = models[0].n if isinstance(models[0], RobotModel) else models[0].model.n
+    readings = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
     if len(readings) < 3:
         raise InvalidValueError(
             f"q: expected three configurations or more to fit a base, got {len(readings)}."
         )
-    T, goal = _poses(robot, readings, frame), _poses(real, readings, frame)[:, :3, 3]
-    p = T[:, :3, 3]
-    at_best = p + T[:, :3, :3] @ _best_tool(T, goal)
-    gaps = p - goal, _base_fitted(p, goal), _base_fitted(at_best, goal)
+    T, goal = (
+        dgm(m, readings, frame)
+        if isinstance(m, RobotModel)
+        else calibrated_pose(m, readings, frame)
+        for m in models
+    )
+    R, p, goal = T[:, :3, :3], T[:, :3, 3], goal[:, :3, 3]
+
+    def left(point: Array) -> Array:
+        at = p + R @ point
+        Z = best_motion(at, goal)
+        return at @ Z[:3, :3].T + Z[:3, 3] - goal
+
+    tool = least_squares(
+        lambda x: left(x).ravel(), np.zeros(3), "3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
     none = np.full(len(p), np.nan)
+    gaps = p - goal, left(np.zeros(3)), left(tool.x)
     return TrueErrors(*(Errors(np.linalg.norm(gap, axis=1), none) for gap in gaps))
-
-
-def _poses(robot: Any, q: Array, frame: Frame) -> Array:
-    if isinstance(robot, RobotModel):
-        return dgm(robot, q, frame)
-    return calibrated_pose(as_calibrated(robot), q, frame)
-
-
-def _base_fitted(p: Array, goal: Array) -> Array:
-    Z = best_motion(p, goal)
-    return p @ Z[:3, :3].T + Z[:3, 3] - goal
-
-
-def _best_tool(T: Array, goal: Array) -> Array:
-    """Point of the tool (3,) by Gauss-Newton, with the six parameters of the base."""
-    R, p, point = T[:, :3, :3], T[:, :3, 3], np.zeros(3)
-    size = float(np.linalg.norm(np.ptp(goal, axis=0))) or 1.0
-    for _ in range(_STEPS):
-        Z = best_motion(p + R @ point, goal)
-        at = (p + R @ point) @ Z[:3, :3].T
-        J = np.concatenate([np.broadcast_to(np.eye(3), R.shape), -skew(at), Z[:3, :3] @ R], axis=2)
-        # the shortest step: base and tool need not be distinguishable
-        step = np.linalg.lstsq(J.reshape(-1, 9), (goal - at - Z[:3, 3]).ravel(), rcond=1e-9)[0]
-        point = point + step[6:]
-        if np.linalg.norm(step[6:]) < _ROUNDING * size:
-            break
-    return point

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from itertools import count
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..model import RobotModel, check_model
 from .alignment import align_base_and_tool
 from .candidates import candidate_parameters
 from .contradiction import contradictions, with_outliers
-from .identifiable import IdentifiableParameters, Reason, all_corrections, identifiable_on
+from .identifiable import Reason, identifiable_on
 from .measurements import KnownDistance, Measurement
 from .notes import implausible, notes_after, notes_before, notes_of_errors
 from .parameters import Compliance, GeometricParameters, as_names
@@ -25,7 +25,7 @@ from .prior import ParameterPrior, estimated_with, note_of_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
 from .significance import adjusted, check_enough, insignificant_parameters
-from .solve import Solution, solve
+from .solve import solve
 from .structure import note_of_structure, structure_of, trials_of
 from .validation import (
     Validation,
@@ -91,8 +91,8 @@ def fit(
         ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
         How large the corrections are expected to be, so that the estimate is the maximum a
-        posteriori; default `ParameterPrior()`. Corrections that contradict it widen it, with a
-        note. None for none: parameters that noise hides still stay nominal.
+        posteriori. Corrections that contradict it widen it, with a note. None for none:
+        parameters that noise hides still stay nominal.
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int
@@ -120,17 +120,16 @@ def fit(
 
     References
     ----------
-    Seed book section 1.4.
+    Seed book section 1.4.4.
 
     Examples
     --------
     >>> import robotmodels as rm
-    >>> import robotmodels.calibration
+    >>> from robotmodels.calibration import Pose
     >>> arm = rm.load("rx90")
     >>> real = arm.with_tool(rm.se3.translation(0.001, 0.0, 0.1))
     >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> result = fit(arm, rm.calibration.Pose(q, rm.dgm(real, q)), folds=0)
-    >>> result.model.tool[:3, 3].round(6)
+    >>> fit(arm, Pose(q, rm.dgm(real, q)), folds=0).model.tool[:3, 3].round(6)
     array([0.001, 0.   , 0.1  ])
     """
     check_model(model)
@@ -171,14 +170,39 @@ def fit(
             candidates = make_candidates(aligned_model).subset(candidates.names)
     if prior is not None:
         prior = sized(prior, candidates.table.size)
-    estimate = _estimate(
-        candidates, measured, known, known_lengths, prior, loss=loss, truncation=truncation, rng=rng
-    )
-    solution = estimate.solution
-    expected = None if prior is None else replace(prior, strength=solution.fit.prior.strength)
+    given_prior = prior
+    identify = partial(identifiable_on, dependent=_DEPENDENT, known_lengths=known_lengths)
+    identifiable = identify(candidates, measured, known=known)
+    check_enough(identifiable, measured)
+    for attempt in range(1, _TRIES + 1):
+        estimated = identifiable.kept
+        if prior is not None:
+            estimated = estimated_with(prior, identifiable, measured)
+        problem = problem_of(estimated, measured)
+        zero = np.zeros(problem.P)
+        start = np.concatenate([zero, guessed_fixtures(problem, zero)])
+        used = settled_prior(prior, problem, loss, rng)
+        solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
+        insignificant = [] if truncation else insignificant_parameters(solution, start)
+        identify_there = partial(
+            identify,
+            measurements=measured,
+            known=(*known, *identifiable.of_reason(Reason.NOISE)),
+            corrections=dict(zip(estimated.names, solution.corrections, strict=True)),
+            fixtures=solution.fixtures,
+        )
+        preferred = candidates.preferring(estimated.names)
+        after = identify_there(preferred)
+        wider = None if prior is None else widened(prior, problem, solution.fit)
+        # columns that depend on others at the nominal robot may not at the solution
+        gained = set(after.names) - set(estimated.names) if prior is not None else set()
+        if attempt == _TRIES or not (insignificant or gained or wider is not prior):
+            break
+        prior, identifiable = wider, adjusted(identifiable, insignificant, gained)
+    expected = given_prior and replace(given_prior, strength=solution.fit.prior.strength)
     contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
     solution = with_outliers(solution, contradicted, expected)
-    structure = None if implausible(solution) else structure_of(solution, estimate.identifiable)
+    structure = None if implausible(solution) else structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts = partition(model, measured, folds if blocks >= 2 * folds else 0, rng)
     last = partition(model, measured, max(round(1.0 / share), 2) if share else 0, rng)
@@ -193,7 +217,12 @@ def fit(
             "No measurements can be held out: each object is measured in only one posture."
         )
     trials_to_fit = len(structure.indicated) if structure and fits else 0
-    step = _Steps(progress, 1 + fits + len(last.splits) + trials_to_fit * (1 + fits))
+    total, done = 1 + fits + len(last.splits) + trials_to_fit * (1 + fits), count(1)
+    work = Workers(progress=progress)
+
+    def step() -> None:
+        work.done(next(done) / total)
+
     step()
     in_folds = in_test = None
     if fits:
@@ -205,9 +234,8 @@ def fit(
     if structure is not None:
         trials = []
         if in_folds is not None:
-            preferred, identify = estimate.preferred, estimate.identify
             trials = trials_of(
-                structure, solution, preferred, identify, parts, in_folds, nominal, step
+                structure, solution, preferred, identify_there, parts, in_folds, nominal, step
             )
         notes.append(note_of_structure(structure, trials, in_folds))
     in_sample = errors_of(solution.problem, solution.corrections, solution.fixtures)
@@ -216,102 +244,19 @@ def fit(
     return CalibrationResult(
         nominal=model,
         known=(*known_lengths, *known),
-        identifiable=estimate.identifiable,
-        identifiable_after=estimate.identifiable_after,
+        identifiable=identifiable,
+        identifiable_after=after,
         solution=solution,
         validation=validation,
         notes=(
             *notes_of_errors(solution, validation),
             *notes,
             *dict.fromkeys(part.note for part in (parts, last) if part.note),
-            *note_of_prior(prior, estimate.prior, distances),
+            *note_of_prior(given_prior, prior, distances),
             *(c.note for c in contradicted),
-            *notes_after(solution, estimate.identifiable, estimate.identifiable_after),
+            *notes_after(solution, identifiable, after),
         ),
     )
-
-
-class _Estimate(NamedTuple):
-    """A solution, the identifiable parameters before and at it, and the prior as widened.
-
-    ``preferred`` are the candidates with those estimated first; ``identify`` gives the identifiable
-    ones of some candidates at the solution.
-    """
-
-    solution: Solution
-    identifiable: IdentifiableParameters
-    identifiable_after: IdentifiableParameters
-    prior: ParameterPrior | None
-    preferred: GeometricParameters
-    identify: Callable[[GeometricParameters], IdentifiableParameters]
-
-
-def _estimate(
-    candidates: GeometricParameters,
-    measured: tuple[Measurement, ...],
-    known: tuple[str, ...],
-    known_lengths: tuple[str, ...],
-    prior: ParameterPrior | None,
-    *,
-    loss: Loss,
-    truncation: float | None,
-    rng: np.random.Generator,
-) -> _Estimate:
-    """Fit the parameters that are identifiable and significant, with a prior that suits them."""
-    identifiable = identifiable_on(candidates, measured, known_lengths, known, dependent=_DEPENDENT)
-    check_enough(identifiable, measured, known_lengths, known, _DEPENDENT)
-    for _ in range(_TRIES):
-        estimated = identifiable.kept
-        if prior is not None:
-            estimated = estimated_with(prior, identifiable, measured)
-        problem = problem_of(estimated, measured)
-        zero = np.zeros(problem.P)
-        start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-        used = settled_prior(prior, problem, loss, rng)
-        solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
-        insignificant = [] if truncation else insignificant_parameters(solution, start)
-        fixed = (*known, *identifiable.of_reason(Reason.NOISE))
-        identify = partial(_identifiable_at, solution, known_lengths, fixed)
-        preferred = candidates.preferring(estimated.names)
-        after = identify(preferred)
-        found = _Estimate(solution, identifiable, after, prior, preferred, identify)
-        wider = None if prior is None else widened(prior, problem, solution.fit)
-        # columns that depend on others at the nominal robot may not at the solution
-        gained = set(after.names) - set(estimated.names) if prior is not None else set()
-        if not insignificant and not gained and wider is prior:
-            break
-        prior, identifiable = wider, adjusted(identifiable, insignificant, gained)
-    return found
-
-
-def _identifiable_at(
-    solution: Solution,
-    known_lengths: tuple[str, ...],
-    known: tuple[str, ...],
-    candidates: GeometricParameters,
-) -> IdentifiableParameters:
-    """Identifiable ones of some candidates at a solution."""
-    estimated = solution.problem.parameters
-    return identifiable_on(
-        candidates,
-        solution.problem.measurements,
-        known_lengths,
-        known,
-        corrections=all_corrections(candidates, estimated, solution.corrections),
-        fixtures=solution.fixtures,
-        dependent=_DEPENDENT,
-    )
-
-
-class _Steps:
-    """Counts fits and tells the fraction done."""
-
-    def __init__(self, progress: Progress, total: int) -> None:
-        self._work, self._total, self._done = Workers(progress=progress), total, 0
-
-    def __call__(self) -> None:
-        self._done += 1
-        self._work.done(self._done / self._total)
 
 
 def _held_out(

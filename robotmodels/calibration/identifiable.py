@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, read_only
+from .._arrays import Array, Frozen, as_exact
 from ..errors import InvalidValueError
-from ..estimation import ColumnBasis, column_basis
+from ..estimation import column_basis
 from ..model import RobotModel, check_model
 from ..table_text import boxed
 from .candidates import candidate_parameters
@@ -20,19 +20,13 @@ from .extended_table import Frame
 from .measurements import Measurement
 from .measurements.kinds import Kind, as_kind, drawn_groups, measurement_of
 from .parameters import Compliance, ErrorLaw, GeometricParameters, as_names
-from .problem import (
-    Problem,
-    guessed_fixtures,
-    linearised,
-    measured_frames,
-    problem_of,
-    satisfying,
-)
+from .problem import Problem, guessed_fixtures, linearised, measured_frames, problem_of, satisfying
 from .scale import check_scale, needs_a_length
 
 DEPENDENT = 1e-7
 """Sine of the angle to the columns before, below which a parameter acts like a combination."""
-_EMPTY = 1e-9  # length of a column beside the longest, below which it has no effect
+_EMPTY = 1e-9
+"""Length of a column beside the longest, below which it has no effect."""
 _SEED = 14
 _CONTACTS = 14
 """Number of contacts that are drawn for structural identifiability."""
@@ -55,27 +49,21 @@ class Reason(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class IdentifiableParameters(Rebuilt):
+class IdentifiableParameters(Frozen):
     """The identifiable parameters, and why the others are not; prints as a table.
 
     Parameters
     ----------
-    candidates : GeometricParameters
-        All parameters that were examined.
-    kept : GeometricParameters
-        Those that can be estimated.
+    candidates, kept : GeometricParameters
+        All parameters that were examined, and those that can be estimated.
     reasons : mapping of str to Reason
         For every other candidate.
     regrouping : mapping of str to mapping of str to float
         ``{kept: {candidate: coefficient}}``: the estimate of a kept parameter is this sum.
-    basis : ColumnBasis
-        Of the fixtures and candidates, in this order.
-    fixtures : int
-        How many columns of the basis are fixtures.
+    gap : tuple of float
+        Smallest distance of a kept column, largest of a dependent one: sines of angles.
     condition : float
         Condition number of the kept columns and fixtures, columns scaled to length 1.
-    rows : int
-        Number of residual rows.
     factor : ndarray, shape (count, count)
         Triangular factor of the kept columns without their projection on the fixtures: its
         singular values are those of the identification matrix of the kept parameters.
@@ -92,15 +80,10 @@ class IdentifiableParameters(Rebuilt):
     kept: GeometricParameters
     reasons: dict[str, Reason]
     regrouping: dict[str, dict[str, float]]
-    basis: ColumnBasis
-    fixtures: int
+    gap: tuple[float, float]
     condition: float
-    rows: int
     factor: Array
     configurations: int
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "factor", read_only(self.factor))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -111,11 +94,6 @@ class IdentifiableParameters(Rebuilt):
     def count(self) -> int:
         """How many can be estimated."""
         return len(self.kept)
-
-    @property
-    def gap(self) -> tuple[float, float]:
-        """Smallest distance of a kept column, largest of a dependent one: sines of angles."""
-        return self.basis.gap
 
     def of_reason(self, reason: Reason) -> tuple[str, ...]:
         """Names of the parameters that are left out for a reason."""
@@ -204,10 +182,7 @@ def identifiable_parameters(
     With kinds of measurement the result is structural: for random configurations within the joint
     ranges. Contacts are drawn at configurations that satisfy them exactly (several postures of
     each of several contacts), without joint limits. With measured data the result is that of
-    these data.
-
-    Measurements without any known length are refused: at least one must be named. The base stays
-    as it is if no measurement depends on it.
+    these data. The base stays as it is if no measurement depends on it.
 
     Parameters
     ----------
@@ -218,10 +193,9 @@ def identifiable_parameters(
         data; kinds and data together as well.
     frame : str, int or None
         The end of kinds; None is the tool. Data have their own.
-    known_lengths : iterable of str
-        Parameters that are known: they stay as they are and give the scale.
-    known : iterable of str
-        Other parameters that stay as they are.
+    known_lengths, known : iterable of str
+        Parameters that are known and stay as they are. Measurements without any known length need
+        one of ``known_lengths``, which gives the scale.
     parameters : GeometricParameters or names, optional
         Candidates, in the order of preference, or which of them; default all that the next
         arguments make.
@@ -243,11 +217,6 @@ def identifiable_parameters(
     InvalidValueError, FrameNotFoundError
         No length is known; no contact can be reached in two postures; unknown names.
 
-    References
-    ----------
-    Seed book section 1.4.4.2; W. Khalil, M. Gautier, Ch. Enguehard, "Identifiable parameters and
-    optimum configurations for robots calibration", Robotica 9, 1991.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -255,7 +224,13 @@ def identifiable_parameters(
     30
     """
     check_model(model)
-    given = _kinds_and_data(measurements)
+    single = isinstance(measurements, Measurement | str | type)
+    given = [
+        m if isinstance(m, Measurement) else as_kind(m, f"measurements[{k}]")
+        for k, m in enumerate([measurements] if single else measurements)
+    ]
+    if not given:
+        raise InvalidValueError("measurements: expected kinds or measured data, got none.")
     data = [m for m in given if isinstance(m, Measurement)]
     frames = measured_frames(data) if data else ()
     if len(data) < len(given):
@@ -270,12 +245,7 @@ def identifiable_parameters(
             compliance=compliance, eccentricity=eccentricity,
         )  # fmt: skip
         candidates = candidates if parameters is None else candidates.subset(parameters)
-    xi = None
-    if isinstance(corrections, Mapping):
-        xi = np.zeros(len(candidates))
-        xi[candidates.index(corrections, "corrections")] = list(corrections.values())
-    elif corrections is not None:
-        xi = as_exact(corrections, (len(candidates),), "corrections")
+    xi = None if corrections is None else _all_corrections(candidates, corrections)
     rng = np.random.default_rng(_SEED) if rng is None else rng
     drawn = [
         m if isinstance(m, Measurement) else _drawn(candidates, m, rng, frame, xi) for m in given
@@ -283,16 +253,15 @@ def identifiable_parameters(
     return identifiable_on(candidates, drawn, known_lengths, known, xi)
 
 
-def _kinds_and_data(measurements: Any) -> list[Measurement | Kind]:
-    """Kinds and measured data, from a single one or several."""
-    single = isinstance(measurements, Measurement | str | type)
-    given = [measurements] if single else list(measurements)
-    if not given:
-        raise InvalidValueError("measurements: expected kinds or measured data, got none.")
-    return [
-        m if isinstance(m, Measurement) else as_kind(m, f"measurements[{k}]")
-        for k, m in enumerate(given)
-    ]
+def _all_corrections(
+    candidates: GeometricParameters, corrections: ArrayLike | Mapping[str, float]
+) -> Array:
+    """Corrections of all candidates, zero for those that a mapping does not name."""
+    if not isinstance(corrections, Mapping):
+        return as_exact(corrections, (len(candidates),), "corrections")
+    xi = np.zeros(len(candidates))
+    xi[candidates.index(corrections, "corrections")] = list(corrections.values())
+    return xi
 
 
 def _drawn(
@@ -323,7 +292,7 @@ def identifiable_on(
     measurements: Iterable[Measurement],
     known_lengths: Iterable[str] = (),
     known: Iterable[str] = (),
-    corrections: Array | None = None,
+    corrections: ArrayLike | Mapping[str, float] | None = None,
     fixtures: Array | None = None,
     dependent: float = DEPENDENT,
     scale_is_known: bool = False,
@@ -338,7 +307,7 @@ def identifiable_on(
         *candidates.index(known_lengths, "known_lengths").tolist(),
         *candidates.index(known, "known").tolist(),
     }
-    xi = np.zeros(len(candidates)) if corrections is None else corrections
+    xi = _all_corrections(candidates, {} if corrections is None else corrections)
     values = guessed_fixtures(problem, xi) if fixtures is None else fixtures
     exact = satisfying(problem, xi, values)
     if not any(m.views for m in exact.measurements):
@@ -347,24 +316,27 @@ def identifiable_on(
             "satisfy these constraints, so the model is far from the robot. Check the labels, "
             "the order of the joints and the tool (a first value of its length helps)."
         )
-    base = [e.row == 0 and e.law is ErrorLaw.CONSTANT for e in candidates.entries]
-    gauge = [n for n, of_base in zip(candidates.names, base, strict=True)
-             if of_base and not problem.sees_base]  # fmt: skip
+    gauge = [e.name for e in candidates.entries if e.row == 0 and e.law is ErrorLaw.CONSTANT]
+    gauge = [] if problem.sees_base else gauge
     reasons = dict.fromkeys(gauge, Reason.GAUGE)
     reasons |= {candidates.names[k]: Reason.KNOWN for k in at}
-    W = _all_rows(exact, xi, values)
-    size = problem.parameters.table.size
-    units = [np.tile([size if u == "m" else 1.0 for u in m.units], m.blocks)
-             for m in exact.measurements]  # fmt: skip
-    relative = W / np.concatenate(units)[:, None]  # lengths in parts of the robot's size
+    W, size = _all_rows(exact, xi, values), problem.parameters.table.size
+    units = [np.tile(m.units, m.blocks) for m in exact.measurements]
+    # lengths in parts of the robot's size
+    relative = W / np.where(np.concatenate(units) == "m", size, 1.0)[:, None]
     if not scale_is_known and needs_a_length(problem, (*known, *known_lengths)):
         check_scale(exact, relative, [*known, *known_lengths, *gauge], known_lengths)
     F = problem.F
     free = [k for k, name in enumerate(candidates.names) if name not in reasons]
     columns = np.concatenate([np.arange(F), F + np.array(free)]).astype(int)
-    unit = [size if f.unit == "m" else 1.0 for f in problem.fixtures]
-    unit += [size if e.element.is_length else 1.0 for e in candidates.entries]
-    basis = _angle_basis(relative[:, columns], dependent, np.array(unit)[columns])
+    lengths = [f.unit == "m" for f in problem.fixtures]
+    lengths += [e.element.is_length for e in candidates.entries]
+    # independent columns by their angles, since metres and radians have no common scale
+    relative, unit = relative[:, columns], np.where(lengths, size, 1.0)[columns]
+    length = np.linalg.norm(relative * unit, axis=0)
+    longest = length.max(initial=0.0) or 1.0
+    scale = unit / np.where(length > _EMPTY * longest, length, longest)
+    basis = column_basis(relative, scale=scale, negligible=dependent)
     names = [f.name for f in problem.fixtures] + [candidates.names[k] for k in free]
     reasons |= {names[k]: Reason.NO_EFFECT for k in basis.empty if k >= F}
     reasons |= {names[k]: Reason.REGROUPED for k in basis.dependent if k >= F}
@@ -380,30 +352,11 @@ def identifiable_on(
         kept=candidates.subset(regrouping),
         reasons=reasons,
         regrouping=regrouping,
-        basis=basis,
-        fixtures=F,
+        gap=basis.gap,
         condition=float(singular[0] / singular[-1]) if len(singular) else 1.0,
-        rows=len(W),
         factor=np.asarray(np.linalg.qr(chosen, mode="r"))[first:, first:],
         configurations=exact.blocks,
     )
-
-
-def all_corrections(
-    candidates: GeometricParameters, kept: GeometricParameters, corrections: Array
-) -> Array:
-    """Corrections of all candidates, zero for those that were not estimated."""
-    values = np.zeros(len(candidates))
-    values[candidates.index(kept.names)] = corrections
-    return values
-
-
-def _angle_basis(W: Array, dependent: float, unit: Array) -> ColumnBasis:
-    """Independent columns by their angles, since metres and radians have no common scale."""
-    length = np.linalg.norm(W * unit, axis=0)
-    longest = length.max(initial=0.0) or 1.0
-    size = np.where(length > _EMPTY * longest, length, longest)
-    return column_basis(W, scale=unit / size, negligible=dependent)
 
 
 def _all_rows(problem: Problem, xi: Array, fixtures: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from math import pi
 from typing import Any
 
@@ -14,22 +13,19 @@ from .. import se3
 from .._arrays import Array, as_mask, as_vector, batch_rows
 from ..geometry import REVOLUTE
 from ..igm import igm
+from ..igm.arrange import arranged, result_fields, turned_inside
+from ..igm.postures import MERGE, Postures, difference
 from ..igm.request import above_zero, locks_of
-from ..igm.solutions import IGMSolutions, posture_distance
-from ..igm.status import IGMStatus
-from ..kinematics import dgm
+from ..igm.solutions import IGMSolutions, of_fields
+from ..kinematics import dgm, jacobian
+from ..kinematics.lengths import characteristic_length
 from ..se3.orientation import rotation_vectors_of
-from .measurements.motions import inverse_left_jacobians
-from .robot import CalibratedRobot, as_calibrated, calibrated_pose, reading_jacobian
+from .robot import CalibratedRobot, as_calibrated, calibrated_pose
 
-STEPS, HALVINGS = 20, 6
-LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
-SINGULAR = 1e-7  # singular value below which the pseudo-inverse replaces the inverse
-ROUNDED = 1e-14  # pose error that is rounding
-MERGE = 1e-6  # solutions closer than this are one [rad, m], as in `igm`
+_STEPS = 30
+_LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
+_ROUNDED = 1e-14  # pose error that is rounding
 _RANK_TOLERANCE = 1e-10  # singular values beside the largest that count as zero
-
-Flags = NDArray[np.bool_]
 
 
 def corrected_igm(
@@ -44,9 +40,10 @@ def corrected_igm(
 ) -> IGMSolutions:
     """Inverse geometric model of a calibrated robot: the readings of its joints.
 
-    `igm` of the calibrated table gives the solutions; Newton's method refines each in the readings,
-    where gains, eccentricity, compliance of the joints and bending of the links act. At the edge of
-    its reach a robot that bends may have solutions that its rigid table does not lead to.
+    `igm` of the calibrated table gives the solutions. Gains, eccentricity and compliance of the
+    joints are inverted; Newton's method with the Jacobian of the table takes account of links that
+    bend, and of the readings of locked joints. At the edge of its reach a robot that bends may have
+    solutions that its rigid table does not lead to.
 
     Parameters
     ----------
@@ -55,15 +52,12 @@ def corrected_igm(
     T : array_like, shape (..., 4, 4)
         World poses of the tool, metres.
     q_ref : array_like, shape (..., n), optional
-        Reference readings, rad or m: order of the solutions, and the choice of redundant arms.
-    mask : array_like, shape (6,), optional
-        Components ``x y z rx ry rz`` requested, see `igm`.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
+        Reference readings, rad or m: order of the solutions, and the choice of redundant arms,
+        whose free joints keep them.
+    mask, mask_axes, lock
+        As `igm`; locked joints (column of q, from 0, or name) keep a reading, rad or m.
     limits : bool
         Whether readings must lie within the joint limits, whole turns of the joints added.
-    lock : mapping, optional
-        Joints (column of q, from 0, or name) that keep a reading, rad or m.
     tolerance : float
         Largest pose error of a solution, metres and radians.
 
@@ -76,10 +70,6 @@ def corrected_igm(
     ------
     ShapeError, InvalidValueError, NotARotationError
         As `igm`.
-
-    Notes
-    -----
-    The free joints of a redundant arm keep the readings of ``q_ref``.
 
     References
     ----------
@@ -99,16 +89,17 @@ def corrected_igm(
     array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
     """
     robot = as_calibrated(robot)
-    model, n = robot.model, robot.model.n
+    model, n, errors = robot.model, robot.model.n, robot.joint_errors
     tolerance = above_zero(tolerance, "tolerance")
     requested, locks = as_mask(mask), dict(locks_of(model, lock))
-    poses = se3.as_pose(T)
-    reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref")
+    poses, given = se3.as_pose(T), q_ref is not None
+    reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref").copy()
+    reference[..., [*locks]] = [*locks.values()]
     flat = poses.reshape(*poses.shape[:-2], 16)
     batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     targets = np.ascontiguousarray(rows.reshape(-1, 4, 4))
     options: dict[str, Any] = {
-        "q_ref": None if q_ref is None else robot.joint_errors.actual(references),
+        "q_ref": errors.actual(references) if given else None,
         "mask": None if requested.all() else requested,
         "mask_axes": mask_axes,
         "lock": locks or None,
@@ -119,13 +110,47 @@ def corrected_igm(
     if robot.bent_rows and len(targets):
         # at the edge of reach, bending decides whether there is a solution
         found = igm(model, _unbent(robot, targets, found, references), **options)
-    newton = _Newton(robot, requested, mask_axes == "tool", list(locks))
-    reading, residual = newton.readings(targets, found, references, q_ref is not None, limits)
-    kept = found.valid & (residual <= tolerance)
-    kept &= ~_repeated(reading, kept, newton.turns)
-    return _arranged(
-        found, newton, (reading, residual, kept), references, q_ref is not None, limits, batch
+    turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    joints = np.array([model.lower, model.upper, turns])
+    q = np.where(found.valid[..., None], found.q, 0.0)
+    low, high = (model.lower, model.upper) if limits else (np.full(n, -pi), np.full(n, pi))
+    bounded = np.isfinite(low) & np.isfinite(high)
+    goal = references[:, None] if given and limits else np.where(bounded, low + high, 0.0) / 2.0
+    reading = errors.reading(q)
+    whole = np.nan_to_num(np.round((turned_inside(reading, low, high, goal) - reading) / (2 * pi)))
+    if whole.any():  # turns of the joints, not of their readings
+        reading = errors.reading(q + 2.0 * pi * whole * turns)
+    joint = model.chain.joint[model.twin.frame(None).path - 1]
+    is_redundant = int((joint >= 0).sum()) - len(locks) > int(requested.sum())
+    held = np.isin(np.arange(n), [*locks]) | (found.free_joints & is_redundant)
+    off = references[:, None] - reading
+    off -= 2.0 * pi * np.round(off / (2.0 * pi)) * turns
+    reading = np.where(held, reading + off, reading)
+    pose, solution = np.nonzero(found.valid & np.isfinite(reading).all(axis=-1))
+    residual = np.full(found.valid.shape, np.inf)
+    reading[pose, solution], residual[pose, solution] = _refined(
+        robot, targets[pose], reading[pose, solution], held[pose, solution], requested,
+        mask_axes == "tool",
+    )  # fmt: skip
+    kept = residual <= tolerance
+    reading = np.where(kept[..., None], reading, 0.0)
+    gap = np.abs(difference(model.table.sigma[model.table.joint_rows], reading[:, :, None],
+                            reading[:, None])).max(axis=-1, initial=0.0)  # fmt: skip
+    kept &= ~((gap < MERGE) & kept[:, None] & np.tri(gap.shape[1], k=-1, dtype=bool)).any(axis=-1)
+    postures = Postures(
+        reading, kept, residual, found.double, found.free_joints, kept & False, found.family_joints
     )
+    out = arranged(
+        postures, found.code, found.labels, np.arange(n), references, given, joints, limits
+    )
+    none = found.count == 0
+    missing = {
+        name: None if values is None else np.where(none[:, None], values, np.nan)
+        for name, values in (("closest", found.closest), ("missing", found.missing))
+    }
+    out = out._replace(status=np.where(none, found.status, out.status), **missing)
+    method = f"{found.method}; of the calibrated table, refined in the readings"
+    return of_fields(result_fields(batch, out, method, turns & (not limits), tuple(requested)))
 
 
 def _unbent(
@@ -143,206 +168,55 @@ def _unbent(
     return dgm(robot.model, q) @ se3.inverse(calibrated_pose(robot, reading)) @ targets
 
 
-def _repeated(q: Array, kept: Flags, turns: Flags) -> Flags:
-    """Solutions that are an earlier one of the same pose. Shapes: q (N, S, n), kept (N, S)."""
-    same = kept[:, :, None] & kept[:, None] & np.tri(kept.shape[1], k=-1, dtype=np.bool_)
-    for joint, turn in enumerate(turns):
-        distance = np.abs(q[:, :, None, joint] - q[:, None, :, joint])
-        same &= (np.minimum(distance, np.abs(2.0 * pi - distance)) if turn else distance) < MERGE
-    return np.asarray(same.any(axis=-1))
+def _refined(
+    robot: CalibratedRobot,
+    targets: Array,
+    q: Array,
+    held: NDArray[np.bool_],
+    mask: NDArray[np.bool_],
+    in_tool_axes: bool,
+) -> tuple[Array, Array]:
+    """Readings (M, n) after Newton steps while these lower the pose errors, and the errors (M,).
 
+    Shapes: targets (M, 4, 4), q and held (M, n).
+    """
+    model = robot.model
+    length = characteristic_length(model)
+    axes = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    if in_tool_axes:
+        axes = targets[:, :3, :3].swapaxes(1, 2)
+    unit = np.where(model.table.sigma[model.table.joint_rows] == REVOLUTE, 1.0, length)
+    weight = np.repeat([1.0 / length, 1.0], 3)[:, None]
 
-def _arranged(
-    found: IGMSolutions,
-    newton: _Newton,
-    rows: tuple[Array, Array, Flags],
-    references: Array,
-    given: bool,
-    limits: bool,
-    batch: tuple[int, ...],
-) -> IGMSolutions:
-    """The kept rows in order: by their distance to the reference if one is given."""
-    model, (reading, residual, kept) = newton.robot.model, rows
-    inside = ((reading >= model.lower) & (reading <= model.upper)).all(axis=-1)
-    chosen = kept & (inside | (not limits))
-    periodic = newton.turns & (not limits)
-    key = np.broadcast_to(np.arange(float(kept.shape[1])), kept.shape)
-    if given:
-        key = posture_distance(reading, references[:, None], periodic)
-    order = np.argsort(np.where(chosen, key, np.inf), axis=1, kind="stable")
-    order = order[:, : int(chosen.sum(axis=1).max(initial=0))]
-    there = np.take_along_axis(chosen, order, axis=1)
+    def in_axes(rows: NDArray[np.int64], columns: Array) -> Array:
+        parts = axes[rows] @ columns[:, :3], axes[rows] @ columns[:, 3:]
+        return np.concatenate(parts, axis=1) * mask[:, None]
 
-    def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
-        places = order if values.ndim == 2 else order[..., None]
-        out = np.take_along_axis(values, places, axis=1)
-        out[~there] = empty
-        return shaped(out)
+    def error_at(rows: NDArray[np.int64], q: Array) -> tuple[Array, Array]:
+        e = in_axes(rows, pose_errors(calibrated_pose(robot, q), targets[rows])[..., None])
+        return e, np.linalg.norm(e.reshape(-1, 2, 3), axis=-1).max(axis=-1)
 
-    def shaped(values: NDArray[Any]) -> NDArray[Any]:
-        return values.reshape((*batch, *values.shape[1:]))
-
-    solved = chosen.any(axis=1)
-    status = np.where(found.count > 0, int(IGMStatus.NOT_CONVERGED), found.status)
-    status = np.where(kept.any(axis=1), int(IGMStatus.OUTSIDE_LIMITS), status)
-    status = np.where(solved, found.status, status).astype(np.int8)
-    unsolved: dict[str, Array | None] = {"closest": found.closest, "missing": found.missing}
-    for name, values in unsolved.items():
-        if values is not None:
-            unsolved[name] = shaped(np.where(solved.reshape(-1, 1), np.nan, values))
-    return IGMSolutions(
-        q=packed(reading, np.nan),
-        valid=shaped(there),
-        residual=packed(residual, np.nan),
-        within_limits=packed(inside & chosen, False),
-        code=packed(found.code, -1),
-        labels=found.labels,
-        status=shaped(status),
-        double=packed(found.double, False),
-        free_joints=packed(found.free_joints, False),
-        family_joints=packed(found.family_joints, False),
-        method=f"{found.method}; of the calibrated table, refined in the readings",
-        periodic=periodic,
-        mask=newton.mask,
-        **unsolved,
-    )
-
-
-class _Newton:
-    """Newton refinement of readings for one robot and request (mask, axes, locked joints)."""
-
-    def __init__(
-        self, robot: CalibratedRobot, mask: Flags, in_tool_axes: bool, locked: list[int]
-    ) -> None:
-        model = robot.model
-        tool = model.twin.frame(None)
-        joints = model.chain.joint[tool.path - 1]
-        on_path = np.zeros(model.n, np.bool_)
-        on_path[joints[joints >= 0]] = True
-        lengths = np.linalg.norm(model.chain.position[tool.path[1:] - 1], axis=-1).sum()
-        self.length = float(lengths + np.linalg.norm(tool.position)) or 1.0
-        self.turns: Flags = np.asarray(model.table.sigma[model.table.joint_rows] == REVOLUTE)
-        self.unit = np.where(on_path, np.where(self.turns, 1.0, self.length), 0.0)
-        self.locked = np.isin(np.arange(model.n), locked)
-        self.robot, self.mask, self.in_tool_axes = robot, mask, in_tool_axes
-        self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
-
-    def readings(
-        self, targets: Array, found: IGMSolutions, references: Array, given: bool, limits: bool
-    ) -> tuple[Array, Array]:
-        """Readings (N, S, n) of solutions, and their pose errors (N, S), infinite without one."""
-        errors, held = self.robot.joint_errors, self.locked | found.free_joints & self.is_redundant
-        q = np.where(found.valid[..., None], found.q, 0.0)
-        reading = q if errors.is_zero or not q.size else errors.reading(q)
-        there = found.valid & np.isfinite(reading).all(axis=-1)
-        reading = np.where(there[..., None], reading, 0.0)
-        fixed = held & there[..., None]
-        off = np.where(fixed, references[:, None] - reading, 0.0)
-        off[..., self.turns] -= 2.0 * pi * np.round(off[..., self.turns] / (2.0 * pi))
-        reading, residual = self.refined(targets, reading + off, there, fixed)
-        aim = references[:, None] if given else None
-        turned = self._turned(reading, aim, limits)
-        moved = there & (turned != reading).any(axis=-1)
-        again, after = self.refined(targets, turned, moved, fixed)
-        return again, np.where(moved, after, residual)
-
-    def _turned(self, reading: Array, aim: Array | None, limits: bool) -> Array:
-        """Readings with whole turns added: in (-pi, pi], or with limits inside them if possible.
-
-        With limits nearest to the aim (N, 1, n), without one to mid-range.
-        """
-        low, high = np.full(len(self.turns), -pi), np.full(len(self.turns), pi)
-        goal: Any = np.zeros(len(self.turns))
-        if limits:
-            low, high = self.robot.model.lower, self.robot.model.upper
-            both = np.isfinite(low) & np.isfinite(high)
-            goal = np.where(both, 0.5 * (low + high), 0.0) if aim is None else aim
-            goal = np.where(np.isfinite(goal), goal, 0.0)
-        step = np.round((goal - reading) / (2.0 * pi))
-        least = np.ceil((low - reading) / (2.0 * pi) - 1e-15)
-        most = np.floor((high - reading) / (2.0 * pi) + 1e-15)
-        step = np.where(least <= most, np.clip(step, least, most), 0.0) * self.turns
-        # a whole turn of the joint, not of its reading
-        errors, turned = self.robot.joint_errors, reading + 2.0 * pi * step
-        if errors.is_zero or not step.any():
-            return turned
-        known = errors.reading(errors.actual(reading) + 2.0 * pi * step)
-        return np.where(np.isfinite(known) & (step != 0).any(axis=-1, keepdims=True), known, turned)
-
-    def refined(
-        self, targets: Array, reading: Array, rows: Flags, held: Flags
-    ) -> tuple[Array, Array]:
-        """Readings and pose errors after Newton's method in some rows.
-
-        Shapes: reading, held (N, S, n); rows (N, S) -> (N, S, n), (N, S).
-        """
-        pose, solution = np.nonzero(rows)
-        goals, fixed, q = targets[pose], held[pose, solution], reading[pose, solution]
-        size = self._sizes(goals, q)
-        going = np.flatnonzero(size > ROUNDED)
-        for _ in range(STEPS):
-            if not going.size:
-                break
-            step, better_rows = self._step(goals[going], q[going], fixed[going]), []
-            for _ in range(HALVINGS):
-                trial = q[going] + step
-                after = self._sizes(goals[going], trial)
-                better = after < size[going]
-                q[going[better]], size[going[better]] = trial[better], after[better]
-                better_rows.append(going[better])
-                going, step = going[~better], 0.5 * step[~better]
-                if not going.size:
-                    break
-            going = np.concatenate(better_rows)
-            going = going[size[going] > ROUNDED]
-        out, error = reading.copy(), np.full(rows.shape, np.inf)
-        out[pose, solution], error[pose, solution] = q, size
-        return out, error
-
-    def _in_axes(self, targets: Array, columns: Array) -> Array:
-        """Both halves of columns (M, 6, k) along the axes of the components."""
-        if not self.in_tool_axes:
-            return columns
-        turned = targets[:, :3, :3].swapaxes(1, 2)
-        return np.concatenate([turned @ columns[:, :3], turned @ columns[:, 3:]], axis=1)
-
-    def _sizes(self, targets: Array, reading: Array) -> Array:
-        """The larger of the missing translation (m) and rotation (rad), shape (M,)."""
-        errors = pose_errors(calibrated_pose(self.robot, reading), targets)
-        asked = self._in_axes(targets, errors[..., None])[..., 0] * self.mask
-        return np.asarray(np.linalg.norm(asked.reshape(-1, 2, 3), axis=-1).max(axis=-1))
-
-    def _step(self, targets: Array, reading: Array, held: Flags) -> Array:
-        """Newton steps of readings (M, n), the shortest."""
-        errors = pose_errors(calibrated_pose(self.robot, reading), targets)
-        slope = pose_error_slope(reading_jacobian(self.robot, reading), errors[:, 3:])
-        weight = np.repeat([1.0 / self.length, 1.0], 3)[:, None]
-        free = np.where(held, 0.0, self.unit)
-        A = (weight * self._in_axes(targets, slope))[:, self.mask] * free[:, None, :]
-        e = (weight * self._in_axes(targets, errors[..., None]))[:, self.mask]
-        step = (_inverses(A) @ e)[..., 0]
-        largest = np.abs(step).max(axis=-1, initial=0.0)
-        step *= np.minimum(1.0, LONGEST / np.maximum(largest, LONGEST))[:, None]
-        return step * free
-
-
-def _inverses(A: Array) -> Array:
-    """Inverses of regular square matrices, pseudo-inverses of all others, (M, m, n)."""
-    if A.shape[1] == A.shape[2]:
-        with suppress(np.linalg.LinAlgError):  # one of them is singular to the last digit
-            inverse = np.asarray(np.linalg.inv(A), np.float64)
-            rows = np.flatnonzero(~(np.linalg.norm(inverse, axis=(1, 2)) < 1.0 / SINGULAR))
-            inverse[rows] = np.linalg.pinv(A[rows], _RANK_TOLERANCE)
-            return inverse
-    return np.asarray(np.linalg.pinv(A, _RANK_TOLERANCE), np.float64)
+    going = np.arange(len(q))
+    e, size = error_at(going, q)
+    for _ in range(_STEPS):
+        at = size[going] > _ROUNDED
+        going, e = going[at], e[at]
+        if not going.size:
+            break
+        J = jacobian(model, robot.joint_errors.actual(q[going]))
+        free = np.where(held[going], 0.0, unit)
+        A = weight * in_axes(going, J) * free[:, None]
+        step = (np.linalg.pinv(A, _RANK_TOLERANCE) @ (weight * e))[..., 0]
+        longest = np.abs(step).max(axis=-1, initial=_LONGEST)
+        trial = q[going] + free * step * (_LONGEST / longest)[:, None]
+        e, after = error_at(going, trial)
+        better = after < size[going]
+        going, e = going[better], e[better]
+        q[going], size[going] = trial[better], after[better]
+    return q, size
 
 
 def pose_errors(T: Array, wanted: Array) -> Array:
     """Translation (m) and rotation vector (rad) from poses to the wanted ones, (N, 6), world."""
     turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
     return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors_of(turn)], axis=1)
-
-
-def pose_error_slope(J: Array, phi: Array) -> Array:
-    """Minus the derivative of `pose_errors` at rotation errors phi (N, 3): (N, 6, n)."""
-    return np.concatenate([J[:, :3], inverse_left_jacobians(-phi) @ J[:, 3:]], axis=1)

@@ -40,7 +40,7 @@ def check_readings(
     model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
 ) -> list[str]:
     """Compare readings with the limits of the joints: notes, or an error."""
-    beyond: dict[str, list[str]] = {}
+    notes: list[str] = []
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     for k, m in enumerate(measurements):
         if not m.views:
@@ -54,22 +54,18 @@ def check_readings(
                 "Pass radians: np.deg2rad(q)."
             )
         sentences, most = beyond_limits(model, q, rows)
+        if not sentences:
+            continue
+        note = (
+            f"{where}: readings beyond the limits of the joints: {'; '.join(sentences)}. Check "
+            "that the columns are readings in the order of the joints, with the signs and zeros "
+            "of the model, in rad and m. If the limits of the model are wrong, give it others: "
+            "model.with_table(model.table.replace(lower=..., upper=...))."
+        )
         if most:
-            raise InvalidValueError(
-                f"{where}: readings beyond the limits of the joints: {'; '.join(sentences)}. Check "
-                "that the columns are readings in the order of the joints, with the signs and "
-                "zeros of the model, in rad and m. If the limits of the model are wrong, give it "
-                "others: model.with_table(model.table.replace(lower=..., upper=...))."
-            )
-        if sentences:
-            beyond.setdefault("; ".join(sentences), []).append(where)
-    if not beyond:
-        return []
-    listed = "; ".join(f"{', '.join(where)}: {text}" for text, where in beyond.items())
-    return [
-        f"Readings beyond the limits of the joints: {listed}. Check that sign, zero and unit of "
-        "these readings are those of the model."
-    ]
+            raise InvalidValueError(note)
+        notes.append(note)
+    return notes
 
 
 def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:

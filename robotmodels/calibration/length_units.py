@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import permutations
 from math import exp, log
 from typing import NamedTuple
@@ -46,8 +46,8 @@ _ALIKE = 0.3
 """Largest relative residual of measured against scaled nominal lengths."""
 _FAR = 3.0
 """Difference of a known distance, in scatters of the nominal points, for a check of its unit."""
-_SPREAD, _STILL = 50.0, 200.0
-"""Implausible ratios: of a measured spread to the robot's reach, and of nominal to measured."""
+_SPREAD = 50.0
+"""Implausible ratio of measured lengths to the robot's reach."""
 _FEW = 7
 """Smallest number of lengths for the check of a pivot."""
 
@@ -72,7 +72,7 @@ class UnitError(NamedTuple):
         return 1.0 / _SLIPS[self.unit, self.taken]
 
 
-def unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
+def _unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
     """The unit error whose factor is near a ratio of measured to nominal lengths."""
     if not 0.0 < ratio < np.inf:
         return None
@@ -81,57 +81,61 @@ def unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
     return UnitError(*pair, ratio) if close else None
 
 
-def unit_error_of_positions(nominal: Array, measured: Array) -> UnitError | None:
-    """Unit error of positions, by a similarity fit. Shapes: nominal, measured (N, 3)."""
-    if len(nominal) < 3:
-        return None
-    R = best_motion(nominal, measured)[:3, :3]
-    turned = (nominal - nominal.mean(axis=0)) @ R.T
-    return _unit_error_of_lengths(turned, measured - measured.mean(axis=0))
+def unit_error_of_positions(
+    model: RobotModel, frame: Frame, nominal: Array, measured: Array
+) -> UnitError | None:
+    """Unit error of positions by a similarity, else by their spread: nominal, measured (N, 3)."""
+    spread = float(np.linalg.norm(np.ptp(measured, axis=0)))
+    return _unit_error(model, frame, [_aligned(nominal, measured)], spread)
 
 
-def unit_error_of_spread(model: RobotModel, frame: Frame, spread: float) -> UnitError | None:
-    """Unit error by measured spread over reach, for lengths not proportional to nominal ones."""
-    ratio = spread / characteristic_length(model, frame)
+def _unit_error(
+    model: RobotModel, frame: Frame, pairs: Iterable[tuple[Array, Array]], size: float
+) -> UnitError | None:
+    """Unit error of proportional nominal and measured lengths, else of a size over the reach."""
+    for nominal, measured in pairs:
+        square = float((nominal * nominal).sum())
+        ratio = float((nominal * measured).sum()) / square if square > 0.0 else 0.0
+        left = float(np.linalg.norm(measured - ratio * nominal))
+        error = _unit_error_of(ratio)
+        if error is not None and left < _ALIKE * float(np.linalg.norm(measured)):
+            return error
+    ratio = size / characteristic_length(model, frame)
     return UnitError("millimetres", "metres", ratio) if ratio > _SPREAD else None
 
 
-def _unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
-    """Unit error by the ratio of measured to nominal displacements, if they are proportional."""
-    size = float((nominal * nominal).sum())
-    ratio = float((nominal * measured).sum()) / size if size > 0.0 else 0.0
-    left = float(np.linalg.norm(measured - ratio * nominal))
-    return unit_error_of(ratio) if left < _ALIKE * float(np.linalg.norm(measured)) else None
+def _aligned(nominal: Array, measured: Array) -> tuple[Array, Array]:
+    """Displacements from the mean, the nominal ones turned to the measured ones."""
+    if len(nominal) < 3:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    R = best_motion(nominal, measured)[:3, :3]
+    return (nominal - nominal.mean(axis=0)) @ R.T, measured - measured.mean(axis=0)
 
 
-def _unit_error_of_pivot(p: Array, length: Array) -> UnitError | None:
-    """Unit error of lengths from a pivot, by ``|p - c|^2 = s length^2``, linear in c, c.c, s."""
+def _from_pivot(p: Array, length: Array) -> tuple[Array, Array]:
+    """Nominal and measured lengths from a pivot c: ``|p - c|^2 = s length^2`` gives c and s."""
     if len(p) < _FEW:
-        return None
+        return np.zeros(0), np.zeros(0)
     x = p - p.mean(axis=0)
     square = (x * x).sum(axis=1)
     A = np.column_stack([x, np.ones(len(x)), (length / length.max()) ** 2])
     found = np.linalg.lstsq(A, square, rcond=None)[0]
-    left = np.linalg.norm(A @ found - square)
-    if left > _ALIKE * np.linalg.norm(square - square.mean()) or found[-1] <= 0.0:
-        return None
-    return unit_error_of(float(length.max() / np.sqrt(found[-1])))
+    if np.linalg.norm(A @ found - square) > _ALIKE * np.linalg.norm(square - square.mean()):
+        return np.zeros(0), np.zeros(0)
+    return np.sqrt(max(found[-1], 0.0)) * length / length.max(), length
 
 
 def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
     """Refuse lengths in another unit than metres."""
     points: dict[str, list[Array]] = {}
     for k, m in enumerate(measurements):
-        where = f"measurements[{k}] ({m.name})"
-        quantity, error = _unit_error(model, m)
+        quantity, error = _error_of(model, m)
         if error is not None:
             raise InvalidValueError(
-                f"{where}: {quantity} are {error.sentence()}. Pass metres: multiply by "
-                f"{error.factor:.4g}."
+                f"measurements[{k}] ({m.name}): {quantity} are {error.sentence()}. Pass metres: "
+                f"multiply by {error.factor:.4g}."
             )
-        if isinstance(m, Pose | Position):
-            _check_spread(model, m, where)
-        elif isinstance(m, PointContact):
+        if isinstance(m, PointContact):
             for label, p in zip(m.label, dgm(model, m.q, m.frame)[:, :3, 3], strict=True):
                 points.setdefault(f"{m.name}:{label}", []).append(p)
     for m in measurements:
@@ -139,49 +143,34 @@ def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
             _check_distance(m, np.array(points[m.point]), np.array(points[m.other]))
 
 
-def _unit_error(model: RobotModel, m: Measurement) -> tuple[str, UnitError | None]:
+def _error_of(model: RobotModel, m: Measurement) -> tuple[str, UnitError | None]:
     """The measured quantity and its unit error, if there is one."""
-    if isinstance(m, Pose | Position) and all(m.rows[:3]):
-        p = _positions(m)
-        error = unit_error_of_positions(dgm(model, m.q, m.frame)[:, :3, 3], p)
-        size = float(np.linalg.norm(np.ptp(p, axis=0)))
-        return "positions", error or unit_error_of_spread(model, m.frame, size)
-    if isinstance(m, CameraPose) and all(m.rows):
-        p, seen = dgm(model, m.q, m.frame)[:, :3, 3], se3.inverse(m.T)[:, :3, 3]
-        boards = (m.groups == k for k in range(len(m.labels)))
-        errors = (unit_error_of_positions(p[board], seen[board]) for board in boards)
-        return "positions of the boards", next(filter(None, errors), None)
-    if isinstance(m, RelativePose) and all(m.rows[:3]):
-        moved = se3.inverse(dgm(model, m.q, m.frame)) @ dgm(model, m.q_other, m.frame)
-        return "displacements", _unit_error_of_lengths(moved[:, :3, 3], m.T[:, :3, 3])
-    if isinstance(m, Distance) and not m.offset:
-        p = dgm(model, m.q, m.frame)[:, :3, 3]
+    if not isinstance(m, Pose | Position | CameraPose | RelativePose | Distance):
+        return "", None
+    T = dgm(model, m.q, m.frame)
+    p = T[:, :3, 3]
+    if isinstance(m, Distance):
+        if m.offset:
+            return "", None
         if m.q_other is not None:
-            apart = np.linalg.norm(p - dgm(model, m.q_other, m.frame)[:, :3, 3], axis=1)
-            error = _unit_error_of_lengths(apart, m.length)
+            other = dgm(model, m.q_other, m.frame)[:, :3, 3]
+            pairs = [(np.linalg.norm(p - other, axis=1), m.length)]
         else:
-            pivots = (m.groups == k for k in range(len(m.labels)))
-            errors = (_unit_error_of_pivot(p[one], m.length[one]) for one in pivots)
-            error = next(filter(None, errors), None)
-        size = float(np.median(m.length))
-        return "lengths", error or unit_error_of_spread(model, m.frame, size)
-    return "", None
-
-
-def _positions(m: Pose | Position) -> Array:
-    return m.T[:, :3, 3] if isinstance(m, Pose) else m.p
-
-
-def _check_spread(model: RobotModel, m: Pose | Position, where: str) -> None:
-    """Refuse positions that do not move although the robot does."""
-    measured, nominal = _positions(m), dgm(model, m.q, m.frame)[:, :3, 3]
-    spread, expected = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (measured, nominal))
-    if 0.0 < spread < expected / _STILL:
-        raise InvalidValueError(
-            f"{where}: positions are spread over {spread:.3g} m, but those of the robot over "
-            f"{expected:.3g} m: the positions seem to be constant, or in "
-            "kilometres. Pass metres."
-        )
+            groups = (m.groups == k for k in range(len(m.labels)))
+            pairs = [_from_pivot(p[one], m.length[one]) for one in groups]
+        return "lengths", _unit_error(model, m.frame, pairs, float(np.median(m.length)))
+    if not all(m.rows[:3]):
+        return "", None
+    if isinstance(m, Position | Pose):
+        measured = m.p if isinstance(m, Position) else m.T[:, :3, 3]
+        return "positions", unit_error_of_positions(model, m.frame, p, measured)
+    if isinstance(m, RelativePose):
+        moved = se3.inverse(T) @ dgm(model, m.q_other, m.frame)
+        pairs = [(moved[:, :3, 3], m.T[:, :3, 3])]
+        return "displacements", _unit_error(model, m.frame, pairs, 0.0)
+    seen = se3.inverse(m.T)[:, :3, 3]
+    pairs = [_aligned(p[m.groups == k], seen[m.groups == k]) for k in range(len(m.labels))]
+    return "positions of the boards", _unit_error(model, m.frame, pairs if all(m.rows) else [], 0.0)
 
 
 def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
@@ -193,7 +182,7 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
         return
     # halfway to the next factor, that of inches, if the nominal robot is no better
     near = min(_NEAR + scatter / max(apart, 1e-12), exp(0.5 * log(39.37 / 25.4)) - 1.0)
-    error = unit_error_of(m.length / max(apart, 1e-12), near)
+    error = _unit_error_of(m.length / max(apart, 1e-12), near)
     if error is not None:
         raise InvalidValueError(
             f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is "

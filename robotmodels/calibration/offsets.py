@@ -8,24 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
 
-from .._arrays import Array, Rebuilt, as_mask, as_vector, read_only
+from .._arrays import Array, Frozen, as_mask, as_vector
 from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
 from ..igm.request import above_zero
 from ..igm.solutions import IGMSolutions
 from ..kinematics import dgm
-from .inverse import corrected_igm, pose_error_slope, pose_errors
-from .robot import CalibratedRobot, as_calibrated, calibrated_pose, reading_jacobian
+from .inverse import corrected_igm, pose_errors
+from .robot import CalibratedRobot, as_calibrated, calibrated_pose
 
 if TYPE_CHECKING:
     from .result import CalibrationResult
 
-STEPS = 50
-_RANK_TOLERANCE = 1e-9  # singular values beside the largest below which offsets are dependent
+_CLOSE = 1e-15
+_RANK_TOLERANCE = 1e-8  # singular values beside the largest below which offsets are dependent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointOffsets(Rebuilt):
+class JointOffsets(Frozen):
     """One constant offset for each joint, and the errors without and with them.
 
     Parameters
@@ -43,10 +45,6 @@ class JointOffsets(Rebuilt):
     rank: int
     before: Array
     after: Array
-
-    def __post_init__(self) -> None:
-        for name in ("offset", "before", "after"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def position(self) -> tuple[float, float]:
@@ -66,7 +64,7 @@ class JointOffsets(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseOffsets(Rebuilt):
+class PoseOffsets(Frozen):
     """False targets: commanded to a controller with the nominal model, they lead to the true ones.
 
     Parameters
@@ -80,9 +78,6 @@ class PoseOffsets(Rebuilt):
 
     solutions: IGMSolutions
     command: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "command", read_only(self.command))
 
     def nearest(self, q: ArrayLike) -> Array:
         """False target (..., 4, 4) of the solution nearest to a posture (..., n); NaN if none."""
@@ -101,14 +96,14 @@ def joint_offsets(
     mask: ArrayLike | None = None,
     length: float | None = None,
 ) -> JointOffsets:
-    """Constant joint offsets with the least squares of errors over a set of configurations.
+    """Constant joint offsets that are the best in the mean, for a controller that keeps its model.
 
     Parameters
     ----------
     robot : CalibratedRobot or CalibrationResult
         The robot, n joints.
     q : array_like, shape (N, n)
-        Commanded joint values, rad or m: the poses of the nominal model there are wanted.
+        Configurations over which the errors are least, as commanded: rad or m.
     mask : array_like, shape (6,), optional
         Components ``x y z rx ry rz`` (world axes) that count; default all, and positions alone for
         a result of positions alone: orientations that were not measured must not weigh.
@@ -121,12 +116,6 @@ def joint_offsets(
     JointOffsets
         Offsets, and the errors before and after. Constant errors of the joint variables are
         cancelled exactly.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong shapes, NaN or infinity, no configuration, a mask that leaves nothing, a length that
-        is not above zero.
 
     References
     ----------
@@ -156,27 +145,19 @@ def joint_offsets(
         length = float(away.mean()) or 1.0
     length = above_zero(length, "length")
     weight = np.where(requested, np.repeat([1.0, length], 3), 0.0)
-    revolute = robot.model.table.sigma[robot.model.table.joint_rows] == 0
+    revolute = robot.model.table.sigma[robot.model.table.joint_rows] == REVOLUTE
     unit = np.where(revolute, 1.0, length)
 
-    def errors(offset: Array) -> tuple[Array, float]:
-        missing = pose_errors(calibrated_pose(robot, commanded + offset), wanted)
-        return missing, float(np.sum((weight * missing) ** 2))
+    def errors(offset: Array) -> Array:
+        return pose_errors(calibrated_pose(robot, commanded + unit * offset), wanted)
 
-    offset, rank = np.zeros(n), 0
-    before, cost = errors(offset)
-    error = before
-    for _ in range(STEPS):
-        J = reading_jacobian(robot, commanded + offset)
-        W = weight[:, None] * pose_error_slope(J, error[:, 3:]) * unit
-        step, _, rank, _ = np.linalg.lstsq(
-            W.reshape(-1, n), (weight * error).ravel(), _RANK_TOLERANCE
-        )
-        trial, after = errors(offset + unit * step)
-        if not after < cost:
-            break  # only rounding is left
-        offset, error, cost = offset + unit * step, trial, after
-    return JointOffsets(offset, int(rank), before, error)
+    fit = least_squares(
+        lambda x: (weight * errors(x)).ravel(), np.zeros(n), "3-point",
+        xtol=_CLOSE, ftol=_CLOSE, gtol=_CLOSE,
+    )  # fmt: skip
+    rank = np.linalg.matrix_rank(fit.jac, rtol=_RANK_TOLERANCE)
+    before, after = errors(np.zeros(n)), errors(fit.x)
+    return JointOffsets(unit * fit.x, int(rank), before, after)
 
 
 def pose_offsets(
@@ -196,7 +177,7 @@ def pose_offsets(
 
     Parameters
     ----------
-    robot : CalibratedRobot
+    robot : CalibratedRobot or CalibrationResult
         The robot.
     T : array_like, shape (..., 4, 4)
         World poses that the tool shall reach, metres.
@@ -207,15 +188,6 @@ def pose_offsets(
     -------
     PoseOffsets
         Commands, one for each posture.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        As `corrected_igm`.
-
-    References
-    ----------
-    Seed book section 1.4.6.
 
     Examples
     --------

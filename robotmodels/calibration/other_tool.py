@@ -18,7 +18,7 @@ from ..errors import InvalidValueError
 from ..estimation.linearised import inverse_factor
 from ..se3 import skew
 from .differential import differential_model
-from .identifiable import Reason, all_corrections
+from .identifiable import Reason
 from .parameters import ErrorLaw, GeometricParameters
 from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
@@ -94,13 +94,14 @@ def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
     }
     parameters = identifiable.candidates.without(known - {*estimated.names})
     problem = problem_of(parameters, solution.problem.measurements)
-    corrections = all_corrections(parameters, estimated, solution.corrections)
+    at = parameters.index(estimated.names)
+    corrections = np.zeros(len(parameters))
+    corrections[at] = solution.corrections
     _, J = stacked(problem, np.concatenate([corrections, solution.fixtures]), solution.scales)
     if not fit.sigma_known:
         J = J / max(fit.scale, 1.0)  # below 1 the data are exact
     information = np.zeros(J.shape[1])
     information[: problem.P] = 1.0 / standard_deviations(ParameterPrior(), problem)
-    at = parameters.index(estimated.names)
     information[at] = np.sqrt(fit.prior.strength) / fit.prior.sigma[: len(at)]
     rows = np.vstack([np.sqrt(fit.weights)[:, None] * J, np.diag(information)])
     # directions without information (a tool that is not measured) move no other tool

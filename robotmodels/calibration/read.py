@@ -21,7 +21,7 @@ from ..kinematics.coordinates.orientations import orientation_kind
 from ..model import RobotModel, check_model
 from .extended_table import Frame
 from .joint_readings import beyond_limits, expected_joints_text
-from .length_units import unit_error_of_positions, unit_error_of_spread
+from .length_units import unit_error_of_positions
 from .measurements import FileRow, Measurement, Pose
 from .measurements.base import fields_of, required
 from .measurements.kinds import Kind, as_kind
@@ -68,20 +68,17 @@ def read_measurements(
         ``"point_contact"``, ``"relative_pose"``; or the class of a kind.
     model : RobotModel
         The robot: names, number and types of its joints.
-    joints : sequence of str or int, length n, optional
-        Columns of the readings; default those named as the joints of the robot, or q1 to qn.
+    joints, other_joints : sequence of str or int, length n, optional
+        Columns of the readings; default those named as the joints of the robot, or q1 to qn. Of
+        the other end of a distance (without them it is from a pivot) or of a relative pose.
     columns : sequence of str or int, optional
-        Columns of the measured coordinates, in their order: position, then orientation
-        as ``orientation`` orders it (a quaternion scalar first). Default x, y, z and the names of
-        the orientation's coordinates (for quaternions also qw, qx, qy, qz); ``distance`` for
-        distances. Contacts have none.
+        Columns of the measured coordinates: position, then orientation as ``orientation`` orders
+        it (a quaternion scalar first). Default x, y, z and the names of the orientation's
+        coordinates (for quaternions also qw, qx, qy, qz); ``distance``. Contacts have none.
     label : str or int, optional
         Column of the label of the touched point, pose, plane or line, of the pivot of a distance,
         of the board of a camera. Default: the names of the files without their suffix if there
         are several; else all the same.
-    other_joints : sequence of str or int, length n, optional
-        Columns of the readings at the other end of a distance (without them it is from a pivot),
-        or of a relative pose.
     lengths : ``"m"`` or ``"mm"``
         Unit of positions, distances and the readings of prismatic joints in the file.
     angles, joint_angles : ``"rad"`` or ``"deg"``
@@ -91,16 +88,11 @@ def read_measurements(
         listed x, y, z; ``"rpy"`` the same listed z, y, x; ``"quaternion"``; ``"angle_axis"``.
     rows : sequence of 0 or 1, optional
         As `Position` and `Pose`: which coordinates count. All columns are read.
-    pattern : str
-        Of the files in a folder.
-    delimiter : str, optional
-        Between cells; default the first of semicolon, tab, comma in the first line, else blanks.
-    sigma : array_like, optional
-        Standard deviations of the rows of a measurement, in metres and radians.
-    frame : str, int or None
-        The measured end; None is the tool.
-    name : str, optional
-        In reports, and in front of labels; default the folder's name, or as the kind.
+    pattern, delimiter : str
+        Of the files in a folder; between cells, default the first of semicolon, tab, comma in the
+        first line, else blanks.
+    sigma, frame, name
+        As `Measurement`; default name the folder's, or as the kind.
 
     Returns
     -------
@@ -114,10 +106,6 @@ def read_measurements(
         be right; files of a folder with different contents.
     OSError
         A file cannot be opened.
-
-    References
-    ----------
-    Seed book sections 1.4.4 and 1.4.5.
 
     Examples
     --------
@@ -385,8 +373,7 @@ def _check_lengths(
     """Refuse positions in another unit. Shapes: p (N, 3), q (N, n)."""
     # clipped so that squares of wrong columns do not overflow
     nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
-    spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-    error = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
+    error = unit_error_of_positions(model, frame, nominal, p)
     if error is not None:
         stated = "metres" if unit is LengthUnit.METRE else "millimetres"
         symbol = {"metres": "m", "millimetres": "mm"}.get(error.unit)

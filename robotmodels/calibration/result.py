@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt
+from .._arrays import Array
 from ..errors import InvalidValueError, nearest_names
 from ..estimation import FitStatus
+from ..estimation.estimate import NamedValues
 from ..model import RobotModel
 from .identifiable import IdentifiableParameters
 from .other_tool import PredictedError, other_tool_error
@@ -22,7 +23,7 @@ _BY_PRIOR = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CalibrationResult(Rebuilt):
+class CalibrationResult(NamedValues):
     """Result of a calibration: the calibrated robot, standard errors and validation.
 
     Parameters
@@ -86,23 +87,12 @@ class CalibrationResult(Rebuilt):
         return self.solution.fit.covariance[:P, :P]
 
     @property
-    def standard_errors(self) -> Array:
-        """Standard errors of the values, shape (P,)."""
-        return np.sqrt(np.diagonal(self.covariance))
-
-    @property
     def relative_errors(self) -> Array:
         """Standard errors relative to the corrections, shape (P,); inf where these are zero."""
         size = np.abs(self.corrections)
         return np.divide(
             self.standard_errors, size, out=np.full(len(size), np.inf), where=size > 0.0
         )
-
-    @property
-    def correlation(self) -> Array:
-        """Correlations of the values, shape (P, P)."""
-        s = self.standard_errors
-        return self.covariance / np.outer(s, s)
 
     @property
     def fixtures(self) -> dict[str, float]:
@@ -113,18 +103,6 @@ class CalibrationResult(Rebuilt):
     def status(self) -> FitStatus:
         """Outcome of the fit."""
         return self.solution.fit.status
-
-    def reason(self) -> str:
-        """Sentence of the status."""
-        return self.status.sentence
-
-    def value(self, name: str) -> float:
-        """Calibrated value of one parameter, m, rad or its unit."""
-        return float(self.values[self._number(name)])
-
-    def standard_error(self, name: str) -> float:
-        """Standard error of one parameter, m, rad or its unit."""
-        return float(self.standard_errors[self._number(name)])
 
     def _number(self, name: str) -> int:
         if name not in self.names:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
+from .._arrays import Array, Frozen, as_exact, as_vector, read_only
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from ..urdf.in_place import tool_link
@@ -24,10 +24,8 @@ from .extended_table import (
 )
 from .parameters import ErrorLaw, GeometricParameters
 
-NEWTON_STEPS = 60
-LONGEST = 0.5  # step of a reading, rad or m
-ROUNDING = 2e-14  # of a joint variable, relative to the largest plus 1
-DIFFERENCE = 1e-4  # step of the central differences of the laws, rad or m
+_STEPS = 200
+_ROUNDING, _WRONG = 1e-15, 1e-12  # of joint variables, relative to the largest plus 1
 
 _LAW_WORDS = {
     ErrorLaw.GAIN: "Gains and couplings of the readings are",
@@ -36,7 +34,7 @@ _LAW_WORDS = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointErrors(Rebuilt):
+class JointErrors(Frozen):
     """Joint variables as a function of the readings, ``q = q_read + sum of values * factors``.
 
     ``laws`` are the P parameters that add to joint variables, ``values (P,)`` their corrections.
@@ -44,9 +42,6 @@ class JointErrors(Rebuilt):
 
     laws: GeometricParameters
     values: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", read_only(self.values))
 
     @property
     def is_zero(self) -> bool:
@@ -58,51 +53,23 @@ class JointErrors(Rebuilt):
         q = as_vector(q_read, self.laws.model.n, "q_read")
         return q + self._errors(q)
 
-    def slope(self, q_read: ArrayLike) -> Array:
-        """Derivative of `actual` by central differences of the laws, (..., n) -> (..., n, n)."""
-        n = self.laws.model.n
-        q = as_vector(q_read, n, "q_read")[..., None, :]
-        step = DIFFERENCE * np.eye(n)
-        change = self._errors(q + step) - self._errors(q - step)
-        return np.eye(n) + change.swapaxes(-1, -2) / (2.0 * DIFFERENCE)
-
     def reading(self, q_actual: ArrayLike) -> Array:
-        """Readings that lead to joint variables, the inverse of `actual`, by Newton's method.
+        """Readings that lead to joint variables, the inverse of `actual`, by fixed-point iteration.
 
-        NaN in rows where none was found: errors so large that the law is not monotonic.
+        NaN in rows where it does not converge: changes of the errors near those of the readings.
         """
-        n = self.laws.model.n
-        goals = as_vector(q_actual, n, "q_actual")
-        wanted = goals.reshape(-1, n)
+        wanted = as_vector(q_actual, self.laws.model.n, "q_actual")
         q = wanted.copy()
-        if self.is_zero:
-            return q.reshape(goals.shape)
-        floor = ROUNDING * (1.0 + np.abs(wanted).max(axis=-1, initial=0.0))
-        # exact for gains and couplings
-        zero = np.zeros(n)
-        start, *_ = np.linalg.lstsq(self.slope(zero), (wanted - self.actual(zero)).T, rcond=None)
-        q[:] = start.T
-        missing = wanted - self.actual(q)
-        size = np.abs(missing).max(axis=-1, initial=0.0)
-        for _ in range(NEWTON_STEPS):
-            going = np.flatnonzero(size > floor)
-            if not going.size:
+        if self.is_zero or not q.size:
+            return q
+        size = 1.0 + np.abs(wanted).max(axis=-1)
+        for _ in range(_STEPS):
+            missing = wanted - self.actual(q)
+            off = np.abs(missing).max(axis=-1) / size
+            if (off <= _ROUNDING).all():
                 break
-            D = self.slope(q[going])
-            # least squares: the law may be singular there
-            normal = D.swapaxes(-1, -2) @ D + 1e-12 * np.eye(n)
-            step = np.linalg.solve(normal, D.swapaxes(-1, -2) @ missing[going, :, None])[..., 0]
-            step *= np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=-1), LONGEST))[
-                :, None
-            ]
-            trial = wanted[going] - self.actual(q[going] + step)
-            worse = np.abs(trial).max(axis=-1) >= size[going]
-            step[worse] *= 0.5
-            q[going] += step
-            trial[worse] = wanted[going[worse]] - self.actual(q[going[worse]])
-            missing[going], size[going] = trial, np.abs(trial).max(axis=-1)
-        q[size > floor] = np.nan
-        return q.reshape(goals.shape)
+            q += missing
+        return np.where((off <= _WRONG)[..., None], q, np.nan)
 
     def _errors(self, q: Array) -> Array:
         """Differences of joint variables and readings, (..., n)."""
@@ -143,14 +110,14 @@ class CalibratedEnd(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
-class CalibratedRobot(Rebuilt):
+class CalibratedRobot(Frozen):
     """A robot with its corrections applied.
 
-    Constant corrections are in ``model``, whose variables are the actual joint variables;
-    ``joint_errors.actual`` gives them from the readings. Links and a mount that bend under gravity
-    are in `calibrated_pose` alone: no model with constant elements has them. Limits and named
-    configurations are those of the readings. Bodies keep their place in their own frames: inertial
-    parameters are those of the nominal robot, and so is the transmission.
+    Constant corrections are in ``model`` (its table has beta, gamma and b), whose variables are the
+    actual joint variables; ``joint_errors.actual`` gives them from the readings. Links and a mount
+    that bend under gravity are in `calibrated_pose` alone: no model with constant elements has
+    them. Limits and named configurations are those of the readings. Inertial parameters, each in
+    its own frame, and the transmission are those of the nominal robot.
 
     Parameters
     ----------
@@ -159,7 +126,7 @@ class CalibratedRobot(Rebuilt):
     corrections : ndarray, shape (P,)
         Their corrections (rad, m, or the unit of the parameter).
     model : RobotModel
-        The table (with beta, gamma and b), base and tool with the constant corrections.
+        The model with the constant corrections of table, base and tool.
     joint_errors : JointErrors
         Gains, couplings, eccentricity and compliance of the joints about their own axes.
     ends : tuple of CalibratedEnd
@@ -168,15 +135,6 @@ class CalibratedRobot(Rebuilt):
     References
     ----------
     Seed book section 1.4.6.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("rx90"))
-    >>> robot = calibrated_model(parameters, 1e-3 * (np.array(parameters.names) == "d3"))
-    >>> float((robot.model.table.d - robot.nominal.table.d)[2].round(9))
-    0.001
     """
 
     parameters: GeometricParameters
@@ -184,9 +142,6 @@ class CalibratedRobot(Rebuilt):
     model: RobotModel
     joint_errors: JointErrors
     ends: tuple[CalibratedEnd, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "corrections", read_only(self.corrections))
 
     @property
     def nominal(self) -> RobotModel:
@@ -271,15 +226,6 @@ def calibrated_model(parameters: GeometricParameters, corrections: ArrayLike) ->
     CalibratedRobot
         ``calibrated_pose`` of it equals ``differential_model(parameters, q, corrections).T``.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not P finite numbers; laws of the readings on elements that no joint moves.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
     Examples
     --------
     >>> from robotmodels.calibration import calibrated_pose, candidate_parameters
@@ -363,20 +309,7 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
     Returns
     -------
     ndarray, shape (..., 4, 4)
-        World poses, metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        Wrong length, NaN or infinity; an unknown frame.
-
-    References
-    ----------
-    Seed book sections 1.2.2 and 1.4.6.
-
-    Examples
-    --------
-    See `calibrated_model`.
+        World poses, metres; an example is at `calibrated_model`.
     """
     p, n = robot.parameters, robot.model.n
     readings = as_vector(q_read, n, "q_read")
@@ -384,37 +317,6 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
     path, after = _path_of(robot, frame)
     T, _ = screws_of(p.table, q, path, after, robot.corrections, p.actions, p.factors(q), 0)
     return T.reshape(*readings.shape[:-1], 4, 4)
-
-
-def reading_jacobian(robot: CalibratedRobot, q_read: ArrayLike) -> Array:
-    """Jacobian [v; w] of the tool by the readings, laws by central differences.
-
-    Shapes: q_read (..., n) -> (..., 6, n).
-    """
-    p, table, n = robot.parameters, robot.parameters.table, robot.model.n
-    readings = as_vector(q_read, n, "q_read")
-    q = readings.reshape(-1, n)
-    owner, rows, elements = p.actions
-    laws = [k for k, e in enumerate(p.entries) if e.law is not ErrorLaw.CONSTANT]
-    active = np.flatnonzero(np.isin(owner, laws) & (robot.corrections[owner] != 0.0))
-    steps = DIFFERENCE * np.eye(n)
-    change = np.zeros((len(q), n, len(active)))
-    if active.size:
-        high, low = (p.factors((q[:, None] + step).reshape(-1, n)) for step in (steps, -steps))
-        change = (high - low)[:, active].reshape(change.shape)
-        change *= robot.corrections[owner[active]] / (2.0 * DIFFERENCE)
-    # column P + j: the motion of joint j, and the change of every law with its reading
-    P, moving = len(p), np.flatnonzero(table.joint >= 0)
-    variables = np.array([JOINT_VARIABLE[sigma] for sigma in table.sigma[moving]], np.int64)
-    actions = (
-        np.concatenate([owner, P + table.joint[moving], P + np.repeat(np.arange(n), len(active))]),
-        np.concatenate([rows, moving, np.tile(rows[active], n)]),
-        np.concatenate([elements, variables, np.tile(elements[active], n)]),
-    )
-    factors = np.hstack([p.factors(q), np.ones((len(q), n)), change.reshape(len(q), -1)])
-    values = np.concatenate([robot.corrections, np.zeros(n)])
-    _, psi = screws_of(table, q, *_path_of(robot), values, actions, factors, P + n)
-    return psi[..., P:].reshape(*readings.shape[:-1], 6, n)
 
 
 def _path_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,81 +10,35 @@ import numpy as np
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..estimation.linearised import inverse_factor
-from ..kinematics.lengths import spread_configurations
-from ..model import RobotModel
-from .identifiable import IdentifiableParameters, Reason, identifiable_on
+from .identifiable import IdentifiableParameters, Reason
 from .measurements import Measurement
 from .prior import largest_factors
-from .problem import guessed_fixtures, problem_of, stacked
+from .problem import problem_of, stacked
 from .solve import Solution
 
 _LARGEST_LENGTH, _LARGEST_ANGLE = 0.01, 0.02
 """Standard errors above which a parameter is not estimated: relative to the robot's size, and rad
 (of the largest effect)."""
-_TINY = 1e-300
-_SEED = 17
-_ROWS = 4
-"""Rows per unknown in the simulated larger data set."""
-_STILL = 0.02
-"""Range of readings below which a joint counts as fixed, rad or m."""
 
 
-def check_enough(
-    identifiable: IdentifiableParameters,
-    measured: Sequence[Measurement],
-    known_lengths: Iterable[str],
-    known: Iterable[str],
-    dependent: float,
-) -> None:
+def check_enough(identifiable: IdentifiableParameters, measured: Sequence[Measurement]) -> None:
     """Refuse fewer rows than unknowns."""
     problem = problem_of(identifiable.kept, measured)
-    if problem.P and problem.rows > problem.P + problem.F:
+    P, F = problem.P, problem.F
+    if P and problem.rows > P + F:
         return
-    candidates, zero = identifiable.candidates, np.zeros(len(identifiable.candidates))
-    P, F = identifiable.count, problem.F
-    if any(m.views for m in measured):
-        whole = problem_of(candidates, measured)
-        more = identifiable_on(
-            candidates,
-            _more(whole.parameters.model, measured, _ROWS * (whole.P + F)),
-            known_lengths,
-            known,
-            fixtures=guessed_fixtures(whole, zero),
-            dependent=dependent,
-        )
-        P = max(P, more.count)
     if not P:
         raise InvalidValueError(
             "No parameter is identifiable from these measurements. See identifiable_parameters, "
             "and measure with all joints spread over their ranges."
         )
     rows = max(len(m.axes) for m in measured if m.views)
-    missing = max(1, -(-(P + F + 1 - problem.rows) // rows))
+    missing = -(-(P + F + 1 - problem.rows) // rows)
     raise InvalidValueError(
         f"{problem.rows} rows cannot determine {P} parameters and {F} unknown coordinates of "
         f"fixtures: measure at least {missing} more configurations (better three times as many "
         "rows as unknowns), or name fewer parameters."
     )
-
-
-def _more(model: RobotModel, measured: Sequence[Measurement], rows: int) -> list[Measurement]:
-    """The measurements at many random configurations; joints that are still stay so."""
-    readings = np.concatenate([view.q for m in measured for view in m.views])
-    still = (np.ptp(readings, axis=0) < _STILL) & (len(np.unique(readings, axis=0)) > 1)
-    rng = np.random.default_rng(_SEED)
-    more: list[Measurement] = []
-    for m in measured:
-        if m.views:
-            times = -(-rows // (m.blocks * len(m.axes)))
-            m = m.subset(np.tile(np.arange(m.blocks), times))
-            drawn: dict[int, Array] = {}
-            for view in m.views:
-                q = spread_configurations(model, m.blocks, rng)
-                q[:, still] = readings[0, still]
-                drawn.setdefault(id(view.q), q)
-            m = m.with_configurations([drawn[id(view.q)] for view in m.views])
-        more.append(m)
-    return more
 
 
 def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
@@ -93,12 +47,10 @@ def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
     # parameter, and constraints violated at the start seem to hold information. The worst is
     # removed first, as it may hide others.
     problem, prior = solution.problem, solution.fit.prior
+    length = _LARGEST_LENGTH * problem.parameters.table.size
+    sizes = [length if e.element.is_length else _LARGEST_ANGLE for e in problem.parameters.entries]
     limit = np.full(problem.P + problem.F, np.inf)
-    limit[: problem.P] = [
-        _LARGEST_LENGTH * problem.parameters.table.size if e.element.is_length
-        else _LARGEST_ANGLE
-        for e in problem.parameters.entries
-    ] / np.maximum(largest_factors(problem), _TINY)  # fmt: skip
+    limit[: problem.P] = sizes / np.maximum(largest_factors(problem), 1e-300)
     information = np.diag(np.sqrt(prior.strength) / prior.sigma)
     factors = [
         np.asarray(

@@ -1,7 +1,28 @@
 """Contacts: the end meets points, poses, planes or lines, one in each configuration.
 
 Contacts need no measuring device. Their targets are unknown and estimated, unless they are given.
-Arguments that are not explained here are those of `Measurement`.
+
+Parameters
+----------
+point, pose, plane, line : array_like of int or str, shape (N,), optional
+    Label of the target of each configuration; default: all the same.
+known : mapping of label to array_like, optional
+    Targets in the world: points, shape (3,), m; poses, shape (4, 4), m; planes, shape (4,), a
+    normal of length 1 and an offset in m; lines, shape (2, 3), a point (m) and a direction.
+
+The other arguments are those of `Measurement`.
+
+Examples
+--------
+>>> q = np.zeros((3, 6))
+>>> PointContact(q, [0, 0, 1]).labels
+('0', '1')
+>>> FrameContact(q, [0, 0, 1]).fixtures[9].name
+'frame:1.rx'
+>>> [fixture.name for fixture in PlaneContact(q, name="table").fixtures]
+['table:0.rx', 'table:0.ry', 'table:0.offset']
+>>> [fixture.name for fixture in LaserLine(q).fixtures]
+['line:0.rx', 'line:0.ry', 'line:0.x', 'line:0.y']
 """
 
 from __future__ import annotations
@@ -16,39 +37,20 @@ from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..extended_table import Frame
 from . import fields
-from .base import (
-    POSE_ROWS,
-    POSITION_ROWS,
-    Contact,
-    Evaluation,
-    Linearised,
-)
+from .base import POSE_ROWS, POSITION_ROWS, Contact, Evaluation, Linearised
 from .fields import Given
 from .motions import difference, tilt_of, tilted_axes, unit_vector, widened
-from .poses import as_known_pose, mean_poses, target_poses
-from .positions import as_point, target_points
+from .poses import mean_poses, target_poses
+from .positions import target_points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointContact(Contact):
-    """Touches of points by the end's origin: a ball in a socket, a tip in a centre hole.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (3,), optional
-        Positions of points in the world, metres.
-    point : array_like of int or str, shape (N,), optional
-        Label of the touched point; default: all the same.
-
-    Examples
-    --------
-    >>> PointContact(np.zeros((3, 6)), [0, 0, 1]).labels
-    ('0', '1')
-    """
+    """Touches of points by the end's origin: a ball in a socket, a tip in a centre hole."""
 
     q: Array = field(metadata=fields.READINGS)
     point: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(default=None, metadata=fields.targets(as_point))
+    known: Given = field(default=None, metadata=fields.targets(fields.as_point))
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
     frame: Frame = None
@@ -80,23 +82,11 @@ class FrameContact(Contact):
 
     Unknown poses are estimated as position and rotation vector. Two postures of a pose give six
     rows more than unknowns.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (4, 4), optional
-        Poses in the world, metres.
-    pose : array_like of int or str, shape (N,), optional
-        Label of the pose that is reached; default: all the same.
-
-    Examples
-    --------
-    >>> FrameContact(np.zeros((3, 6)), [0, 0, 1]).fixtures[9].name
-    'frame:1.rx'
     """
 
     q: Array = field(metadata=fields.READINGS)
     pose: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(default=None, metadata=fields.targets(as_known_pose))
+    known: Given = field(default=None, metadata=fields.targets(fields.as_known_pose))
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
     frame: Frame = None
@@ -133,20 +123,8 @@ class PlaneContact(Contact):
 
     One inclined plane touched in many postures identifies as much as touched points do. With a
     single plane at right angles to the axis of the first joint (a table under an upright robot)
-    that joint's offset and motions of the whole arm along the plane are not identifiable (see
-    `identifiable_parameters`). Incline it, or touch a second plane that is not parallel to it.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (4,), optional
-        Normals (of length 1) and offsets (m) of planes in the world.
-    plane : array_like of int or str, shape (N,), optional
-        Label of the touched plane; default: all the same.
-
-    Examples
-    --------
-    >>> [fixture.name for fixture in PlaneContact(np.zeros((5, 6)), name="table").fixtures]
-    ['table:0.rx', 'table:0.ry', 'table:0.offset']
+    that joint's offset and motions of the whole arm along the plane are not identifiable. Incline
+    it, or touch a second plane that is not parallel to it.
     """
 
     q: Array = field(metadata=fields.READINGS)
@@ -215,22 +193,9 @@ class LaserLine(Contact):
     A line is the axis z of the world rotated about x and y (rx, ry, rad) and moved along the
     rotated x and y axes (x, y, m): four coordinates of an unknown line.
 
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (2, 3), optional
-        Points (m) and directions of lines in the world.
-    line : array_like of int or str, shape (N,), optional
-        Label of the line; default: all the same.
-
     References
     ----------
-    W. S. Newman, C. E. Birkhimer, R. J. Horning, A. T. Wilkey, "Calibration of a Motoman P8 robot
-    based on laser tracking", IEEE ICRA 2000.
-
-    Examples
-    --------
-    >>> [fixture.name for fixture in LaserLine(np.zeros((5, 6))).fixtures]
-    ['line:0.rx', 'line:0.ry', 'line:0.x', 'line:0.y']
+    W. S. Newman et al., "Calibration of a Motoman P8 robot based on laser tracking", ICRA 2000.
     """
 
     q: Array = field(metadata=fields.READINGS)

@@ -127,6 +127,16 @@ def targets(check: Callable[[Any, str], Array]) -> Metadata:
     return {"check": as_known}
 
 
+def as_known_pose(value: Any, name: str) -> Array:
+    """Check a known pose."""
+    return read_only(se3.as_single_pose(value, name))
+
+
+def as_point(value: Any, name: str) -> Array:
+    """Check a known point."""
+    return read_only(as_exact(value, (3,), name))
+
+
 def lengths(*names: str) -> Metadata:
     """A measured length for each block."""
     return {"check": as_values, "content": "length", "names": names, "block": True}

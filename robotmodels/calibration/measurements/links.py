@@ -1,6 +1,32 @@
 """Links: two ends of one robot with a common object, and known distances of touched points.
 
-Arguments that are not explained here are those of `Measurement`.
+Parameters
+----------
+frame, frame_other : str, int or None
+    The two ends; None is the tool.
+link : array_like of int or str, shape (N,), optional
+    Label of the object; default: always the same.
+known : mapping of label to array_like, shape (4, 4), optional
+    Poses of the other end in the first one, metres.
+orientation : bool
+    Whether the object holds the orientation as well: 6 rows, else 3.
+point, other : str
+    Points of `PointContact` as ``name:label``, such as ``"point:0"`` and ``"point:1"``.
+length : float
+    Their distance, metres.
+sigma : float
+    Standard deviation of the length, m; default 0.1 mm, which a calliper or a drilled plate
+    reaches.
+
+The other arguments are those of `Measurement`.
+
+Examples
+--------
+>>> held = LinkedFrames(np.zeros((9, 12)), "left_tool", "right_tool", orientation=False)
+>>> [fixture.name for fixture in held.fixtures]
+['link:0.x', 'link:0.y', 'link:0.z']
+>>> KnownDistance("point:0", "point:1", 0.05).fixtures[0].name
+'point:0.x'
 """
 
 from __future__ import annotations
@@ -15,19 +41,10 @@ from ..._arrays import Array, as_floats
 from ...errors import InvalidValueError
 from ..extended_table import Frame
 from . import fields
-from .base import (
-    POSE_ROWS,
-    Evaluation,
-    Fixture,
-    Labelled,
-    Linearised,
-    Measurement,
-    Row,
-    View,
-)
+from .base import POSE_ROWS, Evaluation, Fixture, Labelled, Linearised, Measurement, Row, View
 from .fields import Given
 from .motions import difference, product, relative, widened
-from .poses import as_known_pose, mean_poses, target_poses
+from .poses import mean_poses, target_poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,30 +57,13 @@ class LinkedFrames(Labelled):
 
     Two robots become one tree by `combine_arms`. For one robot that meets an object in several
     postures use `FrameContact` or `PointContact`.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (4, 4), optional
-        Poses X, metres.
-    frame, frame_other : str, int or None
-        The two ends; None is the tool.
-    link : array_like of int or str, shape (N,), optional
-        Label of the object; default: always the same.
-    orientation : bool
-        Whether the object holds the orientation as well: 6 rows, else 3.
-
-    Examples
-    --------
-    >>> held = LinkedFrames(np.zeros((9, 12)), "left_tool", "right_tool", orientation=False)
-    >>> [fixture.name for fixture in held.fixtures]
-    ['link:0.x', 'link:0.y', 'link:0.z']
     """
 
     q: Array = field(metadata=fields.READINGS)
     frame: Frame
     frame_other: Frame
     link: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(default=None, metadata=fields.targets(as_known_pose))
+    known: Given = field(default=None, metadata=fields.targets(fields.as_known_pose))
     orientation: bool = True
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
@@ -124,21 +124,6 @@ class KnownDistance(Measurement):
     """The distance between two unknown points of `PointContact`, known from elsewhere.
 
     Contacts alone do not determine the scale of a robot; this is the missing length.
-
-    Parameters
-    ----------
-    point, other : str
-        Points as ``name:label``, such as ``"point:0"`` and ``"point:1"``.
-    length : float
-        Their distance, metres.
-    sigma : float
-        Standard deviation of the length, m; default 0.1 mm, which a calliper or a drilled plate
-        reaches.
-
-    Examples
-    --------
-    >>> KnownDistance("point:0", "point:1", 0.05).fixtures[0].name
-    'point:0.x'
     """
 
     point: str

@@ -1,6 +1,32 @@
 """Measured poses: of the end in the world, between two configurations, of boards in a camera.
 
-Arguments that are not explained here are those of `Measurement`.
+Parameters
+----------
+T : array_like, shape (N, 4, 4)
+    Measured poses, metres: of the end in the world; of the end at ``q_other`` in the end at ``q``;
+    of the board in the camera.
+rows : six of 0 or 1
+    Which of x, y, z, rx, ry, rz are measured: in axes of the world, of the end at ``q``, or of the
+    camera.
+q, q_other : array_like, shape (N, n)
+    Readings of the joints at the two configurations of each pair, rad or m.
+board : array_like of int or str, shape (N,), optional
+    Label of the board; default: always the same.
+known : mapping of label to array_like, shape (4, 4), optional
+    Poses of boards in the world, metres.
+
+The other arguments are those of `Measurement`.
+
+Examples
+--------
+>>> q, T = np.zeros((4, 6)), np.tile(np.eye(4), (4, 1, 1))
+>>> Pose(q, T).axes
+('x', 'y', 'z', 'rx', 'ry', 'rz')
+>>> RelativePose.successive(q, T[1:]).blocks
+3
+>>> boards = CameraPose(q, T)
+>>> len(boards.fixtures), boards.sees_base
+(6, False)
 """
 
 from __future__ import annotations
@@ -13,19 +39,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ... import se3
-from ..._arrays import Array, as_core, read_only
+from ..._arrays import Array, as_core
 from ...errors import InvalidValueError, ShapeError
 from ..extended_table import Frame
 from . import fields
-from .base import (
-    POSE_ROWS,
-    Evaluation,
-    Labelled,
-    Linearised,
-    Measurement,
-    Row,
-)
+from .base import POSE_ROWS, Evaluation, Labelled, Linearised, Measurement, Row
 from .fields import Given
 from .motions import difference, left_jacobians, relative, widened
 
@@ -36,20 +54,7 @@ class Pose(Measurement):
 
     The world is the frame of the measuring device: where the device stands is the base Z of the
     robot, and the target on the arm is the tool E; both are parameters of the robot. A camera
-    beside the robot that observes a board on its arm gives this kind, with the camera's frame as
-    world; a camera on the arm gives `CameraPose`.
-
-    Parameters
-    ----------
-    T : array_like, shape (N, 4, 4)
-        Measured poses, metres.
-    rows : six of 0 or 1
-        Which of x, y, z, rx, ry, rz (world axes) are measured.
-
-    Examples
-    --------
-    >>> Pose(np.zeros((2, 6)), np.tile(np.eye(4), (2, 1, 1))).axes
-    ('x', 'y', 'z', 'rx', 'ry', 'rz')
+    beside the robot that observes a board on its arm gives this kind.
     """
 
     q: Array = field(metadata=fields.READINGS)
@@ -97,21 +102,6 @@ class RelativePose(Measurement):
     The places of the robot and of the measuring device do not matter: increments of an inertial
     unit, of a camera on the arm that observes a scene, of a tracker that is moved between the
     pairs but not within a pair.
-
-    Parameters
-    ----------
-    q, q_other : array_like, shape (N, n)
-        Readings of the joints at the two configurations of each pair, rad or m.
-    T : array_like, shape (N, 4, 4)
-        Measured pose of the end at ``q_other`` in the end at ``q``, metres.
-    rows : six of 0 or 1
-        Which of x, y, z, rx, ry, rz (axes of the end at ``q``) are measured.
-
-    Examples
-    --------
-    >>> q = np.zeros((4, 6))
-    >>> RelativePose.successive(q, np.tile(np.eye(4), (3, 1, 1))).blocks
-    3
     """
 
     q: Array = field(metadata=fields.READINGS)
@@ -153,39 +143,18 @@ class CameraPose(Labelled):
     """Poses of fixed boards in a camera on the arm (eye in hand), ``(Z T(q) E)^-1 B``.
 
     The end is the camera: its place on the arm is the tool E, a parameter of the robot. The pose B
-    of a board is unknown and estimated, unless it is given. Without known boards the base is not
-    identifiable. A camera beside the robot that observes a board on the arm measures a `Pose`.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (4, 4), optional
-        Poses of boards in the world, metres.
-    T : array_like, shape (N, 4, 4)
-        Measured poses of the board in the camera, metres.
-    board : array_like of int or str, shape (N,), optional
-        Label of the board; default: always the same.
-    rows : six of 0 or 1
-        Which of x, y, z, rx, ry, rz (axes of the camera) are measured; ``[1, 1, 1, 0, 0, 0]`` is
-        a target without orientation, of which three coordinates are estimated.
+    of a board is unknown and estimated, unless it is given (of a target without orientation, rows
+    ``[1, 1, 1, 0, 0, 0]``, three coordinates). Without known boards the base is not identifiable.
 
     References
     ----------
-    R. Y. Tsai, R. K. Lenz, "A new technique for fully autonomous and efficient 3D robotics
-    hand/eye calibration", IEEE Transactions on Robotics and Automation 5, 1989.
-
-    Examples
-    --------
-    >>> boards = CameraPose(np.zeros((5, 6)), np.tile(np.eye(4), (5, 1, 1)))
-    >>> len(boards.fixtures), boards.sees_base
-    (6, False)
+    R. Y. Tsai, R. K. Lenz, IEEE Transactions on Robotics and Automation 5, 1989 (hand-eye).
     """
 
     q: Array = field(metadata=fields.READINGS)
     T: Given = field(metadata=fields.POSES)
     board: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(
-        default=None, metadata=fields.targets(lambda value, name: as_known_pose(value, name))
-    )
+    known: Given = field(default=None, metadata=fields.targets(fields.as_known_pose))
     rows: Given = field(default=(1, 1, 1, 1, 1, 1), metadata=fields.ROWS)
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
@@ -218,11 +187,6 @@ class CameraPose(Labelled):
 
 
 # --- poses as targets -----------------------------------------------------------------------------
-
-
-def as_known_pose(value: Any, name: str) -> Array:
-    """Check a known pose."""
-    return read_only(se3.as_single_pose(value, name))
 
 
 def target_poses(kind: Labelled, fixtures: Array, parameters: int) -> Evaluation:

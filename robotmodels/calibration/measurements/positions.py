@@ -1,6 +1,43 @@
 """Measured positions and lengths: points, coordinates along an axis, distances.
 
-Arguments that are not explained here are those of `Measurement`.
+Parameters
+----------
+p : array_like, shape (N, 3)
+    Measured positions in the world, metres.
+rows : three of 0 or 1
+    Which of x, y, z are measured.
+value : array_like, shape (N,)
+    Readings of a gauge, metres.
+axis : array_like, shape (3,)
+    Direction in the world in which the reading grows; its length does not matter.
+zero : float, optional
+    Coordinate at which the gauge reads 0, metres; default: unknown and estimated.
+axis_is_known : bool
+    False: the axis is estimated, as two rotations of the given one.
+length : array_like, shape (N,) or ()
+    Measured lengths, metres; one number for a bar that stays the same.
+q_other : array_like, shape (N, n), optional
+    Readings at the other position.
+pivot : array_like of int or str, shape (N,), optional
+    Label of the pivot; default: all from the same. Not with ``q_other``.
+known : mapping of label to array_like, shape (3,), optional
+    Positions of pivots in the world, metres.
+offset : bool
+    Whether a constant is to be subtracted from the lengths, one for each pivot, unknown and
+    estimated: the dead path of an interferometer that counts from where it was set to zero.
+
+The other arguments are those of `Measurement`.
+
+Examples
+--------
+>>> q = np.zeros((3, 6))
+>>> Position(q, np.zeros((3, 3)), rows=[1, 1, 0]).axes
+('x', 'y')
+>>> gauge = AxisPosition(q, [0.0, 1e-3, 2e-3], [0, 0, 1], axis_is_known=False)
+>>> [fixture.name for fixture in gauge.fixtures]
+['gauge.turn_1', 'gauge.turn_2', 'gauge.zero']
+>>> [fixture.name for fixture in Distance(q, 0.3).fixtures]
+['pivot:0.x', 'pivot:0.y', 'pivot:0.z']
 """
 
 from __future__ import annotations
@@ -16,14 +53,7 @@ from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..extended_table import Frame
 from . import fields
-from .base import (
-    POSITION_ROWS,
-    Evaluation,
-    Fixture,
-    Labelled,
-    Linearised,
-    Measurement,
-)
+from .base import POSITION_ROWS, Evaluation, Fixture, Labelled, Linearised, Measurement
 from .fields import Given
 from .motions import tilt_of, tilted_axes, unit_vector
 
@@ -34,18 +64,6 @@ class Position(Measurement):
 
     Where the device stands is the base Z of the robot, and the target's place on the arm is the
     tool E: both are parameters of the robot.
-
-    Parameters
-    ----------
-    p : array_like, shape (N, 3)
-        Measured positions in the world, metres.
-    rows : three of 0 or 1
-        Which of x, y, z are measured.
-
-    Examples
-    --------
-    >>> Position(np.zeros((2, 6)), np.zeros((2, 3)), rows=[1, 1, 0]).axes
-    ('x', 'y')
     """
 
     q: Array = field(metadata=fields.READINGS)
@@ -70,23 +88,6 @@ class AxisPosition(Measurement):
 
     One gauge a measurement; give several of them different names. A cable that is drawn from a
     drum measures a `Distance`.
-
-    Parameters
-    ----------
-    value : array_like, shape (N,)
-        Readings of the gauge, metres.
-    axis : array_like, shape (3,)
-        Direction in the world in which the reading grows; its length does not matter.
-    zero : float, optional
-        Coordinate at which the gauge reads 0, metres; default: unknown and estimated.
-    axis_is_known : bool
-        False: the axis is estimated, as two rotations of the given one.
-
-    Examples
-    --------
-    >>> gauge = AxisPosition(np.zeros((3, 6)), [0.0, 1e-3, 2e-3], [0, 0, 1], axis_is_known=False)
-    >>> [fixture.name for fixture in gauge.fixtures]
-    ['gauge.turn_1', 'gauge.turn_2', 'gauge.zero']
     """
 
     q: Array = field(metadata=fields.READINGS)
@@ -183,11 +184,6 @@ def _as_pivots(m: Distance, name: str, value: Any) -> tuple[str, ...] | None:
     return None
 
 
-def as_point(value: Any, name: str) -> Array:
-    """Check a known point."""
-    return read_only(as_exact(value, (3,), name))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Distance(Labelled):
     """Measured lengths between the end and a pivot, or between two positions of the end.
@@ -196,33 +192,13 @@ class Distance(Labelled):
     it is that from a pivot: the fixed ball of a ball-bar, the drum of a cable, the head of an
     interferometer. Pivots are unknown and estimated, unless they are given. If all positions
     about an unknown pivot lie in a plane, it may be on either side, and the lower side is taken.
-
-    Parameters
-    ----------
-    known : mapping of label to array_like, shape (3,), optional
-        Positions of pivots in the world, metres.
-    length : array_like, shape (N,) or ()
-        Measured lengths, metres; one number for a bar that stays the same.
-    q_other : array_like, shape (N, n), optional
-        Readings at the other position.
-    pivot : array_like of int or str, shape (N,), optional
-        Label of the pivot; default: all from the same. Not with ``q_other``.
-    offset : bool
-        Whether a constant is to be subtracted from the lengths, one for each pivot, unknown and
-        estimated: the dead path of an interferometer that counts from where it was set to zero.
-
-    Examples
-    --------
-    >>> bar = Distance(np.zeros((4, 6)), 0.3)
-    >>> [fixture.name for fixture in bar.fixtures]
-    ['pivot:0.x', 'pivot:0.y', 'pivot:0.z']
     """
 
     q: Array = field(metadata=fields.READINGS)
     length: Given = field(metadata=fields.lengths("distance", "length"))
     q_other: Given = field(default=None, metadata=fields.READINGS)
     pivot: Given = field(default=None, metadata={**fields.LABELS, "check": _as_pivots})
-    known: Given = field(default=None, metadata=fields.targets(as_point))
+    known: Given = field(default=None, metadata=fields.targets(fields.as_point))
     offset: bool = False
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
