@@ -19,6 +19,9 @@ from frozen_estimates import (
     summary,
 )
 
+pytestmark = pytest.mark.filterwarnings("ignore:q. joint")
+"""Readings found by Newton's method may be whole turns away."""
+
 
 @pytest.mark.parametrize(
     ("part", "case"),

@@ -29,8 +29,7 @@ from .robot import as_calibrated, calibrated_model, calibrated_pose, with_moved_
 from .solve import ROUGH, first_scales, solve
 from .validation import Errors, errors_of
 
-_NEAR = 0.2
-"""Mean residual, in lengths of the robot, above which base and tool are aligned first."""
+_NEAR = 0.2  # mean residual, in lengths of the robot, above which base and tool are aligned first
 _ALIKE = 1.0 + 2.0 * np.cos(0.5)
 """Mean trace of the rotations from nominal to measured poses below which they are too."""
 
@@ -78,7 +77,7 @@ def align_base_and_tool(
         model = _with_gravity_of(calibrated_model(kept, solution.corrections).model, model)
         if len(kept) == len(names):
             break
-    return model, errors_of(problem, solution.corrections, solution.fixtures)
+    return model, errors_of(problem, solution.corrections, solution.fixture_values)
 
 
 def _with_gravity_of(placed: RobotModel, model: RobotModel) -> RobotModel:

@@ -60,12 +60,6 @@ def candidate_parameters(
     GeometricParameters
         Candidates in the order of preference.
 
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        Not a model; unknown frames; a coupling of a frame that does not move; compliance of a
-        robot without masses.
-
     References
     ----------
     Seed book section 1.4.2; S. Hayati, IEEE CDC 1983.

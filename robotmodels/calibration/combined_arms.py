@@ -48,11 +48,6 @@ def combine_arms(
     RobotModel
         A tree with n_a + n_b joints. Configurations that both robots name are kept.
 
-    Raises
-    ------
-    InvalidValueError, NotARotationError
-        Not two models, names that are equal, a base that is no pose, gravities that differ.
-
     Examples
     --------
     >>> import robotmodels as rm

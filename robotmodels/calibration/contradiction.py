@@ -25,12 +25,10 @@ from .scale import needs_a_length
 from .solve import Solution, refitted
 from .validation import errors_of
 
-_CONTRADICTED = 3.0
-"""Difference from which a distance is reported, standard errors."""
+_CONTRADICTED = 3.0  # difference from which a distance is reported, standard errors
 _COMMON = 0.5
 """Part of the residuals assumed systematic, so that averaging over postures does not reduce it."""
-_REFITS = 2
-"""Largest number of fits without the outliers."""
+_REFITS = 2  # largest number of fits without the outliers
 
 
 class Contradiction(NamedTuple):
@@ -50,7 +48,7 @@ def contradictions(
     measurements = solution.problem.measurements
     numbers = [k for k, m in enumerate(measurements) if isinstance(m, KnownDistance)]
     rival = ""
-    if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0], ()):
+    if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0]):
         # if they alone determine the scale, the first one is taken as correct
         first, *numbers = numbers
         rival = _named(measurements[first])  # type: ignore[arg-type]
@@ -139,7 +137,7 @@ def _predicted_differences(
     x = _unbiased(others)
     residual, jacobian = stacked(distances, x, scales)
     T = sigma[:, None] * (jacobian @ others.fit.basis)
-    rms = errors_of(solution.problem, x[: distances.P], x[distances.P :]).rms["m"]
+    rms = errors_of(solution.problem, others.corrections, others.fixture_values).rms["m"]
     return sigma * residual, T @ T.T + (_COMMON * rms) ** 2 * np.eye(len(numbers))
 
 

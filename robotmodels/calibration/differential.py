@@ -51,11 +51,6 @@ def differential_model(
     DifferentialModel
         Poses and Psi.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Shapes that do not fit, NaN, an end that was not given to `candidate_parameters`.
-
     References
     ----------
     Seed book section 1.4.3.

@@ -27,8 +27,7 @@ _GAIN = 1e-10
 _SWEEPS = 50
 _CHUNK = 4096
 _STEP = 1e-6  # of a configuration, for differences
-_MOVE_SWEEPS, _MOVE_ITERATIONS = 3, 15
-_MOVE_GAIN = 1e-4  # of a whole sweep (of a logarithm), below which no other follows
+_MOVE_SWEEPS, _MOVE_ITERATIONS = 2, 15
 
 
 def index_of(information: Array, criterion: Criterion) -> Array:
@@ -134,7 +133,7 @@ def moved_configurations(
     model: RobotModel,
     work: Workers,
 ) -> Array:
-    """Local optimisation of the configurations, one after the other.
+    """Move configurations one after another while the criterion improves.
 
     Shapes: groups (count, m, n), rows (count, k, p) -> (count, m, n).
     """
@@ -146,38 +145,32 @@ def moved_configurations(
     sigma = np.tile(model.table.sigma[model.table.joint_rows], m)
     # without limits strokes would grow without bound, as longer levers are always better
     endless = (sigma == PRISMATIC) & ~(np.isfinite(lower) & np.isfinite(upper))
-    value, total = float(index_of(information(rows), criterion)), _MOVE_SWEEPS * count
-    for sweep in range(_MOVE_SWEEPS):
-        before = value
-        for g in range(count):
-            rest = information(rows[np.arange(count) != g])
-            ridge = _ridge(rows)
-            x0 = groups[g].ravel()
-            low, high = np.where(endless, x0, lower), np.where(endless, x0, upper)
+    value = float(index_of(information(rows), criterion))
+    for g in np.tile(np.arange(count), _MOVE_SWEEPS):
+        rest, x0 = information(rows[np.arange(count) != g]), groups[g].ravel()
+        base = rest + _ridge(rows)
+        low, high = np.where(endless, x0, lower), np.where(endless, x0, upper)
 
-            def cost(x: Array, base: Array = rest + ridge, high: Array = high) -> Any:
-                # a step back from an upper limit, as rows beyond it mean nothing
-                h = np.where(x + _STEP > high, -_STEP, _STEP)
-                points = np.vstack([x, x + np.diag(h)]).reshape(-1, m, n)
-                index = added(base, rows_of(points), criterion)
-                return -float(index[0]), -(index[1:] - index[0]) / h
+        def cost(x: Array, base: Array = base, high: Array = high) -> Any:
+            # a step back from an upper limit, as rows beyond it mean nothing
+            h = np.where(x + _STEP > high, -_STEP, _STEP)
+            points = np.vstack([x, x + np.diag(h)]).reshape(-1, m, n)
+            index = added(base, rows_of(points), criterion)
+            return -float(index[0]), -(index[1:] - index[0]) / h
 
-            x = minimize(
-                cost, np.clip(x0, low, high), jac=True, method="L-BFGS-B",
-                bounds=list(zip(low, high, strict=True)), options={"maxiter": _MOVE_ITERATIONS},
-            ).x  # fmt: skip
-            for part in (1.0, 0.5, 0.25, 0.1):
-                trial = np.clip(x0 + part * (x - x0), lower, upper).reshape(1, m, n)
-                if not is_allowed(trial)[0]:
-                    continue
-                new = rows_of(trial)
-                after = float(index_of(rest + information(new), criterion))
-                if after > value:
-                    groups[g], rows[g], value = trial[0], new[0], after
-                    break
-            work.done((sweep * count + g + 1) / total)
-        if value - before < _MOVE_GAIN:
-            break
+        x = minimize(
+            cost, np.clip(x0, low, high), jac=True, method="L-BFGS-B",
+            bounds=list(zip(low, high, strict=True)), options={"maxiter": _MOVE_ITERATIONS},
+        ).x  # fmt: skip
+        for part in (1.0, 0.5, 0.25, 0.1):
+            trial = np.clip(x0 + part * (x - x0), lower, upper).reshape(1, m, n)
+            if not is_allowed(trial)[0]:
+                continue
+            new = rows_of(trial)
+            after = float(index_of(rest + information(new), criterion))
+            if after > value:
+                groups[g], rows[g], value = trial[0], new[0], after
+                break
     work.done()
     return groups
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from ..errors import InvalidValueError
 from ..geometry import FIXED
 from ..kinematics import link_poses
@@ -21,10 +21,8 @@ from ..se3 import rotation, translation
 
 Frame = str | int | None
 """A frame of a model: a name, a number, or None for the tool."""
-_LEAST_SIZE = 1e-12
-"""Sum of all lengths of a robot that counts as zero, m."""
-_LEAST_SINE = 0.5
-"""Least sine of alpha at which the six parameters of a pose are used without a quarter turn."""
+_LEAST_SIZE = 1e-12  # sum of all lengths of a robot that counts as zero, m
+_LEAST_SINE = 0.5  # of alpha at which the six parameters of a pose need no quarter turn
 
 
 class Element(IntEnum):
@@ -52,14 +50,12 @@ class Element(IntEnum):
         return self.name.lower()
 
 
-JOINT_VARIABLE = (Element.THETA, Element.R, None)
-"""Element that is the joint variable, by sigma."""
-_AXIS = (2, 2, 1, 0, 0, 2, 2)
-"""Axis (x, y, z) of each element."""
+JOINT_VARIABLE = (Element.THETA, Element.R, None)  # element that is the joint variable, by sigma
+_AXIS = (2, 2, 1, 0, 0, 2, 2)  # axis (x, y, z) of each element
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExtendedTable(Rebuilt):
+class ExtendedTable(Frozen):
     """The table of a robot with its base as row 0 and each measured end as a row behind."""
 
     model: RobotModel
@@ -77,12 +73,6 @@ class ExtendedTable(Rebuilt):
     """Constant turn in front of row 0, shape (4, 4)."""
     after: Array
     """Constant turn behind each end, shape (number of ends, 4, 4)."""
-
-    def __post_init__(self) -> None:
-        for name in ("antecedent", "sigma", "joint"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-        for name in ("nominal", "before", "after"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def rows(self) -> int:
@@ -142,9 +132,9 @@ def extend_table(model: RobotModel, frames: Sequence[Frame] = (None,)) -> Extend
         model=model,
         frames=frames,
         nominal=np.vstack([base.elements, np.column_stack(columns), *(t.elements for t in tools)]),
-        antecedent=np.concatenate([[-1], table.antecedent, [parent for parent, _ in ends]]),
-        sigma=np.concatenate([[FIXED], table.sigma, fixed]),
-        joint=np.concatenate([[-1], model.chain.joint, [-1] * len(ends)]),
+        antecedent=np.array([-1, *table.antecedent, *(parent for parent, _ in ends)], np.int64),
+        sigma=np.array([FIXED, *table.sigma, *fixed], np.int64),
+        joint=np.array([-1, *model.chain.joint, *(-1 for _ in ends)], np.int64),
         before=base.turn,
         after=np.array([t.turn for t in tools]),
     )

@@ -38,10 +38,8 @@ from .validation import (
 
 _PRIOR = ParameterPrior()
 _SEED = 1
-_TRIES = 6
-"""Largest number of fits for the choice of parameters and of the prior's width."""
-_DEPENDENT = 1e-4
-"""Sine of the angle below which a column counts as dependent."""
+_TRIES = 6  # largest number of fits for the choice of parameters and of the prior's width
+_DEPENDENT = 1e-4  # sine of the angle below which a column counts as dependent
 
 
 def fit(
@@ -238,7 +236,7 @@ def fit(
                 structure, solution, preferred, identify_there, parts, in_folds, nominal, step
             )
         notes.append(note_of_structure(structure, trials, in_folds))
-    in_sample = errors_of(solution.problem, solution.corrections, solution.fixtures)
+    in_sample = errors_of(solution.problem, solution.corrections, solution.fixture_values)
     validation = Validation(given, nominal, in_sample, in_folds, in_test)
     distances = any(isinstance(m, KnownDistance) for m in measured)
     return CalibrationResult(

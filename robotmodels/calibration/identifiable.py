@@ -21,15 +21,13 @@ from .measurements import Measurement
 from .measurements.kinds import Kind, as_kind, drawn_groups, measurement_of
 from .parameters import Compliance, ErrorLaw, GeometricParameters, as_names
 from .problem import Problem, guessed_fixtures, linearised, measured_frames, problem_of, satisfying
-from .scale import check_scale, needs_a_length
+from .scale import check_scale
 
 DEPENDENT = 1e-7
 """Sine of the angle to the columns before, below which a parameter acts like a combination."""
-_EMPTY = 1e-9
-"""Length of a column beside the longest, below which it has no effect."""
+_EMPTY = 1e-9  # length of a column beside the longest, below which it has no effect
 _SEED = 14
-_CONTACTS = 14
-"""Number of contacts that are drawn for structural identifiability."""
+_CONTACTS = 14  # number of contacts that are drawn for structural identifiability
 
 
 class Reason(Enum):
@@ -324,8 +322,8 @@ def identifiable_on(
     units = [np.tile(m.units, m.blocks) for m in exact.measurements]
     # lengths in parts of the robot's size
     relative = W / np.where(np.concatenate(units) == "m", size, 1.0)[:, None]
-    if not scale_is_known and needs_a_length(problem, (*known, *known_lengths)):
-        check_scale(exact, relative, [*known, *known_lengths, *gauge], known_lengths)
+    if not scale_is_known:
+        check_scale(problem, {*known, *known_lengths}, known_lengths)
     F = problem.F
     free = [k for k, name in enumerate(candidates.names) if name not in reasons]
     columns = np.concatenate([np.arange(F), F + np.array(free)]).astype(int)

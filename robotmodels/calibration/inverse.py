@@ -110,7 +110,8 @@ def corrected_igm(
     if robot.bent_rows and len(targets):
         # at the edge of reach, bending decides whether there is a solution
         found = igm(model, _unbent(robot, targets, found, references), **options)
-    turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    sigma = model.table.sigma[model.table.joint_rows]
+    turns = sigma == REVOLUTE
     joints = np.array([model.lower, model.upper, turns])
     q = np.where(found.valid[..., None], found.q, 0.0)
     low, high = (model.lower, model.upper) if limits else (np.full(n, -pi), np.full(n, pi))
@@ -126,16 +127,17 @@ def corrected_igm(
     off = references[:, None] - reading
     off -= 2.0 * pi * np.round(off / (2.0 * pi)) * turns
     reading = np.where(held, reading + off, reading)
+    in_tool = mask_axes == "tool"
     pose, solution = np.nonzero(found.valid & np.isfinite(reading).all(axis=-1))
     residual = np.full(found.valid.shape, np.inf)
-    reading[pose, solution], residual[pose, solution] = _refined(
-        robot, targets[pose], reading[pose, solution], held[pose, solution], requested,
-        mask_axes == "tool",
-    )  # fmt: skip
+    refined = _refined(
+        robot, targets[pose], reading[pose, solution], held[pose, solution], requested, in_tool
+    )
+    reading[pose, solution], residual[pose, solution] = refined
     kept = residual <= tolerance
     reading = np.where(kept[..., None], reading, 0.0)
-    gap = np.abs(difference(model.table.sigma[model.table.joint_rows], reading[:, :, None],
-                            reading[:, None])).max(axis=-1, initial=0.0)  # fmt: skip
+    gap = np.abs(difference(sigma, reading[:, :, None], reading[:, None]))
+    gap = gap.max(axis=-1, initial=0.0)
     kept &= ~((gap < MERGE) & kept[:, None] & np.tri(gap.shape[1], k=-1, dtype=bool)).any(axis=-1)
     postures = Postures(
         reading, kept, residual, found.double, found.free_joints, kept & False, found.family_joints

@@ -12,10 +12,8 @@ from ..geometry import REVOLUTE
 from ..model import RobotModel
 from .measurements import Measurement
 
-_TURNS = 30.0
-"""Largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed."""
-_TOLERANCE = 0.02
-"""Tolerance beyond a limit, rad or m and relative to the range."""
+_TURNS = 30.0  # largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed
+_TOLERANCE = 0.02  # tolerance beyond a limit, rad or m and relative to the range
 _MOST = 0.6
 """Share of readings beyond a limit above which they are refused; simulated readings over a
 symmetric range have a share of 0.5 where a limit is at zero."""

@@ -40,16 +40,12 @@ _TENFOLD = {
     ("centimetres", "millimetres"): "ten times too short: a misplaced decimal point, or cm for mm",
 }
 """Sentences on a known distance that is ten times too long or too short."""
-_NEAR = 0.15
-"""Relative tolerance of a unit factor."""
-_ALIKE = 0.3
-"""Largest relative residual of measured against scaled nominal lengths."""
+_NEAR = 0.15  # relative tolerance of a unit factor
+_ALIKE = 0.3  # largest relative residual of measured against scaled nominal lengths
 _FAR = 3.0
 """Difference of a known distance, in scatters of the nominal points, for a check of its unit."""
-_SPREAD = 50.0
-"""Implausible ratio of measured lengths to the robot's reach."""
-_FEW = 7
-"""Smallest number of lengths for the check of a pivot."""
+_SPREAD = 50.0  # implausible ratio of measured lengths to the robot's reach
+_FEW = 7  # smallest number of lengths for the check of a pivot
 
 
 class UnitError(NamedTuple):

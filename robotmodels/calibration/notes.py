@@ -17,10 +17,8 @@ from .problem import Problem, measured_frames
 from .solve import Solution, states_noise
 from .validation import Validation
 
-_HARDLY = 0.02
-"""Standard deviation of a joint's readings below which it hardly moves, rad or m."""
-_FAR = 50.0
-"""Residual in stated standard deviations that units explain better than noise."""
+_HARDLY = 0.02  # standard deviation of a joint's readings below which it hardly moves, rad or m
+_FAR = 50.0  # residual in stated standard deviations that units explain better than noise
 _IMPLAUSIBLE = 0.02
 """Noise that is estimated, relative to the robot or in rad, that no measurement of a robot has."""
 _OTHER_LENGTH, _OTHER_ANGLE = 0.1, 0.35

@@ -8,12 +8,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, as_floats, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .identifiable import IdentifiableParameters
 
-_RANK_TOLERANCE = 1e-14
-"""A singular value below this part of the largest is zero."""
+_RANK_TOLERANCE = 1e-14  # A singular value below this part of the largest is zero
 
 
 class Criterion(Enum):
@@ -27,21 +26,15 @@ class Criterion(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observability(Rebuilt):
-    """The five observability indices; larger is better for all.
+class Observability(Frozen):
+    """The five observability indices (`Criterion`), of m configurations; larger is better for all.
 
     Parameters
     ----------
-    o1 : float
-        ``(s_1 ... s_L)^(1/L) / sqrt(m)``: volume of the ellipsoid of the effects of errors.
-    o2 : float
-        ``s_L / s_1``: its inverse condition, its shape.
-    o3 : float
-        ``s_L``: its shortest axis, the worst combination of parameters.
-    o4 : float
-        ``s_L^2 / s_1``: noise amplification index.
-    o5 : float
-        ``1 / (1/s_1 + ... + 1/s_L)``: the harmonic mean of the axes, divided by L.
+    o1, o2, o3, o4, o5 : float
+        Volume of the ellipsoid of the effects of errors; its inverse condition (its shape); its
+        shortest axis, the worst combination of parameters; noise amplification index; the harmonic
+        mean of the axes, divided by L.
     singular_values : ndarray, shape (L,)
         s_1 >= ... >= s_L, of the scaled matrix.
     configurations : int
@@ -55,9 +48,6 @@ class Observability(Rebuilt):
     o5: float
     singular_values: Array
     configurations: int
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "singular_values", read_only(self.singular_values))
 
     @property
     def condition(self) -> float:
@@ -101,11 +91,6 @@ def observability(
     -------
     Observability
         The indices.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No matrix, no column, NaN; scales that are not positive; no configuration.
 
     References
     ----------

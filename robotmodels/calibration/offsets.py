@@ -151,10 +151,8 @@ def joint_offsets(
     def errors(offset: Array) -> Array:
         return pose_errors(calibrated_pose(robot, commanded + unit * offset), wanted)
 
-    fit = least_squares(
-        lambda x: (weight * errors(x)).ravel(), np.zeros(n), "3-point",
-        xtol=_CLOSE, ftol=_CLOSE, gtol=_CLOSE,
-    )  # fmt: skip
+    close = {"xtol": _CLOSE, "ftol": _CLOSE, "gtol": _CLOSE}
+    fit = least_squares(lambda x: (weight * errors(x)).ravel(), np.zeros(n), "3-point", **close)
     rank = np.linalg.matrix_rank(fit.jac, rtol=_RANK_TOLERANCE)
     before, after = errors(np.zeros(n)), errors(fit.x)
     return JointOffsets(unit * fit.x, int(rank), before, after)

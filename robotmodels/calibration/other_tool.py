@@ -24,10 +24,8 @@ from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
 from .robot import CalibratedRobot
 
-_POSTURES = 200
-"""Largest number of the measured postures that a prediction is made for."""
-_LEAST_LENGTH = 0.1
-"""Smallest length of the tool, relative to the size of the robot."""
+_POSTURES = 200  # largest number of the measured postures that a prediction is made for
+_LEAST_LENGTH = 0.1  # smallest length of the tool, relative to the size of the robot
 
 
 class PredictedError(NamedTuple):

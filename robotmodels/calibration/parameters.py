@@ -48,10 +48,10 @@ class ErrorLaw(Enum):
 class Compliance(Enum):
     """Elements that deflect under gravity, in proportion to their gravity load.
 
-    Examples
-    --------
-    >>> Compliance.ISOTROPIC.value
-    'joints and mount, the same about all axes'
+    Parameters
+    ----------
+    value : str
+        The elements.
     """
 
     NONE = "nothing"
@@ -114,10 +114,8 @@ class GeometricParameters(Rebuilt):
 
     Parameters
     ----------
-    table : ExtendedTable
-        The extended table.
-    entries : tuple of GeometricParameter
-        The parameters.
+    table, entries
+        The extended table, and the parameters of it.
 
     References
     ----------
@@ -139,7 +137,6 @@ class GeometricParameters(Rebuilt):
     table: ExtendedTable
     entries: tuple[GeometricParameter, ...]
     names: tuple[str, ...] = field(init=False)
-    """Names, shape (P,)."""
     actions: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]] = field(init=False)
     """Parameter, row and element of each action, shapes (A,): a parameter has one or more."""
 
@@ -209,9 +206,8 @@ class GeometricParameters(Rebuilt):
     def without(self, names: Iterable[str]) -> Self:
         """All but the named parameters, which keep their nominal values."""
         left_out = set(self.index(names).tolist())
-        return replace(
-            self, entries=tuple(e for k, e in enumerate(self.entries) if k not in left_out)
-        )
+        kept = (e for k, e in enumerate(self.entries) if k not in left_out)
+        return replace(self, entries=tuple(kept))
 
     def factors(self, q: ArrayLike) -> Array:
         """Factor of each action by its law. Shapes: q (N, n) -> (N, A)."""

@@ -12,18 +12,15 @@ from ..errors import InvalidValueError
 from ..estimation import NonlinearFit, Prior
 from .identifiable import IdentifiableParameters
 from .measurements import Measurement
-from .parameters import ErrorLaw, GeometricParameter, GeometricParameters
+from .parameters import ErrorLaw, GeometricParameters
 from .problem import Problem, problem_of
 
-_WRONG_ZEROS = 3.0
-"""Increase of the prior's angles from which zeros or signs of joints may be wrong."""
-_LENGTH = 1e-3
-"""Prior standard deviation of lengths of robots of 1 m and more, m."""
+_WRONG_ZEROS = 3.0  # increase of the prior's angles from which zeros of joints may be wrong
+_LENGTH = 1e-3  # prior standard deviation of lengths of robots of 1 m and more, m
+# least ratio of a kept parameter's correction to that of a regrouped one with the same effect, both
+# in prior standard deviations, for which the regrouped one is estimated too
 _SHARED = 0.1
-"""Least ratio of a kept parameter's correction to that of a regrouped one with the same effect,
-both in prior standard deviations, for which the regrouped one is estimated too."""
-_CONTRADICTED = 2.5
-"""Rms of corrections over their prior standard deviations from which the prior is widened."""
+_CONTRADICTED = 2.5  # rms of corrections over their prior standard deviations that widens it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,19 +46,9 @@ class ParameterPrior(Rebuilt):
         True: parameters whose effect base and tool can reproduce keep their nominal values. False:
         they share corrections with base and tool.
 
-    Raises
-    ------
-    InvalidValueError
-        A standard deviation that is not positive.
-
     References
     ----------
     Seed book section 1.4.4.3.
-
-    Examples
-    --------
-    >>> ParameterPrior(length=1e-3, angle=2e-3).strength
-    1.0
     """
 
     length: float | None = None
@@ -92,27 +79,20 @@ def sized(prior: ParameterPrior, size: float) -> ParameterPrior:
 
 def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
     """Prior standard deviations of the parameters, shape (P,); infinite without prior."""
-    parameters = problem.parameters
-    prior, f = sized(prior, parameters.table.size), parameters.model.f
-    return np.array(
-        [
-            prior.named.get(entry.name, _standard_deviation(prior, entry, f, largest))
-            for entry, largest in zip(parameters.entries, largest_factors(problem), strict=True)
-        ]
-    )
-
-
-def _standard_deviation(
-    prior: ParameterPrior, entry: GeometricParameter, f: int, largest: float
-) -> float:
-    constant = float(prior.length or np.inf) if entry.element.is_length else prior.angle
-    if entry.law is ErrorLaw.CONSTANT:
-        return constant if 0 < entry.row <= f else np.inf
+    prior, f = sized(prior, problem.parameters.table.size), problem.parameters.model.f
     by_law = {ErrorLaw.GAIN: prior.gain, ErrorLaw.COMPLIANCE: prior.compliance}
-    given = by_law.get(entry.law, prior.eccentricity)
-    if given is not None:
-        return given
-    return constant / largest if largest > 0.0 else np.inf
+    sigma = np.full(problem.P, np.inf)
+    for k, (e, largest) in enumerate(
+        zip(problem.parameters.entries, largest_factors(problem), strict=True)
+    ):
+        given = prior.named.get(e.name, by_law.get(e.law, prior.eccentricity))
+        if e.law is ErrorLaw.CONSTANT:
+            given = prior.named.get(e.name, None if 0 < e.row <= f else np.inf)
+        if given is not None:
+            sigma[k] = given
+        elif largest > 0.0:
+            sigma[k] = (prior.length if e.element.is_length else prior.angle) / largest
+    return sigma
 
 
 def largest_factors(problem: Problem) -> Array:

@@ -6,7 +6,7 @@ Source: Seed book section 1.4.5.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,7 @@ from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
 from .differential import differential_model
 from .joint_readings import expected_joints_text
-from .measurements import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    Measurement,
-    PointContact,
-    whitened,
-)
+from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact, whitened
 from .measurements.kinds import satisfied_measurement
 from .parameters import GeometricParameters
 
@@ -95,9 +88,16 @@ def problem_of(
                 raise InvalidValueError(
                     f"fixture {fixture.name!r} is in m for one measurement and rad for another."
                 )
-    return Problem(
-        parameters, measurements, tuple(fixtures.values()), _factors(parameters, measurements)
-    )
+    return _problem(parameters, measurements, tuple(fixtures.values()))
+
+
+def _problem(
+    parameters: GeometricParameters,
+    measurements: tuple[Measurement, ...],
+    fixtures: tuple[Fixture, ...],
+) -> Problem:
+    factors = tuple(tuple(parameters.factors(view.q) for view in m.views) for m in measurements)
+    return Problem(parameters, measurements, fixtures, factors)
 
 
 def as_measurements(
@@ -116,12 +116,6 @@ def as_measurements(
                 f"measurement, got {type(m).__name__}."
             )
     return found
-
-
-def _factors(
-    parameters: GeometricParameters, measurements: tuple[Measurement, ...]
-) -> tuple[tuple[Array, ...], ...]:
-    return tuple(tuple(parameters.factors(view.q) for view in m.views) for m in measurements)
 
 
 def measured_frames(measurements: Iterable[Measurement]) -> tuple[str | int | None, ...]:
@@ -175,8 +169,7 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
     Shapes: x (P + F,), scales (k,) -> residual (M,), jacobian (M, P + F).
     """
     P = problem.P
-    residual = np.empty(problem.rows)
-    jacobian = np.zeros((problem.rows, P + problem.F))
+    residual, jacobian = np.empty(problem.rows), np.zeros((problem.rows, P + problem.F))
     first, parts = 0, linearised(problem, x[:P], x[P:])
     for m, part, scale in zip(problem.measurements, parts, scales, strict=True):
         rows = slice(first, first + part.residual.size)
@@ -192,12 +185,11 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
 
 def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
     """The problem with readings moved to satisfy the constraints exactly, for rank decisions."""
-    parameters = problem.parameters
     moved = [
-        satisfied_measurement(parameters, m, xi, fixtures[problem.columns(m)])
+        satisfied_measurement(problem.parameters, m, xi, fixtures[problem.columns(m)])
         if m.is_constraint
         else m
         for m in problem.measurements
     ]
     measurements = tuple(m for m in moved if m is not None)
-    return replace(problem, measurements=measurements, factors=_factors(parameters, measurements))
+    return _problem(problem.parameters, measurements, problem.fixtures)

@@ -26,10 +26,8 @@ from .measurements import FileRow, Measurement, Pose
 from .measurements.base import fields_of, required
 from .measurements.kinds import Kind, as_kind
 
-_QUATERNION_TOLERANCE = 1e-3
-"""Largest deviation from 1 of the length of a quaternion of few digits."""
-_LARGEST_ANGLE = 30.0
-"""Largest plausible angle, rad; beyond it, degrees are assumed."""
+_QUATERNION_TOLERANCE = 1e-3  # largest deviation from 1 of the length of a quaternion of few digits
+_LARGEST_ANGLE = 30.0  # largest plausible angle, rad; beyond it, degrees are assumed
 
 
 def read_measurements(

@@ -32,8 +32,7 @@ from .result import CalibrationResult
 from .solve import states_noise
 from .validation import Errors, suited_fixtures
 
-_STRONG = 0.9
-"""Correlation from which a pair is listed."""
+_STRONG = 0.9  # correlation from which a pair is listed
 _LISTED = 12
 
 
@@ -49,10 +48,6 @@ def report(result: CalibrationResult) -> str:
     -------
     str
         Sections with tables; lengths in mm, angles in degrees.
-
-    References
-    ----------
-    Seed book section 1.4.4.
 
     Examples
     --------
@@ -372,7 +367,7 @@ def measured_residuals(result: CalibrationResult) -> tuple[MeasuredResiduals, ..
     """Residuals of every measurement of a calibration, before and after it."""
     solution = result.solution
     problem, fit, nominal = solution.problem, solution.fit, np.zeros(solution.problem.P)
-    before = linearised(problem, nominal, suited_fixtures(problem, nominal, {}))
+    before = linearised(problem, nominal, suited_fixtures(problem, nominal))
     after = linearised(problem, solution.corrections, solution.fixtures)
     seen = evaluations(problem, solution.corrections)
     found, row, block = [], 0, 0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_floats, read_only
+from .._arrays import Array, Frozen, as_floats
 from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
@@ -19,14 +19,7 @@ from ..model import RobotModel, check_model
 from ..obstacles.clearance import checked_obstacles, clearance, links
 from ..obstacles.shapes import Obstacle
 from .candidates import candidate_parameters
-from .exchange import (
-    exchanged,
-    greedy,
-    index_of,
-    information,
-    moved_configurations,
-    nested,
-)
+from .exchange import exchanged, greedy, index_of, information, moved_configurations, nested
 from .extended_table import Frame
 from .identifiable import identifiable_on
 from .measurements import Measurement, whitened
@@ -35,10 +28,8 @@ from .observability import Criterion, Observability, observability
 from .parameters import GeometricParameters
 from .problem import guessed_fixtures, linearised, problem_of
 
-LENGTH_NOISE = 1e-4
-"""Standard error of a length where none is given, m."""
-_RANKED = 150
-"""Number of candidate configurations used for the rank test."""
+LENGTH_NOISE = 1e-4  # standard error of a length where none is given, m
+_RANKED = 150  # number of candidate configurations used for the rank test
 _DRAWS = 12
 _CONTACT_TOLERANCE = 1e-6
 """Distance (m) and angle (rad) up to which given postures of a contact count as meeting."""
@@ -46,7 +37,7 @@ _CHUNK = 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SelectedConfigurations(Rebuilt):
+class SelectedConfigurations(Frozen):
     """Configurations selected for a calibration, the most useful ones first.
 
     The first c of them are a good set of c for every c.
@@ -95,12 +86,6 @@ class SelectedConfigurations(Rebuilt):
     pool: int
     left_out: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        for name in ("candidates", "counts"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-        for name in ("groups", "values", "standard_errors", "errors"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
     @property
     def count(self) -> int:
         """Number of selected configurations or contacts."""
@@ -109,7 +94,7 @@ class SelectedConfigurations(Rebuilt):
     @property
     def q(self) -> Array:
         """All postures as rows, shape (count * m, n)."""
-        return read_only(self.groups.reshape(-1, self.groups.shape[-1]))
+        return self.groups.reshape(-1, self.groups.shape[-1])
 
     @property
     def labels(self) -> NDArray[np.int64]:
@@ -181,7 +166,7 @@ def select_configurations(
     rng: np.random.Generator | int | None = None,
     progress: Progress = False,
 ) -> SelectedConfigurations:
-    """Select configurations for a calibration (optimal experiment design, exciting postures).
+    """Select configurations for a calibration (optimal experiment design).
 
     An exchange algorithm takes the best set out of candidates: a greedy set and random ones are
     improved member by member until no single exchange makes them better, and the best is kept.
@@ -217,10 +202,8 @@ def select_configurations(
         The measured end; None is the tool.
     postures : int, optional
         Postures of a contact; default by the kind.
-    obstacles : iterable of Obstacle
-        Sphere, Box, Plane, Capsule of `obstacles`.
-    radius : float
-        Of the links, metres.
+    obstacles, radius
+        Sphere, Box, Plane, Capsule of `obstacles`; radius of the links, metres.
     optimise : bool
         Whether the selected configurations are moved afterwards, within limits and clear of
         obstacles, as long as that helps. Not for contacts.
@@ -244,15 +227,13 @@ def select_configurations(
 
     References
     ----------
-    Seed book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972; J.-H. Borm,
-    C.-H. Menq, Int. J. Robotics Research 10(1), 1991; D. Daney, Y. Papegay, B. Madeline, Int. J.
-    Robotics Research 24(6), 2005.
+    Seed book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972; D. Daney, Y.
+    Papegay, B. Madeline, Int. J. Robotics Research 24(6), 2005.
 
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> found = select_configurations(
-    ...     load("rx90"), "pose", 20, drawn=200, rng=np.random.default_rng(0))
+    >>> found = select_configurations(load("rx90"), "pose", 20, drawn=200, rng=0)
     >>> found.q.shape, len(found.parameters)
     ((20, 6), 30)
     """
@@ -285,10 +266,9 @@ def select_configurations(
         given = _given(parameters, kind, candidates, frame)
         within, clear = _within_limits(model, given), is_clear(given)
         numbers = np.flatnonzero(within & clear)
-        pool, notes = given[numbers], _counted({
-            "{} candidates are beyond the limits of the joints.": (~within).sum(),
-            "{} candidates touch an obstacle.": (~clear).sum(),
-        })  # fmt: skip
+        pool = given[numbers]
+        notes = _counted("{} candidates are beyond the limits of the joints.", ~within)
+        notes += _counted("{} candidates touch an obstacle.", ~clear)
     if len(pool) < count:
         raise InvalidValueError(
             f"count: expected at most {len(pool)}, the number of usable candidates (within the "
@@ -386,9 +366,9 @@ def _within_limits(model: RobotModel, q: Array) -> NDArray[np.bool_]:
     return np.asarray(within.all(axis=(1, 2)))
 
 
-def _counted(sentences: dict[str, Any]) -> tuple[str, ...]:
-    """Sentences with their numbers, those of zero left out."""
-    return tuple(text.format(int(number)) for text, number in sentences.items() if number)
+def _counted(sentence: str, number: Any) -> tuple[str, ...]:
+    """The sentence with a number; none if it is zero."""
+    return (sentence.format(np.sum(number)),) if np.any(number) else ()
 
 
 def _drawn(
@@ -413,10 +393,11 @@ def _drawn(
         parts.append(groups[clear])
         if sum(map(len, parts)) >= wanted:
             break
-    return np.concatenate(parts)[:wanted], _counted({
-        f"{{}} drawn contacts do not have {postures} postures within the limits.": short,
-        "{} drawn ones touch an obstacle.": touching,
-    })  # fmt: skip
+    notes = _counted(
+        f"{{}} drawn contacts do not have {postures} postures within the limits.", short
+    )
+    notes += _counted("{} drawn ones touch an obstacle.", touching)
+    return np.concatenate(parts)[:wanted], notes
 
 
 def _given(

@@ -16,10 +16,8 @@ from .measurements import Measurement
 from .prior import ParameterPrior, gaussian_prior, widened
 from .problem import Problem, guessed_fixtures, stacked
 
-_FIRST_LENGTH = 1e-3
-"""Standard deviation of lengths before it has been estimated, m."""
-_SMALL = 0.05
-"""Initial noise beside a prior, relative to the initial noise without one."""
+_FIRST_LENGTH = 1e-3  # standard deviation of lengths before it has been estimated, m
+_SMALL = 0.05  # initial noise beside a prior, relative to the initial noise without one
 _ROUNDS = 10
 _PSEUDO_ROWS = 50.0
 """Pseudo-rows by which noise estimates of one kind are drawn to their common value."""
@@ -29,8 +27,7 @@ ROUGH = 1e-6
 _EXACT = 1e-9
 """Smallest standard deviation that is estimated, rad or part of the robot's size: below, the data
 are exact."""
-_WIDENINGS = 4
-"""Largest number of fits for the prior's width."""
+_WIDENINGS = 4  # largest number of fits for the prior's width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,14 +66,19 @@ def states_noise(m: Measurement) -> bool:
     return m.sigma is not None or m.covariance is not None
 
 
+def by_units(problem: Problem, length: float, angle: float) -> tuple[Array, ...]:
+    """A number for the rows in m and one for those in rad of each measurement, shapes (k,)."""
+    return tuple(
+        read_only([length if unit == "m" else angle for unit in m.units])
+        for m in problem.measurements
+    )
+
+
 def first_scales(problem: Problem) -> tuple[Array, ...]:
     """Initial standard deviations: 1 mm, and 1 mm over the reach as an angle."""
     size = problem.parameters.table.size
     length = _FIRST_LENGTH * min(1.0, size)
-    return tuple(
-        read_only([length if unit == "m" else length / size for unit in m.units])
-        for m in problem.measurements
-    )
+    return by_units(problem, length, length / size)
 
 
 def solve(
@@ -160,17 +162,14 @@ def refitted(
     return solution
 
 
-def _least(unit: str, size: float) -> float:
-    """Smallest standard deviation that is estimated."""
-    return _EXACT * size if unit == "m" else _EXACT
+def _least(problem: Problem) -> tuple[Array, ...]:
+    """Smallest standard deviations that are estimated."""
+    return by_units(problem, _EXACT * problem.parameters.table.size, _EXACT)
 
 
 def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
-    size = problem.parameters.table.size
-    return any(
-        bool((scale <= [_least(unit, size) for unit in m.units]).any())
-        for m, scale in zip(problem.measurements, scales, strict=True)
-    )
+    both = zip(scales, _least(problem), strict=True)
+    return any(bool((scale <= least).any()) for scale, least in both)
 
 
 def _estimated_scales(
@@ -178,8 +177,7 @@ def _estimated_scales(
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit, shrunk to the common value of its kind."""
     leverage = (fit.orthonormal_rows**2).sum(axis=1)
-    size = problem.parameters.table.size
-    estimates: dict[tuple[type, str], list[tuple[int, float, float]]] = {}
+    estimates: dict[tuple[type, str], list[tuple[int, Array, float, float]]] = {}
     first = 0
     for k, (m, scale) in enumerate(zip(problem.measurements, scales, strict=True)):
         rows = slice(first, first + m.blocks * len(m.axes))
@@ -197,14 +195,14 @@ def _estimated_scales(
                 count = np.full(m.blocks, of_unit.sum())
                 factor = robust_scale(np.linalg.norm(residual, axis=1), count, fitted)
             std = float(scale[of_unit][0] * factor)
-            estimates.setdefault((type(m), unit), []).append((k, std, freedom))
-    new = [scale.copy() for scale in scales]
-    for (_, unit), parts in estimates.items():
-        total = sum(freedom for _, _, freedom in parts)
-        square = sum(std**2 * freedom for _, std, freedom in parts)
-        for k, std, freedom in parts:
+            estimates.setdefault((type(m), unit), []).append((k, of_unit, std, freedom))
+    new, least = [scale.copy() for scale in scales], _least(problem)
+    for parts in estimates.values():
+        total = sum(freedom for *_, freedom in parts)
+        square = sum(std**2 * freedom for *_, std, freedom in parts)
+        for k, of_unit, std, freedom in parts:
             if total > 0.0 and len(parts) > 1:
                 pooled = _PSEUDO_ROWS * square / total
                 std = np.sqrt((std**2 * freedom + pooled) / (freedom + _PSEUDO_ROWS))
-            new[k][np.array(problem.measurements[k].units) == unit] = max(std, _least(unit, size))
+            new[k][of_unit] = np.maximum(std, least[k][of_unit])
     return tuple(read_only(scale) for scale in new)

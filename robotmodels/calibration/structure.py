@@ -32,23 +32,16 @@ from .scale import needs_a_length
 from .solve import ROUGH, Solution, refitted
 from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of
 
-_SIGNIFICANCE = 0.01
-"""Significance level of all tests together."""
-_INDICATED = 0.05
-"""Significance level at which a family is tried."""
+_SIGNIFICANCE = 0.01  # significance level of all tests together
+_INDICATED = 0.05  # significance level at which a family is tried
 _FLIPS = 999
 _LEAST_P = 4.0 / (1 + _FLIPS)
 """Smallest p-value that four tests with so many draws of signs can give."""
-_FEWEST = 20
-"""Smallest numbers of postures and of residual degrees of freedom for the test."""
-_ROUNDING = 1e-8
-"""Largest residuals of exact data, relative to the robot's size, or rad."""
-_DEPENDENT = 1e-4
-"""Sine of the angle to the columns of the fit below which a column is one of them."""
-_SURE = 3.0
-"""Standard errors by which the mean square of errors on held-out data must fall."""
-_GAIN = 0.02
-"""Smallest relative decrease of the mean square."""
+_FEWEST = 20  # smallest numbers of postures and of residual degrees of freedom for the test
+_ROUNDING = 1e-8  # largest residuals of exact data, relative to the robot's size, or rad
+_DEPENDENT = 1e-4  # sine of the angle to the columns of the fit below which a column is one of them
+_SURE = 3.0  # standard errors by which the mean square of errors on held-out data must fall
+_GAIN = 0.02  # smallest relative decrease of the mean square
 
 
 class TermFamily(NamedTuple):
@@ -87,7 +80,7 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
     problem = problem_of(whole, solution.problem.measurements)
     corrections = np.zeros(problem.P)
     corrections[whole.index(solution.problem.parameters.names)] = solution.corrections
-    errors = errors_of(problem, corrections, solution.fixtures)
+    errors = errors_of(problem, corrections, solution.fixture_values)
     sizes = {"m": whole.table.size, "rad": 1.0}
     largest = max((e / sizes[unit] for unit, e in errors.max.items()), default=0.0)
     posture = _posture_of_rows(problem)
@@ -159,7 +152,7 @@ def _all_parameters(
     others = {e.name: e for e in everything.entries if e.name not in entries}
     left_out: set[str] = set()
     missing = {name for name, e in others.items() if e.law is ErrorLaw.CONSTANT}
-    is_open = needs_a_length(problem_of(everything, solution.problem.measurements), ())
+    is_open = needs_a_length(problem_of(everything, solution.problem.measurements))
     if is_open:  # with all lengths free the robot shrinks until nothing is left of a residual
         left_out = missing.union(*(found.of_reason(why) for why in (Reason.KNOWN, Reason.GAUGE)))
     kept = (e for name, e in (entries | others).items() if name not in left_out)

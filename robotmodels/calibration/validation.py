@@ -6,8 +6,9 @@ measured next to a posture of the fit resembles it, and its errors would be too 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -16,32 +17,28 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from ..errors import InvalidValueError
 from ..estimation import Loss, fit_nonlinear
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
 from .measurements import Labelled, Measurement, scale_is_observable, single_observations
-from .parameters import GeometricParameters
 from .prior import ParameterPrior
 from .problem import Problem, guessed_fixtures, linearised, problem_of, stacked
 from .solve import ROUGH, Solution, first_scales, refitted, solve
 
-_NEAR = 0.2
-"""Extent of one place, relative to the size of the robot."""
-_FEWEST = 3
-"""Smallest number of places for leaving places out."""
+_NEAR = 0.2  # extent of one place, relative to the size of the robot
+_FEWEST = 3  # smallest number of places for leaving places out
 _STRENGTHS = np.logspace(-3.0, 3.0, 13)
-_FOLDS = 5
-"""Folds for the choice of a prior's strength."""
+_FOLDS = 5  # folds for the choice of a prior's strength
 
 Numbers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Errors(Rebuilt):
+class Errors(Frozen):
     """Lengths of the residuals of measurements, and their statistics by unit. Read-only.
 
     ``mean``, ``rms``, ``max`` and ``count`` are mappings with the keys ``"m"`` and ``"rad"``, as
@@ -54,17 +51,13 @@ class Errors(Rebuilt):
 
     Examples
     --------
-    >>> errors = Errors([0.003, 0.004], [np.nan, np.nan])
+    >>> errors = Errors(np.array([0.003, 0.004]), np.full(2, np.nan))
     >>> errors.mean, errors.max["m"]
     ({'m': 0.0035}, 0.004)
     """
 
     position: Array
     angle: Array
-
-    def __post_init__(self) -> None:
-        for name in ("position", "angle"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def mean(self) -> dict[str, float]:
@@ -126,38 +119,24 @@ class Validation:
     held_out: HeldOutErrors | None = None
 
 
-def errors_of(problem: Problem, corrections: Array, fixtures: Array | None = None) -> Errors:
-    """Errors at given corrections (P,), by default with the fixtures that suit them best."""
-    if fixtures is None:
-        fixtures = suited_fixtures(problem, corrections, {})
-    parts = zip(problem.measurements, linearised(problem, corrections, fixtures), strict=True)
-    measured = [(m, part.residual) for m, part in parts if m.views]
-
-    def lengths(unit: str) -> Array:
-        columns = [(residual, np.array(m.units) == unit) for m, residual in measured]
-        of_each = [
-            np.linalg.norm(residual[:, rows], axis=1)
-            if rows.any()
-            else np.full(len(residual), np.nan)
-            for residual, rows in columns
-        ]
-        return np.concatenate([np.zeros(0), *of_each])
-
-    return Errors(lengths("m"), lengths("rad"))
-
-
-def errors_elsewhere(
-    parameters: GeometricParameters,
-    corrections: Array,
-    measurements: Sequence[Measurement],
-    known: dict[str, float],
+def errors_of(
+    problem: Problem, corrections: Array, known: Mapping[str, float] = MappingProxyType({})
 ) -> Errors:
-    """Errors of measurements that were not fitted; fixtures are known ones, or suit best."""
-    problem = problem_of(parameters, measurements)
-    return errors_of(problem, corrections, suited_fixtures(problem, corrections, known))
+    """Errors at given corrections (P,); fixtures are known ones, or those that suit best."""
+    fixtures = suited_fixtures(problem, corrections, known)
+    parts = zip(problem.measurements, linearised(problem, corrections, fixtures), strict=True)
+    lengths: dict[str, list[Array]] = {"m": [np.zeros(0)], "rad": [np.zeros(0)]}
+    for m, part in ((m, part) for m, part in parts if m.views):
+        for unit, of_unit in lengths.items():
+            rows = np.array(m.units) == unit
+            none = 0.0 if rows.any() else np.nan
+            of_unit.append(np.linalg.norm(part.residual[:, rows], axis=1) + none)
+    return Errors(*map(np.concatenate, lengths.values()))
 
 
-def suited_fixtures(problem: Problem, corrections: Array, known: dict[str, float]) -> Array:
+def suited_fixtures(
+    problem: Problem, corrections: Array, known: Mapping[str, float] = MappingProxyType({})
+) -> Array:
     """Least-squares fixtures at given corrections (P,), shape (F,)."""
     values = np.array([known.get(fixture.name, np.nan) for fixture in problem.fixtures])
     free = np.flatnonzero(np.isnan(values))
@@ -191,8 +170,8 @@ def cross_validated(
             tuple(solution.scales[k] for k in split.numbers),
             tolerance=ROUGH,
         )
-        corrections, values = fitted.corrections, fitted.fixture_values
-        found.append(errors_elsewhere(problem.parameters, corrections, split.test, values))
+        test = problem_of(problem.parameters, split.test)
+        found.append(errors_of(test, fitted.corrections, fitted.fixture_values))
         done()
     blocks = np.concatenate([split.blocks for split in parts.splits])
     return HeldOutErrors(
@@ -207,9 +186,9 @@ def cross_validated(
 
 def errors_on(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
     """Errors of measurements that took part in no fit."""
-    parameters, known = solution.problem.parameters, solution.fixture_values
-    errors = errors_elsewhere(parameters, solution.corrections, test, known)
-    nominal = errors_elsewhere(parameters, np.zeros(len(parameters)), test, {})
+    problem = problem_of(solution.problem.parameters, test)
+    errors = errors_of(problem, solution.corrections, solution.fixture_values)
+    nominal = errors_of(problem, np.zeros(problem.P))
     blocks = np.arange(len(errors.position))
     return HeldOutErrors(errors.position, errors.angle, blocks, nominal, 1)
 

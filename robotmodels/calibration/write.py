@@ -18,8 +18,7 @@ from .robot import CalibratedRobot
 from .solve import states_noise
 from .validation import Errors, HeldOutErrors
 
-_FORMAT = 2
-"""Increased when the meaning or the name of an entry changes."""
+_FORMAT = 2  # increased when the meaning or the name of an entry changes
 _COLUMNS = (
     *("names", "antecedent", "sigma"),
     *("gamma", "b", "beta", "alpha", "d", "theta", "r"),
@@ -30,9 +29,8 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
     """Write a calibration to a file whose suffix gives its format.
 
     ``.json`` and ``.yaml`` hold the same (SI units, stated beside each parameter; null for numbers
-    that are not finite). YAML is written by PyYAML, which the package's own dependencies bring
-    (meshcat needs pyngrok, which needs it). To keep everything and go on with it in Python, pickle
-    the result: files hold what other programs need.
+    that are not finite), what other programs need; ``.urdf`` is that of `calibrated_urdf`. YAML
+    needs PyYAML. To keep everything and go on with it in Python, pickle the result.
 
     Parameters
     ----------
@@ -43,23 +41,8 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
 
     Raises
     ------
-    InvalidValueError
-        Another suffix.
-    MissingExtraError
-        PyYAML is not installed.
-    UrdfError
-        As `calibrated_urdf`.
-    OSError
-        The file cannot be written.
-
-    Warns
-    -----
-    UrdfWarning
-        What a URDF has no place for.
-
-    References
-    ----------
-    Seed book section 1.4.6.
+    InvalidValueError, MissingExtraError, UrdfError, OSError
+        Another suffix; PyYAML is not installed; as `calibrated_urdf`; the file cannot be written.
 
     Examples
     --------
@@ -100,19 +83,11 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
     fit, problem = result.solution.fit, result.solution.problem
     validation, table, found = result.validation, result.model.table, result.identifiable
     measurements = zip(problem.measurements, result.solution.scales, strict=True)
-    parameters = zip(
-        result.names,
-        result.units,
-        result.parameters.nominal,
-        result.corrections,
-        result.values,
-        result.standard_errors,
-        confidence_intervals(fit),
-        strict=False,
-    )
-    fixtures = zip(
-        problem.fixtures, result.solution.fixtures, fit.standard_errors[problem.P :], strict=True
-    )
+    columns = result.names, result.units, result.parameters.nominal, result.corrections
+    columns += result.values, result.standard_errors, confidence_intervals(fit)
+    parameters = zip(*columns, strict=False)
+    errors = fit.standard_errors[problem.P :]
+    fixtures = zip(problem.fixtures, result.solution.fixtures, errors, strict=True)
     words = ("name", "unit", "start", "correction", "value", "standard_error", "interval_95")
     data = {
         "format": _FORMAT,
@@ -187,7 +162,7 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     Of a robot read by `RobotModel.from_urdf` only the ``<origin>`` elements of joints between the
     base and the measured ends change. The link that is its tool (``tip_link``) and measured
     links are the calibrated ones. All links, joints, meshes, masses, limits and comments stay;
-    what is fixed to a link moves with it.
+    what is fixed to a link moves with it. A robot without such a source is written by `to_urdf`.
 
     - Base: the first joint of the chain, if it is fixed, takes the new origin. Without a fixed
       first joint, a new root link ``world`` is added; if ``base_link`` was given, the origin of
@@ -195,8 +170,6 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     - Tool: a tool without a link (`RobotModel.with_tool`) becomes a new link ``tool``; the tip
       link is unchanged. If the tool link is the child of a moving joint whose axis changes
       relative to it, a new link is inserted between them, and its meshes move with it.
-
-    A robot without such a source (a table) is written by `to_urdf`.
 
     Parameters
     ----------
@@ -212,24 +185,17 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
 
     Raises
     ------
-    InvalidValueError
-        Another type.
-    UrdfError
-        As `to_urdf`; the robot's table has other joints than its URDF.
+    InvalidValueError, UrdfError
+        Another type; as `to_urdf`; the robot's table has other joints than its URDF.
 
     Warns
     -----
     UrdfWarning
         Lists what a URDF has no place for, the errors of the readings among it.
 
-    References
-    ----------
-    Seed book section 1.4.6.
-
     Examples
     --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.robot import calibrated_model
+    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
     >>> from robotmodels.model import RobotModel
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("lab_rr"))

@@ -8,13 +8,15 @@ from .base import (
     Linearised,
     Measurement,
     View,
+    scale_is_observable,
+    single_observations,
+    whitened,
 )
 from .contacts import FrameContact, LaserLine, PlaneContact, PointContact
 from .fields import FileRow
 from .links import KnownDistance, LinkedFrames
 from .poses import CameraPose, Orientation, Pose, RelativePose
 from .positions import AxisPosition, Distance, Position
-from .several import scale_is_observable, single_observations, whitened
 
 __all__ = [
     "AxisPosition",

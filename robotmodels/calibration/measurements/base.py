@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from re import sub
 from typing import Any, ClassVar, NamedTuple, Self
@@ -68,7 +68,6 @@ class _Declared(ABC):
     """Fields that the kinds declare themselves, in the order of their arguments."""
 
     __slots__ = ()
-
     q: Array
     sigma: Given
     covariance: Given
@@ -103,12 +102,6 @@ class Measurement(_Declared):
     origin : tuple of FileRow
         Row of a file that each block was read from; empty if it was not read.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Shapes that do not fit; NaN; matrices that are no poses; no row chosen; a known target that
-        no block has; a sigma or covariance that is not positive.
-
     References
     ----------
     Seed book sections 1.4.4 and 1.4.5.
@@ -137,14 +130,12 @@ class Measurement(_Declared):
                 value = f.metadata["check"](self, f.name, getattr(self, f.name))
                 object.__setattr__(self, f.name, value)
         self._check()
-        k = len(self.axes)
         if self.sigma is not None and self.covariance is not None:
             raise InvalidValueError("Give sigma or covariance, not both.")
-        if self.sigma is not None:
-            object.__setattr__(self, "sigma", as_sigma(self.sigma, self.blocks, k))
-        if self.covariance is not None:
-            covariance = as_covariance(self.covariance, self.blocks, k)
-            object.__setattr__(self, "covariance", covariance)
+        for name, check in (("sigma", as_sigma), ("covariance", as_covariance)):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, check(value, self.blocks, len(self.axes)))
 
     def _check(self) -> None:
         """Check fields against each other."""
@@ -317,15 +308,13 @@ class Labelled(Measurement):
     @property
     def groups(self) -> NDArray[np.int64]:
         """Number of the label of each block."""
-        return self._numbers(self.labels)
+        number = {label: k for k, label in enumerate(self.labels)}
+        return np.array([number[label] for label in self.label], dtype=np.int64)
 
     @property
     def unknown_groups(self) -> NDArray[np.int64]:
         """Number of the label of each block among the unknown ones; -1 where it is known."""
-        return self._numbers(self.unknown)
-
-    def _numbers(self, among: Sequence[str]) -> NDArray[np.int64]:
-        number = {label: k for k, label in enumerate(among)}
+        number = {label: k for k, label in enumerate(self.unknown)}
         return np.array([number.get(label, -1) for label in self.label], dtype=np.int64)
 
     @property
@@ -387,3 +376,58 @@ class Contact(Labelled):
     @abstractmethod
     def target_at(T: Array, rng: np.random.Generator) -> Array:
         """A known target that an end at pose T meets, its free coordinates random."""
+
+
+# --- several measurements -------------------------------------------------------------------------
+
+
+def whitened(measurement: Measurement, rows: Array, scale: Array) -> Array:
+    """Rows divided by their standard deviations, or by the root of their covariance.
+
+    Shapes: rows (B, k) or (B, k, m), scale (k,).
+    """
+    columns = rows if rows.ndim == 3 else rows[..., None]
+    if measurement.covariance is not None:
+        columns = np.linalg.solve(np.linalg.cholesky(measurement.covariance), columns)
+    else:
+        sigma = scale if measurement.sigma is None else measurement.sigma
+        columns = columns / sigma[..., None]
+    return columns.reshape(rows.shape)
+
+
+def scale_is_observable(measurements: Iterable[Measurement], base_origin: Any = None) -> bool:
+    """Whether measurements determine the scale of a robot, all of them together."""
+    measurements = tuple(measurements)
+    if any(m.knows_length for m in measurements):
+        return True
+    parts = [m.scale_centres for m in measurements]
+    if base_origin is not None:
+        parts.append((np.eye(3), np.asarray(base_origin)))
+    return not have_solution(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def single_observations(measurements: Iterable[Measurement]) -> dict[str, str]:
+    """Targets with no more rows than unknown coordinates of their own, and a sentence on each."""
+    unknowns: dict[str, set[str]] = {}
+    rows, blocks = Counter[str](), Counter[str]()
+    for m in measurements:
+        own: dict[str, set[str]] = {}
+        for fixture in m.fixtures:
+            own.setdefault(fixture.name.rpartition(".")[0], set()).add(fixture.name)
+        for target, names in own.items():
+            label = target.removeprefix(f"{m.name}:")
+            # fixtures of kinds without labels are common to all blocks
+            count = m.label.count(label) if isinstance(m, Labelled) else m.blocks
+            unknowns.setdefault(target, set()).update(names)
+            rows[target] += count * len(m.axes)
+            blocks[target] += count
+    found = {}
+    for target, names in unknowns.items():
+        if rows[target] <= len(names):
+            times = "once" if blocks[target] == 1 else f"{blocks[target]} times"
+            found[target] = (
+                f"{target} is measured {times}: {rows[target]} rows determine its {len(names)} "
+                "unknown coordinates at most, and no parameter of the robot. Measure it in more "
+                "postures, or leave it out."
+            )
+    return found

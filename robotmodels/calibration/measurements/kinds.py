@@ -24,11 +24,9 @@ from .base import Contact, Evaluation, Labelled, Measurement, required
 
 Kind = type[Measurement]
 """A kind of measurement: its class."""
-_STARTS = 6
-"""Starts of the search for each posture."""
+_STARTS = 6  # starts of the search for each posture
 _STEPS = 40
-_LONGEST = 0.3
-"""Longest step of a joint in one iteration, rad or m."""
+_LONGEST = 0.3  # longest step of a joint in one iteration, rad or m
 
 
 def as_kind(value: Any, name: str = "kind", among: Any = None) -> Kind:
