@@ -426,8 +426,8 @@ def test_values_have_names_and_units(rng):
     assert [cells[k][1] for k in ("Fv1", "Fv3", "Fc1", "Fc3")] == ["N m s/rad", "N s/m", "N m", "N"]
     assert cells["M3R"][1] == "kg"
     text = " ".join(str(base).split())
-    assert "; Ia kg m^2, Fv N m s/rad, Fc N m;" in text
-    assert "; of prismatic joints Ia kg, Fv N s/m, Fc N " in text + " "
+    assert "; Ia kg m^2, Fv N m s/rad, Fc and offset N m;" in text
+    assert "; of prismatic joints Ia kg, Fv N s/m, Fc and offset N" in text
     again = pickle.loads(pickle.dumps(base.value_table(base.values(model))))
     assert dict(again) == dict(table)
     assert not again.numbers.flags.writeable
@@ -465,7 +465,7 @@ def test_result_is_a_value():
 def test_values_belong_to_the_robot(rng):
     arm = rm.load("rx90")
     base = base_parameters(arm)
-    with pytest.raises(InvalidValueError, match=r"'puma560' has others: axis 3 has another place"):
+    with pytest.raises(InvalidValueError, match=r"'puma560' has others: axis 3 has another"):
         base.values(rm.load("puma560"))
     with pytest.raises(InvalidValueError, match="frames or kinds of joints differ"):
         base.values(rm.load("planar_2r"))

@@ -38,9 +38,7 @@ def ddm(
 ) -> Array:
     """Direct dynamic model: joint accelerations under given torques, the inverse of `idm`.
 
-    Also called forward dynamics. Where joints mimic others (a transmission ``q = K q_c + q_0``
-    with a singular K), they follow: with G the columns of K that are not zero, ``a = G a_c``,
-    ``G^T M G a_c = G^T (tau - C v - g - ...)``, and ``K^T tau`` is that of ``idm(model, q, v, a)``.
+    Also called forward dynamics. Mimic joints follow, and ``K^T tau`` is that of ``idm``.
 
     Parameters
     ----------
@@ -63,17 +61,13 @@ def ddm(
     InertiaError
         The mass matrix is not positive definite; the links that are not physical are named.
     ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity; a singular transmission that is
-        not one of mimic joints; mimic joints that do not follow in ``q`` or ``v``.
+        As `idm`; a singular transmission that is not one of mimic joints; mimic joints that do not
+        follow in ``q`` or ``v``.
 
     Warns
     -----
     InertiaWarning
         A link has a negative mass, though the mass matrix is positive definite.
-
-    References
-    ----------
-    Seed book section 1.5 (introduction), 1.5.1 and, for the coupling, 1.2.1.
 
     Examples
     --------

@@ -1,4 +1,27 @@
-"""Robot model with base parameters as standard parameters, and its inverse dynamics."""
+"""Robot model with base parameters as standard parameters, and its inverse dynamics.
+
+Seed book sections 1.5.2.2 and 1.5.3.
+
+Parameters
+----------
+model : RobotModel
+    The robot; geometry, base, tool, gravity and drive parameters of the kinds that are not
+    among the base ones are taken from it.
+base : BaseParameters
+    The b base parameters.
+values : array_like, shape (b,)
+    Their values, such as identified ones or ``base.values(model)``.
+q, v, a, wrench, friction
+    As for `idm`; friction acts besides that whose parameters are among the base ones.
+
+Raises
+------
+InvalidValueError
+    Base parameters of another robot (structure, geometry, gravity, couplings), or, for a model,
+    with those of a friction model; NaN or infinity.
+ShapeError
+    Not one value for each base parameter, or motion of the wrong length.
+"""
 
 from __future__ import annotations
 
@@ -43,36 +66,14 @@ class Base(Protocol):
 def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     """Robot model with base parameters as standard parameters, the others zero.
 
-    `idm`, `ddm`, `mass_matrix`, `coriolis_matrix` and `gravity_torque`, with drives included, are
+    Shapes: values (b,). `idm`, `ddm`, `mass_matrix` and the others, with drives included, are
     those of the robot. Its links are not physical (first moments without mass) and partly contain
     the rotors, so that single links and ``drive=False`` have no meaning.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot; geometry, base, tool, gravity and drive parameters of the kinds that are not
-        among the base ones are taken from it.
-    base : BaseParameters
-        The b base parameters.
-    values : array_like, shape (b,)
-        Their values, such as identified ones or ``base.values(model)``.
 
     Returns
     -------
     RobotModel
         A new model.
-
-    Raises
-    ------
-    InvalidValueError
-        Base parameters of another robot (structure, geometry, gravity, couplings), or with those
-        of a friction model, which a model does not contain; NaN or infinity.
-    ShapeError
-        Not one value for each base parameter.
-
-    References
-    ----------
-    Seed book section 1.5.3.
 
     Examples
     --------
@@ -104,28 +105,10 @@ def idm_from_base(
 ) -> Array:
     """Inverse dynamic model from base parameters alone: the torques of `idm`, drives included.
 
-    Parameters
-    ----------
-    model, base, values
-        As for `base_model`. Drive parameters that are not among the base ones are the model's.
-    q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
-    wrench, friction
-        As for `idm`; friction acts besides that whose parameters are among the base ones.
-
     Returns
     -------
     ndarray, shape (..., n)
-        Torques (N m) or forces (N) in table order.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity; base parameters of another robot.
-
-    References
-    ----------
-    Seed book sections 1.5.2.2 and 1.5.3.
+        Torques (N m) or forces (N) in table order, of motions q, v, a (..., n).
 
     Examples
     --------

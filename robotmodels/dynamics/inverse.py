@@ -37,7 +37,6 @@ def idm(
     ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
 
     It is linear in the inertial parameters; base parameters and negative masses are allowed, too.
-    An empty batch gives an empty result.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def idm(
 
     References
     ----------
-    Seed book sections 1.5.1 (eq. of motion, friction, rotors, external forces) and 1.5.2.
+    Seed book sections 1.5.1 and 1.5.2.
 
     Examples
     --------

@@ -1,7 +1,23 @@
 """Parts of the dynamic model: masses, Coriolis and centrifugal torques, gravity, energies.
 
-Leading axes are batch axes and broadcast; arguments of the wrong length, or with NaN or infinity,
-raise `ShapeError` and `InvalidValueError`.
+Parameters
+----------
+model : RobotModel
+    The robot, n joints.
+q, v : array_like, shape (..., n)
+    Joint variables (rad or m) and velocities; the leading axes broadcast.
+drive : bool
+    Whether rotor inertia (and that of coupled motors) is included.
+
+Returns
+-------
+ndarray
+    Of the shape (..., core) that each names; SI units.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Arguments of the wrong length, or with NaN or infinity.
 
 References
 ----------
@@ -27,17 +43,7 @@ from .inverse import batched, rigid_torques, warn_without_masses
 def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     """Joint-space inertia matrix M(q), also called A(q) or generalised inertia.
 
-    Parameters
-    ----------
-    model, q
-        The robot of n joints, and joint variables of shape (..., n), rad or m.
-    drive : bool
-        Whether rotor inertia (and that of coupled motors) is included.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
-        Symmetric, kg m^2 (kg m, kg for prismatic joints).
+    Shapes: q (..., n) -> (..., n, n), symmetric, kg m^2 (kg m, kg for prismatic joints).
 
     Examples
     --------
@@ -68,15 +74,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
 def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     """Matrix C(q, v) of Christoffel symbols; ``dM/dt - 2 C`` is skew-symmetric.
 
-    Parameters
-    ----------
-    model, q, v
-        The robot of n joints, and joint variables (rad or m) and velocities of shape (..., n).
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
-        ``C v`` are the Coriolis and centrifugal torques.
+    Shapes: q, v (..., n) -> (..., n, n). ``C v`` are the Coriolis and centrifugal torques.
 
     Examples
     --------
@@ -99,21 +97,9 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
 def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
     """Blocks B and C of the book: ``C(q, v) v = B [v v] + C [v^2]``.
 
-    With the Christoffel symbols ``c_{i,jk}`` of the mass matrix, ``B_{i,jk} = 2 c_{i,jk}`` and
-    ``C_{ij} = c_{i,jj}``.
-
-    Parameters
-    ----------
-    model, q
-        The robot of n joints, and joint variables of shape (..., n), rad or m.
-
-    Returns
-    -------
-    B : ndarray, shape (..., n, n (n - 1) / 2)
-        Coefficients of the products ``v_j v_k``, j < k in lexical order (``numpy.triu_indices(n,
-        1)``).
-    C : ndarray, shape (..., n, n)
-        Coefficients of the squares.
+    Shapes: q (..., n) -> B (..., n, n (n - 1) / 2), C (..., n, n). With the Christoffel symbols
+    ``c_{i,jk}`` of the mass matrix, ``B_{i,jk} = 2 c_{i,jk}`` for the products ``v_j v_k``, j < k
+    in lexical order (``numpy.triu_indices(n, 1)``), and ``C_{ij} = c_{i,jj}``.
 
     Examples
     --------
@@ -142,25 +128,13 @@ def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
 def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     """Gravity torques Q(q), also ``gravload``.
 
-    Parameters
-    ----------
-    model, q
-        The robot of n joints, and joint variables of shape (..., n), rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Torques (N m) or forces (N).
+    Shapes: q (..., n) -> (..., n), N m or N.
 
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
-    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link,
-    ...                                  gravity=(0, -9.81, 0))
-    >>> gravity_torque(pendulum, [0.0])
-    array([1.962])
+    >>> from robotmodels.robots import load
+    >>> gravity_torque(load("puma560"), [0.0] * 6).round(2)
+    array([ 0.  , 37.48,  0.25,  0.  ,  0.  ,  0.  ])
     """
     check_model(model)
     q = as_vector(q, model.n, "q")
@@ -177,17 +151,7 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
 def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = True) -> Array:
     """Kinetic energy ``v^T M v / 2``.
 
-    Parameters
-    ----------
-    model, q, v
-        The robot of n joints, and joint variables (rad or m) and velocities of shape (..., n).
-    drive : bool
-        Whether rotor inertia (and that of coupled motors) is included.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Joules.
+    Shapes: q, v (..., n) -> (...), joules.
 
     Examples
     --------
@@ -218,15 +182,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
 def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     """Potential energy in the gravity field, zero for masses at the world's origin.
 
-    Parameters
-    ----------
-    model, q
-        The robot of n joints, and joint variables of shape (..., n), rad or m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Joules.
+    Shapes: q (..., n) -> (...), joules.
 
     Examples
     --------

@@ -1,4 +1,36 @@
-"""Payload of a robot: an additional body on a link."""
+"""Payload of a robot: an additional body on a link.
+
+Parameters
+----------
+model : RobotModel
+    The robot.
+mass : float
+    Kilograms, not negative.
+com : array_like, shape (3,)
+    Centre of mass in the frame, metres.
+inertia : array_like, shape (3, 3), optional
+    Symmetric tensor about the centre of mass, in the axes of the frame, kg m^2; default a point
+    mass.
+frame : str or int, optional
+    Name or number of the frame that ``com`` and ``inertia`` are given in and that carries the
+    body; default the tool.
+
+Returns
+-------
+RobotModel
+    A new model; its tool and its named postures are those of the old one.
+
+Raises
+------
+InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
+    The payload is not physical; the frame is the base's, whose bodies load no joint, or there
+    is no such frame; NaN or infinity; arguments of the wrong shape.
+
+References
+----------
+Seed book section 1.5.1; W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload
+inertial parameters of industrial manipulators", IEEE ICRA 2007.
+"""
 
 from __future__ import annotations
 
@@ -23,38 +55,7 @@ def with_payload(
 ) -> RobotModel:
     """Robot with an additional body rigidly fixed to one of its frames.
 
-    Models are values: the given robot is not changed. `without_payload` removes it again.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    mass : float
-        Kilograms, not negative.
-    com : array_like, shape (3,)
-        Centre of mass in the frame, metres.
-    inertia : array_like, shape (3, 3), optional
-        Symmetric tensor about the centre of mass, in the axes of the frame, kg m^2; default a point
-        mass.
-    frame : str or int, optional
-        Name or number of the frame that ``com`` and ``inertia`` are given in and that carries the
-        body; default the tool.
-
-    Returns
-    -------
-    RobotModel
-        A new model; its tool and its named postures are those of the old one.
-
-    Raises
-    ------
-    InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
-        The payload is not physical; the frame is the base's, whose bodies load no joint, or there
-        is no such frame; NaN or infinity; arguments of the wrong shape.
-
-    References
-    ----------
-    Seed book section 1.5.1; W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload
-    inertial parameters of industrial manipulators", IEEE ICRA 2007.
+    Shapes: com (3,), inertia (3, 3).
 
     Examples
     --------
@@ -77,25 +78,9 @@ def without_payload(
 ) -> RobotModel:
     """The robot without a body: undoes `with_payload` with the same arguments.
 
-    The body is subtracted from the link that carries it; parameters below the rounding of
-    the subtraction become zero.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    mass, com, inertia, frame
-        As for `with_payload`: kg, shapes (3,) in m and (3, 3) in kg m^2, and the frame.
-
-    Returns
-    -------
-    RobotModel
-        A new model.
-
-    Warns
-    -----
-    InertiaWarning
-        The remaining link is not physical though the link was: the payload was not part of it.
+    The body is subtracted from the link that carries it; parameters below the rounding of the
+    subtraction become zero. An `InertiaWarning` names a link that is not physical without it.
+    Shapes: com (3,), inertia (3, 3).
 
     Examples
     --------

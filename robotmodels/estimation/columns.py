@@ -30,23 +30,14 @@ class ColumnBasis(Frozen):
 
     Parameters
     ----------
-    kept : ndarray of int, shape (b,)
-        Numbers of the independent columns, in the order of the matrix.
-    empty : ndarray of int, shape (e,)
-        Numbers of the columns without effect.
+    kept, empty : ndarray of int, shapes (b,), (e,)
+        Numbers of the independent columns, in the order of the matrix, and of those without effect.
     coefficients : ndarray, shape (b, p)
         ``W = W[:, kept] @ coefficients``: the parameters of the kept columns that give the same
         product as all parameters are ``coefficients @ parameters``.
     distance : ndarray, shape (p,)
         Residual norm of each column after projection on those kept before it, relative to the
         longest column: small for a column that nearly depends on others or is nearly empty.
-
-    Examples
-    --------
-    >>> basis = column_basis([[1.0, 2.0, 0.0], [1.0, 2.0, 1.0]])
-    >>> basis.kept, basis.coefficients
-    (array([0, 2]), array([[1., 2., 0.],
-           [0., 0., 1.]]))
     """
 
     kept: NDArray[np.int64]
@@ -102,11 +93,6 @@ def column_basis(
     ColumnBasis
         Kept columns and combinations; coefficients below the tolerance are exactly zero.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not a matrix, NaN, or scales that are not positive.
-
     References
     ----------
     Seed book section 1.5.3; M. Gautier, "Numerical calculation of the base inertial parameters of
@@ -114,8 +100,10 @@ def column_basis(
 
     Examples
     --------
-    >>> column_basis(np.ones((5, 3))).kept
-    array([0])
+    >>> basis = column_basis([[1.0, 2.0, 0.0], [1.0, 2.0, 1.0]])
+    >>> basis.kept, basis.coefficients
+    (array([0, 2]), array([[1., 2., 0.],
+           [0., 0., 1.]]))
     """
     W = as_floats(W, "W")
     if W.ndim != 2:

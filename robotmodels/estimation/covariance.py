@@ -28,7 +28,7 @@ _LARGEST_LEVERAGE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelatedCovariance(Frozen):
-    """Covariance of estimates for correlated residuals. Read-only.
+    """Covariance (b, b) of estimates for correlated residuals. Read-only.
 
     Parameters
     ----------
@@ -63,12 +63,9 @@ def correlated_covariance(
     ----------
     rows : Rows
         The equations.
-    values : ndarray, shape (b,)
-        Estimated parameters.
-    weights : ndarray, shape (m,)
-        Weights of the groups of equations.
-    inverse : ndarray, shape (b, b)
-        Inverse of the information ``sum W^T diag(weights^2) W``.
+    values, weights, inverse : ndarray, shapes (b,), (m,), (b, b)
+        Estimated parameters, weights of the groups of equations, and the inverse of the information
+        ``sum W^T diag(weights^2) W``.
     lags : int, optional
         Lags on either side; default twice the correlation length of the residuals.
     leverage : ndarray, shape (m,), optional
@@ -79,10 +76,6 @@ def correlated_covariance(
     CorrelatedCovariance
         Corrected for the number of parameters.
 
-    References
-    ----------
-    D. Cochrane and G. Orcutt, J. American Statistical Association 44, 1949.
-
     Examples
     --------
     >>> from types import SimpleNamespace
@@ -90,10 +83,8 @@ def correlated_covariance(
     >>> W, e = np.ones((4000, 1, 1)), rng.normal(size=(4001, 1))
     >>> block = SimpleNamespace(W=W, y=e[1:] + e[:-1], use=np.ones((4000, 1), dtype=bool))
     >>> rows = SimpleNamespace(blocks=lambda: [block])
-    >>> mean = block.y.mean(axis=0)
-    >>> spread = correlated_covariance(rows, mean, np.ones(1), np.eye(1) / 4000)
-    >>> white = block.y.var() / 4000  # half the variance of this mean
-    >>> bool(1.6 < spread.covariance[0, 0] / white < 2.4)
+    >>> found = correlated_covariance(rows, block.y.mean(axis=0), np.ones(1), np.eye(1) / 4000)
+    >>> bool(1.6 < found.covariance[0, 0] / (block.y.var() / 4000) < 2.4)
     True
     """
     b, m = len(values), len(weights)

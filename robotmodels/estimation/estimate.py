@@ -13,13 +13,7 @@ from ..errors import InvalidValueError, nearest_names
 
 
 class EstimateStatus(Outcome):
-    """Outcome of an estimation.
-
-    Examples
-    --------
-    >>> EstimateStatus.SOLVED.sentence
-    'The parameters minimise the weighted squares of the residuals.'
-    """
+    """Outcome of an estimation."""
 
     SOLVED = 0, "The parameters minimise the weighted squares of the residuals."
     NOT_CONVERGED = (

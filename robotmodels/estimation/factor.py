@@ -57,10 +57,8 @@ class TriangularFactors(Frozen):
         The b parameters.
     factors : tuple of ndarray, shapes (r, b + 1)
         Factor R of each group, ``R^T R = [W y]^T [W y]``.
-    counts : ndarray of int, shape (m,)
-        Used equations of each group.
-    left_out : ndarray of int, shape (m,)
-        Excluded equations of each group.
+    counts, left_out : ndarray of int, shape (m,)
+        Used and excluded equations of each group.
 
     Examples
     --------

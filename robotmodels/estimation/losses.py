@@ -31,7 +31,6 @@ class Loss(Enum):
 
     Examples
     --------
-    >>> from robotmodels.estimation import Loss
     >>> [loss.name for loss in Loss]
     ['SQUARES', 'HUBER', 'CAUCHY', 'TUKEY']
     """

@@ -64,37 +64,24 @@ class NonlinearFit(Rebuilt):
 
     Parameters
     ----------
-    x : ndarray, shape (P,)
-        The estimate.
+    x, covariance : ndarray, shapes (P,), (P, P)
+        The estimate; its covariance is infinite for undetermined parameters, NaN where there are no
+        more rows than parameters and the noise is to be estimated.
     status : FitStatus
         Outcome; ``status.sentence`` is the explanation.
-    covariance : ndarray, shape (P, P)
-        Covariance of the estimate; infinite for undetermined parameters, NaN where
-        there are no more rows than parameters and the noise is to be estimated.
     scale : float
         Standard deviation of the residuals in units of the stated ones: from the sum of squares, or
         from the median if the loss is robust.
     freedom : float
         Effective number of parameters: less than P with a prior or where directions were dropped.
-    residuals : ndarray, shape (M,)
-        Rows at ``x``, in their units.
-    jacobian : ndarray, shape (M, P)
-        Jacobian of the rows at ``x``.
-    sigma : ndarray, shape (M,)
-        Stated standard deviations of the rows.
-    block : ndarray of int, shape (M,)
-        Measurement of each row.
-    weights : ndarray, shape (M,)
-        Weights of the loss, from 0 to 1; equal for the rows of a measurement.
+    residuals, jacobian, sigma, block, weights : ndarray, shapes (M,), (M, P), (M,), (M,), (M,)
+        Rows at ``x`` and their derivatives, in their units; stated standard deviations; measurement
+        of each row; weights of the loss, from 0 to 1, equal for the rows of a measurement.
     outliers : ndarray of int, shape (K,)
         Measurements with deleted residuals larger than noise explains, the worst first. They stay
         in the fit with their weights.
-    loss : Loss
-        The loss that was minimised.
-    sigma_known : bool
-        Whether the stated standard deviations are exact.
-    prior : Prior
-        Prior of the parameters.
+    loss, sigma_known, prior
+        As given to `fit_nonlinear`.
     singular_values : ndarray, shape (P,)
         Singular values of the weighted Jacobian with the prior, scaled columns; largest first.
     dropped : ndarray, shape (k, P)
@@ -197,10 +184,8 @@ def fit_nonlinear(
     truncation : float, optional
         Drop directions whose singular value relative to the largest (columns scaled to length 1) is
         smaller: the parameters do not move along them.
-    tolerance : float
-        Largest last step relative to the parameters, both scaled by the columns.
-    iterations : int
-        Largest number of steps.
+    tolerance, iterations : float, int
+        Largest last step relative to the parameters, both scaled by the columns; most steps.
 
     Returns
     -------
@@ -224,9 +209,8 @@ def fit_nonlinear(
     >>> def linearise(x):
     ...     e = np.exp(-x[1] * t)
     ...     return x[0] * e - y, np.column_stack((e, -x[0] * t * e))
-    >>> fit = fit_nonlinear(linearise, [1.0, 1.0])
-    >>> fit.x.round(9), fit.status.sentence
-    (array([2., 3.]), 'The fit has converged: further steps are rounding.')
+    >>> fit_nonlinear(linearise, [1.0, 1.0]).x.round(9)
+    array([2., 3.])
     """
     loss = chosen(Loss, loss, "loss")
     tolerance = _fraction(tolerance, "tolerance")

@@ -20,17 +20,11 @@ class Prior(Rebuilt):
 
     Parameters
     ----------
-    mean : array_like, shape (P,)
-        Expected values, in the units of the parameters.
-    sigma : array_like, shape (P,)
-        Standard deviations, positive; infinite for no information.
+    mean, sigma : array_like, shape (P,)
+        Expected values and standard deviations, in the units of the parameters; infinite for no
+        information.
     strength : float
         Factor on the information: 1 uses sigma unchanged, 0 ignores it.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Lengths that differ, NaN, a sigma that is not positive, a negative strength.
 
     Examples
     --------
@@ -70,17 +64,6 @@ class Prior(Rebuilt):
         return replace(self, strength=strength)
 
     def rows(self, x: ArrayLike) -> tuple[Array, Array]:
-        """Values of the added rows at x, and the diagonal of their Jacobian.
-
-        Parameters
-        ----------
-        x : array_like, shape (P,)
-            Parameters.
-
-        Returns
-        -------
-        value, slope : ndarray, shape (P,)
-            Zero without information.
-        """
+        """Values of the added rows at x (P,), and the diagonal of their Jacobian (P,)."""
         slope = np.sqrt(self.strength) / self.sigma
         return (np.asarray(x, dtype=np.float64) - self.mean) * slope, slope

@@ -74,13 +74,14 @@ class ConsistencyReport:
         return "\n".join(map(str, self.links))
 
 
-def pseudo_inertia(row: Array) -> Array:
-    """Pseudo-inertia matrix (4, 4) of ten parameters; positive semidefinite for a body."""
-    tensor = row[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-    pseudo = np.empty((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
-    pseudo[:3, 3] = pseudo[3, :3] = row[6:9]
-    pseudo[3, 3] = row[9]
+def pseudo_inertia(rows: Array) -> Array:
+    """Pseudo-inertia matrices (..., 4, 4) of ten parameters; positive semidefinite for bodies."""
+    tensor = rows[..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    pseudo = np.empty((*rows.shape[:-1], 4, 4))
+    half = 0.5 * np.trace(tensor, axis1=-2, axis2=-1)
+    pseudo[..., :3, :3] = half[..., None, None] * np.eye(3) - tensor
+    pseudo[..., :3, 3] = pseudo[..., 3, :3] = rows[..., 6:9]
+    pseudo[..., 3, 3] = rows[..., 9]
     return pseudo
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InertiaError, InvalidValueError
 from ..inertia import InertialParameters
+from ..inertia.consistency import pseudo_inertia
 from ..model import RobotModel, check_model
 from ..se3 import skew
 
@@ -28,9 +29,8 @@ def uniform_bodies(
 ) -> InertialParameters:
     """Uniform solids along the links: a prior for parameters without effect on the torques.
 
-    Each link is a round bar with spherical ends from the origin of its frame to those of the
-    frames it carries, and to the tool at the tip; a sphere where it has no length. All have one
-    density.
+    Each link is a round bar with spherical ends from the origin of its frame to those of the frames
+    it carries, and to the tool at the tip; a sphere where it has no length. All have one density.
 
     Parameters
     ----------
@@ -45,11 +45,6 @@ def uniform_bodies(
     -------
     InertialParameters
         Physical parameters of f frames.
-
-    Raises
-    ------
-    InvalidValueError
-        A mass or radius that is not positive.
 
     Examples
     --------
@@ -73,20 +68,9 @@ def uniform_bodies(
     return InertialParameters(values * (mass / values[:, 9].sum()))
 
 
-def pseudo_inertias(bodies: InertialParameters) -> Array:
-    """Pseudo-inertia matrices, positive definite for bodies with extent. Shapes: -> (f, 4, 4)."""
-    J = bodies.tensors
-    P = np.zeros((bodies.f, 4, 4))
-    half = 0.5 * np.trace(J, axis1=1, axis2=2)
-    P[:, :3, :3] = half[:, None, None] * np.eye(3) - J
-    P[:, :3, 3] = P[:, 3, :3] = bodies.first_moments
-    P[:, 3, 3] = bodies.mass
-    return P
-
-
 def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] = ()) -> Array:
     """Pseudo-inertias of bodies; raise for bodies without mass or extent. Shapes: -> (f, 4, 4)."""
-    P = pseudo_inertias(bodies)
+    P = pseudo_inertia(bodies.values)
     bad = np.flatnonzero(~has_extent(bodies))
     if bad.size:
         j = int(bad[0])
@@ -107,7 +91,7 @@ def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] 
 
 def has_extent(bodies: InertialParameters) -> NDArray[np.bool_]:
     """Whether bodies have mass and extent in three directions. Shapes: -> (f,) bool."""
-    values = np.linalg.eigvalsh(pseudo_inertias(bodies))
+    values = np.linalg.eigvalsh(pseudo_inertia(bodies.values))
     return values[:, 0] > _SINGULAR * np.maximum(values[:, -1], 1e-300)
 
 

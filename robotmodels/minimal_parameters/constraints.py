@@ -137,11 +137,6 @@ class CenterOfMassBox(Rebuilt):
     low, high : array_like, shape (3,)
         Corners in frame R_j, metres; infinite where there is no bound, equal where it is known.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Corners of the wrong shape, NaN, or low above high.
-
     Examples
     --------
     >>> CenterOfMassBox(2, [0, -0.1, -0.1], [0.4, 0.1, 0.1]).link
@@ -186,11 +181,6 @@ class CenterOfMassEllipsoid(Rebuilt):
         Centre in frame R_j and half lengths, metres.
     rotation : array_like, shape (3, 3), optional
         Its columns are the directions of the axes in R_j; default the axes of R_j.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong shapes, NaN, lengths that are not positive, or axes that are not orthonormal.
 
     Examples
     --------

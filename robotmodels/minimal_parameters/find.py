@@ -56,21 +56,17 @@ def base_parameters(
         Drive parameters among the standard ones: kinds such as ``"Ia"``, True for all
         (the offsets too), False for none. The couplings of motors belong to their kinds.
     motion : tuple of array_like, shapes (N, n), Samples or Trajectory, optional
-        Joint variables (rad or m), velocities and accelerations that the regressor is taken on, of
-        the numeric method; default random ones. A trajectory is taken at 1000 times. Parameters
-        that logged motion does not excite are not kept; see `BaseParameters.notes`.
+        Positions (rad or m), velocities and accelerations of the regressor of the numeric method;
+        default random ones. Parameters that logged motion does not excite are not kept.
     constraint : array_like, shape (n, u), or Transmission, optional
         Joints that are bound to each other, ``v = constraint u`` (mimic joints, a transmission):
         the torques are those of the u free variables. Of the numeric method.
     tolerance : float, optional
-        Zero tolerance of both methods: the largest relative torque of a parameter that is not kept,
-        the angle in rad up to which axes are taken as parallel or perpendicular, and a coefficient
-        (of parameters in their natural units); at most 0.01. By default axes within 1e-5 rad are
-        taken as aligned (a file may write 1.5708 for a right angle), and of the robot with these
-        axes the torques of each parameter are kept to 1e-11 of the largest; `BaseParameters.notes`
-        lists these axes, their angles, and the difference of the torques. ``tolerance=1e-11`` uses
-        every digit of the table. On logged motion the limit of the torques moves to the widest gap
-        within a factor of 30.
+        Zero tolerance, at most 0.01: the largest relative torque of a parameter that is not kept,
+        the angle in rad up to which axes are taken as aligned, and a coefficient in natural units.
+        By default axes within 1e-5 rad are taken as parallel or perpendicular (a file may write
+        1.5708), and the torques of that robot are kept to 1e-11; ``1e-11`` uses every digit of the
+        table. On logged motion the limit moves to the widest gap within a factor of 30.
     friction : Friction, optional
         A friction model that is linear in its parameters (`robotmodels.friction`), whose columns
         come after those of the drives.
@@ -78,21 +74,20 @@ def base_parameters(
     Returns
     -------
     BaseParameters
-        ``.names``, ``.regrouping``, ``.matrix``, ``.no_effect``; prints as the book's table.
+        ``.names``, ``.regrouping``, ``.matrix``, ``.no_effect``, ``.notes``; prints as the book's
+        table.
 
     Raises
     ------
-    InvalidValueError
-        Another method; motion or a constraint for the symbolic one; NaN; an empty log; friction
-        that is not linear or repeats columns of the drives; a tolerance above 0.01.
-    ShapeError
-        Arrays of the wrong shape.
+    InvalidValueError, ShapeError
+        Another method; motion or a constraint for the symbolic one; an empty log; friction that is
+        not linear or repeats columns of the drives; a tolerance above 0.01; arrays of the wrong
+        shape.
 
     References
     ----------
     Seed book section 1.5.3; M. Gautier and W. Khalil, "Direct calculation of minimum set of
-    inertial parameters of serial robots", IEEE T-RA 6(3), 1990; W. Khalil and F. Bennis, "Comments
-    on ...", IEEE T-RA 10(1), 1994.
+    inertial parameters of serial robots", IEEE T-RA 6(3), 1990.
 
     Examples
     --------
@@ -162,10 +157,10 @@ def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int6
     fine, coarse = terms_at(_FINEST), terms_at(_COARSEST)
     table = model.table
     small = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
-    small = np.append(small, np.linalg.norm(model.gravity) / EARTH)
     has_rules = len(sizes) == 10 * model.f + model.n * len(drive)
     clear = has_rules and zero <= NEGLIGIBLE and fine.keys() == coarse.keys()
     clear = clear and not ((small > _FINEST) & (small < _COARSEST)).any()
+    clear = clear and bool(np.linalg.norm(model.gravity) > _COARSEST * EARTH)
     terms = fine if clear else terms_at(zero)
     kept = np.array(sorted(terms), dtype=np.int64)
     matrix = np.zeros((len(kept), len(sizes)))

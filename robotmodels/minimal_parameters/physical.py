@@ -17,9 +17,8 @@ import numpy as np
 from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import MissingExtraError
-from ..inertia import InertialParameters
+from ..inertia.consistency import pseudo_inertia
 from ..regressors.columns import LINKS
-from .bodies import pseudo_inertias
 from .constraints import Constraint, drive_constraints, numbers_by_kind, positive_drives
 from .result import BaseParameters
 
@@ -126,7 +125,7 @@ class PhysicalProblem:
     ) -> None:
         f, p = base.model.f, len(prior)
         self.base, self.prior = base, prior
-        basis = pseudo_inertias(InertialParameters(np.eye(10)))
+        basis = pseudo_inertia(np.eye(10))
         inverse = np.zeros((p, p))
         bodies = []
         for j in range(f):
@@ -332,7 +331,7 @@ def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
     free = np.linalg.lstsq(scaled, t, rcond=1e-12)[0]
     mass = max(float(np.abs(free).max(initial=0.0)), 1e-6)
     W = np.diag([1.0 / radius] * 3 + [1.0])
-    maps = (W @ pseudo_inertias(InertialParameters(np.diag(unit))) @ W).reshape(10, 16).T
+    maps = (W @ pseudo_inertia(np.diag(unit)) @ W).reshape(10, 16).T
     x = cp.Variable(10)
     size = mass * float(np.abs(scaled).max(initial=0.0)) or 1.0
     squares = cp.sum_squares(scaled @ x * (mass / size) - t / size) + 1e-12 * cp.sum_squares(x)

@@ -46,7 +46,8 @@ class BaseMethod(Enum):
 class BaseParameters:
     """Minimal set of inertial (and drive) parameters of a robot. Read-only, picklable.
 
-    Also called minimal, identifiable or barycentric parameters.
+    Compare two results in the torque, ``reduce(W) @ matrix``: where a kept column has little
+    effect, its row of the matrix may change much.
 
     Parameters
     ----------
@@ -62,13 +63,11 @@ class BaseParameters:
         Method that determined them.
     gap : (float, float), optional
         Rank gap of the numeric method: smallest residual norm of a kept column and largest of a
-        dropped one, relative to the longest column (parameters in natural units, those of a robot
-        of this size and unit mass). If it is small, `notes` names the uncertain parameters.
+        dropped one, relative to the longest column (parameters in natural units).
     friction : Friction, optional
         A linear friction model whose parameters come after those of the drives.
     tolerance, angle : float
-        Part of the largest torque that counts as zero; angle in rad up to which axes were taken as
-        parallel or perpendicular.
+        Part of the largest torque that counts as zero; angle in rad up to which axes were aligned.
     notes : tuple of str
         Nearly aligned axes, constrained joints, an uncertain rank, a motion with little excitation.
     neglected : tuple of str
@@ -78,25 +77,13 @@ class BaseParameters:
         Largest torque error on an independent motion, relative to the largest torque; for logged
         motion on the same samples. None for symbolic rules alone.
 
-    Raises
-    ------
-    ShapeError
-        Fields that do not fit each other.
-
-    Notes
-    -----
-    Two results are compared in the torque, ``reduce(W) @ matrix``, and not by their matrices: where
-    a kept column has little effect, its row of the matrix may change much.
-
     Examples
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
     >>> base = base_parameters(load("planar_2r"), drive=False)
-    >>> base.names
-    ('ZZ1', 'ZZ2', 'MX2', 'MY2')
-    >>> dict(base.regrouping["ZZ1"])
-    {'ZZ1': 1.0, 'M2': 1.0}
+    >>> base.names, dict(base.regrouping["ZZ1"])
+    (('ZZ1', 'ZZ2', 'MX2', 'MY2'), {'ZZ1': 1.0, 'M2': 1.0})
     """
 
     model: RobotModel
@@ -271,20 +258,15 @@ class BaseParameters:
         )
 
     def _units(self) -> str:
-        """Units of the kinds of parameters that there are."""
-        slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
-        units = ["XX to ZZ kg m^2, MX to MZ kg m, M kg"]
-        kinds = [kind.value for kind in drive_kinds(self.drive)]
-        forces = " and ".join(kind for kind in kinds if kind in ("Fc", "offset"))
-        for joints, mark, words in (
-            (~slides, "", ("kg m^2", "N m s/rad", "N m")),
-            (slides, "of prismatic joints ", ("kg", "N s/m", "N")),
-        ):
-            names = [kind if kind in kinds else "" for kind in ("Ia", "Fv")] + [forces]
-            parts = [f"{name} {unit}" for name, unit in zip(names, words, strict=True) if name]
-            if joints.any() and parts:
-                units.append(mark + ", ".join(parts))
-        return "; ".join(units)
+        """Units of the parameters."""
+        units = "XX to ZZ kg m^2, MX to MZ kg m, M kg"
+        if self.drive:
+            slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
+            if not slides.all():
+                units += "; Ia kg m^2, Fv N m s/rad, Fc and offset N m"
+            if slides.any():
+                units += "; of prismatic joints Ia kg, Fv N s/m, Fc and offset N"
+        return units
 
     def _repr_markdown_(self) -> str:
         return markdown(self.latex)
@@ -304,33 +286,28 @@ class BaseParameters:
 
 def structure_differences(model: RobotModel, other: RobotModel, drive: Drives) -> list[str]:
     """Differences of two robots that change their base parameters."""
+    a, b = model.chain, other.chain
     if model is other:
         return []
-    a, b = model.chain, other.chain
     if not (np.array_equal(a.antecedent, b.antecedent) and np.array_equal(a.sigma, b.sigma)):
         return ["its frames or kinds of joints differ"]
-    differences = []
-    for k, (before, sigma) in enumerate(zip(a.antecedent.tolist(), a.sigma.tolist(), strict=True)):
-        R, S, moved = a.rotation[k], b.rotation[k], a.position[k] - b.position[k]
-        z = R[:, 2]
-        turned = z - S[:, 2] if sigma == REVOLUTE else R - S
-        if sigma == PRISMATIC:
-            moved = moved - (moved @ z) * z
-        if np.abs(turned).max() > _SAME:
-            differences.append(f"axis {k + 1} has another direction in frame {before}")
-        elif before and np.abs(moved).max() > _SAME * reach(model):  # the base has no effect
-            differences.append(f"axis {k + 1} has another place in frame {before}")
+    z, revolute, slides = a.rotation[:, :, 2], a.sigma == REVOLUTE, a.sigma == PRISMATIC
+    turned = np.abs(a.rotation - b.rotation)
+    turned[revolute, :, :2] = 0.0  # the zero of a revolute joint is free
+    moved = a.position - b.position
+    moved -= slides[:, None] * np.sum(moved * z, axis=1, keepdims=True) * z
+    moved[a.antecedent == 0] = 0.0  # the place of the base has no effect
+    off = (turned.max(axis=(1, 2)) > _SAME) | (np.abs(moved).max(axis=1) > _SAME * reach(model))
+    differences = [f"axis {k + 1} has another place" for k in np.flatnonzero(off)]
     down, below = (np.asarray(m.gravity) @ m.chain.base_rotation for m in (model, other))
     if np.abs(down - below).max() > _SAME * max(1.0, float(np.abs(down).max())):
-        shown = ["(" + ", ".join(f"{x:.4g}" for x in vector) + ")" for vector in (below, down)]
-        differences.append(f"gravity in the base is {shown[0]} instead of {shown[1]} m/s^2")
+        differences.append(f"gravity in the base is {below.round(4)} instead of {down.round(4)}")
     if any(kind.coupling is not None for kind in drive_kinds(drive)):
         mine, theirs = (_coupled(m) for m in (model, other))
-        if mine.keys() != theirs.keys():
-            differences.append("other motors are coupled")
-        else:
-            far = [m for m in mine if np.abs(mine[m] - theirs[m]).max() > _SAME]
-            differences += [f"motor {m} is coupled in another way" for m in far]
+        if mine.keys() != theirs.keys() or any(
+            np.abs(mine[m] - theirs[m]).max() > _SAME for m in mine
+        ):
+            differences.append("other motors are coupled, or in another way")
     return differences
 
 

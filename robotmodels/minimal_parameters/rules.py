@@ -22,7 +22,8 @@ product:
 
 The rules for one joint hold wherever a link can move freely. Near the base it cannot: before the
 first revolute joint it only translates, and as long as all revolute axes are parallel it rotates
-about one direction, which is fixed in the world and in the link (`MotionSpan`).
+about one direction, which is fixed in the world and in the link (`MotionSpan`). Without gravity
+rotations about one point leave fewer parameters: the numeric method decides there.
 
 Source: W. Khalil and F. Bennis, "Comments on direct calculation of minimum set of inertial
 parameters of serial robots", IEEE T-RA 10(1), 1994.
@@ -71,7 +72,7 @@ class RotationRank(Enum):
 class MotionSpan:
     """Possible rotations and translations of a link, in the axes of its frame.
 
-    A centre is a point on all axes of rotation.
+    The centre is a point on the only axis of rotation, None where there are several.
     """
 
     rotations: RotationRank
@@ -113,26 +114,10 @@ def _with_joint(
         return replace(before, slides=slides, centre=before.centre if keeps else None)
     if before.rotations is RotationRank.NONE:
         return MotionSpan(RotationRank.ONE, z, before.slides, P)
-    centre = _common_point(before, z, P, along, length)
-    if along:
-        return replace(before, centre=centre)
-    return MotionSpan(RotationRank.SEVERAL, np.zeros(3), (), None if before.slides else centre)
-
-
-def _common_point(
-    before: MotionSpan, z: Array, P: Array, along: bool, length: float
-) -> Array | None:
-    """A point on the axis (z, P) and on the axes before it; any point of a common axis."""
-    if before.centre is None:
-        return None
-    way, e = before.centre - P, before.direction
-    if before.rotations is RotationRank.SEVERAL or along:
-        point = P if along else before.centre
-        return point if _length_of_cross(z, way) <= length else None
-    # both axes pass through P + s z = centre + t e
-    s, t = np.linalg.lstsq(np.stack((z, -e), axis=1), way, rcond=None)[0]
-    point = P + s * z
-    return point if float(np.linalg.norm(point - before.centre - t * e)) <= length else None
+    if not along:
+        return MotionSpan(RotationRank.SEVERAL, np.zeros(3), (), None)
+    same = before.centre is not None and _length_of_cross(z, before.centre - P) <= length
+    return replace(before, centre=P if same else None)
 
 
 def parallel(a: Array, b: Array, tolerance: float = EXACT) -> bool:
@@ -300,10 +285,6 @@ class _Regrouping:
         self.add(first + XX, -1, yy)
         self.add_tensor(a, np.eye(3, dtype=np.int64) - np.outer(z, z), yy)
         self.add_moment(a, z, P, self.take(first + MZ))
-        if span.centre is not None and not weight:
-            # all rotations about one point: first moments act as an inertia about it
-            for i, place in ((0, 2), (1, 4)):
-                self.add(first + place, span.centre[2], self.take(first + MX + i))
 
     def _regroup_prismatic(self, j: int, a: int) -> None:
         first, span, row, e = 10 * (j - 1), self.spans[j], self.rows[j - 1], self.directions[j - 1]

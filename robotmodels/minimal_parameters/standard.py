@@ -30,10 +30,9 @@ class StandardParameters(Rebuilt):
     ----------
     base : BaseParameters
         The b base parameters and p standard parameters.
-    requested : ndarray, shape (b,)
-        Base parameters that were given, or those of the fit without constraints.
-    prior : ndarray, shape (p,)
-        Standard parameters of the prior.
+    requested, prior : ndarray, shapes (b,), (p,)
+        Base parameters that were given, or those of the fit without constraints; standard
+        parameters of the prior.
     drive_prior : DriveParameters
         Drives of the prior, for the kinds that are not among the parameters.
     fit : PhysicalFit

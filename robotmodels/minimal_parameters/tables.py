@@ -147,14 +147,11 @@ class BaseValues(Rebuilt, Mapping[str, float]):
 
     Parameters
     ----------
-    names : tuple of str
-        Standard names of the b kept parameters.
-    printed : tuple of str
-        The same with an R where others are regrouped into them.
+    names, printed, units : tuple of str
+        Standard names of the b kept parameters; the same with an R where others are regrouped into
+        them; units.
     numbers : ndarray, shape (b,)
         Values.
-    units : tuple of str
-        Units.
 
     Examples
     --------

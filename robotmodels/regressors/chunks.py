@@ -59,9 +59,7 @@ def chunked(
     columns: Columns | None = None,
     friction: Friction | None = None,
 ) -> Iterator[tuple[slice, Any]]:
-    """A regressor of a long log, a piece at a time in one reused buffer.
-
-    Memory does not grow with the number of samples, and a piece stays in the processor's cache.
+    """A regressor of a long log, a piece at a time in one reused buffer of bounded size.
 
     Parameters
     ----------
@@ -87,10 +85,6 @@ def chunked(
     ------
     ShapeError, InvalidValueError
         As the regressor, ``size`` below 1, a log without samples, or another regressor.
-
-    References
-    ----------
-    Seed book section 1.6.2.1.
 
     Examples
     --------

@@ -1,4 +1,31 @@
-"""Energy and power regressors, and the work of the torques between samples."""
+"""Energy and power regressors, and the work of the torques between samples.
+
+Source: M. Gautier and W. Khalil, "On the identification of the inertial parameters of robots", IEEE
+CDC 1988 (energy); M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997.
+
+Parameters
+----------
+model, drive, columns, friction
+    As for `torque_regressor`. Friction stores no energy: that has columns of the links, ``Ia`` and
+    ``Iam`` alone, with base parameters such as ``base_parameters(model, drive=("Ia",))``.
+q, v, a : array_like, shape (..., n)
+    Joint variables (rad or m), velocities and accelerations; between samples of shape (N, n).
+t : array_like, shape (N,)
+    Times, ascending, seconds; need not be regular.
+knots : array_like of int, shape (k,), optional
+    Numbers of the samples that the rows lie between, ascending; default every sample. Longer
+    stretches are fewer rows with less noise.
+
+Returns
+-------
+ndarray
+    Joules or watts, per unit of each parameter for a regressor.
+
+Raises
+------
+ShapeError, InvalidValueError
+    As `torque_regressor`; times or knots that do not ascend, or fewer than two of them.
+"""
 
 from __future__ import annotations
 
@@ -36,38 +63,8 @@ def energy_regressor(
 ) -> Array:
     """Row of the total energy: kinetic plus potential energy is the row times the parameters.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    q, v : array_like, shape (..., n)
-        Joint variables (rad or m) and velocities; the leading axes broadcast.
-    drive : bool or collection of DriveKind or str
-        Whether the columns of the rotor inertias, ``v^2 / 2`` (and those of coupled motors), are
-        included: True, or kinds with ``"Ia"`` among them. Friction stores no energy.
-    columns : indices, names, mask or BaseParameters, optional
-        A choice of the columns. Base parameters without friction and offsets, such as
-        ``base_parameters(model, drive=("Ia",))``, give the energy up to a constant.
-
-    Returns
-    -------
-    ndarray, shape (..., 10 f + n)
-        Columns as `energy_parameter_names`: as `parameter_names` up to ``Ia`` (10 f without
-        drives), then one more for the ``Iam`` of each coupled motor.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`.
-
-    See Also
-    --------
-    energy_difference_regressor : with the work of friction, for identification.
-
-    References
-    ----------
-    Seed book section 1.5.1.2; M. Gautier and W. Khalil, "On the identification of the inertial
-    parameters of robots", IEEE CDC 1988.
+    Shapes: q, v (..., n) -> (..., 10 f + n), columns as `energy_parameter_names`. Base parameters
+    give the energy up to a constant.
 
     Examples
     --------
@@ -90,33 +87,8 @@ def power_regressor(
 ) -> Array:
     """Row of the joint power: ``v . idm(model, q, v, a)`` is the row times the parameters.
 
-    ``v^T`` times the torque regressor, computed without it. The columns of the links and rotors
-    are the rate of `energy_regressor`; those of friction and offsets are the dissipated power.
-    `energy_difference_regressor` is its integral between samples and needs no accelerations.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
-    drive, columns, friction
-        As for `torque_regressor`.
-
-    Returns
-    -------
-    ndarray, shape (..., p)
-        Watts per unit of each parameter; columns as `parameter_names`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`.
-
-    References
-    ----------
-    Seed book sections 1.5.1.2 and 1.6.3; M. Gautier, "Dynamic identification of robots with power
-    model", IEEE ICRA 1997.
+    Shapes: q, v, a (..., n) -> (..., p), columns as `parameter_names`: for links and rotors the
+    rate of `energy_regressor`, for friction and offsets the dissipated power.
 
     Examples
     --------
@@ -141,38 +113,9 @@ def energy_difference_regressor(
     """Rows of the work of the torques between samples: energy gained plus work of friction.
 
     ``row @ parameters = integral of tau . v dt``, which `joint_work` gives from measured torques.
-    The columns of links and rotors are differences of `energy_regressor` and exact; those of
-    friction are integrals, exact where the velocity is linear between the samples (also through
-    zero), and those of offsets are differences of ``q``. No accelerations are needed.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    t : array_like, shape (N,)
-        Times, ascending, seconds; need not be regular.
-    q, v : array_like, shape (N, n)
-        Joint variables (rad or m) and velocities at these times.
-    drive, columns, friction
-        As for `torque_regressor`.
-    knots : array_like of int, shape (k,), optional
-        Numbers of the samples that the rows lie between, ascending; default every sample. Longer
-        stretches are fewer rows with less noise; friction is integrated over all samples.
-
-    Returns
-    -------
-    ndarray, shape (k - 1, p)
-        Joules per unit of each parameter; columns as `parameter_names`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`; times or knots that do not ascend, or fewer than two of them.
-
-    References
-    ----------
-    Seed book section 1.5.1.2; M. Gautier and W. Khalil, "On the identification of the inertial
-    parameters of robots", IEEE CDC 1988 (energy model).
+    Shapes: t (N,), q, v (N, n), knots (k,) -> (k - 1, p), columns as `parameter_names`. Those of
+    links, rotors and offsets are exact; those of friction where the velocity is linear between the
+    samples (also through zero). No accelerations are needed.
 
     Examples
     --------
@@ -199,31 +142,8 @@ def energy_difference_regressor(
 def joint_work(t: ArrayLike, v: ArrayLike, tau: ArrayLike, knots: ArrayLike | None = None) -> Array:
     """Work of joint torques between samples, ``integral of tau . v dt``.
 
-    Exact where torques and velocities are linear between the samples.
-
-    Parameters
-    ----------
-    t : array_like, shape (N,)
-        Times, ascending, seconds.
-    v, tau : array_like, shape (N, n)
-        Joint velocities and torques.
-    knots : array_like of int, shape (k,), optional
-        As for `energy_difference_regressor`.
-
-    Returns
-    -------
-    ndarray, shape (k - 1,)
-        Joules.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays that do not fit each other, NaN, times or knots that do not ascend, or fewer than
-        two of them.
-
-    References
-    ----------
-    Seed book section 1.5.1.2.
+    Shapes: t (N,), v, tau (N, n), knots (k,) -> (k - 1,). Exact where torques and velocities are
+    linear between the samples.
 
     Examples
     --------

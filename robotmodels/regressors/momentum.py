@@ -1,4 +1,27 @@
-"""Momentum and filtered regressors: identification without accelerations."""
+"""Momentum and filtered regressors: identification without accelerations.
+
+Source: J.-J. Slotine and W. Li, "On the adaptive control of robot manipulators", IJRR 6(3), 1987
+(the filtered form); A. De Luca and R. Mattone, "Actuator failure detection and isolation using
+generalized momenta", IEEE ICRA 2003.
+
+Parameters
+----------
+model, drive, columns, friction
+    As for `torque_regressor`.
+q, v : array_like, shape (..., n)
+    Joint variables (rad or m) and velocities; regularly sampled, (N, n), for a filter.
+dt : float
+    Sampling period, seconds.
+low_pass : array_like, shape (k, 6)
+    Second-order sections of a stable filter for this period, such as
+    ``scipy.signal.butter(4, cutoff, fs=1 / dt, output="sos")``.
+
+Raises
+------
+ShapeError, InvalidValueError
+    As `torque_regressor`; a period that is not positive; sections of another shape, or of a
+    filter that is not stable; a log without samples.
+"""
 
 from __future__ import annotations
 
@@ -44,37 +67,12 @@ def momentum_regressor(
     """Regressors P and S of the momentum form ``dp/dt = tau + C^T v - Q - friction``.
 
     With ``p = P @ parameters`` the torque is ``tau = (dP/dt - S) @ parameters``: filtered or
-    integrated, it needs no accelerations. ``C^T v`` is ``dA/dt v - C v``, the gradient of the
-    kinetic energy by the configuration.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    q, v : array_like, shape (..., n)
-        Joint variables (rad or m) and velocities; the leading axes broadcast.
-    drive, columns, friction
-        As for `torque_regressor`.
+    integrated, it needs no accelerations.
 
     Returns
     -------
     MomentumRegressors
         ``momentum`` and ``force``, each of shape (..., n, p); columns as `parameter_names`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`.
-
-    See Also
-    --------
-    filtered_regressor : both through a low-pass filter.
-
-    References
-    ----------
-    Seed book sections 1.5.1.2 and 1.6.3; J.-J. Slotine and W. Li, "On the adaptive control of robot
-    manipulators", IJRR 6(3), 1987 (the filtered form); A. De Luca and R. Mattone, "Actuator failure
-    detection and isolation using generalized momenta", IEEE ICRA 2003.
 
     Examples
     --------
@@ -100,38 +98,12 @@ def filtered_regressor(
     """Torque regressor through a low-pass filter, from positions and velocities alone.
 
     The momentum form between samples, ``(P_k - P_{k-1}) / dt - (S_k + S_{k-1}) / 2``, through the
-    filter. `filtered_torque` brings measured torques through the same one, so that
-    ``filtered_torque(tau, low_pass) = W @ parameters`` up to the square of the sampling period.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    dt : float
-        Sampling period, seconds.
-    q, v : array_like, shape (N, n)
-        Joint variables (rad or m) and velocities, regularly sampled.
-    low_pass : array_like, shape (k, 6)
-        Second-order sections of a stable filter for this period, such as
-        ``scipy.signal.butter(4, cutoff, fs=1 / dt, output="sos")``.
-    drive, columns, friction
-        As for `torque_regressor`.
+    filter: ``filtered_torque(tau, low_pass) = W @ parameters`` up to the square of the period.
 
     Returns
     -------
     ndarray, shape (N, n, p)
         Columns as `parameter_names`; the first sample is zero.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`; a period that is not positive; sections of another shape, or of a
-        filter that is not stable; a log without samples.
-
-    References
-    ----------
-    Seed book section 1.6.2; J.-J. Slotine and W. Li, "On the adaptive control of robot
-    manipulators", IJRR 6(3), 1987.
 
     Examples
     --------
@@ -162,26 +134,11 @@ def filtered_regressor(
 def filtered_torque(tau: ArrayLike, low_pass: ArrayLike) -> Array:
     """Measured torques through the filter of `filtered_regressor`.
 
-    Parameters
-    ----------
-    tau : array_like, shape (N, ...)
-        Torques (N m or N) along the first axis, regularly sampled.
-    low_pass : array_like, shape (k, 6)
-        The second-order sections.
-
     Returns
     -------
     ndarray, shape (N, ...)
-        Means of neighbouring samples, filtered from rest; the first is zero.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No samples, NaN; sections as for `filtered_regressor`.
-
-    References
-    ----------
-    Seed book section 1.6.2.
+        Means of neighbouring samples of the torques (N, ...), filtered from rest; the first is
+        zero.
 
     Examples
     --------

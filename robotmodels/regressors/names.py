@@ -1,8 +1,11 @@
 """The standard parameters: their names in the order of the regressors' columns, their values.
 
-References
-----------
 Seed book sections 1.5.1.2 and 1.5.2.1.
+
+Parameters
+----------
+model, drive, friction, columns
+    As for `torque_regressor`.
 """
 
 from __future__ import annotations
@@ -23,11 +26,6 @@ def parameter_names(
     columns: Columns | None = None,
 ) -> tuple[str, ...]:
     """Names of the standard parameters, in the order of the columns of `torque_regressor`.
-
-    Parameters
-    ----------
-    model, drive, friction, columns
-        As for `torque_regressor`.
 
     Returns
     -------
@@ -51,11 +49,6 @@ def energy_parameter_names(
 ) -> tuple[str, ...]:
     """Names of the parameters that store energy, in the order of the columns of `energy_regressor`.
 
-    Parameters
-    ----------
-    model, drive, columns
-        As for `energy_regressor`.
-
     Returns
     -------
     tuple of str
@@ -76,11 +69,6 @@ def parameter_vector(
     model: RobotModel, drive: Drives = True, friction: Friction | None = None
 ) -> Array:
     """The model's own standard parameters: ``torque_regressor(...) @ parameter_vector(...)``.
-
-    Parameters
-    ----------
-    model, drive, friction
-        As for `torque_regressor`.
 
     Returns
     -------

@@ -34,13 +34,11 @@ def torque_regressor(
         The robot, f frames and n joints; its own inertia is not used.
     q, v, a : array_like, shape (..., n)
         Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
-        An empty batch gives an empty result.
     drive : bool or collection of DriveKind or str
         Drive parameters with columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
         couplings of motors belong to their kinds.
     columns : indices, names, mask or BaseParameters, optional
-        A choice of the columns, which alone are computed; default all. Base parameters choose the
-        columns that they keep.
+        A choice of the columns, which alone are computed; default all.
     friction : Friction, optional
         A friction model that is linear in its parameters; its columns come last.
 
@@ -56,20 +54,10 @@ def torque_regressor(
         Arguments of the wrong length, or with NaN or infinity; columns that do not exist;
         friction that is not linear.
 
-    See Also
-    --------
-    torque_regressor_chunks : the same for long logs, in pieces of bounded size.
-
-    References
-    ----------
-    Seed book sections 1.5.2.1, 1.6.2 and 1.6.3.
-
     Examples
     --------
     >>> from robotmodels.geometry import DHTable
     >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> float(torque_regressor(one, [0.0], [0.0], [2.0])[0, 5])
-    2.0
     >>> torque_regressor(one, [0.0], [3.0], [2.0], columns=["ZZ1", "Fv1"])
     array([[2., 3.]])
     """
@@ -101,15 +89,6 @@ def torque_regressor_chunks(
         Samples of the piece.
     W : ndarray, shape (k, n, p)
         Their regressor. The next piece overwrites it: use or copy it before going on.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `torque_regressor`, ``size`` below 1, or a log without samples.
-
-    References
-    ----------
-    Seed book section 1.6.2.1.
 
     Examples
     --------
