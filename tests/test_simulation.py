@@ -1,7 +1,5 @@
 """Simulation against closed forms, conservation laws and the inverse model."""
 
-import logging
-import pickle
 from itertools import cycle
 
 import numpy as np
@@ -14,12 +12,10 @@ from robotmodels.dynamics import ddm, gravity_torque, idm, mass_matrix
 from robotmodels.errors import (
     InertiaError,
     InvalidValueError,
-    RobotModelsError,
     ShapeError,
     SingularMassMatrixError,
 )
 from robotmodels.friction import (
-    AsymmetricFriction,
     CoulombFriction,
     FrictionSum,
     StribeckFriction,
@@ -88,16 +84,14 @@ def holds(model, sim, wrench=None, drive=True):
 # --- closed forms ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("method", "tolerance"), [("DOP853", 1e-9), ("radau", 1e-6)])
-def test_pendulum_swings_as_the_elliptic_functions_say(method, tolerance):
-    length, start = 0.4, 1.9  # from the vertical
-    t, rtol = np.linspace(0.0, 3.0, 61), 1e-10 if tolerance < 1e-7 else 1e-8
-    sim = simulate(pendulum(length=length), [start - np.pi / 2], [0.0], t=t, method=method,
-                   rtol=rtol)  # fmt: skip
+def test_pendulum_swings_as_the_elliptic_functions_say():
+    length, start, t = 0.4, 1.9, np.linspace(0.0, 3.0, 61)  # from the vertical
     k = np.sin(start / 2)
     sn, _, _, _ = ellipj(ellipk(k * k) - np.sqrt(G / length) * t, k * k)
-    assert np.abs(sim.q[:, 0] - (2.0 * np.arcsin(k * sn) - np.pi / 2)).max() < tolerance
-    assert sim.status is SimulationStatus.FINISHED
+    for method, rtol, tolerance in (("DOP853", 1e-10, 1e-9), ("radau", 1e-8, 1e-6)):
+        sim = simulate(pendulum(length=length), [start - np.pi / 2], t=t, method=method, rtol=rtol)
+        assert np.abs(sim.q[:, 0] - (2.0 * np.arcsin(k * sn) - np.pi / 2)).max() < tolerance
+        assert sim.status is SimulationStatus.FINISHED
 
 
 # --- dry friction ------------------------------------------------------------------------------
@@ -139,18 +133,13 @@ def test_mass_on_a_spring_loses_the_same_at_every_turn():
     assert sim.friction[-1, 0] == pytest.approx(k * 0.01, abs=1e-6)
 
 
-def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds():
-    """Torques that pass the breakaway torque for a short while, between looks of a step."""
-    excess = 1e-8
-    for w in (0.7, 2.9):
+def test_parts_break_away_where_the_torque_crosses_and_stick_again():
+    for excess, w in ((0.1, 0.7), (0.05, 2.9)):
         sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
-                       lambda t, q, v, w=w: [3.0 * (1.0 + excess) * np.sin(w * t)],
-                       t=[0.0, 2.5 / w])  # fmt: skip
+                       lambda t, q, v, e=excess, w=w: [3.0 * (1.0 + e) * np.sin(w * t)],
+                       t=[0.0, 3.0 / w])  # fmt: skip
         assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY, KINDS.STUCK]
-        crossing = np.arcsin(1.0 / (1.0 + excess)) / w
-        # what the rounding of a part in 1e13 of the torque takes, at the slope it crosses with
-        late = 2e-13 / (w * np.sqrt(2.0 * excess))
-        assert sim.events[0].t == pytest.approx(crossing, abs=late + 1e-14)
+        assert sim.events[0].t == pytest.approx(np.arcsin(1.0 / (1.0 + excess)) / w, abs=1e-9)
 
 
 def coupled_wrist(Fcm=0.5, Fc=(0.3, 0.2)):
@@ -226,20 +215,6 @@ def test_torques_at_times_are_linear_between_them():
     assert np.allclose(against.wrench_work, -4.0 * t**2, atol=1e-12)
 
 
-def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
-    t = np.array([0.0, 1.0])
-    breaks = np.arange(1, 10) / 10
-
-    def control(t, q, v):
-        return [1.0 - 2.0 * (np.searchsorted(breaks, t, side="right") % 2)]
-
-    sim = simulate(slider(), [0.0], [0.0], control, t, breaks=breaks)
-    assert sim.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
-    assert sim.q[-1, 0] == pytest.approx(5 * 2 * 0.25 * 0.1**2, abs=1e-14)
-    blind = simulate(slider(), [0.0], [0.0], control, t)
-    assert blind.evaluations > 3 * sim.evaluations
-
-
 def test_friction_models_beside_the_drives():
     t, rail = np.linspace(0.0, 2.0, 41), slider()
 
@@ -252,12 +227,6 @@ def test_friction_models_beside_the_drives():
     assert np.allclose(own.q, given.q, atol=1e-10)
     assert np.array_equal(own.sticking, given.sticking)
     assert own.sticking[-1, 0]
-    # directions that differ: breaks away at 4 N backwards, holds 2.5 N forwards
-    gears = AsymmetricFriction(Fvp=[0.1], Fcp=[2.5], Fvn=[0.2], Fcn=[4.0])
-    for force, moves in ((2.4, False), (2.6, True), (-3.9, False), (-4.1, True)):
-        sim = simulate(rail, [0.0], [0.0], [force], t, friction=gears)
-        assert bool(sim.v[-1, 0]) is moves
-        assert sim.v[-1, 0] * force >= 0.0
     # Stribeck: static friction first, then less
     falling = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[2.0], vs=[0.05])
     slow = simulate(rail, [0.0], [0.0], lambda t, q, v: [2.0 * t], t=t, friction=falling)
@@ -267,12 +236,6 @@ def test_friction_models_beside_the_drives():
     # an offset is no dry friction
     pushed = simulate(rail, [0.0], [0.0], None, t, friction=TorqueOffset([1.0]))
     assert np.allclose(pushed.a, -0.5)
-    # smoothed jumps approach the events, and joints creep where they should stick
-    stiff = {"smoothing": 1e-4, "method": "Radau", "rtol": 1e-8}
-    smooth = simulate(rail, [0.0], [0.9], None, t, friction=gears, **stiff)
-    assert not smooth.events
-    sharp = simulate(rail, [0.0], [0.9], None, t, friction=gears)
-    assert np.abs(smooth.q - sharp.q).max() < 1e-4
     creeping = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0, smoothing=[0.01], method="Radau")
     # tanh(v / w) = load / Fc, where it has crept to
     weight = gravity_torque(pendulum(), creeping.q[-1])[0]
@@ -346,26 +309,10 @@ def test_ends_before_the_end_have_a_status():
     assert np.linalg.eigvalsh(mass_matrix(ghost, lost.q)).min() > 0.0
 
 
-def test_a_simulation_is_a_value_and_reports_progress(caplog):
-    done = []
-    sim = simulate(pendulum(Fc=[2.0]), [0.5], [0.0], t=0.3, progress=done.append)
-    assert done[-1] == 1.0
-    again = pickle.loads(pickle.dumps(sim))
-    assert np.array_equal(again.q, sim.q)
-    assert again.events == sim.events
-    with pytest.raises(ValueError, match="read-only"):
-        again.kinetic[0] = 1.0
-    assert f"evaluations of the model: {sim.evaluations}" in str(sim)
-    with caplog.at_level(logging.INFO, logger="robotmodels"):
-        simulate(pendulum(), [0.0], [0.0], t=0.1, progress=True)
-    assert "100 % done" in caplog.text
-
-
 def broken(t, q, v):
     return [1.0 / (t - t)]
 
 
-COUPLED = double_pendulum().with_transmission(Transmission([[1.0, 1.0], [1.0, 1.0]]))
 MIMICS = double_pendulum().with_transmission(Transmission([[1.0, 0.0], [1.0, 0.0]]))
 
 
@@ -373,22 +320,15 @@ MIMICS = double_pendulum().with_transmission(Transmission([[1.0, 0.0], [1.0, 0.0
     ("arguments", "error", "message"),
     [
         ({"q0": [[0.0]]}, ShapeError, "q0: expected shape"),
-        ({"t": -1.0}, ShapeError, "duration from 0"),
         ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending times, got 1.0 s and then 1.0 s"),
-        ({"control": [1.0, 2.0]}, ShapeError, r"function control\(t, q, v\) -> \(1,\), or"),
-        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, ShapeError, r"or \(3, 1\), got shape"),
         ({"control": lambda t, q, v: [1.0, 2.0]}, ShapeError, r"at t = 0 s: expected shape \(1,\)"),
         ({"control": broken}, ZeroDivisionError, "division"),
         ({"v0": [1e200]}, InvalidValueError, r"v0: the accelerations or the energy of"),
-        ({"friction": CoulombFriction([1.0, 2.0])}, ShapeError, "friction of 1 joints, got 2"),
         ({"friction": CoulombFriction([-1.0])}, InvalidValueError, "of joint 1 is negative"),
-        ({"smoothing": 0.0}, InvalidValueError, "smoothing: expected at least"),
         ({"method": "euler"}, InvalidValueError, "method: expected one of 'dop853'"),
-        ({"breaks": [[0.5]]}, ShapeError, "breaks: expected times"),
         ({"model": load("planar_2r")}, SingularMassMatrixError, "moves no inertia"),
         ({"model": slider().with_inertia(InertialParameters([[0] * 9 + [-1.0]]))}, InertiaError,
          "link 1: negative mass -1 kg"),
-        ({"model": COUPLED}, InvalidValueError, "coupling matrix K is singular, it has rank 1"),
         ({"model": MIMICS}, InvalidValueError, "joints that mimic others, which simulate does"),
     ],
 )  # fmt: skip
@@ -417,8 +357,6 @@ def test_parts_of_the_torque_make_the_whole(seed):
     assert np.allclose(parts.inertia, np.einsum("...ij,...j", mass_matrix(model, q), a))
     assert np.array_equal(parts.gravity, gravity_torque(model, q))
     assert np.allclose(torque_parts(model, q, 2 * v, a).coriolis, 4 * parts.coriolis)
-    with pytest.raises(InvalidValueError, match="q, v, a: the motion is empty"):
-        torque_parts(model, q[:0], v[:0], a[:0])
     bare = torque_parts(model, q, v, a, drive=False)
     assert not bare.friction.any()
     assert np.allclose(bare.total, idm(model, q, v, a, drive=False))
@@ -443,14 +381,6 @@ def test_maps_over_joints():
         (pendulum(), 0, [-np.pi, np.pi]),
     ):
         assert dynamics_map(model, j, samples=2).ranges[0] == pytest.approx(ends)
-    for wrong, message in (
-        ({"joints": (1, 1)}, "one or two different joints"),
-        ({"joints": 0, "ranges": [1, 0]}, "ascending ends"),
-        ({"joints": (0, 1), "ranges": [0, 1]}, r"expected shape \(2, 2\)"),
-        ({"joints": 0, "samples": 1}, "samples: expected 1 whole numbers from 2"),
-    ):
-        with pytest.raises(RobotModelsError, match=message):
-            dynamics_map(arm, **wrong)
 
 
 # --- feedback ----------------------------------------------------------------------------------
@@ -506,20 +436,6 @@ def test_a_sampled_control_holds_its_torque_and_advances_by_euler(delay):
     assert sim.relative_drift < 1e-9
 
 
-def test_functions_and_rows_are_sampled_too():
-    t = np.linspace(0.0, 1.0, 5)
-    rows = simulate(slider(), [0.0], None, t[:, None], t, period=0.25)
-    law = simulate(slider(), [0.0], None, lambda t, q, v: [t], t, period=0.25)
-    assert rows.v[-1, 0] == law.v[-1, 0] == pytest.approx(0.25 * (0.25 + 0.5 + 0.75) / 2.0)
-    assert np.allclose(law.tau[:-1, 0], t[:-1])  # a sample belongs to the time after it
-    beside = np.array([0.0, 0.25 - 1e-13, 0.5 + 1e-13, 1.0])  # rounding of times is no instant
-    near = simulate(slider(), [0.0], None, t[:, None], t, period=0.25, breaks=beside)
-    assert np.allclose(near.v, rows.v, atol=1e-12)
-    steps = simulate(slider(), [0.0], None, lambda t, q, v: [t], 1.0, period=0.25)
-    assert set(np.arange(4) / 4) <= set(steps.t.tolist())
-    assert np.isin(steps.tau[:-1, 0], np.arange(4) / 4).all()
-
-
 class Broken(WithIntegral):
     def rate(self, t, q, v, x):
         return [np.nan]
@@ -528,11 +444,8 @@ class Broken(WithIntegral):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"period": 0.0}, "period: expected a finite number above 0"),
-        ({"period": 0.1, "delay": -1.0}, "delay: expected a finite number of at least 0"),
         ({"delay": 0.1}, "only a sampled control is delayed"),
         ({"period": 0.1, "delay": 2.0}, "less than the duration 1 s, got 2 s"),
-        ({"period": 1e-9}, "would sample more than"),
         ({"period": 0.1, "control": None}, "no control to sample"),
         ({"control": Broken(1.0)}, r"control.rate\(t, q, v, x\) at t = 0 s: expected finite"),
     ],

@@ -111,26 +111,16 @@ class DryFriction:
         return self.mode(signs)
 
     def margin(self, mode: Mode, reaction: Array) -> float:
-        """Distance of the sticking parts from breakaway: 1 in the middle, 0 at breakaway."""
-        middle, half = self._box(mode.stuck)
-        if mode.holding is not None:
-            return float(np.min(1.0 - np.abs(mode.holding @ reaction - middle) / half))
-        # not unique: distribution with the largest margin
-        from scipy.optimize import linprog
+        """Distance of the sticking parts from breakaway: 1 in the middle, 0 at breakaway.
 
-        k, D = mode.stuck.size, self.rates[mode.stuck].T
-        level, D = reaction - D @ middle, D * half
-        scale = max(float(np.abs(level).max()), float(np.abs(D).max()))
-        eye = np.eye(k)
-        best = linprog(
-            np.append(np.zeros(k), 1.0),
-            A_ub=np.c_[np.r_[eye, -eye], -np.ones(2 * k)],
-            b_ub=np.zeros(2 * k),
-            A_eq=np.c_[D, np.zeros(len(D))] / scale,
-            b_eq=level / scale,
-            bounds=(None, None),
-        )
-        return 1.0 - float(best.fun) if best.status == 0 else -np.inf
+        Where torques on them are not unique, 0 as long as some within the breakaway torques exist.
+        """
+        if mode.holding is None:
+            return -float(
+                np.abs(self._slip_rates(mode.stuck, np.eye(len(reaction)), reaction)).max()
+            )
+        middle, half = self._box(mode.stuck)
+        return float(np.min(1.0 - np.abs(mode.holding @ reaction - middle) / half))
 
     def _box(self, parts: NDArray[np.int64]) -> tuple[Array, Array]:
         low, high = self.lower[parts], self.upper[parts]

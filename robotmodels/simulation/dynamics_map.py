@@ -22,13 +22,11 @@ class DynamicsMap(Rebuilt):
     Parameters
     ----------
     model, joints, q
-        As for `dynamics_map`: n joints, columns of q that vary, and values of the others.
+        As for `dynamics_map`.
     ranges : tuple of ndarray, shapes (N1,) and (N2,)
         Values of the joints that vary, rad or m, ascending.
-    mass : ndarray, shape (N1, n, n) or (N1, N2, n, n)
-        Mass matrices.
-    gravity : ndarray, shape (N1, n) or (N1, N2, n)
-        Gravity torques, N m or N.
+    mass, gravity : ndarray, shape (N1, n, n) or (N1, N2, n, n), (N1, n) or (N1, N2, n)
+        Mass matrices; gravity torques, N m or N.
     """
 
     model: RobotModel
@@ -62,7 +60,7 @@ def dynamics_map(
     samples: int | Sequence[int] | None = None,
     drive: bool = True,
 ) -> DynamicsMap:
-    """Mass matrix and gravity torques over a range of one or two joints.
+    """Mass matrix and gravity torques over a range of one or two joints (seed book 1.5.1.3).
 
     Parameters
     ----------
@@ -73,8 +71,7 @@ def dynamics_map(
     q : array_like, shape (n,), optional
         Values of the other joints, rad or m; default zero.
     ranges : array_like, shape (2,) or (2, 2), optional
-        Lower and upper end of each joint's range; default its limits, or a whole turn (a metre of
-        a prismatic joint) where it has none.
+        Ends of each joint's range; default its limits, or a whole turn (a metre) without them.
     samples : int or sequence of ints, optional
         Values of each joint, at least 2; default 181 of one joint, 61 each of two.
     drive : bool
@@ -84,15 +81,6 @@ def dynamics_map(
     -------
     DynamicsMap
         Grid of values.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No such joints, the same twice, or more than two; ranges that do not ascend.
-
-    References
-    ----------
-    Seed book section 1.5.1.3.
 
     Examples
     --------

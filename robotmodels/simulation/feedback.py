@@ -40,17 +40,9 @@ class StatefulControl(Protocol):
     """
 
     @property
-    def state0(self) -> ArrayLike:
-        """State at the start, shape (k,)."""
-        ...
-
-    def command(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike:
-        """Torques, shape (n,)."""
-        ...
-
-    def rate(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike:
-        """Time derivative of the state, shape (k,)."""
-        ...
+    def state0(self) -> ArrayLike: ...  # noqa: D102
+    def command(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike: ...  # noqa: D102
+    def rate(self, t: float, q: Array, v: Array, x: Array) -> ArrayLike: ...  # noqa: D102
 
 
 class Feedback:
@@ -80,16 +72,14 @@ class Feedback:
                 f"delay: expected less than the duration {end - start:.6g} s, got {delay:.6g} s; "
                 "no torque would act."
             )
-        taken: Array = start + period * np.arange(
-            max(1, ceil((end - start) / period - 1e-9)), dtype=np.float64
-        )
+        count = max(1, ceil((end - start) / period - 1e-9))
         # a torque that acts at a later sample acts exactly then
         whole = int(delay / period + 1e-9)
         rest = delay - whole * period
-        acts: Array = start + period * (np.arange(len(taken), dtype=np.float64) + whole)
-        acts = acts if rest < 1e-9 * period else acts + rest
-        taken = _snapped(taken, near, 1e-9 * period)
-        acts = _snapped(acts, near, 1e-9 * period)
+        rest = 0.0 if rest < 1e-9 * period else rest
+        k, tolerance = np.arange(count, dtype=np.float64), 1e-9 * period
+        taken = _snapped(start + period * k, near, tolerance)
+        acts = _snapped(start + period * (k + whole) + rest, near, tolerance)
         self._taken, self._acts = deque(taken.tolist()), deque(acts[acts < end].tolist())
         self.instants = tuple(sorted({*self._taken, *self._acts}))
         self._period, self._sampled, self.state0 = period, True, _NONE

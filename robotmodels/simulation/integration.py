@@ -1,7 +1,7 @@
 """Event-driven integration: steps of SciPy's integrators, and event location in each step.
 
-`solve_ivp` looks for events at the ends of its steps only, and gives no partial result when a
-budget is used up; here each step is searched between its ends as well.
+`solve_ivp` gives no partial result when a budget is used up, and looks for events at the ends of
+its steps only; here they are looked for at eight times of each step.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from .motion import Motion
 from .result import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
 
 _LOOKS = 8  # number of evaluations of the event functions per step
-_FLAT = 1e-7  # relative to the time between looks: accuracy of a minimum
 _SLACK = 1e-9  # relative to the breakaway torque: ignored excess
 _ROUNDING = 1e-13
 _SAME_INSTANT = 64 * float(np.finfo(np.float64).eps)
@@ -62,7 +61,7 @@ class Integration:
         self.rows: list[tuple[Array, ...]] = []
         self.events: list[SimulationEvent] = []
         self.status = SimulationStatus.FINISHED
-        self.steps, self._repeats, self._last_event, self._reported = 0, 0, -np.inf, 0.0
+        self.steps, self._repeats, self._last_event, self._report_at = 0, 0, -np.inf, -np.inf
         self._step: float | None = None
 
     def follow(self, q: Array, v: Array, cuts: Sequence[tuple[float, bool]]) -> None:
@@ -122,10 +121,9 @@ class Integration:
                     self._sample(time, y if time == t else dense(time))
                 if self.times is None and self.t[-1] < t != self._open:
                     self._sample(t, y)
-                done = (t - self._start) / (self._end - self._start)
-                if done >= self._reported + 0.01 or done >= 1.0:
-                    self._reported = done
-                    self.report.done(done)
+                if t >= self._report_at:
+                    self._report_at = t + 0.01 * (self._end - self._start)
+                    self.report.done((t - self._start) / (self._end - self._start))
                 if event is not None:
                     return t, np.array(y), event
         except ValueError as error:
@@ -166,7 +164,7 @@ class Integration:
         values = G @ Y + c[:, None]
         least = -_ROUNDING * (1.0 + (np.abs(G) @ np.abs(Y)).max(axis=1, initial=0.0))
         event: Event | None = None
-        for i in np.flatnonzero(values.min(axis=1) - np.ptp(values, axis=1) < least).tolist():
+        for i in np.flatnonzero((values < least[:, None]).any(axis=1)).tolist():
             distance = partial(lambda i, s: float(G[i] @ dense(s)[: 2 * n] + c[i]), i)
             root = first_below(distance, ts, values[i], float(least[i]))
             if root is not None and (event is None or root[0] < event.t):
@@ -252,38 +250,14 @@ def _at_rest(y: Array, mode: Mode) -> Array:
 def first_below(
     g: Callable[[float], float], ts: Array, values: Array, least: float, zero: float = 0.0
 ) -> tuple[float, float] | None:
-    """Last root of a function before its first value below a level, and a time below it.
-
-    Shapes: ts, values (K,), of smooth functions with up to one minimum between looks.
-    """
-    from scipy.optimize import fminbound
-
-    for k, value in enumerate(values):
-        low, beside = float(ts[k]), slice(max(k - 1, 0), k + 2)
-        if k == 0 or value >= least:
-            # lower bound between looks: the difference of adjacent values
-            depth = float(np.ptp(values[max(k - 2, 0) : k + 3]))
-            if not least <= value == values[beside].min() or value - depth >= least:
-                continue
-            left, *_, right = ts[beside].tolist()
-            low = float(np.asarray(fminbound(g, left, right, xtol=_FLAT * (right - left))))
-            if g(low) >= least:
-                continue
-        return _root(g, float(ts[max(int(np.searchsorted(ts, low)) - 1, 0)]), low, zero), low
-    return None
-
-
-def _root(g: Callable[[float], float], left: float, low: float, zero: float) -> float:
-    """Where a function passes zero before `low`, or the left end if it is not above zero there."""
+    """Root of a function before its first value (K,) below a level, and the time ts (K,) of it."""
     from scipy.optimize import brentq
 
-    high = low
-    # after an event it starts at zero and may increase before it decreases
-    for x in (left, *(left + (low - left) * 0.5**k for k in range(1, 41))):
-        if g(x) > zero:
-            if g(high) >= zero:
-                return high
-            root: Any = brentq(lambda t: g(t) - zero, x, high, xtol=1e-15 * max(1.0, abs(low)))
-            return float(root)
-        high = x if x > left else high
-    return left
+    below = np.flatnonzero(values < least)
+    if not below.size:
+        return None
+    left, low = float(ts[max(below[0] - 1, 0)]), float(ts[below[0]])
+    if g(left) <= zero:
+        return left, low
+    root: Any = brentq(lambda t: g(t) - zero, left, low, xtol=1e-15 * max(1.0, abs(low)))
+    return float(root), low

@@ -1,4 +1,12 @@
-"""Result of a simulation: motion, loads, energy balance, events and status."""
+"""Result of a simulation: motion, loads, energy balance, events and status.
+
+Examples
+--------
+>>> print(SimulationEvent(SimulationEventKind.STUCK, 0.25, 1))
+0.25 s: joint 2 comes to rest and sticks
+>>> Integrator("Radau").name
+'RADAU'
+"""
 
 from __future__ import annotations
 
@@ -35,11 +43,6 @@ class Integrator(Enum):
     ``DOP853`` and ``RK45`` are explicit Runge-Kutta methods of order 8 and 5; ``RADAU`` (order 5)
     and ``BDF`` (order 1 to 5) are implicit, for stiff models: springs in the control, narrow
     smoothing of dry friction, large viscous friction on small inertia.
-
-    Examples
-    --------
-    >>> Integrator("Radau")
-    <Integrator.RADAU: 'Radau'>
     """
 
     DOP853 = "DOP853"
@@ -59,24 +62,7 @@ class SimulationEventKind(Outcome):
 
 @dataclass(frozen=True, slots=True)
 class SimulationEvent:
-    """Event of a joint or a motor shaft.
-
-    Parameters
-    ----------
-    kind : SimulationEventKind
-        Kind.
-    t : float
-        Time, s.
-    joint : int
-        Column of q, from 0; for a coupled motor, the motor's joint.
-    motor : bool
-        Whether it concerns the shaft of a motor that several joints turn, see `Transmission`.
-
-    Examples
-    --------
-    >>> print(SimulationEvent(SimulationEventKind.STUCK, 0.25, 1))
-    0.25 s: joint 2 comes to rest and sticks
-    """
+    """Event at t (s) of a joint (from 0), or of the shaft of a motor that several joints turn."""
 
     kind: SimulationEventKind
     t: float
@@ -100,10 +86,8 @@ class Simulation(Value):
         The robot, n joints.
     t : ndarray, shape (N,)
         Times, s; they end early if the simulation did.
-    q, v, a : ndarray, shape (N, n)
-        Positions (rad or m), velocities, accelerations.
-    tau : ndarray, shape (N, n)
-        Torques of the control, N m or N.
+    q, v, a, tau : ndarray, shape (N, n)
+        Positions (rad or m), velocities, accelerations, torques of the control (N m or N).
     friction : ndarray, shape (N, n)
         Torques of viscous and dry friction, without the drives' offsets; for a joint that sticks,
         the reaction that holds it.
@@ -114,24 +98,11 @@ class Simulation(Value):
     control_work, friction_work, wrench_work : ndarray, shape (N,)
         Work since the start, J: of the control, on friction and the drives' offsets, and of the
         tool on the environment.
-    drive : bool
-        Whether the model's drives took part.
-    events : tuple of SimulationEvent
-        Stick, slip and limits, in the order of time.
-    status : SimulationStatus
-        Why it ended.
-    evaluations, steps : int
-        Numbers of evaluations of the model and of steps of the integrator.
+    drive, events, status, evaluations, steps
+        Whether drives took part; stick, slip and limits in the order of time; why it ended;
+        evaluations of the model and steps of the integrator.
     state : ndarray, shape (N, k)
         State of the control law; k = 0 without one.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.simulation import simulate
-    >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.2)
-    >>> motion.status, bool(motion.relative_drift < 1e-9)
-    (<SimulationStatus.FINISHED: 0>, True)
     """
 
     model: RobotModel
@@ -180,11 +151,7 @@ class Simulation(Value):
 
     @property
     def drift(self) -> Array:
-        """Error of the energy balance since the start, J, shape (N,).
-
-        ``kinetic + potential - control work + friction work + wrench work``, less its value at
-        the start: zero but for the errors of the integration.
-        """
+        """Error of the energy balance since the start, J, shape (N,): that of the integration."""
         change = (self.kinetic - self.kinetic[0]) + (self.potential - self.potential[0])
         return change - self.control_work + self.friction_work + self.wrench_work
 
@@ -197,11 +164,7 @@ class Simulation(Value):
 
     @property
     def relative_drift(self) -> float:
-        """Largest drift, relative to the energy turnover.
-
-        The turnover counts at least a millionth of the largest potential energy and 1e-9 J, so
-        that the value of an arm at rest is not the ratio of two rounding errors.
-        """
+        """Largest drift, relative to the turnover (at least 1e-6 potential energies and 1e-9 J)."""
         least = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
         return float(np.abs(self.drift).max()) / max(self.energy_turnover, least)
 

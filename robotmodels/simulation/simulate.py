@@ -50,11 +50,10 @@ def simulate(
 ) -> Simulation:
     """Simulate a robot under torques: integrate the direct dynamic model over time.
 
-    The integrator takes steps as large as the tolerances allow. Dry friction (Fc of the drives, Fcm
-    of coupled motors, jumps at rest of a friction model) is exact: a part that comes to rest is
-    held as long as the torque on it stays within its breakaway torques (by 1e-9 of them), and each
-    change is an event at which the integration starts anew. Energies and works are integrated
-    along: the drift of their balance measures the error of the integration.
+    Dry friction (Fc of the drives, Fcm of coupled motors, jumps at rest of a friction model) is
+    exact: a part that comes to rest is held as long as the torque on it stays within its breakaway
+    torques, and each change is an event at which the integration starts anew. Energies and works
+    are integrated along: the drift of their balance measures the error of the integration.
 
     Parameters
     ----------
@@ -69,8 +68,9 @@ def simulate(
     t : array_like
         A duration in seconds, with samples at the steps of the integrator; or ascending times (N,)
         of the samples, the first one the start.
-    wrench : callable, or array_like of shape (6,) or (N, 6), optional
-        Wrench of the tool on the environment, see `idm`; given as ``control``.
+    wrench, disturbance : callable, or array_like of shape (6,) or (N, 6), (n,) or (N, n), optional
+        Wrench of the tool on the environment, see `idm`, and torques of the surroundings on the
+        joints; given as ``control``.
     drive : bool
         Whether rotor inertia, friction and offsets of the model's drives take part.
     friction : Friction, optional
@@ -78,34 +78,25 @@ def simulate(
         own velocity.
     smoothing : array_like, scalar or shape (n,), optional
         Velocities w (rad/s or m/s) of a simpler model without events: ``tanh(v / w)`` instead of
-        ``sign(v)``. Joints creep where they should stick; narrow widths are stiff (use "Radau").
+        ``sign(v)``.
     stop_at_limits : bool
-        Whether the simulation ends where a joint reaches a finite limit of its table. Otherwise
-        limits are ignored.
+        Whether the motion ends where a joint reaches one of its limits.
     breaks : array_like, shape (K,)
-        Times at which ``control`` or ``wrench`` jump, such as the instants of a sampled controller:
-        the integration starts anew there. The value at a break belongs to the time after it.
+        Times at which a law jumps; the value at a break belongs to the time after it.
     method : Integrator or str
         Explicit ``DOP853`` (default) and ``RK45``, implicit ``Radau`` and ``BDF``.
-    rtol, atol : float
-        Tolerances of a step, relative and absolute (rad, m, per s, J).
-    max_step : float
-        Longest step, s, for laws with short pulses that are no ``breaks``.
+    rtol, atol, max_step : float
+        Tolerances of a step, relative and absolute (rad, m, per s, J), and the longest step, s, for
+        laws with short pulses that are no ``breaks``.
     max_evaluations : int, optional
         Evaluations of the model after which the simulation ends with a status. Default 100 000, and
-        10 000 for each second and 200 for each break or row of ``control``; free motion of an arm
-        needs about 1000 a second.
+        10 000 for each second and 200 for each break or row of ``control``.
     progress : bool or callable, optional
-        A function is called with the fraction done, about every hundredth; True writes it to the
-        log of Python.
-    period : float, optional
+        A function is called with the fraction done; True writes it to the log of Python.
+    period, delay : float, optional
         Sampling period of the control, s: its torques are held between samples, its state advances
-        by Euler steps. Default: continuous.
-    delay : float
-        Time from a sample to its torque, s; zero torque acts before the first.
-    disturbance : callable, or array_like of shape (n,) or (N, n), optional
-        Torques of the surroundings on the joints, given as functions of (t, q, v) or arrays. Their
-        work is counted with that of the wrench.
+        by Euler steps (default: continuous); time from a sample to its torque, s, zero torque
+        before the first.
 
     Returns
     -------
@@ -117,10 +108,9 @@ def simulate(
     SingularMassMatrixError, InertiaError
         A mass matrix that is singular or not positive definite at the start.
     ShapeError, InvalidValueError
-        Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
-        a start outside the limits, or so fast that its energy is not finite; limits requested that
-        no joint has; negative dry friction; joints that mimic others; a delay without a period, or
-        as long as the simulation.
+        Arguments, or answers of laws, of the wrong shape, with NaN or infinity; a start outside the
+        limits, or too fast; negative dry friction; joints that mimic others; a delay without a
+        period, or as long as the simulation.
 
     References
     ----------

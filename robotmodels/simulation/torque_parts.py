@@ -1,9 +1,4 @@
-"""Decomposition of the torques of a motion into inertia, Coriolis, gravity, friction and wrench.
-
-References
-----------
-Seed book sections 1.5.1.1 to 1.5.1.5.
-"""
+"""Decomposition of the torques of a motion (seed book sections 1.5.1.1 to 1.5.1.5)."""
 
 from __future__ import annotations
 
@@ -29,12 +24,9 @@ class TorqueParts(Rebuilt):
 
     Parameters
     ----------
-    inertia, coriolis, gravity : ndarray, shape (..., n)
-        ``M(q) a``, with rotors, ``C(q, v) v`` and ``g(q)``, N m or N.
-    friction : ndarray, shape (..., n)
-        Viscous and dry friction and offsets of the drives, and of a friction model.
-    wrench : ndarray, shape (..., n)
-        ``J^T wrench``.
+    inertia, coriolis, gravity, friction, wrench : ndarray, shape (..., n)
+        ``M(q) a`` with rotors, ``C(q, v) v``, ``g(q)``, friction and offsets, ``J^T wrench``; N m
+        or N.
     """
 
     inertia: Array
@@ -66,27 +58,13 @@ def torque_parts(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations of at least one sample; the
-        leading axes broadcast.
-    wrench : array_like, shape (..., 6), optional
-        Wrench of the tool on the environment, see `idm`.
-    drive : bool
-        Whether rotor inertia, friction and offsets of the model's drives are included.
-    friction : Friction, optional
-        A friction model that acts besides them.
+    model, q, v, a, wrench, drive, friction
+        As for `idm`: q, v, a (..., n) of at least one sample.
 
     Returns
     -------
     TorqueParts
         Arrays (..., n) of all of them.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity; a motion without samples.
 
     Examples
     --------
@@ -134,19 +112,6 @@ def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
     -------
     TorqueParts
         Arrays (N, n); the total is the torque of the control.
-
-    Raises
-    ------
-    InvalidValueError
-        Not a simulation.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.simulation import simulate
-    >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.1)
-    >>> bool(np.abs(simulated_torque_parts(motion).total).max() < 1e-12)
-    True
     """
     if not isinstance(simulation, Simulation):
         got = type(simulation).__name__
