@@ -74,5 +74,5 @@ MUTATIONS = [
     Mutation("simulation: feedback", "a sampled state is a step ahead", "def tick(self, t",
         "x = self._state = self._next", "x, self._state = self._state, self._next", FEEDBACK),
     Mutation("simulation: feedback", "a delay rounds up to whole periods", "def sample(self, ends",
-        "else acts + rest", "else acts + period", FEEDBACK),
+        "1e-9 * period else rest", "1e-9 * period else period", FEEDBACK),
 ]  # fmt: skip
