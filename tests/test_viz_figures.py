@@ -594,13 +594,6 @@ def test_plan_and_phase_plane_show_limits_that_exist():
     assert far.axes[0].get_ylim()[1] < 1.2 * data(far.axes[0], "quickest motion").max()
 
 
-def test_lines_of_a_title_are_of_similar_lengths():
-    text = "a sentence of many words that does not fit into a line, less than 2 %."
-    first, second = style.wrapped(text, 4.0).split("\n")
-    assert abs(len(first) - len(second)) < 12
-    assert style.wrapped("a\n\nb", 4.0) == "a\n\nb"
-
-
 # ---------------------------------------------------------------- mistakes
 
 T3 = np.broadcast_to(np.eye(4), (3, 4, 4))
@@ -635,7 +628,7 @@ MISTAKES = (
     (lambda: viz.plot_pose_path(np.eye(4)), r"poses: expected shape \(N, 4, 4\)"),
     (lambda: viz.plot_pose_path(T3, eventful_path()), "path: .* these 3 poses, got 40"),
     (lambda: viz.plot_pose_path(T3, unit="rad"), "unit: expected a length"),
-    (lambda: viz.plot_pose_path(T3, frame_size=0.0), "frame_size: expected a positive length"),
+    (lambda: viz.plot_pose_path(T3, frame_size=0.0), "frame_size: .* above 0"),
     (lambda: viz.plot_pose_path(T3, frames=-1), "frames: expected how many"),
     (lambda: viz.plot_joint_motion(SCARA, [], np.zeros((0, 3))), r"t: expected shape \(N,\)"),
     (lambda: viz.plot_joint_motion(SCARA, [0.0], {"a": [0.0]}), r"q of 'a': .* shape \(1, 3\)"),

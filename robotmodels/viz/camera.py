@@ -24,17 +24,10 @@ class Camera:
 
     Parameters
     ----------
-    target : ndarray, shape (3,)
-        Centre of the view and of its rotation, world axes, metres.
-    position : ndarray, shape (3,)
-        Position of the camera, world axes, metres.
+    target, position : ndarray, shape (3,)
+        Centre of the view and of its rotation, and position of the camera, world axes, metres.
     depth : float
         Extent of the drawn points behind the target, metres.
-
-    Examples
-    --------
-    >>> Camera(np.zeros(3), np.array([2.0, 0.0, 0.0])).distance
-    2.0
     """
 
     target: Array

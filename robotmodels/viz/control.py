@@ -6,23 +6,16 @@ Parameters
 ----------
 run : ControlledMotion
     As `robotmodels.control.run` gives it; for `plot_surface` of a law with a surface.
-title, size
-    Text over the figure; its width and height in inches, shape (2,).
 walls : SpringWall or sequence of SpringWall
     Walls that are drawn.
 length : float, optional
     Length of the arrow of the largest force, m; default some part of the scene.
-**options
-    As for `animate`.
+**look, **options
+    ``title`` and ``size``, see `robotmodels.viz`; options as for `animate`.
 
 Returns
 -------
 matplotlib.figure.Figure or Scene
-
-Raises
-------
-InvalidValueError
-    A run that is no ControlledMotion; a law without a surface.
 
 References
 ----------
@@ -46,10 +39,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_number
@@ -57,12 +49,13 @@ from ..control import ControlledMotion, SpringWall
 from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..trajectories import Samples
-from ..visual import Box, Cylinder
+from ..visual import Box, Cylinder, z_along
 from . import over_time, style
 from .motion import Track, keyframes
 from .scene import Scene
 from .shapes import Node, Triangles, along_bars, moving_chain
 from .show import animate
+from .style import Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,20 +68,22 @@ _ARROW = (0.85, 0.2, 0.1, 1.0)
 _WALL = (0.45, 0.55, 0.7, 0.45)
 
 
+def _as_run(run: Any) -> ControlledMotion:
+    """The run, checked."""
+    return style.as_instance(run, ControlledMotion, "run", "control.run")
+
+
 @style.plot
-def plot_control(
-    run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_control(run: ControlledMotion, **look: Unpack[Look]) -> Figure:
     """Error, torques, force on the environment and Lyapunov function of a run over time."""
-    run = style.as_instance(run, ControlledMotion, "run", "control.run")
-    names = over_time.joint_names(None, run.q.shape[1], run.simulation.model)
+    model = _as_run(run).simulation.model
+    names, efforts = over_time.joint_names(None, model.n, model), over_time.effort_units(model)
     count = run.error.shape[1]
     rows = getattr(getattr(run.law, "inner", run.law), "rows", ())
     errors = names if count == len(names) else [f"component {k + 1}" for k in range(count)]
     if getattr(run.law, "space", "") != "joint" and len(rows) == count:
         errors = _COMPONENTS[rows].tolist()
-    slides = over_time.is_prismatic(run.simulation.model)
-    unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
+    unit = " or ".join(u for u in ("N m", "N") if u in efforts)
     felt = np.abs(run.wrench).max(axis=0) > 1e-9 * max(np.abs(run.wrench).max(), 1e-9)
     force = "force, moment\n(N, N m)" if felt[3:].any() else "force (N)"
     V = np.empty((len(run.t), 0)) if run.lyapunov is None else run.lyapunov[:, None]
@@ -98,22 +93,19 @@ def plot_control(
         (force, run.wrench[:, felt], _FORCES[felt].tolist()),
         ("V", V, ["V"]),
     ]
-    return _figure(run.t, [panel for panel in panels if panel[1].size], title, size)
+    return _figure(run.t, [panel for panel in panels if panel[1].size], look)
 
 
 @style.plot
-def plot_surface(
-    run: ControlledMotion, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_surface(run: ControlledMotion, **look: Unpack[Look]) -> Figure:
     """The surface ``s = e' + slope e`` of sliding modes, passivity and adaptive control."""
-    run = style.as_instance(run, ControlledMotion, "run", "control.run")
-    if (s := run.surface) is None:
+    if (s := _as_run(run).surface) is None:
         raise InvalidValueError(
             f"run: {type(run.law).__name__} has no surface; sliding modes, passivity and adaptive "
             "control have one."
         )
     names = over_time.joint_names(None, s.shape[1], run.simulation.model)
-    return _figure(run.t, [("s (rad/s or m/s)", s, names)], title, size)
+    return _figure(run.t, [("s (rad/s or m/s)", s, names)], look)
 
 
 def animate_control(
@@ -124,11 +116,9 @@ def animate_control(
     **options: Any,
 ) -> Scene:
     """Draw the robot of a run as it moves, with the force on the environment as an arrow."""
-    run = style.as_instance(run, ControlledMotion, "run", "control.run")
-    sim, still = run.simulation, 0.0 * run.q
+    sim, still = _as_run(run).simulation, 0.0 * run.q
     moving = animate(sim.model, Samples(run.t, run.q, run.v, sim.a, still), **options)
-    if moving.motion is None:  # animations have one
-        return moving
+    assert moving.motion is not None
     tips, size = dgm(sim.model, run.q)[:, :3, 3], 0.15 * moving.camera.distance
     size = size if length is None else as_number(length, "length", above=0.0)
     nodes, tracks = _arrow(run.t - run.t[0], tips, run.wrench[:, :3], size)
@@ -139,28 +129,21 @@ def animate_control(
     return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)
 
 
-def _figure(
-    t: Array, panels: Sequence[tuple[str, Array, list[str]]], title: str | None, size: Any
-) -> Figure:
+def _figure(t: Array, panels: Sequence[tuple[str, Array, list[str]]], look: Look) -> Figure:
     """Panels over each other with one axis of time."""
-    figure, grid = style.panel_list(len(panels), 1, 1.6, size)
+    figure, grid = style.panel_list(len(panels), 1, 1.6, look)
     shown = [""]
     for axes, (label, values, names) in zip(grid, panels, strict=True):
-        axes.axhline(0.0, **style.ZERO)
         # hidden from the legend of the figure: each panel has its own
-        over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names])
+        over_time.lines_over_time(axes, t, values, [f"_{name}" for name in names], zero=True)
         axes.set_ylabel(label)
         if names not in ([label], shown):  # the same names have the legend of the panel above
             shown, lines = names, axes.get_lines()[-len(names) :]
-            rows = ceil(len(names) * (max(map(len, names)) + 9.0) / _LETTERS)
-            axes.legend(
-                lines,
-                names,
-                loc="lower right",
-                bbox_to_anchor=(1, 1),
-                ncols=ceil(len(names) / rows),
-            )
-    return style.finished(figure, title)
+            columns = int(_LETTERS / (max(map(len, names)) + 9.0))
+            columns = ceil(len(names) / ceil(len(names) / columns))
+            place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1)}
+            axes.legend(lines, names, ncols=columns, **place)
+    return style.finished(figure, look)
 
 
 def _arrow(t: Array, tips: Array, force: Array, size: float) -> tuple[list[Node], list[Track]]:
@@ -172,15 +155,14 @@ def _arrow(t: Array, tips: Array, force: Array, size: float) -> tuple[list[Node]
     nodes, tracks = moving_chain("force", "xyzzy", t, along_bars(tips, tips + seen))
     times, along = keyframes(t, (size * norms / norms.max())[:, None])
     path = nodes[-1].path
-    ring = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
-    circle = 0.045 * size * np.column_stack([np.cos(ring), np.sin(ring), 0.0 * ring])
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+    circle = 0.045 * size * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
     points = np.vstack([circle, [[0.0, 0.0, 0.0], [0.0, 0.0, 0.13 * size]]]).astype(np.float32)
     sides = [(k, (k + 1) % 24, apex) for k in range(24) for apex in (24, 25)]
-    shapes = [(f"piece_{k}", (k + 0.5) / _PIECES) for k in range(_PIECES)] + [("head", 1.0)]
-    for name, part in shapes:
+    rod, head = Cylinder(0.015 * size, size / _PIECES), Triangles(points, np.array(sides))
+    pieces = [(f"piece_{k}", (k + 0.5) / _PIECES, rod) for k in range(_PIECES)]
+    for name, part, shape in (*pieces, ("head", 1.0, head)):
         at = f"{path}/{name}"
-        rod = Cylinder(0.015 * size, size / _PIECES)
-        shape = rod if name != "head" else Triangles(points, np.array(sides, dtype=np.uint32))
         nodes += [Node(at, se3.translation(0.0, 0.0, part * along[0, 0]))]
         nodes += [Node(f"{at}/shape", np.eye(4), shape, _ARROW)]
         tracks.append(Track(at, True, times, part * along[:, 0]))
@@ -190,10 +172,6 @@ def _arrow(t: Array, tips: Array, force: Array, size: float) -> tuple[list[Node]
 def _wall(wall: SpringWall, tips: Array, size: float, path: str) -> Node:
     """A square plate below the surface, at the point nearest to the path of the tool."""
     above = (tips - wall.point) @ wall.normal
-    centre = tips[above.argmin()] - above.min() * wall.normal
-    pose, thin = np.eye(4), 0.03 * size
-    side = np.cross(wall.normal, np.eye(3)[np.abs(wall.normal).argmin()])
-    side /= np.linalg.norm(side)
-    pose[:3, :3] = np.column_stack([side, np.cross(wall.normal, side), wall.normal])
-    pose[:3, 3] = centre - 0.5 * thin * wall.normal
+    pose, thin = z_along(wall.normal), 0.03 * size
+    pose[:3, 3] = tips[above.argmin()] - (above.min() + 0.5 * thin) * wall.normal
     return Node(path, pose, Box((1.6 * size, 1.6 * size, thin)), _WALL)

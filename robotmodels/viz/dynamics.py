@@ -1,5 +1,36 @@
 """Figures of dynamics: the parts of torques, the energy balance of a simulation, inertia maps.
 
+Parameters
+----------
+model : RobotModel
+    The robot, n joints; of a simulation its own.
+motion : Trajectory, Samples or Simulation
+    One motion of n joints. A simulation brings its own friction, wrench and drives.
+wrench : array_like, shape (6,), optional
+    Constant wrench that the tool exerts on the environment, see `idm`.
+drive : bool
+    Whether rotor inertia, friction and offsets of the model's drives are included.
+friction : Friction, optional
+    A friction model that acts besides them.
+joints : sequence of int, optional
+    Which joints, columns of q from 0; default all.
+columns : int, optional
+    How many panels stand in a row; default one, or two from five joints on.
+simulation : Simulation
+    As `simulate` gives it. Many samples make smooth lines: give it times.
+events : bool
+    Whether thin lines mark where joints stick and break away.
+grid : DynamicsMap
+    As `dynamics_map` gives it.
+of : int, optional
+    Of two joints that vary: whose gravity torque and inertia, from 0; default the first.
+pair : array_like of int, shape (2,), optional
+    Of two joints that vary: whose coupling, from 0; default these two.
+degrees : bool
+    Whether angles are in degrees instead of radians.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
+
 Returns
 -------
 matplotlib.figure.Figure
@@ -7,13 +38,25 @@ matplotlib.figure.Figure
 References
 ----------
 Seed book sections 1.5.1.1 to 1.5.1.5.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> from robotmodels.simulation import dynamics_map
+>>> from robotmodels.trajectories import quintic
+>>> move = quintic(np.zeros(6), np.ones(6), duration=1.0)
+>>> figure = plot_torque_parts(load("rx90"), move, joints=[0, 1])
+>>> [axes.get_title(loc="left") for axes in figure.axes]
+['joint_1 (N m)', 'joint_2 (N m)']
+>>> len(plot_inertia_map(dynamics_map(load("rx90"), 2)).axes)
+3
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +71,7 @@ from ..simulation.torque_parts import TorqueParts, simulated_torque_parts, torqu
 from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Unit
-from .style import COLUMN, DASHED, INK, PAGE, PALE, ZERO
+from .style import COLUMN, DASHED, INK, PAGE, PALE, ZERO, Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +85,6 @@ _PARTS = (
 )
 _MARKED = (SimulationEventKind.STUCK, SimulationEventKind.BROKE_AWAY)
 _MOST_MARKS = 40  # more would hide the lines
-_PREFIXES = (("MJ", 1e-6), ("kJ", 1e-3), ("J", 1.0), ("mJ", 1e3), ("µJ", 1e6), ("nJ", 1e9))
 _PAIRS, _LEAST = 5, 0.005  # most lines of coupling, and the least coupling that is drawn
 _SPREAD = 50.0  # ratio of inertias from which on their axis is logarithmic
 _ROUNDING = 1e-12
@@ -58,62 +100,33 @@ def plot_torque_parts(
     friction: Friction | None = None,
     joints: Sequence[int] | None = None,
     columns: int | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Torques of a motion split into inertia, Coriolis, gravity, friction and wrench, by joint.
 
     A panel for each joint; parts that are zero for all of them have no line.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints; of a simulation its own.
-    motion : Trajectory, Samples or Simulation
-        One motion of n joints. A simulation brings its own friction, wrench and drives.
-    wrench : array_like, shape (6,), optional
-        Constant wrench that the tool exerts on the environment, see `idm`.
-    drive : bool
-        Whether rotor inertia, friction and offsets of the model's drives are included.
-    friction : Friction, optional
-        A friction model that acts besides them.
-    joints : sequence of int, optional
-        Which joints, columns of q from 0; default all.
-    columns : int, optional
-        How many panels stand in a row; default one, or two from five joints on.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import quintic
-    >>> move = quintic(np.zeros(6), np.ones(6), duration=1.0)
-    >>> figure = plot_torque_parts(load("rx90"), move, joints=[0, 1])
-    >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['joint_1 (N m)', 'joint_2 (N m)']
     """
     check_model(model)
     times, parts = _split(model, motion, wrench, drive, friction)
     if not model.n:
         raise InvalidValueError("model: there are no joints to draw.")
-    shown = style.as_choice(
-        range(model.n) if joints is None else joints, model.n, "joints", "joints"
-    )
-    names, prismatic = over_time.joint_names(None, model.n, model), over_time.is_prismatic(model)
-    total = parts.total[:, shown]
-    least = _ROUNDING * np.abs(total).max(axis=0, initial=0.0)
+    every = range(model.n) if joints is None else joints
+    shown = style.as_choice(every, model.n, "joints", "joints")
+    names, efforts = over_time.joint_names(None, model.n, model), over_time.effort_units(model)
+    least = _ROUNDING * np.abs(parts.total[:, shown]).max(axis=0, initial=0.0)
     values = [getattr(parts, field)[:, shown] for field, _ in _PARTS]
     present = [k for k, part in enumerate(values) if (np.abs(part) > least).any()]
+    labels = [_PARTS[part][1] for part in present]
     wide = style.as_columns(columns, len(shown), 1 if len(shown) < 5 else 2)
-    figure, order = style.panel_list(len(shown), wide, 1.1, size)
+    figure, order = style.panel_list(len(shown), wide, 1.1, look)
     for k, (axes, j) in enumerate(zip(order, shown, strict=True)):
-        axes.axhline(0.0, **ZERO)
-        lines = np.stack([values[part][:, k] for part in present] or [np.zeros_like(times)], axis=1)
-        labels = [_PARTS[part][1] for part in present] or ["_none"]
-        over_time.lines_over_time(axes, times, lines, labels, present or [0])
-        look = {"marker": "" if len(times) > 1 else "o", "color": INK, "linewidth": 1.8}
-        axes.plot(times, total[:, k], alpha=0.85, zorder=1.9, label="total", **look)
-        axes.set_title(f"{names[j]} ({'N' if prismatic[j] else 'N m'})", loc="left")
-    return style.finished(figure, title)
+        lines = np.array([values[part][:, k] for part in present]).reshape(-1, len(times)).T
+        over_time.lines_over_time(axes, times, lines, labels, present, zero=True)
+        total = {"marker": "" if len(times) > 1 else "o", "color": INK, "linewidth": 1.8}
+        total |= {"alpha": 0.85, "zorder": 1.9, "label": "total"}
+        axes.plot(times, parts.total[:, j], **total)
+        axes.set_title(f"{names[j]} ({efforts[j]})", loc="left")
+    return style.finished(figure, look)
 
 
 def _split(
@@ -145,33 +158,16 @@ def plot_energy(
     simulation: Simulation,
     *,
     events: bool = True,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Energies and works of a simulated motion, and the drift of their balance.
 
     The sum of kinetic energy, change of potential energy, work of friction and work of the tool on
     the environment, less the work of the control, is constant; the lower panel has its drift, which
     is the error of the integration. Terms that are zero all the time have no line.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        As `simulate` gives it. Many samples make smooth lines: give it times.
-    events : bool
-        Whether thin lines mark where joints stick and break away.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.simulation import simulate
-    >>> fall = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=np.linspace(0.0, 0.2, 51))
-    >>> figure = plot_energy(fall)
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['kinetic energy', 'potential energy', 'sum']
     """
     sim = style.as_instance(simulation, Simulation, "simulation", "simulate")
-    figure, grid = style.panels(COLUMN, 3.4, size, 2, sharex=True, height_ratios=[2.6, 1.0])
+    figure, grid = style.panels(COLUMN, 3.4, look, 2, sharex=True, height_ratios=[2.6, 1.0])
     upper, lower = grid[:, 0]
     unit, factor = _unit(sim.energy_turnover)
     terms = {
@@ -190,19 +186,21 @@ def plot_energy(
     upper.set_ylabel(f"energy ({unit})")
     unit, factor = _unit(float(np.abs(sim.drift).max()))
     lower.plot(sim.t, factor * sim.drift, marker=marker, color=INK, label="_drift")
-    lower.set_ylabel(f"drift ({unit})")
-    lower.set_xlabel("time (s)")
+    lower.set(xlabel="time (s)", ylabel=f"drift ({unit})")
     marked = [event.t for event in sim.events if event.kind in _MARKED] if events else []
     for t in marked[-_MOST_MARKS:]:
         for axes in (upper, lower):
             axes.axvline(t, color=PALE, linewidth=0.8, zorder=1.2, label="_event")
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def _unit(most: float) -> tuple[str, float]:
     """A unit in which an energy is easy to read, and its factor."""
-    readable = [(unit, factor) for unit, factor in _PREFIXES if most * factor >= 1.0]
-    return readable[0] if readable else ("J", 1.0) if most == 0.0 else ("pJ", 1e12)
+    from matplotlib.ticker import EngFormatter
+
+    prefixes = EngFormatter.ENG_PREFIXES
+    power = 3 * int(np.clip(np.floor(np.log10(most) / 3.0), -4, 2)) if most > 0.0 else 0
+    return f"{prefixes[power]}J", 10.0**-power
 
 
 @style.plot
@@ -212,79 +210,56 @@ def plot_inertia_map(
     of: int | None = None,
     pair: ArrayLike | None = None,
     degrees: bool = True,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Gravity torques, diagonal inertia and coupling over one or two joints.
 
     Over one joint: lines of all joints, and of the pairs of joints that are coupled most. Over two
     joints: three maps, of one joint and one pair. Coupling is ``M_ij / sqrt(M_ii M_jj)``, without
     unit: 0 where neither joint feels the other's acceleration, 1 where they move one body.
-
-    Parameters
-    ----------
-    grid : DynamicsMap
-        As `dynamics_map` gives it.
-    of : int, optional
-        Of two joints that vary: whose gravity torque and inertia, from 0; default the first.
-    pair : array_like of int, shape (2,), optional
-        Of two joints that vary: whose coupling, from 0; default these two.
-    degrees : bool
-        Whether angles are in degrees instead of radians.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.simulation import dynamics_map
-    >>> figure = plot_inertia_map(dynamics_map(load("rx90"), 2))
-    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
-    ['gravity torque (N m)', 'inertia (kg m²)', 'coupling (no unit)']
     """
     style.as_instance(grid, DynamicsMap, "grid", "dynamics_map")
-    names = over_time.joint_names(None, grid.model.n, grid.model)
-    if len(grid.joints) > 1:
-        joint = (
-            [grid.joints[0]] if of is None else style.as_choice([of], grid.model.n, "of", "a joint")
+    n, joints = grid.model.n, grid.joints
+    names, kinds = [
+        [every[j] for j in joints]
+        for every in (
+            over_time.joint_names(None, n, grid.model),
+            over_time.joint_units(None, n, grid.model, degrees),
         )
-        two = list(grid.joints) if pair is None else pair
-        two = style.as_choice(np.atleast_1d(two), grid.model.n, "pair", "two different joints")
+    ]
+    if len(joints) > 1:
+        (joint,) = style.as_choice([joints[0] if of is None else of], n, "of", "a joint")
+        two = np.atleast_1d(list(joints) if pair is None else pair)
+        two = style.as_choice(two, n, "pair", "two different joints")
         if len(two) != 2:
             raise InvalidValueError(f"pair: expected two different joints, got {pair!r:.60}.")
-        return _maps(grid, names, joint[0], two, degrees, title, size)
+        return _maps(grid, names, kinds, joint, two, look)
     if of is not None or pair is not None:
         raise InvalidValueError(
             "of, pair: these choose what is on a map over two joints; over one joint all lines are "
             "drawn."
         )
-    return _lines(grid, names, degrees, title, size)
+    return _lines(grid, f"{names[0]} ({kinds[0].value})", kinds[0].factor, look)
 
 
-def _lines(
-    grid: DynamicsMap, names: list[str], degrees: bool, title: str | None, size: Any
-) -> Figure:
+def _lines(grid: DynamicsMap, label: str, factor: float, look: Look) -> Figure:
     """Lines over one joint."""
-    n, prismatic = grid.model.n, over_time.is_prismatic(grid.model)
-    factor, unit = _axis(grid, 0, degrees)
-    x = factor * grid.ranges[0]
-    figure, places = style.panels(COLUMN, 4.6, size, 3, sharex=True)
+    n, x = grid.model.n, factor * grid.ranges[0]
+    names, efforts = over_time.joint_names(None, n, grid.model), over_time.effort_units(grid.model)
+    figure, places = style.panels(COLUMN, 4.6, look, 3, sharex=True)
     gravity, inertia, coupling = places[:, 0]
     diagonal = np.einsum("kii->ki", grid.mass)
-    labels = names if n > 1 else ["_only"]
-    over_time.lines_over_time(gravity, x, grid.gravity, labels)
-    over_time.lines_over_time(inertia, x, diagonal, labels)
+    labels, units = (names if n > 1 else ["_only"]), [u for u in ("N m", "N") if u in efforts]
+    for axes, what, values, symbols in (
+        (gravity, "gravity torque", grid.gravity, {"N m": "N m", "N": "N"}),
+        (inertia, "inertia", diagonal, {"N m": "kg m²", "N": "kg"}),
+    ):
+        over_time.lines_over_time(axes, x, values, labels)
+        axes.set_ylabel(f"{what}\n({' or '.join(symbols[unit] for unit in units)})")
     if (diagonal > 0.0).all() and diagonal.max() > _SPREAD * diagonal.min():
         inertia.set_yscale("log")
-    some = (not prismatic.all(), bool(prismatic.any()))
-    for axes, what, symbols in (
-        (gravity, "gravity torque", ("N m", "N")),
-        (inertia, "inertia", ("kg m²", "kg")),
-    ):
-        mixed = " or ".join(s for s, there in zip(symbols, some, strict=True) if there)
-        axes.set_ylabel(f"{what}\n({mixed})")
-    coupling.set_ylabel("coupling\n(no unit)")
-    coupling.set_ylim(-1.08, 1.08)
+    coupling.set(xlabel=label, ylabel="coupling\n(no unit)", ylim=(-1.08, 1.08))
     coupling.axhline(0.0, **ZERO)
-    coupling.set_xlabel(f"{names[grid.joints[0]]} ({unit})")
     pairs = {
         (i, j): float(np.nan_to_num(np.abs(grid.coupling[:, i, j])).max())
         for i, j in combinations(range(n), 2)
@@ -298,32 +273,31 @@ def _lines(
         figure.legend(coupling.get_lines()[1:], both, loc="outside lower center", ncols=2)
     else:
         style.note(coupling, "no coupling" if pairs else "one joint: no coupling")
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def _maps(
     grid: DynamicsMap,
-    names: list[str],
+    varied: Sequence[str],
+    kinds: Sequence[Unit],
     joint: int,
     pair: Sequence[int],
-    degrees: bool,
-    title: str | None,
-    size: Any,
+    look: Look,
 ) -> Figure:
     """Maps over two joints."""
     i, j = pair
+    names = over_time.joint_names(None, grid.model.n, grid.model)
     long = over_time.is_prismatic(grid.model)[joint]
-    figure, places = style.panels(PAGE, 2.55 if title is None else 2.8, size, 1, 3, sharey=True)
-    torque = grid.gravity[..., joint]
-    tiny = _ROUNDING * float(np.abs(grid.gravity).max(initial=0.0))
+    height = 2.8 if look.get("title") else 2.55
+    figure, places = style.panels(PAGE, height, look, 1, 3, sharey=True)
+    torque, tiny = grid.gravity[..., joint], _ROUNDING * float(np.abs(grid.gravity).max(initial=0))
     coupling, inertia = grid.coupling[..., i, j], grid.mass[..., joint, joint]
     maps = (
         (f"gravity torque\nof {names[joint]}", "(N)" if long else "(N m)", torque, tiny, True),
         (f"inertia\nof {names[joint]}", "(kg)" if long else "(kg m²)", inertia, 0.0, False),
         (f"coupling\n{names[i]}, {names[j]}", "no unit", coupling, _ROUNDING, True),
     )
-    (x_factor, x_unit), (y_factor, y_unit) = (_axis(grid, k, degrees) for k in (0, 1))
-    x, y = x_factor * grid.ranges[0], y_factor * grid.ranges[1]
+    x, y = (unit.factor * values for unit, values in zip(kinds, grid.ranges, strict=True))
     for axes, (label, unit, values, rounding, signed) in zip(places[0], maps, strict=True):
         # rounding errors would be stretched to all colours of a map
         values = np.where(np.abs(values) <= rounding, 0.0, values)
@@ -335,16 +309,6 @@ def _maps(
         elif not most:
             style.note(axes, "zero everywhere" if finite.size else "a joint moves\nno inertia")
         axes.set_title(style.wrapped(label, PAGE / 3.0 - 0.6))
-        axes.set_xlabel(f"{names[grid.joints[0]]} ({x_unit})")
-        for axis, symbol in ((axes.xaxis, x_unit), (axes.yaxis, y_unit)):
-            style.few_numbers(axis, symbol)
-    places[0, 0].set_ylabel(f"{names[grid.joints[1]]} ({y_unit})")
-    return style.finished(figure, title)
-
-
-def _axis(grid: DynamicsMap, k: int, degrees: bool) -> tuple[float, str]:
-    """Factor and symbol of the unit of a joint that varies."""
-    if over_time.is_prismatic(grid.model)[grid.joints[k]]:
-        return 1.0, Unit.METRE.value
-    unit = Unit.DEGREE if degrees else Unit.RADIAN
-    return unit.factor, unit.value
+        style.joint_axes(axes, varied, kinds)
+        axes.label_outer()
+    return style.finished(figure, look)

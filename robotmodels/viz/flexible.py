@@ -10,31 +10,32 @@ q, e : array_like, shape (..., n) and (..., m), optional
     Configurations, drawn over each other; default zero. Of `plot_frequencies` the other joints.
 scale : float
     Factor by which deflections are exaggerated.
-grid : bool
-    Whether the floor and the axes of the world are drawn.
-height : int
-    Of the picture in a notebook, pixels.
+grid, height : bool and int
+    Whether the floor and the axes of the world are drawn; pixels in a notebook.
 joint : int
     Which joint moves, from 0.
 span : array_like, shape (2,)
     Its range, rad or m.
 joints : str
     ``"locked"`` or ``"free"``, see `robotmodels.flexible.natural_frequencies`.
-title : str, optional
-    Text over the figure.
-size : array_like, shape (2,), optional
-    Width and height, inches.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Vectors of another length; a scale that is not positive; a joint that does not exist; something
-    that is no flexible robot or link, or a link without modes that move its axis.
+Returns
+-------
+Scene or matplotlib.figure.Figure
+
+Examples
+--------
+>>> from robotmodels import load, flexible
+>>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
+>>> show_flexible(arm, np.zeros(6), [0.0, 0.05]).paths[0]
+'configuration_1/row_3'
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,11 +44,11 @@ from .._arrays import Array, as_exact, as_number, as_vector
 from ..errors import InvalidValueError
 from ..flexible import FlexibleLink, FlexibleRobot, dgm, link_poses, natural_frequencies
 from ..visual import Color, characteristic_length
-from . import style
+from . import over_time, style
 from .camera import framed
 from .scene import Scene
 from .shapes import Node, apply, floor_grid, path_tube
-from .style import PALETTE, as_instance
+from .style import COLUMN, PALETTE, ZERO, Look, as_instance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,20 +66,7 @@ def show_flexible(
     grid: bool = True,
     height: int = 480,
 ) -> Scene:
-    """Draw a flexible robot: bent links as swept tubes in colour, rigid ones grey.
-
-    Returns
-    -------
-    Scene
-        The picture.
-
-    Examples
-    --------
-    >>> from robotmodels import load, flexible
-    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
-    >>> show_flexible(arm, np.zeros(6), [0.0, 0.05]).paths[0]
-    'configuration_1/row_3'
-    """
+    """Draw a flexible robot: bent links as swept tubes in colour, rigid ones grey."""
     as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
     q = as_vector(np.zeros(arm.n) if q is None else q, arm.n, "q")
     e = as_vector(np.zeros(arm.m) if e is None else e, arm.m, "e")
@@ -112,31 +100,22 @@ def show_flexible(
 
 
 @style.plot
-def plot_modes(
-    link: FlexibleLink, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
-    """Mode shapes of a link: displacements along its axis, with their frequencies.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-    """
+def plot_modes(link: FlexibleLink, **look: Unpack[Look]) -> Figure:
+    """Mode shapes of a link: displacements along its axis, with their frequencies."""
     as_instance(link, FlexibleLink, "link", "robotmodels.flexible")
     along = np.linalg.norm(link.nodes - link.nodes[0], axis=1)
     moved = [c for c in range(link.m) if np.abs(link.shapes[..., c]).max() > 0.0]
     if not moved:
         raise InvalidValueError("link: no mode moves the axis of this link; there is no figure.")
-    figure, axes = style.panels(style.COLUMN, 2.4, size)
+    figure, ((axes,),) = style.panels(COLUMN, 2.4, look)
     for k, c in enumerate(moved):
         shape = link.shapes[..., c]
         axis = int(np.abs(shape).max(axis=0).argmax())
         label = f"along {'xyz'[axis]}, {link.frequencies[c]:.4g} rad/s"
-        axes[0, 0].plot(along, shape[:, axis], label=label, **style.line(k))
-    axes[0, 0].axhline(0.0, **style.ZERO)
-    axes[0, 0].set_xlabel("distance from the root (m)")
-    axes[0, 0].set_ylabel("displacement (m)")
-    return style.finished(figure, title, ["modes"])
+        axes.plot(along, shape[:, axis], label=label, **style.line(k))
+    axes.axhline(0.0, **ZERO)
+    axes.set(xlabel="distance from the root (m)", ylabel="displacement (m)")
+    return style.finished(figure, look, ["modes"])
 
 
 @style.plot
@@ -146,16 +125,9 @@ def plot_frequencies(
     span: ArrayLike = (-np.pi, np.pi),
     q: ArrayLike | None = None,
     joints: str = "locked",
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
-    """Natural frequencies of an arm over the range of a joint.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-    """
+    """Natural frequencies of an arm over the range of a joint."""
     as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
     (column,) = style.as_choice([joint], arm.n, "joint", "a number")
     low, high = as_exact(span, (2,), "span")
@@ -163,10 +135,10 @@ def plot_frequencies(
     many = np.tile(np.zeros(arm.n) if q is None else as_exact(q, (arm.n,), "q"), (61, 1))
     many[:, column] = places
     found = natural_frequencies(arm, many, joints)
-    figure, axes = style.panels(style.COLUMN, 2.4, size)
+    figure, ((axes,),) = style.panels(COLUMN, 2.4, look)
     for k in range(arm.n if joints == "free" else 0, found.shape[1]):
-        axes[0, 0].plot(places, found[:, k], label=f"_{k}", color=PALETTE[k % 8], linewidth=1.2)
-    axes[0, 0].set_xlabel(f"joint {column + 1} (rad or m)")
-    axes[0, 0].set_ylabel("natural frequency (rad/s)")
-    axes[0, 0].set_yscale("log")
-    return style.finished(figure, title)
+        axes.plot(places, found[:, k], label=f"_{k}", color=PALETTE[k % 8], linewidth=1.2)
+    unit = over_time.joint_units(None, arm.n, arm.model)[column].value
+    axes.set(xlabel=f"{arm.model.table.joint_names[column]} ({unit})", yscale="log")
+    axes.set_ylabel("natural frequency (rad/s)")
+    return style.finished(figure, look)

@@ -6,6 +6,10 @@ result : IdentificationResult
     Of `identification.fit`.
 test : Log, optional
     Held-out log of the same joints.
+found : ExcitingTrajectory
+    Of `identification.excitation.exciting_trajectory`.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
 
 Returns
 -------
@@ -22,43 +26,36 @@ Examples
 >>> result = fit(*example_log())
 >>> [axes.get_ylabel() for axes in plot_identification_torques(result).axes]
 ['torque (N m)', 'torque (N m)']
->>> plot_identification_residuals(result).axes[0].get_ylabel()
-'residual (N m)'
 >>> [axes.get_title() for axes in plot_identification_parameters(result).axes]
 ['bodies', 'drives and friction']
->>> plot_identification_standard_errors(result).axes[0].get_ylabel()
-'relative standard error (%)'
->>> plot_identification_correlations(result).axes[1].get_ylabel()
-'correlation'
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..dynamics import idm
 from ..errors import ShapeError
-from ..geometry import PRISMATIC
 from ..identification.equations import Equations
 from ..identification.excitation import ExcitingTrajectory
 from ..identification.excitation.result import ExcitationStatus
-from ..identification.report_tables import effort_units, group_names, group_units
+from ..identification.report_tables import group_names, group_units
 from ..identification.residuals import residual_diagnostics
 from ..identification.result import IdentificationResult, check_result, predicted_torque, validate
 from ..identification.signals import piece_signals, pieces
 from ..identification.weak_parameters import WEAK
 from ..logs import Log
 from . import over_time, style
-from .style import BAND, DASHED, INK, PAGE, PALE, PALETTE, ZERO
+from .style import BAND, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_WORDS = ("measured", "predicted", "measured less predicted")
 _BAND: dict[str, Any] = {"color": BAND, "linewidth": 0.0, "zorder": 0.5}
 _POINTS = 700  # groups of samples of a log that are drawn
 _RESIDUALS = 4000  # residuals that are drawn
@@ -78,11 +75,7 @@ def as_result(result: Any, test: Any = None) -> IdentificationResult:
 
 @style.plot
 def plot_identification_torques(
-    result: IdentificationResult,
-    test: Log | None = None,
-    *,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    result: IdentificationResult, test: Log | None = None, **look: Unpack[Look]
 ) -> Figure:
     """Measured and predicted torques over time and their difference, a row for each joint.
 
@@ -94,63 +87,50 @@ def plot_identification_torques(
     logs = [("fitted", found.equations.log, found.validation.in_sample)]
     if test is not None:
         logs.append(("held out", test, validate(found, test)))
-    n, units = found.model.n, effort_units(found.model)
+    n, names = found.model.n, found.model.table.joint_names
     widths = [max(log.duration, 0.25 * logs[0][1].duration) for _, log, _ in logs]
-    figure, grid = style.panels(
-        PAGE, 0.9 + 1.15 * n, size, n, len(logs), sharex="col", sharey="row", width_ratios=widths
-    )
+    shared: dict[str, Any] = {"sharex": "col", "sharey": "row", "width_ratios": widths}
+    figure, grid = style.panels(PAGE, 0.9 + 1.15 * n, look, n, len(logs), **shared)
     for column, (word, log, errors) in zip(grid.T, logs, strict=True):
-        signals, slow_t, slow = _torques(found, log)
+        t, y, slow_t, slow = _torques(found, log)
         for j, axes in enumerate(column):
             place = axes.get_xaxis_transform()
             area = {"step": "mid", "transform": place, "label": "dead band"} | _BAND
             axes.fill_between(slow_t, 0.0, 1.0, where=slow[:, j], **area)
             axes.axhline(0.0, **ZERO)
-            for k, width, label in (
-                (3, 0.8, "measured"),
-                (1, 0.8, "measured less predicted"),
-                (0, 1.1, "predicted"),
-            ):
-                t, y = signals[label]
-                axes.plot(t[:, j], y[:, j], color=PALETTE[k], linewidth=width, label=label)
+            for k, color, width in ((0, 3, 0.8), (2, 1, 0.8), (1, 0, 1.1)):
+                line = {"color": PALETTE[color], "linewidth": width, "label": _WORDS[k]}
+                axes.plot(t[:, k, j], y[:, k, j], **line)
             # the second column may be narrow: its joints are named beside it
-            name = f"{found.model.table.joint_names[j]}, " if word == "fitted" else ""
+            name = f"{names[j]}, " if word == "fitted" else ""
             axes.set_title(f"{name}{word}: {100.0 * errors.relative[j]:.3g} %", loc="left")
         column[-1].set_xlabel("time (s)")
-    for axes, unit in zip(grid[:, 0], units, strict=True):
+    for axes, unit in zip(grid[:, 0], over_time.effort_units(found.model), strict=True):
         axes.set_ylabel(f"{'force' if unit == 'N' else 'torque'} ({unit})")
-    return style.finished(figure, title, ("measured", "measured less predicted", "predicted"))
+    return style.finished(figure, look, (_WORDS[0], _WORDS[2], _WORDS[1]))
 
 
-def _torques(
-    result: IdentificationResult, log: Log
-) -> tuple[dict[str, tuple[Array, Array]], Array, Array]:
-    """Envelopes of the torques of a log, NaN between recordings; times in the dead band."""
+def _torques(result: IdentificationResult, log: Log) -> tuple[Array, Array, Array, Array]:
+    """Envelopes of the torques of a log, NaN between recordings, and when joints are slow.
+
+    Shapes: -> times and values (K, 3, n), times (L,) and flags (L, n).
+    """
     chosen = result.equations.processing
     step = max(1, len(log) // _POINTS)
-    words = ("measured", "predicted", "measured less predicted")
-    parts: dict[str, list[tuple[Array, Array]]] = {word: [] for word in words}
-    slow_t, slow = [], []
-    gap = np.full((1, log.n), np.nan)
-    begin = None
+    gap, begin = np.full((2, 1, 3 * log.n), np.nan), None
+    parts: list[Any] = []
+    slow: list[tuple[Array, Array]] = []
     for piece in pieces(log, chosen):
-        signals = piece_signals(log, chosen, piece, 0)
-        tau = predicted_torque(result, signals.q, signals.v, signals.a)
-        for word, y in zip(words, (signals.tau, tau, signals.tau - tau), strict=True):
-            if begin is not None and piece.begin != begin:
-                parts[word].append((gap, gap))
-            parts[word].append(_envelope(signals.t, y, step))
+        s = piece_signals(log, chosen, piece, 0)
+        tau = predicted_torque(result, s.q, s.v, s.a)
+        if begin is not None and piece.begin != begin:
+            parts.append(gap)
         begin = piece.begin
-        starts = np.arange(0, len(signals), step)
-        counts = np.diff(np.append(starts, len(signals)))
-        inside = (np.abs(signals.v) < chosen.dead_band).astype(float)
-        slow_t.append(signals.t[starts] + 0.5 * (counts - 1) * log.dt)
-        slow.append(np.add.reduceat(inside, starts, axis=0) > 0.5 * counts[:, None])
-    joined = {
-        word: (np.concatenate([t for t, _ in part]), np.concatenate([y for _, y in part]))
-        for word, part in parts.items()
-    }
-    return joined, np.concatenate(slow_t), np.concatenate(slow)
+        parts.append(_envelope(s.t, np.hstack((s.tau, tau, s.tau - tau)), step))
+        slow.append((s.t[::step], (np.abs(s.v) < chosen.dead_band)[::step]))
+    t, y = (np.concatenate(some).reshape(-1, 3, log.n) for some in zip(*parts, strict=True))
+    slow_t, flags = (np.concatenate(some) for some in zip(*slow, strict=True))
+    return t, y, slow_t, flags
 
 
 def _envelope(t: Array, y: Array, step: int) -> tuple[Array, Array]:
@@ -171,11 +151,7 @@ def _envelope(t: Array, y: Array, step: int) -> tuple[Array, Array]:
 
 @style.plot
 def plot_identification_residuals(
-    result: IdentificationResult,
-    test: Log | None = None,
-    *,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    result: IdentificationResult, test: Log | None = None, **look: Unpack[Look]
 ) -> Figure:
     """Residuals of the equations with two standard deviations, and their autocorrelation.
 
@@ -188,9 +164,8 @@ def plot_identification_residuals(
     t, e, far = _residuals(system, found.values, sigma)
     correlation = residual_diagnostics(system, found.values)
     lag = np.arange(1, correlation.lags + 1) / found.equations.processing.rate
-    figure, grid = style.panels(
-        PAGE, 0.9 + 1.1 * len(names), size, len(names), 2, sharex="col", width_ratios=[2.2, 1.0]
-    )
+    shared: dict[str, Any] = {"sharex": "col", "width_ratios": [2.2, 1.0]}
+    figure, grid = style.panels(PAGE, 0.9 + 1.1 * len(names), look, len(names), 2, **shared)
     dot = {"color": PALETTE[0], "markersize": 1.4, "markeredgewidth": 0.0}
     both = "two standard deviations; 95 % of white residuals"
     for j, (left, right) in enumerate(grid):
@@ -207,7 +182,7 @@ def plot_identification_residuals(
     grid[0, 1].set_title("autocorrelation", loc="left")
     grid[-1, 0].set_xlabel("time (s)")
     grid[-1, 1].set_xlabel("lag (s)")
-    return style.finished(figure, title, (both,))
+    return style.finished(figure, look, (both,))
 
 
 def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, Array, Array]:
@@ -231,9 +206,7 @@ def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, A
 
 
 @style.plot
-def plot_identification_parameters(
-    result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_identification_parameters(result: IdentificationResult, **look: Unpack[Look]) -> Figure:
     """Parameters with their 95 % intervals, as contributions to the torques.
 
     Values of different units compare by their effect: the root mean square torque of the parameter
@@ -245,18 +218,18 @@ def plot_identification_parameters(
     value, half = effect * found.values, _NORMAL * effect * found.standard_errors
     weak = found.relative_errors > WEAK
     body = np.array([name.rstrip("0123456789") in _BODIES for name in found.names])
-    groups = {"bodies": np.flatnonzero(body), "drives and friction": np.flatnonzero(~body)}
-    groups = {word: some for word, some in groups.items() if some.size}
-    most = max(some.size for some in groups.values())
-    figure, grid = style.panels(PAGE, 1.0 + 0.155 * max(most, 8), size, 1, len(groups))
+    both = (("bodies", np.flatnonzero(body)), ("drives and friction", np.flatnonzero(~body)))
+    groups = [(word, some) for word, some in both if some.size]
+    most = max(some.size for _, some in groups)
+    figure, grid = style.panels(PAGE, 1.0 + 0.155 * max(most, 8), look, 1, len(groups))
     weakly = f"standard error above {100 * WEAK:.0f} %"
-    for axes, (word, some) in zip(grid[0], groups.items(), strict=True):
-        names = [found.names[k] for k in some]
+    for axes, (word, some) in zip(grid[0], groups, strict=True):
         kinds = {"determined": ~weak[some], weakly: weak[some]}
-        style.interval_panel(axes, names, value[some], half[some], kinds, len(groups) > 1)
+        names = [found.names[k] for k in some]
+        style.interval_panel(axes, names, value[some], half[some], kinds)
         axes.set_xlabel("effect on the torques (%)")
         axes.set_title(word)
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def _effects(result: IdentificationResult) -> Array:
@@ -272,7 +245,7 @@ def _effects(result: IdentificationResult) -> Array:
 
 @style.plot
 def plot_identification_standard_errors(
-    result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
+    result: IdentificationResult, **look: Unpack[Look]
 ) -> Figure:
     """Relative standard errors of the parameters, the largest first.
 
@@ -286,7 +259,7 @@ def plot_identification_standard_errors(
     order = np.argsort(-relative, kind="stable")
     rows = max(1, -(-len(order) // _IN_A_ROW))
     each = -(-len(order) // rows)
-    figure, grid = style.panels(PAGE, 0.7 + 1.8 * rows, size, rows, 1, sharey=True)
+    figure, grid = style.panels(PAGE, 0.7 + 1.8 * rows, look, rows, 1, sharey=True)
     finite = relative[np.isfinite(relative) & (relative > 0.0)]
     low = float(finite.min(initial=100.0 * WEAK)) / 2.0
     high = 1.3 * float(finite.max(initial=100.0 * WEAK))
@@ -308,42 +281,23 @@ def plot_identification_standard_errors(
         axes.set_xticks(x, [found.names[k] for k in some], rotation=90)
         axes.grid(False, axis="x")
         axes.set_ylabel("relative standard error (%)")
-    return style.finished(figure, title, ("determined", "poorly determined"))
+    return style.finished(figure, look, ("determined", "poorly determined"))
 
 
 @style.plot
-def plot_identification_correlations(
-    result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_identification_correlations(result: IdentificationResult, **look: Unpack[Look]) -> Figure:
     """Correlations of the estimates; strongly correlated pairs are dark."""
     found = as_result(result)
-    return style.correlation_figure(found.estimate.correlation, found.names, title, size)
+    return style.correlation_figure(found.estimate.correlation, found.names, look)
 
 
 @style.plot
-def plot_excitation(
-    found: ExcitingTrajectory, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_excitation(found: ExcitingTrajectory, **look: Unpack[Look]) -> Figure:
     """Motion and torques of an exciting trajectory within their limits, and its search.
 
     Panels of position, velocity, acceleration and torque over one period, joints of different
     units in columns of their own, limits dashed; below them the criterion over the iterations of
     every start, and that of random motions beside those of the starts, before and after.
-
-    Parameters
-    ----------
-    found : ExcitingTrajectory
-        Of `identification.excitation.exciting_trajectory`.
-
-    Examples
-    --------
-    >>> from robotmodels.identification.excitation import exciting_trajectory
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> found = exciting_trajectory(arm, starts=1, baseline=4, iterations=5, rng=0)
-    >>> figure = plot_excitation(found)
-    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
-    ['position (rad)', 'velocity (rad/s)']
     """
     style.as_instance(found, ExcitingTrajectory, "found", "exciting_trajectory")
     model, limits = found.model, found.limits.motion.limits
@@ -351,38 +305,31 @@ def plot_excitation(
     drive, n = model.drive, model.n
     parameters = (model.inertia.values, drive.Ia, drive.Fv, drive.Fc, drive.offset)
     rows = 3 + any(values.any() for values in parameters)  # torques of a robot that has some
-    torque = idm(model, *motion.values[:3]) if rows == 4 else np.empty((0, n))
-    labels = over_time.joint_names(None, n, model)
+    names, efforts = over_time.joint_names(None, n, model), over_time.effort_units(model)
     columns = over_time.joints_by_unit(over_time.joint_units(None, n, model))
-    figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * n, size, rows=0)
+    figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * n, look, rows=0)
     parts: Any = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
-    above, below = parts
-    grid = above.subplots(rows, len(columns), squeeze=False, sharex=True)
-    sigma = model.table.sigma[model.table.joint_rows]
+    grid = parts[0].subplots(rows, len(columns), squeeze=False, sharex=True)
     for column, (unit, joints) in zip(grid.T, columns.items(), strict=True):
         for order, axes in enumerate(column[:3]):
-            over_time.quantity_over_time(axes, motion, order, joints, unit, labels, limits)
+            over_time.quantity_over_time(axes, motion, order, joints, unit, names, limits)
         if rows == 4:
-            most, names = found.limits.torque_limits[joints], [labels[j] for j in joints]
-            over_time.lines_over_time(
-                column[3], motion.t, torque[:, joints], names, joints, -most, most
-            )
-            force = sigma[joints[0]] == PRISMATIC
-            column[3].set_ylabel("force\n(N)" if force else "torque\n(N m)")
+            torque = idm(model, *motion.values[:3])[:, joints]
+            most, some = found.limits.torque_limits[joints], [names[j] for j in joints]
+            over_time.lines_over_time(column[3], motion.t, torque, some, joints, -most, most)
+            effort = efforts[joints[0]]
+            column[3].set_ylabel(f"{'force' if effort == 'N' else 'torque'}\n({effort})")
         column[-1].set_xlabel("time (s)")
-    left, right = below.subplots(1, 2)
-    _draw_search(left, found)
-    _draw_baseline(right, found)
-    if title is None:
-        title = (
-            f"{model.name}: condition number {found.condition:.4g}, {found.scaled_condition:.3g} "
-            "with scaled columns"
-        )
-    return style.finished(figure, title, labels)
+    _draw_search(*parts[1].subplots(1, 2), found)
+    look["title"] = look.get("title") or (
+        f"{model.name}: condition number {found.condition:.4g}, {found.scaled_condition:.3g} "
+        "with scaled columns"
+    )
+    return style.finished(figure, look, names)
 
 
-def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
-    """The smooth criterion over the iterations; the best start in front."""
+def _draw_search(left: Axes, right: Axes, found: ExcitingTrajectory) -> None:
+    """The smooth criterion over the iterations; the criterion of random motions and of starts."""
     best = min(range(len(found.starts)), key=lambda k: found.starts[k].rank(found.criterion))
     ratio = found.criterion == "condition"
     for k, start in enumerate(found.starts):
@@ -390,42 +337,29 @@ def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
         y = np.exp(np.minimum(start.history, _MOST)) if ratio else np.asarray(start.history)
         color, width = (PALETTE[0], 1.3) if k == best else (PALE, 0.8)
         x = np.arange(1, len(y) + 1)
-        axes.plot(x, y, color=color, linewidth=width, zorder=2 + (k == best), label="_start")
+        left.plot(x, y, color=color, linewidth=width, zorder=2 + (k == best), label="_start")
     for end in np.cumsum(found.starts[best].stages)[:-1]:
-        axes.axvline(end, color=PALE, zorder=1.5, **DASHED)
-    _scale_criterion(axes, ratio)
-    axes.set_xlabel("iteration")
-    axes.set_ylabel("smooth condition number" if ratio else "smooth criterion")
-    axes.set_title("every start; dashed: next stage")
-
-
-def _draw_baseline(axes: Axes, found: ExcitingTrajectory) -> None:
-    """The criterion of random motions and of the starts, before and after."""
+        left.axvline(end, color=PALE, zorder=1.5, **DASHED)
+    left.set(xlabel="iteration", ylabel="smooth condition number" if ratio else "smooth criterion")
+    left.set_title("every start; dashed: next stage")
     feasible = [s for s in found.starts if s.status is not ExcitationStatus.INFEASIBLE]
-    groups = {
-        "random": (found.baseline, PALE),
-        "starts": ([start.before for start in found.starts], PALETTE[1]),
-        "improved": ([start.after for start in feasible], PALETTE[0]),
-    }
-    for k, (judged, color) in enumerate(groups.values()):
+    groups = (
+        ("random", found.baseline, PALE),
+        ("starts", [start.before for start in found.starts], PALETTE[1]),
+        ("improved", [start.after for start in feasible], PALETTE[0]),
+    )
+    for k, (_, judged, color) in enumerate(groups):
         values = np.array([one.of(found.criterion) for one in judged])
         values = values[np.isfinite(values)]
         # spread evenly, so that equal values stay visible
         x = k + 0.25 * np.sin(2.4 * np.arange(len(values)))
-        axes.plot(x, values, "o", color=color, markersize=2.6, alpha=0.8, label="_values")
+        right.plot(x, values, "o", color=color, markersize=2.6, alpha=0.8, label="_values")
         if len(values):
-            median = [float(np.median(values))] * 2
-            axes.plot([k - 0.32, k + 0.32], median, color=INK, label="_median")
-    ratio = found.criterion == "condition"
-    _scale_criterion(axes, ratio)
-    axes.set_xlim(-0.6, 2.6)
-    axes.set_xticks(range(3), list(groups))
-    axes.set_ylabel("condition number" if ratio else "minus log det")
-    axes.set_title("line: median")
-
-
-def _scale_criterion(axes: Axes, ratio: bool) -> None:
-    """Logarithmic scale of condition numbers."""
-    if ratio:
+            right.hlines(np.median(values), k - 0.32, k + 0.32, color=INK)
+    right.set_xlim(-0.6, 2.6)
+    right.set_xticks(range(3), [word for word, _, _ in groups])
+    right.set_ylabel("condition number" if ratio else "minus log det")
+    right.set_title("line: median")
+    for axes in (left, right) if ratio else ():
         axes.set_yscale("log")
-        style.plain_logarithmic(axes.yaxis, 8, style.subdivisions(axes.get_ylim()))
+        style.plain_logarithmic(axes.yaxis, 8)

@@ -42,11 +42,6 @@ class Motion:
         Seconds.
     loop : bool
         Whether it starts again at its end.
-
-    Examples
-    --------
-    >>> Motion((), 0, 0.0, True).keyframes
-    0
     """
 
     tracks: tuple[Track, ...]

@@ -18,7 +18,7 @@ from ..trajectories.motions import PiecewisePolynomial
 from ..trajectories.pose_trajectory import PoseTrajectory
 from ..trajectories.trajectory import Samples, Trajectory
 from . import style
-from .style import ALERT, BEYOND, DASHED, INK, LIMIT, PALE
+from .style import ALERT, BEYOND, DASHED, INK, LIMIT, PALE, ZERO
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,22 +48,10 @@ class Unit(Enum):
     @property
     def factor(self) -> float:
         """Factor from SI units and radians."""
-        factors = {Unit.DEGREE: 180.0 / np.pi, Unit.MILLIMETRE: 1e3}
-        return factors.get(self, 1.0)
+        return {Unit.DEGREE: 180.0 / np.pi, Unit.MILLIMETRE: 1e3}.get(self, 1.0)
 
     def of(self, order: int) -> str:
-        """Unit of a derivative by time.
-
-        Parameters
-        ----------
-        order : int
-            0 position, 1 velocity, to 3 jerk.
-
-        Returns
-        -------
-        str
-            Such as ``rad/s²``.
-        """
+        """Unit of a derivative by time, such as ``rad/s²``: order 0 position, to 3 jerk."""
         per = ("", "/s", "/s²", "/s³")[order]
         return " or ".join(part + per for part in self.value.split(" or "))
 
@@ -84,14 +72,17 @@ def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = 
 
 
 def joint_units(
-    units: Unit | str | Sequence[Unit | str] | None, n: int, model: RobotModel | None = None
+    units: Unit | str | Sequence[Unit | str] | None,
+    n: int,
+    model: RobotModel | None = None,
+    degrees: bool = False,
 ) -> list[Unit]:
-    """Units of joints for their axes."""
+    """Units of joints for their axes; degrees in place of radians where none are given."""
     _check_model(model, n)
     lengths = [None] * n if model is None else is_prismatic(model).tolist()
     if units is None:
-        default = {None: Unit.UNSTATED, True: Unit.METRE, False: Unit.RADIAN}
-        return [default[long] for long in lengths]
+        angle = Unit.DEGREE if degrees else Unit.RADIAN
+        return [{None: Unit.UNSTATED, True: Unit.METRE, False: angle}[long] for long in lengths]
     given = [units] * n if isinstance(units, (Unit, str)) else list(units)
     if len(given) != n:
         raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
@@ -107,6 +98,11 @@ def joint_units(
 def joints_by_unit(kinds: Sequence[Unit]) -> dict[Unit, list[int]]:
     """Numbers of the joints of each unit."""
     return {u: [j for j, kind in enumerate(kinds) if kind is u] for u in dict.fromkeys(kinds)}
+
+
+def effort_units(model: RobotModel) -> list[str]:
+    """Units of the torques and forces of joints."""
+    return ["N" if slides else "N m" for slides in is_prismatic(model)]
 
 
 def as_unit(unit: Unit | str) -> Unit:
@@ -145,8 +141,8 @@ class Sampled:
 
     t: Array
     values: Array
-    breaks: tuple[Array, ...]
-    duration: float
+    breaks: tuple[Array, ...] = ()
+    duration: float = 0.0
 
     @property
     def n(self) -> int:
@@ -156,31 +152,27 @@ class Sampled:
 
 def sampled(trajectory: Any, name: str = "trajectory") -> Sampled:
     """Dense samples of a trajectory, with both sides of every jump."""
-    if isinstance(trajectory, Samples):
-        return _of_samples(trajectory, name)
+    breaks: tuple[Array, ...] = ()
     if isinstance(trajectory, PoseTrajectory):
         raise InvalidValueError(
             f"{name}: this is a motion of the tool. Draw its law of time with `.law`, its path "
             "with plot_pose_path, or the joints that joint_path finds."
         )
-    motion = style.as_instance(trajectory, Trajectory, name, "joints").motion
-    if motion.batch:
-        raise InvalidValueError(
-            f"{name}: expected one motion, got a batch of shape {motion.batch}; draw one of them "
-            "as Samples(t, q[i], v[i], a[i], jerk[i]) of trajectory.at(t)."
-        )
-    T = float(motion.duration)
-    pieces = motion.breaks if isinstance(motion, PiecewisePolynomial) else ()
-    breaks = tuple(np.unique(row) for row in pieces)
-    times = np.concatenate((np.linspace(0.0, T, _SAMPLES), *breaks))
-    times = np.concatenate((times, *(row - _BEFORE * T for row in breaks)))
-    times = np.unique(times[(times >= 0.0) & (times <= T)])
-    return _of_samples(trajectory.at(times), name, breaks, T)
-
-
-def _of_samples(
-    samples: Samples, name: str, breaks: tuple[Array, ...] = (), T: float | None = None
-) -> Sampled:
+    if isinstance(trajectory, Samples):
+        samples, T = trajectory, float(np.ptp(trajectory.t)) if trajectory.t.size else 0.0
+    else:
+        motion = style.as_instance(trajectory, Trajectory, name, "joints").motion
+        if motion.batch:
+            raise InvalidValueError(
+                f"{name}: expected one motion, got a batch of shape {motion.batch}; draw one of "
+                "them as Samples(t, q[i], v[i], a[i], jerk[i]) of trajectory.at(t)."
+            )
+        T = float(motion.duration)
+        if isinstance(motion, PiecewisePolynomial):
+            breaks = tuple(np.unique(row) for row in motion.breaks)
+        both = [np.append(row, row - _BEFORE * T) for row in breaks]
+        times = np.unique(np.concatenate((np.linspace(0.0, T, _SAMPLES), *both)))
+        samples = trajectory.at(times[(times >= 0.0) & (times <= T)])
     t = samples.t.reshape(-1)
     if not t.size:
         raise InvalidValueError(f"{name}: there are no samples to draw.")
@@ -192,7 +184,7 @@ def _of_samples(
             f"{name}: expected samples of one motion, q of shape ({t.size}, n), got "
             f"{samples.q.shape}."
         )
-    return Sampled(t, np.stack(rows), breaks, float(t[-1] - t[0]) if T is None else T)
+    return Sampled(t, np.stack(rows), breaks, T)
 
 
 def lines_over_time(
@@ -203,6 +195,7 @@ def lines_over_time(
     numbers: Sequence[int] | None = None,
     lower: Array | None = None,
     upper: Array | None = None,
+    zero: bool = False,
 ) -> None:
     """Lines of k signals in the styles of some numbers, with limits and values beyond them.
 
@@ -210,6 +203,8 @@ def lines_over_time(
     """
     numbers = range(len(names)) if numbers is None else numbers
     marker = "" if len(t) > 1 else "o"
+    if zero:
+        axes.axhline(0.0, **ZERO)
     for y, name, k in zip(values.T, names, numbers, strict=True):
         axes.plot(t, y, label=name, marker=marker, **style.line(k))
     if lower is None or upper is None:

@@ -191,7 +191,8 @@ def _object(node: Node) -> Any:
         case Sphere(radius):
             return g.Mesh(g.Sphere(float(radius)), solid)
         case Triangles(vertices, faces):
-            return g.Mesh(g.TriangularMeshGeometry(vertices, faces), solid)
+            both = vertices.astype(np.float32), faces.astype(np.uint32)
+            return g.Mesh(g.TriangularMeshGeometry(*both), solid)
         case Segments(points):
             thin = g.LineBasicMaterial(**look)
             return g.LineSegments(g.PointsGeometry(points.T), thin)

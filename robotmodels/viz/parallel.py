@@ -13,23 +13,15 @@ modes : AssemblyModes
 workspace : PlatformWorkspace
     From `parallel.workspace`, planar or a section.
 title : str, optional
-    Of the page or over the figure; default the family.
-height : int
-    Pixels in a notebook.
-dark : bool
-    Whether the background is dark.
-size : array_like, shape (2,), optional
-    Width and height of a figure, inches.
+    Of the page; default the family.
+height, dark : int and bool
+    Pixels in a notebook; whether the background is dark.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
 
 Returns
 -------
 Scene or matplotlib.figure.Figure
-    A scene shows itself in a notebook; ``.save("hexapod.html")`` writes one offline page.
-
-Raises
-------
-InvalidValueError, ShapeError
-    Poses out of reach, arguments that do not fit.
 
 Examples
 --------
@@ -37,12 +29,7 @@ Examples
 >>> hexapod = parallel.gough_symmetric(1.0, lower=0.8, upper=1.4)
 >>> show_parallel(hexapod)
 <Scene 'Gough-Stewart platform': 36 shapes>
->>> jog_parallel(hexapod)
-<Scene 'Gough-Stewart platform': 30 shapes, 6 sliders>
 >>> robot = parallel.planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
->>> figure = plot_platform_workspace(parallel.workspace(robot, orientation=0.3, resolution=50))
->>> figure.axes[0].get_xlabel()
-'x (m)'
 >>> modes = parallel.assembly_modes(robot, [1.0, 1.1, 1.2])
 >>> plot_assembly_modes(robot, modes).axes[0].get_title()
 '1: det -'
@@ -51,7 +38,7 @@ Examples
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,7 +56,7 @@ from .motion import Motion, Track
 from .scene import Scene
 from .shapes import Node, Triangles, along_bars, chain, floor_grid, moving_chain
 from .sliders import SliderPanel
-from .style import INK, PAGE, PALETTE
+from .style import INK, PAGE, PALETTE, Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,26 +116,28 @@ def jog_parallel(
         bar = Cylinder(_THIN * robot.size, 1.0)
         nodes.append(Node(f"leg_{i}", np.eye(4)))
         nodes.append(Node(f"leg_{i}/bar", se3.translation(0, 0, 0.5), bar, PALETTE[1]))
-        struts.append({
-            "path": f"leg_{i}", "name": f"leg {i}", "start": robot.base[i].tolist(),
-            "end": robot.platform[i].tolist(), "lower": float(robot.lower[i]),
-            "upper": float(min(robot.upper[i], 1e9)), "frame": frame,
-        })  # fmt: skip
+        limits = {"lower": float(robot.lower[i]), "upper": float(min(robot.upper[i], 1e9))}
+        ends = {"start": robot.base[i].tolist(), "end": robot.platform[i].tolist()}
+        struts.append({"path": f"leg_{i}", "name": f"leg {i}", "frame": frame} | ends | limits)
     start, home, sliders = _six(pose), _six(robot.home), []
     kept = [3 if k == 5 and robot.m == 3 else k for k in robot.columns]  # planar robots: yaw
     for k, name in enumerate(("x", "y", "z", "yaw", "pitch", "roll")):
         reach = 0.4 * robot.size if k < 3 else (0.9 if k == 3 else 0.45) * np.pi
         middle = home[k] if k < 3 else 0.0
-        sliders.append({
-            "name": name, "path": platform[2 * k + 1].path, "prismatic": k < 3, "lower": -1e9,
-            "upper": 1e9, "ends": [middle - reach, middle + reach], "leads": k in kept,
-            "note": "" if k in kept else "constant",
-        })  # fmt: skip
+        slider = {"name": name, "path": platform[2 * k + 1].path, "prismatic": k < 3}
+        slider |= {"lower": -1e9, "upper": 1e9, "ends": [middle - reach, middle + reach]}
+        sliders.append(slider | {"leads": k in kept, "note": "" if k in kept else "constant"})
     matrix = np.eye(6)[:, kept]
     panel = SliderPanel(
-        np.array(kept), matrix, start * (matrix.sum(axis=1) == 0), start[kept], tuple(sliders),
-        (("home", home[kept]),), (("platform", frame, np.eye(4)),), tuple(struts),
-    )  # fmt: skip
+        independent=np.array(kept),
+        matrix=matrix,
+        offset=start * (matrix.sum(axis=1) == 0),
+        start=start[kept],
+        joints=tuple(sliders),
+        postures=(("home", home[kept]),),
+        targets=(("platform", frame, np.eye(4)),),
+        struts=tuple(struts),
+    )
     name = robot.family.value[0]
     return Scene(name, tuple(nodes), framed(points), height=height, sliders=panel, dark=dark)
 
@@ -159,8 +148,7 @@ def plot_assembly_modes(
     modes: AssemblyModes,
     *,
     columns: int | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """All assembly modes beside each other, with the sign of their determinants."""
     T = np.asarray(modes.T)[modes.valid]
@@ -169,7 +157,7 @@ def plot_assembly_modes(
     wide = style.as_columns(columns, len(T), min(len(T), 4 if len(T) < 13 else 8))
     rows, flat = -(-len(T) // wide), 2 not in robot.columns
     tall = 0.3 + rows * PAGE / wide * (1.0 if flat else 1.1)
-    figure, places = style.panels(PAGE, tall, size, rows, wide)
+    figure, places = style.panels(PAGE, tall, look, rows, wide)
     base, view = np.broadcast_to(robot.base, (len(T), robot.m, 3)), _view(flat)
     anchors = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
     paths = np.stack((base, _knees(robot, T), anchors), axis=2) @ view.T
@@ -182,40 +170,34 @@ def plot_assembly_modes(
         sign = modes.det[modes.valid][k] > 0
         for path in paths[k]:
             axes.plot(*path.T, color="0.45", linewidth=1.0, zorder=2)
-        for outline, look in ((base[k], "0.75"), (anchors[k], PALETTE[0 if sign else 1])):
+        for outline, color in ((base[k], "0.75"), (anchors[k], PALETTE[0 if sign else 1])):
             ring = outline[_ring(outline)] @ view.T
-            axes.fill(*ring.T, facecolor=look, alpha=0.5, edgecolor=look, linewidth=1.2, zorder=3)
+            axes.fill(*ring.T, facecolor=color, alpha=0.5, edgecolor=color, linewidth=1.2, zorder=3)
         axes.plot(*paths[k, :, 0].T, "o", color=INK, markersize=2.0, zorder=4)
         axes.set_title(f"{k + 1}: det {'+' if sign else '-'}", fontsize=7)
         axes.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], aspect="equal")
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 @style.plot
-def plot_platform_workspace(
-    workspace: PlatformWorkspace, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_platform_workspace(workspace: PlatformWorkspace, **look: Unpack[Look]) -> Figure:
     """A workspace in a plane with the singular curves of its orientation."""
     if workspace.coordinates != "plane":
         raise InvalidValueError("workspace: expected one in a plane; give workspace(height=...).")
     robot: Any = workspace.model
-    figure, places = style.panels(0.5 * PAGE, 0.46 * PAGE, size, 1, 1)
-    axes = places.flat[0]
+    figure, ((axes,),) = style.panels(0.5 * PAGE, 0.46 * PAGE, look)
     x, y = (np.unique(column) for column in workspace.points.T)
     margin = workspace.margin.reshape(workspace.shape).T
     axes.contourf(x, y, margin, [0.0, max(margin.max(), 1e-9)], colors=[PALETTE[5]], alpha=0.5)
     axes.contour(x, y, margin, levels=[0.0], colors=[PALETTE[0]], linewidths=1.2)
-    names = ["reached"]
     axes.fill([], [], color=PALETTE[5], alpha=0.5, label="reached")
     det = determinant(robot, workspace.poses).reshape(workspace.shape).T
     if len(workspace.rotations) == 1 and np.nanmin(det) < 0.0 < np.nanmax(det):
         axes.contour(x, y, det, levels=[0.0], colors=[PALETTE[1]], linewidths=1.4)
         axes.plot([], [], color=PALETTE[1], label="singular")
-        names.append("singular")
     axes.plot(*robot.base[:, :2].T, "^", color=INK, markersize=4.0, label="base")
-    axes.set_aspect("equal")
-    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="x (m)", ylabel="y (m)")
-    return style.finished(figure, title, [*names, "base"])
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    return style.finished(figure, look, ["reached", "singular", "base"])
 
 
 def _points(robot: ParallelRobot, T: Array) -> tuple[Array, LegStates]:
@@ -269,8 +251,8 @@ def _plate(robot: ParallelRobot, T: Array, path: str, color: Color) -> list[Node
     if len(ring := _ring(points)) > 2:
         fan = np.array([(ring[0], a, b) for a, b in pairwise(ring[1:])])
         # both sides with their own corners, or their normals would cancel
-        faces = np.concatenate((fan, fan[:, ::-1] + len(points))).astype(np.uint32)
-        shape = Triangles(np.tile(points, (2, 1)).astype(np.float32), faces)
+        faces = np.concatenate((fan, fan[:, ::-1] + len(points)))
+        shape = Triangles(np.tile(points, (2, 1)), faces)
         nodes.append(Node(f"{path}/face", np.eye(4), shape, color))
     return nodes
 

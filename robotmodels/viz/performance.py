@@ -2,20 +2,41 @@
 
 Parameters
 ----------
-title : str, optional
-    Text over the figure.
-size : array_like, shape (2,), optional
-    Width and height, inches.
+w : Workspace
+    From `workspace`. In the scene, the cells at its border are drawn in space, all in a plane.
+curves : bool
+    Whether singular curves and cusps are drawn, where they are defined.
+a : Aspects
+    From `aspects` or `free_components`; of three and more joints that share a factor the first
+    two are drawn, the others in the middle of their ranges.
+path : FeasiblePath
+    From `feasible_path`.
+joint : int, optional
+    Column of q; default the one whose postures differ most.
+q : array_like, shape (n,), optional
+    Configuration of the robot, default zero.
+**look, **options
+    ``title`` and ``size``, see `robotmodels.viz`; options as for `show`.
 
 Returns
 -------
-matplotlib.figure.Figure
+matplotlib.figure.Figure or Scene
+
+Examples
+--------
+>>> from robotmodels.performance import aspects, workspace
+>>> from robotmodels.robots import load
+>>> w = workspace(load("planar_2r"), limits=False, resolution=20)
+>>> plot_workspace(w).axes[0].get_xlabel()
+'x (m)'
+>>> show_workspace(w, [0.3, 0.8]).paths[-1]
+'workspace/2'
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +49,7 @@ from .camera import framed
 from .scene import Scene
 from .shapes import Node, Triangles
 from .show import show
-from .style import ALERT, COLUMN, INK, PAGE, PALE, PALETTE
+from .style import ALERT, COLUMN, INK, PAGE, PALE, PALETTE, Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,32 +58,16 @@ _LINES = {"boundary": (INK, 1.1), "internal": (ALERT, 0.9), "limit": (PALE, 0.9)
 _TINTS = ("#f4f4f4", "#cfe3f5", "#9cc4e6", "#6aa2d3", "#3f7fbb", "#235c99")
 _SECTION = ("distance from axis 1 (m)", "height (m)")
 _CORNERS = np.array([(i, j, k) for k in (-0.5, 0.5) for j in (-0.5, 0.5) for i in (-0.5, 0.5)])
-_QUADS = ((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
-          (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3))  # fmt: skip
+_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_TRIANGLES = np.array(_FACES)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+"""Of a cell: its corners, and its faces as two triangles each; the first one is that in a plane."""
 
 
 @style.plot
-def plot_workspace(
-    w: Workspace, *, curves: bool = True, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_workspace(w: Workspace, *, curves: bool = True, **look: Unpack[Look]) -> Figure:
     """Section of a workspace: numbers of postures as colours, singular curves, cusps as points.
 
     Of a workspace in space the greatest numbers seen along two axes of the world.
-
-    Parameters
-    ----------
-    w : Workspace
-        From `workspace`.
-    curves : bool
-        Whether singular curves and cusps are drawn, where they are defined.
-
-    Examples
-    --------
-    >>> from robotmodels.performance import workspace
-    >>> from robotmodels.robots import load
-    >>> w = workspace(load("planar_2r"), limits=False, resolution=40)
-    >>> plot_workspace(w).axes[0].get_xlabel()
-    'x (m)'
     """
     style.as_instance(w, Workspace, "w", "workspace")
     if not len(w.points):
@@ -71,7 +76,7 @@ def plot_workspace(
 
     in_space, numbers = w.coordinates == "space", np.unique(w.count)
     width = PAGE if in_space else 1.3 * COLUMN
-    figure, grid = style.panels(width, 3.6, size, 1, 1 + in_space)
+    figure, grid = style.panels(width, 3.6, look, 1, 1 + in_space)
     axes = [np.unique(coordinate) for coordinate in w.points.T]
     names = _SECTION if w.coordinates == "half plane" else ("x (m)", "y (m)", "z (m)")
     tints = ListedColormap([_TINTS[min(k, len(_TINTS) - 1)] for k in range(len(numbers))])
@@ -79,8 +84,8 @@ def plot_workspace(
     views = ((0, 2, (1,)), (0, 1, (2,))) if in_space else ((0, 1, ()),)
     for panel, (across, up, along) in zip(grid[0], views, strict=True):
         counts = w.count.reshape(w.shape).max(axis=along).T
-        image = panel.pcolormesh(axes[across], axes[up], counts, cmap=tints, norm=norm,
-                                 shading="nearest", rasterized=True)  # fmt: skip
+        kind: dict[str, Any] = {"cmap": tints, "norm": norm, "shading": "nearest"}
+        image = panel.pcolormesh(axes[across], axes[up], counts, rasterized=True, **kind)
         panel.grid(False)
         panel.set(xlabel=names[across], ylabel=names[up], aspect="equal")
         middles = 0.5 * (norm.boundaries[1:] + norm.boundaries[:-1])
@@ -96,26 +101,12 @@ def plot_workspace(
         points = cusps(w.model).section
         if len(points):
             grid[0, 0].plot(*points.T, "o", color=ALERT, markersize=3.5, label="cusp")
-    return style.finished(figure, title, ("boundary", "internal", "limit", "cusp"))
+    return style.finished(figure, look, ("boundary", "internal", "limit", "cusp"))
 
 
 @style.plot
-def plot_aspects(a: Aspects, *, title: str | None = None, size: ArrayLike | None = None) -> Figure:
-    """Aspects in the joints that share a factor, and beside it where the tool is in each.
-
-    Parameters
-    ----------
-    a : Aspects
-        From `aspects` or `free_components`; of three and more joints that share a factor the first
-        two are drawn, the others in the middle of their ranges.
-
-    Examples
-    --------
-    >>> from robotmodels.performance import aspects
-    >>> from robotmodels.robots import load
-    >>> len(plot_aspects(aspects(load("puma560"), limits=False)).axes)
-    2
-    """
+def plot_aspects(a: Aspects, **look: Unpack[Look]) -> Figure:
+    """Aspects in the joints that share a factor, and beside it where the tool is in each."""
     style.as_instance(a, Aspects, "a", "aspects")
     if not a.count:
         raise InvalidValueError(f"a: there are no aspects to draw. {a.reason()}")
@@ -125,61 +116,41 @@ def plot_aspects(a: Aspects, *, title: str | None = None, size: ArrayLike | None
     arm, count = section_arm(a.model), len(group.volumes)
     of_section = arm is not None and len(group.joints) == 2
     maps = min(count, 3) if of_section else 1
-    figure, grid = style.panels(PAGE, 3.1, size, 1, 1 + maps, width_ratios=[maps, *[1] * maps])
+    figure, grid = style.panels(PAGE, 3.1, look, 1, 1 + maps, width_ratios=[maps, *[1] * maps])
     left, *right = grid[0]
     middle = tuple(n // 2 for n in group.labels.shape[2:])
     labels = group.labels[(..., *middle)].reshape(len(group.labels), -1)
     colors = [PALETTE[k % len(PALETTE)] for k in range(count)]
     ends, sides = np.append(group.low, -0.5), np.append(group.side, 1.0)
     x, y = (ends[k] + sides[k] * (np.arange(labels.shape[k]) + 0.5) for k in range(2))
-    left.pcolormesh(x, y, np.ma.masked_equal(labels, 0).T, cmap=ListedColormap(colors), vmin=0.5,
-                    vmax=count + 0.5, shading="nearest", alpha=0.75, rasterized=True)  # fmt: skip
+    kind: dict[str, Any] = {"cmap": ListedColormap(colors), "vmin": 0.5, "vmax": count + 0.5}
+    kind |= {"shading": "nearest", "alpha": 0.75, "rasterized": True}
+    left.pcolormesh(x, y, np.ma.masked_equal(labels, 0).T, **kind)
     names = [f"q{j + 1} (rad)" for j in group.joints] + [""]
     left.set(xlabel=names[0], ylabel=names[1])
     left.grid(False)
     if arm is not None and of_section:
         mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
         points, text = arm.values(mesh)[:, :2], _SECTION if arm.radial else ("x (m)", "y (m)")
-        dot: dict[str, Any] = {"markersize": 1.6, "markeredgewidth": 0.0}
+        dot: dict[str, Any] = {"markersize": 1.6, "markeredgewidth": 0.0, "rasterized": True}
         for k, panel in enumerate(right):
             inside = points[(labels == k + 1).ravel()]
-            panel.plot(*points.T, ".", color="#e8e8e8", rasterized=True, label="_all", **dot)
-            panel.plot(
-                *inside.T, ".", color=colors[k], alpha=0.12, rasterized=True, label=f"_{k}", **dot
-            )
+            panel.plot(*points.T, ".", color="#e8e8e8", label="_all", **dot)
+            panel.plot(*inside.T, ".", color=colors[k], alpha=0.12, label=f"_{k}", **dot)
             panel.set(xlabel=text[0], ylabel="" if k else text[1], aspect="equal")
             panel.set_title(f"aspect with {100.0 * group.volumes[k] / group.volumes.sum():.0f} %")
     else:
         right[0].bar(np.arange(1, a.count + 1), a.volume, color=INK, alpha=0.6)
         right[0].set(xlabel="aspect", ylabel="volume of joint space")
         right[0].locator_params(axis="x", integer=True)
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 @style.plot
 def plot_feasible_path(
-    path: FeasiblePath, joint: int | None = None, *, title: str | None = None,
-    size: ArrayLike | None = None,
-) -> Figure:  # fmt: skip
-    """All postures along a path as a graph over one joint: which go on, and where they break.
-
-    Parameters
-    ----------
-    path : FeasiblePath
-        From `feasible_path`.
-    joint : int, optional
-        Column of q; default the one whose postures differ most.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.performance import feasible_path
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> path = feasible_path(arm, dgm(arm, np.linspace([0.1, 1.0], [0.4, 1.4], 20)))
-    >>> plot_feasible_path(path).axes[0].get_xlabel()
-    'number of the pose'
-    """
+    path: FeasiblePath, joint: int | None = None, **look: Unpack[Look]
+) -> Figure:
+    """All postures along a path as a graph over one joint: which go on, and where they break."""
     from matplotlib.collections import LineCollection
 
     style.as_instance(path, FeasiblePath, "path", "feasible_path")
@@ -190,7 +161,7 @@ def plot_feasible_path(
     j = int(spread.argmax())
     if joint is not None:
         j = style.as_choice([joint], q.shape[2], "joint", "a number")[0]
-    figure, grid = style.panels(0.5 * (COLUMN + PAGE), 3.2, size)
+    figure, grid = style.panels(0.5 * (COLUMN + PAGE), 3.2, look)
     axes = grid[0, 0]
     k, s = np.nonzero(path.following >= 0)
     ends = q[k + 1, path.following[k, s], j]
@@ -208,34 +179,11 @@ def plot_feasible_path(
     axes.plot(turn, color=PALETTE[0], linewidth=2.2, label="best motion")
     axes.autoscale()
     axes.set(xlabel="number of the pose", ylabel=f"q{j + 1} of all postures (rad or m)")
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def show_workspace(w: Workspace, q: ArrayLike | None = None, **options: Any) -> Scene:
-    """Scene of a robot and its workspace: cells as blocks, a colour for each number of postures.
-
-    Parameters
-    ----------
-    w : Workspace
-        From `workspace`; in space the cells at its border are drawn, of a plane all cells.
-    q : array_like, shape (n,), optional
-        Configuration of the robot, default zero.
-    **options
-        As for `show`.
-
-    Returns
-    -------
-    Scene
-        A page that shows itself in a notebook.
-
-    Examples
-    --------
-    >>> from robotmodels.performance import workspace
-    >>> from robotmodels.robots import load
-    >>> w = workspace(load("planar_2r"), limits=False, resolution=20)
-    >>> show_workspace(w, [0.3, 0.8]).paths[-1]
-    'workspace/2'
-    """
+    """Scene of a robot and its workspace: cells as blocks, a colour for each number of postures."""
     style.as_instance(w, Workspace, "w", "workspace")
     flags = (w.count > 0).reshape(w.shape)
     if w.coordinates == "space" and flags.size:
@@ -244,20 +192,19 @@ def show_workspace(w: Workspace, q: ArrayLike | None = None, **options: Any) -> 
             inner = inner & np.roll(inner, 1, axis) & np.roll(inner, -1, axis)
         flags = flags & ~inner[1:-1, 1:-1, 1:-1]
     d = len(w.size)
-    corners, quads = (_CORNERS, _QUADS) if d == 3 else (_CORNERS[:4, :2], _QUADS[:2])
+    corners, triangles = (_CORNERS, _TRIANGLES) if d == 3 else (_CORNERS[:4, :2], _TRIANGLES[:2])
     nodes, legend, seen = [], [], np.zeros((0, 3))
     for k, number in enumerate(np.unique(w.count[w.count > 0])):
         cells = w.points[flags.ravel() & (w.count == number)]
         points = (cells[:, None] + corners * w.size).reshape(-1, d) @ w.frame[:3, :d].T
         points = points + w.frame[:3, 3]
-        faces = len(corners) * np.arange(len(cells))[:, None, None] + np.array(quads)
+        faces = len(corners) * np.arange(len(cells))[:, None, None] + triangles
         color = (*PALETTE[k % 8][:3], 0.35)
-        shape = Triangles(points.astype(np.float32), faces.reshape(-1, 3))
+        shape = Triangles(points, faces.reshape(-1, 3))
         nodes.append(Node(f"workspace/{number}", np.eye(4), shape, color))
         legend.append((f"{number} posture{'s' if number > 1 else ''}", color))
         seen = np.concatenate((seen, points))
     scene = show(w.model, q, **options)
-    return replace(
-        scene, nodes=(*scene.nodes, *nodes), legend=(*scene.legend, *legend),
-        camera=framed(seen, None) if len(seen) else scene.camera,
-    )  # fmt: skip
+    camera = framed(seen, None) if len(seen) else scene.camera
+    more = {"nodes": (*scene.nodes, *nodes), "legend": (*scene.legend, *legend)}
+    return replace(scene, camera=camera, **more)

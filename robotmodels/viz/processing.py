@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
@@ -23,12 +22,13 @@ from ..logs import Log
 from ..model import RobotModel
 from . import style
 from .over_time import joint_names, joint_units
-from .style import ALERT, BAND, DASHED, INK, PAGE, PALETTE
+from .style import ALERT, BAND, DASHED, INK, PAGE, PALETTE, Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_KEPT = (0, (5.0, 1.0))
 _POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
 _NOISE: dict[str, Any] = {"color": ALERT, "linewidth": 0.9, "linestyle": (0, (1.3, 1.1))}
 _LONGEST = 1 << 18  # samples for spectra
@@ -46,8 +46,7 @@ def plot_processing(
     processing: Processing | None = None,
     *,
     model: RobotModel | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Spectra of positions and torques before and after processing, and the criteria of its choice.
 
@@ -59,12 +58,14 @@ def plot_processing(
         The choices for a log, of `identification.choose_processing`.
     model : RobotModel, optional
         The robot of a log, for units and names of its joints.
+    **look
+        ``title`` and ``size``, see `robotmodels.viz`.
 
     Returns
     -------
     matplotlib.figure.Figure
         A row for each joint: densities of position and torque, with the frequency of the motion,
-        the cutoff of the positions (of their filter), the cutoff of regressor and torques (of the
+        the cutoff of the positions (of their filter), that of regressor and torques (of the
         decimation) and the noise of the positions. The grey part above the cutoff is removed; the
         title gives its root mean square, for torques also relative.
 
@@ -73,14 +74,6 @@ def plot_processing(
         of both cutoffs; and the equations for each parameter (edges and dead bands not subtracted)
         against that of regressor and torques. Dots mark the choice, dashed lines its bounds. A bias
         below 1e-6 is drawn at the lower edge.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Not a log, not a processing, or of other joints; fewer than 16 samples; a result together
-        with a processing or a model.
-    MissingExtraError
-        Matplotlib is not installed.
 
     References
     ----------
@@ -105,25 +98,31 @@ def plot_processing(
         )
     q, tau = np.array(log.q[rows]), np.array(log.tau[rows])
     filtered = q if chosen.cutoff is None else zero_phase(q, chosen.cutoff, log.dt, chosen.order)
-    names = joint_names(None, log.n, model)
-    units = [unit.value for unit in joint_units(None, log.n, model)]
-    efforts = [{"rad": "N m", "m": "N"}.get(unit, "N m or N") for unit in units]
-    inner = slice(min(chosen.edges, N // 4), N - min(chosen.edges, N // 4))  # without transients
+    names, units = joint_names(None, log.n, model), joint_units(None, log.n, model)
+    kinds = [unit.value for unit in units]
+    efforts = [{"rad": "N m", "m": "N"}.get(unit, "N m or N") for unit in kinds]
+    edge = min(chosen.edges, N // 4)
+    inner = slice(edge, N - edge)  # without transients
     count = log.n + (system is not None)
-    figure, grid = style.panels(PAGE, 1.2 + 1.15 * count, size, count, 2, sharex=True)
+    figure, grid = style.panels(PAGE, 1.2 + 1.15 * count, look, count, 2, sharex=True)
     decimated = _decimated(tau, chosen.decimation)
     for column, what, whole, kept, cutoff, of in (
-        (grid[:, 0], "position", q, filtered, chosen.cutoff, units),
-        (grid[:, 1], "torque", tau, decimated, chosen.torque_cutoff, efforts),
+        (grid[:, 0], "position", q, filtered, chosen.cutoff, kinds),
+        (
+            grid[:, 1],
+            "torque",
+            tau,
+            decimated,
+            chosen.torque_cutoff,
+            efforts,
+        ),
     ):
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)
         cut, rms = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (whole - kept, whole))
-        for j, name in enumerate(names):
-            axes = column[j]
+        for j, axes in enumerate(column[: log.n]):
             axes.loglog(f, before[:, j], color=PALETTE[1], linewidth=0.9, label="as recorded")
-            dashes = (0, (5.0, 1.0))
-            axes.loglog(f, after[:, j], color=PALETTE[0], linestyle=dashes, label="kept")
+            axes.loglog(f, after[:, j], color=PALETTE[0], linestyle=_KEPT, label="kept")
             if cutoff is not None:
                 axes.axvspan(cutoff, 0.5 / log.dt, color=BAND, linewidth=0.0, zorder=0.4)
             _draw_frequencies(axes, chosen)
@@ -131,18 +130,20 @@ def plot_processing(
             noise = float(np.median(before[high, j])) if high.any() else 0.0
             if what == "position" and noise > 0.0:
                 axes.axhline(noise, label="noise of the positions", **_NOISE)
-            axes.set_ylim(*_range(before[:, j], after[:, j]))
+            y = np.concatenate((before[:, j], after[:, j]))
+            top = float(y.max()) or 1.0
+            axes.set_ylim(max(before[:, j].min() / 3.0, 1e-12 * top), 3.0 * top)
             relative = what == "torque" and rms[j] > 0.0
             share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if relative else ""
-            axes.set_title(f"{name}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
-            axes.set_ylabel(f"{what}\n({of[j]}/√Hz)" if " or " not in of[j] else f"{what}\n(1/√Hz)")
+            axes.set_title(f"{names[j]}: {cut[j]:.2g} {of[j]} rms{share} cut", loc="left")
+            axes.set_ylabel(f"{what}\n({'1' if ' or ' in of[j] else of[j]}/√Hz)")
         column[-1].set_xlabel("frequency (Hz)")
     if system is not None:
         _draw_criteria(grid[-1], system)
     for axes in grid.flat:
         style.plain_logarithmic(axes.yaxis, 4)
         style.plain_logarithmic(axes.xaxis)
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def _given(
@@ -240,11 +241,3 @@ def _density(x: Array, dt: float) -> tuple[Array, Array]:
     counts = np.diff([*first, len(f)])
     power = np.add.reduceat(P, first, axis=0) / counts[:, None]
     return np.add.reduceat(f, first) / counts, np.sqrt(power)
-
-
-def _range(before: Array, after: Array) -> tuple[float, float]:
-    """Limits of a logarithmic axis, above rounding."""
-    top = float(max(before.max(initial=0.0), after.max(initial=0.0)))
-    if top <= 0.0:
-        return 1e-12, 1.0
-    return max(float(before[before > 0.0].min(initial=top)) / 3.0, 1e-12 * top), 3.0 * top

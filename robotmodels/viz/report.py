@@ -1,17 +1,39 @@
 """Reports with their figures as one HTML file, readable offline and on paper.
 
+Parameters
+----------
+result : CalibrationResult or IdentificationResult
+    Of `calibration.fit` or `identification.fit`.
+path : str or Path
+    The HTML file.
+test : Log, optional
+    Held-out log, for the figures; the result contains its errors only.
+robot : StandardParameters, optional
+    Result of `consistent_robot`; the increase of its residuals is reported.
+
 Raises
 ------
 InvalidValueError, ShapeError
     Not a result; not a log of its joints.
-MissingExtraError
-    Matplotlib is not installed.
 OSError
     The file cannot be written.
 
 References
 ----------
 Seed book sections 1.4 and 1.6.5.
+
+Examples
+--------
+>>> from tempfile import TemporaryDirectory
+>>> import numpy as np
+>>> import robotmodels as rm
+>>> from robotmodels.calibration import Pose, fit
+>>> arm, q = rm.load("rx90"), np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+>>> result = fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+>>> with TemporaryDirectory() as folder:
+...     html_report(result, Path(folder) / "report.html")
+...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
+5
 """
 
 from __future__ import annotations
@@ -39,54 +61,43 @@ from .processing import plot_processing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_RESIDUALS = (
+    "Residuals (predicted minus measured) of each row over the number of the configuration, before "
+    "(nominal table, base and tool fitted) and after; the scales of both sides differ."
+)
+_IN_SPACE = "Errors of position where they were made, magnified as stated; crosses are outliers."
+_NORMALITY = "Residuals in standard deviations: Gaussian ones follow the curve and the line."
+_TORQUES = (
+    "Measured and predicted torques and their difference, with its size relative to the measured "
+    "torque; grey: the joint is in its dead band."
+)
+_EQUATIONS = (
+    "Residuals of the equations, with two standard deviations, and their autocorrelation, with the "
+    "95 % band of white residuals"
+)
+_PARAMETERS = "Parameters with 95 % intervals, as their contributions to the torques of the log."
+_ERRORS = (
+    "Relative standard errors; above the dashed line (30 %) the log does not determine the "
+    "parameter."
+)
+_PROCESSING = (
+    "Spectra of positions and torques, kept and cut off as noise (grey); below, the criteria: the "
+    "bias that noise of the positions causes, and the number of equations."
+)
+
 Drawing = tuple[Callable[..., "Figure"], str]
 """A function that draws a figure of a result, and the caption of the figure."""
 
 
 def html_report(result: CalibrationResult, path: str | Path) -> None:
-    """Write the report on a calibration with its figures into one file that needs no network.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of `calibration.fit`.
-    path : str or Path
-        The HTML file.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> import numpy as np
-    >>> import robotmodels as rm
-    >>> from robotmodels.calibration import Pose, fit
-    >>> arm, q = rm.load("rx90"), np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> result = fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
-    >>> with TemporaryDirectory() as folder:
-    ...     html_report(result, Path(folder) / "report.html")
-    ...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
-    5
-    """
+    """Write the report on a calibration with its figures into one offline file."""
     found = calibration.as_result(result)
     figures: list[Drawing] = [
-        (
-            calibration.plot_calibration_residuals,
-            "Residuals (predicted minus measured) of each row over the number of the "
-            "configuration, before (nominal table, base and tool fitted) and after; the scales of "
-            "both sides differ.",
-        ),
-        (
-            calibration.plot_calibration_in_space,
-            "Errors of position where they were made, magnified as stated; crosses are outliers.",
-        ),
-        (
-            calibration.plot_calibration_parameters,
-            "Corrections of the parameters with their intervals.",
-        ),
+        (calibration.plot_calibration_residuals, _RESIDUALS),
+        (calibration.plot_calibration_in_space, _IN_SPACE),
+        (calibration.plot_calibration_parameters, "Corrections with their intervals."),
         (calibration.plot_calibration_correlations, "Correlations of the estimates."),
-        (
-            calibration.plot_calibration_normality,
-            "Residuals in standard deviations: Gaussian ones follow the curve and the line.",
-        ),
+        (calibration.plot_calibration_normality, _NORMALITY),
     ]
     title = f"Geometric calibration of {found.nominal.name}"
     _write(path, title, calibration_sections(found), figures, found)
@@ -98,64 +109,21 @@ def identification_html(
     test: Log | None = None,
     robot: StandardParameters | None = None,
 ) -> None:
-    """Write the report on an identification with its figures into one file that needs no network.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Result of `identification.fit`.
-    path : str or Path
-        The HTML file.
-    test : Log, optional
-        Held-out log, for the figures; the result contains its errors only.
-    robot : StandardParameters, optional
-        Result of `consistent_robot`; the increase of its residuals is reported.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from robotmodels.datasets import example_log
-    >>> from robotmodels.identification import fit
-    >>> result = fit(*example_log())
-    >>> with TemporaryDirectory() as folder:
-    ...     identification_html(result, Path(folder) / "report.html")
-    ...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
-    6
-    """
+    """Write the report on an identification with its figures into one offline file."""
     found = identification.as_result(result, test)
-    figures: list[Drawing] = [
-        (
-            partial(identification.plot_identification_torques, test=test),
-            "Measured and predicted torques and their difference, with its size relative to the "
-            "measured torque; grey: the joint is in its dead band.",
-        ),
-        (
-            identification.plot_identification_residuals,
-            "Residuals of the fitted equations, with two standard deviations, and their "
-            "autocorrelation, with the 95 % band of white residuals.",
-        ),
-        (
-            partial(identification.plot_identification_residuals, test=test),
-            "The same for the held-out log.",
-        ),
-        (
-            identification.plot_identification_parameters,
-            "Parameters with 95 % intervals, as their contributions to the torques of the log.",
-        ),
-        (
-            identification.plot_identification_standard_errors,
-            "Relative standard errors; above the dashed line (30 %) the log does not determine the "
-            "parameter.",
-        ),
-        (identification.plot_identification_correlations, "Correlations of the estimates."),
-        (
-            plot_processing,
-            "Spectra of positions and torques, kept and cut off as noise (grey); below, the "
-            "criteria: the bias that noise of the positions causes, and the number of equations.",
-        ),
+    own = identification
+    held_out: list[Drawing] = [
+        (partial(own.plot_identification_residuals, test=test), f"{_EQUATIONS}, held-out log.")
     ]
-    if test is None:
-        del figures[2]
+    figures: list[Drawing] = [
+        (partial(own.plot_identification_torques, test=test), _TORQUES),
+        (own.plot_identification_residuals, f"{_EQUATIONS}."),
+        *(held_out if test is not None else ()),
+        (own.plot_identification_parameters, _PARAMETERS),
+        (own.plot_identification_standard_errors, _ERRORS),
+        (own.plot_identification_correlations, "Correlations of the estimates."),
+        (plot_processing, _PROCESSING),
+    ]
     title = f"Dynamic identification of {found.model.name}"
     _write(path, title, identification_sections(found, robot), figures, found)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array
-from ..errors import RobotModelsWarning
+from .._arrays import Array, as_number
+from ..errors import InvalidValueError, RobotModelsWarning
 from ..geometry import PRISMATIC, DHTable, constant_factors
 from ..kinematics import link_poses
 from ..model import RobotModel
@@ -21,15 +23,28 @@ from .shapes import Drawable, Label, Node, apply, extent
 MESH_COLOR: Color = (0.72, 0.74, 0.78, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class RobotStyle:
-    """Parts of a robot to draw, and the opacity of its links."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Options of scenes of robots, explained at the head of `robotmodels.viz.show`."""
 
     frames: bool = False
     names: bool = False
     tool: bool = True
     meshes: bool = True
+    color: Any = None
     opacity: float = 1.0
+    box: ArrayLike | None = None
+    grid: bool = True
+    view: ArrayLike | None = None
+    height: int = 480
+    dark: bool = False
+
+    def __post_init__(self) -> None:
+        """Check two of them; what draws with the others checks them."""
+        if as_number(self.opacity, "opacity", least=0.0) > 1.0:
+            raise InvalidValueError(f"opacity: expected at most 1, got {self.opacity}.")
+        if not isinstance(self.dark, (bool, np.bool_)):
+            raise InvalidValueError(f"dark: expected True or False, got {self.dark!r:.80}.")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +74,7 @@ def draw_robot(
     model: RobotModel,
     q: Array,
     root: str,
-    style: RobotStyle,
+    options: Options,
     colors: Sequence[Color | None],
     seen: Array | None = None,
 ) -> RobotDrawing:
@@ -67,7 +82,7 @@ def draw_robot(
 
     Shapes: q (N, n), seen (M, n).
     """
-    if style.meshes:
+    if options.meshes:
         model, missing = with_stand_ins(model)
         if missing:
             warnings.warn(
@@ -81,11 +96,11 @@ def draw_robot(
     seen = q if seen is None else seen
     table = with_strokes(model.table, seen)
     size = characteristic_length(table, model.tool)
-    pieces = _pieces(model, table, style, size)
+    pieces = _pieces(model, table, options, size)
     one = len(q) == 1
     nodes = [Node(root, model.base)]
     # several configurations share what stands still: it keeps its own colour
-    nodes += _shapes([p for p in pieces if p.frame == 0], root, colors[0] if one else None, style)
+    nodes += _shapes([p for p in pieces if p.frame == 0], root, colors[0] if one else None, options)
     paths: list[list[str]] = []
     for k, configuration in enumerate(q):
         top = root if one else f"{root}/posture_{k + 1}"
@@ -94,7 +109,7 @@ def draw_robot(
         nodes += frames
         paths.append(hung)
         for j in range(1, model.f + 1):
-            nodes += _shapes([p for p in pieces if p.frame == j], hung[j], colors[k], style)
+            nodes += _shapes([p for p in pieces if p.frame == j], hung[j], colors[k], options)
     joints = tuple(paths[0][row + 1] for row in model.table.joint_rows)
     return RobotDrawing(tuple(nodes), _extent(model, seen, pieces), joints, size, tuple(paths[0]))
 
@@ -108,21 +123,21 @@ def with_strokes(table: DHTable, q: Array) -> DHTable:
     )
 
 
-def _pieces(model: RobotModel, table: DHTable, style: RobotStyle, size: float) -> list[_Piece]:
+def _pieces(model: RobotModel, table: DHTable, options: Options, size: float) -> list[_Piece]:
     """Links, axes of frames, and names."""
-    visuals = model.visuals if style.meshes else ()
+    visuals = model.visuals if options.meshes else ()
     pieces = []
     for i, visual in enumerate(visuals or skeleton(table, model.tool, model.tip, axes=False)):
         for k, (shape, color) in enumerate(_solids(visual)):
             name = f"shape:{i + 1}.{k + 1}"
             pieces.append(_Piece(visual.frame, name, visual.pose, shape, color, True))
-    triads = [(j, np.eye(4), f"R{j}", 0.11) for j in range(1, model.f + 1) if style.frames]
-    triads += [(model.tip, model.tool, "tool", 0.12)] if style.tool else []
+    triads = [(j, np.eye(4), f"R{j}", 0.11) for j in range(1, model.f + 1) if options.frames]
+    triads += [(model.tip, model.tool, "tool", 0.12)] if options.tool else []
     for j, pose, name, part in triads:
         for axis, visual in zip("xyz", triad(j, pose, part * size), strict=True):
             shape, color = _solids(visual)[0]
             pieces.append(_Piece(j, f"{name}:{axis}", visual.pose, shape, color, False))
-    for j, name in enumerate(table.names if style.names else (), start=1):
+    for j, name in enumerate(table.names if options.names else (), start=1):
         at = se3.translation(0.0, 0.0, 0.125 * size)
         pieces.append(_Piece(j, f"label:{j}", at, Label(name), (0.1, 0.1, 0.1, 1.0), False))
     return pieces
@@ -155,12 +170,12 @@ def _frames(model: RobotModel, q: Array, top: str) -> tuple[list[Node], list[str
     return nodes, paths
 
 
-def _shapes(pieces: list[_Piece], path: str, color: Color | None, style: RobotStyle) -> list[Node]:
+def _shapes(pieces: list[_Piece], path: str, color: Color | None, options: Options) -> list[Node]:
     """Nodes of pieces below a path."""
     nodes = []
     for piece in pieces:
         r, g, b, a = piece.color if color is None or not piece.is_link else color
-        rgba = (r, g, b, a * style.opacity if piece.is_link else a)
+        rgba = (r, g, b, a * options.opacity if piece.is_link else a)
         nodes.append(Node(f"{path}/{piece.name}", piece.pose, piece.shape, rgba))
     return nodes
 

@@ -41,12 +41,9 @@ class Scene:
 
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.model import RobotModel
-    >>> from robotmodels.viz import show
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> show(arm, [0.0, 0.5]).paths[0]
-    'robots/robot'
+    >>> import robotmodels as rm
+    >>> rm.viz.show(rm.load("planar_2r"), [0.0, 0.5]).paths[0]
+    'robots/planar_2r'
     """
 
     title: str
@@ -64,23 +61,7 @@ class Scene:
         return tuple(node.path for node in self.nodes)
 
     def pose(self, path: str) -> Array:
-        """World pose of a node, of the first sample if the scene moves.
-
-        Parameters
-        ----------
-        path : str
-            One of `paths`.
-
-        Returns
-        -------
-        ndarray, shape (4, 4)
-            Its pose.
-
-        Raises
-        ------
-        FrameNotFoundError
-            No node has this path.
-        """
+        """World pose (4, 4) of a node, by its path, of the first sample if the scene moves."""
         poses = {node.path: node.pose for node in self.nodes}
         if path not in poses:
             raise FrameNotFoundError("node", path, poses)
@@ -90,41 +71,12 @@ class Scene:
         return T
 
     def html(self) -> str:
-        """The picture as one HTML page that loads nothing from anywhere.
-
-        Returns
-        -------
-        str
-            About 0.9 MB without meshes.
-
-        Raises
-        ------
-        MissingExtraError
-            meshcat is not installed.
-        """
+        """The picture as one HTML page that loads nothing; about 0.9 MB without meshes."""
         panel = None if self.sliders is None else self.sliders.data()
         return page(self.title, self.nodes, self.camera, self.motion, self.legend, panel, self.dark)
 
     def save(self, path: str | Path) -> Path:
-        """Write the picture as one offline page, with its animation.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, by custom ``.html``; its folder must exist.
-
-        Returns
-        -------
-        Path
-            The file written.
-
-        Raises
-        ------
-        InvalidValueError
-            There is no such folder, or the path is a folder.
-        OSError
-            It cannot be written.
-        """
+        """Write the picture as one offline page, with its animation, and return the path."""
         path = Path(path)
         if path.is_dir():
             raise InvalidValueError(f"path: {path} is a folder; give a file, such as arm.html.")

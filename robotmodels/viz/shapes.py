@@ -27,8 +27,7 @@ _ALONG = {"x": se3.rotation("y", 0.5 * np.pi), "y": se3.rotation("x", -0.5 * np.
 
 # ellipsoids, in parts of the size of the robot
 _REACH = 0.25  # of the largest ellipsoid of a kind, at most
-_CUT = 0.32  # from where on a longer one is cut
-_DASH, _GAP, _DASHES = 0.02, 0.015, 3
+_CUT, _BEYOND = 0.32, 0.42  # where longer ones are cut, and how far their axes go on
 _THIN = 0.0035  # radius of bars
 _LONGEST = 8.0  # length drawn of an unbounded ellipsoid, in its least radii
 
@@ -46,7 +45,7 @@ _FORCES = (EllipsoidQuantity.FORCE, EllipsoidQuantity.MOMENT)
 class Triangles:
     """A surface made of triangles. Shapes: vertices (v, 3), faces (t, 3)."""
 
-    vertices: NDArray[np.float32]
+    vertices: NDArray[np.floating]
     faces: NDArray[np.integer]
 
 
@@ -139,7 +138,7 @@ def apply(T: Array, points: Array) -> Array:
 def floor_grid(points: Array, dark: bool) -> list[Node]:
     """A grid on the world's plane z = 0 around points, and the axes of the world."""
     low, high = points.min(axis=0), points.max(axis=0)
-    cell = _rounded_down(float((high - low).max()) / 8.0)
+    cell = rounded_down(float((high - low).max()) / 8.0)
     first = np.floor(np.minimum(low[:2], 0.0) / cell) - 1
     last = np.ceil(np.maximum(high[:2], 0.0) / cell) + 1
     x, y = (np.arange(a, b + 1) * cell for a, b in zip(first, last, strict=True))
@@ -214,10 +213,10 @@ def _surface(grid: Array) -> Triangles:
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     a, b, c, d = first, first + 1, first + columns, first + columns + 1
     faces = np.stack((a, b, d, a, d, c), axis=-1).reshape(-1, 3)
-    return Triangles(grid.reshape(-1, 3).astype(np.float32), faces.astype(np.uint32))
+    return Triangles(grid.reshape(-1, 3), faces)
 
 
-def _rounded_down(length: float) -> float:
+def rounded_down(length: float) -> float:
     """The largest of 1, 2 or 5 times a power of ten that is not above a length."""
     if length <= 0.0:
         return 0.1
@@ -260,12 +259,12 @@ def draw_ellipsoids(
             finite = float(np.max(radii, where=np.isfinite(radii), initial=0.0))
             longest = _CUT * size if scale is None else max(_CUT * size, 1.3 * finite)
             cut = radii > longest * (1.0 + 1e-9)
-            beyond = ", continues along the dashes" if cut.any() else beyond
+            beyond = ", continues along its axes" if cut.any() else beyond
+            ends = np.where(cut, longest * _BEYOND / _CUT, radii)
             pose = se3.translation(*ellipsoid.centre)
             pose[:3, :3] = ellipsoid.axes
             nodes.append(Node(f"ellipsoids/{k}", pose))
-            nodes += _ellipsoid_nodes(f"ellipsoids/{k}", radii, cut, longest, size, color)
-            ends = np.where(cut, longest + _DASHES * (_DASH + _GAP) * size, radii)
+            nodes += _ellipsoid_nodes(f"ellipsoids/{k}", radii, ends, longest, size, color)
             points.append(apply(pose, np.vstack((np.diag(ends), -np.diag(ends)))))
         text = f"{quantity.value}: {s:g} m drawn per {quantity.unit}{beyond}"
         legend.append((text, (*color[:3], 1.0)))
@@ -280,67 +279,35 @@ def _scale(quantity: EllipsoidQuantity, radii: Array, size: float) -> float:
     longest = float(finite.max())
     if quantity in _FORCES:  # near singular positions they grow without bound
         longest = min(longest, _LONGEST * float(finite.min()))
-    return _rounded_down(_REACH * size / longest)
+    return rounded_down(_REACH * size / longest)
 
 
 def _ellipsoid_nodes(
-    path: str, radii: Array, cut: NDArray[np.bool_], longest: float, size: float, color: Color
+    path: str, radii: Array, ends: Array, longest: float, size: float, color: Color
 ) -> list[Node]:
-    """Surface, principal ellipses, axes and dashes along the cut axes, in the ellipsoid's axes."""
+    """Surface and principal ellipses, cut where they are too long, and axes, in its own axes."""
     dark: Color = (0.65 * color[0], 0.65 * color[1], 0.65 * color[2], 1.0)
-    thin = _THIN * size
-    ends = np.where(cut, longest, radii)
-    seen = ends > thin
-    here = np.eye(4)
-    nodes = []
-    if seen.sum() > 1 and not cut.all():
-        nodes.append(Node(f"{path}/surface", here, _ellipsoid_surface(radii, longest), color))
-        t = np.linspace(0.0, 2.0 * np.pi, 65)
+    thin, here, nodes = _THIN * size, np.eye(4), list[Node]()
+    seen = np.flatnonzero(radii > thin)
+    r = np.minimum(radii, 1e6 * longest)
+    if len(seen) > 1 and (radii <= longest).any():
+        # about the shortest axis: where the others are cut, the surface is a tube or two sheets
+        k = int(radii.argmin())
+        theta, phi = np.linspace(0.0, np.pi, 33)[:, None], np.linspace(0.0, 2.0 * np.pi, 65)
+        round_k = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
+        unit = np.stack((*round_k, np.cos(theta) + 0.0 * phi), axis=-1)
+        points = np.clip(r * np.roll(unit, k - 2, axis=-1), -longest, longest)
+        nodes.append(Node(f"{path}/surface", here, _surface(points), color))
         lines = []
-        for i, j in ((0, 1), (0, 2), (1, 2)):
-            if seen[i] and seen[j]:
-                line = np.zeros((len(t), 3))
-                line[:, i], line[:, j] = np.cos(t), np.sin(t)
-                line *= np.minimum(radii, 1e6 * longest)
-                lines.append(np.repeat(np.clip(line, -longest, longest), 2, axis=0)[1:-1])
+        for i, j in ((i, j) for i in seen for j in seen if i < j):
+            line = np.zeros((len(phi), 3))
+            line[:, i], line[:, j] = r[i] * np.cos(phi), r[j] * np.sin(phi)
+            lines.append(np.repeat(np.clip(line, -longest, longest), 2, axis=0)[1:-1])
         nodes.append(Node(f"{path}/outline", here, Segments(np.concatenate(lines)), dark))
-    elif not seen.any():
+    elif not len(seen):
         nodes.append(Node(f"{path}/dot", here, Sphere(2.0 * thin), dark))
-    width = thin if seen.sum() == 1 else 0.4 * thin
-    for i in np.flatnonzero(seen):
-        bars = {f"axis_{i + 1}": (-ends[i], ends[i], width)}
-        for d in range(_DASHES if cut[i] else 0):
-            start = longest + ((d + 1) * _GAP + d * _DASH) * size
-            stop = start + _DASH * size
-            bars[f"dash_{i + 1}+{d}"] = (start, stop, thin)
-            bars[f"dash_{i + 1}-{d}"] = (-stop, -start, thin)
-        for name, (start, stop, radius) in bars.items():
-            tube = path_tube(np.outer((start, stop), np.eye(3)[i]), radius)
-            if tube is not None:
-                nodes.append(Node(f"{path}/{name}", here, tube, dark))
+    for i in seen:
+        width = thin if len(seen) == 1 or radii[i] > longest else 0.4 * thin
+        tube = path_tube(np.outer((-ends[i], ends[i]), np.eye(3)[i]), width)
+        nodes += [] if tube is None else [Node(f"{path}/axis_{i + 1}", here, tube, dark)]
     return nodes
-
-
-def _ellipsoid_surface(radii: Array, longest: float) -> Triangles:
-    """An ellipsoid; where it is too long: a tube, or two sheets joined at their rims."""
-    long = radii > longest
-    axis = int(np.argmin(long)) if long.sum() == 2 else int(np.argmax(long)) if long.any() else 2
-    others = [i for i in range(3) if i != axis]
-    turn = np.linspace(0.0, 2.0 * np.pi, 33)
-    ring = np.stack((np.cos(turn), np.sin(turn)))[:, None]
-    if long.sum() == 2:
-        rho = longest * np.r_[np.linspace(0.0, 1.0, 9), np.linspace(1.0, 0.0, 9)]
-        across = rho[:, None] * ring
-        inside = 1.0 - ((across / radii[others, None, None]) ** 2).sum(axis=0)
-        along = radii[axis] * np.repeat((1.0, -1.0), 9)[:, None] * np.sqrt(inside)
-    elif long.any():
-        along = np.linspace(-longest, longest, 17)[:, None]
-        across = np.sqrt(1.0 - (along / radii[axis]) ** 2) * ring * radii[others, None, None]
-    else:
-        angle = np.linspace(0.0, np.pi, 17)[:, None]
-        along = radii[axis] * np.cos(angle)
-        across = np.sin(angle) * ring * radii[others, None, None]
-    grid = np.empty((*across.shape[1:], 3))
-    grid[..., others] = np.moveaxis(across, 0, -1)
-    grid[..., axis] = along
-    return _surface(grid)

@@ -1,32 +1,51 @@
 """Pictures of robots: still, moving, with sliders.
 
-Options of all of them:
-
 Parameters
 ----------
-frames : bool
-    Whether the axes of every frame R_j are drawn (x red, y green, z blue).
-names : bool
-    Whether the names of the frames are written beside them.
-tool : bool
-    Whether the axes of the tool are drawn.
-meshes : bool
-    Whether the shapes of the source URDF are used, with a skeleton and a warning for mesh files
-    that are missing; otherwise a skeleton sized from the table, as for robots without shapes.
-color : array_like, shape (3,) or (4,), optional
-    Of the links: red, green, blue and opacity in [0, 1].
-opacity : float
-    Of the links, in [0, 1].
-box : array_like, shape (6,), optional
-    Workspace to draw: ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, metres.
-grid : bool
-    Whether the floor z = 0 and the axes of the world are drawn.
-view : array_like, shape (2,), optional
-    Azimuth and elevation of the camera seen from the robot, radians; default obliquely.
-height : int
-    Of the picture in a notebook, pixels.
-dark : bool
-    Whether the background is dark.
+model : RobotModel, LoopedRobot or sequence of these
+    The robot, or R robots that stand where their bases are; `jog` takes one RobotModel.
+q : array_like or str
+    Joint variables in radians or metres, default zero. `show`: (n,) or (N, n) or the name of one of
+    ``model.configurations``; with N > 1 the postures are drawn together, each in a colour of its
+    own. `animate`: (N, n) or (N, 1, n), N >= 2, or a Trajectory (sampled at the frame rate),
+    Samples, JointPath or ResolvedMotion with its own times. For several robots a list with an entry
+    for each. `jog`: the first posture, and that of Reset.
+columns : int, optional
+    Postures of one robot beside each other, so many in a row, numbered from 1; without it they
+    stand over each other, where those that differ only by the turn of a link hide one another.
+legend : sequence of str, optional
+    A text for each posture drawn (those of the first robot first), listed in a corner of the
+    picture with its colour.
+ellipsoids : Ellipsoid or sequence of Ellipsoid, optional
+    Of velocities or forces, drawn at the tools they belong to; a batch gives one for each posture.
+    Flat ones are discs or bars; unbounded ones are cut, their axes go on beyond.
+ellipsoid_scale : float, optional
+    Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m. By default a round number for each quantity that
+    fits the robot. The legend gives it.
+dt : float, optional
+    Seconds from one sample to the next; they replace the times of samples that have some.
+fps : float, optional
+    Samples a second, instead of ``dt``; default 30. Motions with more are resampled at 30.
+path : bool
+    Whether the path of the tool is drawn.
+loop : bool
+    Whether the motion starts again at its end.
+**options
+    Of every scene: frames, names, tool (bool): whether the axes of all frames, their names, the
+    axes of the tool are drawn (x red, y green, z blue); meshes (bool): whether the shapes of the
+    source URDF are used, with a skeleton and a warning for mesh files that are missing, otherwise
+    a skeleton sized from the table, as for robots without shapes; color (array_like, shape (3,) or
+    (4,)): of the links, red, green, blue and opacity in [0, 1], in `show` also one for each
+    posture or robot; opacity (float): of the links, in [0, 1]; box (array_like, shape (6,)):
+    workspace to draw, ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, m; grid (bool): whether
+    the floor z = 0 and the axes of the world are drawn; view (array_like, shape (2,)): azimuth and
+    elevation of the camera seen from the robot, rad; height (int): pixels in a notebook; dark
+    (bool): whether the background is dark.
+
+Returns
+-------
+Scene
+    Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
 
 Raises
 ------
@@ -37,12 +56,25 @@ UrdfError
     A mesh file cannot be read.
 MissingExtraError
     A package that draws is not installed.
+
+Examples
+--------
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.trajectories import quintic
+>>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], d=[0, 0.3]))
+>>> show(arm, [[0.0, 0.5], [0.4, -0.5]], frames=True)
+<Scene 'robot': 31 shapes>
+>>> animate(arm, np.linspace([0.0, 0.0], [1.0, 0.5], 1001), dt=0.002)
+<Scene 'robot': 12 shapes, 2 s from 1001 samples in 122 keyframes>
+>>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
+1.5
+>>> jog(arm, [0.5, 0.1])
+<Scene 'robot': 12 shapes, 2 sliders>
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import index
 from typing import Any
 
 import numpy as np
@@ -63,11 +95,10 @@ from .camera import framed
 from .loops import with_closures
 from .motion import Motion, Track, keyframes, timed_samples
 from .over_time import is_prismatic
-from .robot import MESH_COLOR, RobotDrawing, RobotStyle, draw_robot
+from .robot import MESH_COLOR, Options, RobotDrawing, draw_robot
 from .scene import Scene
 from .shapes import (
     Label,
-    Legend,
     Node,
     as_ellipsoids,
     draw_ellipsoids,
@@ -76,7 +107,7 @@ from .shapes import (
     workspace_box,
 )
 from .sliders import coupled_posture, coupling, slider_panel
-from .style import PALETTE, as_texts
+from .style import PALETTE, as_texts, as_whole
 
 Moving = ArrayLike | Trajectory | Samples | JointPath | ResolvedMotion
 
@@ -91,72 +122,23 @@ def show(
     model: RobotModel | LoopedRobot | Sequence[RobotModel | LoopedRobot],
     q: ArrayLike | str | Sequence[ArrayLike | str] | None = None,
     *,
-    frames: bool = False,
-    names: bool = False,
-    tool: bool = True,
-    meshes: bool = True,
-    color: ArrayLike | Sequence[ArrayLike] | None = None,
-    opacity: float = 1.0,
-    box: ArrayLike | None = None,
-    grid: bool = True,
-    view: ArrayLike | None = None,
-    height: int = 480,
     columns: int | None = None,
     legend: Sequence[str] | None = None,
     ellipsoids: Ellipsoid | Sequence[Ellipsoid] | None = None,
     ellipsoid_scale: float | None = None,
-    dark: bool = False,
+    **options: Any,
 ) -> Scene:
-    """Draw a robot, several postures of it over each other, or several robots; also called plot.
-
-    Parameters
-    ----------
-    model : RobotModel, LoopedRobot or sequence of these
-        The robot, or R robots that stand where their bases are.
-    q : array_like, shape (n,) or (N, n), or str, optional
-        Joint variables in radians or metres; with N > 1 the postures are drawn together, each in
-        a colour of its own; or the name of one of ``model.configurations``. For several robots a
-        list with an entry for each, or one name. Default zero.
-    frames, names, tool, meshes, opacity, box, grid, view, height, dark
-        As at the head of `robotmodels.viz.show`.
-    color : array_like, shape (3,) or (4,), optional
-        Of the links. For several postures or robots also a list with an entry for each.
-    columns : int, optional
-        Postures of one robot beside each other, so many in a row, numbered from 1; without it
-        they stand over each other, where those that differ only by the turn of a link hide one
-        another.
-    legend : sequence of str, optional
-        A text for each posture drawn (those of the first robot first), listed in a corner of the
-        picture with its colour.
-    ellipsoids : Ellipsoid or sequence of Ellipsoid, optional
-        Of velocities or forces, drawn at the tools they belong to; a batch gives one for each
-        posture. Flat ones are discs or bars; unbounded ones are cut, with dashes beyond.
-    ellipsoid_scale : float, optional
-        Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m. By default a round number for each quantity
-        that fits the robot. The legend gives it.
-
-    Returns
-    -------
-    Scene
-        Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> show(arm, [[0.0, 0.5], [0.4, -0.5]], frames=True)
-    <Scene 'robot': 29 shapes>
-    """
-    model = with_closures(model, q)
+    """Draw a robot, several postures of it over each other, or several robots; also called plot."""
+    model, given = with_closures(model, q), Options(**options)
     models = _as_models(model)
-    postures = [
-        _as_postures(value, item)
-        for item, value in zip(models, _as_many(q, model, len(models)), strict=True)
-    ]
-    colors = _colors(color, [len(p) for p in postures])
-    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
-    title = ", ".join(_unique_names(models))
-    key = _as_legend(legend, [c for each in colors for c in each])
+    values = _as_many(q, model, len(models))
+    postures = [_as_postures(value, item) for item, value in zip(models, values, strict=True)]
+    colors = _colors(given.color, [len(p) for p in postures])
+    title, key = ", ".join(_unique_names(models)), list[tuple[str, Color]]()
+    if legend is not None:
+        drawn_colors = [color or MESH_COLOR for each in colors for color in each]
+        words = as_texts(legend, len(drawn_colors), "legend", "postures drawn")
+        key = list(zip(words, drawn_colors, strict=True))
     drawn, extra = list(models), list[Node]()
     if columns is not None:
         if len(drawn) > 1 or ellipsoids is not None:
@@ -165,17 +147,17 @@ def show(
                 "where their bases are (see RobotModel.with_base), and ellipsoids where the robot "
                 "is."
             )
-        drawn, extra = _side_by_side(drawn[0], postures[0], columns)
-        view = _FROM_THE_FRONT if view is None else view
+        drawn, extra = _side_by_side(drawn[0], postures[0], as_whole(columns, "columns"))
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
-        draw_robot(item, p, f"robots/{label}", style, c)
+        draw_robot(item, p, f"robots/{label}", given, c)
         for item, p, label, c in zip(drawn, postures, _unique_names(drawn), colors, strict=True)
     ]
     size = max(robot.size for robot in robots)
     nodes, points, more = draw_ellipsoids(as_ellipsoids(ellipsoids), size, ellipsoid_scale)
     robots.append(RobotDrawing(tuple(nodes), points, (), 0.0))
-    return _scene(title, robots, extra, box, grid, view, height, dark, legend=(*key, *more))
+    view = None if columns is None else _FROM_THE_FRONT
+    return _scene(title, robots, extra, given, view, legend=(*key, *more))
 
 
 def animate(
@@ -186,69 +168,21 @@ def animate(
     *,
     path: bool = False,
     loop: bool = True,
-    frames: bool = False,
-    names: bool = False,
-    tool: bool = True,
-    meshes: bool = True,
-    color: ArrayLike | None = None,
-    opacity: float = 1.0,
-    box: ArrayLike | None = None,
-    grid: bool = True,
-    view: ArrayLike | None = None,
-    height: int = 480,
-    dark: bool = False,
+    **options: Any,
 ) -> Scene:
-    """Draw a robot, or several, that moves; also called play.
-
-    Motions with more than 30 samples per second are resampled at 30 per second.
-
-    Parameters
-    ----------
-    model : RobotModel, LoopedRobot or sequence of these
-        The robot, or R robots.
-    q : array_like, shape (N, n) or (N, 1, n), or Trajectory, Samples, JointPath or ResolvedMotion
-        Joint variables in radians or metres, N >= 2, or a motion with its own times; for several
-        robots a list of them. A trajectory is sampled at the frame rate.
-    dt : float, optional
-        Seconds from one sample to the next; they replace the times of samples that have some.
-    fps : float, optional
-        Samples a second, instead of ``dt``; default 30.
-    path : bool
-        Whether the path of the tool is drawn.
-    loop : bool
-        Whether the motion starts again at its end.
-    frames, names, tool, meshes, color, opacity, box, grid, view, height, dark
-        As at the head of `robotmodels.viz.show`.
-
-    Returns
-    -------
-    Scene
-        ``.motion`` has the duration and the number of keyframes.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> q = np.linspace([0.0, 0.0], [1.0, 0.5], 1001)
-    >>> animate(arm, q, dt=0.002)
-    <Scene 'robot': 11 shapes, 2 s from 1001 samples in 122 keyframes>
-    >>> from robotmodels.trajectories import quintic
-    >>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
-    1.5
-    """
-    model = with_closures(model, q)
+    """Draw a robot, or several, that moves; also called play."""
+    model, given = with_closures(model, q), Options(**options)
     models = _as_models(model)
     values = _as_many(q, model, len(models))
     samples = [timed_samples(v, m.n, dt, fps, "q") for m, v in zip(models, values, strict=True)]
-    rgba = None if color is None else _as_color(color)
-    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
     labels = _unique_names(models)
     robots: list[RobotDrawing] = []
     tracks: list[Track] = []
     paths: list[Node] = []
     for item, (times, motion), label in zip(models, samples, labels, strict=True):
         some = motion[np.unique(np.linspace(0, len(motion) - 1, _SEEN).astype(int))]
-        robot = draw_robot(item, motion[:1], f"robots/{label}", style, [rgba], some)
+        colors = _colors(given.color, [1])[0]
+        robot = draw_robot(item, motion[:1], f"robots/{label}", given, colors, some)
         t, kept = keyframes(times, motion)
         slides = is_prismatic(item).tolist()
         tracks += map(Track, robot.joints, slides, [t] * item.n, kept.T)
@@ -259,25 +193,10 @@ def animate(
     count = max(len(motion) for _, motion in samples)
     end = max(float(times[-1]) for times, _ in samples)
     played = Motion(tuple(tracks), count, end, bool(loop))
-    return _scene(", ".join(labels), robots, paths, box, grid, view, height, dark, motion=played)
+    return _scene(", ".join(labels), robots, paths, given, motion=played)
 
 
-def jog(
-    model: RobotModel,
-    q: ArrayLike | str | None = None,
-    *,
-    frames: bool = False,
-    names: bool = False,
-    tool: bool = True,
-    meshes: bool = True,
-    color: ArrayLike | None = None,
-    opacity: float = 1.0,
-    box: ArrayLike | None = None,
-    grid: bool = True,
-    view: ArrayLike | None = None,
-    height: int = 640,
-    dark: bool = False,
-) -> Scene:
+def jog(model: RobotModel, q: ArrayLike | str | None = None, **options: Any) -> Scene:
     """Draw a robot with a slider for each joint; also called teach, teach panel, joint sliders.
 
     The page needs no server. Its panel has a slider and a number for each joint (degrees or
@@ -288,79 +207,44 @@ def jog(
 
     The address of the page may hold a posture, ``arm.html#q=10,-20,0.3``, in the order and the
     units of the sliders; the page keeps it there, so that a link shows a posture.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : array_like, shape (n,), or str, optional
-        The first posture, and that of Reset: joint variables in radians or metres, or the name of
-        one of ``model.configurations``; default zero.
-    frames, names, tool, meshes, color, opacity, box, grid, view, height, dark
-        As at the head of `robotmodels.viz.show`.
-
-    Returns
-    -------
-    Scene
-        Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], d=[0, 0.3]))
-    >>> jog(arm, [0.5, 0.1])
-    <Scene 'robot': 12 shapes, 2 sliders>
     """
     check_model(model)
-    given = _named(q, model)
-    start = coupled_posture(model, None if given is None else as_exact(given, (model.n,), "q"))
-    rgba = None if color is None else _as_color(color)
-    style = RobotStyle(frames, names, tool, meshes, _as_opacity(opacity))
+    given, first = Options(**({"height": 640} | options)), _named(q, model)
+    start = coupled_posture(model, None if first is None else as_exact(first, (model.n,), "q"))
     (label,) = _unique_names((model,))
-    seen = _neighbourhood(model, start)
-    robot = draw_robot(model, start[None], f"robots/{label}", style, [rgba], seen)
+    colors, seen = _colors(given.color, [1])[0], _neighbourhood(model, start)
+    robot = draw_robot(model, start[None], f"robots/{label}", given, colors, seen)
     panel = slider_panel(model, start, robot.joints, robot.frames)
-    return _scene(model.name, [robot], [], box, grid, view, height, dark, sliders=panel)
+    return _scene(model.name, [robot], [], given, sliders=panel)
 
 
 def _scene(
     title: str,
     robots: Sequence[RobotDrawing],
     extra: Sequence[Node],
-    box: ArrayLike | None,
-    grid: bool,
-    view: ArrayLike | None,
-    height: int,
-    dark: bool,
-    **options: Any,
+    options: Options,
+    view: tuple[float, float] | None = None,
+    **more: Any,
 ) -> Scene:
     """Robots, extra nodes and what stands around them as a scene that they fill."""
-    if not isinstance(dark, (bool, np.bool_)):
-        raise InvalidValueError(f"dark: expected True or False, got {dark!r:.80}.")
     points: Array = np.concatenate([robot.points for robot in robots])
     nodes = [node for robot in robots for node in robot.nodes]
     nodes += extra
-    if box is not None:
-        box_nodes, corners = workspace_box(box)
+    if options.box is not None:
+        box_nodes, corners = workspace_box(options.box)
         nodes += box_nodes
         points = np.concatenate((points, corners))
-    if grid:
-        nodes += floor_grid(points, dark)
-    angles = None if view is None else as_exact(view, (2,), "view").tolist()
-    camera = framed(points, angles)
-    return Scene(title, tuple(nodes), camera, height=height, dark=bool(dark), **options)
+    if options.grid:
+        nodes += floor_grid(points, options.dark)
+    if options.view is not None:
+        view = as_exact(options.view, (2,), "view").tolist()
+    camera = framed(points, view)
+    look = {"height": options.height, "dark": bool(options.dark)}
+    return Scene(title, tuple(nodes), camera, **look, **more)
 
 
-def _side_by_side(model: RobotModel, q: Array, columns: int) -> tuple[list[RobotModel], list[Node]]:
+def _side_by_side(model: RobotModel, q: Array, wide: int) -> tuple[list[RobotModel], list[Node]]:
     """Copies of the robot, one for each posture, in rows with numbers. Shapes: q (N, n)."""
-    try:
-        wide = 0 if isinstance(columns, bool) else index(columns)
-    except TypeError:
-        wide = 0
-    if wide < 1:
-        raise InvalidValueError(
-            f"columns: expected how many postures stand in a row, 1 or more, got {columns!r}."
-        )
     size = characteristic_length(model.table, model.tool)
     poses = link_poses(model, q)
     ends = poses[:, model.tip - 1] @ model.tool
@@ -431,10 +315,8 @@ def _named(q: ArrayLike | str | None, model: RobotModel) -> ArrayLike | None:
 
 def _as_postures(value: ArrayLike | str | None, model: RobotModel) -> Array:
     """Joint variables as (N, n), N at least 1."""
-    given = _named(value, model)
-    if given is None:
-        return model.configurations["zero"].reshape(1, model.n)
-    q = as_vector(given, model.n, "q")
+    given = _named("zero" if value is None else value, model)
+    q = as_vector(np.zeros(model.n) if given is None else given, model.n, "q")
     if q.ndim > 2 or not q.shape[0]:
         raise ShapeError(
             f"q: expected one posture ({model.n},) or several (N, {model.n}), got {q.shape}."
@@ -442,59 +324,39 @@ def _as_postures(value: ArrayLike | str | None, model: RobotModel) -> Array:
     return q.reshape(-1, model.n)
 
 
-def _as_color(value: Any, name: str = "color") -> Color:
-    """A colour, checked. Shapes: value (3,) or (4,)."""
-    numbers = as_floats(value, name)
-    if numbers.shape not in ((3,), (4,)):
-        raise ShapeError(f"{name}: expected (r, g, b) or (r, g, b, a), got shape {numbers.shape}.")
-    if numbers.min() < 0 or numbers.max() > 1:
-        raise InvalidValueError(f"{name}: expected numbers from 0 to 1, got {numbers.tolist()}.")
-    r, g, b, a = (*numbers.tolist(), 1.0)[:4]
-    return r, g, b, a
-
-
-def _as_opacity(value: float) -> float:
-    """An opacity, checked."""
-    opacity = float(as_exact(value, (), "opacity"))
-    if not 0 <= opacity <= 1:
-        raise InvalidValueError(f"opacity: expected a number from 0 to 1, got {opacity}.")
-    return opacity
-
-
 def _colors(color: Any, counts: list[int]) -> list[list[Color | None]]:
     """A colour, or None for the links' own, for each posture of each robot."""
     if color is None:
-        return [
-            [None] if count == 1 else [PALETTE[k % len(PALETTE)] for k in range(count)]
-            for count in counts
-        ]
-    if not (hasattr(color, "__len__") and len(color) and hasattr(color[0], "__len__")):
-        return [[_as_color(color)] * count for count in counts]
-    each = [_as_color(c, f"color[{i}]") for i, c in enumerate(color)]
-    if len(counts) > 1 and len(each) == len(counts):
-        return [[c] * count for c, count in zip(each, counts, strict=True)]
-    if len(counts) == 1 and len(each) == counts[0]:
-        return [list(each)]
-    wanted = f"{len(counts)} robots" if len(counts) > 1 else f"{counts[0]} postures"
-    raise ShapeError(f"color: expected one, or one for each of the {wanted}, got {len(each)}.")
+        hues = [PALETTE[k % len(PALETTE)] for k in range(max(counts))]
+        return [[None] if count == 1 else [*hues[:count]] for count in counts]
+    many = hasattr(color, "__len__") and len(color) > 0 and hasattr(color[0], "__len__")
+    each = [_as_color(one) for one in color] if many else [_as_color(color)]
+    places = len(counts) if len(counts) > 1 else counts[0]
+    if len(each) not in (1, places):
+        wanted = f"{places} {'robots' if len(counts) > 1 else 'postures'}"
+        raise ShapeError(f"color: expected one, or one for each of the {wanted}, got {len(each)}.")
+    each = each * places if len(each) == 1 else each
+    if len(counts) > 1:
+        return [[one] * count for one, count in zip(each, counts, strict=True)]
+    return [[*each]]
 
 
-def _as_legend(texts: Any, colors: Sequence[Color | None]) -> Legend:
-    """Texts beside the colours they explain."""
-    if texts is None:
-        return ()
-    words = as_texts(texts, len(colors), "legend", "postures drawn")
-    return tuple(zip(words, (color or MESH_COLOR for color in colors), strict=True))
+def _as_color(value: Any) -> Color:
+    """A colour, checked. Shapes: value (3,) or (4,)."""
+    numbers = as_floats(value, "color")
+    if numbers.shape not in ((3,), (4,)):
+        raise ShapeError(f"color: expected (r, g, b) or (r, g, b, a), got shape {numbers.shape}.")
+    if numbers.min() < 0 or numbers.max() > 1:
+        raise InvalidValueError(f"color: expected numbers from 0 to 1, got {numbers.tolist()}.")
+    r, g, b, a = (*numbers.tolist(), 1.0)[:4]
+    return r, g, b, a
 
 
 def _unique_names(models: Sequence[RobotModel]) -> tuple[str, ...]:
     """A name for each robot in the scene: its own, with a number if another one has it."""
     names: list[str] = []
     for model in models:
-        name = own = model.name.replace("/", "_")
-        k = 1
-        while name in names:
-            k += 1
-            name = f"{own}_{k}"
-        names.append(name)
+        own = model.name.replace("/", "_")
+        tried = (own if k == 1 else f"{own}_{k}" for k in range(1, len(models) + 1))
+        names.append(next(name for name in tried if name not in names))
     return tuple(names)

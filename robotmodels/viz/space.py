@@ -87,18 +87,13 @@ def fill_cells(figure: Figure, cells: list[tuple[Any, tuple[float, ...], str]]) 
             artist.set_clip_on(False)  # the box may stand a little outside of its rectangle
 
 
-def _taken(axes: Any) -> tuple[Array, Array]:
+def _taken(axes: Any) -> Array:
     """Least and greatest pixels of the box and of the texts on it, as they were drawn last."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
     x, y, _ = proj_transform(*corners.reshape(3, -1), axes.get_proj())  # type: ignore[call-arg]
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
     points = [axes.transData.transform(np.column_stack((x, y)))]
-    for name in "xyz":
-        axis = getattr(axes, f"{name}axis")
-        start, stop = sorted(getattr(axes, f"get_{name}lim")())
-        # numbers of ticks beyond the ends of an axis are not drawn
-        ticks = [t.label1 for t in axis.get_major_ticks() if start <= t.get_loc() <= stop]
-        points += [text.get_window_extent().get_points() for text in (axis.label, *ticks)]
-    every = np.concatenate(points)
-    return every.min(axis=0), every.max(axis=0)
+    every = np.concatenate(points + [box.get_points() for box in boxes if box is not None])
+    return np.array((every.min(axis=0), every.max(axis=0)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
+from math import ceil
 from operator import index
 from pathlib import Path
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, ParamSpec, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,6 +53,13 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
+class Look(TypedDict, total=False):
+    """Options of every figure: a text over it; its width and height in inches, shape (2,)."""
+
+    title: str | None
+    size: ArrayLike | None
+
+
 def plot(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator of functions that draw: in the common style, whatever style is set outside."""
 
@@ -70,16 +78,14 @@ def plot(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def panels(
-    width: float,
-    height: float,
-    size: ArrayLike | None,
-    rows: int = 1,
-    columns: int = 1,
-    **options: Any,
+    width: float, height: float, look: Look, rows: int = 1, columns: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
     """Figure in inches, without pyplot and its global state, and its axes (rows, columns)."""
     from .plot_figure import PlotFigure
 
+    if unknown := sorted(set(look) - {"title", "size"}):
+        raise TypeError(f"unexpected arguments: {', '.join(unknown)}.")
+    size = look.get("size")
     given = np.array((width, height)) if size is None else as_exact(size, (2,), "size")
     if (given <= 0.0).any():
         raise InvalidValueError(f"size: expected positive inches, got {given}.")
@@ -87,11 +93,11 @@ def panels(
     return figure, figure.subplots(rows, columns, squeeze=False, **options) if rows else None
 
 
-def panel_list(count: int, columns: int, height: float, size: Any) -> tuple[Figure, list[Any]]:
+def panel_list(count: int, columns: int, height: float, look: Look) -> tuple[Figure, list[Any]]:
     """Figure with panels over a common time axis, one below the other in each column."""
     rows = -(-count // columns)
     width = COLUMN if columns == 1 else PAGE
-    figure, grid = panels(width, 0.75 + height * rows, size, rows, columns, sharex=True)
+    figure, grid = panels(width, 0.75 + height * rows, look, rows, columns, sharex=True)
     order = list(grid.T.flat)
     for axes in order[count:]:
         axes.set_visible(False)
@@ -102,7 +108,7 @@ def panel_list(count: int, columns: int, height: float, size: Any) -> tuple[Figu
     return figure, order[:count]
 
 
-def finished(figure: Figure, title: str | None = None, names: Sequence[str] = ()) -> Figure:
+def finished(figure: Figure, look: Look, names: Sequence[str] = ()) -> Figure:
     """Figure with its legend above, in the order of the names; labels of limits come last."""
     entries: dict[str, Any] = {}
     for axes in figure.axes:
@@ -111,12 +117,13 @@ def finished(figure: Figure, title: str | None = None, names: Sequence[str] = ()
     rank = {name: k for k, name in enumerate(names)} | {LIMIT: 1000, BEYOND: 1001}
     texts = sorted(entries, key=lambda text: rank.get(text, len(names)))
     figure.align_ylabels([axes for axes in figure.axes if axes.name != "3d"])
+    title = look.get("title")
     title = None if title is None else wrapped(str(title), 1.2 * figure.get_figwidth())
     if texts:
         # a letter is about half as wide as it is high; a line takes as much as five letters
         width = (0.5 * max(map(len, texts)) + 5.2) * 8.0 / 72.0
-        rows = -(-len(texts) // int(np.clip(figure.get_figwidth() // width, 1, len(texts))))
-        place = {"loc": "outside upper center", "ncols": -(-len(texts) // rows), "title": title}
+        rows = ceil(len(texts) / int(np.clip(figure.get_figwidth() // width, 1, len(texts))))
+        place = {"loc": "outside upper center", "ncols": ceil(len(texts) / rows), "title": title}
         figure.legend([entries[text] for text in texts], texts, **place)
     elif title is not None:
         figure.suptitle(title)
@@ -131,28 +138,30 @@ def line(k: int) -> dict[str, Any]:
 
 def wrapped(text: str, width: float) -> str:
     """Text in lines of similar lengths that fit into a width in inches."""
-    most, lines = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4), list[str]()
-    for part in text.split("\n"):
-        tried = [wrap(part, letters, break_long_words=False) for letters in range(4, most + 1)]
-        lines.append("\n".join(next(some for some in tried if len(some) == len(tried[-1]))))
-    return "\n".join(lines)
+    most = max(int(0.8 * width * 72.0 / (0.55 * 8.5)), 4)
+    parts = [(part, ceil(len(part) / most)) for part in text.split("\n")]
+    return "\n".join(
+        fill(part, min(most, len(part) // count + 8), break_long_words=False) if count else part
+        for part, count in parts
+    )
 
 
 def note(axes: Axes, text: str) -> None:
     """Text in the middle of a panel."""
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    axes.text(
-        0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", bbox=box, zorder=5
-    )
+    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+    axes.text(0.5, 0.5, text, bbox=box, zorder=5, **place)
 
 
-def plain_logarithmic(axis: Any, most: int = 6, subs: Sequence[float] = (1.0,)) -> None:
-    """Logarithmic axis with few plain numbers such as 0.01."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+def plain_logarithmic(axis: Any, most: int = 6) -> None:
+    """Logarithmic axis with few plain numbers such as 0.01; more a power where there are few."""
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high < 60.0 * low else (1.0, 3.0) if high < 600.0 * low else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=most))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _=None: f"{value:g}"))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def few_numbers(axis: Any, unit: str) -> None:
@@ -163,25 +172,14 @@ def few_numbers(axis: Any, unit: str) -> None:
     axis.set_major_locator(MaxNLocator(5, steps=steps))
 
 
-def subdivisions(limits: tuple[float, float]) -> tuple[float, ...]:
-    """Numbers within each power of ten on a logarithmic axis: more where there are few powers."""
-    low, high = limits
-    if high < 60.0 * low:
-        return (1.0, 2.0, 5.0)
-    return (1.0, 3.0) if high < 600.0 * low else (1.0,)
+def powers_around_zero(axes: Axes, axis: str, least: float, count: int) -> None:
+    """Scale that is linear below ``least``, with about so many powers of ten on either side."""
+    from matplotlib.ticker import NullLocator
 
-
-def powers_around_zero(axes: Axes, axis: str, most: float, least: float, count: int) -> None:
-    """Scale that is linear below ``least`` and of at most so many powers of ten beyond."""
-    from matplotlib.ticker import FixedLocator, LogFormatterMathtext, NullLocator
-
-    first, last = round(np.log10(least)), int(np.floor(np.log10(most)))
-    powers = 10.0 ** np.arange(last, first - 1, -max(1, -(-(last - first + 1) // count)))
     getattr(axes, f"set_{axis}scale")("symlog", linthresh=least)
     scale = getattr(axes, f"{axis}axis")
-    scale.set_major_locator(FixedLocator([*-powers, 0.0, *powers[::-1]]))
+    scale.get_major_locator().set_params(numticks=2 * count + 1)
     scale.set_minor_locator(NullLocator())
-    scale.set_major_formatter(LogFormatterMathtext(linthresh=least))
 
 
 def color_map(
@@ -195,10 +193,8 @@ def color_map(
         low, high = -(most or 1.0), most or 1.0
     elif high - low <= 1e-9 * most:
         low, high = low - 0.5 * (most or 1.0), high + 0.5 * (most or 1.0)
-    kind = SIGNED_MAP if signed else POSITIVE_MAP
-    image = axes.pcolormesh(
-        x, y, z, cmap=kind, vmin=low, vmax=high, shading="nearest", rasterized=True
-    )
+    kind: dict[str, Any] = {"cmap": SIGNED_MAP if signed else POSITIVE_MAP, "shading": "nearest"}
+    image = axes.pcolormesh(x, y, z, vmin=low, vmax=high, rasterized=True, **kind)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(False)
     bar: Any = figure.colorbar(image, ax=axes, pad=0.03, aspect=25)
@@ -207,20 +203,27 @@ def color_map(
     return most
 
 
-def correlation_figure(C: Array, names: Sequence[str], title: str | None, size: Any) -> Figure:
+def joint_axes(axes: Axes, names: Sequence[str], units: Sequence[Any]) -> None:
+    """Two joints on the axes of a map, with their units."""
+    for axis, name, unit in zip((axes.xaxis, axes.yaxis), names, units, strict=True):
+        axis.set_label_text(f"{name} ({unit.value})")
+        few_numbers(axis, unit.value)
+
+
+def correlation_figure(C: Array, names: Sequence[str], look: Look) -> Figure:
     """Matrix of correlations of estimates. Shapes: C (k, k)."""
     side = float(np.clip(1.3 + 0.155 * len(names), 3.5, PAGE))
-    figure, grid = panels(side + 0.6, side, size)
+    figure, grid = panels(side + 0.6, side, look)
     k = np.arange(len(names))
     axes = grid[0, 0]
     picture = axes.pcolormesh(k, k, C, cmap=SIGNED_MAP, vmin=-1.0, vmax=1.0, rasterized=True)
-    shown = k[:: max(1, int(np.ceil(len(names) * 0.128 / (side - 1.1))))]
+    shown = k[:: max(1, ceil(len(names) * 0.128 / (side - 1.1)))]
     axes.set_xticks(shown, [names[i] for i in shown], rotation=90)
     axes.set_yticks(shown, [names[i] for i in shown])
     axes.invert_yaxis()
     axes.grid(False)
     figure.colorbar(picture, ax=axes, fraction=0.045, pad=0.02, label="correlation")
-    return finished(figure, title)
+    return finished(figure, look)
 
 
 def interval_panel(
@@ -229,7 +232,6 @@ def interval_panel(
     values: Array,
     half: Array,
     groups: Mapping[str, Any],
-    crowded: bool,
     truth: Array | None = None,
 ) -> None:
     """Estimates with intervals, downwards; a scale of powers if few are far larger than most.
@@ -237,23 +239,23 @@ def interval_panel(
     Shapes: values, half widths, truth (k,), groups {label: mask (k,)}.
     """
     axes.axvline(0.0, **ZERO)
-    y = np.arange(len(names))
+    y, half = np.arange(len(names)), np.nan_to_num(half, posinf=0.0)
     for k, (label, mask) in enumerate(groups.items()):
         if mask.any():
-            x, width = values[mask], np.nan_to_num(half[mask], posinf=0.0)
-            look = {"fmt": "os"[k % 2], "markersize": 3.2, "elinewidth": 1.1, "capsize": 1.8}
-            axes.errorbar(x, y[mask], xerr=width, color=PALETTE[k], label=label, **look)
-    ends = np.abs(values) + np.nan_to_num(half, posinf=0.0)
+            look: dict[str, Any] = {"fmt": "os"[k % 2], "color": PALETTE[k], "label": label}
+            look |= {"markersize": 3.2, "elinewidth": 1.1, "capsize": 1.8}
+            axes.errorbar(values[mask], y[mask], xerr=half[mask], **look)
+    ends = np.abs(values) + half
     if truth is not None and not np.isnan(truth).all():
         axes.plot(truth, y, "x", color=INK, markersize=4.5, zorder=3.0, label="truth")
         ends = np.fmax(ends, np.abs(truth))
     most, usual = float(ends.max(initial=0.0)), float(np.median(ends)) if ends.size else 0.0
     axes.margins(x=0.06)
     if usual and most > 25.0 * usual:
-        powers_around_zero(axes, "x", most, 10.0 ** np.floor(np.log10(usual)), 2 if crowded else 3)
+        powers_around_zero(axes, "x", 10.0 ** np.floor(np.log10(usual)), 2)
         axes.set_xlim(-1.4 * most, 1.4 * most)
     else:
-        axes.locator_params(axis="x", nbins=5 if crowded else 7)
+        axes.locator_params(axis="x", nbins=5)
     axes.set_yticks(y, list(names))
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(False, axis="y")
@@ -279,9 +281,8 @@ def as_named(given: Any, names: Any, name: str, of: str) -> dict[str, Any]:
             raise InvalidValueError(f"names: a mapping of {of}s has its own names.")
         named = {str(key): value for key, value in given.items()}
     elif isinstance(given, Sequence) and not isinstance(given, str):
-        words = [f"{of} {k + 1}" for k in range(len(given))]
-        if names is not None:
-            words = as_texts(names, len(given), "names", f"{of}s")
+        default = [f"{of} {k + 1}" for k in range(len(given))]
+        words = default if names is None else as_texts(names, len(given), "names", f"{of}s")
         if len(set(words)) < len(words):
             raise InvalidValueError(f"names: expected a different one for each {of}, got {words}.")
         named = dict(zip(words, given, strict=True))
@@ -294,13 +295,16 @@ def as_named(given: Any, names: Any, name: str, of: str) -> dict[str, Any]:
     return named
 
 
+def as_whole(value: Any, name: str, least: int = 1) -> int:
+    """A number of things."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidValueError(f"{name}: expected how many, from {least}, got {value!r}.")
+    return int(value)
+
+
 def as_columns(columns: Any, count: int, default: int) -> int:
     """How many panels stand in a row."""
-    if columns is None:
-        return min(count, default)
-    if isinstance(columns, bool) or not isinstance(columns, (int, np.integer)) or columns < 1:
-        raise InvalidValueError(f"columns: expected a whole number from 1, got {columns!r}.")
-    return min(int(columns), count)
+    return min(count, default if columns is None else as_whole(columns, "columns"))
 
 
 def as_choice(values: Any, count: int, name: str, what: str) -> list[int]:

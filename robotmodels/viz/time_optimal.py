@@ -1,14 +1,48 @@
 """Figures of motions within limits: phase plane of a path, plan, joints in their ranges.
 
+Parameters
+----------
+timed : TimedPath
+    From `robotmodels.trajectories.time_optimal`, with a motion.
+plan : Plan
+    From `robotmodels.trajectories.kinodynamic`, with a motion.
+model : RobotModel
+    The robot, n joints; of a plan optional, to draw its torques.
+torque : array_like, shape () or (n,), optional
+    Limits of torque, N m or N: torques are drawn as shares of them, but for joints without a
+    limit; default those of the model's table.
+t : array_like, shape (N,)
+    Times, s.
+q : array_like, shape (N, n), or mapping of str to such arrays
+    Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
+degrees : bool
+    Whether angles are in degrees instead of radians.
+columns : int, optional
+    How many panels stand in a row; default one, or two from five joints on.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
+
 Returns
 -------
 matplotlib.figure.Figure
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
+>>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0))
+>>> plot_phase_plane(timed).axes[0].get_ylabel()
+'rate s′ (1/s)'
+>>> t = np.linspace(0.0, 1.0, 11)
+>>> figure = plot_joint_motion(load("panda"), t, np.zeros((11, 7)))
+>>> figure.axes[0].get_title(loc="left")
+'panda_joint1 (deg)'
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +54,7 @@ from ..model import RobotModel
 from ..trajectories.kinodynamic import Plan
 from ..trajectories.time_optimal import TimedPath
 from . import over_time, style
-from .over_time import Unit
-from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALE, PALETTE
+from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALE, PALETTE, Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,30 +67,18 @@ _MARGIN = 0.12  # of the range of a joint, shown beyond either limit
 
 @style.plot
 def plot_phase_plane(
-    timed: TimedPath, *, title: str | None = None, size: ArrayLike | None = None
+    timed: TimedPath,
+    **look: Unpack[Look],
 ) -> Figure:
     """Rate over the path parameter, below the maximum velocity curve, and the limit that binds.
 
-    The ribbon below has the colour of the limit that binds at each point; it is white where none
-    does.
-
-    Parameters
-    ----------
-    timed : TimedPath
-        From `robotmodels.trajectories.time_optimal`, with a motion.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
-    >>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0))
-    >>> plot_phase_plane(timed).axes[0].get_ylabel()
-    'rate s′ (1/s)'
+    The ribbon below has the colour of the limit that binds at each point; white where none does.
     """
     style.as_instance(timed, TimedPath, "timed", "time_optimal")
     if timed.trajectory is None:
         raise InvalidValueError(f"timed: it has no motion to draw. {timed.reason()}")
     s, rate, most = timed.parameter, timed.rate, timed.maximum_rate
-    figure, grid = style.panels(COLUMN, 3.0, size, 2, sharex=True, height_ratios=[1.0, 0.07])
+    figure, grid = style.panels(COLUMN, 3.0, look, 2, sharex=True, height_ratios=[1.0, 0.07])
     above, below = grid[:, 0]
     shown = most <= _HIGHEST * rate.max()
     top = 1.1 * max(float(rate.max()), float(most.max(where=shown, initial=0.0)))
@@ -68,7 +89,7 @@ def plot_phase_plane(
     above.plot(s, rate, color=INK, label="quickest motion")
     above.set_ylim(0.0, top)
     above.set_ylabel("rate s′ (1/s)")
-    names = sorted(set(timed.active.tolist()) - {""}, key=_order)
+    names = sorted(set(timed.active.tolist()) - {""}, key=lambda name: (len(name), name))
     for k, name in enumerate(names):
         here = (timed.active == name)[:-1]
         starts, steps = s[:-1][here], np.diff(s)[here]
@@ -78,41 +99,18 @@ def plot_phase_plane(
     below.grid(False)
     below.set_xlabel("path parameter s")
     below.set_xlim(s[0], s[-1])
-    return style.finished(figure, title, ["quickest motion", "maximum velocity curve", *names])
-
-
-def _order(name: str) -> tuple[str, int]:
-    words = name.split()
-    return words[0], int(words[-1]) if words[-1].isdigit() else 0
+    return style.finished(figure, look, ["quickest motion", "maximum velocity curve", *names])
 
 
 @style.plot
 def plot_plan(
-    plan: Plan, *, model: RobotModel | None = None, torque: ArrayLike | None = None,
-    title: str | None = None, size: ArrayLike | None = None,
-) -> Figure:  # fmt: skip
-    """Joints of a planned motion over time, its torques, and the costs of the search.
-
-    Parameters
-    ----------
-    plan : Plan
-        From `robotmodels.trajectories.kinodynamic`, with a motion.
-    model : RobotModel, optional
-        The robot, n joints: its torques are drawn.
-    torque : array_like, shape () or (n,), optional
-        Limits of torque, N m or N: torques are drawn as shares of them, but for joints without a
-        limit; default those of the model's table.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import MotionLimits, kinodynamic
-    >>> arm = load("ur5e")
-    >>> plan = kinodynamic(arm, [0, -1.5, 1, 0, 0, 0], [1, -1, 0.5, 0, 0, 0], MotionLimits(),
-    ...                    seconds=0.2)
-    >>> sorted(" ".join(axes.get_ylabel().split()) for axes in plot_plan(plan, model=arm).axes)
-    ['cost', 'position (rad)', 'torque (of its limit)']
-    """
+    plan: Plan,
+    *,
+    model: RobotModel | None = None,
+    torque: ArrayLike | None = None,
+    **look: Unpack[Look],
+) -> Figure:
+    """Joints of a planned motion over time, its torques, and the costs of the search."""
     style.as_instance(plan, Plan, "plan", "kinodynamic")
     if plan.trajectory is None:
         raise InvalidValueError(f"plan: it has no motion to draw. {plan.reason()}")
@@ -120,7 +118,7 @@ def plot_plan(
     seen = plan.trajectory.at(t)
     n = seen.q.shape[1]
     names, kinds = over_time.joint_names(None, n, model), over_time.joint_units(None, n, model)
-    figure, grid = style.panels(PAGE, 2.9, size, 2 if model is not None else 1, 2)
+    figure, grid = style.panels(PAGE, 2.9, look, 2 if model is not None else 1, 2)
     left, right = grid[:, 0], grid[0, 1]
     over_time.lines_over_time(left[0], t, seen.q, names)
     for time in plan.via_times:
@@ -148,7 +146,7 @@ def plot_plan(
     right.axhline(plan.cost, color=ALERT, label="checked motion", **DASHED)
     right.set_xlabel("evaluations")
     right.set_ylabel("cost")
-    return style.finished(figure, title, names)
+    return style.finished(figure, look, names)
 
 
 def _torque_limits(model: RobotModel, torque: ArrayLike | None) -> Array:
@@ -172,8 +170,7 @@ def plot_joint_motion(
     *,
     degrees: bool = True,
     columns: int | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Positions of all joints within their limits, and the margin that is left.
 
@@ -181,29 +178,6 @@ def plot_joint_motion(
     values beyond the limits are shaded. The last panel, if any joint has both limits, has the least
     margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
     at a limit.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    t : array_like, shape (N,)
-        Times, s.
-    q : array_like, shape (N, n), or mapping of str to such arrays
-        Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
-    degrees : bool
-        Whether angles are in degrees instead of radians.
-    columns : int, optional
-        How many panels stand in a row; default one, or two from five joints on.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], lower=[-1.0, 0.0],
-    ...                                     upper=[1.0, 0.5]))
-    >>> t = np.linspace(0.0, 1.0, 11)
-    >>> figure = plot_joint_motion(arm, t, np.c_[np.sin(t), 0.3 * t])
-    >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['joint_1 (deg)', 'joint_2 (m)', 'least margin (%)']
     """
     style.as_instance(model, RobotModel, "model", "")
     times = as_floats(t, "t")
@@ -212,13 +186,11 @@ def plot_joint_motion(
     motions = _motions(q, times.size, model.n)
     labels = list(motions) if len(motions) > 1 else ["_motion"]
     names = over_time.joint_names(None, model.n, model)
-    units = over_time.joint_units(None, model.n, model)
-    if degrees:
-        units = [Unit.DEGREE if unit is Unit.RADIAN else unit for unit in units]
+    units = over_time.joint_units(None, model.n, model, degrees)
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
     count = model.n + bool(bounded.any())
     wide = style.as_columns(columns, count, 1 if count < 6 else 2)
-    figure, order = style.panel_list(count, wide, 0.95, size)
+    figure, order = style.panel_list(count, wide, 0.95, look)
     for j, (axes, unit) in enumerate(zip(order, units, strict=False)):
         k = unit.factor
         over_time.lines_over_time(
@@ -236,7 +208,7 @@ def plot_joint_motion(
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -0.08 * max(high, 1.0)), high)
         _shade_beyond(axes, 0.0, np.inf)
-    return style.finished(figure, title, labels)
+    return style.finished(figure, look, labels)
 
 
 def _draw_range(axes: Axes, lower: float, upper: float) -> None:

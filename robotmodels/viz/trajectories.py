@@ -2,32 +2,74 @@
 
 Parameters
 ----------
-model : RobotModel, optional
-    The robot, n joints.
-names : sequence of str, length n, optional
-    Of the joints; default those of the model, else ``joint 1`` and so on.
+trajectory : Trajectory or Samples
+    One motion of n joints; rad or m, and per s.
+limits : MotionLimits, optional
+    Drawn as dashed lines, in the colour of their joint or grey where all joints share them; values
+    beyond them are underlaid in red. `plot_joint_path` takes those of its model by default.
+names : sequence of str, optional
+    Of the joints, default those of the model, else ``joint 1`` and so on; of `plot_profiles` those
+    of a sequence of motions.
 units : Unit or str, or sequence of them, length n, optional
     ``rad``, ``deg``, ``m``, ``mm`` for the axes; default rad or m by the joint types of the model,
     and "rad or m" without one.
-limits : MotionLimits, optional
-    Drawn as dashed lines, in the colour of their joint or grey where all joints share them; values
-    beyond them are underlaid in red.
+model : RobotModel, optional
+    The robot, n joints.
+orders : sequence of int
+    Which panels: 0 position, 1 velocity, 2 acceleration, 3 jerk.
+breakpoints : bool
+    Whether the times at which pieces meet are marked: by thin lines where all joints change
+    pieces together, else by dots on the lines of the joints.
+profiles : mapping of str to Trajectory, or sequence of Trajectory
+    Motions by their names; `Samples` may stand for a trajectory. The legend gives the durations.
+joint : int
+    Which joint, from 0.
+unit : Unit or str
+    As ``units``; of `plot_pose_path` ``m`` or ``mm``.
+side_by_side : bool
+    Whether each motion stands in a column of its own, with common scales, instead of all
+    motions over each other.
+path : JointPath
+    From `joint_path`, drawn over time, or over the number of the pose if it has no times; of
+    `plot_pose_path` optional, for its events.
+poses : PoseTrajectory, PoseSamples or array_like, shape (N, 4, 4)
+    World poses of the tool, m.
+frames : int
+    At how many poses, evenly spaced in time, the axes of the tool are drawn, both ends included.
+frame_size : float, optional
+    Length of the axes, m; default a tenth of the extent of the path.
+view : array_like, shape (2,), optional
+    Azimuth and elevation from which the path is seen, rad; default obliquely, across its
+    longest horizontal direction.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
 
 Returns
 -------
 matplotlib.figure.Figure
+
+Examples
+--------
+>>> from robotmodels.trajectories import MotionLimits, bang_bang, cubic, trapezoidal
+>>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
+>>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], limits=limits), limits, units="rad")
+>>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
+['position (rad)', 'velocity (rad/s)']
+>>> laws = {"bang-bang": bang_bang(0, 1, duration=1.0), "cubic": cubic(0, 1, duration=1.2)}
+>>> [line.get_label() for line in plot_profiles(laws, unit="rad").axes[0].get_lines()]
+['bang-bang, 1 s', 'cubic, 1.2 s']
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact
+from .._arrays import Array, as_exact, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
@@ -38,7 +80,7 @@ from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Sampled, Unit
 from .space import across, fill_cells, space
-from .style import COLUMN, INK, PAGE, PALETTE
+from .style import COLUMN, INK, PAGE, PALETTE, Look, as_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,30 +111,11 @@ def plot_trajectory(
     model: RobotModel | None = None,
     orders: Sequence[int] = (0, 1, 2, 3),
     breakpoints: bool = True,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Position, velocity, acceleration and jerk of every joint over time.
 
     Joints of different units stand in columns of their own. Both sides of a jump are drawn.
-
-    Parameters
-    ----------
-    trajectory : Trajectory or Samples
-        One motion of n joints; rad or m, and per s.
-    orders : sequence of int
-        Which panels: 0 position, 1 velocity, 2 acceleration, 3 jerk.
-    breakpoints : bool
-        Whether the times at which pieces meet are marked: by thin lines where all joints change
-        pieces together, else by dots on the lines of the joints.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import MotionLimits, trapezoidal
-    >>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
-    >>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], limits=limits), limits, units="rad")
-    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
-    ['position (rad)', 'velocity (rad/s)']
     """
     motion = over_time.sampled(trajectory)
     n = motion.n
@@ -102,7 +125,7 @@ def plot_trajectory(
     if n == 1 and names is None and model is None:
         labels = ["_joint"]  # one line needs no legend
     width, height = COLUMN if len(columns) == 1 else PAGE, 0.55 + 1.05 * len(shown) + 0.02 * n
-    figure, grid = style.panels(width, height, size, len(shown), len(columns), sharex=True)
+    figure, grid = style.panels(width, height, look, len(shown), len(columns), sharex=True)
     for column, (unit, joints) in enumerate(columns.items()):
         for row, order in enumerate(shown):
             over_time.quantity_over_time(
@@ -111,7 +134,7 @@ def plot_trajectory(
             if breakpoints:
                 over_time.mark_breaks(grid[row, column], motion, order, joints, unit)
         grid[-1, column].set_xlabel("time (s)")
-    return style.finished(figure, title, labels)
+    return style.finished(figure, look, labels)
 
 
 @style.plot
@@ -124,34 +147,9 @@ def plot_profiles(
     *,
     side_by_side: bool = False,
     orders: Sequence[int] = (0, 1, 2, 3),
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
-    """One joint's position, velocity, acceleration and jerk under several laws of motion.
-
-    Parameters
-    ----------
-    profiles : mapping of str to Trajectory, or sequence of Trajectory
-        The motions by their names; `Samples` may stand for a trajectory. The legend gives their
-        durations.
-    names : sequence of str, optional
-        Of the motions of a sequence; default ``motion 1`` and so on.
-    joint : int
-        Which joint, from 0.
-    unit : Unit or str
-        ``rad``, ``deg``, ``m`` or ``mm`` for the axes.
-    side_by_side : bool
-        Whether each motion stands in a column of its own, with common scales, instead of all
-        motions over each other.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import bang_bang, cubic
-    >>> laws = {"bang-bang": bang_bang(0, 1, duration=1.0), "cubic": cubic(0, 1, duration=1.2)}
-    >>> figure = plot_profiles(laws, unit="rad")
-    >>> [line.get_label() for line in figure.axes[0].get_lines()]
-    ['bang-bang, 1 s', 'cubic, 1.2 s']
-    """
+    """One joint's position, velocity, acceleration and jerk under several laws of motion."""
     named = style.as_named(profiles, names, "profiles", "motion")
     motions = {name: over_time.sampled(motion, repr(name)) for name, motion in named.items()}
     least = min(motion.n for motion in motions.values())
@@ -159,7 +157,7 @@ def plot_profiles(
     shown, kind = over_time.as_orders(orders), over_time.as_unit(unit)
     columns = len(motions) if side_by_side else 1
     width, height = COLUMN if columns == 1 else PAGE, 0.75 + 1.05 * len(shown)
-    figure, grid = style.panels(width, height, size, len(shown), columns, sharex=True, sharey="row")
+    figure, grid = style.panels(width, height, look, len(shown), columns, sharex=True, sharey="row")
     for k, (name, motion) in enumerate(motions.items()):
         column = k if side_by_side else 0
         bounds, duration = over_time.as_limits(limits, motion.n), f"{motion.duration:.4g} s"
@@ -173,7 +171,7 @@ def plot_profiles(
         grid[-1, column].set_xlabel("time (s)")
     for axes in grid.flat:
         axes.label_outer()
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 @style.plot
@@ -184,31 +182,13 @@ def plot_joint_path(
     *,
     model: RobotModel | None = None,
     limits: MotionLimits | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Joints along a path of poses, their velocities, the conditioning, and the events.
 
     The lowest panel has a row for every kind of event on the path. In its colour the other panels
     are shaded where the path leaves the reach or stays singular, and have a thin line where it is
     singular at one pose, where the posture changes and where it jumps.
-
-    Parameters
-    ----------
-    path : JointPath
-        From `joint_path`; drawn over time, or over the number of the pose if it has no times.
-    limits : MotionLimits, optional
-        Of position and velocity; default those of the model, if given.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.trajectories import cartesian_trajectory, joint_path
-    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
-    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 9), q)
-    >>> [axes.get_xlabel() for axes in plot_joint_path(path, model=arm).axes]
-    ['', '', 'number of the pose']
     """
     if not len(style.as_instance(path, JointPath, "path", "joint_path").q):
         raise InvalidValueError("path: there are no poses to draw.")
@@ -219,15 +199,14 @@ def plot_joint_path(
     bounds = over_time.as_limits(limits, n)
     timed = not np.isnan(path.t).any()
     x = path.t if timed else np.arange(len(path.q), dtype=float)
-    motion = Sampled(x, np.stack((path.q, path.v)), (), 0.0)
+    motion = Sampled(x, np.stack((path.q, path.v)))
     columns = over_time.joints_by_unit(kinds).items()
     rows = [(order, *column) for order in range(1 + timed) for column in columns]
     happens = [kind for kind in PathEventKind if path.of_kind(kind)]
     heights = [1.1] * len(rows) + [0.8, 0.16 + 0.17 * max(len(happens), 1)]
     width = COLUMN if n < 5 else 0.5 * (COLUMN + PAGE)
-    figure, grid = style.panels(
-        width, 1.0 + sum(heights), size, len(heights), sharex=True, height_ratios=heights
-    )
+    shared: dict[str, Any] = {"sharex": True, "height_ratios": heights}
+    figure, grid = style.panels(width, 1.0 + sum(heights), look, len(heights), **shared)
     *above, lowest = grid[:, 0]
     for axes, (order, unit, joints) in zip(above, rows, strict=False):
         over_time.quantity_over_time(axes, motion, order, joints, unit, labels, bounds)
@@ -242,17 +221,16 @@ def plot_joint_path(
     if not happens:
         style.note(lowest, "no events on the path")
     lowest.set_xlabel("time (s)" if timed else "number of the pose")
-    return style.finished(figure, title, labels)
+    return style.finished(figure, look, labels)
 
 
 def _draw_conditioning(axes: Axes, x: Array, conditioning: Array) -> None:
     """The conditioning, on a logarithmic scale where it comes near zero."""
     axes.plot(x, np.maximum(conditioning, _LEAST), color=INK, linewidth=1.0, label="_conditioning")
     axes.set_ylabel("conditioning\n(1)")
-    least = float(np.nanmin(conditioning)) if np.isfinite(conditioning).any() else 1.0
+    least = float(np.nanmin(np.append(conditioning, 1.0)))
     if least < 0.02:
-        axes.set_yscale("log")
-        axes.set_ylim(max(0.5 * least, _LEAST), 1.5)
+        axes.set(yscale="log", ylim=(max(0.5 * least, _LEAST), 1.5))
     else:
         axes.set_ylim(0.0, None)
 
@@ -282,44 +260,16 @@ def plot_pose_path(
     frame_size: float | None = None,
     unit: Unit | str = Unit.METRE,
     view: ArrayLike | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
-    """Path of the tool in space, with its frame at some poses and equal scales.
-
-    Parameters
-    ----------
-    poses : PoseTrajectory, PoseSamples or array_like, shape (N, 4, 4)
-        World poses of the tool, m.
-    path : JointPath, optional
-        Result of `joint_path` for these poses; its events are marked.
-    frames : int
-        At how many poses the axes of the tool are drawn, the two ends included; they are evenly
-        spaced in the numbers of the samples, so in time.
-    frame_size : float, optional
-        Length of the axes, m; default a tenth of the extent of the path.
-    unit : Unit or str
-        ``m`` or ``mm`` for the axes.
-    view : array_like, shape (2,), optional
-        Azimuth and elevation from which the path is seen, rad; default obliquely, across its
-        longest horizontal direction.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> from robotmodels.trajectories import straight_line
-    >>> move = straight_line(np.eye(4), translation(0.2, 0.1, 0), duration=1.0)
-    >>> plot_pose_path(move).axes[0].get_xlabel()
-    'x (m)'
-    """
+    """Path of the tool in space, with its frame at some poses, equal scales and events."""
     if path is not None:
         style.as_instance(path, JointPath, "path", "joint_path")
     T = _poses(poses, path)
     length = over_time.as_unit(unit)
     if length not in (Unit.METRE, Unit.MILLIMETRE):
         raise InvalidValueError(f"unit: expected a length, 'm' or 'mm', got {length.value!r}.")
-    if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 0:
-        raise InvalidValueError(f"frames: expected how many are drawn, from 0, got {frames!r}.")
+    count = as_whole(frames, "frames", 0)
     if path is not None and len(path.q) != len(T):
         raise ShapeError(f"path: expected the joints of these {len(T)} poses, got {len(path.q)}.")
     k = length.factor
@@ -327,20 +277,18 @@ def plot_pose_path(
     extent = float(np.ptp(points, axis=0).max())
     arm = 0.1 * (extent if extent > _STILL * k else k)
     if frame_size is not None:
-        arm = k * float(as_exact(frame_size, (), "frame_size"))
-        if arm <= 0.0:
-            raise InvalidValueError(f"frame_size: expected a positive length, got {arm / k:g} m.")
+        arm = k * as_number(frame_size, "frame_size", above=0.0)
     angles = across(points) if view is None else as_exact(view, (2,), "view")
-    some = np.unique(np.linspace(0, len(T) - 1, int(frames)).round().astype(int))
+    some = np.unique(np.linspace(0, len(T) - 1, count).round().astype(int))
     tips = points[some, None] + arm * np.swapaxes(T[some, :3, :3], 1, 2)
-    figure, _ = style.panels(COLUMN, 0.92 * COLUMN, size, rows=0)
+    figure, _ = style.panels(COLUMN, 0.92 * COLUMN, look, rows=0)
     every = np.concatenate((points, tips.reshape(-1, 3)))
     axes = space(figure, (1, 1, 1), every, length, angles)
     axes.plot(*points.T, color=INK, label="path")
     for a, (color, dashes) in enumerate(((1, "-"), (2, (0, (3.0, 1.0))), (0, (0, (1.0, 0.8))))):
-        look = {"color": PALETTE[color], "linestyle": dashes, "linewidth": 1.2}
+        line = {"color": PALETTE[color], "linestyle": dashes, "linewidth": 1.2}
         for ends in np.stack((points[some], tips[:, a]), axis=-1):
-            axes.plot(*ends, label=f"tool {'xyz'[a]}", **look)
+            axes.plot(*ends, label=f"tool {'xyz'[a]}", **line)
     for i, marker, text in ((0, "o", "start"), (-1, "s", "end")):
         axes.plot(*points[i], marker, color=INK, markersize=4.0, label=text)
     for event in () if path is None else path.events:
@@ -348,7 +296,7 @@ def plot_pose_path(
         run = points[event.first : event.last + 1]
         axes.plot(*run.T, color=color, linewidth=4.0, alpha=0.45, label=f"_{text}")
         axes.plot(*run[[0, -1]].T, marker, color=color, markersize=4.5, label=text)
-    style.finished(figure, title)
+    style.finished(figure, look)
     figure.draw_without_rendering()
     tops = [legend.get_window_extent().y0 for legend in figure.legends]
     fill_cells(figure, [(axes, (0.0, 0.0, 1.0, min(tops) / figure.bbox.height), "")])

@@ -1,5 +1,46 @@
 """Figures of velocities: inverse models near singularities, ellipsoids, maps of singularities.
 
+Parameters
+----------
+distance : array_like, shape (N,)
+    Distance from the singular position, rad or m, ascending; it may have a sign.
+solutions : mapping of str to IKMSolution, or sequence
+    Result of each method at these distances, by its name: an `IKMSolution` of N rows, or a pair of
+    arrays, the joint velocities (N, n) and the error of the twist (N, 6) or None, linear then
+    angular. NaN rows leave a gap.
+names : sequence of str, optional
+    Of the methods of a sequence; default ``method 1`` and so on.
+model : RobotModel, optional
+    The robot, n joints: their names and units; of maps, areas outside its joint limits are hatched.
+units : Unit or str, or sequence of them, length n, optional
+    Of the joints, as in `plot_trajectory`; joints of different units have panels of their own.
+limits : MotionLimits, optional
+    Whose velocities are drawn as dashed lines (the greater of both directions).
+each_joint : bool
+    Whether each method has a column with the speeds of all joints, instead of lines for the
+    greatest speed of each method.
+distance_unit, distance_name : Unit or str, and str
+    ``deg``, ``rad``, ``m`` or ``mm``, and the name of the axis.
+logarithmic : bool, optional
+    Whether the distance is on a scale of powers, linear around zero where it has a sign;
+    default where most of the samples are near zero.
+ellipsoids : Ellipsoid or sequence of Ellipsoid
+    One, several, or batches, which are taken apart.
+labels : sequence of str, optional
+    Texts of the legend: the first is for the first ellipsoid of every quantity, and so on.
+    Default numbers, if a quantity has several.
+maps : SingularityMap or sequence of them
+    From `singularity_map`; several stand beside each other.
+q : array_like, shape (n,) or (N, n), optional
+    Postures to mark, rad or m; several are joined by a line in their order. A map shows their
+    two joints only.
+degrees : bool
+    Whether angles are in degrees on the axes instead of radians.
+columns : int, optional
+    How many maps stand in a row; default two, or one for a single map.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
+
 Returns
 -------
 matplotlib.figure.Figure
@@ -7,12 +48,24 @@ matplotlib.figure.Figure
 References
 ----------
 Seed book sections 1.3.1.3 and 1.3.2; Khalil and Dombre, section 5.8.2.
+
+Examples
+--------
+>>> d = np.linspace(-0.1, 0.1, 11)
+>>> bounded = d[:, None] / (d[:, None] ** 2 + 1e-3)
+>>> missing = np.c_[np.zeros((11, 5)), 1e-3 / (d**2 + 1e-3)]
+>>> figure = plot_inverse_velocities(d, {"damped": (bounded, missing)}, units="rad")
+>>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes][::2]
+['greatest joint speed (rad/s)', 'missing angular velocity (rad/s)']
+>>> egg = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), [20.0, 10.0, 5.0], 3)
+>>> [(a.get_xlabel(), a.get_ylabel()) for a in plot_ellipsoids(egg).axes][1]
+('$f_x$ (N)', '$f_z$ (N)')
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +80,7 @@ from ..trajectories.limits import MotionLimits
 from . import over_time, style
 from .over_time import Unit
 from .shapes import as_ellipsoids
-from .style import COLUMN, DASHED, INK, LIMIT, PAGE, PALE
+from .style import COLUMN, DASHED, INK, LIMIT, PAGE, PALE, Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,13 +94,7 @@ _BELOW = {
     3: "least singular\nvalue",
 }
 _PLANES = ((0, 1), (0, 2), (1, 2))
-_SYMBOLS = {
-    EllipsoidQuantity.LINEAR_VELOCITY: "v",
-    EllipsoidQuantity.ANGULAR_VELOCITY: "ω",
-    EllipsoidQuantity.FORCE: "f",
-    EllipsoidQuantity.MOMENT: "m",
-}
-_MARGIN = 1.15
+_SYMBOLS = dict(zip(EllipsoidQuantity, "vωfm", strict=True))
 _LONGEST = 8.0  # extent shown of an unbounded ellipsoid, in its least radii
 _FAR = 1e3  # times the extent: unbounded axes are drawn up to there
 
@@ -65,49 +112,12 @@ def plot_inverse_velocities(
     distance_unit: Unit | str = Unit.DEGREE,
     distance_name: str = "distance from the singular position",
     logarithmic: bool | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Joint speeds and task error of several methods across a singular position.
 
     Panels: speeds; the missing linear and angular velocity, for those rows that were requested;
     the least singular value, where it is known.
-
-    Parameters
-    ----------
-    distance : array_like, shape (N,)
-        Distance from the singular position, rad or m, ascending; it may have a sign.
-    solutions : mapping of str to IKMSolution, or sequence
-        Result of each method at these distances, by its name: an `IKMSolution` of N rows, or a
-        pair of arrays, the joint velocities (N, n) and the error of the twist (N, 6) or None,
-        linear then angular. NaN rows leave a gap.
-    names : sequence of str, optional
-        Of the methods of a sequence; default ``method 1`` and so on.
-    model : RobotModel, optional
-        The robot, n joints: their names and units.
-    units : Unit or str, or sequence of them, length n, optional
-        Of the joints, as in `plot_trajectory`; joints of different units have panels of their own.
-    limits : MotionLimits, optional
-        Whose velocities are drawn as dashed lines (the greater of both directions).
-    each_joint : bool
-        Whether each method has a column with the speeds of all joints, instead of lines for the
-        greatest speed of each method.
-    distance_unit : Unit or str
-        ``deg``, ``rad``, ``m`` or ``mm`` for the axis.
-    distance_name : str
-        Name of the axis.
-    logarithmic : bool, optional
-        Whether the distance is on a scale of powers, linear around zero where it has a sign;
-        default where most of the samples are near zero.
-
-    Examples
-    --------
-    >>> d = np.linspace(-0.1, 0.1, 11)
-    >>> bounded = d[:, None] / (d[:, None] ** 2 + 1e-3)
-    >>> missing = np.c_[np.zeros((11, 5)), 1e-3 / (d**2 + 1e-3)]
-    >>> figure = plot_inverse_velocities(d, {"damped": (bounded, missing)}, units="rad")
-    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes][::2]
-    ['greatest joint speed (rad/s)', 'missing angular velocity (rad/s)']
     """
     x = as_floats(distance, "distance")
     if x.ndim != 1 or not x.size or (np.diff(x) <= 0.0).any():
@@ -125,26 +135,23 @@ def plot_inverse_velocities(
     below = [k for k in _BELOW if any(method[k] is not None for method in methods.values())]
     rows, columns = len(speeds) + len(below), len(methods) if each_joint else 1
     width = COLUMN if columns == 1 else PAGE
-    figure, grid = style.panels(
-        width, 0.75 + 1.05 * rows, size, rows, columns, sharex=True, sharey="row"
-    )
+    shared: dict[str, Any] = {"sharex": True, "sharey": "row"}
+    figure, grid = style.panels(width, 0.75 + 1.05 * rows, look, rows, columns, **shared)
     for m, (name, method) in enumerate(methods.items()):
         column = grid[:, m if each_joint else 0]
         for axes, (kind, some) in zip(column, speeds.items(), strict=False):
-            speed, names, numbers = kind.factor * np.abs(method[0][:, some]), [name], [m]
+            which, speed = [joints[j] for j in some], kind.factor * np.abs(method[0][:, some])
             if each_joint:
-                names, numbers = [joints[j] for j in some], some
+                over_time.lines_over_time(axes, x, speed, which, some)
             else:
-                speed = speed.max(axis=1, keepdims=True)
-            over_time.lines_over_time(axes, x, speed, names, numbers)
+                over_time.lines_over_time(axes, x, speed.max(axis=1, keepdims=True), [name], [m])
             if bounds is not None:
                 most = np.maximum(bounds.velocity[some], -bounds.velocity_lower[some])
-                which = [joints[j] for j in some]
                 over_time.limit_lines(axes, kind.factor * most, which, some if each_joint else None)
         for axes, k in zip(column[len(speeds) :], below, strict=True):
             if method[k] is not None:
-                look = {"color": INK} if each_joint else style.line(m)
-                axes.plot(x, method[k], label=f"_{name}", **look)
+                line = {"color": INK} if each_joint else style.line(m)
+                axes.plot(x, method[k], label=f"_{name}", **line)
         if each_joint:
             column[0].set_title(style.wrapped(name, width / columns))
     labels = [f"{'' if each_joint else 'greatest '}joint\nspeed ({k.of(1)})" for k in speeds]
@@ -157,15 +164,13 @@ def plot_inverse_velocities(
         axes.set_xlabel(style.wrapped(f"{distance_name} ({unit.value})", width / columns))
         if near:
             _set_powers(axes, "x")
-    return style.finished(figure, title, joints if each_joint else list(methods))
+    return style.finished(figure, look, joints if each_joint else list(methods))
 
 
 def _method(solution: Any, name: str, N: int) -> tuple[Array, Any, Any, Any]:
     """Joint velocities (N, n); norms of the missing velocities and least singular values (N,)."""
     mask, least = np.ones(6, dtype=bool), None
-    if isinstance(solution, IKMSolution):
-        if solution.a is not None:
-            raise InvalidValueError(f"{name!r}: these are accelerations, not velocities.")
+    if isinstance(solution, IKMSolution) and solution.a is None:
         v, error, mask = solution.v, solution.error, solution.mask
         least = solution.singular_values[..., -1] if solution.singular_values.size else None
     elif isinstance(solution, tuple) and len(solution) == 2:
@@ -205,7 +210,7 @@ def _set_powers(axes: Any, which: str) -> None:
         return
     signed = bool((values < 0.0).any())
     least = 10.0 ** np.floor(np.log10(float(some.min())))
-    style.powers_around_zero(axes, which, most, least, 2 if signed else 5)
+    style.powers_around_zero(axes, which, least, 2 if signed else 5)
     if not signed:
         axes.set(**{f"{which}lim": (0.0, 1.5 * most)})
 
@@ -215,28 +220,12 @@ def plot_ellipsoids(
     ellipsoids: Ellipsoid | Sequence[Ellipsoid],
     *,
     labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Projections of ellipsoids on the planes xy, xz and yz of the world, a row for each quantity.
 
     A projection shows the largest component along every direction of the plane. The principal axes
     are drawn in it, unbounded ones as dashes to the border of the picture.
-
-    Parameters
-    ----------
-    ellipsoids : Ellipsoid or sequence of Ellipsoid
-        One, several, or batches, which are taken apart.
-    labels : sequence of str, optional
-        Texts of the legend: the first is for the first ellipsoid of every quantity, and so on.
-        Default numbers, if a quantity has several.
-
-    Examples
-    --------
-    >>> egg = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), [20.0, 10.0, 5.0], 3)
-    >>> figure = plot_ellipsoids(egg)
-    >>> [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes][1]
-    ('$f_x$ (N)', '$f_z$ (N)')
     """
     given = as_ellipsoids(ellipsoids)
     if not given:
@@ -247,7 +236,7 @@ def plot_ellipsoids(
     names = [str(k + 1) for k in range(count)] if count > 1 else ["_"]
     if labels is not None:
         names = style.as_texts(labels, count, "labels", "ellipsoids of a kind")
-    figure, grid = style.panels(PAGE, 0.35 + 2.35 * len(rows), size, len(rows), len(_PLANES))
+    figure, grid = style.panels(PAGE, 0.35 + 2.35 * len(rows), look, len(rows), len(_PLANES))
     for row, own in zip(grid, rows, strict=True):
         quantity = own[0].quantity
         half = _shown(np.array([e.radii for e in own]))
@@ -257,18 +246,14 @@ def plot_ellipsoids(
             x, y = (f"${_SYMBOLS[quantity]}_{'xyz'[i]}$ ({quantity.unit})" for i in plane)
             axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel=x, ylabel=y)
             axes.locator_params(nbins=5)
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
 def _shown(radii: Array) -> float:
     """Half the width of a picture that holds the bounded radii."""
     finite = radii[np.isfinite(radii) & (radii > 0)]
-    if not finite.size:
-        return 1.0
-    longest = float(finite.max())
-    if not np.isfinite(radii).all():
-        longest = min(longest, _LONGEST * float(finite.min()))
-    return _MARGIN * longest
+    longest, least = (finite.max(), finite.min()) if finite.size else (1.0, 1.0)
+    return 1.15 * float(longest if np.isfinite(radii).all() else min(longest, _LONGEST * least))
 
 
 def _draw_projection(
@@ -284,9 +269,9 @@ def _draw_projection(
     for u, radius, endless in zip(U.T, r, unbounded, strict=True):
         if np.linalg.norm(u) > 1e-6 and radius > 0.0:
             x, y = np.outer(u, (-1.0, 1.0)) * (_FAR * half if endless else radius)
-            dashes = (0, (6.0, 3.0)) if endless else "-"
-            name = "_unbounded axis" if endless else "_axis"
-            axes.plot(x, y, color=color, linestyle=dashes, linewidth=0.8, alpha=0.8, label=name)
+            dashes, name = ((0, (6.0, 3.0)), "_unbounded axis") if endless else ("-", "_axis")
+            line: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 0.8}
+            axes.plot(x, y, alpha=0.8, label=name, **line)
     if not (r > 0).any():
         axes.plot(0.0, 0.0, "o", color=INK, label="_no motion")
 
@@ -320,37 +305,13 @@ def plot_singularities(
     q: ArrayLike | None = None,
     degrees: bool = True,
     columns: int | None = None,
-    title: str | None = None,
-    size: ArrayLike | None = None,
+    **look: Unpack[Look],
 ) -> Figure:
     """Maps of singular factors, or of the determinant, over two joints.
 
     The robot is singular where they are zero, drawn as bold lines: where the values change sign,
     and where they are zero on the grid itself (dots). A zero between grid points at which the sign
     does not change is not found.
-
-    Parameters
-    ----------
-    maps : SingularityMap or sequence of them
-        From `singularity_map`; several stand beside each other.
-    model : RobotModel, optional
-        The robot: areas outside its joint limits are hatched.
-    q : array_like, shape (n,) or (N, n), optional
-        Postures to mark, rad or m; several are joined by a line in their order. A map shows their
-        two joints only.
-    degrees : bool
-        Whether angles are in degrees on the axes instead of radians.
-    columns : int, optional
-        How many maps stand in a row; default two, or one for a single map.
-
-    Examples
-    --------
-    >>> a = b = np.linspace(-1.0, 1.0, 21)
-    >>> wrist = SingularityMap("arm", np.array([2, 4]), ("joint_3", "joint_5"), a, b,
-    ...                        np.sin(a)[:, None] * np.cos(b), "S3 C5", ("rad", "rad", "1"))
-    >>> figure = plot_singularities(wrist)
-    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_title()
-    ('joint_3 (deg)', 'S3 C5')
     """
     given = [maps] if isinstance(maps, SingularityMap) else maps
     kinds = isinstance(given, Sequence) and all(isinstance(m, SingularityMap) for m in given)
@@ -365,73 +326,60 @@ def plot_singularities(
     rows = -(-len(given) // wide)
     width = COLUMN if wide == 1 else PAGE
     height = 0.35 + rows * min(0.85 * width / wide, 3.0)
-    figure, places = style.panels(width, height, size, rows, wide)
+    figure, places = style.panels(width, height, look, rows, wide)
     for axes in places.flat[len(given) :]:
         axes.set_visible(False)
     for axes, grid in zip(places.flat, given, strict=False):
-        scales = [_scale(grid, i, degrees) for i in (0, 1)]
-        _draw_map(figure, axes, grid, scales)
+        units = [over_time.as_unit(unit) for unit in grid.units[:2]]
+        units = [Unit.DEGREE if degrees and u is Unit.RADIAN else u for u in units]
+        _draw_map(figure, axes, grid, units)
         if model is not None:
-            _hatch_outside(axes, grid, model, scales)
+            _hatch_outside(axes, grid, model, units)
         if postures is not None:
-            x, y = (k * postures[:, grid.joints[i]] for i, (k, _) in enumerate(scales))
-            every = max(1, len(x) // 10)
-            look = {"marker": "o", "markersize": 3.6, "markerfacecolor": "white", "zorder": 4.0}
-            axes.plot(x, y, color=INK, markevery=every, label="postures", **look)
+            x, y = (u.factor * postures[:, j] for u, j in zip(units, grid.joints, strict=True))
+            line = {"marker": "o", "markersize": 3.6, "markerfacecolor": "white", "zorder": 4.0}
+            line |= {"color": INK, "markevery": max(1, len(x) // 10), "label": "postures"}
+            axes.plot(x, y, **line)
         axes.set_title(style.wrapped(grid.label, width / wide))
-    return style.finished(figure, title)
+    return style.finished(figure, look)
 
 
-def _draw_map(
-    figure: Figure, axes: Axes, grid: SingularityMap, scales: list[tuple[float, str]]
-) -> None:
+def _draw_map(figure: Figure, axes: Axes, grid: SingularityMap, units: list[Unit]) -> None:
     """Colours for the values, bold lines where they are zero."""
-    x, y = (k * axis for (k, _), axis in zip(scales, (grid.first, grid.second), strict=True))
+    x, y = (u.factor * axis for u, axis in zip(units, (grid.first, grid.second), strict=True))
     unit = grid.units[2].replace("^2", "²").replace("^3", "³")
     label = "value" if unit == "1" else f"value ({unit})"
     most = style.color_map(figure, axes, x, y, grid.values, True, label)
-    for axis, name, (_, symbol) in zip((axes.xaxis, axes.yaxis), grid.names, scales, strict=True):
-        axis.set_label_text(f"{name} ({symbol})")
-        style.few_numbers(axis, symbol)
+    style.joint_axes(axes, grid.names, units)
     if most == 0.0:
         style.note(axes, "zero everywhere:\nsingular in all\nof these postures")
         return
     # exact zeros (to rounding) become a tiny value of the sign of a neighbour, so that lines cross
     z = np.where(np.abs(grid.values) <= 1e-12 * most, 0.0, grid.values)
     zero = z == 0.0
-    if zero.any():
-        i, j = np.nonzero(zero)
-        axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, markeredgewidth=0.0, label="_zero")
+    i, j = np.nonzero(zero)
+    axes.plot(x[i], y[j], "o", color=INK, markersize=2.0, markeredgewidth=0.0, label="_zero")
     z = np.ma.masked_invalid(np.where(zero, 1e-12 * most, z).T)
-    if (z > 0.0).any() and (z < 0.0).any():
+    changes = (z > 0.0).any() and (z < 0.0).any()
+    if changes:
         axes.contour(x, y, z, levels=[0.0], colors=[INK], linewidths=2.0)
-    if zero.any() or ((z > 0.0).any() and (z < 0.0).any()):
+    if zero.any() or changes:
         axes.plot([], [], color=INK, linewidth=2.0, label="singular: zero")
 
 
-def _hatch_outside(
-    axes: Axes, grid: SingularityMap, model: RobotModel, scales: list[tuple[float, str]]
-) -> None:
+def _hatch_outside(axes: Axes, grid: SingularityMap, model: RobotModel, units: list[Unit]) -> None:
     """Hatches outside the joint limits, and lines at them."""
     box = {"facecolor": (1.0, 1.0, 1.0, 0.55), "edgecolor": PALE, "hatch": "////"}
     box |= {"linewidth": 0.0, "zorder": 2.4, "label": "outside joint limits"}
     lines, areas = (axes.axvline, axes.axhline), (axes.axvspan, axes.axhspan)
     for i, values in enumerate((grid.first, grid.second)):
-        j, k = int(grid.joints[i]), scales[i][0]
+        j, k = int(grid.joints[i]), units[i].factor
         first, last = k * values[[0, -1]]
         lower, upper = np.clip((k * model.lower[j], k * model.upper[j]), first, last)
         for limit, edge in ((lower, first), (upper, last)):
             if limit != edge:
                 lines[i](limit, color=INK, zorder=2.5, label=f"_limit of {grid.names[i]}", **DASHED)
                 areas[i](*sorted((limit, edge)), **box)
-
-
-def _scale(grid: SingularityMap, i: int, degrees: bool) -> tuple[float, str]:
-    """Factor and symbol of the unit of an axis."""
-    unit = over_time.as_unit(grid.units[i])
-    if unit is Unit.RADIAN and degrees:
-        unit = Unit.DEGREE
-    return unit.factor, unit.value
 
 
 def _check(grid: SingularityMap, model: RobotModel | None, q: Array | None) -> None:

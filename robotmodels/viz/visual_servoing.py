@@ -4,8 +4,8 @@ Parameters
 ----------
 run : ServoMotion
     Result of `servo`.
-title, size : str and array_like of shape (2,), optional
-    Text over the figure; its width and height in inches.
+**look
+    ``title`` and ``size``, see `robotmodels.viz`.
 model : RobotModel, optional
     The robot of the run; it moves, and a camera on its tool moves with it.
 height, dark : int and bool
@@ -14,12 +14,6 @@ height, dark : int and bool
 Returns
 -------
 matplotlib.figure.Figure or Scene
-    A scene shows itself in a notebook; ``.save("servo.html")`` writes one offline page.
-
-Raises
-------
-ShapeError, InvalidValueError, MissingExtraError
-    Arguments that do not fit; a package that draws is not installed.
 
 Examples
 --------
@@ -34,10 +28,9 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array
@@ -50,11 +43,11 @@ from . import style
 from .camera import framed
 from .motion import Motion, Track, keyframes
 from .over_time import Unit, is_prismatic
-from .robot import RobotStyle, draw_robot
+from .robot import Options, draw_robot
 from .scene import Scene
 from .shapes import Node, Segments, apply, floor_grid, path_node
 from .space import across, fill_cells, space
-from .style import INK, PAGE, PALE, PALETTE
+from .style import INK, PAGE, PALE, PALETTE, Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,22 +60,19 @@ _VIEW = Sensor(1.0, (0.4, 0.3), (0.8, 0.6))  # type: ignore[arg-type]
 
 
 @style.plot
-def plot_servo(
-    run: ServoMotion, *, title: str | None = None, size: ArrayLike | None = None
-) -> Figure:
+def plot_servo(run: ServoMotion, **look: Unpack[Look]) -> Figure:
     """Image paths, errors and velocities over time, and the path of the camera.
 
     Circles are the start, crosses the goal. Pixels with the camera of the run, otherwise
     normalised coordinates; features without points show their centre.
     """
     style.as_instance(run, ServoMotion, "run", "servo")
-    figure, grid = style.panels(PAGE, 5.4, size, 2, 2)
-    image, errors, speeds = grid[0, 0], grid[0, 1], grid[1, 0]
-    grid[1, 1].remove()
+    figure, ((image, errors), (speeds, free)) = style.panels(PAGE, 5.4, look, 2, 2)
+    free.remove()
     paths, goal = image_paths(run)
     for k, path in enumerate(paths.swapaxes(0, 1)):
-        image.plot(*path.T, color=PALETTE[k % 8], linewidth=1.2)
-        image.plot(*path[0], "o", color=PALETTE[k % 8], markersize=4.0)
+        line: dict[str, Any] = {"color": PALETTE[k % 8], "linewidth": 1.2, "markersize": 4.0}
+        image.plot(*path.T, "-o", markevery=[0], **line)
     if goal is not None:
         image.plot(*goal.T, "x", color=INK, markersize=5.0, zorder=3.0)
     unit = "1" if run.camera is None else "pixel"
@@ -106,9 +96,9 @@ def plot_servo(
     for T in run.cameras[[0, -1]]:
         for edge in apply(T, view).reshape(-1, 2, 3):
             axes.plot(*edge.T, color=PALETTE[0], linewidth=0.8)
-    style.finished(figure, title)
+    style.finished(figure, look)
     figure.draw_without_rendering()  # places the other panels
-    fill_cells(figure, [(axes, (0.55, 0.02, 0.43, 0.43), "")])
+    fill_cells(figure, [(axes, (0.5, 0.0, 0.5, 0.46), "")])
     return figure
 
 
@@ -121,7 +111,7 @@ def show_servo(
     points = np.concatenate((places, track))
     nodes, motion, path, first = list[Node](), None, "camera", run.cameras[0]
     if model is not None and run.q is not None:
-        robot = draw_robot(model, run.q[:1], "robots/robot", RobotStyle(), [None], run.q)
+        robot = draw_robot(model, run.q[:1], "robots/robot", Options(), [None], run.q)
         nodes += robot.nodes
         points = np.concatenate((points, robot.points))
         t, q = keyframes(run.t, run.q)
