@@ -18,7 +18,6 @@ from robotmodels import se3, simulation, viz
 from robotmodels import trajectories as tr
 from robotmodels.errors import InvalidValueError, RobotModelsError, RobotModelsWarning, ShapeError
 from robotmodels.symbolic import SingularityMap
-from robotmodels.viz import style
 
 H = np.pi / 2
 RX90 = rm.load("rx90").with_drive(

@@ -1311,7 +1311,7 @@ MUTATIONS = [
         "def _border(", "np.where(unbounded, 0.0, r) ** 2", "np.where(unbounded, 0.0, r)",
         f"{FIGURES} -k projections"),
     Mutation("viz: figures", "the total torque is its inertial part", "def plot_torque_parts(",
-        "total = parts.total[:, shown]", "total = parts.inertia[:, shown]",
+        "parts.total[:, j]", "parts.inertia[:, j]",
         f"{FIGURES} -k torque_parts_add_up"),
     Mutation("viz: fits", "residuals after a calibration are those before it",
         "_SIDES = (", '("after", PALETTE[0]', '("before", PALETTE[0]',
