@@ -337,7 +337,6 @@ def test_a_path_of_poses_needs_the_robot():
         ({"limits": MotionLimits(1.0, 1.0, upper=0.2)}, InvalidValueError, "outside its limits"),
         ({"path": np.zeros((3, 2))}, InvalidValueError, "cubic_spline"),
         ({"path": line([0, 0], [0, 0])}, InvalidValueError, "no length"),
-        ({"path": line(np.zeros((2, 2)), [1, 1])}, InvalidValueError, "batch"),
         ({"torque": 5.0}, InvalidValueError, "model"),
         ({"model": planar(), "torque": [1.0, np.nan]}, InvalidValueError, "torque"),
         ({"model": planar(), "torque": [-1.0, 1.0]}, InvalidValueError, "torque"),

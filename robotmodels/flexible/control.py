@@ -218,18 +218,18 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
     base = ends[0] + np.outer(share**2 * (3.0 - 2.0 * share), ends[1] - ends[0])
 
     def path(factors: Array) -> PiecewisePolynomial:
-        """Motions with other free coefficients, factors (..., K, n)."""
-        none = np.zeros((*factors.shape[:-2], 4, n))
-        values = base + np.concatenate([none, factors, none], axis=-2)
-        breaks = np.broadcast_to(np.linspace(0.0, T, K + 2), (*factors.shape[:-2], 1, K + 2))
-        return PiecewisePolynomial(breaks, pieces @ values[..., None, :, :])
+        """Motions with other free coefficients, factors (P, K, n), side by side as P n joints."""
+        none = np.zeros((len(factors), 4, n))
+        values = base + np.concatenate([none, factors, none], axis=1)
+        c = np.moveaxis(pieces @ values[:, None], 0, 2)
+        return PiecewisePolynomial(np.linspace(0.0, T, K + 2)[None], c.reshape(K + 1, 8, -1))
 
     def elastic(factors: Array, rtol: float, dense: bool = False) -> Any:
         """Solutions for several motions, factors (P, K, n)."""
         P, motion = len(factors), path(factors)
 
         def rate(t: float, y: Array) -> Array:
-            q, v, a = (x[:, 0] for x in motion.derivatives(np.full((P, 1), t), (0, 1, 2)))
+            q, v, a = (x.reshape(P, n) for x in motion.derivatives(np.array([t]), (0, 1, 2)))
             e, e_v = y.reshape(P, 2, m).swapaxes(0, 1)
             e_a = solved(arm, False, np.hstack([q, e]), np.hstack([v, e_v]), a)[0][:, n:]
             return np.stack([e_v, e_a], axis=1).ravel()
@@ -264,7 +264,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
     end, _ = left_over(found)
     still = (np.abs(end) < 10.0 * _STILL).all()
     status = RestStatus.AT_REST if still else RestStatus.VIBRATES
-    return RestToRest(arm, Trajectory(path(c), holds=True), end, status, found.sol)
+    return RestToRest(arm, Trajectory(path(c[None]), holds=True), end, status, found.sol)
 
 
 def _splines(K: int) -> Array:

@@ -263,10 +263,8 @@ def random_profile(
     """
     law = chosen(ProfileLaw, law, "law")
     count, generator = whole_number(nodes, "nodes", 0), generator_of(rng)
-    ends, batch, scalar = joint_vectors(q0=q0, q1=q1)
-    if batch:
-        raise InvalidValueError(f"q0, q1: expected one motion, got a batch of shape {batch}.")
-    start, end = ends["q0"][0], ends["q1"][0]
+    ends, scalar = joint_vectors(q0=q0, q1=q1)
+    start, end = ends["q0"], ends["q1"]
     if not np.any(start != end):
         raise InvalidValueError("q0, q1: the ends are the same, so there is no way between them.")
     points = start + np.linspace(0.0, 1.0, count + 2)[:, None] * (end - start)

@@ -45,12 +45,11 @@ from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
 from .blends import PARABOLA, QUARTIC, rates_of, schedule
-from .checks import given_durations, limits_along, refuse_short, sample_count, slowed
-from .circle_timing import circle_law
-from .laws import TimeLaw
+from .checks import limits_along, sample_count, slowed
+from .laws import LineLimits, TimeLaw, law_of_limits
 from .limits import MotionLimits, ranges_of
 from .motions import PiecewisePolynomial
-from .point_to_point import along_line, assembled
+from .point_to_point import along_line
 from .pose_trajectory import (
     BlendedPoses,
     FixedAxisPath,
@@ -69,6 +68,10 @@ _NO_TURN = 1e-15
 _FLAT = 1e-9
 """Height of three points beside their longest side below which they are on a line. Down to it an
 arc passes them within some 1e-15 of their coordinates, however far away its centre is."""
+
+
+_SPEEDS = 60
+"""Speeds that are tried on a circle."""
 
 
 def cartesian_trajectory(
@@ -276,18 +279,39 @@ def _timed(
     law, bounds = chosen(TimeLaw, law, "law"), _of_space(limits)
     turn = abs(path.turn)
     size = np.array([path.length, turn if turn > _NO_TURN else 0.0])
-    goal, of_s = np.ones(1) if size.any() else np.zeros(1), None
+    along = None
     if bounds is not None:
-        V, A, B, J, K, _ = limits_along(bounds, size[None, None, :], _MOVES)
-        of_s = MotionLimits(V, A, J, velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K)
+        along = limits_along(bounds, size, _MOVES)
         if path.radius > 0.0 and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any():
-            along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
-            T, pieces = given_durations(duration, ()), circle_law(law, path, bounds)
-            refuse_short(T, pieces.durations.sum(axis=-1), np.ones((1, 1)))
-            moves = assembled(pieces, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
-            return PoseTrajectory(path, moves)
-    moves = along_line(law, np.zeros(1), goal, duration, of_s)
-    return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
+            along = _on_circle(law, path, bounds, along)
+        V, A, B, J, K, _ = along
+        along = MotionLimits(V, A, J, velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K)
+    return PoseTrajectory(path, along_line(law, 0.0, float(size.any()), duration, along))
+
+
+def _on_circle(
+    law: TimeLaw, path: FixedAxisPath, limits: MotionLimits, along: LineLimits
+) -> LineLimits:
+    """Limits along a circle, for the greatest speed and the part of the jerk that do best.
+
+    On a circle of radius r and length L the acceleration is ``(L s'', (L s')^2 / r)`` along it and
+    towards the centre, the jerk ``(L s''' - (L s')^3 / r^2, 3 L^2 s' s'' / r)``.
+    """
+    L, r, A, J = path.length, path.radius, limits.acceleration[0], limits.jerk[0]
+    best, least = along, np.inf
+    most = min(along.velocity * L, np.sqrt(A * r), np.cbrt(J * r * r))
+    parts = np.linspace(0.1, 0.9, 9) if np.isfinite(J) else np.ones(1)
+    for speed in (most * np.linspace(0.0, 1.0, _SPEEDS + 1)[1:]).tolist():
+        for part in parts.tolist():
+            pull = min(np.sqrt(max(A * A - (speed**2 / r) ** 2, 0.0)), part * J * r / (3.0 * speed))
+            jolt = np.inf if np.isinf(J) else np.sqrt(1.0 - part**2) * J - speed**3 / r**2
+            if pull > 0.0 and jolt > 0.0:
+                up = [min(x, pull / L) for x in along[1:3]]
+                up += [min(x, jolt / L) for x in along[3:5]]
+                bounds = LineLimits(min(along.velocity, speed / L), *up, along.back)
+                T = float(law_of_limits(law, 1.0, bounds).durations.sum())
+                best, least = (bounds, T) if least > T else (best, least)
+    return best
 
 
 def _of_space(limits: MotionLimits | None) -> MotionLimits | None:

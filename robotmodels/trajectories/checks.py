@@ -6,32 +6,32 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.singular.task import whole_number
 from .laws import LineLimits
-from .limits import RATES, MotionLimits, ranges_of
+from .limits import RATES, MotionLimits
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
 
 _EXTREME = 1e50
-"""Largest size of states, durations and limits: cubes of their ratios are floats."""
+"""Largest size of states and durations, and of their inverses: cubes of ratios are floats."""
 
 
-def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
-    """Positions and rates of the same joints as arrays (R, n); leading axes; whether scalar."""
+def joint_vectors(**given: Any) -> tuple[dict[str, Array], bool]:
+    """Positions and rates (n,) of the same joints; whether they are numbers."""
     arrays = {name: as_floats(value, name) for name, value in given.items()}
+    got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
     try:
-        shape = np.broadcast_shapes((1,), *(array.shape for array in arrays.values()))
+        _, *rows = np.broadcast_arrays(np.zeros(1), *arrays.values())
     except ValueError:
-        got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
-    refuse_jointless(shape[-1], " and ".join(tuple(given)[:2]))
-    rows = {k: np.broadcast_to(v, shape).reshape(-1, shape[-1]) for k, v in arrays.items()}
-    return rows, shape[:-1], all(array.ndim == 0 for array in arrays.values())
+    if rows[0].ndim != 1:
+        raise ShapeError(f"Expected the states of one motion, of shape () or (n,), got {got}.")
+    refuse_jointless(rows[0].size, "q0 and q1")
+    return dict(zip(arrays, rows, strict=True)), all(array.ndim == 0 for array in arrays.values())
 
 
 def sample_count(N: Any, name: str = "N", least: int = 0, most: int = 10**9) -> int:
@@ -51,21 +51,16 @@ def refuse_jointless(n: int, name: str) -> None:
         )
 
 
-def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] = ()) -> LineLimits:
-    """Limits of the coordinate that several joints share.
-
-    Shapes: direction (R, 1, n) or (R, n, 1).
-    """
-    own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
-    u = direction[..., 0] if own else direction[..., 0, :]
+def limits_along(limits: MotionLimits, u: Array, names: tuple[str, ...] = ()) -> LineLimits:
+    """Limits of the coordinate that joints share which move by u (n,) for each unit of it."""
     pairs = [(getattr(limits, f"{name}_lower"), getattr(limits, name)) for name in RATES]
-    most = np.stack([x for low, high in pairs for x in (high, -low)])[:, None]
+    most = np.stack([x for low, high in pairs for x in (high, -low)])
     # the bound that stops the coordinate from growing; then that of the way back
     bounds = np.where(u > 0.0, most, most[[1, 0, 3, 2, 5, 4]])
     zero = (u != 0.0) & (bounds == 0.0)
     zero[1] = False
     if zero.any():
-        i, *_, j = (int(k) for k in np.argwhere(zero)[0])
+        i, j = (int(k) for k in np.argwhere(zero)[0])
         what, other = f"joint {j + 1}", "leave the joint where it is"
         if names:
             what, other = names[j], f"take poses without {names[j]}"
@@ -75,27 +70,17 @@ def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] 
         )
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         bounds = np.where(u != 0.0, bounds / np.abs(u), np.inf)
-    V, back, A, B, J, K = bounds.reshape(6, -1) if own else bounds.min(axis=-1)
+    V, back, A, B, J, K = bounds.min(axis=-1).tolist()
     return LineLimits(V, A, B, J, K, back)
 
 
-def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
-    """Checked durations, shape (R,), one per motion."""
-    if duration is None:
-        return None
-    T = as_floats(duration, "duration")
-    if (T < 0.0).any():
-        raise InvalidValueError(f"duration: expected seconds of at least 0, got {T.min():g}.")
-    try:
-        return np.broadcast_to(T, batch).reshape(-1)
-    except ValueError:
-        raise ShapeError(
-            f"duration: expected one number or one per motion {batch}, got shape {T.shape}."
-        ) from None
+def given_duration(duration: float | None) -> float | None:
+    """A duration of at least zero seconds, or None."""
+    return None if duration is None else as_number(duration, "duration", least=0.0)
 
 
 def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> MotionLimits | None:
-    """Limits of n joints, within which the postures are. Shapes: *postures (R, n)."""
+    """Limits of n joints, within which the postures (n,) or (N, n) are."""
     if limits is None:
         return None
     if not isinstance(limits, MotionLimits):
@@ -116,57 +101,45 @@ def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> Mot
     return limits
 
 
-def refuse_short(T: Array | None, least: Array, length: Array) -> None:
-    """Refuse durations below the least feasible ones. Shapes: T, least (R,); length (R, ...)."""
-    if T is None:
-        return
-    short = least * (1.0 - ROUNDING) > T
-    if short.any():
-        i = int(short.argmax())
+def refuse_short(T: float | None, least: float, moves: bool = True) -> None:
+    """Refuse a duration below the least feasible one, or of zero for a motion."""
+    if T is not None and least * (1.0 - ROUNDING) > T:
         raise InvalidValueError(
-            f"duration: {T[i]:.9g} s is too short for the limits; the least is "
-            f"{least_shown(least[i])} s."
+            f"duration: {T:.9g} s is too short for the limits; the least is {least_shown(least)} s."
         )
-    if ((T == 0.0) & (length > 0.0).any(axis=-1)).any():
+    if T == 0.0 and moves:
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
 
 
-def slowed(T: Array, blends: Array, duration: ArrayLike | None, kept: bool) -> tuple[Array, Array]:
+def slowed(T: Array, blends: Array, duration: float | None, kept: bool) -> tuple[Array, Array]:
     """Times (m - 1,) of lines and (m,) of their blends, evenly stretched to a whole duration.
 
     ``kept``: whether limits make the given times the least ones.
     """
     least = float(T.sum() + 0.5 * (blends[0] + blends[-1]))
-    wanted = given_durations(duration, ())
+    wanted = given_duration(duration)
     if wanted is None or least == 0.0:
         return T, blends
-    refuse_short(wanted, np.array([least if kept else 0.0]), np.ones((1, 1)))
-    return T * (wanted[0] / least), blends * (wanted[0] / least)
+    refuse_short(wanted, least if kept else 0.0)
+    return T * (wanted / least), blends * (wanted / least)
 
 
 def checked_request(
-    states: dict[str, Array], batch: tuple[int, ...], duration: Any, limits: MotionLimits | None
-) -> tuple[Array | None, MotionLimits | None]:
-    """Durations (R,) and limits of a motion between states (R, n); at least one of the two.
-
-    States, durations and limits whose powers overflow or underflow are refused.
-    """
-    T = given_durations(duration, batch)
+    states: dict[str, Array], duration: float | None, limits: MotionLimits | None
+) -> tuple[float | None, MotionLimits | None]:
+    """Duration and limits of a motion between states (n,); at least one of the two."""
+    T = given_duration(duration)
     if T is None and limits is None:
         raise InvalidValueError("Give duration, limits or both.")
-    bounds = checked_limits(limits, states["q0"].shape[1], states["q0"], states["q1"])
-    given = states if T is None else states | {"duration": T}
-    if bounds is not None:
-        for name, least, most in ranges_of(bounds)[1:]:
-            given = given | {f"limits: {name}": most, f"limits: {name}_lower": least}
-    for name, values in given.items():
-        size = np.abs(values)
-        small = (size > 0.0) & (size < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
-        wrong = size[np.isfinite(size) & ((size > _EXTREME) | small)]
-        if wrong.size:
+    bounds = checked_limits(limits, states["q0"].size, states["q0"], states["q1"])
+    rates = () if bounds is None else [(f"limits: {name}", getattr(bounds, name)) for name in RATES]
+    for name, values in (*states.items(), *rates, ("duration", np.array(T or 0.0))):
+        size = np.abs(values[np.isfinite(values) & (values != 0.0)])
+        least = 0.0 if name in ("q0", "q1") else 1.0 / _EXTREME
+        if size.max(initial=0.0) > _EXTREME or size.min(initial=1.0) < least:
             raise InvalidValueError(
                 f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0), got "
-                f"{wrong[0]:.3g}; check the units."
+                f"{size.max():.3g}; check the units."
             )
     return T, bounds
 
@@ -187,12 +160,11 @@ def greatest_shown(rows: Iterable[tuple[str, Array]]) -> str:
     """The greatest sizes of quantities of joints, and which joint has them."""
     texts = []
     for name, values in rows:
-        size = np.abs(np.where(np.isnan(values), 0.0, values)).reshape(-1, values.shape[-1])
-        if size.size:
-            size = size.max(axis=0)
-            joint = f" (joint {int(size.argmax()) + 1})" if size.size > 1 and size.any() else ""
-            texts.append(f"{name} {size.max():.4g}{joint}")
-    return "greatest " + ", ".join(texts) if texts else "no values"
+        size = np.abs(np.nan_to_num(values, posinf=np.inf, neginf=-np.inf))
+        size = size.reshape(-1, values.shape[-1]).max(axis=0, initial=0.0)
+        joint = f" (joint {int(size.argmax()) + 1})" if size.size > 1 and size.any() else ""
+        texts.append(f"{name} {size.max():.4g}{joint}")
+    return f"greatest {', '.join(texts)}"
 
 
 def seconds_shown(t: Array) -> str:

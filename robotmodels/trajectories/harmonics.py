@@ -73,9 +73,9 @@ class FourierSeries(Motion):
         return self.mean.size
 
     @property
-    def duration(self) -> Array:
+    def duration(self) -> float:
         """Seconds."""
-        return np.asarray(self.period * self.periods)
+        return self.period * self.periods
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
         """Derivatives (N, n) of the orders at times t (N,), s."""

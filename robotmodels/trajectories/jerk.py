@@ -32,7 +32,7 @@ _GIVEN = (
 def jerk_limited(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
@@ -47,14 +47,14 @@ def jerk_limited(
 
     Parameters
     ----------
-    q0, q1 : array_like, shape () or (..., n)
-        Positions at the ends, rad or m; leading axes are motions of their own.
-    duration : array_like, shape () or (...), optional
+    q0, q1 : array_like, shape () or (n,)
+        Positions at the ends, rad or m.
+    duration : float, optional
         Seconds; default the least.
     limits : MotionLimits
         All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
         both ways.
-    v0, v1, a0, a1 : array_like, shape () or (..., n)
+    v0, v1, a0, a1 : array_like, shape () or (n,)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation or str
         How the joints are kept in step; a member or its name.
@@ -86,35 +86,24 @@ def jerk_limited(
     if limits is None:
         raise InvalidValueError("limits: JERK_LIMITED has no shape without limits; give limits.")
     synchronisation = chosen(Synchronisation, synchronisation, "synchronisation")
-    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
-    R, n = states["q0"].shape
+    states, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
     if not any(states[name].any() for name in _STATES[2:]):
         law = TimeLaw.JERK_LIMITED
-        return law_motion(law, states, batch, scalar, duration, limits, synchronisation)
-    T, bounds = checked_request(states, batch, duration, limits)
+        return law_motion(law, states, scalar, duration, limits, synchronisation)
+    T, bounds = checked_request(states, duration, limits)
     assert bounds is not None
-    breaks, c = np.zeros((R, n, _PHASES + 2)), np.zeros((R, _PHASES + 1, 4, n))
-    lengths = np.zeros((R, n, _PHASES + 1))
     find = _on_line if synchronisation is Synchronisation.COORDINATED else _of_joints
-    for i in range(R):
-        state = {name: value[i] for name, value in states.items()}
-        asked = None if T is None else float(T[i])
-        breaks[i], c[i], lengths[i] = find(state, bounds, asked, synchronisation)
-    motion = PiecewisePolynomial(
-        breaks.reshape(*batch, n, _PHASES + 2),
-        c.reshape(*batch, _PHASES + 1, 4, n),
-        lengths.reshape(*batch, n, _PHASES + 1),
-    )
+    motion = PiecewisePolynomial(*find(states, bounds, T, synchronisation))
     if np.isinf([bounds.lower, bounds.upper]).all():
         return Trajectory(motion, scalar)
     low, high = motion.extremes(0)
     outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
     if outside.any():
-        j = int(np.argwhere(outside)[0][-1])
+        j = int(outside.argmax())
         raise InvalidValueError(
-            f"limits: between these states joint {j + 1} swings from {low[..., j].min():.6g} to "
-            f"{high[..., j].max():.6g}, outside its limits {bounds.lower[j]:.6g} to "
-            f"{bounds.upper[j]:.6g}; give states at the ends that are slower."
+            f"limits: between these states joint {j + 1} moves from {low[j]:.6g} to {high[j]:.6g}, "
+            f"outside its limits {bounds.lower[j]:.6g} to {bounds.upper[j]:.6g}; give slower "
+            "states at the ends."
         )
     return Trajectory(motion, scalar)
 
@@ -143,9 +132,11 @@ def _on_line(
             "The velocities and accelerations at the ends are not along the line from q0 to q1, "
             "so the joints cannot stay on it; pass synchronisation=Synchronisation.SAME_TIME."
         )
-    V, A, B, J, K, back = limits_along(limits, u[None, None, :])
+    V, A, B, J, K, back = limits_along(limits, u)
     one = dict(zip(("q1", *_STATES[2:]), along[:, None], strict=True)) | {"q0": np.zeros(1)}
-    breaks, c, lengths = _by_ruckig(one, _Box(V, -back, A, -B, np.minimum(J, K)), T, how)
+    breaks, c, lengths = _by_ruckig(
+        one, _Box(*(np.array([x]) for x in (V, -back, A, -B, min(J, K)))), T, how
+    )
     c = c * u
     c[:, 0] += state["q0"]
     return breaks, c, lengths

@@ -1,15 +1,14 @@
-"""Motions whose pieces are polynomials of time."""
+"""Motions whose pieces are polynomials of time, or functions of it."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import factorial, prod
+from math import factorial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array, Value, read_only
 from ..errors import InvalidValueError, ShapeError
@@ -28,33 +27,28 @@ class Motion(Value, ABC):
     __slots__ = ()
     n: int
     """Number of joints."""
-    duration: Array
-    """Durations of the motions, s, shape (...)."""
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """Leading axes: one motion each."""
-        return ()
+    duration: float
+    """Seconds."""
 
     @abstractmethod
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
+        """Derivatives (N, n) of the orders at times (N,) within the duration."""
 
     def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value (..., n) of a derivative, here of samples."""
-        (values,) = self.derivatives(np.linspace(0.0, float(self.duration), _SAMPLES), (order,))
+        """Least and greatest value (n,) of a derivative, here of samples."""
+        (values,) = self.derivatives(np.linspace(0.0, self.duration, _SAMPLES), (order,))
         return values.min(axis=0), values.max(axis=0)
 
     def jumps(self, order: int) -> tuple[Any, Any]:
-        """Whether a derivative jumps down, and up, inside the motion, (..., n); here smooth."""
+        """Whether a derivative jumps down, and up, inside the motion, (n,); here smooth."""
         return np.zeros(self.n, np.bool_), np.zeros(self.n, np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewisePolynomial(Motion):
-    """Polynomials of the normalised time of each piece.
+    """Polynomials of the normalised time of each piece; joints share one clock or have their own.
 
-    Shapes: breaks (..., c, K + 1), coefficients (..., K, d + 1, n), lengths (..., c, K).
+    Shapes: breaks (1 or n, K + 1), coefficients (K, d + 1, n), lengths (1 or n, K).
     """
 
     breaks: Array
@@ -73,123 +67,75 @@ class PiecewisePolynomial(Motion):
         return self.coefficients.shape[-1]
 
     @property
-    def batch(self) -> tuple[int, ...]:
-        """Leading axes: one motion each."""
-        return self.coefficients.shape[:-3]
-
-    @property
-    def duration(self) -> Array:
-        """Durations of the motions, s, shape (...)."""
-        return self.breaks[..., -1].max(axis=-1)
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.breaks[:, -1].max())
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives at times inside the motion. Shapes: t (..., N) -> (..., N, n)."""
+        """Derivatives (N, n) at times (N,) inside the motion."""
         from ..kernels.piecewise_polynomials import piecewise_derivatives
 
-        M, N, parts = prod(self.batch), t.shape[-1], (self.breaks, self.lengths, self.coefficients)
-        breaks, lengths, c = (x.reshape(M, *x.shape[len(self.batch) :]) for x in parts)
-        out = np.empty((len(orders), M, N, self.n))
-        times = np.ascontiguousarray(t).reshape(M, N)
-        piecewise_derivatives(times, breaks, lengths, c, np.asarray(orders, np.int64), out)
-        return [values.reshape(*t.shape, self.n) for values in out]
+        out = np.empty((len(orders), 1, t.size, self.n))
+        rows = (
+            np.ascontiguousarray(x)[None] for x in (t, self.breaks, self.lengths, self.coefficients)
+        )
+        piecewise_derivatives(*rows, np.asarray(orders, np.int64), out)
+        return list(out[:, 0])
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece."""
-        live, step = self._steps
-        low, high = _range_on_unit_interval(_in_time(self.coefficients, step, order))
-        none = ~live.any(axis=-2)
-        low = np.where(live, low, np.inf).min(axis=-2)
-        high = np.where(live, high, -np.inf).max(axis=-2)
-        if none.any():  # a motion without duration stays at its start
-            still = self.coefficients[..., 0, 0, :] if order == 0 else 0.0
-            low, high = np.where(none, still, low), np.where(none, still, high)
+        live = self.lengths.T > 0.0
+        low, high = ranges_of_pieces(self.coefficients, self.lengths.T, order)
+        low = np.where(live, low, np.inf).min(axis=0)
+        high = np.where(live, high, -np.inf).max(axis=0)
+        # a motion without duration stays at its start
+        still = self.coefficients[0, 0] if order == 0 else 0.0
+        low, high = (np.where(live.any(axis=0), x, still) for x in (low, high))
         if order > 0:
             down, up = self.jumps(order - 1)
             low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
         return low, high
 
-    @property
-    def _steps(self) -> tuple[NDArray[np.bool_], Array]:
-        """Whether pieces last, and their lengths or 1, each (..., K, c)."""
-        h = np.swapaxes(self.lengths, -1, -2)
-        return h > 0.0, np.where(h > 0.0, h, 1.0)
-
     def jumps(self, order: int) -> tuple[Any, Any]:
-        """Whether a derivative jumps down, and up, between pieces beyond rounding, (..., n)."""
-        live, step = self._steps
-        c = _in_time(self.coefficients, step, order)
-        first, last = c[..., 0, :], c.sum(axis=-2)
-        live = np.broadcast_to(live, first.shape)
-        scale = np.abs(np.where(live[..., None, :], c, 0.0)).sum(axis=-2).max(axis=-2)
-        before, started = last[..., 0, :], live[..., 0, :]
-        down, up = np.zeros(before.shape), np.zeros(before.shape)
-        for k in range(1, c.shape[-3]):
-            jump = np.where(live[..., k, :] & started, first[..., k, :] - before, 0.0)
-            down, up = np.minimum(down, jump), np.maximum(up, jump)
-            before = np.where(live[..., k, :], last[..., k, :], before)
-            started = started | live[..., k, :]
-        return down < -_ROUNDING * scale, up > _ROUNDING * scale
+        """Whether a derivative jumps down, and up, between pieces beyond rounding, (n,)."""
+        c = _in_time(self.coefficients, self.lengths.T, order)
+        live = np.broadcast_to(self.lengths.T > 0.0, c[:, 0].shape)
+        jumps = np.zeros((2, self.n))
+        for j, (on, of) in enumerate(zip(live.T, np.moveaxis(c, -1, 0), strict=True)):
+            jump = of[on][1:, 0] - of[on][:-1].sum(axis=1)
+            size = _ROUNDING * np.abs(of[on]).sum(axis=1).max(initial=0.0)
+            jumps[:, j] = jump.min(initial=0.0) < -size, jump.max(initial=0.0) > size
+        return jumps[0] > 0.0, jumps[1] > 0.0
 
 
-def _derived(c: Array) -> Array:
-    """Coefficients of the derivative with respect to x; the powers are the last axis but one."""
-    return c[..., 1:, :] * np.arange(1.0, c.shape[-2])[:, None]
-
-
-def _in_time(c: Array, step: Array, order: int) -> Array:
-    """Derivatives by time; divided one by one, as the power of a step may vanish."""
-    for _ in range(order):
-        c = _derived(c) / step[..., None, :] if c.shape[-2] > 1 else np.zeros_like(c)
+def _in_time(c: Array, h: Array, order: int) -> Array:
+    """Coefficients (K, d + 1, n) of derivatives by time, pieces of lengths (K, 1 or n)."""
+    step = np.where(h > 0.0, h, 1.0)[:, None]
+    for _ in range(order):  # divided one by one, as the power of a step may vanish
+        if c.shape[1] == 1:
+            return np.zeros_like(c)
+        c = c[:, 1:] * np.arange(1.0, c.shape[1])[:, None] / step
     return c
 
 
-def _range_on_unit_interval(c: Array) -> tuple[Array, Array]:
-    """Least and greatest value on [0, 1] of polynomials (..., d + 1, n), shapes (..., n)."""
-    ends = np.stack((c[..., 0, :], c.sum(axis=-2)))
+def ranges_of_pieces(c: Array, h: Array, order: int) -> tuple[Array, Array]:
+    """Least and greatest value (K, n) of a derivative on each piece, of lengths h (K, 1 or n)."""
+    from scipy.interpolate import PPoly
+
+    c = np.where(h[:, None] > 0.0, _in_time(c, h, order), 0.0)
+    ends = np.stack((c[:, 0], c.sum(axis=1)))
     low, high = ends.min(axis=0), ends.max(axis=0)
-    if c.shape[-2] < 3:
+    if c.shape[1] < 3:
         return low, high
-    x = _real_roots(np.moveaxis(_derived(c), -2, -1))  # (..., n, d - 1)
-    y = np.zeros(x.shape)
-    for part in np.moveaxis(c, -2, 0)[::-1, ..., None]:
-        y = y * x + part
-    return np.minimum(low, y.min(axis=-1)), np.maximum(high, y.max(axis=-1))
-
-
-def _real_roots(c: Array) -> Array:
-    """Real parts of all roots (..., d) of polynomials (..., d + 1), clipped to [0, 1].
-
-    Points that are no roots do no harm where the caller takes an extreme over them.
-    """
-    d = c.shape[-1] - 1
-    size = np.abs(c).max(axis=-1, keepdims=True)
-    c = c / np.where(size > 0.0, size, 1.0)
-    if d == 1:
-        slope = np.where(c[..., 1:] == 0.0, 1.0, c[..., 1:])
-        return np.clip(-c[..., :1] / slope, 0.0, 1.0)
-    if d == 2:
-        half = -0.5 * c[..., 1]
-        root = np.sqrt(np.maximum(half * half - c[..., 2] * c[..., 0], 0.0))
-        far = half + np.copysign(root, half)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            x: Any = np.stack((far / c[..., 2], c[..., 0] / far), axis=-1)
-        return np.clip(np.nan_to_num(x, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    # a leading coefficient that is nothing beside the others moves only roots far outside
-    lead = np.where(np.abs(c[..., -1]) < 1e-14, 1e-14, c[..., -1])
-    companion = np.zeros((*c.shape[:-1], d, d))
-    companion[..., range(1, d), range(d - 1)] = 1.0
-    companion[..., -1] = -c[..., :-1] / lead[..., None]
-    x = np.linalg.eigvals(companion).real
-    for _ in range(2):  # a companion matrix with a small lead loses digits
-        p = c[..., -1, None] * x + c[..., -2, None]
-        dp = np.broadcast_to(c[..., -1, None], x.shape)
-        for i in range(d - 2, -1, -1):
-            dp = dp * x + p
-            p = p * x + c[..., i, None]
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            step = p / dp
-        x = np.where(np.abs(step) < 1e-3, x - step, x)
-    return np.clip(x, 0.0, 1.0)
+    for j in range(c.shape[2]):  # one by one: SciPy drops a root that the joint before has too
+        # pieces side by side, each over its own normalised time
+        curve = PPoly(c[:, ::-1, j].T, np.arange(len(c) + 1.0))
+        x = curve.derivative().roots(discontinuity=False, extrapolate=False)
+        x = x[np.isfinite(x)]
+        piece, y = np.floor(x).astype(int).clip(max=len(c) - 1), curve(x)
+        np.minimum.at(low[:, j], piece, y)
+        np.maximum.at(high[:, j], piece, y)
+    return low, high
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,13 +143,8 @@ class FunctionMotion(Motion):
     """Position and the derivatives that are known, as functions t (N,) -> (N, n) or (N,)."""
 
     functions: tuple[Callable[[Array], Any], ...]
-    end: float
+    duration: float
     n: int
-
-    @property
-    def duration(self) -> Array:
-        """Seconds."""
-        return np.asarray(self.end)
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
         """Derivatives at times (N,); those not given by differences of the last one given."""
@@ -228,9 +169,9 @@ class FunctionMotion(Motion):
 
     def _difference(self, t: Array, order: int, k: int) -> Array:
         """Derivative k of the polynomial through seven values around each time."""
-        h, half = _SPACING * self.end, _STENCIL // 2
+        h, half = _SPACING * self.duration, _STENCIL // 2
         steps = np.arange(-half, half + 1.0)
-        middle = np.clip(t, half * h, self.end - half * h)
+        middle = np.clip(t, half * h, self.duration - half * h)
         x = (t - middle) / h
         values = self._value(order, (middle[:, None] + h * steps).reshape(-1))
         values = values.reshape(t.size, _STENCIL, self.n)
@@ -255,7 +196,7 @@ class TimedMotion(Motion):
         return self.path.n
 
     @property
-    def duration(self) -> Array:
+    def duration(self) -> float:
         """Seconds."""
         return self.law.duration
 
@@ -263,7 +204,7 @@ class TimedMotion(Motion):
         """Derivatives at times (N,), by the chain rule."""
         every = tuple(range(max(orders) + 1))
         s, *r = self.law.derivatives(t, every)
-        q = self.path.derivatives(np.clip(s[:, 0], 0.0, float(self.path.duration)), every)
+        q = self.path.derivatives(np.clip(s[:, 0], 0.0, self.path.duration), every)
         found = {0: lambda: q[0], 1: lambda: q[1] * r[0]}
         found[2] = lambda: q[2] * r[0] ** 2 + q[1] * r[1]
         found[3] = lambda: q[3] * r[0] ** 3 + 3.0 * q[2] * r[0] * r[1] + q[1] * r[2]

@@ -284,9 +284,7 @@ def path_of(path: object, model: RobotModel | None, points: int) -> tuple[Motion
             "through points is cubic_spline(points, times, ends='not_a_knot')."
         )
     motion = path.motion
-    if motion.batch:
-        raise InvalidValueError("path: expected one path, got a batch of motions.")
-    if not (end := float(motion.duration)) > 0.0:
+    if not (end := motion.duration) > 0.0:
         raise InvalidValueError("path: it has no length; its ends are the same.")
     # the path itself serves where its velocity is continuous and nowhere small
     t = np.linspace(0.0, end, _SAMPLES * points + 1)

@@ -9,9 +9,9 @@ Parameters
 ----------
 law : TimeLaw or str
     Of `along_line`: a member or its name.
-q0, q1 : array_like, shape () or (..., n)
-    Positions at the ends, rad or m; leading axes are motions of their own.
-duration : array_like, shape () or (...), optional
+q0, q1 : array_like, shape () or (n,)
+    Positions at the ends, rad or m.
+duration : float, optional
     Seconds; default the least with which the law keeps the limits. A longer one slows the quickest
     motion down evenly.
 limits : MotionLimits, optional
@@ -21,7 +21,7 @@ limits : MotionLimits, optional
     refused.
 synchronisation : Synchronisation or str
     How the joints are kept in step; a member or its name.
-v0, v1, a0, a1 : array_like, shape () or (..., n)
+v0, v1, a0, a1 : array_like, shape () or (n,)
     Velocities and accelerations at the ends, rad or m, per s and s^2.
 
 Returns
@@ -52,11 +52,18 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .checks import checked_request, joint_vectors, limits_along, refuse_short, sample_count
+from .checks import (
+    checked_request,
+    joint_vectors,
+    limits_along,
+    refuse_jointless,
+    refuse_short,
+    sample_count,
+)
 from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .motions import PiecewisePolynomial
-from .splines import motion_between
+from .splines import between_states, motion_between
 from .trajectory import Samples, Trajectory
 
 
@@ -73,7 +80,7 @@ class Synchronisation(Enum):
 def linear(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
@@ -84,7 +91,7 @@ def linear(
 def bang_bang(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
@@ -99,7 +106,7 @@ def bang_bang(
 def trapezoidal(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
@@ -121,7 +128,7 @@ def trapezoidal(
 def smoothed_trapezoidal(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
@@ -136,20 +143,20 @@ def smoothed_trapezoidal(
 def cubic(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
 ) -> Trajectory:
     """Third-order polynomials with given velocities at the ends."""
-    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
-    return _polynomial(TimeLaw.CUBIC, states, batch, scalar, duration, limits)
+    states, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1)
+    return _polynomial(TimeLaw.CUBIC, states, scalar, duration, limits)
 
 
 def quintic(
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None = None,
+    duration: float | None = None,
     limits: MotionLimits | None = None,
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
@@ -166,18 +173,22 @@ def quintic(
     >>> quintic(0.0, 1.0, limits=MotionLimits(velocity=1.875, acceleration=5.0)).duration
     1.0745...
     """
-    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
-    return _polynomial(TimeLaw.QUINTIC, states, batch, scalar, duration, limits)
+    states, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
+    return _polynomial(TimeLaw.QUINTIC, states, scalar, duration, limits)
 
 
 def _polynomial(
-    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
-    duration: ArrayLike | None, limits: MotionLimits | None,
-) -> Trajectory:  # fmt: skip
+    law: TimeLaw,
+    states: dict[str, Array],
+    scalar: bool,
+    duration: float | None,
+    limits: MotionLimits | None,
+) -> Trajectory:
     """From rest to rest the law of its name, else polynomials of its order."""
     if not any(states[name].any() for name in states if name not in ("q0", "q1")):
-        return law_motion(law, states, batch, scalar, duration, limits)
-    return motion_between(3 if law is TimeLaw.CUBIC else 5, states, batch, scalar, duration, limits)
+        return law_motion(law, states, scalar, duration, limits)
+    order = 3 if law is TimeLaw.CUBIC else 5
+    return Trajectory(motion_between(order, states, duration, limits), scalar)
 
 
 def joint_trajectory(
@@ -214,16 +225,24 @@ def joint_trajectory(
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
             raise InvalidValueError("N: expected a number of samples or times that ascend.")
     times = t - t[0] if t.size else t
-    samples = quintic(q0, q1, float(times.max(initial=0.0)) or 1.0, v0=v0, v1=v1).at(times)
-    return Samples(t, samples.q, samples.v, samples.a, samples.jerk)
+    ends = [as_floats(x, name) for x, name in ((q0, "q0"), (q1, "q1"), (v0, "v0"), (v1, "v1"))]
+    shape = np.broadcast_shapes(*(x.shape for x in ends))
+    # polynomials of one duration: joints of all rows side by side
+    rows = [np.broadcast_to(x, shape).reshape(-1) for x in ends]
+    T, names = float(times.max(initial=0.0)) or 1.0, ("q0", "q1", "v0", "v1")
+    refuse_jointless(shape[-1] if shape else 1, "q0 and q1")
+    states = dict(zip(names, rows, strict=True)) | {"a0": np.zeros(1), "a1": np.zeros(1)}
+    motion = PiecewisePolynomial(np.array([[0.0, T]]), between_states(5, states, T)[None])
+    values = (x.reshape(t.size, *shape) for x in motion.derivatives(times, (0, 1, 2, 3)))
+    return Samples(t, *(np.moveaxis(x, 0, max(len(shape) - 1, 0)) for x in values))
 
 
 def along_line(
     law: TimeLaw | str,
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: ArrayLike | None,
-    limits: MotionLimits | None,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Motion from rest to rest by any law, for programs that choose it."""
@@ -233,33 +252,34 @@ def along_line(
 
 
 def law_motion(
-    law: TimeLaw, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
-    duration: ArrayLike | None, limits: MotionLimits | None,
+    law: TimeLaw,
+    states: dict[str, Array],
+    scalar: bool,
+    duration: float | None,
+    limits: MotionLimits | None,
     how: Synchronisation = Synchronisation.COORDINATED,
-) -> Trajectory:  # fmt: skip
-    """Motion from rest to rest between checked positions q0, q1 (R, n)."""
-    start, end = states["q0"], states["q1"]
-    n = start.shape[1]
-    T, bounds = checked_request(states, batch, duration, limits)
+) -> Trajectory:
+    """Motion from rest to rest between checked positions q0, q1 (n,)."""
+    T, bounds = checked_request(states, duration, limits)
+    way = states["q1"] - states["q0"]
+    way = np.where(np.abs(way) < 1e-50, 0.0, way)
+    # one law for all joints, or one law each
     together = bounds is None or how is Synchronisation.COORDINATED
-    # one law for all joints of a motion, or one law each
-    difference = np.where(np.abs(end - start) < 1e-50, 0.0, end - start)
-    way = difference[:, None, :] if together else difference[:, :, None]
-    length = np.abs(way).max(axis=-1, initial=0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        direction = np.where(way != 0.0, way / length[..., None], 0.0)
-    if bounds is None:
-        assert T is not None
-        refuse_short(T, np.zeros(len(start)), length)
-        pieces = law_of_duration(law, length.reshape(-1), np.repeat(T, 1 if together else n))
-        return assembled(pieces, start, direction, batch, scalar, T)
-    along = limits_along(bounds, direction)
-    pieces = law_of_limits(law, length.reshape(-1), along)
-    totals = pieces.durations.sum(axis=-1).reshape(length.shape)
-    refuse_short(T, totals.max(axis=-1, initial=0.0), length)
+    laws, turns = [], []
+    for row in way[None] if together else np.diag(way):
+        length = float(np.abs(row).max())
+        turns.append(row / length if length > 0.0 else row)
+        if bounds is None:
+            assert T is not None
+            laws.append(law_of_duration(law, length, T))
+        else:
+            laws.append(law_of_limits(law, length, limits_along(bounds, turns[-1])))
+    least = 0.0 if bounds is None else max(float(one.durations.sum()) for one in laws)
+    refuse_short(T, least, bool(way.any()))
     waits = T is None and how is Synchronisation.INDEPENDENT
-    moves = assembled(pieces, start, direction, batch, scalar, T, waits)
-    if waits and law in (TimeLaw.LINEAR, TimeLaw.CUBIC):  # jumps at an end are inside the motion
+    moves = Trajectory(_assembled(laws, np.array(turns), states["q0"], T, waits), scalar)
+    if waits and bounds is not None and law in (TimeLaw.LINEAR, TimeLaw.CUBIC):
+        # jumps at an end are inside the motion
         report = moves.check(bounds)
         if not report.kept:
             raise InvalidValueError(
@@ -270,39 +290,29 @@ def law_motion(
     return moves
 
 
-def assembled(
-    pieces: Pieces, start: Array, direction: Array, batch: tuple[int, ...], scalar: bool,
-    T: Array | None = None, waits: bool = False,
-) -> Trajectory:  # fmt: skip
-    """Trajectory of laws along given directions, stretched to the durations T (R,).
+def _assembled(
+    laws: list[Pieces], turns: Array, start: Array, T: float | None, waits: bool
+) -> PiecewisePolynomial:
+    """Laws along given directions (1 or n, n), stretched to a duration or the longest of them.
 
-    Without them to the longest of each motion, or each law ``waits`` at its end.
-    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1).
+    Or each law ``waits`` at its end.
     """
-    (R, n), columns = start.shape, direction.shape[1]
-    h, c = pieces.durations, pieces.coefficients
-    total = h.sum(axis=-1)
-    ends = total.reshape(R, columns).max(axis=-1, initial=0.0) if T is None else T
-    goal = np.repeat(ends, columns)
-    stretches = (total > 0.0) & (not waits)
-    h = h * np.where(stretches, goal / np.where(stretches, total, 1.0), 1.0)[:, None]
-    rest = np.where(stretches, 0.0, goal - total)
-    if (rest > 0.0).any():
-        last = np.zeros_like(c[:, :1])
-        last[:, 0, 0] = c[:, -1].sum(axis=-1)
-        h, c = np.append(h, rest[:, None], axis=1), np.append(c, last, axis=1)
-    K, powers = c.shape[1:]
-    breaks = np.zeros((R, columns, K + 1))
-    breaks[..., 1:] = np.cumsum(h, axis=-1).reshape(R, columns, K)
-    if T is not None:
-        # times of all laws end together to the last digit
-        breaks = np.minimum(breaks, T[:, None, None])
-        breaks[..., -1] = T[:, None]
-    c = np.moveaxis(c.reshape(R, columns, K, powers), 1, -1) * direction.reshape(R, 1, 1, n)
-    c[:, :, 0] += start[:, None, :]
-    motion = PiecewisePolynomial(
-        breaks.reshape(*batch, columns, K + 1),
-        c.reshape(*batch, K, powers, n),
-        h.reshape(*batch, columns, K),
-    )
-    return Trajectory(motion, scalar)
+    K, powers = (max(one.coefficients.shape[axis] for one in laws) for axis in range(2))
+    totals = [float(one.durations.sum()) for one in laws]
+    end = max(totals) if T is None else T
+    h, c = np.zeros((len(laws), K + 1)), np.zeros((K + 1, powers, start.size))
+    for k, ((durations, of), total, turn) in enumerate(zip(laws, totals, turns, strict=True)):
+        m, d = of.shape
+        stretch = end / total if total > 0.0 and not waits else 1.0
+        h[k, :m], h[k, m:K] = durations * stretch, 0.0
+        h[k, K] = max(end - total, 0.0) if waits or not total > 0.0 else 0.0
+        c[:m, :d] += of[..., None] * turn
+        c[m:, 0] += of[-1].sum() * turn
+    c[:, 0] += start
+    breaks = np.concatenate((np.zeros((len(laws), 1)), np.cumsum(h, axis=1)), axis=1)
+    if not h[:, -1].any():
+        h, c, breaks = h[:, :-1], c[:-1], breaks[:, :-1]
+    if not waits:  # times of all laws end together to the last digit
+        breaks[:, 1:] = np.minimum(breaks[:, 1:], end)
+        breaks[:, -1] = end
+    return PiecewisePolynomial(breaks, c, h)

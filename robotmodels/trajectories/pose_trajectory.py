@@ -57,7 +57,7 @@ class PoseTrajectory(Value):
     @property
     def duration(self) -> float:
         """Seconds."""
-        return float(self.law.duration)
+        return self.law.duration
 
     def pose(self, t: ArrayLike) -> Array:
         """World poses (t.shape..., 4, 4) at times t, m.

@@ -36,7 +36,6 @@ Khalil and Dombre, Modeling, identification and control of robots, section 13.5.
 from __future__ import annotations
 
 from enum import Enum
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -54,11 +53,10 @@ from .checks import (
     refuse_short,
 )
 from .limits import MotionLimits, ranges_of
-from .motions import PiecewisePolynomial
+from .motions import PiecewisePolynomial, ranges_of_pieces
 from .trajectory import Trajectory
 
 _ROUNDED = 1e-14  # relative excess that rounding alone makes
-_TRIALS = 2000  # durations of the grid
 
 
 class SplineEnds(Enum):
@@ -176,7 +174,7 @@ class _Knots:
         ends = {name + "0": x[:-1] for name, x in states.items()}
         ends |= {name + "1": x[1:] for name, x in states.items()}
         h = np.diff(self.times)
-        c = np.swapaxes(between_states(order, ends, h[:, None]), 0, 1)
+        c = np.moveaxis(between_states(order, ends, h[:, None]), 0, 1)
         trajectory = Trajectory(PiecewisePolynomial(self.times[None], c), self.scalar)
         if self.limits is None:
             return trajectory
@@ -231,61 +229,19 @@ def _chosen_times(knots: _Knots) -> Array:
 
 
 def motion_between(
-    order: int, states: dict[str, Array], batch: tuple[int, ...], scalar: bool,
-    duration: ArrayLike | None, limits: MotionLimits | None,
-) -> Trajectory:  # fmt: skip
-    """Motion by polynomials of an order between states (R, n), checked against the limits."""
-    T, bounds = checked_request(states, batch, duration, limits)
-    R, n = states["q0"].shape
-    refuse_short(T, np.zeros(R), np.ones((R, 1)))
-    if bounds is not None:
-        rows = [{name: value[i] for name, value in states.items()} for i in range(R)]
-        given = np.full(R, np.nan) if T is None else T
-        T = np.array([_kept(order, *row, bounds) for row in zip(rows, given, strict=True)])
-    assert T is not None
-    c = np.moveaxis(between_states(order, states, T[:, None]), 0, -2)
-    breaks = np.stack((np.zeros(R), T), axis=-1).reshape(*batch, 1, 2)
-    return Trajectory(PiecewisePolynomial(breaks, c.reshape(*batch, 1, order + 1, n)), scalar)
+    order: int, states: dict[str, Array], duration: float | None, limits: MotionLimits | None
+) -> PiecewisePolynomial:
+    """Polynomials of an order between states (n,), in a given duration or the least."""
+    T, bounds = checked_request(states, duration, limits)
+    refuse_short(T, 0.0)
+    if bounds is not None and (T is None or _excess(order, states, [T], bounds)[0] > ROUNDING):
+        T = _least_duration(order, states, T, bounds)
+    c = between_states(order, states, T)[None]
+    return PiecewisePolynomial(np.array([[0.0, T]]), c)
 
 
-def _kept(order: int, state: dict[str, Array], T: float, limits: MotionLimits) -> float:
-    """The duration T if it keeps the limits, or for NaN the least that does."""
-    if not np.isnan(T) and excess(order, state, np.array([T]), limits)[0] <= ROUNDING:
-        return T
-    for rate, (_, low, high) in zip("va", ranges_of(limits)[1:3], strict=True):
-        for name in (f"{rate}0", f"{rate}1") if f"{rate}0" in state else ():
-            wrong = (state[name] > high) | (state[name] < low)
-            if wrong.any():
-                j = int(wrong.argmax())
-                raise InvalidValueError(
-                    f"limits: {name} of joint {j + 1} is {state[name][j]:.9g}, outside its limits "
-                    f"{low[j]:.9g} to {high[j]:.9g}; the least limit that will do is "
-                    f"{least_shown(abs(state[name][j]))}."
-                )
-    least = least_duration(order, state, limits)
-    if least is None:
-        raise InvalidValueError(
-            "limits: no duration keeps them with these states at the ends; give slower states or "
-            "greater limits, or take jerk_limited, which finds a motion between any states."
-        )
-    if np.isnan(T):
-        return least
-    more = ""
-    if least < T:
-        longer = least_duration(order, state, limits, T)
-        more = f" The least that is longer than that given is {least_shown(longer or T)} s."
-        more = more if longer else " No longer one does."
-    raise InvalidValueError(
-        f"duration: with {T:.9g} s the limits are not kept; the least duration that keeps them is "
-        f"{least_shown(least)} s.{more}"
-    )
-
-
-def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
-    """Coefficients of normalised time of the polynomials between two states.
-
-    Shapes: states (R, n) or (n,) -> (order + 1, ...).
-    """
+def between_states(order: int, states: dict[str, Array], T: Any) -> Array:
+    """Coefficients (order + 1, ...) of normalised time of the polynomials between two states."""
     q0, D = states["q0"] + 0.0 * T, states["q1"] - states["q0"]
     v0, v1 = T * states["v0"], T * states["v1"]
     if order == 3:
@@ -294,17 +250,17 @@ def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
     cubed = 10.0 * D - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
     fourth = -15.0 * D + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
     fifth = 6.0 * D - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
-    return np.stack((q0, v0, 0.5 * a0, cubed, fourth, fifth))
+    return np.stack(np.broadcast_arrays(q0, v0, 0.5 * a0, cubed, fourth, fifth))
 
 
-def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) -> Array:
-    """Relative excess over the worst limit for given durations."""
-    c = np.moveaxis(between_states(order, state, T[:, None]), 0, -2)[:, None]
-    worst = np.full(T.shape, -np.inf)
-    motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
+def _excess(order: int, states: dict[str, Array], T: Any, limits: MotionLimits) -> Array:
+    """Relative excess (N,) over the worst limit for durations (N,)."""
+    T = np.asarray(T)[:, None]
+    c = np.moveaxis(between_states(order, states, T), 0, 1)
+    worst = np.full(len(T), -np.inf)
     for k, (_, least, most) in enumerate(ranges_of(limits)):
         if np.isfinite((least, most)).any():
-            low, high = motion.extremes(k)
+            low, high = ranges_of_pieces(c, T, k)
             size = np.maximum(np.abs(least), np.abs(most))
             size = np.where(np.isfinite(size) & (size > 0.0), size, 1.0)
             over = np.maximum((high - most) / size, (least - low) / size)
@@ -312,40 +268,42 @@ def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) 
     return worst
 
 
-def least_duration(
-    order: int, state: dict[str, Array], limits: MotionLimits, after: float = 0.0
-) -> float | None:
-    """Least duration with which the polynomials keep the limits: trials, finer and finer."""
-    q0, q1 = state["q0"], state["q1"]
-    room = np.minimum(limits.upper - np.maximum(q0, q1), np.minimum(q0, q1) - limits.lower)
-    sizes = [(0, np.abs(q1 - q0))]
-    sizes += [("qva".index(name[0]), np.abs(x)) for name, x in state.items() if name[0] != "q"]
-    if not any(size.any() for _, size in sizes):
-        return 0.0
-    # times that states and limits make: the durations sought are of their size
-    sizes += [(0, np.maximum(room, 0.0))]
-    sizes += [(k, np.minimum(m, -x)) for k, (_, x, m) in enumerate(ranges_of(limits)) if k]
+def _least_duration(
+    order: int, states: dict[str, Array], given: float | None, limits: MotionLimits
+) -> float:
+    """Least duration with which the limits are kept: trials, finer and finer; refuses the given."""
+    ranges = ranges_of(limits)
+    for rate, (_, low, high) in zip("va", ranges[1:3], strict=True):
+        for name in (f"{rate}0", f"{rate}1") if f"{rate}0" in states else ():
+            wrong = (states[name] > high) | (states[name] < low)
+            if wrong.any():
+                j = int(wrong.argmax())
+                raise InvalidValueError(
+                    f"limits: {name} of joint {j + 1} is {states[name][j]:.9g}, outside its limits "
+                    f"{low[j]:.9g} to {high[j]:.9g}; the least limit that will do is "
+                    f"{least_shown(abs(states[name][j]))}."
+                )
+    # times that the way, the states and the limits make: those sought are of their size
+    way = np.abs(states["q1"] - states["q0"]) + np.abs(states["v0"]) + np.abs(states["v1"])
+    rows = [np.minimum(most, -least) for _, least, most in ranges[1:]]
     with np.errstate(divide="ignore", invalid="ignore"):
-        pairs = combinations(sorted(sizes, key=lambda size: size[0]), 2)
-        scales = np.concatenate([(x / y) ** (1.0 / (k - i)) for (i, x), (k, y) in pairs if k > i])
-    scales = scales[np.isfinite(scales) & (scales > 0.0)]
-    ends = (1e-3 * scales.min(), 1e3 * scales.max()) if scales.size else (1e-3, 1e3)
-    trials = np.geomspace(*ends, _TRIALS)
-    trials = np.append(after, trials[trials > after]) if after > 0.0 else trials
-    kept = excess(order, state, trials, limits) <= _ROUNDED
-    if not kept.any():
-        return None
-    k = int(kept.argmax())
-    if k == 0 and after == 0.0:
-        raise InvalidValueError(
-            "limits: between these states they are kept in any time, however short; give duration."
-        )
-    below, T = float(trials[max(k - 1, 0)]), float(trials[k])
-    while np.nextafter(below, T) < T:
-        finer = np.linspace(below, T, 18)
-        inner = np.append(excess(order, state, finer[1:-1], limits) <= _ROUNDED, True)
-        k = int(inner.argmax()) + 1
-        if (below, T) == (finer[k - 1], finer[k]):
+        units = np.stack([(way / row) ** (1.0 / (k + 1)) for k, row in enumerate(rows)])
+    unit = units[np.isfinite(units) & (units > 0.0)].max(initial=0.0) or 1.0
+    trials = unit * np.geomspace(1e-4, 1e4, 2000)
+    for _ in range(8):
+        kept = _excess(order, states, trials, limits) <= _ROUNDED
+        k = int(kept.argmax())
+        if not kept.any() or kept[0]:
             break
-        below, T = float(finer[k - 1]), float(finer[k])
-    return T
+        trials = np.linspace(trials[k - 1], trials[k], 100)
+    if not kept.any():
+        raise InvalidValueError(
+            "limits: no duration keeps them with these states at the ends; give slower states or "
+            "greater limits, or take jerk_limited, which finds a motion between any states."
+        )
+    if given is None:
+        return float(trials[k])
+    raise InvalidValueError(
+        f"duration: with {given:.9g} s the limits are not kept; the least duration that keeps them "
+        f"is {least_shown(trials[k])} s."
+    )

@@ -166,7 +166,7 @@ def time_optimal(
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
     own, rated = motion is getattr(path, "motion", None), bool(np.isfinite(problem.rates).any())
     s = np.linspace(0.0, 1.0, points + 1) if own and not rated else toward_ends(points)
-    s = float(motion.duration) * s
+    s = motion.duration * s
     q, rate, bend = motion.derivatives(s, (0, 1, 2))
     checked_limits(problem.limits, n, q)
     ends = (first, last)

@@ -124,8 +124,6 @@ def time_scaled(
         raise InvalidValueError(
             f"trajectory: expected a Trajectory, got {type(trajectory).__name__}."
         )
-    if trajectory.motion.batch:
-        raise InvalidValueError("trajectory: expected one motion, got a batch of motions.")
     check_model(model)
     end, motion = trajectory.duration, trajectory.motion
     if not end > 0.0:
@@ -160,7 +158,7 @@ def time_scaled(
 
 def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:
     """A, B and C of ``A / T^2 + B / T + C`` at fractions (N,) of a motion, each (N, n)."""
-    T = float(motion.duration)
+    T = motion.duration
     q, v, a = motion.derivatives(fraction * T, (0, 1, 2))
     v, a, rest = at_rest(v) * T, a * T * T, np.zeros(q.shape)
     C = rigid_torques(model, q, rest, rest)
@@ -236,11 +234,11 @@ def _least_duration(
 
 def stretched(motion: Motion, duration: float) -> Motion:
     """The same profile in another duration."""
-    factor = duration / float(motion.duration)
+    factor = duration / motion.duration
     if isinstance(motion, PiecewisePolynomial):
         lengths = motion.lengths * factor
         return PiecewisePolynomial(motion.breaks * factor, motion.coefficients, lengths)
     if isinstance(motion, TimedMotion):
         return TimedMotion(motion.path, stretched(motion.law, duration))  # type: ignore[arg-type]
-    law = PiecewisePolynomial([[0.0, duration]], [[[0.0], [float(motion.duration)]]])  # type: ignore[arg-type]
+    law = PiecewisePolynomial([[0.0, duration]], [[[0.0], [motion.duration]]])  # type: ignore[arg-type]
     return TimedMotion(motion, law)

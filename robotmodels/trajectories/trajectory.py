@@ -37,8 +37,9 @@ class Samples(Sampled):
     ----------
     t : ndarray, shape (N,)
         Times, s.
-    q, v, a, jerk : ndarray, shape (..., N, n)
-        Positions and their first three derivatives, rad or m, and per s.
+    q, v, a, jerk : ndarray, shape (N, n)
+        Positions and their first three derivatives, rad or m, and per s; (..., N, n) of
+        `joint_trajectory` of several motions.
     """
 
     t: Array
@@ -54,13 +55,11 @@ class Samples(Sampled):
                 object.__setattr__(self, field.name, read_only(value))
 
     def __repr__(self) -> str:
-        k, shape = self.t.ndim, self.q.shape
-        scalar = len(shape) <= k or shape[-1 - k : -1] != self.t.shape
-        values = [x[..., None] if scalar else x for x in (self.v, self.a, self.jerk)]
-        batch, n = values[0].shape[: -1 - k], values[0].shape[-1]
+        n = self.q.shape[-1] if self.q.shape != self.t.shape else 1
+        rows = [x.reshape(-1, n) for x in (self.v, self.a, self.jerk)]
         return (
-            f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}"
-            f"{_motions(batch)}\n  {greatest_shown(zip(RATES, values, strict=True))}>"
+            f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}\n"
+            f"  {greatest_shown(zip(RATES, rows, strict=True))}>"
         )
 
 
@@ -124,16 +123,14 @@ class Trajectory(Value):
         return self.motion.n
 
     @property
-    def duration(self) -> Any:
-        """Seconds: a float, or an array (...) for a batch of motions."""
-        duration = self.motion.duration
-        return duration.copy() if self.motion.batch else float(duration)
+    def duration(self) -> float:
+        """Seconds."""
+        return self.motion.duration
 
     def q(self, t: ArrayLike) -> Array:
-        """Positions (..., t.shape..., n) at times t, rad or m; scalar ones without the last axis.
+        """Positions (t.shape..., n) at times t, rad or m; scalar ones without the last axis.
 
-        Leading axes are those of a batch of motions. A time outside of a motion that does not rest
-        there is an error.
+        A time outside of a motion that does not rest there is an error.
         """
         return self._at(t, (0,))[0]
 
@@ -164,11 +161,8 @@ class Trajectory(Value):
     def grid(self, samples: int | None = None, period: float | None = None) -> Array:
         """Times (N,): ``samples`` from 0 to the duration, or multiples of ``period``, s.
 
-        Those end at or after the duration, or before it where the motion does not end at rest. A
-        batch of motions has no common grid.
+        Those end at or after the duration, or before it where the motion does not end at rest.
         """
-        if self.motion.batch:
-            raise InvalidValueError("resample: a batch of motions has no common grid; use at(t).")
         T = self.duration
         if samples is not None and period is None:
             return np.linspace(0.0, T, _count(samples))
@@ -200,39 +194,34 @@ class Trajectory(Value):
 
     def _at(self, given: ArrayLike, orders: tuple[int, ...]) -> list[Array]:
         """Derivatives at times, those outside of the motion included."""
-        t = as_floats(given, "t")
-        batch, end = self.motion.batch, np.asarray(self.motion.duration)[..., None]
-        flat = np.broadcast_to(t.reshape(-1), (*batch, t.size))
-        outside = None
+        t, end, outside = as_floats(given, "t"), self.duration, None
+        flat = t.reshape(-1)
         if not self.repeats and ((flat < 0.0) | (flat > end)).any():
             # a few roundings beside an end, where sums of steps arrive, are the end
-            before, after = flat < -4.0 * np.spacing(end), flat > end + 4.0 * np.spacing(end)
+            slack = 4.0 * np.spacing(end)
+            before, after = flat < -slack, flat > end + slack
             for beyond, edge, side in (
-                (before, 0.0 * end, "before the start"),
+                (before, 0.0, "before the start"),
                 (after, end, "after the end"),
             ):
-                edges = np.broadcast_to(edge, (*batch, 1))
-                if not self.holds and beyond.any() and self._moving(edges):
+                if not self.holds and beyond.any() and self._moving(np.array([edge])):
                     raise InvalidValueError(
-                        f"t: {float(flat[beyond][0]):g} s is {side} of a motion of "
-                        f"{float(np.max(end)):g} s that does not rest there; ask for times inside "
-                        "it."
+                        f"t: {float(flat[beyond][0]):g} s is {side} of a motion of {end:g} s that "
+                        "does not rest there; ask for times inside it."
                     )
             flat, outside = np.clip(flat, 0.0, end), before | after
-        values = self.motion.derivatives(np.ascontiguousarray(flat), orders)
+        values = self.motion.derivatives(flat, orders)
         for value, order in zip(values, orders, strict=True):
             if outside is not None and order:
                 value[outside] = 0.0
-        shape = (*batch, *t.shape) if self.scalar else (*batch, *t.shape, self.n)
+        shape = t.shape if self.scalar else (*t.shape, self.n)
         return [value.reshape(shape) for value in values]
 
     def __repr__(self) -> str:
         peaks = [np.stack(self.motion.extremes(order)) for order in (1, 2, 3)]
-        durations = np.unique(self.motion.duration)
-        T = " to ".join(f"{x:.6g}" for x in durations[[0, -1][: durations.size]])
         return (
-            f"<Trajectory: {counted(self.n, 'joint')}, {T or 0} s{', periodic' * self.repeats}"
-            f"{_motions(self.motion.batch)}\n  {greatest_shown(zip(RATES, peaks, strict=True))}>"
+            f"<Trajectory: {counted(self.n, 'joint')}, {self.duration:.6g} s"
+            f"{', periodic' * self.repeats}\n  {greatest_shown(zip(RATES, peaks, strict=True))}>"
         )
 
 
@@ -253,10 +242,6 @@ class TimingResult(Frozen, Value):
     def reason(self) -> str:
         """The status as a sentence, with the place and the joint."""
         return self.explanation or self.status.sentence
-
-
-def _motions(batch: tuple[int, ...]) -> str:
-    return f", batch of motions {batch}" if batch else ""
 
 
 def _count(samples: Any) -> int:

@@ -162,11 +162,6 @@ def sampled(trajectory: Any, name: str = "trajectory") -> Sampled:
         samples, T = trajectory, float(np.ptp(trajectory.t)) if trajectory.t.size else 0.0
     else:
         motion = style.as_instance(trajectory, Trajectory, name, "joints").motion
-        if motion.batch:
-            raise InvalidValueError(
-                f"{name}: expected one motion, got a batch of shape {motion.batch}; draw one of "
-                "them as Samples(t, q[i], v[i], a[i], jerk[i]) of trajectory.at(t)."
-            )
         T = float(motion.duration)
         if isinstance(motion, PiecewisePolynomial):
             breaks = tuple(np.unique(row) for row in motion.breaks)

@@ -59,10 +59,7 @@ LEVELS = (
 )
 FIGURES, FITS, SCENES = (f"tests/test_viz_{name}.py" for name in ("figures", "fits", "scenes"))
 COMMANDS, ERRORS = "tests/test_cli.py", "tests/test_cli_errors.py"
-RAMPS = (
-    "tests/test_trajectories.py"
-    " -k (least_times_of_smooth or (derivatives and not cubic and not quintic))"
-)
+RAMPS = "tests/test_trajectories.py -k (closed_forms or derivatives)"
 
 # fmt: off
 MUTATIONS = [
@@ -730,7 +727,7 @@ MUTATIONS = [
         "tests/test_trajectories.py -k (derivatives or closed_forms)"),
     Mutation("trajectories", "a harmonic's wave by the sum for the difference",
         "def _waves(t: Array", "c[k - 1] * c1 - s[k - 1] * s1", "c[k - 1] * c1 + s[k - 1] * s1",
-        "tests/test_trajectories_paths.py -k fourier"),
+        "tests/test_trajectories.py -k fourier"),
     Mutation("trajectories", "a rotation about an axis keeps sin for 1 - cos",
         "def rotation_about(", "2.0 * np.sin(0.5 * angle) ** 2", "np.sin(0.5 * angle) ** 2",
         "tests/test_trajectories_paths.py -k rotation_vectors"),
@@ -752,7 +749,7 @@ MUTATIONS = [
         "apart, np.inf).argmin(", "apart, -np.inf).argmax(",
         "tests/test_trajectories_paths.py -k go_on_by"),
     Mutation("trajectories: seven phases", "falling acceleration covers as much as rising",
-        "def ramp(V: Array", "fall * fall / 3.0", "fall * fall / 6.0", RAMPS),
+        "def ramp(V: float", "fall * fall / 3.0", "fall * fall / 6.0", RAMPS),
     Mutation("trajectories: seven phases", "a phase run backwards with one sign",
         "_BACK = np.array(", "[-1, 2, -1, 0]", "[-1, 2, 1, 0]", RAMPS),
     # --- simulation ------------------------------------------------------------------------------
