@@ -148,8 +148,6 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
     """Function of time of a motion, function or constant; without shapes that of joints."""
     if shapes is None and isinstance(reference, Trajectory):
         motion, end, n = reference.motion, float(reference.duration), reference.n
-        if motion.batch:
-            raise ShapeError(f"{name}: expected one motion, got {motion.batch}.")
 
         def joints(t: float) -> tuple[Array, ...]:
             if 0.0 <= t <= end:  # without the checks of a trajectory

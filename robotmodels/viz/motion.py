@@ -122,10 +122,6 @@ def timed_samples(
 
 def _sampled(motion: Trajectory, n: int, step: float, name: str) -> tuple[Array, Array]:
     """Samples of a trajectory; the last one is its end."""
-    if motion.motion.batch:
-        raise ShapeError(
-            f"{name}: expected one motion, got a batch of shape {motion.motion.batch}."
-        )
     if motion.n != n:
         raise ShapeError(f"{name}: expected a motion of {n} joints, got one of {motion.n}.")
     T = motion.duration
