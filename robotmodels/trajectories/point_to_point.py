@@ -241,8 +241,8 @@ def along_line(
     law: TimeLaw | str,
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: float | None = None,
-    limits: MotionLimits | None = None,
+    duration: float | None,
+    limits: MotionLimits | None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Motion from rest to rest by any law, for programs that choose it."""
