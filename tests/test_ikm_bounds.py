@@ -21,16 +21,6 @@ def test_velocity_bounds_by_hand():
     assert bounds.conflicts(model, [9.0, -9.0]).all()
 
 
-def test_without_a_step_joints_stop_at_the_limit():
-    model = rm.load("planar_2r")
-    bounds = JointBounds(velocity=1.0, lower=-1.0, upper=1.0)
-    low, high = bounds.velocity_bounds(model, [[1.0, -1.0], [0.999, 1.5]])
-    np.testing.assert_array_equal(high, [[0.0, 1.0], [1.0, 0.0]])
-    np.testing.assert_array_equal(low, [[-1.0, 0.0], [-1.0, -1.0]])
-    braking = JointBounds(velocity=1.0, lower=-1.0, upper=1.0, acceleration=2.0)
-    np.testing.assert_allclose(braking.velocity_bounds(model, [0.99, 1.0])[1], [0.2, 0.0])
-
-
 def random_command(rng, low, high):
     """Mostly at a bound, else anything between."""
     kind = rng.random(low.shape)
@@ -96,20 +86,6 @@ def test_limits_that_exclude_each_other_are_told():
     np.testing.assert_allclose(bounds.velocity_bounds(model, q, v)[1], [0.95, 1.15])
     assert bounds.conflicts(model, q, v).tolist() == [True, True]
     assert bounds.conflicts(model, [0.0, 0.0], [0.5, -0.5]).tolist() == [False, False]
-
-
-def test_the_default_limits_are_the_robots():
-    model = rm.load("panda")
-    q = 0.5 * (model.lower + model.upper)
-    low, high = JointBounds().velocity_bounds(model, np.tile(q, (2, 3, 1)))
-    assert high.shape == (2, 3, 7)
-    np.testing.assert_array_equal(high[1, 2], model.table.velocity)
-    np.testing.assert_array_equal(low, -high)
-    free = rm.load("planar_2r")
-    low, high = JointBounds(step=0.1, acceleration=1.0).velocity_bounds(free, [9.0, -9.0])
-    np.testing.assert_array_equal(high, [np.inf, np.inf])
-    np.testing.assert_array_equal(low, [-np.inf, -np.inf])
-    assert JointBounds().velocity_bounds(model, np.empty((0, 7)))[0].shape == (0, 7)
 
 
 def test_wrong_limits_are_named():

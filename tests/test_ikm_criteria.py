@@ -113,18 +113,6 @@ def test_manipulability_is_the_root_of_the_determinant(rng):
     )
 
 
-@pytest.mark.parametrize("side", [1e-3, 1e-9, 0.0])
-def test_manipulability_near_a_singular_position(side):
-    """Its slope is finite there, and leads away on the side where the arm is."""
-    arm = rm.load("planar_2r")
-    planar = ManipulabilityCriterion(mask=[1, 1, 0, 0, 0, 0])
-    for sign in (1.0, -1.0):
-        g = planar.gradient(arm, [0.7, sign * side])
-        np.testing.assert_allclose(np.abs(g), [0.0, np.cos(side)], atol=1e-9)
-        if side:
-            assert np.sign(g[1]) == sign
-
-
 def test_obstacle_values_by_hand():
     arm = rm.load("planar_2r")  # two links of a metre in the plane of x and y
     table, point = Plane([0.0, -0.1, 0.0], [0.0, 3.0, 0.0]), Sphere([2.3, 0.4, 0.0])
@@ -137,26 +125,6 @@ def test_obstacle_values_by_hand():
     assert still.clearance(arm, np.zeros((4, 2))).tolist() == [np.inf] * 4
     assert still.value(arm, [0.0, 0.0]) == 0.0
     assert still.gradient(arm, np.zeros((4, 2))).shape == (4, 2)
-
-
-def test_leading_axes_are_the_batch(rng):
-    model = rm.load("panda")
-    q = rng.uniform(model.lower, model.upper, size=(2, 3, 7))
-    for criterion in (
-        *(criterion for criterion, _ in smooth_criteria(model, rng)),
-        NearLimitCriterion(),
-        ObstacleCriterion([Sphere([0.3, 0.2, 0.5], 0.1), Plane([0, 0, 0.1], [0, 0, 1])], 0.5),
-    ):
-        value, g = criterion.value(model, q), criterion.gradient(model, q)
-        assert value.shape == (2, 3)
-        assert g.shape == (2, 3, 7)
-        for i in np.ndindex(2, 3):
-            one, slope = criterion.value(model, q[i]), criterion.gradient(model, q[i])
-            assert np.shape(one) == ()
-            np.testing.assert_allclose(one, value[i], rtol=1e-12, atol=1e-14)
-            np.testing.assert_allclose(slope, g[i], rtol=1e-10, atol=1e-12)
-        assert criterion.value(model, q[:0]).shape == (0, 3)
-        assert criterion.gradient(model, q[:0]).shape == (0, 3, 7)
 
 
 # --- a seven-joint arm -------------------------------------------------------------------------
@@ -228,19 +196,6 @@ def test_an_arm_avoids_an_obstacle_along_a_line():
     assert criterion.clearance(model, around).min() > 0.02
     assert error < TRACKED
     np.testing.assert_allclose(rm.dgm(model, around[-1]), rm.dgm(model, plain[-1]), atol=TRACKED)
-
-
-def test_an_arm_returns_to_its_posture_while_the_tool_stays():
-    model = rm.load("panda")
-    home = np.array([0.0, 0.3, 0.0, -1.8, 0.0, 2.1, 0.7])
-    path, error = follow(model, home, np.zeros(3), criterion=PostureCriterion(home + 0.3))
-    assert error < 1e-3
-    criterion = PostureCriterion(home + 0.3)
-    values = criterion.value(model, path)
-    assert (np.diff(values) < 1e-12).all()
-    # at the end nothing is left of the gradient in the null space
-    start, v = rm.ikm(model, [home, path[-1]], np.zeros(6), secondary=criterion).v
-    assert np.linalg.norm(v) < 0.05 * np.linalg.norm(start)
 
 
 def test_wrong_criteria_are_named():

@@ -171,9 +171,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
             pin.computeKineticEnergy(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
         )
     else:
-        from ..kernels.torques import kinetic_energies
-
-        energy = batched(kinetic_energies, model, {"q": q, "v": v}, ())
+        energy = _energies(model, q, v)[..., 0].copy()
     if drive and (drives := model.drive_matrices) is not None:
         energy = energy + 0.5 * np.einsum("...i,ij,...j->...", v, drives.rotor, v)
     return np.asarray(energy)
@@ -200,9 +198,14 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
         energy = pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q))
         return np.asarray(energy, dtype=np.float64)
-    from ..kernels.torques import potential_energies
+    return _energies(model, q, np.zeros(model.n))[..., 1].copy()
 
-    return batched(potential_energies, model, {"q": q}, (), model.gravity)
+
+def _energies(model: RobotModel, q: Array, v: Array) -> Array:
+    """Kinetic energy of the links, and potential energy. Shapes: q, v (..., n) -> (..., 2)."""
+    from ..kernels.torques import energies
+
+    return batched(energies, model, {"q": q, "v": v}, (2,), model.gravity)
 
 
 @lru_cache

@@ -15,7 +15,7 @@ import numpy as np
 
 from ._compile import Floats, Ints, compiled
 
-__all__ = ["complement", "largest_part"]
+__all__ = ["cleared", "complement", "largest_part"]
 
 _DEPENDENT = 1e-12
 """Length of what is left of a column of F, beside orthonormal rows, that counts as zero."""
@@ -28,9 +28,31 @@ _STEPS_PER_JOINT = 40
 
 
 @compiled()
+def cleared(x: Floats, V: Floats, k: int, d: int, parts: Floats) -> float:
+    """Take the parts along the first k orthonormal rows of V out of x, and square what is left.
+
+    Shapes: x (>= d,), V (>= k, >= d) -> parts (>= k,).
+    """
+    for i in range(k):
+        parts[i] = 0.0
+    for _ in range(2):  # twice is enough
+        for i in range(k):
+            inner = 0.0
+            for c in range(d):
+                inner += V[i, c] * x[c]
+            parts[i] += inner
+            for c in range(d):
+                x[c] -= inner * V[i, c]
+    total = 0.0
+    for c in range(d):
+        total += x[c] * x[c]
+    return total
+
+
+@compiled()
 def complement(V: Floats, r: int, d: int) -> None:
     """Complete r orthonormal rows of ``V (>= d, >= d)`` to a basis of the space of d dimensions."""
-    left = np.empty(d)
+    left, parts = np.empty(d), np.empty(d)
     for c in range(d):
         left[c] = 1.0
         for i in range(r):
@@ -43,17 +65,7 @@ def complement(V: Floats, r: int, d: int) -> None:
         for c in range(d):
             V[k, c] = 0.0
         V[k, best] = 1.0
-        for _ in range(2):  # twice is enough
-            for i in range(k):
-                inner = 0.0
-                for c in range(d):
-                    inner += V[i, c] * V[k, c]
-                for c in range(d):
-                    V[k, c] -= inner * V[i, c]
-        total = 0.0
-        for c in range(d):
-            total += V[k, c] * V[k, c]
-        length = sqrt(total)
+        length = sqrt(cleared(V[k], V, k, d, parts))
         for c in range(d):
             V[k, c] /= length
             left[c] -= V[k, c] * V[k, c]
@@ -69,24 +81,12 @@ def dependence(
     """
     for c in range(f):
         z[c] = side * F[c, p]
-    for i in range(k):
-        r[i] = 0.0
-    for _ in range(2):
-        for i in range(k):
-            inner = 0.0
-            for c in range(f):
-                inner += E[i, c] * z[c]
-            r[i] += inner
-            for c in range(f):
-                z[c] -= inner * E[i, c]
+    square = cleared(z, E, k, f, r)
     for i in range(k - 1, -1, -1):
         for j in range(i + 1, k):
-            r[i] -= R[i, j] * r[j]
+            r[i] -= R[j, i] * r[j]
         r[i] /= R[i, i]
-    total = 0.0
-    for c in range(f):
-        total += z[c] * z[c]
-    return total
+    return square
 
 
 @compiled()
@@ -97,19 +97,7 @@ def factorise(
     for i in range(done, k):
         for c in range(f):
             E[i, c] = sides[i] * F[c, active[i]]
-            R[c, i] = 0.0
-        for _ in range(2):
-            for j in range(i):
-                inner = 0.0
-                for c in range(f):
-                    inner += E[j, c] * E[i, c]
-                R[j, i] += inner
-                for c in range(f):
-                    E[i, c] -= inner * E[j, c]
-        total = 0.0
-        for c in range(f):
-            total += E[i, c] * E[i, c]
-        R[i, i] = sqrt(total)
+        R[i, i] = sqrt(cleared(E[i], E, i, f, R[i]))
         for c in range(f):
             E[i, c] /= R[i, i]
 
@@ -120,22 +108,22 @@ def nearest_inside(
     F: Floats,
     f: int,
     wish: Floats,
-    lower: Floats,
-    upper: Floats,
+    bounds: Floats,
     v: Floats,
     active: Ints,
-    sides: Floats,
-    press: Floats,
-    r: Floats,
-    z: Floats,
-    E: Floats,
-    R: Floats,
+    work: Floats,
+    basis: Floats,
 ) -> tuple[int, int, float, float]:
-    """Nearest ``v = x + F^T y`` to a wish with ``lower <= v <= upper``.
+    """Nearest ``v = x + F^T y`` to a wish with ``bounds[0] <= v <= bounds[1]``.
 
-    Shapes: x, wish, lower, upper (n,); F, f (>= f, n) -> v, active, sides, press (n,).
+    Shapes: x, wish (n,); bounds (2, n); F (>= f, n); basis (2, n, n) -> v, active (n,), work (5, n)
+    with the sides and pressures of the active bounds and the decomposition of the one that cannot
+    be met.
     """
     n = x.shape[0]
+    lower, upper = bounds[0], bounds[1]
+    sides, press, r, z = work[1], work[2], work[3], work[4]
+    E, R = basis[0], basis[1]
     for j in range(n):
         v[j] = x[j]
     for c in range(f):
@@ -198,31 +186,28 @@ def largest_part(
     F: Floats,
     f: int,
     wish: Floats,
-    lower: Floats,
-    upper: Floats,
+    bounds: Floats,
     v: Floats,
-    at: Ints,
-    stuck: Ints,
-    base: Floats,
-    active: Ints,
-    sides: Floats,
-    press: Floats,
-    r: Floats,
-    z: Floats,
-    E: Floats,
-    R: Floats,
+    marks: Ints,
+    work: Floats,
+    basis: Floats,
 ) -> float:
-    """Largest s in [0, 1] with a ``v = x + s w + F^T y`` inside the bounds, and the nearest v."""
+    """Largest s in [0, 1] with a ``v = x + s w + F^T y`` inside the bounds, and the nearest v.
+
+    Shapes as for `nearest_inside`; marks (3, n): joints at a bound, joints that limit s (both 1 or
+    -1, else 0), and scratch.
+    """
     n = x.shape[0]
+    lower, upper = bounds[0], bounds[1]
+    base, sides, r = work[0], work[1], work[3]
+    at, stuck, active = marks[0], marks[1], marks[2]
     s, size, k = 1.0, 0.0, 0
     for j in range(n):
         stuck[j] = 0
     for _ in range(_CUTS):
         for j in range(n):
             base[j] = x[j] + s * w[j]
-        k, joint, side, size = nearest_inside(
-            base, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R
-        )
+        k, joint, side, size = nearest_inside(base, F, f, wish, bounds, v, active, work, basis)
         if joint < 0:
             break
         bound = upper[joint] if side > 0.0 else lower[joint]

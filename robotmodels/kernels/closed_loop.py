@@ -1,8 +1,7 @@
 """A sampled controller and the robot that it moves, by Runge-Kutta steps of fixed length.
 
-The direct model of one state: bias torques by Newton-Euler without acceleration, the mass matrix by
-composite bodies of the same transforms, Cholesky (M. Walker and D. Orin 1982). Nothing divides by
-a mass, so links may be those of base parameters; only the mass matrix has to be positive definite.
+The direct model is that of `mass.joint_accelerations`; nothing divides by a mass, so links may be
+those of base parameters, and only the mass matrix has to be positive definite.
 """
 
 from math import isfinite
@@ -11,10 +10,8 @@ import numpy as np
 
 from . import Chain
 from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, compiled
-from ._inertia import inertia_of, join_antecedent
-from ._motion import base_acceleration, carry_acceleration, link_pose, link_wrench
-from ._vectors import add, cross, matrix, put_matrix, put_vector, times, vector
-from .mass import POSITIVE, solve_in_place
+from .mass import POSITIVE, mass_of_sample, solve_in_place
+from .torques import torque_room, torques_of_sample
 
 __all__ = ["follow_references"]
 
@@ -29,76 +26,6 @@ def direction(v: float, width: float) -> float:
     if width == 0.0:
         return 0.0
     return v / width
-
-
-@compiled()
-def bias_and_mass(
-    q: Floats,
-    v: Floats,
-    rest: Floats,
-    chain: Chain,
-    pi: Floats,
-    R: Floats,
-    U: Floats,
-    links: Floats,
-    composite: Floats,
-    h: Floats,
-    M: Floats,
-) -> None:
-    """Torques h (1, n) of the state q, v (1, n) without acceleration, and its M (1, n, n).
-
-    Scratch: R, U (f + 1, 3, 3), links (6, f + 1, 3), composite (f, 10), with the base in rows 0;
-    rest (1, n) is zero.
-    """
-    f = chain.antecedent.shape[0]
-    P, w, dw, u, force, moment = links[0], links[1], links[2], links[3], links[4], links[5]
-    for k in range(f):
-        Rj, Pj = link_pose(chain, k, q, 0)
-        wj, dwj, Uj, uj = carry_acceleration(chain, k, v, rest, 0, Rj, Pj, w, dw, U, u)
-        F, N = link_wrench(pi, k, wj, dwj, Uj, uj)
-        put_matrix(R, k + 1, Rj)
-        put_vector(P, k + 1, Pj)
-        put_vector(force, k + 1, F)
-        put_vector(moment, k + 1, N)
-        for x in range(10):
-            composite[k, x] = pi[k, x]
-    for row in range(h.shape[1]):
-        for column in range(h.shape[1]):
-            M[0, row, column] = 0.0
-    for j in range(f, 0, -1):
-        F = vector(force, j)
-        N = vector(moment, j)
-        Rj = matrix(R, j)
-        Pj = vector(P, j)
-        J, MS, mass = inertia_of(composite, j - 1)
-        b = chain.antecedent[j - 1]
-        if b > 0:
-            Fb = times(Rj, F)
-            Nb = add(times(Rj, N), cross(Pj, Fb))
-            put_vector(force, b, add(vector(force, b), Fb))
-            put_vector(moment, b, add(vector(moment, b), Nb))
-            join_antecedent(composite, b - 1, Rj, Pj, J, MS, mass)
-        if chain.sigma[j - 1] == 2:
-            continue
-        column = chain.joint[j - 1]
-        if chain.sigma[j - 1] == 0:
-            h[0, column] = N[2]
-            F = (-MS[1], MS[0], 0.0)
-            N = (J[2], J[4], J[5])
-        else:
-            h[0, column] = F[2]
-            F = (0.0, 0.0, mass)
-            N = (MS[1], -MS[0], 0.0)
-        inner = j
-        while inner > 0:
-            if chain.sigma[inner - 1] != 2:
-                entry = N[2] if chain.sigma[inner - 1] == 0 else F[2]
-                M[0, chain.joint[inner - 1], column] = entry
-                M[0, column, chain.joint[inner - 1]] = entry
-            Rj = matrix(R, inner)
-            F = times(Rj, F)
-            N = add(times(Rj, N), cross(vector(P, inner), F))
-            inner = chain.antecedent[inner - 1]
 
 
 @compiled()
@@ -167,11 +94,8 @@ def follow_references(
     f = chain.antecedent.shape[0]
     motors = coupling.shape[0]
     step = dt / substeps
-    R = np.empty((f + 1, 3, 3))
-    U = np.zeros((f + 1, 3, 3))
-    links = np.zeros((6, f + 1, 3))
-    composite = np.empty((f, 10))
-    M = np.empty((1, n, n))
+    room = torque_room(chain, gravity)
+    composite, M = np.empty((f, 10)), np.empty((1, n, n))
     sizes = np.empty(n)
     diagonal = np.empty(n)
     x = np.empty((1, n))
@@ -180,7 +104,6 @@ def follow_references(
     rest = np.zeros((1, n))
     taken = np.empty((1, n))
     slopes = np.empty((2, 4, n))
-    base_acceleration(chain, gravity, links[3])
     ticks = int(state[4, 0])
     for i in range(N):
         for part in range(substeps):
@@ -205,7 +128,8 @@ def follow_references(
                     if stage > 0:
                         x[0, j] += ahead * slopes[0, before, j]
                         y[0, j] += ahead * slopes[1, before, j]
-                bias_and_mass(x, y, rest, chain, pi, R, U, links, composite, h, M)
+                torques_of_sample(x, y, rest, 0, chain, pi, room, h)
+                mass_of_sample(chain, pi, room[0], room[1], composite, M, 0)
                 drive_torque(
                     y, viscous, drives[0], drives[1], coupling, coupled[:motors], drives[2],
                     coupled[motors:], taken,
@@ -214,7 +138,7 @@ def follow_references(
                     h[0, row] = state[3, row] - h[0, row] - taken[0, row]
                     for column in range(n):
                         M[0, row, column] += rotor[row, column]
-                if solve_in_place(M, h, 0, sizes, diagonal) != POSITIVE:
+                if solve_in_place(M[0], h[0], sizes, diagonal) != POSITIVE:
                     return i
                 for j in range(n):
                     slopes[0, stage, j] = y[0, j]

@@ -11,7 +11,7 @@ from math import sqrt
 import numpy as np
 
 from ._compile import INT, INTS, MATRIX, NOTHING, OUT2, STACK, VECTOR, Floats, Ints, compiled
-from .bounded_velocity import complement, largest_part
+from .bounded_velocity import cleared, complement, largest_part
 from .inverse_factors import PSEUDO_INVERSE, inverse_factors
 from .svd import orthogonal_rows
 
@@ -61,30 +61,6 @@ def narrowed(F: Floats, V: Floats, f: int, G: Floats) -> None:
 
 
 @compiled()
-def projected(a: Floats, F: Floats, f: int, out: Floats) -> None:
-    """Part of a vector in the space of the f orthonormal rows of F."""
-    for j in range(a.shape[0]):
-        out[j] = 0.0
-    for c in range(f):
-        inner = 0.0
-        for j in range(a.shape[0]):
-            inner += F[c, j] * a[j]
-        for j in range(a.shape[0]):
-            out[j] += inner * F[c, j]
-
-
-@compiled()
-def without(a: Floats, F: Floats, f: int) -> None:
-    """Take the part in the space of the f orthonormal rows of F out of a vector."""
-    for c in range(f):
-        inner = 0.0
-        for j in range(a.shape[0]):
-            inner += F[c, j] * a[j]
-        for j in range(a.shape[0]):
-            a[j] -= inner * F[c, j]
-
-
-@compiled()
 def freed(F: Floats, f: int, stuck: Ints, V: Floats, G: Floats) -> int:
     """Take out of the f rows of F what moves joints that are stuck; how many rows are left."""
     n = F.shape[1]
@@ -94,17 +70,7 @@ def freed(F: Floats, f: int, stuck: Ints, V: Floats, G: Floats) -> int:
             continue
         for c in range(f):
             V[r, c] = F[c, j]
-        for _ in range(2):
-            for b in range(r):
-                inner = 0.0
-                for c in range(f):
-                    inner += V[b, c] * V[r, c]
-                for c in range(f):
-                    V[r, c] -= inner * V[b, c]
-        total = 0.0
-        for c in range(f):
-            total += V[r, c] * V[r, c]
-        length = sqrt(total)
+        length = sqrt(cleared(V[r], V, r, f, G[0]))
         if length > _STUCK:
             for c in range(f):
                 V[r, c] /= length
@@ -156,12 +122,12 @@ def level_velocities(
     B = np.empty((wide, wide + wide))
     W, U, V = np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
     A = np.empty((wide, n))
-    F, G, E, R = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    F, G = np.empty((n, n)), np.empty((n, n))
     sigma, inner, factors, rest = np.empty(wide), np.empty(wide), np.empty(wide), np.empty(wide)
     x, w, wish, zero = np.empty(n), np.empty(n), np.empty(n), np.zeros(n)
-    low, high, base, found, before = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    sides, press, r, z = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    active, at, stuck = np.empty(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
+    bounds, found, before = np.empty((2, n)), np.empty(n), np.empty(n)
+    spare, basis, marks = np.empty((5, n)), np.empty((2, n, n)), np.zeros((3, n), np.int64)
+    at, stuck, parts = marks[0], marks[1], spare[3]
     kind, threshold, largest, speed = int(method[0]), method[1], method[2], method[3]
     for i in range(N):
         # weighted joints are u = root * v, so that least norms are plain
@@ -170,8 +136,8 @@ def level_velocities(
             x[j] = 0.0
             at[j] = 0
             if bounded:
-                low[j] = lower[i, j] * joint_roots[j]
-                high[j] = upper[i, j] * joint_roots[j]
+                bounds[0, j] = lower[i, j] * joint_roots[j]
+                bounds[1, j] = upper[i, j] * joint_roots[j]
             for c in range(n):
                 F[j, c] = 1.0 if j == c else 0.0
         f = n
@@ -226,45 +192,26 @@ def level_velocities(
             for a in range(rank, f):
                 for j in range(n):
                     G[a - rank, j] = F[a, j]
-            scale[i, level], mixed[i, level] = 1.0, 0.0
-            if not bounded:
-                for j in range(n):
-                    x[j] += w[j]
-                f -= rank
-                for a in range(f):
-                    for j in range(n):
-                        F[a, j] = G[a, j]
-                continue
-            s = largest_part(
-                x, w, G, f - rank, wish, low, high, found, at, stuck,
-                base, active, sides, press, r, z, E, R,
-            )  # fmt: skip
+            s, mixed[i, level] = 1.0, 0.0
+            if bounded:
+                s = largest_part(x, w, G, f - rank, wish, bounds, found, marks, spare, basis)
             if s < 0.0:
                 # No part of the rate alone fits: from the least motion without the level, which
                 # fits, as far as possible towards all that the level asks.
                 mixed[i, level] = 1.0
-                largest_part(
-                    before, zero, F, f, zero, low, high, found, at, stuck,
-                    base, active, sides, press, r, z, E, R,
-                )  # fmt: skip
+                largest_part(before, zero, F, f, zero, bounds, found, marks, spare, basis)
                 for j in range(n):
                     w[j] += x[j]
                     x[j] = found[j]
-                without(x, G, f - rank)
+                cleared(x, G, f - rank, n, parts)
                 for j in range(n):
                     w[j] -= x[j]
-                s = largest_part(
-                    x, w, G, f - rank, wish, low, high, found, at, stuck,
-                    base, active, sides, press, r, z, E, R,
-                )  # fmt: skip
+                s = largest_part(x, w, G, f - rank, wish, bounds, found, marks, spare, basis)
                 if s < 0.0:  # the start fits but for rounding
                     s = 0.0
                     for j in range(n):
                         w[j] = 0.0
-                    largest_part(
-                        x, w, G, f - rank, wish, low, high, found, at, stuck,
-                        base, active, sides, press, r, z, E, R,
-                    )  # fmt: skip
+                    largest_part(x, w, G, f - rank, wish, bounds, found, marks, spare, basis)
             scale[i, level] = s
             f -= rank
             for a in range(f):
@@ -277,19 +224,16 @@ def level_velocities(
                 f = freed(F, f, stuck, V, G)
                 for j in range(n):
                     x[j] = found[j]
-                without(x, F, f)
+                cleared(x, F, f, n, parts)
         if not bounded:
             for j in range(n):
                 found[j] = wish[j]
-            projected(found, F, f, base)
+            cleared(found, F, f, n, parts)
             for j in range(n):
-                v[i, j] = (x[j] + base[j]) / joint_roots[j]
+                v[i, j] = (x[j] + wish[j] - found[j]) / joint_roots[j]
         else:
             if L == 0:
-                largest_part(
-                    x, zero, F, f, wish, low, high, found, at, stuck,
-                    base, active, sides, press, r, z, E, R,
-                )  # fmt: skip
+                largest_part(x, zero, F, f, wish, bounds, found, marks, spare, basis)
             for j in range(n):
                 value = min(max(found[j] / joint_roots[j], lower[i, j]), upper[i, j])
                 if at[j] != 0:

@@ -1,12 +1,15 @@
 """LU factors of small square matrices with row exchanges, and linear systems solved by them."""
 
+from math import inf
+
 from ._compile import Floats, Ints, compiled
 
 
 @compiled()
-def factor(A: Floats, pivots: Ints) -> None:
-    """LU factors of a square matrix with row exchanges, in place."""
+def factor(A: Floats, pivots: Ints) -> float:
+    """LU factors of a square matrix with row exchanges, in place; the least pivot."""
     n = A.shape[0]
+    least = inf
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -16,12 +19,14 @@ def factor(A: Floats, pivots: Ints) -> None:
         if best != k:
             for j in range(n):
                 A[k, j], A[best, j] = A[best, j], A[k, j]
+        least = min(least, abs(A[k, k]))
         if abs(A[k, k]) < 1e-300:  # singular: the solutions grow without bound
             A[k, k] = 1e-300
         for i in range(k + 1, n):
             A[i, k] /= A[k, k]
             for j in range(k + 1, n):
                 A[i, j] -= A[i, k] * A[k, j]
+    return least
 
 
 @compiled()

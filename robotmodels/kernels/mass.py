@@ -42,65 +42,68 @@ from ._vectors import (
     times,
     vector,
 )
-from .torques import joint_torques
+from .linear_systems import factor, solve
+from .torques import torque_room, torques_of_sample
 
 __all__ = ["coriolis_matrices", "joint_accelerations", "mass_matrices"]
 
-BLOCK = 64
 POSITIVE, INDEFINITE, SINGULAR = 0, 1, 2  # what a symmetric matrix is
 EPSILON = float(np.finfo(np.float64).eps)
 
 
-@compiled(NOTHING(MATRIX, CHAIN, MATRIX, OUT3))
-def mass_matrices(
-    q: Floats,
-    chain: Chain,
-    pi: Floats,
-    out: Floats,
+@compiled(inlined=True)
+def mass_of_sample(
+    chain: Chain, pi: Floats, R: Floats, P: Floats, composite: Floats, out: Floats, i: int
 ) -> None:
-    """Mass matrices of the rigid links, without rotor inertia.
+    """Mass matrix of the poses R, P of the links in their antecedents, without rotor inertia.
 
-    Shapes: q (N, n), pi (f, 10) -> out (N, n, n).
+    Shapes: pi (f, 10), R (f + 1, 3, 3), P (f + 1, 3), composite (f, 10) -> out[i] (n, n).
     """
     f = chain.antecedent.shape[0]
     n = out.shape[1]
-    R = np.empty((f + 1, 3, 3))
-    P = np.empty((f + 1, 3))
-    composite = np.empty((f, 10))
+    for row in range(n):
+        for column in range(n):
+            out[i, row, column] = 0.0
+    for k in range(f):
+        for x in range(10):
+            composite[k, x] = pi[k, x]
+    for j in range(f, 0, -1):
+        J, MS, M = inertia_of(composite, j - 1)
+        b = chain.antecedent[j - 1]
+        if b > 0:
+            join_antecedent(composite, b - 1, matrix(R, j), vector(P, j), J, MS, M)
+        if chain.sigma[j - 1] == 2:
+            continue
+        if chain.sigma[j - 1] == 0:
+            force = (-MS[1], MS[0], 0.0)
+            moment = (J[2], J[4], J[5])
+        else:
+            force = (0.0, 0.0, M)
+            moment = (MS[1], -MS[0], 0.0)
+        column = chain.joint[j - 1]
+        inner = j
+        while inner > 0:
+            if chain.sigma[inner - 1] != 2:
+                entry = moment[2] if chain.sigma[inner - 1] == 0 else force[2]
+                out[i, chain.joint[inner - 1], column] = entry
+                out[i, column, chain.joint[inner - 1]] = entry
+            Rj = matrix(R, inner)
+            force = times(Rj, force)
+            moment = add(times(Rj, moment), cross(vector(P, inner), force))
+            inner = chain.antecedent[inner - 1]
+
+
+@compiled(NOTHING(MATRIX, CHAIN, MATRIX, OUT3))
+def mass_matrices(q: Floats, chain: Chain, pi: Floats, out: Floats) -> None:
+    """Mass matrices of the rigid links. Shapes: q (N, n), pi (f, 10) -> out (N, n, n)."""
+    f = chain.antecedent.shape[0]
+    R, P, composite = np.empty((f + 1, 3, 3)), np.empty((f + 1, 3)), np.empty((f, 10))
     for i in range(q.shape[0]):
-        for row in range(n):
-            for column in range(n):
-                out[i, row, column] = 0.0
         for k in range(f):
             Rj, Pj = link_pose(chain, k, q, i)
             put_matrix(R, k + 1, Rj)
             put_vector(P, k + 1, Pj)
-            for x in range(10):
-                composite[k, x] = pi[k, x]
-        for j in range(f, 0, -1):
-            J, MS, M = inertia_of(composite, j - 1)
-            b = chain.antecedent[j - 1]
-            if b > 0:
-                join_antecedent(composite, b - 1, matrix(R, j), vector(P, j), J, MS, M)
-            if chain.sigma[j - 1] == 2:
-                continue
-            if chain.sigma[j - 1] == 0:
-                force = (-MS[1], MS[0], 0.0)
-                moment = (J[2], J[4], J[5])
-            else:
-                force = (0.0, 0.0, M)
-                moment = (MS[1], -MS[0], 0.0)
-            column = chain.joint[j - 1]
-            inner = j
-            while inner > 0:
-                if chain.sigma[inner - 1] != 2:
-                    entry = moment[2] if chain.sigma[inner - 1] == 0 else force[2]
-                    out[i, chain.joint[inner - 1], column] = entry
-                    out[i, column, chain.joint[inner - 1]] = entry
-                Rj = matrix(R, inner)
-                force = times(Rj, force)
-                moment = add(times(Rj, moment), cross(vector(P, inner), force))
-                inner = chain.antecedent[inner - 1]
+        mass_of_sample(chain, pi, R, P, composite, out, i)
 
 
 @compiled()
@@ -127,13 +130,7 @@ def body_factor(J: Moments, MS: Vector, M: float, w: Vector, v: Vector) -> tuple
 
 
 @compiled(NOTHING(MATRIX, MATRIX, CHAIN, MATRIX, OUT3))
-def coriolis_matrices(
-    q: Floats,
-    v: Floats,
-    chain: Chain,
-    pi: Floats,
-    out: Floats,
-) -> None:
+def coriolis_matrices(q: Floats, v: Floats, chain: Chain, pi: Floats, out: Floats) -> None:
     """Christoffel-consistent Coriolis matrices: dM/dt - 2 C is skew-symmetric.
 
     Shapes: q, v (N, n); pi (f, 10) -> out (N, n, n).
@@ -221,121 +218,103 @@ def coriolis_matrices(
 
 
 @compiled()
-def solve_definite(A: Floats, b: Floats, i: int, diagonal: Floats) -> int:
-    """Solve ``A[i] x = b[i]`` into b[i] by Cholesky: POSITIVE; else SINGULAR or INDEFINITE.
+def solve_definite(A: Floats, b: Floats, diagonal: Floats) -> int:
+    """Solve ``A x = b`` into b by Cholesky: POSITIVE; else SINGULAR or INDEFINITE.
 
-    A[i] has unit diagonal, kept in ``diagonal`` (n,); its lower half is overwritten. A zero pivot
+    A has unit diagonal, kept in ``diagonal`` (n,); its lower half is overwritten. A zero pivot
     with a non-zero rest of its column means INDEFINITE.
     """
-    n = A.shape[1]
+    n = A.shape[0]
     least = 4.0 * n * EPSILON
     for k in range(n):
-        diagonal[k] = A[i, k, k]
+        diagonal[k] = A[k, k]
     kind = POSITIVE
     for k in range(n):
-        pivot = A[i, k, k]
+        pivot = A[k, k]
         for column in range(k):
-            pivot -= A[i, k, column] * A[i, k, column]
+            pivot -= A[k, column] * A[k, column]
         for row in range(k + 1, n):
-            rest = A[i, k, row]
+            rest = A[k, row]
             for column in range(k):
-                rest -= A[i, row, column] * A[i, k, column]
-            A[i, row, k] = rest
+                rest -= A[row, column] * A[k, column]
+            A[row, k] = rest
         if not pivot > least:
             kind = INDEFINITE if pivot < -least else SINGULAR
             for row in range(k + 1, n):
-                if A[i, row, k] * A[i, row, k] > 4.0 * least:
+                if A[row, k] * A[row, k] > 4.0 * least:
                     kind = INDEFINITE
             break
-        A[i, k, k] = sqrt(pivot)
+        A[k, k] = sqrt(pivot)
         for row in range(k + 1, n):
-            A[i, row, k] /= A[i, k, k]
+            A[row, k] /= A[k, k]
     if kind != POSITIVE:
         for row in range(n):
-            A[i, row, row] = diagonal[row]
+            A[row, row] = diagonal[row]
             for column in range(row):
-                A[i, row, column] = A[i, column, row]
+                A[row, column] = A[column, row]
         return kind
     for row in range(n):
-        rest = b[i, row]
+        rest = b[row]
         for column in range(row):
-            rest -= A[i, row, column] * b[i, column]
-        b[i, row] = rest / A[i, row, row]
+            rest -= A[row, column] * b[column]
+        b[row] = rest / A[row, row]
     for row in range(n - 1, -1, -1):
-        rest = b[i, row]
+        rest = b[row]
         for column in range(row + 1, n):
-            rest -= A[i, column, row] * b[i, column]
-        b[i, row] = rest / A[i, row, row]
+            rest -= A[column, row] * b[column]
+        b[row] = rest / A[row, row]
     return POSITIVE
 
 
 @compiled()
-def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats, diagonal: Floats) -> int:
-    """Solve ``A[i] x = b[i]`` into b[i], spoiling A[i], which is POSITIVE or INDEFINITE.
+def solve_in_place(A: Floats, b: Floats, sizes: Floats, diagonal: Floats) -> int:
+    """Solve ``A x = b`` into b, spoiling A, which is POSITIVE or INDEFINITE.
 
     Not if it is SINGULAR to rounding. ``sizes`` and ``diagonal`` (n,) are scratch.
     """
-    n = A.shape[1]
+    n = A.shape[0]
     # Coordinates of unit diagonal (of the row's size where that is zero), so that the units and
     # sizes of the bodies do not decide what is singular
     for row in range(n):
-        sizes[row] = abs(A[i, row, row])
+        sizes[row] = abs(A[row, row])
         if not sizes[row] > 0.0:
             for column in range(n):
-                sizes[row] = max(sizes[row], abs(A[i, row, column]))
+                sizes[row] = max(sizes[row], abs(A[row, column]))
         if not sizes[row] > 0.0:
             return SINGULAR
         sizes[row] = sqrt(sizes[row])
     for row in range(n):
         for column in range(n):
-            A[i, row, column] /= sizes[row] * sizes[column]
-        b[i, row] /= sizes[row]
-    kind = solve_definite(A, b, i, diagonal)
+            A[row, column] /= sizes[row] * sizes[column]
+        b[row] /= sizes[row]
+    kind = solve_definite(A, b, diagonal)
     if kind == SINGULAR:
         return SINGULAR
-    if kind == INDEFINITE and not eliminate(A, b, i):
+    if kind == INDEFINITE and not eliminate(A, b):
         return SINGULAR
     for row in range(n):
-        b[i, row] /= sizes[row]
+        b[row] /= sizes[row]
     return kind
 
 
 @compiled()
-def eliminate(A: Floats, b: Floats, i: int) -> bool:
-    """Solve ``A[i] x = b[i]`` into b[i] by pivoting rows; False if A[i] is singular to rounding."""
-    n = A.shape[1]
+def eliminate(A: Floats, b: Floats) -> bool:
+    """Solve ``A x = b`` into b by pivoting rows; False if A is singular to rounding."""
+    n = A.shape[0]
     for row in range(n):
         scale = 0.0
         for column in range(n):
-            scale = max(scale, abs(A[i, row, column]))
+            scale = max(scale, abs(A[row, column]))
         if not scale > 0.0:
             return False
         # Rows of unit size, so that rows of different units compare
         for column in range(n):
-            A[i, row, column] /= scale
-        b[i, row] /= scale
-    for k in range(n):
-        pivot = k
-        largest = abs(A[i, k, k])
-        for row in range(k + 1, n):
-            if abs(A[i, row, k]) > largest:
-                pivot, largest = row, abs(A[i, row, k])
-        if not largest > 4.0 * n * EPSILON:
-            return False
-        if pivot != k:
-            for column in range(k, n):
-                A[i, k, column], A[i, pivot, column] = A[i, pivot, column], A[i, k, column]
-            b[i, k], b[i, pivot] = b[i, pivot], b[i, k]
-        for row in range(k + 1, n):
-            factor = A[i, row, k] / A[i, k, k]
-            for column in range(k + 1, n):
-                A[i, row, column] -= factor * A[i, k, column]
-            b[i, row] -= factor * b[i, k]
-    for row in range(n - 1, -1, -1):
-        rest = b[i, row]
-        for column in range(row + 1, n):
-            rest -= A[i, row, column] * b[i, column]
-        b[i, row] = rest / A[i, row, row]
+            A[row, column] /= scale
+        b[row] /= scale
+    pivots = np.empty(n, dtype=np.int64)
+    if not factor(A, pivots) > 4.0 * n * EPSILON:
+        return False
+    solve(A, pivots, b)
     return True
 
 
@@ -355,44 +334,27 @@ def joint_accelerations(
     Shapes: q, v, tau (N, n); pi (f, 10); gravity (3,); rotor (n, n) -> out (N, n).
     """
     samples, n = q.shape
-    block = min(samples, BLOCK)
-    h = np.empty((block, n))
-    M = np.empty((block, n, n))
-    still = np.zeros((block, n))
-    sizes = np.empty(n)
-    diagonal = np.empty(n)
-    singular = -1
-    indefinite = -1
-    for start in range(0, samples, BLOCK):
-        stop = min(start + BLOCK, samples)
-        size = stop - start
-        joint_torques(
-            q[start:stop],
-            v[start:stop],
-            still[:size],
-            chain,
-            pi,
-            gravity,
-            h[:size],
-        )
-        mass_matrices(
-            q[start:stop],
-            chain,
-            pi,
-            M[:size],
-        )
-        for i in range(size):
+    f = chain.antecedent.shape[0]
+    room = torque_room(chain, gravity)
+    composite, M, still = np.empty((f, 10)), np.empty((1, n, n)), np.zeros((1, n))
+    sizes, diagonal = np.empty(n), np.empty(n)
+    singular, indefinite = -1, -1
+    for i in range(samples):
+        h = out[i : i + 1]
+        torques_of_sample(q[i : i + 1], v[i : i + 1], still, 0, chain, pi, room, h)
+        mass_of_sample(chain, pi, room[0], room[1], composite, M, 0)
+        for row in range(n):
+            h[0, row] = tau[i, row] - h[0, row]
+            for column in range(n):
+                M[0, row, column] += rotor[row, column]
+        kind = solve_in_place(M[0], h[0], sizes, diagonal)
+        if kind == SINGULAR and singular < 0:
+            singular = i
+        if kind == INDEFINITE and indefinite < 0:
+            indefinite = i
+        if kind == SINGULAR:
             for row in range(n):
-                h[i, row] = tau[start + i, row] - h[i, row]
-                for column in range(n):
-                    M[i, row, column] += rotor[row, column]
-            kind = solve_in_place(M, h, i, sizes, diagonal)
-            if kind == SINGULAR and singular < 0:
-                singular = start + i
-            if kind == INDEFINITE and indefinite < 0:
-                indefinite = start + i
-            for row in range(n):
-                out[start + i, row] = np.nan if kind == SINGULAR else h[i, row]
+                h[0, row] = np.nan
     if singular < 0 and indefinite >= 0:
         return -2 - indefinite
     return singular

@@ -68,12 +68,7 @@ def put_pose(pose: Floats, R: Matrix, p: Vector) -> None:
 
 @compiled(NOTHING(MATRIX, CHAIN, INTS, MATRIX, VECTOR, OUT3))
 def tip_poses(
-    q: Floats,
-    chain: Chain,
-    path: Ints,
-    tool_rotation: Floats,
-    tool_position: Floats,
-    out: Floats,
+    q: Floats, chain: Chain, path: Ints, tool_rotation: Floats, tool_position: Floats, out: Floats
 ) -> None:
     """World poses of a tool carried by the last frame of a path.
 
@@ -105,11 +100,7 @@ def tip_poses(
 
 
 @compiled(NOTHING(MATRIX, CHAIN, OUT4))
-def link_poses(
-    q: Floats,
-    chain: Chain,
-    out: Floats,
-) -> None:
+def link_poses(q: Floats, chain: Chain, out: Floats) -> None:
     """World poses of all frames of the table. Shapes: q (N, n) -> out (N, f, 4, 4)."""
     f = chain.antecedent.shape[0]
     R = np.empty((f + 1, 3, 3))

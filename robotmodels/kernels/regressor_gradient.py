@@ -59,14 +59,7 @@ def add_vector(array: Floats, i: int, a: Vector) -> None:
 
 
 @compiled()
-def unit_motions(
-    down: Floats,
-    turn: Floats,
-    k: int,
-    chain: Chain,
-    R: Matrix,
-    P: Vector,
-) -> None:
+def unit_motions(down: Floats, turn: Floats, k: int, chain: Chain, R: Matrix, P: Vector) -> None:
     """Unit motions at link k, in its axes, of its own joint and of all joints inboard.
 
     ``down (f, f, 3)`` and ``turn (f, f, 3)``: linear and angular, by link and joint.

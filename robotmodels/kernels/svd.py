@@ -8,11 +8,9 @@ matrix takes a third of the time of LAPACK's.
 
 from math import sqrt
 
-import numpy as np
+from ._compile import Floats, compiled
 
-from ._compile import NOTHING, OUT2, OUT3, STACK, Floats, compiled
-
-__all__ = ["decompositions", "orthogonal_rows"]
+__all__ = ["orthogonal_rows"]
 
 _EPS = 2.220446049250313e-16
 _SWEEPS = 60
@@ -88,41 +86,3 @@ def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
             break
     for i in range(p):
         lengths[i] = sqrt(lengths[i])
-
-
-@compiled(NOTHING(STACK, OUT3, OUT2, OUT3))
-def decompositions(A: Floats, U: Floats, S: Floats, V: Floats) -> None:
-    """Singular value decompositions ``A = U diag(S) V^T``, singular values descending.
-
-    Shapes: A (N, m, n) -> U (N, m, k), S (N, k), V (N, n, k).
-    """
-    N, m, n = A.shape
-    wide = m <= n
-    p, d = (m, n) if wide else (n, m)
-    B = np.empty((p, d + p))
-    lengths = np.empty(p)
-    for s in range(N):
-        largest = 0.0
-        for i in range(m):
-            for j in range(n):
-                largest = max(largest, abs(A[s, i, j]))
-        size = largest if largest > 0.0 else 1.0
-        for i in range(p):
-            for j in range(d):
-                B[i, j] = (A[s, i, j] if wide else A[s, j, i]) / size
-            for j in range(p):
-                B[i, d + j] = 1.0 if i == j else 0.0
-        orthogonal_rows(B, p, d, d + p, lengths)
-        for i in range(p):
-            S[s, i] = lengths[i] * size
-            for j in range(d):
-                unit = B[i, j] / lengths[i] if lengths[i] > 0.0 else 0.0
-                if wide:
-                    V[s, j, i] = unit
-                else:
-                    U[s, j, i] = unit
-            for j in range(p):
-                if wide:
-                    U[s, j, i] = B[i, d + j]
-                else:
-                    V[s, j, i] = B[i, d + j]

@@ -16,7 +16,7 @@ from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .ellipsoid import in_range
 from .ellipsoids import joint_scale
-from .jacobians import Reference, jacobian
+from .jacobians import COMPONENTS, Reference, jacobian
 from .lengths import length_of
 
 _ON = 1e-9
@@ -176,7 +176,7 @@ def manipulability(
     np.float64(0.03)
     """
     check_model(model)
-    rows = as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
+    rows = as_mask(mask, COMPONENTS)
     own = length_of(model, frame, None)
     relative = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     scale = joint_scale(model, joint_velocity, "joint_velocity", 0.0)

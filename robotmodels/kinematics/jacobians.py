@@ -17,6 +17,7 @@ from ..errors import InvalidValueError
 from ..model import RobotModel, as_positions, check_model
 
 Reference = Literal["world_aligned", "local", "world"]
+COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 # Pinocchio's name of each reference, and the number by which the kernels know it
 _REFERENCES = {

@@ -7,7 +7,9 @@ length of the robot: one for each frame, found once and kept.
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
 from math import pi, tau
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +21,28 @@ from .jacobians import jacobian
 
 _SEED = 20
 _SAMPLES = 64
-# by identity: a model's hash reads all of its numbers
-_KNOWN: dict[int, tuple[weakref.ref[RobotModel], dict[int, float]]] = {}
+
+
+class ModelCache:
+    """Values that belong to a model, kept as long as it lives."""
+
+    def __init__(self) -> None:
+        # by identity: a model's hash reads all of its numbers
+        self._kept: dict[int, tuple[weakref.ref[RobotModel], dict[Any, Any]]] = {}
+
+    def __call__(self, model: RobotModel, key: Any, make: Callable[[], Any]) -> Any:
+        """Value of a key, made where there is none."""
+        place = id(model)
+        entry = self._kept.get(place)
+        if entry is None or entry[0]() is not model:
+            entry = (weakref.ref(model, lambda _: self._kept.pop(place, None)), {})
+            self._kept[place] = entry
+        if key not in entry[1]:
+            entry[1][key] = make()
+        return entry[1][key]
+
+
+_LENGTHS = ModelCache()
 
 
 def spread_configurations(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
@@ -33,16 +55,8 @@ def spread_configurations(model: RobotModel, count: int, rng: np.random.Generato
 def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
     """Reach of a frame: its greatest distance from a revolute axis that moves it."""
     check_model(model)
-    point = model.twin.frame(frame)
-    key = id(model)
-    entry = _KNOWN.get(key)
-    if entry is None or entry[0]() is not model:
-        entry = (weakref.ref(model, lambda _: _KNOWN.pop(key, None)), {})
-        _KNOWN[key] = entry
-    length = entry[1].get(point.pin_id)
-    if length is None:
-        length = entry[1][point.pin_id] = _reach(model, frame)
-    return length
+    key = model.twin.frame(frame).pin_id
+    return float(_LENGTHS(model, key, lambda: _reach(model, frame)))
 
 
 def length_of(model: RobotModel, frame: str | int | None, length: float | None) -> float:

@@ -168,7 +168,7 @@ def damped_step(
         for b in range(g.shape[0]):
             L[0, a, b] = N[a, b]
         L[0, a, a] += damping
-    if solve_definite(L, x, 0, diagonal) != POSITIVE:
+    if solve_definite(L[0], x[0], diagonal) != POSITIVE:
         return 0.0
     for a in range(g.shape[0]):
         least = min(least, L[0, a, a] * L[0, a, a])

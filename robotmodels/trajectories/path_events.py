@@ -7,6 +7,7 @@ Seed book section 4.3.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -126,13 +127,12 @@ class Task:
 
 def inverted(J: Array) -> tuple[Any, Any, Any]:
     """(Pseudo-)inverses, conditioning and sign of the determinant of Jacobians (M, m, n)."""
-    from ..kernels.inverses import inverses
-
     M, m, n = J.shape
     if m == n:
-        inverse, conditioning, sign = np.empty(J.shape), np.empty(M), np.empty(M)
-        if inverses(np.ascontiguousarray(J), inverse, conditioning, sign) < 0:
-            return inverse, np.nan_to_num(conditioning), sign
+        with suppress(np.linalg.LinAlgError):
+            inverse = np.linalg.inv(J)
+            size = np.linalg.norm(J, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
+            return inverse, np.nan_to_num(n / size), np.sign(np.linalg.det(J))
     # one of them is singular to the last digit, or they are not square
     s = np.linalg.svd(J, compute_uv=False)
     live = s[:, -1] > 1e-14 * s[:, 0]

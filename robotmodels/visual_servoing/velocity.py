@@ -172,14 +172,10 @@ def law(
 
 def pseudo_inverse(A: Array) -> tuple[Array, int]:
     """Pseudo-inverse and rank. Shapes: (k, 6) -> (6, k)."""
-    from ..kernels.svd import decompositions
-
-    m, p = A.shape[0], min(A.shape)
-    U, S, V = np.empty((1, m, p)), np.empty((1, p)), np.empty((1, A.shape[1], p))
-    decompositions(np.ascontiguousarray(A[None]), U, S, V)
-    sizes = S[0].tolist()
+    U, S, Vt = np.linalg.svd(A, full_matrices=False)
+    sizes = S.tolist()
     rank = sum(size > RANK_TOLERANCE * sizes[0] for size in sizes)
-    return (V[0, :, :rank] / S[0, :rank]) @ U[0, :, :rank].T, rank
+    return (Vt[:rank].T / S[:rank]) @ U[:, :rank].T, rank
 
 
 @lru_cache(maxsize=64)

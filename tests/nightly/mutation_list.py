@@ -38,7 +38,7 @@ ALIGNED = "tests/test_base_parameters.py -k (aligned or slope or gravity)"
 COMPENSATOR = (
     "tests/test_gravity_compensator.py -k (slope_of_the_energy or forces_by_hand or its_work)"
 )
-CASES = "tests/test_kernels_cases.py"
+CASES = "tests/test_kernels.py"
 SELF = "tests/test_igm_self_motion.py -k "
 ONE_SINGULAR = "tests/test_igm.py -k three_singular"
 REDUCED, REDUNDANT = "tests/test_igm_reduced.py", "tests/test_igm_redundant.py"
@@ -121,11 +121,11 @@ MUTATIONS = [
     Mutation("kernels: accelerations",
         "Coriolis acceleration of a prismatic joint loses its factor 2",
         "def accelerations(\n    q: Floats", "scale(2.0, cross(w, motion))", "cross(w, motion)",
-        "tests/test_kernels_cases.py -k tool_far"),
+        "tests/test_kernels.py -k tool_far"),
     Mutation("kernels: accelerations", "centripetal acceleration of the tool is lost",
         "# the tool does not move in the last frame",
         "add(cross(dw, arm), cross(w, cross(w, arm)))", "cross(dw, arm)",
-        "tests/test_kernels_cases.py -k tool_far"),
+        "tests/test_kernels.py -k tool_far"),
     Mutation("kernels: Jacobian rates", "the point of a moving tool rests",
         "def jacobian_rates(", "add(dp, cross(w, arm))", "dp", "tests/test_kernels.py"),
     Mutation("kernels: Jacobian rates", "axes of moving frames keep their direction",
@@ -168,7 +168,7 @@ MUTATIONS = [
         "M[i, row, column] += rotor[0, column]", KERNELS),
     Mutation("kernels: direct model", "elimination never exchanges rows",
         "def eliminate(A: Floats, b: Floats, i: int)", "abs(A[i, row, k]) > largest",
-        "abs(A[i, row, k]) > 1e300", "tests/test_kernels_cases.py"),
+        "abs(A[i, row, k]) > 1e300", "tests/test_kernels.py"),
     Mutation("kernels: energies", "first moments count once, not twice", "def kinetic_energies(",
         "2.0 * dot(MS, cross(vj, wj))", "dot(MS, cross(vj, wj))", KERNELS),
     Mutation("kernels: energies", "potential energy grows downwards", "def potential_energies(",
@@ -981,7 +981,7 @@ MUTATIONS = [
     Mutation("calibration: differential model", "a second action of a parameter replaces the first",
         "def erroneous_poses(", "out_psi[i, 3 + s, owner[c]] += f * w[s]",
         "out_psi[i, 3 + s, owner[c]] = f * w[s]",
-        "tests/test_kernels_cases.py -k several_elements"),
+        "tests/test_kernels.py -k several_elements"),
     Mutation("calibration: URDF in place", "the link that is the tool stays nominal",
         "def with_moved_tool(", "{} if link is None else {link: tool}", "{}",
         "tests/test_calibrated_urdf.py -k named_tip"),
@@ -1146,10 +1146,10 @@ MUTATIONS = [
         "tests/test_identification_signals.py -k three_decibels"),
     Mutation("identification: decimation", "outputs are centred one sample late", "def add_rows(",
         "tap = place + r - o * step + half", "tap = place + r - o * step + half - 1",
-        "tests/test_kernels_cases.py -k thinned"),
+        "tests/test_kernels.py -k thinned"),
     Mutation("identification: decimation", "a row left out counts", "def add_rows(",
         "use[(start + r) * m + j] != 0", "use[(start + r) * m + j] >= 0",
-        "tests/test_kernels_cases.py -k thinned"),
+        "tests/test_kernels.py -k thinned"),
     Mutation("identification: equations", "filtered form: momenta fall where they rise",
         "def _momentum_rates(", "(ahead - behind)", "(behind - ahead)",
         "tests/test_identification_forms.py -k exact", True),

@@ -49,7 +49,7 @@ from ...obstacles.clearance import (
     links,
 )
 from ...obstacles.shapes import Obstacle, checked_length
-from ..jacobians import Reference, jacobian, jacobian_rate, reference_of
+from ..jacobians import COMPONENTS, Reference, jacobian, jacobian_rate, reference_of
 from .bounds import as_limit, check_order, for_joints
 
 _CHUNK = 512
@@ -230,7 +230,7 @@ class ManipulabilityCriterion(Rebuilt):
     def __post_init__(self) -> None:
         _set_numbers(self, "gain", "length")
         reference_of(self.reference)
-        mask = as_mask(self.mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
+        mask = as_mask(self.mask, COMPONENTS)
         object.__setattr__(self, "mask", read_only(mask, np.bool_))
 
     def value(self, model: RobotModel, q: ArrayLike) -> Array:

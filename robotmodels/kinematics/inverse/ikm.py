@@ -16,7 +16,7 @@ from ..jacobians import Reference
 from .bounds import JointBounds
 from .methods import InverseMethod
 from .solution import IKMSolution
-from .solver import Request, Secondary, check_size, solved, solved_alone
+from .solver import Secondary, check_size, solved, solved_alone
 from .tasks import Task
 
 
@@ -116,11 +116,8 @@ def ikm(
     ):
         return solved_alone(model, q, twist, frame, reference, method)
     return solved(
-        model,
-        Request(
-            q, twist, None, frame, reference, mask, method, joint_weights, length, secondary,
-            augmented, tasks, limits,
-        ),
+        model, q, twist, None, frame, reference, mask, method, joint_weights, length, secondary,
+        augmented, tasks, limits,
     )  # fmt: skip
 
 
@@ -187,9 +184,6 @@ def ikm_second_order(
     acceleration = as_vector(acceleration, 6, "acceleration")
     check_size(acceleration, "acceleration")
     return solved(
-        model,
-        Request(
-            q, acceleration, v, frame, reference, mask, method, joint_weights, length, secondary,
-            augmented, tasks, limits,
-        ),
+        model, q, acceleration, v, frame, reference, mask, method, joint_weights, length,
+        secondary, augmented, tasks, limits,
     )  # fmt: skip

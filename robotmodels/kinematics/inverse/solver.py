@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
@@ -23,12 +22,12 @@ from ..._arrays import (
 )
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
-from ...model import FrameOfInterest, RobotModel
-from ..jacobians import reference_of
-from ..lengths import characteristic_length
+from ...model import RobotModel
+from ..jacobians import COMPONENTS, Reference, jacobian
+from ..lengths import ModelCache, characteristic_length
+from ..velocities import dkm_second_order
 from .bounds import JointBounds
 from .criteria import Criterion
-from .levels import level_velocities
 from .methods import InverseMethod, as_method
 from .solution import IKMSolution, IKMStatus
 from .tasks import Level, Task
@@ -43,25 +42,6 @@ _KEPT = 1.0 - 1e-9
 """Scale of the twist below which limits have slowed it, but for rounding."""
 _SAMPLES, _RANK = 24, 1e-10
 _SINGULAR, _TOO_FEW = int(IKMStatus.SINGULAR), int(IKMStatus.TOO_FEW_JOINTS)
-_WHOLE_TWIST = read_only(np.ones(6), np.bool_)
-
-
-class Request(NamedTuple):
-    """Arguments of a call, ``q``, ``rate`` and ``v`` checked."""
-
-    q: Array
-    rate: Array
-    v: Array | None
-    frame: str | int | None
-    reference: str
-    mask: ArrayLike | str | None
-    method: InverseMethod | None
-    joint_weights: ArrayLike | None
-    length: float | None
-    secondary: Secondary | None
-    augmented: Sequence[Task]
-    tasks: Sequence[Task]
-    limits: JointBounds | bool | None
 
 
 class Scaling(NamedTuple):
@@ -73,76 +53,41 @@ class Scaling(NamedTuple):
     columns: Array
 
 
-class PreparedFrame:
-    """Data of a robot's frame that every call needs."""
-
-    __slots__ = ("length", "packed", "point", "ranks", "usual")
-
-    def __init__(self, model: RobotModel, frame: str | int | None) -> None:
-        self.point = model.twin.frame(frame)
-        self.length = characteristic_length(model, frame)
-        self.usual = _scaling(model, self.length, None, None)
-        self.packed = packed(model, self.point, self.usual.selected, *self.usual[2:])
-        self.ranks: dict[tuple[int, ...], int] = {}
-
-
-# by identity: a model's hash reads all of its numbers
-_PREPARED: dict[int, tuple[weakref.ref[RobotModel], dict[str | int | None, PreparedFrame]]] = {}
-
-
-def prepared_frame(model: RobotModel, frame: str | int | None) -> PreparedFrame:
-    """Cached data of a frame, created on first use."""
-    key = id(model)
-    entry = _PREPARED.get(key)
-    if entry is None or entry[0]() is not model:
-        entry = (weakref.ref(model, lambda _: _PREPARED.pop(key, None)), {})
-        _PREPARED[key] = entry
-    # True and 1.0 are equal to 1 as keys, but they are not frame numbers
-    if frame is not None and frame.__class__ not in (str, int):
-        model.twin.frame(frame)
-        frame = int(frame)
-    prepared = entry[1].get(frame)
-    if prepared is None:
-        prepared = entry[1][frame] = PreparedFrame(model, frame)
-    return prepared
-
-
-def packed(
-    model: RobotModel,
-    point: FrameOfInterest,
-    selected: NDArray[np.int64],
-    rows: Array,
-    columns: Array,
-) -> tuple[NDArray[np.int64], Array, Array, Array]:
-    """Robot, frame, rows and factors for the kernel: each array costs 0.3 us of a single call."""
-    chain, (path, rotation, position) = model.chain, point.kernel_arguments
-    whole = [(chain.sigma.size, path.size, selected.size), *chain[:3], path, selected]
-    return (
-        np.concatenate(whole).astype(np.int64),
-        np.concatenate([chain.rotation, [chain.base_rotation, rotation]]),
-        np.concatenate([chain.position, [chain.base_position, position]]),
-        np.concatenate([rows, columns]),
-    )
+_SCALINGS, _RANKS = ModelCache(), ModelCache()
 
 
 def _scaling(
-    model: RobotModel, length: float, mask: ArrayLike | str | None, weights: ArrayLike | None
+    model: RobotModel,
+    frame: str | int | None,
+    mask: ArrayLike | str | None = None,
+    weights: ArrayLike | None = None,
+    length: float | None = None,
 ) -> Scaling:
+    """Scaling of the arguments of a call."""
+    size = characteristic_length(model, frame)
+    if length is not None:
+        size = as_number(length, "length", above=0.0)
     if weights is None:
-        weights = np.where(_slides(model), 1.0 / length**2, 1.0)
+        weights = np.where(_slides(model), 1.0 / size**2, 1.0)
     weights = as_exact(weights, (model.n,), "joint_weights")
     if not (weights > 0.0).all():
         raise InvalidValueError(
             f"joint_weights: expected positive numbers, got {weights}; a joint that should hardly "
             "move has a large weight."
         )
-    selected = as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz"))
+    selected = as_mask(mask, COMPONENTS)
     return Scaling(
         mask=read_only(selected, np.bool_),
         selected=np.flatnonzero(selected),
-        rows=np.repeat([1.0 / length, 1.0], 3),
+        rows=np.repeat([1.0 / size, 1.0], 3),
         columns=1.0 / np.sqrt(weights),
     )
+
+
+def _usual_scaling(model: RobotModel, frame: str | int | None) -> Scaling:
+    """That of a call without mask, weights and length."""
+    key = model.twin.frame(frame).pin_id
+    return _SCALINGS(model, key, lambda: _scaling(model, frame))
 
 
 def _slides(model: RobotModel) -> NDArray[np.bool_]:
@@ -158,84 +103,78 @@ def check_size(rate: Array, name: str) -> None:
         )
 
 
-def solved(model: RobotModel, request: Request) -> IKMSolution:
-    """The inverse kinematic model, of the first or the second order."""
+def solved(
+    model: RobotModel,
+    q: Array,
+    rate: Array,
+    v: Array | None,
+    frame: str | int | None,
+    reference: Reference,
+    mask: ArrayLike | str | None,
+    method: InverseMethod | None,
+    joint_weights: ArrayLike | None,
+    length: float | None,
+    secondary: Secondary | None,
+    augmented: Sequence[Task],
+    tasks: Sequence[Task],
+    limits: JointBounds | bool | None,
+) -> IKMSolution:
+    """The inverse kinematic model, of the first order or, with velocities v, of the second."""
     from ...kernels.inverse_velocity import inverse_velocities
 
-    reference = reference_of(request.reference)[1]
-    frame = prepared_frame(model, request.frame)
-    scaling = frame.usual
-    if not (request.mask is None and request.joint_weights is None and request.length is None):
-        length = frame.length
-        if request.length is not None:
-            length = as_number(request.length, "length", above=0.0)
-        scaling = _scaling(model, length, request.mask, request.joint_weights)
-    method = as_method(request.method)
-    second = request.v is not None
-    names = ["q", "acceleration" if second else "twist", "v", "secondary"]
-    extra = None
-    if request.secondary is not None:
-        extra = secondary_motion(model, request.q, request.secondary)
-    given = {
-        name: part
-        for name, part in zip(names, (request.q, request.rate, request.v, extra), strict=True)
-        if part is not None
-    }
+    scaling = _scaling(model, frame, mask, joint_weights, length)
+    method = as_method(method)
+    given = {"q": q, "twist": rate} if v is None else {"q": q, "acceleration": rate, "v": v}
+    if secondary is not None:
+        given["secondary"] = secondary_motion(model, q, secondary)
     batch, laid = batch_rows(tuple(given.values()), tuple(given))
-    q, rate, v, z = (dict(zip(given, laid, strict=True)).get(name) for name in names)
-    assert q is not None
-    assert rate is not None
-    augmented = [_level(model, q, v, batch, task, "augmented") for task in _each(request.augmented)]
-    lower = [_level(model, q, v, batch, task, "tasks") for task in _each(request.tasks)]
-    bounds = _bounds(model, q, v, request.limits)
+    q, rate, *rest = laid
+    z = rest.pop() if secondary is not None else None
+    v = rest.pop() if v is not None else None
+    above = [_level(model, q, v, batch, task, "augmented") for task in _each(augmented)]
+    lower = [_level(model, q, v, batch, task, "tasks") for task in _each(tasks)]
+    bounds = _bounds(model, q, v, limits)
     N, n = q.shape
     drift = np.zeros((N, 6))
     if v is not None:
-        drift = _drift(model, frame.point, q, v, reference)
-    numbers, rows, selected = frame.packed, np.empty((0, 6, n)), scaling.selected
-    first = Level(rows, rate, drift, scaling.rows)
-    if augmented or lower or bounds is not None:
-        J = _jacobians(model, frame.point, q, reference)
-        first = _stacked([Level(J, rate, drift, scaling.rows), *augmented])
-        selected = np.concatenate([selected, np.arange(6, first.rate.shape[1])])
-        rows = first.J
-        if min(selected.size, n) > _MOST_ROWS:
-            raise InvalidValueError(
-                f"augmented: expected at most {_MOST_ROWS} rows together with the twist, got "
-                f"{selected.size}; give some of them as tasks of lower priority."
-            )
-    if scaling is not frame.usual or rows.size:
-        numbers = packed(model, frame.point, selected, first.weights, scaling.columns)
-    M, k = first.rate.shape[1], min(selected.size, n)
+        drift = dkm_second_order(model, q, v, np.zeros((N, n)), frame, reference)
+    J = jacobian(model, q, frame, reference)
+    first = _stacked([Level(J, rate, drift, scaling.rows), *above])
+    M = first.rate.shape[1]
+    selected = np.concatenate([scaling.selected, np.arange(6, M)])
+    k = min(selected.size, n)
+    if k > _MOST_ROWS:
+        raise InvalidValueError(
+            f"augmented: expected at most {_MOST_ROWS} rows together with the twist, got "
+            f"{selected.size}; give some of them as tasks of lower priority."
+        )
     wanted = first.rate - first.drift
     out, codes = np.empty((N, n + 3 * M + k + 1)), np.empty((N, 2), np.int8)
     inverse_velocities(
-        *numbers, q, rows, wanted if z is None else np.hstack([wanted, z]), reference,
-        *method.kernel_arguments, out, codes,
+        first.J, wanted if z is None else np.hstack([wanted, z]), first.weights, scaling.columns,
+        selected, *method.kernel_arguments, out, codes,
     )  # fmt: skip
-    cuts = np.cumsum([n, M, M, M, k])
-    motion, achieved, error, reachable, values, damping = np.split(out, cuts, axis=1)
-    status, rank = codes[:, 0].copy(), codes[:, 1].copy()
-    _set_structure(
-        model, frame, scaling, reference, status, rank, selected.size - scaling.selected.size
+    motion, achieved, error, reachable, values, damping = np.split(
+        out, np.cumsum([n, M, M, M, k]), axis=1
     )
+    status, rank = codes[:, 0].copy(), codes[:, 1].copy()
+    _set_structure(model, frame, reference, scaling.selected, status, rank, M - 6)
     scale, limited = np.ones((N, 1 + len(lower))), np.zeros((N, n), np.bool_)
     errors: tuple[Array, ...] = ()
     if lower or bounds is not None:
-        top = Level(rows[:, selected], first.rate[:, selected], first.drift[:, selected],
-                    first.weights[selected])  # fmt: skip
-        found = level_velocities(
-            [top, *lower], np.zeros((N, n)) if z is None else z, bounds, scaling.columns**-2, method
-        )
-        motion, scale, limited = found.v, found.scale, found.limited
+        parts = (part[:, selected] for part in first[:3])
+        levels = [Level(*parts, weights=first.weights[selected]), *lower]
+        wish = np.zeros((N, n)) if z is None else z
+        motion, scale, mixed, found = by_levels(levels, wish, bounds, scaling.columns, method)
+        if bounds is not None:
+            limited = (motion <= bounds[0]) | (motion >= bounds[1])
         error = np.zeros((N, M))
-        error[:, selected] = found.error[0]
+        error[:, selected] = found[0]
         achieved = np.where(np.isin(np.arange(M), selected), wanted - error, 0.0)
-        errors = found.error[1:]
-        status[(scale[:, 0] < _KEPT) | found.mixed[:, 0]] = IKMStatus.LIMITED
+        errors = found[1:]
+        status[(scale[:, 0] < _KEPT) | (mixed[:, 0] > 0.0)] = IKMStatus.LIMITED
     start = drift * scaling.mask
-    ends = np.cumsum([6, *(level.rate.shape[1] for level in augmented)])
-    parts = [error[:, a:b] for a, b in pairwise(ends)]
+    ends = np.cumsum([6, *(level.rate.shape[1] for level in above)])
 
     def frozen(array: NDArray[Any]) -> NDArray[Any]:
         array = np.array(array, order="C").reshape((*batch, *array.shape[1:]))
@@ -254,10 +193,38 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
         frozen(scale[:, 0]),
         frozen(limited),
         scaling.mask,
-        tuple(frozen(part) for part in (*parts, *errors)),
+        tuple(frozen(part) for part in (*(error[:, a:b] for a, b in pairwise(ends)), *errors)),
         frozen(scale[:, 1:]),
         None if v is None else frozen(motion),
     )
+
+
+def by_levels(
+    levels: Sequence[Level],
+    wish: Array,
+    bounds: tuple[Array, Array] | None,
+    columns: Array,
+    method: InverseMethod,
+) -> tuple[Array, Array, Array, tuple[Array, ...]]:
+    """Joint motion for levels in strict order: itself, scales and marks of levels, their errors.
+
+    B. Siciliano and J.-J. Slotine 1991; the bounds by the dual method of D. Goldfarb and A. Idnani
+    1983. The motion of a marked level has not the direction of its rate.
+    """
+    from ...kernels.level_velocities import level_velocities
+
+    N, n = wish.shape
+    starts = np.cumsum([0, *(level.J.shape[1] for level in levels)])
+    first = _stacked(levels)
+    v, error = np.empty((N, n)), np.empty((N, starts[-1]))
+    scale, mixed = np.empty((2, N, len(levels)))
+    low, high = (np.ascontiguousarray(b) for b in bounds or (wish, wish))
+    level_velocities(
+        first.J, first.rate, first.drift, first.weights, starts, np.ascontiguousarray(wish), low,
+        high, int(bounds is not None), 1.0 / columns, np.array(method.kernel_arguments), v, scale,
+        mixed, error,
+    )  # fmt: skip
+    return v, scale, mixed, tuple(error[:, a:b] for a, b in pairwise(starts))
 
 
 def solved_alone(
@@ -265,38 +232,38 @@ def solved_alone(
     q: Array,
     twist: Array,
     frame: str | int | None,
-    reference: str,
+    reference: Reference,
     method: InverseMethod | None,
 ) -> IKMSolution:
     """Fast path for a single twist without further options."""
-    number = reference_of(reference)[1]
-    prepared = prepared_frame(model, frame)
+    mask, selected, rows, columns = _usual_scaling(model, frame)
+    J = jacobian(model, q, frame, reference)
     n = q.size
     k = min(6, n)
     out, codes = np.empty((1, n + 19 + k)), np.empty((1, 2), np.int8)
-    kernel, none, scale, limited, empty = _constants(n)
+    kernel, scale, limited, empty = _constants(n)
     kernel(
-        *prepared.packed, q.reshape(1, n), none, twist.reshape(1, 6), number,
-        *as_method(method).kernel_arguments, out, codes,
+        J[None], twist[None], rows, columns, selected, *as_method(method).kernel_arguments, out,
+        codes,
     )  # fmt: skip
     out, codes = out[0], codes[0]
     if codes[0] == _SINGULAR:
-        _set_structure(model, prepared, prepared.usual, number, codes[:1], codes[1:])
+        _set_structure(model, frame, reference, selected, codes[:1], codes[1:], 0)
     out.setflags(write=False)
     codes.setflags(write=False)
     return IKMSolution(
         out[:n], codes[0, ...], out[n : n + 6], out[n + 6 : n + 12], out[n + 12 : n + 18],
         out[n + 18 : n + 18 + k], codes[1, ...], out[n + 18 + k, ...], scale, limited,
-        _WHOLE_TWIST, (), empty,
+        mask, (), empty,
     )  # fmt: skip
 
 
 @lru_cache(maxsize=64)
 def _constants(n: int) -> tuple[Any, ...]:
-    """Kernel, no rows, and the scale, limited joints and task scales of a row without limits."""
+    """Kernel, and the scale, limited joints and task scales of a row without limits."""
     from ...kernels.inverse_velocity import inverse_velocities
 
-    arrays = np.empty((0, 6, n)), np.ones(()), np.zeros(n, np.bool_), np.empty(0)
+    arrays = np.ones(()), np.zeros(n, np.bool_), np.empty(0)
     for array in arrays:
         array.setflags(write=False)
     return inverse_velocities, *arrays
@@ -338,7 +305,7 @@ def _level(
 def _stacked(levels: Sequence[Level]) -> Level:
     """One level of the rows of several."""
     J, rate, drift, weights = zip(*levels, strict=True)
-    rows = (np.concatenate(part, axis=1) for part in (J, rate, drift))
+    rows = (np.ascontiguousarray(np.concatenate(part, axis=1)) for part in (J, rate, drift))
     return Level(*rows, weights=np.concatenate(weights))
 
 
@@ -358,48 +325,31 @@ def _bounds(
     )
 
 
-def _jacobians(model: RobotModel, point: FrameOfInterest, q: Array, reference: int) -> Array:
-    from ...kernels.poses import jacobians
-
-    J = np.empty((len(q), 6, model.n))
-    jacobians(q, model.chain, *point.kernel_arguments, reference, J)
-    return J
-
-
-def _drift(model: RobotModel, point: FrameOfInterest, q: Array, v: Array, reference: int) -> Array:
-    """Velocity-dependent acceleration of the frame, ``dJ/dt v``. Shapes: q, v (N, n) -> (N, 6)."""
-    from ...kernels.poses import accelerations
-
-    out = np.empty((len(q), 6))
-    accelerations(q, v, np.zeros_like(q), model.chain, *point.kernel_arguments, reference, out)
-    return out
-
-
 def _set_structure(
     model: RobotModel,
-    frame: PreparedFrame,
-    scaling: Scaling,
-    reference: int,
+    frame: str | int | None,
+    reference: Reference,
+    selected: NDArray[np.int64],
     status: NDArray[np.int8],
     rank: NDArray[np.int8],
-    added: int = 0,
+    added: int,
 ) -> None:
     """Set TOO_FEW_JOINTS instead of SINGULAR where the rank is always deficient."""
     lacking = status == _SINGULAR
     if lacking.any():
-        usual = min(_usual_rank(model, frame, scaling, reference) + added, model.n)
-        status[lacking & (rank >= usual)] = _TOO_FEW
+        key = (model.twin.frame(frame).pin_id, reference, *map(int, selected))
+        usual = _RANKS(model, key, lambda: _usual_rank(model, frame, reference, selected))
+        status[lacking & (rank >= min(usual + added, model.n))] = _TOO_FEW
 
 
-def _usual_rank(model: RobotModel, frame: PreparedFrame, scaling: Scaling, reference: int) -> int:
+def _usual_rank(
+    model: RobotModel, frame: str | int | None, reference: Reference, selected: NDArray[np.int64]
+) -> int:
     """Rank that the rows requested have at nearly all configurations."""
-    key = (reference, *map(int, scaling.selected))
-    if key not in frame.ranks:
-        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, model.n))
-        q *= np.where(_slides(model), frame.length / np.pi, 1.0)
-        J = _jacobians(model, frame.point, q, reference)
-        J *= frame.usual.rows[:, None] * frame.usual.columns
-        size = np.linalg.norm(J, axis=(1, 2))
-        values = np.linalg.svd(J[:, scaling.selected], compute_uv=False)
-        frame.ranks[key] = int((values > _RANK * size[:, None]).sum(axis=1).max(initial=0))
-    return frame.ranks[key]
+    scaling = _usual_scaling(model, frame)
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, model.n))
+    q *= np.where(_slides(model), characteristic_length(model, frame) / np.pi, 1.0)
+    J = jacobian(model, q, frame, reference) * (scaling.rows[:, None] * scaling.columns)
+    size = np.linalg.norm(J, axis=(1, 2))
+    values = np.linalg.svd(J[:, selected], compute_uv=False)
+    return int((values > _RANK * size[:, None]).sum(axis=1).max(initial=0))

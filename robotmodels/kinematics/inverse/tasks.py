@@ -53,7 +53,7 @@ from ..._arrays import (
 from ...errors import InvalidValueError, ShapeError
 from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
-from ..jacobians import Reference, jacobian, jacobian_rate, reference_of
+from ..jacobians import COMPONENTS, Reference, jacobian, jacobian_rate, reference_of
 from ..lengths import length_of
 from ..poses import dgm
 
@@ -171,7 +171,7 @@ def TwistTask(
     (1, 3, 6)
     """
     reference_of(reference)
-    selected = np.flatnonzero(as_mask(mask, ("vx", "vy", "vz", "wx", "wy", "wz")))
+    selected = np.flatnonzero(as_mask(mask, COMPONENTS))
     rate = as_core(rate, (6,), "rate")[..., selected]
 
     def rows(model: RobotModel, q: Array, v: Array | None) -> Rows:

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, Rebuilt, as_floats, as_number, as_vector, read_only
 from ...model import RobotModel
-from ..jacobians import jacobian
+from ..jacobians import COMPONENTS, jacobian
 from ..lengths import spread_configurations
 from .task import (
-    COMPONENTS,
     MaskAxes,
     SingularTask,
     generator_of,

@@ -18,14 +18,13 @@ from ..._arrays import Array, as_mask, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
-from ..jacobians import Reference, jacobian, jacobian_rate
+from ..jacobians import COMPONENTS, Reference, jacobian, jacobian_rate
 from ..lengths import length_of
 from .events import random_postures
 
 MaskAxes = Literal["world", "tool"]
 
 _REFERENCES: dict[MaskAxes, Reference] = {"world": "world_aligned", "tool": "local"}
-COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _SEED = 20
 
 
