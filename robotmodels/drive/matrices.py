@@ -36,15 +36,6 @@ class DriveMatrices:
                 for (Ia, Fv, Fc, offset), vel, acc in joints
             ]
             return np.array(torques)
-        if self.rows and a is not None and v.ndim == a.ndim == 2 and v.shape == a.shape:
-            # many samples of them: one pass through the arrays instead of seven
-            from ..kernels.torques import drive_torques
-
-            Ia, Fv, Fc, offset = np.array(self.rows).T.copy()
-            out = np.empty(v.shape)
-            v, a = np.ascontiguousarray(v), np.ascontiguousarray(a)
-            drive_torques(v, a, Ia, Fv, Fc, offset, out)
-            return out
         tau = np.sign(v)
         tau *= self.coulomb
         tau += v.dot(self.viscous)

@@ -165,8 +165,3 @@ class _Files:
                 raise
         except OSError as error:
             _warn(f"the folder cannot be written ({error})")
-
-    def flush(self) -> None:
-        """Remove the files of the function."""
-        for path in self.folder.glob(f"{self.name}-*"):
-            path.unlink(missing_ok=True)

@@ -1,12 +1,9 @@
 """Nearest joint velocities inside bounds, and the largest part of a task that they leave.
 
 What a task leaves free is ``v = x + s w + F^T y``: s is the part of the task, F has orthonormal
-rows, y is free. For a given s the nearest v to a wish is a strictly convex quadratic programme in
-y, solved by the dual active set method of D. Goldfarb and A. Idnani (1983): it starts from the
-wish, adds the bound that is violated most, drops those that stop to press, and either ends at the
-solution or with some bounds that exclude each other. Such a set of bounds says how far s has to
-fall (a Farkas certificate is linear in s), so that s comes down to the largest value possible in
-a few steps, exactly but for rounding.
+rows, y is free. For a given s the nearest v to a wish is found by the dual active set method of
+D. Goldfarb and A. Idnani (1983); where some bounds exclude each other, their multipliers say how
+far s has to fall, so that s comes down to the largest value possible in a few steps.
 """
 
 from math import inf, sqrt

@@ -151,15 +151,8 @@ def follow_references(
                         tau[i, j] = state[3, j]
             for j in range(n):
                 for s in range(2):
-                    state[s, j] += (
-                        step
-                        / 6.0
-                        * (
-                            slopes[s, 0, j]
-                            + 2.0 * (slopes[s, 1, j] + slopes[s, 2, j])
-                            + slopes[s, 3, j]
-                        )
-                    )
+                    middle = slopes[s, 1, j] + slopes[s, 2, j]
+                    state[s, j] += step / 6.0 * (slopes[s, 0, j] + 2.0 * middle + slopes[s, 3, j])
         for j in range(n):
             if not isfinite(state[1, j]) or not abs(state[0, j] - q_ref[i + 1, j]) < astray[j]:
                 return i

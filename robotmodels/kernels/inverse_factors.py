@@ -21,19 +21,6 @@ _NEWTON_STEPS = 100
 
 
 @compiled()
-def squared_damping(kind: int, threshold: float, largest: float, value: float) -> float:
-    """Square of a damping that depends on a singular value or, for MANIPULABILITY, a product."""
-    if kind == CONSTANT:
-        return largest * largest
-    if value >= threshold:
-        return 0.0
-    ratio = value / threshold
-    if kind == MANIPULABILITY:
-        return largest * largest * (1.0 - ratio) * (1.0 - ratio)
-    return largest * largest * (1.0 - ratio * ratio)
-
-
-@compiled()
 def inverse_factors(
     kind: int,
     threshold: float,
@@ -70,7 +57,11 @@ def inverse_factors(
             elif kind > FILTERED:
                 if kind == WEAK_DIRECTIONS:
                     value = sigma[i]
-                square = squared_damping(kind, threshold, largest, value) + mu
+                square = largest * largest
+                if kind != CONSTANT:
+                    part = max(1.0 - value / threshold, 0.0) if threshold > 0.0 else 0.0
+                    square *= part * (part if kind == MANIPULABILITY else 2.0 - part)
+                square += mu
                 damping = max(damping, square)
                 if sigma[i] > zero:
                     bottom = sigma[i] * sigma[i] + square

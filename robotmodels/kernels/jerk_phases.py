@@ -3,6 +3,7 @@
 import numpy as np
 
 from ._compile import MATRIX, NOTHING, OUT2, OUT3, Floats, compiled
+from .bounded_velocity import cleared
 
 __all__ = ["polished_phases"]
 
@@ -35,24 +36,17 @@ def _error(goal: Floats, x: Floats, scale: float) -> tuple[float, float, float, 
 def _least_step(rows: Floats, wanted: Floats, count: int, step: Floats) -> None:
     """The shortest step that meets the equations, those before others; overwrites the rows."""
     n = rows.shape[1]
+    parts = np.empty(rows.shape[0])
     for j in range(n):
         step[j] = 0.0
     for i in range(count):
         before = 0.0
         for j in range(n):
             before += rows[i, j] * rows[i, j]
+        size = cleared(rows[i], rows, i, n, parts)
         left = wanted[i]
-        for _ in range(2):  # a second time for the digits
-            for r in range(i):
-                along = 0.0
-                for j in range(n):
-                    along += rows[i, j] * rows[r, j]
-                for j in range(n):
-                    rows[i, j] -= along * rows[r, j]
-                left -= along * wanted[r]
-        size = 0.0
-        for j in range(n):
-            size += rows[i, j] * rows[i, j]
+        for r in range(i):
+            left -= parts[r] * wanted[r]
         if size <= _GONE * _GONE * before or size == 0.0:
             wanted[i] = 0.0
             for j in range(n):

@@ -51,10 +51,9 @@ def narrowed(F: Floats, V: Floats, f: int, G: Floats) -> None:
     n = F.shape[1]
     for i in range(f):
         for j in range(n):
-            total = 0.0
+            G[i, j] = 0.0
             for c in range(f):
-                total += V[i, c] * F[c, j]
-            G[i, j] = total
+                G[i, j] += V[i, c] * F[c, j]
     for i in range(f):
         for j in range(n):
             F[i, j] = G[i, j]
@@ -154,13 +153,9 @@ def level_velocities(
                 for j in range(n):
                     rest[a] -= A[a, j] * x[j]
                 for c in range(f):
-                    total = 0.0
-                    if level == 0:
-                        total = A[a, c]
-                    else:
-                        for j in range(n):
-                            total += A[a, j] * F[c, j]
-                    W[a, c] = total
+                    W[a, c] = 0.0
+                    for j in range(n):
+                        W[a, c] += A[a, j] * F[c, j]
             longest = sqrt(longest)
             decomposed(W, m, f, B, sigma, U, V)
             k = min(m, f)

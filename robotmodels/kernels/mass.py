@@ -1,21 +1,13 @@
 """Mass and Coriolis matrices, and joint accelerations.
 
-Mass matrices by composite rigid bodies (M. Walker and D. Orin 1982; R. Featherstone, *Rigid Body
-Dynamics Algorithms*, section 6.2).
+Mass matrices by composite rigid bodies (M. Walker and D. Orin 1982). Coriolis matrices by
+S. Echeandia and P. Wensing 2021, algorithm 1: each body has the factor
+B = ((v x*) I + (I v) x* - I (v x)) / 2, [[0, -[p]x], [0, D]] with linear before angular; composite
+bodies add up I and B, and for every joint i from j down to the base, with dS_j = v_j x S_j,
+C_ij = S_i . (I dS_j + B S_j) and C_ji = dS_i . I S_j + S_i . B^T S_j.
 
-Coriolis matrices: S. Echeandia and P. Wensing 2021, "Numerical Methods to Compute the Coriolis
-Matrix and Christoffel Symbols for Rigid-Body Systems", algorithm 1. Each body has the factor
-B = ((v x*) I + (I v) x* - I (v x)) / 2; composite bodies add up I and B. With S_j the axis of
-joint j and dS_j = v_j x S_j, for every joint i from j down to the base
-
-    C_ij = S_i . (I dS_j + B S_j),    C_ji = dS_i . I S_j + S_i . B^T S_j.
-
-With linear before angular, B is [[0, -[p]x], [0, D]]: p is the linear momentum M v + w x MS and
-D a 3x3 matrix.
-
-Accelerations: M a = tau - h(q, v), with h by Newton-Euler without acceleration, solved by Cholesky.
-M need not be positive definite for parameters that are not physical: it is then solved by
-elimination with row pivoting, and the sample is reported.
+Accelerations: M a = tau - h(q, v) by Cholesky. M need not be positive definite for parameters that
+are not physical: it is then solved by elimination, and the sample is reported.
 """
 
 from math import sqrt

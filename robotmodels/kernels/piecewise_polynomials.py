@@ -16,16 +16,8 @@ def _piece(t: float, breaks: Floats, m: int, g: int, last: int, near: int) -> in
     k = min(near, last)
     while k < last and t >= breaks[m, g, k + 1]:
         k += 1
-    # a time before the piece: times that do not ascend
-    if k > 0 and t < breaks[m, g, k]:
-        low, high = 0, k
-        while low < high:
-            middle = (low + high) // 2
-            if t >= breaks[m, g, middle + 1]:
-                low = middle + 1
-            else:
-                high = middle
-        k = low
+    while k > 0 and t < breaks[m, g, k]:  # times that do not ascend
+        k -= 1
     return k
 
 

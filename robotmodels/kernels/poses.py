@@ -31,6 +31,7 @@ from ._vectors import (
     Vector,
     add,
     cross,
+    dot,
     matrix,
     product,
     put_matrix,
@@ -78,20 +79,10 @@ def tip_poses(
     origin = whole_vector(chain.base_position)
     E = whole_matrix(tool_rotation)
     e = whole_vector(tool_position)
-    if path.shape[0] == 0:
-        for i in range(q.shape[0]):
-            put_pose(out[i], product(base, E), add(origin, times(base, e)))
-        return
-    # what comes before the first motion is the same for every sample; after that each frame is
-    # the constant of its row, then the motion of its joint
-    first = path[0] - 1
-    origin = add(origin, times(base, vector(chain.position, first)))
-    base = product(base, matrix(chain.rotation, first))
     for i in range(q.shape[0]):
-        R, p = link_transform(
-            chain.sigma[first], coordinate(q, i, chain.joint[first]), base, origin
-        )
-        for j in path[1:]:
+        R, p = base, origin
+        for j in path:
+            # the constant of a row, then the motion of its joint
             k = j - 1
             p = add(p, times(R, vector(chain.position, k)))
             R = product(R, matrix(chain.rotation, k))
@@ -307,17 +298,10 @@ def improper_pose(T: Floats) -> int:
             if not np.isfinite(T[n, i, 3]):
                 return n
             for j in range(i, 3):
-                off = -1.0 if i == j else 0.0
-                for k in range(3):
-                    off += T[n, i, k] * T[n, j, k]
-                # also False for NaN
-                if not abs(off) <= 4e-15:
+                off = dot(vector(T[n], i), vector(T[n], j)) - (1.0 if i == j else 0.0)
+                if not abs(off) <= 4e-15:  # also for NaN
                     return n
-        det = (
-            T[n, 0, 0] * (T[n, 1, 1] * T[n, 2, 2] - T[n, 1, 2] * T[n, 2, 1])
-            - T[n, 0, 1] * (T[n, 1, 0] * T[n, 2, 2] - T[n, 1, 2] * T[n, 2, 0])
-            + T[n, 0, 2] * (T[n, 1, 0] * T[n, 2, 1] - T[n, 1, 1] * T[n, 2, 0])
-        )
+        det = dot(vector(T[n], 0), cross(vector(T[n], 1), vector(T[n], 2)))
         if det < 0.0:
             return n
     return -1

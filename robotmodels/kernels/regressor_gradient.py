@@ -1,13 +1,9 @@
 """Derivatives of torque regressors, contracted: of the number sum(G * W(q, v, a)).
 
-The reverse mode of differentiation, written out. Row r of G is a set of parameters of its own, so
-the number is the sum over joints r of the torque that r would need if the links had the parameters
-G[r]: sum over r and the links k outboard of it of t . f + z . n, with (t, z) the unit motion of
-joint r at link k and (f, n) the wrench that accelerates the link. The motions (t, z), like the
-velocities and accelerations, come down the tree by one rule a link; their adjoints go up by its
-transpose. The rotation matrices need no adjoint: d(R^T x)/dq = -z_axis x (R^T x).
-
-W as in `torque_regressor` (seed book section 1.6.3).
+Reverse differentiation, written out. Row r of G is a set of parameters of its own, so the number is
+the sum over joints r and links k outboard of t . f + z . n, with (t, z) the unit motion of joint r
+at link k and (f, n) the wrench that accelerates the link. Motions come down the tree by one rule a
+link; their adjoints go up by its transpose. The rotations need none: d(R^T x)/dq = -z x (R^T x).
 """
 
 import numpy as np

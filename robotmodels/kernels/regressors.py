@@ -2,17 +2,10 @@
 
 A motion is given in link axes: t the velocity of the link's origin, z its angular velocity. All
 columns are linear in it, so the unit motion of a joint gives that joint's row, and the link's own
-velocity gives the power.
-
-Torques (seed book section 1.6.3; C. Atkeson, C. An and J. Hollerbach 1986): each parameter, set to
-one, needs a wrench; its power on the unit motion that a joint inboard gives to the link is the
-entry of that joint's row. Power: the same on the link's own velocity, the rate of the energy's row.
-Energy (M. Gautier and W. Khalil 1988; section 1.5.1.2): h_j is made of products of w_j and v_j
-(kinetic) and of the link's world pose and gravity (potential).
-Momentum p = A v, with the rate tau + C^T v - Q (Lagrange), needs no acceleration: p_i is the
-product of the unit motion S_i with the momenta of the links outboard, and (C^T v)_i that of the
-rate of S_i, V x S_i in spatial notation (R. Featherstone, "Rigid Body Dynamics Algorithms", 2008,
-section 2.9, for V the twist of the joint's link).
+velocity gives the power. Torques: seed book section 1.6.3 (C. Atkeson, C. An and J. Hollerbach
+1986); energy: M. Gautier and W. Khalil 1988. Momentum p = A v, with the rate tau + C^T v - Q, needs
+no acceleration: p_i is the product of the unit motion S_i with the momenta of the links outboard,
+and (C^T v)_i that of V x S_i, V the twist of the joint's link.
 """
 
 import numpy as np
@@ -20,14 +13,7 @@ from numpy.typing import NDArray
 
 from . import Chain
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
-from ._motion import (
-    base_acceleration,
-    carry_acceleration,
-    carry_pose,
-    carry_velocity,
-    coordinate,
-    link_pose,
-)
+from ._motion import base_acceleration, carry_acceleration, carry_pose, carry_velocity, link_pose
 from ._vectors import (
     Matrix,
     Vector,
@@ -48,8 +34,6 @@ from ._vectors import (
 __all__ = ["energy_regressors", "momentum_regressors", "power_regressors", "torque_regressors"]
 
 Bools = NDArray[np.bool_]
-
-INERTIA, MOMENTS, MASS = 1, 2, 4  # bits: which of XX to ZZ, MX MY MZ, and M is wanted
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
@@ -79,37 +63,15 @@ def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Ve
 
 
 @compiled()
-def wanted_wrench_columns(
-    t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector, wanted: int
-) -> Ten:
-    """`wrench_columns` for the bits of ``wanted``; zero for the others."""
-    if wanted & INERTIA:
-        if wanted & (MOMENTS | MASS):
-            return wrench_columns(t, z, w, dw, U, u)
-        nothing = (0.0, 0.0, 0.0)
-        return wrench_columns(nothing, z, w, dw, U, nothing)
-    a, b, c = 0.0, 0.0, 0.0
-    if wanted & MOMENTS:
-        pull = transpose_times(U, t)
-        turn = cross(u, z)
-        a, b, c = pull[0] + turn[0], pull[1] + turn[1], pull[2] + turn[2]
-    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, c, dot(t, u))
+def needed_links(place: Ints, antecedent: Ints, wanted: Bools, needed: Bools) -> None:
+    """Whether a link has requested parameters, and whether it or a descendant has any.
 
-
-@compiled()
-def wanted_of_links(place: Ints, antecedent: Ints, wanted: Ints, needed: Bools) -> None:
-    """Requested kinds of parameters of each link, and whether it or a descendant has any.
-
-    ``place (10 f,)``: column of each parameter in ``out``, -1 if not requested;
-    ``wanted (f,)`` bits and ``needed (f,)`` are written.
+    ``place (10 f,)``: column of each parameter in ``out``, -1 if not requested.
     """
     for k in range(antecedent.shape[0] - 1, -1, -1):
-        bits = 0
         for c in range(10):
-            if place[10 * k + c] >= 0:
-                bits |= INERTIA if c < 6 else (MOMENTS if c < 9 else MASS)
-        wanted[k] = bits
-        needed[k] |= bits != 0
+            wanted[k] |= place[10 * k + c] >= 0
+        needed[k] |= wanted[k]
         if needed[k] and antecedent[k] > 0:
             needed[antecedent[k] - 1] = True
 
@@ -165,9 +127,8 @@ def torque_regressors(
     put_vector(p, 0, (0.0, 0.0, 0.0))
     base_acceleration(chain, gravity, u)
     nothing = (0.0, 0.0, 0.0)
-    wanted = np.zeros(f, dtype=np.int64)
-    needed = np.zeros(f, dtype=np.bool_)
-    wanted_of_links(place, chain.antecedent, wanted, needed)
+    wanted, needed = np.zeros(f, dtype=np.bool_), np.zeros(f, dtype=np.bool_)
+    needed_links(place, chain.antecedent, wanted, needed)
     for i in range(q.shape[0]):
         for row in range(out.shape[1]):
             for column in range(out.shape[2]):
@@ -178,8 +139,7 @@ def torque_regressors(
             Rj, Pj = link_pose(chain, k, q, i)
             wj, dwj, Uj, uj = carry_acceleration(chain, k, v, a, i, Rj, Pj, w, dw, U, u)
             Rk, pk = carry_pose(chain, k, Rj, Pj, R, p)
-            bits = wanted[k]
-            if bits == 0:
+            if not wanted[k]:
                 continue
             inner = k + 1
             while inner > 0:
@@ -188,10 +148,10 @@ def torque_regressors(
                 if chain.sigma[inner - 1] == 0:
                     # Unit motion of the link about the joint's axis
                     t = cross(z, transpose_times(Rk, subtract(pk, vector(p, inner))))
-                    columns = wanted_wrench_columns(t, z, wj, dwj, Uj, uj, bits)
+                    columns = wrench_columns(t, z, wj, dwj, Uj, uj)
                     put_columns(out, i, row, place, k, columns)
                 elif chain.sigma[inner - 1] == 1:
-                    columns = wanted_wrench_columns(z, nothing, wj, dwj, Uj, uj, bits)
+                    columns = wrench_columns(z, nothing, wj, dwj, Uj, uj)
                     put_columns(out, i, row, place, k, columns)
                 inner = chain.antecedent[inner - 1]
 
@@ -215,13 +175,9 @@ def power_regressors(
         for column in range(out.shape[2]):
             out[i, 0, column] = 0.0
         for k in range(f):
-            b = chain.antecedent[k]
             Rj, Pj = link_pose(chain, k, q, i)
-            t = transpose_times(Rj, add(vector(speed, b), cross(vector(w, b), Pj)))
-            if chain.sigma[k] == 1:
-                t = (t[0], t[1], t[2] + coordinate(v, i, chain.joint[k]))
+            _, t = carry_velocity(chain, k, v, i, Rj, Pj, w, speed)
             wj, dwj, Uj, uj = carry_acceleration(chain, k, v, a, i, Rj, Pj, w, dw, U, u)
-            put_vector(speed, k + 1, t)
             put_columns(out, i, 0, place, k, wrench_columns(t, wj, wj, dwj, Uj, uj))
 
 
@@ -322,25 +278,9 @@ def momentum_regressors(
                         dt = turn
                     put_columns(momentum, i, row, place, k, momentum_columns(t, z, w, u))
                     rate = momentum_columns(dt, dz, w, u)
-                    weight_moment = cross(weight, z)
-                    weight_force = dot(weight, t)
-                    put_columns(
-                        force,
-                        i,
-                        row,
-                        place,
-                        k,
-                        (
-                            rate[0],
-                            rate[1],
-                            rate[2],
-                            rate[3],
-                            rate[4],
-                            rate[5],
-                            rate[6] + weight_moment[0],
-                            rate[7] + weight_moment[1],
-                            rate[8] + weight_moment[2],
-                            rate[9] + weight_force,
-                        ),
-                    )
+                    put_columns(force, i, row, place, k, rate)
+                    moment, lift = cross(weight, z), dot(weight, t)
+                    for c in range(4):
+                        if place[10 * k + 6 + c] >= 0:
+                            force[i, row, place[10 * k + 6 + c]] += moment[c] if c < 3 else lift
                 inner = chain.antecedent[inner - 1]

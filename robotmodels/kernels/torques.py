@@ -1,4 +1,4 @@
-"""Joint torques by the recursive Newton-Euler algorithm, energies, and torques of the drives.
+"""Joint torques by the recursive Newton-Euler algorithm, and energies.
 
 Seed book section 1.5.2 (J. Luh, M. Walker and R. Paul 1980, in link frames and linear in the
 inertial parameters). Forward, velocities, accelerations and the wrench each link needs; backward,
@@ -35,7 +35,7 @@ from ._vectors import (
     whole_vector,
 )
 
-__all__ = ["drive_torques", "energies", "joint_torques"]
+__all__ = ["energies", "joint_torques"]
 
 
 @compiled()
@@ -125,17 +125,3 @@ def energies(q: Floats, v: Floats, chain: Chain, pi: Floats, gravity: Floats, ou
             twice += M * dot(vj, vj) + 2.0 * dot(MS, cross(vj, wj)) + dot(wj, inertia_times(J, wj))
             energy -= dot(g, add(scale(M, pk), times(Rk, MS)))
         out[i, 0], out[i, 1] = 0.5 * twice, energy
-
-
-@compiled(NOTHING(MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, OUT2))
-def drive_torques(
-    v: Floats, a: Floats, Ia: Floats, Fv: Floats, Fc: Floats, offset: Floats, out: Floats
-) -> None:
-    """``Ia a + Fv v + Fc sign(v) + offset``, joint by joint.
-
-    Shapes: v, a (N, n); Ia, Fv, Fc, offset (n,) -> out (N, n).
-    """
-    for i in range(v.shape[0]):
-        for j in range(v.shape[1]):
-            dry = Fc[j] if v[i, j] > 0.0 else (-Fc[j] if v[i, j] < 0.0 else 0.0)
-            out[i, j] = Ia[j] * a[i, j] + Fv[j] * v[i, j] + offset[j] + dry
