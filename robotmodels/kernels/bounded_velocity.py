@@ -113,9 +113,8 @@ def nearest_inside(
 ) -> tuple[int, int, float, float]:
     """Nearest ``v = x + F^T y`` to a wish with ``bounds[0] <= v <= bounds[1]``.
 
-    Shapes: x, wish (n,); bounds (2, n); F (>= f, n); basis (2, n, n) -> v, active (n,), work (5, n)
-    with the sides and pressures of the active bounds and the decomposition of the one that cannot
-    be met.
+    Shapes: x, wish (n,); bounds (2, n); F (>= f, n); basis (2, n, n) -> v, active (n,), and rows of
+    work (5, n): scratch, sides and pressures of active bounds, `dependence` of the last one.
     """
     n = x.shape[0]
     lower, upper = bounds[0], bounds[1]
