@@ -251,55 +251,25 @@ def __dir__() -> list[str]:
 
 _ROOMS = {
     ".minimal_parameters": (
-        "BaseParameters",
-        "BaseValues",
-        "StandardParameters",
-        "base_parameters",
-        "standard_parameters",
-        "uniform_bodies",
+        "BaseParameters BaseValues StandardParameters base_parameters standard_parameters "
+        "uniform_bodies"
     ),
-    ".igm.paul": (
-        "InverseModelExplanation",
-        "explain_igm",
-    ),
+    ".igm.paul": "InverseModelExplanation explain_igm",
     ".kinematics": (
-        "DampedInverse",
-        "FilteredInverse",
-        "IKMSolution",
-        "IKMStatus",
-        "OrientationKind",
-        "PseudoInverse",
-        "classify_singularity",
-        "coordinate_jacobian",
-        "force_ellipsoid",
-        "ikm",
-        "ikm_second_order",
-        "jacobian_factors",
-        "manipulability",
-        "nearest_singularity",
-        "operational_coordinates",
-        "operational_dimension",
-        "pose_from_coordinates",
-        "static_torque",
-        "static_wrench",
-        "velocity_ellipsoid",
+        "DampedInverse FilteredInverse IKMSolution IKMStatus OrientationKind PseudoInverse "
+        "classify_singularity coordinate_jacobian force_ellipsoid ikm ikm_second_order "
+        "jacobian_factors manipulability nearest_singularity operational_coordinates "
+        "operational_dimension pose_from_coordinates static_torque static_wrench "
+        "velocity_ellipsoid"
     ),
-    ".simulation": (
-        "Simulation",
-        "simulate",
-        "torque_parts",
-    ),
+    ".simulation": "Simulation simulate torque_parts",
     ".symbolic": (
-        "DirectModelExplanation",
-        "JacobianExplanation",
-        "SingularityExplanation",
-        "explain_dgm",
-        "explain_jacobian",
-        "explain_singularities",
+        "DirectModelExplanation JacobianExplanation SingularityExplanation explain_dgm "
+        "explain_jacobian explain_singularities"
     ),
-    ".symoro": ("read_par",),
+    ".symoro": "read_par",
 }
-_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
 # Threads that import rooms which import each other would otherwise see half of one.
 _OPENING = threading.RLock()
 
@@ -307,14 +277,10 @@ _OPENING = threading.RLock()
 def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
     with _OPENING:
-        if name in (
-            "calibration", "control", "datasets", "export", "flexible", "identification", "loops",
-            "obstacles", "parallel", "performance", "simulation", "symbolic", "trajectories",
-            "visual_servoing", "viz",
-        ):  # fmt: skip
-            return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:
             value = getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
             globals()[name] = value  # the next use is a plain attribute
             return value
+        if name in __all__:
+            return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

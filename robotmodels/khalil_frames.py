@@ -31,19 +31,13 @@ class JointAxis:
 
     Parameters
     ----------
-    antecedent : int
-        Number of the link it stands on: 0 is the root, else an earlier joint's number.
-    sigma : int
-        0 revolute, 1 prismatic.
+    antecedent, sigma : int
+        Number of the link it stands on, 0 the root, else an earlier joint's; 0 revolute, 1
+        prismatic.
     origin : ndarray, shape (4, 4)
         Pose of the joint (and, at ``q = 0``, of the link it moves) in the antecedent's link frame.
     axis : ndarray, shape (3,)
         Unit vector in the joint's frame; its sense is the sense of ``q``.
-
-    Examples
-    --------
-    >>> JointAxis(0, 0, np.eye(4), np.array([0.0, 0.0, 1.0])).sigma
-    0
     """
 
     antecedent: int
@@ -60,15 +54,8 @@ class KhalilFrames:
     ----------
     gamma, b, beta, alpha, d, theta, r : ndarray, shape (f,)
         Columns of the table.
-    base : ndarray, shape (4, 4)
-        Pose of R_0 in the root link.
-    link_poses : ndarray, shape (f, 4, 4)
-        Constant pose of each source link's frame in its R_j.
-
-    Examples
-    --------
-    >>> khalil_frames([JointAxis(0, 0, np.eye(4), np.array([0, 0, 1.0]))]).base[2, 2]
-    np.float64(1.0)
+    base, link_poses : ndarray, shapes (4, 4), (f, 4, 4)
+        Pose of R_0 in the root link; constant pose of each source link's frame in its R_j.
     """
 
     gamma: Array
@@ -101,10 +88,6 @@ def khalil_frames(joints: Sequence[JointAxis]) -> KhalilFrames:
     -------
     KhalilFrames
         Table columns, base and link poses.
-
-    References
-    ----------
-    Seed book section 1.2.1 with its notes; Khalil and Kleinfinger 1986 for trees.
 
     Examples
     --------

@@ -65,12 +65,9 @@ def ur10_camera() -> CameraCalibration:
     The pose T of the camera is ``Z T(q) E``: Z, where the room's frame is, is about 70 mm and 2
     degrees off, E, where the camera sits on the wrist, is unknown; both are to be estimated. The
     source gives x, y, z and roll, pitch, yaw (URDF's, ``Rot(z) Rot(y) Rot(x)``), which are poses
-    here. It names neither camera nor frame: that the direct pose and this order are meant was
-    found by fits, in which every other order is tens of millimetres or of degrees off. The
-    board's pose in the camera is what was measured, so that errors of position and angle are
-    correlated: a turn that is 0.1 degrees off is 0.8 mm at the camera, 0.45 m away.
-
-    Comments, plugins, shapes and meshes of the source's URDF are left out.
+    here; that this order is meant was found by fits. The board's pose in the camera is what was
+    measured, so that errors of position and angle are correlated: a turn that is 0.1 degrees off is
+    0.8 mm at the camera, 0.45 m away.
 
     Returns
     -------

@@ -9,13 +9,16 @@ from types import MappingProxyType
 import numpy as np
 
 from .._arrays import Array, Rebuilt, as_exact, read_only
+from ..dynamics import with_payload
 from ..errors import InvalidValueError, nearest_names
 from ..model import RobotModel
+from ..robots import load
 from ._files import folder, numbers
-from .panda_masses import panda_masses
 
 _ROBOTS = ("panda_1", "panda_2")
 _DISTANCE = 0.05
+_HAND = 0.73, (-0.01, 0.0, 0.03), np.diag((0.001, 0.0025, 0.0017))
+"""Mass, kg, centre of mass and inertia of the Panda's hand."""
 _SOURCE = (
     "Franzese and others, arXiv:2503.12584 (2025); data of "
     "github.com/platonics-delft/kinematics_calibration, commit 05a05ab4cbbe"
@@ -28,10 +31,8 @@ class DoubleSocket(Rebuilt):
 
     Parameters
     ----------
-    robot : str
-        Which arm.
-    urdf : str
-        The nominal robot as URDF, meshes and inertia left out by its authors.
+    robot, urdf : str
+        Which arm; the nominal robot as URDF, meshes and inertia left out by its authors.
     places : mapping of str to (ndarray, ndarray)
         For each place of the pair of sockets in the room: readings of the joints with the ball in
         socket 0 and in socket 1, shapes ``(N, 7)``, rad. Read-only.
@@ -39,10 +40,6 @@ class DoubleSocket(Rebuilt):
         Of the two sockets, m.
     source, licence : str
         Where the data come from, and their terms.
-
-    References
-    ----------
-    arXiv:2503.12584.
     """
 
     robot: str
@@ -67,11 +64,12 @@ class DoubleSocket(Rebuilt):
     def model(self) -> RobotModel:
         """The nominal robot with masses, its tool the centre of the ball.
 
-        The URDF has no masses: those of `panda_masses` are added, so that compliance under
-        gravity can be asked of it. They move nothing else. Ball and its holder have no mass here.
+        The URDF has no masses: the catalogue's and those of the hand (C. Gaz and others, IEEE RA-L
+        4(4), 2019) are added, for compliance under gravity. Ball and holder have none.
         """
         bare = RobotModel.from_urdf(self.urdf, tip_link="ball_link")
-        return bare.with_inertia(panda_masses())
+        bare = bare.with_inertia(load("panda").inertia)
+        return with_payload(bare, *_HAND, frame="panda_hand")
 
     @property
     def blocks(self) -> int:
@@ -83,15 +81,9 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     """The double socket with a Panda: 182 readings at 3 places, or 559 at 9.
 
     A ball on the flange sits in one of two sockets that are 50 mm apart, printed as one part; the
-    hand is turned about it, and only the joints are read. No device measures anything. Poses that
-    the controller believed in (``*_pose.csv`` of the source) are not shipped: they follow from
-    the readings.
-
-    The `model` has the published masses of the Panda's links and of its hand, which the URDF
-    leaves out, so that ``calibration.fit(data.model, ..., compliance="isotropic")`` can be asked.
-
-    What looks like two arms may be one on two days: what is identified of them agrees within its
-    deviations. At the place ``high`` of panda_2 the socket was moved in between.
+    hand is turned about it, and only the joints are read. No device measures anything. What looks
+    like two arms may be one on two days: what is identified of them agrees within its deviations.
+    At the place ``high`` of panda_2 the socket was moved in between.
 
     Parameters
     ----------
@@ -103,16 +95,10 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     DoubleSocket
         URDF, readings by place, distance of the sockets.
 
-    Raises
-    ------
-    InvalidValueError
-        Another robot.
-
     References
     ----------
-    Franzese and others, arXiv:2503.12584, 2025: mean distance from the
-    sockets 8.28 mm with the nominal robot, 0.168 mm after calibration where it was fitted and
-    0.347 mm elsewhere.
+    Franzese and others, arXiv:2503.12584, 2025: mean distance from the sockets 8.28 mm with the
+    nominal robot, 0.168 mm after calibration where it was fitted and 0.347 mm elsewhere.
 
     Examples
     --------
@@ -121,8 +107,6 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     {'back-high': (30, 30), 'front': (30, 32), 'right': (30, 30)}
     >>> data.model.n, data.distance, data.licence
     (7, 0.05, 'MIT')
-    >>> round(float(data.model.inertia.mass.sum()), 2)
-    16.79
     """
     if robot not in _ROBOTS:
         near = ", ".join(nearest_names(str(robot), _ROBOTS)) or ", ".join(_ROBOTS)

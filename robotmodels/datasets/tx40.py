@@ -117,11 +117,9 @@ def load_tx40() -> Tx40Log:
 
     References
     ----------
-    T. Nguyen, figaroh-plus (Apache-2.0), examples/staubli_TX40: ZZ1R 1.242, Fv1 8.09, Fc1 7.01 by
-    weighted least squares; root mean square error of its fits on rows 29250 to 45000: 6.40 8.21
-    4.13 1.72 2.65 1.72 N m, the best of each joint. The same robot: A. Janot, P.-O. Vandanjon and
-    M. Gautier, "An instrumental variable approach for rigid industrial robots identification",
-    Control Engineering Practice 25, 2014.
+    T. Nguyen, figaroh-plus (Apache-2.0), examples/staubli_TX40: root mean square error of its fits
+    on rows 29250 to 45000: 6.40 8.21 4.13 1.72 2.65 1.72 N m, the best of each joint. The same
+    robot: A. Janot, P.-O. Vandanjon and M. Gautier, Control Engineering Practice 25, 2014.
 
     Examples
     --------

@@ -46,10 +46,8 @@ class DHTable:
         0 revolute, 1 prismatic, 2 fixed frame.
     mu : array_like of int, shape (f,), optional
         1 actuated, 0 passive; all 1 by default. Fixed frames are not actuated: always 0.
-    gamma, beta, alpha, theta : array_like, shape (f,), optional
-        Radians, default 0.
-    b, d, r : array_like, shape (f,), optional
-        Metres, default 0.
+    gamma, beta, alpha, theta, b, d, r : array_like, shape (f,), optional
+        Radians and metres, default 0.
     names : sequence of str, length f, optional
         Names of the frames; default ``joint_1``, ``joint_2``, ... (``frame_j`` for fixed frames).
     lower, upper : array_like, shape (n,), optional
@@ -67,10 +65,6 @@ class DHTable:
         limits the wrong way round, repeated names.
     ShapeError, InvalidValueError
         Columns of different lengths; NaN anywhere, infinity in a geometric column.
-
-    References
-    ----------
-    Seed book section 1.2.1, eq. [1.2], [1.3] and Table 1.1.
 
     Examples
     --------
@@ -159,16 +153,6 @@ class DHTable:
         degrees : bool
             Whether the angles (and the limits and velocities of revolute joints) are in degrees.
 
-        Returns
-        -------
-        DHTable
-            The table, in radians.
-
-        Raises
-        ------
-        TableError
-            An unknown key (the nearest known ones are named), or as the constructor.
-
         Examples
         --------
         >>> t = DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 90, "d": 0.1}], degrees=True)
@@ -200,15 +184,6 @@ class DHTable:
             The equivalent Khalil-Kleinfinger table with the same joint variables.
         tool : ndarray, shape (4, 4)
             ``Trans(x, a_n) Rot(x, alpha_n)``, to be given to the model as its tool.
-
-        Raises
-        ------
-        TableError, InvalidValueError
-            As `from_rows`.
-
-        References
-        ----------
-        P. I. Corke, *Robotics, Vision and Control*, section 7.1, for the classical convention.
 
         Examples
         --------
@@ -245,17 +220,7 @@ class DHTable:
         return bool((self.antecedent == np.arange(self.f)).all())
 
     def path(self, frame: int) -> list[int]:
-        """Numbers of the frames from the base to one frame, that frame included.
-
-        Parameters
-        ----------
-        frame : int
-            Frame number 1..f; 0, the base, has an empty path.
-
-        Returns
-        -------
-        list of int
-            Frame numbers, ascending.
+        """Numbers of the frames from the base to one frame, 1..f (0: none), ascending.
 
         Examples
         --------
@@ -269,22 +234,7 @@ class DHTable:
         return path[::-1]
 
     def replace(self, **columns: ArrayLike | Sequence[str]) -> Self:
-        """The same table with some columns changed.
-
-        Parameters
-        ----------
-        **columns : array_like
-            Fields of the table by name, shapes as in the constructor.
-
-        Returns
-        -------
-        DHTable
-            A new table.
-
-        Raises
-        ------
-        TableError
-            An unknown column, or as the constructor.
+        """The same table with some columns changed, named and shaped as in the constructor.
 
         Examples
         --------

@@ -18,9 +18,6 @@ from .table import DHTable
 def constant_factors(table: DHTable) -> Array:
     """The constant part ``C_j`` of each factor: ``T(a(j), j) = C_j Motion(q_j)``.
 
-    The motion (rotation about or translation along z) commutes with ``Rot(z, theta)
-    Trans(z, r)``, so everything that does not depend on ``q`` stands on its left.
-
     Parameters
     ----------
     table : DHTable
@@ -66,15 +63,6 @@ def link_transforms(table: DHTable, q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., f, 4, 4)
         One factor per row; their product along a branch is the pose of its last frame in R_0.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``q`` has the wrong length, or holds NaN or infinity.
-
-    References
-    ----------
-    Seed book eq. [1.3].
 
     Examples
     --------

@@ -1,9 +1,8 @@
 """The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
 
 from .argument import as_positions, check_model
-from .frame_of_interest import FrameOfInterest
 from .robot_model import GRAVITY, RobotModel
-from .twin import PinocchioTwin
+from .twin import FrameOfInterest, PinocchioTwin
 from .write import to_urdf, write_urdf
 
 __all__ = [

@@ -20,8 +20,6 @@ _TWO_TURNS = 4.0 * np.pi
 def as_positions(model: RobotModel, q: ArrayLike) -> Array:
     """Check joint positions; angles that may be degrees warn, once for a robot.
 
-    The angles of the first hundred calls are looked at.
-
     Parameters
     ----------
     model : RobotModel
@@ -34,20 +32,11 @@ def as_positions(model: RobotModel, q: ArrayLike) -> Array:
     ndarray, shape (..., n)
         The same as floats.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another length; NaN or infinity.
-
     Warns
     -----
     RobotModelsWarning
-        A revolute joint is more than two turns away from zero, and beyond its limits.
-
-    Examples
-    --------
-    >>> as_positions(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0])), [0.5])
-    array([0.5])
+        A revolute joint is more than two turns away from zero, and beyond its limits, in one of
+        the first hundred calls.
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
@@ -82,15 +71,6 @@ def check_model(model: object) -> None:
     ----------
     model : object
         First argument of a public function.
-
-    Raises
-    ------
-    InvalidValueError
-        It is a name, a table, a Pinocchio model or something else.
-
-    Examples
-    --------
-    >>> check_model(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0])))
     """
     if isinstance(model, RobotModel):
         return

@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import LARGEST, Array, as_bounded, as_exact, read_only, same_value, value_hash
 from ..drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
-from ..geometry import DHTable
+from ..geometry import DHTable, constant_factors
 from ..inertia import InertialParameters
 from ..kernels import Chain
 from ..urdf import NamedFrame, RobotParts, read_urdf
 from ..urdf.parts import UrdfSource
 from ..visual import Visual
-from .chain import multiplied_out
 from .changed import Changeable
 from .other_names import no_attribute
 from .part_checks import check_count, check_name, check_table, check_tip, checked_postures
@@ -45,26 +44,9 @@ class RobotModel(Changeable):
 
     Parameters
     ----------
-    name : str
-        Of the robot.
-    table : DHTable
-        Geometric parameters.
-    inertia : InertialParameters
-        Of the f frames.
-    drive : DriveParameters
-        Of the n joints.
-    base : ndarray, shape (4, 4)
-        ``Z``: pose of R_0 in the world (seed eq. [1.10]).
-    tool : ndarray, shape (4, 4)
-        ``E``: pose of the tool in the tip frame.
-    tip : int
-        Number of the frame that carries the tool.
-    gravity : ndarray, shape (3,)
-        Acceleration of gravity in the world frame, m/s^2.
-    transmission : Transmission or None
-        Between encoders and joints.
-    configurations : mapping of str to ndarray, shape (n,)
-        Named postures; ``"zero"`` is always there.
+    name, table, inertia, drive, base, tool, tip, gravity, transmission, configurations
+        As for `from_table`, checked. ``base`` is ``Z``, the pose of R_0 in the world, and ``tool``
+        ``E``, that of the tool in the tip frame, both of shape (4, 4) (seed eq. [1.10]).
     frames : tuple of NamedFrame
         Frames of interest, such as every link of a source URDF.
     visuals : tuple of Visual
@@ -73,10 +55,6 @@ class RobotModel(Changeable):
         What a reader merged, locked or left out, in sentences.
     source : UrdfSource or None
         Text and options of the URDF that it was read from; no part of equality.
-
-    References
-    ----------
-    Seed book sections 1.2 and 1.5.
 
     Examples
     --------
@@ -161,11 +139,6 @@ class RobotModel(Changeable):
         configurations : mapping of str to array_like, shape (n,), optional
             Named postures; ``"zero"`` is added.
 
-        Returns
-        -------
-        RobotModel
-            The model.
-
         Raises
         ------
         ShapeError, InvalidValueError, NotARotationError, FrameNotFoundError
@@ -205,9 +178,9 @@ class RobotModel(Changeable):
     ) -> Self:
         """Make a model from a URDF: its Khalil-Kleinfinger table is extracted.
 
-        ``q`` keeps the URDF's sign and zero. Every link below the base is a named frame; the
-        links that were merged by fixed joints are listed in ``notes``. Pose and dynamics are
-        those of the URDF to rounding.
+        ``q`` keeps the URDF's sign and zero. Every link below the base is a named frame; the links
+        that were merged by fixed joints are listed in ``notes``. Pose and dynamics are those of the
+        URDF.
 
         Parameters
         ----------
@@ -228,35 +201,23 @@ class RobotModel(Changeable):
         mimic : bool
             Whether mimic joints follow their masters: the coupling is then in ``transmission``.
 
-        Returns
-        -------
-        RobotModel
-            The model.
-
         Raises
         ------
-        UrdfError
-            Malformed text, a DOCTYPE, xacro, a loop, a zero axis, a negative mass, an unsupported
-            joint; with the element at fault and what to do.
-        MeshNotFoundError
-            A mesh is not in the given package folders.
-        FrameNotFoundError
-            ``base_link`` or ``tip_link`` is unknown, or the tip is not below the base.
+        UrdfError, MeshNotFoundError, FrameNotFoundError
+            Malformed text, a DOCTYPE, xacro, a loop, an unsupported joint, with the element at
+            fault and what to do; a mesh that is not in the given folders; a link that is unknown.
 
         Notes
         -----
         Without ``tip_link`` the tool is the link called ``tool``. Else it is the link carried by
-        the last joint of the file, or what is fixed to it as long as that is a single link. Of
-        several arms it is thus that of the last one. If a hand or gripper follows the arm, the tool
-        is the last link before it. A hand is a point where the chain branches into shorter moving
-        branches, if the two longest are equal or at least six joints precede it. If links fixed to
-        that last link are called ``tool0``, ``tcp``, ``tool``, ``ee_link``, ``flange`` or ``hand``,
-        the tool is the first of them in this order. A link of such a name also marks the end of the
-        arm before a single finger. ``print(model)`` names the tip and other links; ``notes`` say
-        what was chosen.
-
-        Joints that do not move the tool are no redundancy: inverse models leave them at their
-        reference.
+        the last joint of the file, or what is fixed to it as long as that is a single link. If a
+        hand or gripper follows the arm, the tool is the last link before it: a hand is a point
+        where the chain branches into shorter moving branches, if the two longest are equal or at
+        least six joints precede it. If links fixed to that last link are called ``tool0``, ``tcp``,
+        ``tool``, ``ee_link``, ``flange`` or ``hand``, the tool is the first of them in this order.
+        A link of such a name also marks the end of the arm before a single finger. ``print(model)``
+        names the tip and other links. Inverse models leave joints that do not move the tool at
+        their reference.
 
         Examples
         --------
@@ -381,3 +342,19 @@ class RobotModel(Changeable):
         parts = [getattr(self, p) for p in _PARTS]
         parts[_PARTS.index("configurations")] = dict(self.configurations)
         return type(self), tuple(parts)
+
+
+def multiplied_out(table: DHTable, base: Array) -> Chain:
+    """Arrays of a table for the kernels: structure and constant transforms."""
+    C = constant_factors(table)
+    joint = np.full(table.f, -1, dtype=np.int64)
+    joint[table.joint_rows] = np.arange(table.n)
+    return Chain(
+        antecedent=table.antecedent,
+        sigma=table.sigma,
+        joint=read_only(joint, np.int64),
+        rotation=read_only(C[:, :3, :3]),
+        position=read_only(C[:, :3, 3]),
+        base_rotation=read_only(base[:3, :3]),
+        base_position=read_only(base[:3, 3]),
+    )

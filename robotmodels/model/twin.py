@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,37 @@ from ..errors import FrameNotFoundError
 from ..geometry import FIXED
 from ..inertia import InertialParameters
 from ..urdf import RobotParts, urdf_text
-from ..urdf.write import link_names
-from .frame_of_interest import FrameOfInterest
-from .urdf_digits import keeps_inertia
+from ..urdf.write import keeps_inertia, link_names
 
 _LONGEST_CHAIN = 100
 """Joints up to which single calls go through Pinocchio, whose scratch data grow with n cubed."""
 _FRAME_KINDS = frozenset((str, int, type(None)))
+
+
+@dataclass(frozen=True, slots=True)
+class FrameOfInterest:
+    """A frame whose pose or Jacobian can be asked for.
+
+    Parameters
+    ----------
+    parent, pin_id : int
+        Number of the table's frame it is fixed to (0 is R_0), and its own in the Pinocchio model.
+    path : ndarray of int, shape (k,)
+        Numbers of the table's frames from the base to the parent.
+    rotation, position : ndarray, shapes (3, 3), (3,)
+        Axes and origin in the parent frame, metres.
+    """
+
+    parent: int
+    path: NDArray[np.int64]
+    rotation: Array
+    position: Array
+    pin_id: int
+
+    @property
+    def kernel_arguments(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """What compiled kernels take: path, rotation, position."""
+        return self.path, self.rotation, self.position
 
 
 class PinocchioTwin:
@@ -34,14 +58,6 @@ class PinocchioTwin:
         The robot.
     gravity : ndarray, shape (3,)
         Acceleration in the world frame, m/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.model import RobotModel
-    >>> twin = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0])).twin
-    >>> twin.model.nq
-    1
     """
 
     __slots__ = (

@@ -9,17 +9,18 @@ import numpy as np
 
 from ..errors import UrdfError, UrdfWarning
 from ..urdf import TOOL, urdf_text
+from ..urdf.write import keeps_inertia
 from .argument import check_model
 from .robot_model import GRAVITY, RobotModel
-from .urdf_digits import keeps_inertia
 
 
 def to_urdf(model: RobotModel) -> str:
-    """URDF text of a model; also called export.
+    """URDF text of a model; also called export. The same model always gives the same text.
 
     Full-precision numbers, so that reading it back gives the same poses, Jacobians and torques.
-    The tool is the link called ``tool``, which `RobotModel.from_urdf` takes for it again. Named
-    configurations are no part of a URDF.
+    The tool is the link called ``tool``, which `RobotModel.from_urdf` takes for it again. A
+    `UrdfWarning` lists what has no place in a URDF: rotor inertia, torque offsets, gravity other
+    than 9.81 m/s^2 downwards, inertia that no body has, passive joints, transmissions.
 
     Parameters
     ----------
@@ -29,19 +30,13 @@ def to_urdf(model: RobotModel) -> str:
     Returns
     -------
     str
-        The text; the same model always gives the same text.
+        The text.
 
     Raises
     ------
     UrdfError
         A transmission ties joints together in a way that a URDF cannot say, so that the text
         would describe a robot with other poses.
-
-    Warns
-    -----
-    UrdfWarning
-        Lists what has no place in a URDF: rotor inertia, torque offsets, gravity other than
-        9.81 m/s^2 downwards, inertia that no body has, passive joints, transmissions.
 
     Examples
     --------
@@ -71,11 +66,6 @@ def write_urdf(model: RobotModel, path: str | Path) -> None:
         The robot.
     path : str or Path
         The file; its folder must exist.
-
-    Raises
-    ------
-    UrdfError
-        As `to_urdf`, or the file cannot be written.
 
     Examples
     --------

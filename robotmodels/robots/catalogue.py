@@ -1,4 +1,10 @@
-"""Robots by name: the catalogue's own, and ``erd:<name>`` for the arms of example-robot-data."""
+"""Robots by name: the catalogue's own, and ``erd:<name>`` for the arms of example-robot-data.
+
+Parameters
+----------
+name : str
+    One of `robots`; another is a `RobotNotFoundError` with the nearest names.
+"""
 
 from __future__ import annotations
 
@@ -58,20 +64,10 @@ def robots() -> tuple[str, ...]:
 def title(name: str) -> str:
     """One-line description of a robot.
 
-    Parameters
-    ----------
-    name : str
-        One of `robots`.
-
     Returns
     -------
     str
         A sentence.
-
-    Raises
-    ------
-    RobotNotFoundError
-        The name is unknown.
 
     Examples
     --------
@@ -88,20 +84,10 @@ def title(name: str) -> str:
 def source(name: str) -> str:
     """Origin of every number of a robot of the catalogue.
 
-    Parameters
-    ----------
-    name : str
-        One of `robots`.
-
     Returns
     -------
     str
         Title, conventions, source of geometry, limits, inertia and drives, references.
-
-    Raises
-    ------
-    RobotNotFoundError
-        The name is unknown.
 
     Examples
     --------
@@ -132,12 +118,9 @@ def load(name: str | Path) -> RobotModel:
 
     Raises
     ------
-    RobotNotFoundError
-        The name is unknown; the nearest names are listed.
-    MissingExtraError
-        An ``erd:`` name, and the data of example-robot-data are not installed.
-    UrdfError, InvalidValueError, FileNotFoundError
-        A file that cannot be read as a robot.
+    RobotNotFoundError, MissingExtraError, UrdfError, InvalidValueError, FileNotFoundError
+        The name is unknown; the data of example-robot-data are not installed; a file that cannot be
+        read as a robot.
 
     Examples
     --------

@@ -26,10 +26,9 @@ def read_par(
     """Read a SYMORO ``.par`` file; SYMORO+'s and OpenSYMORO's spelling are both understood.
 
     The symbol in a joint's own column (theta if revolute, r if prismatic) is its variable,
-    whatever its name; what is added to it is the offset, so ``q`` is SYMORO's. A number alone in
-    that column is an offset. All other symbols get numbers from ``values``. Dynamic parameters
-    that only stand for themselves (``XX1``, ``FV2``) and are not in ``values`` are 0; a warning
-    and the model's ``notes`` say which. Frames with sigma 2 and mu are kept.
+    whatever its name; what is added to it is the offset, so ``q`` is SYMORO's. All other symbols
+    get numbers from ``values``. Dynamic parameters that only stand for themselves (``XX1``,
+    ``FV2``) and are not in ``values`` are 0; a warning and the model's ``notes`` say which.
 
     Parameters
     ----------
@@ -50,19 +49,10 @@ def read_par(
 
     Raises
     ------
-    ParFileError
-        The file is missing or not a ``.par`` file; lists of the wrong length, entries that are
-        not expressions, symbols without a number, a variable with another sign or factor than
-        +1; loops (see `robotmodels.loops.read_par`), floating or mobile bases, flexible joints.
-    TableError
-        Antecedents that do not come before their successors.
-    InvalidValueError
-        A value that is not a finite number.
-
-    Warns
-    -----
-    RobotModelsWarning
-        Lists dynamic parameters without numbers and keywords that are not SYMORO's.
+    ParFileError, TableError, InvalidValueError
+        Not a ``.par`` file; lists of the wrong length, symbols without a number, a variable with
+        another sign or factor than +1; loops (see `robotmodels.loops.read_par`), floating or mobile
+        bases, flexible joints; antecedents out of order; a value that is not a finite number.
 
     References
     ----------

@@ -113,12 +113,11 @@ def _carrier_of_tool(parts: RobotParts, links: dict[str, NamedFrame]) -> str:
 
 def _joints_to(tree: UrdfTree, root: str, links: Iterable[str]) -> set[str]:
     """Names of the joints between the root and some links."""
-    carrying = {joint.child: joint for joint in tree.joints.values()}
     found: set[str] = set()
     for link in links:
-        while link != root:
-            found.add(carrying[link].name)
-            link = carrying[link].parent
+        while link != root and (joint := tree.parent_joint(link)) is not None:
+            found.add(joint.name)
+            link = joint.parent
     return found
 
 

@@ -27,14 +27,7 @@ class NamedFrame:
     pose : ndarray, shape (4, 4)
         In that frame.
     merged : bool
-        Whether it was a link of its own in the source, fixed to (or locked on) another one, so
-        that its inertia is now part of that one's.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> NamedFrame("flange", 6, np.eye(4)).merged
-    False
+        Whether it was a link of its own in the source, whose inertia is now part of another one's.
     """
 
     name: str
@@ -66,36 +59,8 @@ class RobotParts:
 
     Parameters
     ----------
-    name : str
-        Of the robot.
-    table : DHTable
-        Geometric parameters, f frames and n joints.
-    base, tool : ndarray, shape (4, 4)
-        Pose of R_0 in the world, pose of the tool in the tip frame.
-    tip : int
-        Number of the frame that carries the tool.
-    inertia : InertialParameters
-        Of the f frames.
-    drive : DriveParameters
-        Of the n joints.
-    transmission : Transmission, optional
-        Between encoders and joints.
-    frames : tuple of NamedFrame
-        Frames of interest.
-    visuals : tuple of Visual
-        Shapes; empty if the source has none.
-    notes : tuple of str
-        Sentences about what a reader merged, locked or left out.
-    source : UrdfSource, optional
-        What the parts were read from.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> table = DHTable(antecedent=[0], sigma=[0])
-    >>> RobotParts("one", table, np.eye(4), np.eye(4), 1, InertialParameters.zeros(1),
-    ...            DriveParameters.zeros(1)).frames
-    ()
+    name, table, base, tool, tip, inertia, drive, transmission, frames, visuals, notes, source
+        As for `RobotModel`: base and tool of shape (4, 4), f frames and n joints.
     """
 
     name: str

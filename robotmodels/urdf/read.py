@@ -38,42 +38,13 @@ def read_urdf(
 
     Parameters
     ----------
-    path_or_text : str or Path
-        A file, or the text itself (recognised by its ``<``).
-    base_link : str, optional
-        Link whose frame is the world; default the root. What is above it is left out.
-    tip_link : str, optional
-        Link whose frame is the tool. The joints between base and tip are kept, others are locked
-        at zero. Default: every joint below the base is kept, and the tool is the end of the arm,
-        see `RobotModel.from_urdf`.
-    package_dirs : path or iterable of paths
-        Folders that hold the packages named in ``package://`` meshes.
-    dynamics : bool
-        Whether ``<dynamics damping friction>`` become Fv and Fc.
-    mimic : bool
-        Whether mimic joints follow their masters (through the transmission) or are independent.
+    path_or_text, base_link, tip_link, package_dirs, dynamics, mimic
+        As for `RobotModel.from_urdf`; a text is recognised by its ``<``.
 
     Returns
     -------
     RobotParts
         Table, base, tool, inertia, limits, named frames, shapes and notes.
-
-    Raises
-    ------
-    UrdfError
-        The text is malformed or describes something a table cannot.
-    FrameNotFoundError
-        ``base_link`` or ``tip_link`` is not a link, or the tip is not below the base.
-    MeshNotFoundError
-        A mesh is not in the given package folders.
-
-    Examples
-    --------
-    >>> text = '''<robot name="one"><link name="base"/><link name="arm"/>
-    ... <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
-    ... <origin xyz="0 0 0.4"/><axis xyz="0 0 1"/></joint></robot>'''
-    >>> float(read_urdf(text).base[2, 3])
-    0.4
     """
     text, folder = _text_of(path_or_text)
     tree = parse_urdf(text, MeshFinder.of(package_dirs, folder))
@@ -179,7 +150,8 @@ def _parts(
         ]
     if tip_link is None:
         tip_frame, beyond = default_tip(tree, table.names, table.antecedent.tolist(), named)
-        notes += _tip_notes(tip_frame.name, beyond, len(_leaves(table)))
+        leaves = set(range(1, table.f + 1)) - set(table.antecedent.tolist())
+        notes += _tip_notes(tip_frame.name, beyond, len(leaves))
     else:
         tip_frame = next(frame for frame in named if frame.name == tip_link)
     zeros = np.zeros(len(joints))
@@ -230,10 +202,7 @@ def _walk(
     notes: list[str],
 ) -> None:
     """Number the moving joints depth first, in the order of the file, and place every link."""
-    following: dict[str, list[UrdfJoint]] = {}
-    for joint in tree.joints.values():
-        following.setdefault(joint.parent, []).append(joint)
-    stack = [(joint, start) for joint in reversed(following.get(start.name, []))]
+    stack = [(joint, start) for joint in reversed(tree.children(start.name))]
     while stack:
         joint, parent = stack.pop()
         left_out = kept is not None and joint.name not in kept
@@ -259,7 +228,7 @@ def _walk(
                 f"of {owner}."
             )
         placed.append(link)
-        stack += [(j, link) for j in reversed(following.get(joint.child, []))]
+        stack += [(j, link) for j in reversed(tree.children(joint.child))]
 
 
 def _tip_notes(tip: str, beyond: int, branches: int) -> list[str]:
@@ -270,11 +239,6 @@ def _tip_notes(tip: str, beyond: int, branches: int) -> list[str]:
     if beyond:
         end += f", before {beyond} moving joint{'s' * (beyond > 1)} of a hand or gripper"
     return [f"the tool is link {tip!r}{end}. Use tip_link= or with_tool to choose another."]
-
-
-def _leaves(table: DHTable) -> list[int]:
-    """Numbers of the frames that nothing stands on."""
-    return [j for j in range(1, table.f + 1) if j not in table.antecedent]
 
 
 def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialParameters:

@@ -110,7 +110,14 @@ def parse_urdf(text: str, meshes: MeshFinder) -> UrdfTree:
         _add(joints, joint.name, joint, "joint")
     if not links:
         raise UrdfError("the robot has no <link>.")
-    return UrdfTree(robot.get("name", "robot"), links, joints, _root(links, joints))
+    root = _root(links, joints)
+    tree = UrdfTree(robot.get("name", "robot"), links, joints, root)
+    reached = [root]
+    for link in reached:  # grows
+        reached += [joint.child for joint in tree.children(link)]
+    if lost := sorted(links.keys() - {*reached}):
+        raise UrdfError(f"the links {', '.join(lost[:5])} form a loop apart from the root.")
+    return tree
 
 
 def _element_tree(text: str) -> ET.Element:
@@ -180,17 +187,6 @@ def _root(links: dict[str, UrdfLink], joints: dict[str, UrdfJoint]) -> str:
             f"{len(roots)} root links ({', '.join(roots[:5])}): connect them with joints"
         )  # fmt: skip
         raise UrdfError(f"the robot has {what}.")
-    reached, stack = {roots[0]}, [roots[0]]
-    following: dict[str, list[str]] = {}
-    for joint in joints.values():
-        following.setdefault(joint.parent, []).append(joint.child)
-    while stack:
-        for child in following.get(stack.pop(), []):
-            reached.add(child)
-            stack.append(child)
-    lost = [name for name in links if name not in reached]
-    if lost:
-        raise UrdfError(f"the links {', '.join(lost[:5])} form a loop apart from the root.")
     return roots[0]
 
 
