@@ -153,7 +153,8 @@ def erroneous_poses(
     for i in range(q.shape[0]):
         for m in range(k):
             j = path[m]
-            elements[m] = nominal[j]
+            for e in range(_ELEMENTS):
+                elements[m, e] = nominal[j, e]
             if sigma[j] == 0:
                 elements[m, 5] += q[i, joint[j]]
             elif sigma[j] == 1:
