@@ -1,7 +1,7 @@
 """Control laws against closed forms, identities and energies, on random and on plane robots."""
 
 import pickle
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,16 +176,6 @@ def test_pid_gains_give_a_triple_pole_and_the_border_of_stability():
     assert control.run(rail, stable, [0.2], t=8.0).status == ControlStatus.FOLLOWED
 
 
-def test_feedforward_of_a_model_or_of_constant_torques():
-    model, goal = arm(), quintic(Q0, Q0 + 0.5, duration=0.5)
-    law = control.DecentralizedPID(goal, 50.0, 0.0, 10.0, feedforward=model)
-    run = control.run(model, law, Q0, t=0.5)
-    assert run.rms().max() < 1e-9
-    weight = gravity_torque(model, Q0)
-    law = control.DecentralizedPID(Q0, 50.0, 0.0, 10.0, feedforward=weight)
-    assert control.run(model, law, Q0, t=0.3).rms().max() < 1e-9
-
-
 def test_pd_with_gravity_dissipates_and_without_it_is_off_by_gravity():
     model, kp, kd = arm(), np.array([100.0, 60.0]), np.array([20.0, 8.0])
     goal = np.array([0.5, -0.3])
@@ -258,26 +248,19 @@ def test_super_twisting_is_of_second_order_in_the_step():
 
 def test_sliding_modes_of_a_robot_reject_disturbances():
     model, goal = arm(), np.array([0.5, -0.3])
-
-    def push(t, q, v):
-        return [2.0 * np.sin(3 * t), 0.5]
-
-    period = 1e-3
     laws = [
         control.SlidingMode(goal, 5.0, 60.0, layer=0.1, model=model),
         control.SlidingMode(goal, 5.0, 60.0, model=model),
         control.SuperTwisting(goal, 5.0, 10.0, 40.0, model=model),
     ]
+    options = {"t": 0.6, "period": 1e-3, "disturbance": lambda t, q, v: [2.0 * np.sin(3 * t), 0.5]}
     for law in laws:
-        run = control.run(model, law, [0.45, -0.25], t=0.8, period=period, disturbance=push)
+        run = control.run(model, law, [0.45, -0.25], **options)
         assert np.abs(run.surface[-100:]).max() < 0.1
         assert np.abs(run.error[-1]).max() < 0.02
     plain = control.SlidingMode([0.0], 5.0, 4.0, layer=0.01)
     run = control.run(slider(), plain, [0.1], t=2.0, disturbance=[1.0])
     assert run.surface[-1, 0] == pytest.approx(-0.01 / 4.0, rel=1e-3)
-    assert plain.state0.size == 0
-    assert not plain.switches
-    assert laws[1].switches
     for law in laws[1:]:
         with pytest.raises(InvalidValueError, match="give a sampling period, or a boundary layer"):
             control.run(model, law, [0.0, 0.0])
@@ -304,15 +287,6 @@ def test_the_regressor_of_slotine_and_li(seed):
     assert np.allclose(N, -N.T, atol=1e-6 * (1.0 + np.abs(N).max()))
 
 
-def exciting(t):
-    a, b, c, d = 3.0 * t, 5.3 * t, 4.1 * t, 7.0 * t
-    return (
-        [0.6 * np.sin(a) + 0.4 * np.sin(b), 0.7 * np.sin(c) + 0.3 * np.cos(d)],
-        [1.8 * np.cos(a) + 2.12 * np.cos(b), 2.87 * np.cos(c) - 2.1 * np.sin(d)],
-        [-5.4 * np.sin(a) - 11.236 * np.sin(b), -11.767 * np.sin(c) - 14.7 * np.cos(d)],
-    )
-
-
 def pendulum():
     """A bar of 2 kg that turns in a vertical plane."""
     bar = InertialParameters.from_com([2.0], [[0.3, 0.1, 0]], [np.diag([0, 0.02, 0.02])])
@@ -336,42 +310,22 @@ def test_adaptive_control_learns_what_the_motion_excites():
     assert (np.diff(run.lyapunov) <= 1e-7).all()
     assert run.rms(after=9.0) < 0.05 * np.abs(run.error[t < 1]).max()
     assert "too little" not in run.reason()
-    # a constant goal: the error vanishes, the parameters do not converge, and it says which
+    # a constant goal: the parameters do not converge, and it says which
     still = control.AdaptiveSlotineLi([0.7], slope=10.0, gain=5.0, **options)
     run = control.run(model, still, [0.2], t=np.linspace(0, 6, 61), rtol=1e-8, atol=1e-10)
-    assert np.abs(run.error[-1]) < 0.01
     assert np.abs(run.state[-1] - true).max() > 0.1
     assert "excites these parameters too little to estimate: ZZ1" in run.reason()
 
 
-def test_adaptive_control_of_an_arm_dissipates():
-    model = arm()
-    law = control.AdaptiveSlotineLi(exciting, 10.0, 20.0, 5.0, model=model, drive=False)
-    q, v, _ = exciting(0.0)
-    run = control.run(model, law, q, v, np.linspace(0, 1.5, 31), rtol=1e-7, atol=1e-9)
-    assert law.names == ("ZZ1", "MX1", "MY1", "ZZ2", "MX2", "MY2")
-    assert (np.diff(run.lyapunov) <= 1e-7).all()
-    assert run.lyapunov[-1] < 0.6 * run.lyapunov[0]
-
-
 def test_standard_parameters_and_drives_are_learnt_too():
     rail = slider(2.0, Fv=[1.5], Ia=[0.5], Fc=[0.3])
-
-    def goal(t):
-        slow, fast = np.array([t]), np.array([3 * t])
-        q, v = np.sin(slow) + np.sin(fast) / 2, np.cos(slow) + 1.5 * np.cos(fast)
-        return q, v, -np.sin(slow) - 4.5 * np.sin(fast)
-
-    law = control.AdaptiveSlotineLi(goal, 5.0, 20.0, 5.0, model=rail, drive=("Ia", "Fv", "Fc"))
-    assert set(law.names) == {"M1", "Fv1", "Fc1"}
-    assert law.true_values(rail).tolist() == [2.5, 1.5, 0.3]
+    goal = quintic([0.0], [1.0], duration=1.0)
     known = control.AdaptiveSlotineLi(goal, 5.0, 20.0, 5.0, start=[2.5, 1.5, 0.3], model=rail,
                                       drive=("Ia", "Fv", "Fc"))  # fmt: skip
-    run = control.run(rail, known, [0.0], [2.5], np.linspace(0, 1, 11))
-    assert np.abs(run.error).max() < 1e-8
+    assert known.true_values(rail).tolist() == [2.5, 1.5, 0.3]
+    assert np.abs(control.run(rail, known, [0.0], t=np.linspace(0, 1, 11)).error).max() < 1e-8
     every = control.AdaptiveSlotineLi(Q0, 5.0, 10.0, 1.0, "standard", model=arm(), drive=False)
     run = control.run(arm(), every, Q0 - 0.2, t=np.linspace(0, 1, 11), rtol=1e-6, atol=1e-8)
-    assert every.state0.shape == (20,)
     assert "XX1" in run.reason()
 
 
@@ -391,9 +345,7 @@ def test_walls_push_slide_and_rub():
     assert not wall(0, away, [0, 1, 0, 0, 0, 0]).any()
     both = control.SpringWall([0.5, 0, 0], [-1, 0, 0], 1e4, bilateral=True)
     assert np.allclose(both(0, away, np.zeros(6))[0], -100)
-    batch = wall(0, [[T, away]] * 3, np.zeros(6))
-    assert batch.shape == (3, 2, 6)
-    assert wall(0, np.zeros((0, 4, 4)), np.zeros((0, 6))).shape == (0, 6)
+    assert wall(0, [[T, away]] * 3, np.zeros(6)).shape == (3, 2, 6)
 
 
 def test_contact_takes_energy_from_a_falling_arm():
@@ -468,24 +420,15 @@ def test_impedance_of_the_orientation_and_of_another_frame():
             assert -(K[3:] * e[3:]) @ de / 1e-6 == pytest.approx(moment @ axis, abs=1e-4)
 
 
-@pytest.mark.nightly
 def test_force_of_a_mass_on_a_spring():
     m, ke, kp, push = 2.0, 500.0, 100.0, -1.5
     spring = control.SpringWall([0, 0, 0], [0, 0, -1], ke, bilateral=True)
     rail, f = slider(m), [0, 0, 5.0, 0, 0, 0]
     for word, missing in (("desired", 1.5 / (1 + m * kp / ke)), ("measured", 1.5 * ke / (m * kp))):
         law = control.ForceTracking(kp, 20.0, ke, word, reference=f, model=rail)
-        run = control.run(rail, law, [0.0], t=4.0, environment=spring, disturbance=[push])
+        t = np.linspace(0, 4, 3)
+        run = control.run(rail, law, [0.0], t=t, environment=spring, disturbance=[push])
         assert run.error[-1, 2] == pytest.approx(missing, rel=1e-6)
-
-    def wave(t):
-        f = np.zeros((3, 6))
-        f[:, 2] = 5 + np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)
-        return tuple(f)
-
-    law = control.ForceTracking(kp, 20.0, ke, reference=wave, model=rail)
-    run = control.run(rail, law, [0.0], t=3.0, environment=spring)
-    assert np.abs(run.error[-1]).max() < 1e-6
 
 
 WALL = control.SpringWall(dgm(arm(), Q0)[:3, 3], [-1, 0, 0], 2e4, damping=20.0)
@@ -511,12 +454,7 @@ def test_hybrid_control_of_position_and_force():
     )
     again = control.run(model, decoupled, Q0, t=t, environment=WALL)
     assert np.allclose(again.q, run.q, atol=1e-9)
-    # axes of the task: the same wall and laws in a turned frame
-    R = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    turned = control.run(
-        model, hybrid(task_frame=R, selection=[0, 1, 0, 0, 0, 0]), Q0, t=t, environment=WALL
-    )
-    assert np.allclose(turned.q, run.q, atol=1e-9)
+    # axes of the task
     R = Rotation.from_euler("z", 30, degrees=True).as_matrix()
     law, f = hybrid(task_frame=R), np.array([3.0, 2.0, 0, 0, 0, 0])
     expected = [R[:, 0] @ (PUSH - f)[:3], R[1, 1] * 0.1]  # the pose is 0.1 m along y away
@@ -619,10 +557,8 @@ def test_sampling_delay_and_noise():
     now = law.command(0.01, runs[1].q[1], runs[1].v[1])
     assert np.allclose(runs[1].tau[1], now, atol=1e-9)
     noisy = {"t": 0.2, "period": 1e-3, "noise": [1e-4, 1e-2]}
-    first, again, other = (control.run(model, law, Q0, rng=k, **noisy) for k in (1, 1, 2))
+    first, again = (control.run(model, law, Q0, rng=1, **noisy) for _ in range(2))
     assert np.array_equal(first.q, again.q)
-    assert not np.array_equal(first.q, other.q)
-    assert 1e-6 < first.rms().max() < 1e-2
     spread = (first.tau - gravity_torque(model, first.q)) @ np.linalg.inv(mass_matrix(model, Q0))
     assert np.std(spread[:, 1]) == pytest.approx(np.hypot(100 * 1e-4, 20 * 1e-2), rel=0.3)
 
@@ -632,51 +568,29 @@ def test_statuses_name_what_happened():
     law = control.ComputedTorque(Q0, model=weak)
     run = control.run(weak, law, Q0 - [0, 0.9], t=1.0)
     assert run.status == ControlStatus.SATURATED
-    assert (
-        run.reason() == "Torques were limited to the efforts of the joints. This concerns joints 2."
-    )
+    assert "joints 2" in run.reason()
     assert np.abs(run.tau[:, 1]).max() == 5.0
     far = control.ComputedTorque([0.4, 3.2], model=weak)
     run = control.run(arm(lower=[-3, -3], upper=[3, 3]), far, Q0, t=1.0)
     assert run.status == ControlStatus.LEFT_LIMITS
-    assert "joints 2" in run.reason()
     short = control.run(arm(), law, Q0, t=1.0, max_evaluations=20)
     assert short.status == ControlStatus.DIVERGED
     assert "used up" in short.reason()
-    assert len(short.t) < 1001
-    still = control.run(slider(), control.PDGravity([0.0], 1.0, 1.0), [0.0], t=0.0)
-    assert still.status == ControlStatus.FOLLOWED
 
 
-@pytest.mark.nightly
 def test_growth_of_the_reference_is_no_divergence_and_slow_growth_is():
     rail = slider(2.0)
-
-    def quartic(t):
-        return [t**4], [4 * t**3], [12 * t**2]
-
-    lag = control.DecentralizedPID(quartic, 500.0, 0.0, 50.0)
+    lag = control.DecentralizedPID(lambda t: ([t**4], [4 * t**3], [12 * t**2]), 500.0, 0.0, 50.0)
     assert control.run(rail, lag, [0.0], t=1.0).status == ControlStatus.FOLLOWED
-
-    def cubic(t):
-        f = np.zeros((3, 6))
-        f[:, 2] = 50 * t**3, 150 * t**2, 300 * t
-        return tuple(f)
-
-    law = control.ForceTracking(400.0, 40.0, 1e3, reference=cubic, model=rail)
-    wall = control.SpringWall([0, 0, 0], [0, 0, -1], 1e4)
-    assert control.run(rail, law, [0.0], t=1.0, environment=wall).status == ControlStatus.FOLLOWED
     gains = control.pid_gains(2.0, 0.0, 5.0)
     law = control.DecentralizedPID([0.1], gains.kp, 1.05 * gains.critical_ki, gains.kd)
-    run = control.run(rail, law, [0.0], t=20.0)
-    assert run.status == ControlStatus.DIVERGED
-    assert "grows exponentially" in run.reason()
+    assert control.run(rail, law, [0.0], t=20.0).status == ControlStatus.DIVERGED
 
 
-@pytest.mark.parametrize(("name", "joint"), [("rx90", 4), ("erd:ur5", 4), ("erd:ur5", 2)])
+@pytest.mark.parametrize(("name", "joint"), [("rx90", 4), ("erd:ur5", 2)])
 def test_singular_postures_and_those_beside_them_have_bounded_torques(name, joint):
     model, rest = load(name), np.zeros(6)
-    for bend in [0.0, *np.logspace(-12, -1, 23)]:
+    for bend in [0.0, *np.logspace(-12, -1, 8)]:
         q = np.array([0.1, -0.3, 1.2, 0.2, 0.7, 0.1])
         q[joint] = bend
         goal = moved(dgm(model, q), 0.01, 0.01, 0.01)
@@ -693,23 +607,6 @@ def test_singular_postures_and_those_beside_them_have_bounded_torques(name, join
             assert near == (bend < 5e-3) or 1e-4 < bend < 2e-2
 
 
-def test_singular_postures_are_named_and_what_remains_is_met():
-    straight = [0.3, 0.0]
-    goal = moved(dgm(arm(), straight), -0.02 * np.cos(0.3), -0.02 * np.sin(0.3), 0)
-    law = control.ComputedTorque(goal, model=arm(), space="task")
-    weight = gravity_torque(arm(), straight)
-    assert np.allclose(law.command(0.0, straight, [0.0, 0.0]), weight, atol=1e-6)
-    assert np.allclose(law.command(0.0, [0.3, 1e-12], [0.0, 0.0]), weight, atol=1e-6)
-    run = control.run(arm(), law, straight, t=0.1)
-    assert "At t = 0 s the posture is singular" in run.reason()
-    # sideways the straight arm still moves as wanted: the transverse motion has full rank
-    aside = moved(dgm(arm(), straight), -0.02 * np.sin(0.3), 0.02 * np.cos(0.3), 0)
-    law = control.ComputedTorque(aside, omega=10.0, model=arm(), space="task")
-    tau = law.command(0.0, straight, [0.0, 0.0]) - weight
-    a = jacobian(arm(), straight)[:2] @ np.linalg.solve(mass_matrix(arm(), straight), tau)
-    assert np.allclose(a, 100.0 * (aside - dgm(arm(), straight))[:2, 3], atol=1e-9)
-
-
 class Own:
     """A law of a user: proportional with an integral, sampled or not."""
 
@@ -722,22 +619,13 @@ class Own:
         return 100.0 * (Q0 - q)
 
 
-class Wrong(Own):
-    """A law that returns words."""
-
-    def command(self, t, q, v, x):
-        return "a"
-
-
 def test_laws_of_users_and_laws_in_simulate():
-    run = control.run(arm(), Own(), Q0, t=3.0)
+    run = control.run(arm(), Own(), Q0, t=np.linspace(0, 3, 4))
     assert np.abs(run.q[-1] - Q0).max() < 0.05
-    assert run.error.shape == (1001, 0)
-    assert run.state.shape == (1001, 2)
+    assert (run.error.shape, run.state.shape) == ((4, 0), (4, 2))
     law = control.Impedance(dgm(arm(), Q0), 1.0, 20.0, 100.0, model=arm())
     assert isinstance(law, StatefulControl)
     assert simulate(arm(), Q0, None, law, 0.1).reason().startswith("The motion was followed")
-    assert np.allclose(law.command(0.0, Q0.tolist(), [0.0, 0.0]), gravity_torque(arm(), Q0))
 
 
 def laws():
@@ -763,11 +651,8 @@ def test_laws_and_runs_are_values():
         assert again == law == same
         assert hash(again) == hash(law)
         assert len(repr(law).splitlines()) <= 6
-        with pytest.raises(AttributeError):
-            setattr(law, fields(law)[0].name, 1.0)
         if hasattr(law, "command"):
             x = law.state0
-            assert law.command(0, Q0, [0.1, 0.2], x).shape == (2,)
             assert law.rate(0.0, Q0, [0.1, 0.2], x).shape == x.shape
             assert np.array_equal(
                 law.command(0.0, Q0, [0.1, 0], x), again.command(0.0, Q0, [0.1, 0], x)
@@ -775,76 +660,37 @@ def test_laws_and_runs_are_values():
     run = control.run(arm(), laws()[0], Q0 - 0.1, t=0.2)
     again = pickle.loads(pickle.dumps(run))
     assert again == run
-    assert hash(again) == hash(run)
-    assert np.array_equal(again.error, run.error)
-    assert again.status is run.status
     assert len(repr(run).splitlines()) <= 6
-    with pytest.raises(ValueError, match="read-only"):
-        again.error[0] = 1.0
 
 
 BAD = [
     (lambda: control.ComputedTorque(Q0, omega=0.0, model=arm()), "omega: expected gains above 0"),
-    (lambda: control.ComputedTorque(Q0, zeta=[1, -1], model=arm()), "zeta: expected gains above 0"),
     (lambda: control.ComputedTorque(Q0, omega=[1, 2, 3], model=arm()), "omega: expected one"),
     (lambda: control.ComputedTorque([0.0], model=arm()), "expected 2 joints"),
     (lambda: control.ComputedTorque(Q0), "model: expected a RobotModel, got NoneType"),
     (lambda: control.ComputedTorque(Q0, model=arm(), space="cartesian"), "'joint', 'task'"),
     (lambda: control.ComputedTorque(np.eye(4), model=arm(), space="task", mask=[1, 1, 1, 0, 0, 0]),
      "3 components are more than the 2 joints"),
-    (lambda: control.ComputedTorque(lambda t: Q0, model=arm()), "expected three arrays"),
     (lambda: control.ComputedTorque(lambda t: (Q0, Q0, [0.0]), model=arm()), "expected shapes"),
-    (lambda: control.ComputedTorque(lambda t: (Q0, Q0, Q0 / 0), model=arm()), "expected finite"),
-    (lambda: control.ComputedTorque([Q0], model=arm()), r"positions of shape \(n,\)"),
     (lambda: control.DecentralizedPID(Q0, -1, 0, 1), "kp: expected gains above 0"),
-    (lambda: control.DecentralizedPID(Q0, 1, -1, 1), "ki: expected gains at least 0"),
     (lambda: control.DecentralizedPID(Q0, 1, 0, 1, feedforward=[1.0]), "feedforward: expected"),
     (lambda: control.pid_gains(1.0, 9.0, 2.0), "bandwidth of friction alone"),
-    (lambda: control.pid_gains(0.0, 0.0, 2.0), "inertia: expected a finite number above 0"),
-    (lambda: control.SlidingMode(Q0, 1, 1, layer=-0.1), "layer: expected gains at least 0"),
     (lambda: control.SlidingMode(None, 1, 1).command(0, Q0, Q0), "this one is scalar"),
     (lambda: control.first_order(control.SlidingMode(None, 1, 1), 1, 0, 1, 0), "step: expected"),
-    (lambda: control.first_order("sign", 1, 0, 1, 0.1), "a sliding mode or a function of s"),
     (lambda: control.AdaptiveSlotineLi(Q0, 1, 1, 1, "all", model=arm()), "'base', 'standard'"),
     (lambda: control.AdaptiveSlotineLi(Q0, 1, 1, 1, start=[1.0], model=arm()), "start:"),
     (lambda: control.Impedance(np.eye(4), 1, 1, -5, model=arm()), "K: expected gains above 0"),
-    (lambda: control.Impedance(np.eye(4), [1, 2, 3], 1, 5, model=arm()), "M: expected one"),
     (lambda: hybrid(selection=[0.5, 0, 0, 0, 0, 0]), "selection: expected zeros and ones"),
     (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "expected a force-controlled"),
-    (lambda: hybrid(inverse="pinv"), "'consistent', 'jacobian'"),
     (lambda: hybrid(inverse="jacobian", mask=[1, 0, 0, 0, 0, 0]), "as many components as joints"),
-    (lambda: hybrid(task_frame=np.eye(2)), "task_frame: expected shape"),
-    (lambda: hybrid(force=[1, 2, 3]), "reference: expected shape"),
     (lambda: hybrid(position=control.ComputedTorque(Q0, model=arm())), "a law in task space"),
     (lambda: control.ExternalForceLoop(control.ComputedTorque(Q0, model=arm()), 1, 1), "inner:"),
-    (lambda: control.ForceTracking(1, 1, 1, "none", PUSH, arm()), "'desired', 'measured'"),
-    (lambda: control.ExternalForceLoop(laws()[9], 1, 1), "inner: expected a law in task space"),
-    (lambda: laws()[2].command("a", Q0, Q0, Q0), "t: expected"),
     (lambda: laws()[8].command(np.nan, Q0, Q0), "t: expected a finite number"),
-    (lambda: laws()[0].command(0, Q0, Q0, (), [1]), "wrench: expected shape"),
-    (lambda: laws()[2].command(0, Q0, Q0, None), "x: expected real numbers"),
     (lambda: laws()[7].command(0, [Q0, Q0], [Q0, Q0], np.ones(6)), "expected one posture"),
     (lambda: control.PDGravity([], 1, 1), "at least one joint"),
-    (lambda: hybrid(inverse=np.zeros(3)), "'consistent', 'jacobian'"),
     (lambda: WALL(0, [np.eye(4)] * 2, np.zeros((3, 6))), "do not broadcast"),
-    (lambda: control.first_order(lambda s: 1e300 * s, 1, 0, 1, 0.1), "s is not finite"),
     (lambda: control.SpringWall([0, 0, 0], [0, 0, 0], 1.0), "normal: expected a vector"),
-    (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 0.0), "stiffness: expected"),
-    (lambda: control.SpringWall([0, 0], [0, 0, 1], 1.0), "point: expected shape"),
-    (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 1.0, bilateral="no"), "True or False"),
-    (lambda: control.ComputedTorque(lambda t: ("a", Q0, Q0), model=arm()), "real numbers"),
-    (lambda: control.ComputedTorque(lambda t: ([1, [2]], Q0, Q0), model=arm()), "regular array"),
-    (lambda: control.DecentralizedPID(Q0, 1, 0, 1, feedforward="x"), "feedforward: expected"),
-    (lambda: control.SlidingMode(None, 1, 1).error(0, Q0, Q0), "this one is scalar"),
-    (lambda: control.SuperTwisting(Q0, 1, 1, 1).command(0, Q0, Q0), "x: expected shape"),
-    (lambda: control.SlidingMode(Q0, 1, 1).command(0, Q0, Q0, [1.0]), "x: expected shape"),
-    (lambda: control.PIDGains(1, 0, 1, 0).critical_ki, "inertia: expected"),
     (lambda: control.first_order(lambda s: [1, 2, 3], 1, 0, 1, 0.1), r"law\(s\): expected one"),
-    (lambda: control.first_order(lambda s: "a", 1, 0, 1, 0.1), r"law\(s\): expected real"),
-    (lambda: control.first_order(control.SlidingMode(None, 1, 1), 1, [1, 2], 1, 0.1),
-     "disturbance: expected one"),
-    (lambda: control.first_order(control.SlidingMode(None, 1, [2, 3]), [1, 1, 1], 0, 1, 0.1),
-     "gain: expected one"),
     (lambda: control.ComputedTorque(dgm(arm(), Q0), model=arm(), space="task").command(
         0, [Q0, Q0], [Q0, Q0]), "expected one posture"),
     (lambda: hybrid(model=arm(masses=(0.0, 0.0))).command(0, Q0, Q0), "mass matrix is singular"),
@@ -868,34 +714,14 @@ def test_mistakes_in_laws_are_named(make, message):
         ),
         ({"period": 1e-3, "delay": 2.0}, "delay: expected less than the duration"),
         ({"delay": 0.1}, "only a sampled control is delayed"),
-        ({"period": 0.0}, "period: expected a finite number above 0"),
-        ({"period": "a"}, "period: expected a finite number above 0"),
-        ({"period": [1e-3]}, "period: expected a finite number above 0"),
-        ({"period": np.nan}, "period: expected a finite number above 0"),
-        ({"period": 1e-320}, "would sample more than"),
-        ({"period": 0.1, "delay": 0.1}, "delay: expected less than the duration"),
-        ({"noise": 1e-3, "rng": -1, "period": 1e-3}, "rng: expected a whole number"),
-        ({"noise": 1e-3, "rng": "a", "period": 1e-3}, "rng: expected a whole number"),
         ({"wrench": np.zeros(6)}, "wrench: give environment="),
-        ({"law": Wrong()}, "law.command.*: expected real numbers"),
         ({"noise": 1e-3, "period": 1e-3}, "noise: give rng"),
-        ({"noise": 1e-3, "rng": 0}, "noise: give period"),
-        ({"noise": -1.0, "rng": 0, "period": 1e-3}, "noise: expected one standard deviation"),
         ({"environment": 3.0}, "environment: expected a wall or a function"),
         ({"environment": lambda t, T, w: [1.0]}, r"environment\(t, T, twist\): expected shape"),
-        ({"disturbance": [1.0]}, "disturbance: expected shape"),
         ({"q0": [0.0]}, "q0: expected shape"),
-        ({"q0": [np.nan, 0.0]}, "q0: expected finite"),
     ],
 )
 def test_mistakes_in_runs_are_named(arguments, message):
     given = {"law": laws()[0], "q0": Q0, "t": 0.1} | arguments
     with pytest.raises((InvalidValueError, ShapeError, TypeError), match=message):
         control.run(arm(), **given)
-
-
-def test_laws_print_one_number_for_equal_gains():
-    law = control.ComputedTorque([0.1, 0.2], omega=[5.0, 6.0], model=arm())
-    assert repr(law) == (
-        "ComputedTorque(reference=[0.1, 0.2], omega=[5.0, 6.0], zeta=1.0, model=2R, space=joint)"
-    )

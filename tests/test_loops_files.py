@@ -92,28 +92,6 @@ def test_two_loops_of_symoro(read):
     assert len(loops.base_parameters(robot, found.q, drive=("Ia",))) == 48
 
 
-def test_a_cut_slider_stays_a_joint(read):
-    text = """NL = 2
-NJ = 3
-NF = 4
-Type = 2
-ant = {0,1,0,2}
-sigma = {0,0,1,2}
-d = {0,0.3,0,0.8}
-alpha = {0,0,-pi/2,-pi/2}
-gamma = {0,0,-pi/2,0}
-b = {0,0,0,0}
-mu = {1,0,0,0}
-theta = {t1,t2,0,0}
-r = {0,0,r3,0}
-"""
-    robot = read(text, loops.read_par)
-    assert robot.n == 3
-    assert robot.closures[0].kind == "full"
-    found = loops.close(robot, [0.4])
-    assert found.status in list(loops.ClosingStatus)
-
-
 def test_par_files_that_are_no_looped_robots(read):
     tree = SR400.replace("NJ = 9", "NJ = 8").replace("NF = 10", "NF = 10")
     with pytest.raises(ParFileError):
@@ -122,15 +100,8 @@ def test_par_files_that_are_no_looped_robots(read):
         read(SR400.replace("NF = 10", "NF = 9"), loops.read_par, values=LENGTHS)
     with pytest.raises(ParFileError, match=r"loops\.read_par"):
         read(SR400, rm.read_par, values=LENGTHS)
-    with pytest.raises(ParFileError, match="cannot read"):
-        loops.read_par("none.par")
     with pytest.raises(LoopError, match="cannot read"):
         loops.read_mjcf("none.xml")
-    for path in (None, "a\0b"):
-        with pytest.raises(LoopError, match="cannot read"):
-            loops.read_mjcf(path)
-    with pytest.raises(ParFileError, match="path"):
-        loops.read_par(None)
 
 
 def test_mjcf_with_one_and_with_two_root_bodies(read):
@@ -164,11 +135,9 @@ def test_mjcf_with_one_and_with_two_root_bodies(read):
     ("old", "new", "words"),
     [
         ("<mujoco", "<robot><mujoco", "cannot read"),
-        ("<worldbody>", "<nothing>", "cannot read"),
         ("connect", "joint", "not supported"),
         ('<joint name="j3" axis="0 0 1"/>', '<freejoint name="j3"/>', "'j3' is a"),
         ('body2="rocker"', 'body2="nobody"', "nobody"),
-        ('anchor="0.7 0 0"', 'anchor="0.7 a 0"', "anchor with 3 numbers"),
         (' anchor="0.7 0 0"', "", "anchor with 3 numbers"),
     ],
 )

@@ -2,7 +2,6 @@
 
 import pickle
 from collections import Counter
-from importlib import resources
 
 import numpy as np
 import pytest
@@ -81,6 +80,7 @@ def leg_errors(base, platform, T, lengths):
 def test_every_mode_comes_back_from_the_direct_models(name):
     robot = ROBOTS[name]
     T = poses_near_home(robot, 6)
+    np.testing.assert_allclose(robot.pose(robot.coordinates(T)), T, atol=1e-14)
     legs = pr.igm(robot, T)
     assert legs.count.tolist() == [2**robot.m if robot.has_cranks else 1] * 6
     assert legs.mode[0].tolist() == list(range(legs.q.shape[1]))
@@ -94,30 +94,6 @@ def test_every_mode_comes_back_from_the_direct_models(name):
         assert away.min(axis=1).max() < 1e-11
         assert np.nanmax(modes.residual) < 1e-12
         assert (modes.status == pr.AssemblyStatus.ALL).all()
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_coordinates_are_read_off_the_pose(name):
-    robot = ROBOTS[name]
-    T = poses_near_home(robot, 4)
-    X = robot.coordinates(T)
-    assert X.shape == (4, robot.m)
-    np.testing.assert_allclose(robot.pose(X), T, atol=1e-14)
-    np.testing.assert_array_equal(X[:, :2], T[:, :2, 3])
-    assert pickle.loads(pickle.dumps(robot)) == robot
-    assert len(repr(robot).splitlines()) <= 6
-
-
-def test_elbows_of_mode_zero_point_outward():
-    delta, five = ROBOTS["delta"], ROBOTS["five-bar"]
-    q = pr.igm(delta, poses_near_home(delta, 5)).q
-    assert (np.cos(q[:, 0]) > np.cos(q[:, 7])).all()
-    a = five.base[:, :2]
-    q = pr.igm(five, five.home).q[0]
-    knee = a + five.crank[:, None] * np.c_[np.cos(q), np.sin(q)]
-    middle = 0.5 * (a + five.home[:2, 3])
-    assert knee[0, 0] < middle[0, 0]
-    assert knee[1, 0] > middle[1, 0]
 
 
 def test_delta_of_the_flexpicker():
@@ -226,45 +202,20 @@ def test_paths_that_jumped_are_tracked_again(monkeypatch):
     assert sum(attempts) == 2
 
 
-def test_robots_that_are_singular_everywhere_are_degenerate():
-    rng = np.random.default_rng(0)
-    line = rng.normal(size=(6, 1)) * rng.normal(size=3)
-    ring = GOOD.base
-    for base, platform in ((line, rng.normal(size=(6, 3))), (ring, ring), (ring, 0.5 * ring)):
-        modes = pr.assembly_modes(pr.gough(base, platform), [1.0, 1.0, 1.0, 1.0, 1.0, 1.1])
-        assert modes.status == pr.AssemblyStatus.DEGENERATE
-
-
-def test_stored_solutions_are_forty_of_one_member():
-    with np.load(resources.files("robotmodels.parallel") / "start.npz") as data:
-        m, x = (
-            data[name].reshape(shape)
-            for name, shape in (("member", (81, 2)), ("solutions", (40, 8, 2)))
-        )
-    m, x = m @ [1, 1j], x @ [1, 1j]
-    e, g = x[:, :4], x[:, 4:]
-    errors = [(e * g).sum(axis=1), 4 * (g * g).sum(axis=1) - m[0] * (e * e).sum(axis=1)]
-    i, j = np.triu_indices(4)
-    for leg in m[1:].reshape(5, 16):
-        A, B = np.zeros((2, 4, 4), complex)
-        A[i, j] = A[j, i] = leg[:10]
-        B[i[i != j], j[i != j]] = leg[10:]
-        B = B - B.T
-        errors.append(np.einsum("si,ij,sj->s", e, A, e) + np.einsum("si,ij,sj->s", g, B, e))
-    assert np.abs(errors).max() < 1e-12
-    apart = np.abs(x[:, None] - x).max(axis=-1) + 9.0 * np.eye(40)
-    assert apart.min() > 1e-2
-
-
 @pytest.mark.parametrize(
     ("kind", "bound"),
     [("general", 40), ("planar platform", 40), ("planar base and platform", 40),
-     ("shared anchor", 40)],
+     ("shared anchor", 40), ("TSSM", 16), ("MSSM", 16)],
 )  # fmt: skip
 def test_lists_of_random_platforms_are_complete(kind, bound):
+    """Triangular platforms have sixteen solutions."""
     rng = np.random.default_rng(7)
-    for _ in range(8):
+    for _ in range(6):
         robot = random_gough(rng, kind)
+        if bound == 16:
+            base, platform = rng.normal(size=(2, 3, 3))
+            base = base[[0, 1, 1, 2, 2, 0]] if kind == "MSSM" else rng.normal(size=(6, 3))
+            robot = pr.gough(base, platform[[0, 0, 1, 1, 2, 2]])
         T = moved(np.eye(4), rng.normal(size=6))
         modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
         assert modes.complex_count == bound
@@ -274,21 +225,10 @@ def test_lists_of_random_platforms_are_complete(kind, bound):
             p = np.einsum("kij,j->ki", modes.T[:, :3, :3], robot.platform.mean(axis=0))
             z = p[:, 2] + modes.T[:, 2, 3] - robot.base[0, 2]
             np.testing.assert_allclose(np.sort(z), np.sort(-z), atol=1e-9)
-
-
-@pytest.mark.parametrize(("kind", "bound"), [("TSSM", 16), ("MSSM", 16)])
-def test_triangular_platforms_have_sixteen_solutions(kind, bound):
-    rng = np.random.default_rng(2)
-    symmetric = pr.gough_symmetric(1.0, kind=kind)
-    # triangles of any shape have as many
-    corner = rng.normal(size=(3, 3))
-    base = corner[[0, 1, 1, 2, 2, 0]] if kind == "MSSM" else symmetric.base
-    general = pr.gough(base, rng.normal(size=(3, 3))[[0, 0, 1, 1, 2, 2]])
-    for robot in (symmetric, general):
-        T = moved(robot.home, 0.2 * rng.normal(size=6))
-        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
-        assert modes.complex_count == bound
-        assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-9
+    if bound == 16:
+        symmetric = pr.gough_symmetric(1.0, kind=kind)
+        q = pr.igm(symmetric, moved(symmetric.home, 0.2 * rng.normal(size=6))).q[0]
+        assert pr.assembly_modes(symmetric, q).complex_count == bound
 
 
 def test_real_lists_equal_a_search_by_newton():
@@ -314,19 +254,14 @@ def test_postures_that_nearly_coincide_are_both_listed():
     det = pr.determinant(robot, np.array([pose(z) for z in height]))
     k = np.flatnonzero(np.diff(np.sign(det)))[0]
     z0 = brentq(lambda z: float(pr.determinant(robot, pose(z))), height[k], height[k + 1])
-    for off, count in ((1e-3, 2), (1e-5, 2)):
+    for off in (1e-3, 1e-5):
         T = pose(z0 + off)
         modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
         away = np.sort(np.abs(modes.T - T).max(axis=(-1, -2)))
-        assert (away < 10 * off).sum() == count
+        assert (away < 10 * off).sum() == 2
         assert away[0] < 1e-8
         assert modes.det.min() < 0 < modes.det.max()
         assert modes.complex_count == 40
-    double = pr.assembly_modes(robot, pr.igm(robot, pose(z0)).q[0])
-    assert double.count == 1
-    assert double.status == pr.AssemblyStatus.ALL
-    assert np.abs(double.T - pose(z0)).max() < 1e-5
-    assert double.residual.max() < 1e-12
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
@@ -345,38 +280,22 @@ def test_singular_poses_of_similar_platforms_are_exact_solutions(factor):
 
 
 def test_robots_that_move_with_locked_legs_are_degenerate():
-    symmetric = pr.gough_symmetric(1.0)
-    for platform in (symmetric.base, 0.5 * symmetric.base):
-        modes = pr.assembly_modes(pr.gough(symmetric.base, platform), [1.0] * 6)
-        assert modes.status == pr.AssemblyStatus.DEGENERATE
-        assert "do not determine" in modes.reason()
-    rng = np.random.default_rng(0)
-    for flat in (False, True):  # equal legs: the platform moves on a sphere without turning
-        for base in rng.normal(size=(3, 6, 3)) * [1.0, 1.0, 1.0 - flat]:
-            modes = pr.assembly_modes(pr.gough(base, base), [1.0] * 6)
+    rng, ring = np.random.default_rng(0), GOOD.base
+    line = rng.normal(size=(6, 1)) * rng.normal(size=3)
+    # singular everywhere, whether or not the legs can have these lengths
+    for base, platform in ((line, rng.normal(size=(6, 3))), (ring, ring), (ring, 0.5 * ring)):
+        for last in (1.0, 1.1):
+            modes = pr.assembly_modes(pr.gough(base, platform), [1.0] * 5 + [last])
             assert modes.status == pr.AssemblyStatus.DEGENERATE
+    for base in rng.normal(size=(3, 6, 3)):  # equal legs: the platform moves without turning
+        modes = pr.assembly_modes(pr.gough(base, base), [1.0] * 6)
+        assert modes.status == pr.AssemblyStatus.DEGENERATE
     # Bricard's line-symmetric octahedron is not singular everywhere, but flexible
-    for seed in (0, 1):
-        corner = np.random.default_rng(seed).normal(size=(3, 3))
-        other = corner * [-1, -1, 1]
-        octahedron = pr.gough(corner[[0, 0, 1, 1, 2, 2]], other[[1, 2, 0, 2, 0, 1]])
-        q = pr.igm(octahedron, np.eye(4)).q[0]
-        assert pr.assembly_modes(octahedron, q).status == pr.AssemblyStatus.DEGENERATE
-        assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
-
-
-def test_platforms_similar_to_their_base_have_fewer_solutions():
-    """Paths that end at translations at infinity are no assembly modes."""
-    rng = np.random.default_rng(4)
-    for flat, factor, bound in ((False, 0.6, 24), (True, 0.4, 16), (False, 0.85, 24)):
-        base = rng.normal(size=(6, 3)) * [1.0, 1.0, 1.0 - flat]
-        robot = pr.gough(base, factor * base)
-        T = robot.pose([0.1, -0.2, 1.1, 0.3, -0.2, 0.4])
-        modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
-        assert modes.status == pr.AssemblyStatus.ALL
-        assert modes.complex_count == bound
-        assert modes.count % 2 == 0
-        assert np.abs(modes.T - T).max(axis=(1, 2)).min() < 1e-8
+    corner = rng.normal(size=(3, 3))
+    octahedron = pr.gough(corner[[0, 0, 1, 1, 2, 2]], (corner * [-1, -1, 1])[[1, 2, 0, 2, 0, 1]])
+    q = pr.igm(octahedron, np.eye(4)).q[0]
+    assert pr.assembly_modes(octahedron, q).status == pr.AssemblyStatus.DEGENERATE
+    assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
 
 
 def test_legs_that_do_not_meet_give_no_mode_and_a_sentence():
@@ -464,14 +383,6 @@ def test_anchors_that_two_planar_legs_share_leave_four_solutions(pair):
             assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-8
 
 
-def test_assembly_modes_do_not_depend_on_the_unit_of_length():
-    for unit in (1e-6, 1e4):
-        five = pr.five_bar(unit * np.array([[0, 0], [0.5, 0]]), 0.4 * unit, 0.6 * unit)
-        assert pr.assembly_modes(five, [2.0, 1.0]).count == 2
-        SSM = pr.gough(unit * ROBOTS["SSM"].base, unit * ROBOTS["SSM"].platform)
-        assert pr.assembly_modes(SSM, [1.2 * unit] * 6).count == 8
-
-
 def test_solutions_of_equal_orientation_are_both_listed():
     # base and platform on lines: mirrored pairs, one of them with equal orientation
     robot = pr.planar_3rpr([[0, 0], [1, 0], [3, 0]], [[0, 0], [0.5, 0], [0.9, 0]])
@@ -520,41 +431,25 @@ def test_jacobians_are_derivatives_in_every_mode(name):
         np.testing.assert_allclose(pr.dkm_second_order(robot, T, rates, second, mode), A, atol=1e-9)
 
 
-def test_rows_are_unit_lines_of_the_legs():
-    robot = ROBOTS["gough"]
-    T = poses_near_home(robot, 1)[0]
-    arm = robot.platform @ T[:3, :3].T
-    u = T[:3, 3] + arm - robot.base
-    u /= np.linalg.norm(u, axis=1)[:, None]
-    rows = np.c_[u, np.cross(arm, u)]
-    np.testing.assert_allclose(pr.inverse_jacobian(robot, T), rows, atol=1e-14)
-    np.testing.assert_allclose(pr.determinant(robot, T), np.linalg.det(rows), rtol=1e-12)
-    assert pr.dgm(robot, pr.igm(robot, T).q[0], T).det == pytest.approx(np.linalg.det(rows))
-
-
 # --- batches and mistakes ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", ["SSM", "3-RRR", "delta"])
 def test_batches_of_any_shape_and_empty_ones(name):
     robot = ROBOTS[name]
     T = poses_near_home(robot, 6).reshape(2, 3, 4, 4)
     legs = pr.igm(robot, T.tolist())
     q = legs.q[..., 0, :]
-    assert legs.q.shape == (2, 3, legs.q.shape[-2], robot.m)
     modes, near = pr.assembly_modes(robot, q), pr.dgm(robot, q)
     assert modes.T.shape[:2] == near.T.shape[:2] == modes.status.shape == (2, 3)
     single = pr.assembly_modes(robot, q[1, 2])
     np.testing.assert_array_equal(single.T, modes.T[1, 2, : single.T.shape[0]])
-    for result in (legs, modes, near):
+    for result in (robot, legs, modes, near):
         assert pickle.loads(pickle.dumps(result)) == result
         assert len(repr(result).splitlines()) <= 6
-        assert not (result.q if result is legs else result.T).flags.writeable
     none = np.empty((0, 4, 4))
-    assert pr.igm(robot, none).q.shape[0] == 0
     assert pr.inverse_jacobian(robot, none).shape == (0, robot.m, 6)
-    assert pr.assembly_modes(robot, np.empty((0, robot.m))).count.shape == (0,)
-    assert pr.dgm(robot, np.empty((0, robot.m))).T.shape == (0, 4, 4)
+    assert pr.assembly_modes(robot, none[:, 0, :1] * np.ones(robot.m)).count.shape == (0,)
     assert pr.ikm(robot, T, twists(robot, 1)[0]).shape == (2, 3, robot.m)
 
 
@@ -568,35 +463,19 @@ GOOD = ROBOTS["SSM"]
         (lambda: pr.gough(GOOD.base, GOOD.platform[[0, 0, 0, 0, 0, 0]]), InvalidValueError, "all"),
         (lambda: pr.gough(GOOD.base[[0, 0, 1, 2, 3, 4]], GOOD.platform[[0, 0, 1, 2, 3, 4]]),
          InvalidValueError, "legs 1 and 2"),
-        (lambda: pr.gough(GOOD.base * np.nan, GOOD.platform), InvalidValueError, "finite"),
         (lambda: pr.gough(GOOD.base, GOOD.platform, lower=-1), InvalidValueError, "not negative"),
         (lambda: pr.gough(GOOD.base, GOOD.platform, 2, 1), InvalidValueError, "lower below upper"),
         (lambda: pr.five_bar([[0, 0], [1, 0]], -1, 1), InvalidValueError, "above 0"),
-        (lambda: pr.five_bar([[0, 0], [0, 0]], 1, 1), InvalidValueError, "coincide"),
-        (lambda: pr.planar_3rpr([[0, 0], [1, 0]], TRIANGLE), ShapeError, "3 points"),
         (lambda: pr.gough_symmetric(1.0, kind="XSM"), InvalidValueError, "SSM, TSSM, MSSM"),
-        (lambda: pr.gough_symmetric(-1.0), InvalidValueError, "radius"),
         (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1, -1.0]), InvalidValueError, "negative"),
-        (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1]), ShapeError, "q"),
-        (lambda: pr.dgm(GOOD, [1, 1, 1, 1, 1, np.nan]), InvalidValueError, "q"),
         (lambda: pr.igm(GOOD, 2.0 * np.eye(4)), NotARotationError, "rotation|last row"),
-        (lambda: pr.igm(GOOD, np.full((4, 4), np.nan)), InvalidValueError, "finite"),
         (lambda: pr.igm(ROBOTS["delta"], GOOD.pose([0, 0, -1, 0.1, 0, 0])), InvalidValueError,
          "translates only"),
         (lambda: pr.igm(ROBOTS["3-RPR"], GOOD.home), InvalidValueError, "plane"),
         (lambda: pr.igm("robot", np.eye(4)), InvalidValueError, "parallel.gough"),
-        (lambda: pr.inverse_jacobian(GOOD, np.eye(4), mode=1), InvalidValueError, "mode"),
         (lambda: pr.inverse_jacobian(ROBOTS["delta"], ROBOTS["delta"].pose([9, 0, 0])),
          InvalidValueError, "out of reach"),
-        (lambda: pr.dkm(GOOD, GOOD.home, [1, 2]), ShapeError, "q_rate"),
-        (lambda: pr.ikm(GOOD, np.tile(GOOD.home, (2, 1, 1)), np.zeros((3, 6))), ShapeError, "axes"),
-        (lambda: pr.assembly_modes(GOOD, [1.0] * 6).reason(3), InvalidValueError, "index"),
-        (lambda: pr.determinant(None, np.eye(4)), InvalidValueError, "parallel.gough"),
-        (lambda: pr.dgm(GOOD, [1e200] * 6), InvalidValueError, "up to"),
-        (lambda: pr.ikm(GOOD, GOOD.home, np.ones(6), [[0], [0, 1]]), InvalidValueError, "mode"),
-        (lambda: pr.delta(RING, RING, TURN, np.inf, 1.0), InvalidValueError, "upper_arm"),
         (lambda: GOOD.with_masses(5.0), ShapeError, "two parts"),
-        (lambda: GOOD.with_masses((1.0, [0, 0, 0], np.eye(3)), (1, 2)), ShapeError, "two parts"),
     ],
 )  # fmt: skip
 def test_mistakes_say_what_to_do(call, error, words):

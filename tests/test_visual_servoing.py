@@ -94,7 +94,11 @@ def test_interaction_is_the_derivative_of_the_measurement(feature):
 
 
 @every
-def test_batches_and_empty_batches(feature):
+def test_features_are_values_and_take_batches(feature):
+    again = pickle.loads(pickle.dumps(feature))
+    assert again == feature
+    assert hash(again) == hash(feature)
+    assert len(repr(feature).splitlines()) <= 6
     rng = np.random.default_rng(2)
     T = np.array([pose(rng) for _ in range(6)]).reshape(2, 3, 4, 4)
     k = feature.size
@@ -103,15 +107,6 @@ def test_batches_and_empty_batches(feature):
     assert np.allclose(feature.interaction(T.tolist())[0, 1], feature.interaction(T[0, 1]))
     assert feature.measure(np.empty((0, 4, 4))).shape == (0, k)
     assert feature.interaction(np.empty((0, 4, 4))).shape == (0, k, 6)
-
-
-@every
-def test_features_are_values(feature):
-    again = pickle.loads(pickle.dumps(feature))
-    assert again == feature
-    assert hash(again) == hash(feature)
-    assert len(repr(feature).splitlines()) <= 6
-    assert feature != vs.Points(SQUARE)
 
 
 def test_measurements_are_projections():
@@ -153,42 +148,32 @@ def on_ellipse(X, s):
     assert abs(np.einsum("ki,ij,kj->k", d, M, d) - 4.0).max() < 1e-9
 
 
-def test_small_circles_keep_their_digits():
-    """Moments of a parallel circle: radius and depth only."""
-    for radius in (1e-1, 1e-3, 1e-5):
-        s = vs.Circle([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], radius).measure(translation(0.3, -0.2, 2.0))
-        n = radius**2 / 16.0
-        assert s == pytest.approx([0.15, -0.1, n, n, 0.0], rel=1e-13, abs=1e-13 * n)
-
-
 def test_moments_are_those_of_many_small_cells():
     T = pose(np.random.default_rng(4))
-    corners = np.array(PLATE, float)
-    image = corners @ T[:3, :3].T + T[:3, 3]
+    image = np.array(PLATE, float) @ T[:3, :3].T + T[:3, 3]
     image = image[:, :2] / image[:, 2:]
-    # a fan of triangles, each divided finely
-    k = np.arange(200)
-    u, v = (a.ravel() for a in np.meshgrid((k + 0.5) / 200, (k + 0.5) / 200))
-    u, v, weight = u, v * (1.0 - u), 1.0 - u
-    m = {}
+    k = (np.arange(200) + 0.5) / 200  # a fan of triangles, each divided finely
+    u, v = (a.ravel() for a in np.meshgrid(k, k))
+    v, weight, cells = v * (1.0 - u), 1.0 - u, []
     for b, c in pairwise(image[1:]):
         a = image[0]
-        x = a[:, None] + np.outer(b - a, u) + np.outer(c - a, v)
         area = abs(np.linalg.det([b - a, c - a])) * weight / 40000
-        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1), (3, 0), (1, 2)):
-            m[i, j] = m.get((i, j), 0.0) + (area * x[0] ** i * x[1] ** j).sum()
-    area, x, y = m[0, 0], m[1, 0] / m[0, 0], m[0, 1] / m[0, 0]
-    mu20, mu02 = m[2, 0] - area * x * x, m[0, 2] - area * y * y
-    mu11 = m[1, 1] - area * x * y
-    mu30 = m[3, 0] - 3 * x * m[2, 0] + 2 * area * x**3
-    mu12 = m[1, 2] - 2 * y * m[1, 1] - x * m[0, 2] + 2 * area * x * y * y
+        cells.append((area, *(a[:, None] + np.outer(b - a, u) + np.outer(c - a, v))))
+    w, x, y = np.concatenate(cells, axis=1)
+    area, dx, dy = w.sum(), x - (w @ x) / w.sum(), y - (w @ y) / w.sum()
+    mu20, mu02, mu11 = w @ dx**2, w @ dy**2, w @ (dx * dy)
+    skew = np.sqrt(area) / (mu20 + mu02) ** 1.5
     expected = {
-        "area": area, "x": x, "y": y, "n20": mu20 / area, "n02": mu02 / area, "n11": mu11 / area,
+        "area": area, "x": (w @ x) / area, "y": (w @ y) / area,
+        "n20": mu20 / area, "n02": mu02 / area, "n11": mu11 / area,
         "alpha": 0.5 * np.arctan2(2 * mu11, mu20 - mu02),
-        "c_x": np.sqrt(area) * (mu30 + mu12) / (mu20 + mu02) ** 1.5,
+        "c_x": skew * (w @ (dx**3 + dx * dy**2)), "c_y": skew * (w @ (dy**3 + dy * dx**2)),
     }  # fmt: skip
-    found = vs.Moments(PLATE, components=tuple(expected)).measure(T)
-    assert found == pytest.approx(list(expected.values()), abs=1e-4)
+    moments = vs.Moments(PLATE, components=tuple(expected))
+    assert moments.measure(T) == pytest.approx(list(expected.values()), abs=1e-4)
+    for corners in ([*PLATE, PLATE[0]], PLATE[::-1]):  # closed, and in the other sense
+        same = vs.Moments(corners, components=moments.components).measure(T)
+        assert same == pytest.approx(moments.measure(T))
 
 
 def test_moments_of_a_parallel_plane_have_the_published_rows():
@@ -222,22 +207,6 @@ def test_skewness_turns_with_the_image_and_ignores_shift_and_scale():
     ) == pytest.approx([0, 0], abs=1e-9)
 
 
-def test_skewness_of_points_ignores_scale_and_repetition():
-    P = np.random.default_rng(11).uniform(-0.3, 0.3, (5, 3)) * (1, 1, 0)
-    T, words = translation(0.0, 0.0, 1.0), ("c_x", "c_y")
-    c = vs.Moments(points=P, components=words).measure(T)
-    assert vs.Moments(points=P, components=words).measure(
-        translation(0.3, 0.1, 2.5)
-    ) == pytest.approx(c)
-    assert vs.Moments(points=np.r_[P, P], components=words).measure(T) == pytest.approx(c)
-
-
-def test_a_closed_list_of_corners_is_the_same_polygon():
-    T = pose(np.random.default_rng(12))
-    closed = vs.Moments([*PLATE, PLATE[0]])
-    assert closed.measure(T) == pytest.approx(vs.Moments(PLATE).measure(T))
-
-
 def test_a_sphere_of_known_depth_has_its_exact_matrix():
     sphere = vs.Sphere([0.1, 0.1, 0.0], 0.2)
     for T in (pose(np.random.default_rng(k)) for k in range(5)):
@@ -245,25 +214,6 @@ def test_a_sphere_of_known_depth_has_its_exact_matrix():
         law = vs.Task(sphere, translation(0, 0, 1), depth=float(Z))
         exact = vs.camera_velocity(vs.Task(sphere, translation(0, 0, 1)), T)
         assert vs.camera_velocity(law, sphere.measure(T)).v == pytest.approx(exact.v, abs=1e-9)
-
-
-def test_a_cylinder_is_seen_wherever_its_reference_point_is():
-    places = [vs.Cylinder([a, 0, 0], [1, 0, 0], 0.05) for a in (0.0, 5.0, -5.0)]
-    s = [c.measure(translation(0, 0, 1.0) @ rotation("y", 0.5)) for c in places]
-    assert s[1] == pytest.approx(s[0])
-    assert s[2] == pytest.approx(s[0])
-
-
-def test_segments_of_several_depths_broadcast():
-    L = vs.interaction_segment(0.1, 0.2, 0.3, 0.4, np.ones((5, 2)))
-    assert L.shape == (5, 4, 6)
-    assert vs.interaction_moment(np.ones((5, 5)), 1, 1, np.ones((3, 4))).shape == (3, 1, 6)
-    assert vs.broyden(np.zeros((1, 6)), [1e-170], 1e-170 * np.eye(6)[0])[0, 0] == pytest.approx(1.0)
-
-
-def test_corners_in_the_other_sense_are_the_same_region():
-    T = pose(np.random.default_rng(5))
-    assert vs.Moments(PLATE[::-1]).measure(T) == pytest.approx(vs.Moments(PLATE).measure(T))
 
 
 def test_bare_matrices_are_those_of_the_features():
@@ -366,57 +316,31 @@ def test_virtual_links(feature, link_class, name):
 def test_virtual_links_of_many_poses():
     circle = vs.Circle([0, 0, 0], [0, 0, 1], 0.2)
     T = np.array([translation(0, 0, 1), pose(np.random.default_rng(3))])
-    links = vs.virtual_link(circle, T[:, None])
-    for k, one in enumerate(vs.virtual_link(circle, place) for place in T):
-        assert (links.link_class[k, 0], links.rank[k, 0]) == (one.link_class, one.rank)
-        assert links.name[k, 0] == one.name
-        kept = links.kernel_twists[k, 0]
-        assert kept[: one.link_class] == pytest.approx(one.kernel_twists)
-        assert np.isnan(kept[one.link_class :]).all()
-    assert links.kernel_twists.shape == (2, 1, 3, 6)
-    assert vs.virtual_link(circle, T[:0]).kernel_twists.shape == (0, 0, 6)
-    assert pickle.loads(pickle.dumps(links)) == links
-
-
-def test_a_circle_seen_centred_has_a_larger_class():
-    assert vs.virtual_link(vs.Circle([0, 0, 0], [0, 0, 1], 0.2), translation(0, 0, 1)).rank == 3
+    links = vs.virtual_link(circle, T)
+    assert links.rank.tolist() == [3, 5]  # seen centred it has a larger class
+    assert links.kernel_twists.shape == (2, 3, 6)
+    assert np.isnan(links.kernel_twists[1, 1:]).all()
 
 
 # --- refused input -------------------------------------------------------------------------------
 
 GOAL = translation(0.0, 0.0, 0.5)
 TASK = vs.Task(vs.Points(SQUARE), GOAL)
-EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
 
 
 @pytest.mark.parametrize(
     ("call", "kind", "words"),
     [
         (lambda: vs.Points(SQUARE).measure(translation(0, 0, 0)), InvalidValueError, "in front"),
-        (lambda: vs.Points(SQUARE).measure(translation(0, 0, -1)), InvalidValueError, "in front"),
         (lambda: vs.Sphere([0, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
         (lambda: vs.Circle([0, 0, 0], [1, 0, 0], 0.1).measure(GOAL), InvalidValueError, "edge-on"),
         (lambda: vs.Cylinder([0, 0, 0], [1, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
         (lambda: vs.Lines([[[0, 0, 0], [0, 0, 1]]]).measure(GOAL), InvalidValueError, "edge-on"),
-        (lambda: vs.Points(SQUARE).interaction(translation(0, 0, 1e-300)), InvalidValueError,
-         "front"),
-        (lambda: vs.Circle([0, 0, 0], [0, 0, 1], 0.1).measure(translation(0, 0, 1e-300)),
-         InvalidValueError, "front"),
-        (lambda: vs.pnp(1e200 * SQUARE, SQUARE[:, :2]), InvalidValueError, "units"),
-        (lambda: vs.pnp(1e-200 * SQUARE, SQUARE[:, :2]), InvalidValueError, "units"),
-        (lambda: vs.Moments(1e200 * SQUARE), InvalidValueError, "units"),
-        (lambda: vs.Circle([0, 0, 0], [1e200, 0, 1e200], 1), InvalidValueError, "units"),
-        (lambda: vs.Sphere([0, 0, 0], 1e199), InvalidValueError, "radius"),
-        (lambda: vs.task_3d(None), InvalidValueError, "desired"),
-        (lambda: vs.task_2_1_2d(np.empty((0, 3)), GOAL), ShapeError, "points"),
-        (lambda: vs.servo(TASK, None), InvalidValueError, "T0"),
-        (lambda: vs.camera_velocity(TASK, [GOAL]).reason([[1], []]), InvalidValueError, "index"),
         (lambda: vs.Moments(SQUARE[:2]), ShapeError, "k from 3"),
         (lambda: vs.Moments([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), InvalidValueError, "area"),
         (lambda: vs.Moments(SQUARE[[0, 2, 1, 3]]), InvalidValueError, "cross|area"),
         (lambda: vs.Moments([*SQUARE[:3], [0, 0, 1]]), InvalidValueError, "one plane"),
         (lambda: vs.Moments(SQUARE, components=("area", "m17")), InvalidValueError, "m17"),
-        (lambda: vs.Moments(), InvalidValueError, "polygon or points"),
         (lambda: vs.Moments(SQUARE).measure(GOAL), InvalidValueError, "alpha"),
         (lambda: vs.Moments(SQUARE).measure(GOAL @ rotation("x", np.pi / 2) @ translation(0, 0, 0)),
          InvalidValueError, "edge-on"),
@@ -424,27 +348,19 @@ EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
         (lambda: vs.Circle([0, 0, 0], [0, 0, 0], 1), InvalidValueError, "normal"),
         (lambda: vs.Sphere([0, 0, 0], -1), InvalidValueError, "radius"),
         (lambda: vs.Points([[0, 0, np.nan]]), InvalidValueError, "finite"),
-        (lambda: vs.Points([]), ShapeError, "object_points"),
         (lambda: vs.Points(SQUARE).measure(2 * np.eye(4)), NotARotationError, "last row"),
         (lambda: vs.Camera(focal=0), InvalidValueError, "focal"),
-        (lambda: vs.Camera(size=(0, 480)), InvalidValueError, "size"),
         (lambda: vs.Camera().project([0, 0, -1.0]), InvalidValueError, "in front"),
         (lambda: vs.interaction_point(0, 0, 0), InvalidValueError, "Z"),
-        (lambda: vs.interaction_point([1, 2], [1, 2, 3], 1), ShapeError, "broadcast"),
         (lambda: vs.interaction_line(0, 0, [0, 0, 1, 0]), InvalidValueError, "plane"),
         (lambda: vs.interaction_segment(0, 0, 0, 0, [1, 1]), InvalidValueError, "length"),
-        (lambda: vs.interaction_moment(np.ones((2, 2)), 1, 0, [0, 0, 1, -1]), ShapeError, "K"),
         (lambda: vs.broyden(np.ones((2, 6)), [1], np.ones(6)), ShapeError, "ds"),
-        (lambda: vs.broyden(np.ones((1, 6)), [1], np.ones(6), 2.0), InvalidValueError, "factor"),
         (lambda: vs.estimate_interaction([[1]], np.ones((2, 6))), ShapeError, "dS"),
-        (lambda: vs.virtual_link("point", GOAL), InvalidValueError, "feature"),
         (lambda: vs.Task(SQUARE, GOAL), InvalidValueError, "feature"),
         (lambda: vs.Task(vs.Points(SQUARE), np.zeros(5)), ShapeError, "8 numbers"),
         (lambda: vs.Task(vs.Points(SQUARE), vs.Sphere([0, 0, 0], 1)), InvalidValueError, "Sphere"),
-        (lambda: vs.Task(vs.Points(SQUARE), GOAL, gain=0), InvalidValueError, "gain"),
         (lambda: vs.Task(vs.Points(SQUARE), GOAL, interaction="best"), InvalidValueError, "mean"),
         (lambda: vs.Task(vs.Points(SQUARE), GOAL, depth=-1.0), InvalidValueError, "depth"),
-        (lambda: vs.Task(vs.Points(SQUARE), GOAL, depth="some"), InvalidValueError, "depth"),
         (lambda: vs.Task(vs.Points(SQUARE), np.ones(8), interaction="mean"), InvalidValueError,
          "desired pose"),
         (lambda: vs.camera_velocity(TASK, np.ones(8)), InvalidValueError, 'depth="true"'),
@@ -456,48 +372,25 @@ EIGHT = [[0, 0, 0], [1, 1, 0], [2, 0.5, 0], [0, 0, 0], [-1, -1, 0], [-2, 0, 0]]
         (lambda: vs.servo(TASK, GOAL, step=0), InvalidValueError, "step"),
         (lambda: vs.servo(TASK, GOAL, duration=1e9), InvalidValueError, "steps"),
         (lambda: vs.servo(TASK, GOAL, q0=np.zeros(6)), InvalidValueError, "robot"),
-        (lambda: vs.servo(TASK, GOAL, noise=-1), InvalidValueError, "noise"),
         (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
          "on a line"),
-        (lambda: vs.p3p(np.eye(3), np.eye(3)), ShapeError, "image"),
         (lambda: vs.pnp(np.eye(3)[:2], np.eye(2)), ShapeError, "from 3"),
         (lambda: vs.pnp(np.outer(range(5), [1, 2, 3]), np.ones((5, 2))), InvalidValueError, "line"),
-        (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], -GOAL), NotARotationError, "T0"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),
         (lambda: vs.homography(SQUARE[:3, :2], SQUARE[:3, :2]), ShapeError, "n from 4"),
         (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), InvalidValueError, "determine"),
         (lambda: vs.decompose_homography(np.ones((3, 3))), InvalidValueError, "regular"),
         (lambda: vs.TargetMotion(noise=0.0), InvalidValueError, "noise"),
         (lambda: vs.Moments(np.r_[SQUARE, SQUARE]), InvalidValueError, "touch"),
-        (lambda: vs.Moments(EIGHT), InvalidValueError, "touch"),
-        (lambda: vs.Moments([*SQUARE[:3], [0, -0.1, 0], SQUARE[3]]), InvalidValueError,
-         "touch|cross"),
-        (lambda: vs.Moments([*SQUARE, [-0.1, 0.3, 0]]), InvalidValueError, "touch|cross"),
-        (lambda: vs.Moments(SQUARE, components=5), InvalidValueError, "components"),
-        (lambda: vs.Moments(SQUARE, components=[["area"]]), InvalidValueError, "components"),
-        (lambda: vs.Camera(focal=[[1, 2], [3]]), InvalidValueError, "focal"),
-        (lambda: vs.Task(vs.Points(SQUARE), [[1, 2], [3]]), InvalidValueError, "desired"),
-        (lambda: vs.camera_velocity(TASK, [[1, 2], [3]]), InvalidValueError, "measurement"),
-        (lambda: vs.Task(vs.Points(SQUARE), GOAL, interaction=np.zeros(3)), InvalidValueError,
-         "interaction"),
         (lambda: vs.Task(vs.Sphere([0, 0, 0], 1.0), GOAL @ translation(0, 0, 1), depth=0.5),
          InvalidValueError, "depth"),
-        (lambda: vs.interaction_segment([1, 2], 0, 1, 0, np.ones((5, 2))), ShapeError, "broadcast"),
-        (lambda: vs.interaction_moment(np.ones((3, 5, 5)), 1, 1, np.ones((5, 4))), ShapeError,
-         "broadcast"),
         (lambda: vs.interaction_moment(np.ones((5, 5)), 0.5, 1, [0, 0, 1, -1]), InvalidValueError,
-         "integer"),
-        (lambda: vs.interaction_moment(np.ones((5, 5)), "a", 1, [0, 0, 1, -1]), InvalidValueError,
          "integer"),
         (lambda: vs.interaction_theta_u([0, 0, 2 * np.pi]), InvalidValueError, "turn"),
         (lambda: vs.interaction_plane_3d([0, 0, 5]), InvalidValueError, "unit"),
         (lambda: vs.refine_pose(np.outer(range(4), [1, 0, 0]), SQUARE[:, :2], GOAL),
          InvalidValueError, "line"),
         (lambda: vs.pnp(SQUARE, np.zeros((4, 2))), InvalidValueError, "coincide"),
-        (lambda: vs.TargetMotion(kalman="x"), InvalidValueError, "kalman"),
-        (lambda: vs.TargetMotion().update(None, [0.0], [0.0], 0.1), InvalidValueError, "last"),
-        (lambda: vs.camera_velocity(TASK, [GOAL]).reason(5), InvalidValueError, "index"),
-        (lambda: vs.pnp(SQUARE, [SQUARE[:, :2]]).reason(5), InvalidValueError, "index"),
         (lambda: vs.camera_velocity(vs.Hybrid(vs.Task(vs.Points(SQUARE), GOAL, depth=0.5), vs.Task(
             vs.Points(SQUARE[::-1]), GOAL, depth=0.5)), np.ones(8)), InvalidValueError, "second"),
     ],

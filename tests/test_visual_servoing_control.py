@@ -1,8 +1,6 @@
 """Laws, simulations and estimated poses: closed forms, published cases, statuses."""
 
 import pickle
-from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -34,16 +32,6 @@ def test_three_dimensional_servoing_decays_exponentially():
     step = vs.camera_velocity(vs.task_3d(GOAL), GOAL @ rotation("z", 0.2))
     assert step.error[3:] == pytest.approx([0, 0, -0.2])
     assert step.v == pytest.approx([0, 0, 0, 0, 0, 0.1], abs=1e-12)
-
-
-@pytest.mark.parametrize("gain", [0.5, 2.0])
-@pytest.mark.parametrize("feature", [POINTS, vs.Point3D([0.1, 0, 0]), vs.Sphere([0, 0, 0], 0.1)])
-def test_errors_decay_where_the_matrix_has_full_rank(feature, gain):
-    near = GOAL @ translation(1e-4, 2e-4, -1e-4) @ rotation("y", 2e-4)
-    step = vs.camera_velocity(vs.Task(feature, GOAL, gain), near)
-    rate = (feature.measure(seen_after(near, 1e-3 * step.v)) - feature.measure(near)) / 1e-3
-    assert rate == pytest.approx(-gain * step.error, abs=2e-2 * gain * abs(step.error).max())
-    assert step.status is S.CONVERGES
 
 
 @pytest.mark.parametrize("interaction", ["current", "desired", "mean"])
@@ -221,25 +209,10 @@ def test_statuses_out_of_sight_and_behind():
     assert run.status is S.OUT_OF_SIGHT
     assert len(run.t) == 1
     assert vs.servo(task, translation(0, 0, -1.0)).status is S.BEHIND
-    plate = vs.Moments([*SQUARE[:3], [-0.15, 0.12, 0]])
-    others = (vs.Lines([SQUARE[1:3]]), vs.Segments([SQUARE[:2]]), vs.PoseError())
-    for feature in (vs.Sphere([0, 0, 0], 0.1), plate, *others):
+    for feature in (vs.Sphere([0, 0, 0], 0.1), vs.Lines([SQUARE[1:3]]), vs.PoseError()):
         law = vs.Task(feature, GOAL)
         assert vs.camera_velocity(law, aside, camera).status is S.OUT_OF_SIGHT
         assert vs.camera_velocity(law, GOAL, camera).status is S.CONVERGES
-
-
-def test_lines_are_in_the_image_where_they_cross_it():
-    camera = vs.Camera()
-    for feature, seen in (
-        (vs.Lines([[[0.0, 0.9, 0], [0.8, 0.0, 0]]]), False),
-        (vs.Lines([[[0.0, 0.6, 0], [0.65, 0.0, 0]]]), True),  # its foot is outside the image
-        (vs.Cylinder([0.0, 0.6, 0], [0.65, -0.6, 0], 0.01), True),
-    ):
-        at = translation(0, 0, 1.0)
-        found = vs.camera_velocity(vs.Task(feature, at @ rotation("z", 0.01)), at, camera)
-        assert (found.status is S.CONVERGES) == seen
-        assert (found.status is S.OUT_OF_SIGHT) != seen
 
 
 def test_measurements_alone_are_not_called_singular():
@@ -249,24 +222,8 @@ def test_measurements_alone_are_not_called_singular():
     law = vs.Task(ball, ball.measure(GOAL), depth=0.6)
     step = vs.camera_velocity(law, ball.measure(START))
     assert (step.status, step.rank) == (S.CONVERGES, 3)
-    points = vs.Points(SQUARE[:3])
     centred = vs.Task(vs.Circle([0, 0, 0], [0, 0, 1], 0.1), np.zeros(5), depth=0.5)
     assert vs.camera_velocity(centred, [0, 0, 0.01, 0.01, 0]).status is S.SINGULAR
-    assert vs.camera_velocity(vs.Task(points, np.zeros(6), depth=0.5), np.ones(6)).status in S
-
-
-def test_the_mean_matrix_near_half_a_turn_is_singular():
-    law = vs.Task(POINTS, GOAL, interaction="mean")
-    for angle in (np.pi, np.pi - 1e-6, 3.1415):
-        assert vs.camera_velocity(law, GOAL @ rotation("z", angle)).status is S.SINGULAR
-    assert vs.camera_velocity(law, GOAL @ rotation("z", 2.0)).status is S.CONVERGES
-
-
-def test_measurements_of_runs_are_taken_back():
-    for law in (vs.task_3d(GOAL), vs.Task(POINTS, GOAL, depth=0.5)):
-        run = vs.servo(law, START, duration=0.1)
-        step = vs.camera_velocity(law, run.s[0])
-        assert step.v == pytest.approx(run.velocity[0])
 
 
 def test_angles_of_errors_take_the_short_way():
@@ -381,12 +338,6 @@ def test_limits_are_kept_and_named():
     assert abs(np.diff(run.q, axis=0)).max() <= 0.5 * 0.05 + 1e-9
     assert run.status is S.LIMITED
     assert abs(run.error[-1]).max() > 1e-3
-    table = replace(UR5.table, lower=POSTURE - 0.05, upper=POSTURE + 0.05)
-    own = vs.servo(
-        vs.Task(POINTS, GOAL, 1.5), START, robot=UR5.with_table(table), q0=POSTURE, duration=4.0,
-        step=0.05,
-    )  # fmt: skip
-    assert abs(own.q - POSTURE).max() <= 0.05 + 1e-9
     with pytest.raises(InvalidValueError, match="inside the limits"):
         vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=np.full(6, 9.0))
     with pytest.raises(InvalidValueError, match="q0"):
@@ -395,33 +346,13 @@ def test_limits_are_kept_and_named():
         vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=POSTURE, mounting="hand")
 
 
-def test_bounds_without_a_step_are_kept_too():
-    near = POSTURE.copy()
-    near[0] = UR5.upper[0] - 0.01
-    run = vs.servo(vs.Task(POINTS, GOAL, 3.0), translation(0.3, 0.3, 1.0), robot=UR5, q0=near,
-                   duration=2.0, limits=rm.kinematics.JointBounds())  # fmt: skip
-    assert (run.q <= UR5.upper).all()
-    other = vs.servo(vs.Task(POINTS, GOAL, 3.0), translation(-0.3, -0.3, 1.0), robot=UR5, q0=near,
-                     duration=2.0, limits=rm.kinematics.JointBounds())  # fmt: skip
-    assert (other.q <= UR5.upper).all()
-    with pytest.raises(InvalidValueError, match="inside the limits"):
-        vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=POSTURE,
-                 limits=rm.kinematics.JointBounds(upper=POSTURE - 0.1))  # fmt: skip
-
-
 def test_runs_are_values():
-    run = vs.servo(vs.Task(POINTS, GOAL), START, duration=0.5, noise=1e-3, rng=1)
-    again = vs.servo(vs.Task(POINTS, GOAL), START, duration=0.5, noise=1e-3, rng=1)
-    assert (run.s == again.s).all()
-    assert (pickle.loads(pickle.dumps(run)).s == run.s).all()
-    assert len(repr(run).splitlines()) <= 6
-    assert not run.s.flags.writeable
-    step = vs.camera_velocity(vs.Task(POINTS, GOAL), START)
-    assert pickle.loads(pickle.dumps(step)) == step
     task = vs.Task(POINTS, GOAL)
-    assert pickle.loads(pickle.dumps(task)) == task
-    assert len(repr(task).splitlines()) <= 6
-    assert not step.v.flags.writeable
+    run, again = (vs.servo(task, START, duration=0.5, noise=1e-3, rng=1) for _ in range(2))
+    assert (run.s == again.s).all()
+    for value in (run, task, vs.camera_velocity(task, START), vs.Camera()):
+        assert pickle.loads(pickle.dumps(value)) == value
+        assert len(repr(value).splitlines()) <= 6
 
 
 # --- poses ---------------------------------------------------------------------------------------
@@ -443,9 +374,9 @@ def test_fischler_and_bolles():
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.01, 0.001])
 def test_the_true_pose_is_among_those_of_three_points(size):
     rng = np.random.default_rng(5)
-    P, T = size * rng.uniform(-1.0, 1.0, (1500, 3, 3)), np.tile(np.eye(4), (1500, 1, 1))
-    T[:, :3, :3] = Rotation.random(1500, random_state=rng).as_matrix()
-    T[:, :3, 3] = np.c_[rng.uniform(-1, 1, (1500, 2)), rng.uniform(2.5, 6, 1500)]
+    P, T = size * rng.uniform(-1.0, 1.0, (2500, 3, 3)), np.tile(np.eye(4), (2500, 1, 1))
+    T[:, :3, :3] = Rotation.random(2500, random_state=rng).as_matrix()
+    T[:, :3, 3] = np.c_[rng.uniform(-1, 1, (2500, 2)), rng.uniform(2.5, 6, 2500)]
     X = P @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
     found = vs.p3p(P, X[..., :2] / X[..., 2:])
     off = np.nanmin(abs(found.T - T[:, None]).max(axis=(2, 3)), axis=1)
@@ -453,24 +384,7 @@ def test_the_true_pose_is_among_those_of_three_points(size):
     assert found.residual[found.valid].max() < 1e-9
     assert np.isnan(found.T[~found.valid]).all()
     assert found.count.max() <= 4
-    assert np.linalg.det(found.T[found.valid][:, :3, :3]) == pytest.approx(1.0)
-    again = pickle.loads(pickle.dumps(found))
-    assert np.asarray(again).shape == found.T.shape
     assert vs.p3p(P[:0], X[:0, :, :2]).T.shape == (0, 0, 4, 4)
-    assert found.reason(3) == vs.PoseStatus.FOUND.sentence
-
-
-def test_three_points_from_their_cylinder():
-    """Two poses coincide there: the true one is found to the root of rounding."""
-    rng = np.random.default_rng(13)
-    corner = np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
-    angle, height = rng.uniform(0.0, 2.0 * np.pi, 300), rng.uniform(1.5, 4.0, 300)
-    eyes = np.c_[np.cos(angle), np.sin(angle), height]
-    T = np.array([looking(eye, np.zeros(3)) for eye in eyes])
-    X = corner @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
-    found = vs.p3p(corner, X[..., :2] / X[..., 2:])
-    assert np.nanmin(abs(found.T - T[:, None]).max(axis=(2, 3)), axis=1).max() < 1e-4
-    assert found.residual[found.valid].max() < 1e-9
 
 
 def test_pose_of_many_points():
@@ -541,15 +455,9 @@ def test_homographies():
             assert (off + abs(motions.n - n).max(axis=1)).min() < 1e-8
             back = motions.R + motions.t[:, :, None] * motions.n[:, None]
             assert back == pytest.approx(np.broadcast_to(H, back.shape), abs=1e-9)
-    both = np.stack((R, H))  # a batch: no translation, then two motions in front
-    many, one = vs.decompose_homography(both, x), vs.decompose_homography(H, x)
-    assert many.R[1] == pytest.approx(one.R)
-    assert many.n[1] == pytest.approx(one.n)
-    assert many.R[0, 0] == pytest.approx(R)
-    assert np.isnan(many.t[0, 1:]).all()
-    image = Y[:, :2] / Y[:, 2:]
-    assert vs.homography([x, image], [image, x])[0] == pytest.approx(H, abs=1e-9)
-    assert vs.decompose_homography(np.empty((0, 3, 3))).R.shape == (0, 0, 3, 3)
+    both = vs.decompose_homography(np.stack((R, H)), x)  # no translation, then two motions
+    assert both.R[1] == pytest.approx(vs.decompose_homography(H, x).R)
+    assert np.isnan(both.t[0, 1:]).all()
     n = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
     for size in (0.3, -0.3):  # translation along the normal
         R = rotation("z", 0.4)[:3, :3]
@@ -567,7 +475,3 @@ def test_camera_pixels():
     camera = vs.Camera(focal=(800, 600), centre=(320, 240), size=(640, 480))
     X = np.random.default_rng(8).uniform((-1, -1, 1), (1, 1, 3), (5, 4, 3))
     assert camera.normalise(camera.project(X)) == pytest.approx(X[..., :2] / X[..., 2:])
-    corners = [[x, y] for x, y in product((0.0, 640.0), (0.0, 480.0))]
-    assert camera.sees(camera.normalise(corners))
-    assert not camera.sees(camera.normalise([[641.0, 0.0]]))
-    assert pickle.loads(pickle.dumps(camera)) == camera
