@@ -1,4 +1,12 @@
-"""Parallel robots (chapter 2): geometric models, statics, singularities, workspaces, dynamics."""
+"""Parallel robots (chapter 2): geometric models, statics, singularities, workspaces, dynamics.
+
+Throughout, ``robot`` has m legs and is a `ParallelRobot` or a `LoopedPlatform`; ``T`` (..., 4, 4)
+are poses of the platform in the world; ``q`` (..., m) actuated lengths (not strokes), m, or angles,
+rad; ``mode`` (...) numbers working modes as `igm` does, default 0. Twists [v; w] and wrenches
+[f; m] (..., 6) of the platform, m/s, rad/s, N and N m, are taken at its origin in world axes;
+wrenches act on the environment. Arrays of the wrong shape, NaN, and poses that the platform cannot
+have or the legs do not reach raise ShapeError, InvalidValueError or NotARotationError.
+"""
 
 from .direct import (
     AssemblyModes,

@@ -3,15 +3,13 @@
 `dgm` iterates Newton's method from a pose nearby; where it leaves the assembly mode, the lengths
 are continued from those at the start in small pieces. `assembly_modes` continues the 40 complex
 solutions of a stored robot (Gough platforms), solves the sextic (planar robots), or intersects
-spheres and circles (Delta and five-bar). Loops of any other kind are searched from random postures,
-which is no proof (``SOME_LOST``).
+spheres and circles (Delta and five-bar). Kinematic loops are searched from random postures, which
+is no proof (``SOME_LOST``).
 
 Parameters
 ----------
-robot : ParallelRobot or LoopedPlatform
-    The robot, m legs.
-q : array_like, shape (..., m)
-    Actuated lengths, m, or angles, rad.
+robot, q
+    See `robotmodels.parallel`.
 T0 : array_like, shape (..., 4, 4), optional
     Where to start; default the home pose, of a Gough platform without limits raised to the mean of
     the lengths.
@@ -22,16 +20,8 @@ PlatformPoses or AssemblyModes
     ``T`` are poses (..., 4, 4), NaN where none was found, or (..., S, 4, 4), packed, with ``valid``
     and ``count``: by ascending angle of planar robots, else by the distance from home. ``status``
     are codes of `PoseStatus` or `AssemblyStatus`, ``residual`` the largest error of a leg's length,
-    m, and ``det`` determinants of the unit lines of the legs ``[u, (R b) x u]`` in the components
-    of the twist that the platform has: zero at singular poses, one sign for each side.
-    ``iterations`` are those of Newton's method, of loops how often they were closed;
-    ``complex_count`` is the number of solutions in complex numbers, the real ones included, without
-    those that are nearly at infinity.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Arrays of the wrong shape, NaN, negative lengths, no poses.
+    m, ``det`` as `determinant`, ``iterations`` those of Newton's method; ``complex_count`` is the
+    number of solutions in complex numbers, the real ones included, none at infinity.
 
 References
 ----------
@@ -41,15 +31,11 @@ Seed book section 2.4; C. Wampler, "Forward displacement analysis of general six
 
 Examples
 --------
->>> from robotmodels.parallel import gough_symmetric, igm, planar_3rpr
->>> robot = gough_symmetric(1.0)
->>> T = robot.pose([0.1, 0.0, 1.1, 0.1, 0.2, 0.0])
->>> bool(abs(dgm(robot, igm(robot, T).q[0]).T - T).max() < 1e-12)
-True
+>>> from robotmodels.parallel import planar_3rpr
 >>> robot = planar_3rpr([[0, 0], [15.91, 0], [0, 10]], [[0, 0], [17.04, 0], [13.23, 16.1]])
 >>> modes = assembly_modes(robot, [14.98, 15.38, 12.0])
->>> modes.count, modes.complex_count, modes.reason()
-(np.int64(6), array(6), 'All assembly modes are listed.')
+>>> modes.count, modes.complex_count, dgm(robot, [14.98, 15.38, 12.0], modes.T[0]).status
+(np.int64(6), array(6), array(0, dtype=int8))
 """
 
 from __future__ import annotations

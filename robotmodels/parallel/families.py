@@ -18,11 +18,10 @@ lower, upper : array_like, scalar or shape (m,), optional
 home : array_like, shape (4, 4), optional
     Reference pose, from which the direct model starts. Default: centres of the anchors above each
     other, at medium lengths.
-radius, platform_radius : float
-    Radii of the circles of anchors, m; the platform's is 0.6 of the base's by default.
-base_angle, platform_angle : float
-    Angle between the two anchors of a pair, rad. The pairs of the base are around 0, 120 and 240
-    deg, those of the platform around 60, 180 and 300 deg.
+radius, platform_radius, base_angle, platform_angle : float
+    Radii of the circles of anchors, m, of the platform by default 0.6 of the base's; angles between
+    the anchors of a pair, rad. The pairs of the base are around 0, 120 and 240 deg, those of the
+    platform around 60, 180 and 300 deg.
 kind : {"SSM", "TSSM", "MSSM"}
     Simplified symmetric manipulator; triangular, whose platform is a triangle; minimal, with two
     triangles. Angles of triangles are ignored.
@@ -30,13 +29,8 @@ kind : {"SSM", "TSSM", "MSSM"}
 Returns
 -------
 ParallelRobot
-    The description.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Wrong number of legs, NaN, lengths that are not positive, two legs that coincide, anchors that
-    all coincide, limits that are negative or not ascending.
+    The description. Legs that coincide, anchors that all coincide and limits that do not ascend
+    are refused.
 
 References
 ----------
@@ -48,10 +42,6 @@ Examples
 <Gough-Stewart platform: 6 legs of actuated length, length 0.7 to 1.5, without masses>
 >>> five_bar([[0, 0], [0.5, 0]], [0.4, 0.4], [0.6, 0.6]).freedoms
 ('vx', 'vy')
->>> turn = np.deg2rad([-90.0, 30.0, 150.0])
->>> ring = np.c_[np.cos(turn), np.sin(turn), 0.0 * turn]
->>> delta(0.16 * ring, 0.04 * ring, turn, 0.52, 1.24).m
-3
 """
 
 from __future__ import annotations

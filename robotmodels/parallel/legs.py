@@ -2,10 +2,8 @@
 
 Parameters
 ----------
-robot : ParallelRobot or LoopedPlatform
-    The robot, m legs.
-T : array_like, shape (..., 4, 4)
-    Poses of the platform in the world.
+robot, T
+    See `robotmodels.parallel`.
 
 Returns
 -------
@@ -15,11 +13,6 @@ LegSolutions
     lengths, m, or angles in (-pi, pi], rad; ``valid``, ``within_limits`` (angles modulo whole
     turns) and ``residual``, the largest error of a rod's length, m, are (..., S). Packed: after the
     solutions NaN, mode -1. ``status`` (...) are codes of `LegStatus`.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    No poses, or poses that the platform cannot have.
 
 References
 ----------

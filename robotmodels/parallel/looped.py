@@ -1,6 +1,5 @@
 """Parallel robots given as kinematic loops: a platform frame on a robot of `robotmodels.loops`.
 
-The models are numeric: Newton's method on the actuated joints, and the velocity map of the loops.
 A pose is reached if its position and orientation are; the latter does not count where it only
 follows from the position, as of a five-bar's rod.
 
@@ -12,7 +11,7 @@ platform_frame : str or int
     Name or number of the platform's frame in the tree.
 q_home : array_like, shape (n,), optional
     All joints near the home posture, rad or m; default the tree's zero posture. The loops are
-    closed from there.
+    closed from there; other joints and poses are found by continuation from it.
 
 Returns
 -------
@@ -23,8 +22,8 @@ LoopedPlatform
 Raises
 ------
 InvalidValueError, LoopError, FrameNotFoundError
-    Not a LoopedRobot, loops that cannot be closed near home, actuated joints that do not determine
-    the platform, or more of them than it has freedoms.
+    Loops that cannot be closed near home, actuated joints that do not determine the platform, or
+    more of them than it has freedoms.
 
 Examples
 --------

@@ -80,19 +80,10 @@ class ParallelRobot(Value):
         k are set, the lowest bit that of the first leg.
     lower, upper : ndarray, shape (m,)
         Limits of q, m or rad; infinite where there are none.
-    home : ndarray, shape (4, 4)
-        Reference pose of the platform.
-    gravity : ndarray, shape (3,)
-        Acceleration, m/s^2.
+    home, gravity : ndarray, shape (4, 4) and (3,)
+        Reference pose of the platform; acceleration, m/s^2.
     masses : Masses or None
         See `with_masses`.
-
-    Examples
-    --------
-    >>> from robotmodels.parallel import gough_symmetric
-    >>> robot = gough_symmetric(1.0, lower=0.8, upper=1.6)
-    >>> robot.m, robot.freedoms
-    (6, ('vx', 'vy', 'vz', 'wx', 'wy', 'wz'))
     """
 
     family: Family

@@ -2,12 +2,8 @@
 
 Parameters
 ----------
-robot : ParallelRobot or LoopedPlatform
-    The robot, m legs.
-T : array_like, shape (4, 4)
-    One pose of the platform.
-mode : int, optional
-    Working mode of robots with cranks, as numbered by `igm`; default 0.
+robot, T, mode
+    See `robotmodels.parallel`; one pose (4, 4).
 tolerance : float
     Singular values below this fraction of the largest are zero, and sines of elbows.
 
@@ -15,17 +11,11 @@ Returns
 -------
 Singularity
     ``kind``; ``motion`` (k, 6), twists [v; w] of the platform that locked actuators do not prevent,
-    norm 1 with angles times the characteristic length, world axes, at the platform's origin;
-    ``legs``, the smallest set of legs whose lines depend on each other, at serial singularities the
-    straight ones, from 0; ``variety``, the class of these lines in Grassmann geometry, "1" to "4",
-    "5a", "5b", which is the dimension they span, empty where they are independent, and ``form``,
-    the same with Merlet's letter; ``least``, the smallest singular value of the unit lines,
-    relative to the largest.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Several poses, poses that the platform cannot have or the legs do not reach.
+    norm 1 with angles times the characteristic length; ``legs``, the smallest set of legs whose
+    lines depend on each other, at serial singularities the straight ones, from 0; ``variety``, the
+    class of these lines in Grassmann geometry, "1" to "4", "5a", "5b", empty where they are
+    independent, and ``form``, the same with Merlet's letter; ``least``, the smallest singular value
+    of the unit lines, relative to the largest.
 
 References
 ----------

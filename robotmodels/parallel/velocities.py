@@ -1,40 +1,26 @@
 """Kinematic and static models: inverse Jacobian, velocities, forces of the legs, indices.
 
-``q' = J^-1 [v; w]`` with the velocity v of the platform's origin and its angular velocity w, world
-axes. Columns of components that the platform does not have are zero.
+``q' = J^-1 [v; w]``. Columns of components that the platform does not have are zero.
 
 Parameters
 ----------
-robot : ParallelRobot or LoopedPlatform
-    The robot, m legs.
-T : array_like, shape (..., 4, 4)
-    Poses of the platform in the world.
-mode : int or array_like of int, shape (...), optional
-    Working mode of robots with cranks, as numbered by `igm`; default 0.
-twist, acceleration : array_like, shape (..., 6)
-    Velocity [v; w] of the platform and its time derivative, m/s, rad/s and per s.
+robot, T, mode, twist, wrench
+    See `robotmodels.parallel`.
+acceleration : array_like, shape (..., 6)
+    Time derivative of the twist, m/s^2 and rad/s^2.
 q_rate, q_acceleration : array_like, shape (..., m)
     Velocities and accelerations of the actuators, m/s or rad/s and per s.
-wrench : array_like, shape (..., 6)
-    Wrench [f; m] of the platform at its origin, exerted on the environment, world axes, N and N m.
 k : array_like, scalar or shape (m,)
     Stiffness of the actuators, N/m or N m/rad, not negative.
 length : float, optional
-    Metres that equal a radian; default `ParallelRobot.length`. The indices mean nothing without
-    it where the platform also rotates.
+    Metres that equal a radian; default `ParallelRobot.length`.
 
 Returns
 -------
 ndarray
     Matrices (..., m, 6) or (..., 6, 6), motion of the actuators (..., m) or of the platform
-    (..., 6), indices (...); `LegForces` with ``forces`` (..., m), N, or N m of cranks, and
-    ``status`` (...), codes of `ForceStatus`.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Arrays of the wrong shape, NaN, poses that the platform cannot have or the legs do not reach, no
-    such mode, and positions where a leg is straight or has no length.
+    (..., 6), indices (...); `LegForces` with ``forces`` (..., m), N or N m, and ``status`` (...).
+    Straight legs and legs without length are refused.
 
 References
 ----------
@@ -47,9 +33,8 @@ Examples
 >>> rates = ikm(robot, robot.home, V)
 >>> inverse_jacobian(robot, robot.home).shape, dkm(robot, robot.home, rates).round(6).tolist()
 ((6, 6), [0.1, 0.2, 0.3, 0.1, 0.0, 0.2])
->>> turned = robot.pose([0, 0, 1, 0, 0, np.pi / 2])
->>> bool(condition(robot, turned) > 1e14), leg_forces(robot, turned, np.ones(6)).reason()
-(True, 'The pose is singular: no bounded forces of the legs balance every wrench.')
+>>> leg_forces(robot, robot.pose([0, 0, 1, 0, 0, np.pi / 2]), np.ones(6)).reason()
+'The pose is singular: no bounded forces of the legs balance every wrench.'
 """
 
 from __future__ import annotations
@@ -96,11 +81,7 @@ def ikm(robot: Robot, T: ArrayLike, twist: ArrayLike, mode: Mode = None) -> Arra
 
 
 def dkm(robot: Robot, T: ArrayLike, q_rate: ArrayLike, mode: Mode = None) -> Array:
-    """Direct kinematic model: twist of the platform.
-
-    At parallel singularities the twist is not unique: the one of least norm is returned, angles
-    times the characteristic length. See `classify_singularity`.
-    """
+    """Direct kinematic model: twist of the platform, at singularities that of least norm."""
     inverse: Array = np.linalg.pinv(_unitless(robot, T, None, mode), rcond=0.1 * SINGULAR)  # type: ignore[assignment]
     part = times(inverse, as_core(q_rate, (robot.m,), "q_rate"))
     V = np.zeros((*part.shape[:-1], 6))
@@ -142,10 +123,7 @@ class LegForces(PlatformResult):
 
 
 def leg_forces(robot: Robot, T: ArrayLike, wrench: ArrayLike, mode: Mode = None) -> LegForces:
-    """Forces or torques of the actuators for a wrench: ``J^-T forces = wrench``.
-
-    Components of the wrench that the platform cannot move along are borne by the joints.
-    """
+    """Forces or torques of the actuators for a wrench: ``J^-T forces = wrench``."""
     J, W = _unitless(robot, T, None, mode), as_core(wrench, (6,), "wrench")
     U, s, Vt = np.linalg.svd(J)
     singular = s[..., -1:] <= SINGULAR * s[..., :1]
@@ -167,10 +145,7 @@ def stiffness(robot: Robot, T: ArrayLike, k: ArrayLike, mode: Mode = None) -> Ar
 def maneuverability(
     robot: Robot, T: ArrayLike, length: float | None = None, mode: Mode = None
 ) -> Array:
-    """Maneuverability ``sqrt(det(J J^T)) = 1 / |det J^-1|``: volume of the velocity ellipsoid.
-
-    Yoshikawa's manipulability of the Jacobian J; infinite at parallel singularities.
-    """
+    """``sqrt(det(J J^T)) = 1 / |det J^-1|`` (Yoshikawa), infinite at parallel singularities."""
     with np.errstate(divide="ignore"):
         return 1.0 / _singular_values(robot, T, length, mode).prod(axis=-1)
 
@@ -183,10 +158,9 @@ def condition(robot: Robot, T: ArrayLike, length: float | None = None, mode: Mod
 
 
 def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
-    """Determinant of the unit lines of the legs: zero at parallel singularities, NaN out of reach.
+    """Determinant of the unit lines of the legs, NaN out of reach, m for each rotation.
 
-    Its sign tells the sides of singular positions apart, see `assembly_modes`; its zeros in a
-    section are the singular curves. Unit m for each rotation of the platform.
+    Zero at parallel singularities; its sign tells their sides apart, see `assembly_modes`.
     """
     if is_looped(robot, mode):
         raise InvalidValueError(
@@ -220,10 +194,7 @@ def rates_of_rows(robot: ParallelRobot, legs: LegStates, V: Array) -> Array:
 def states(
     robot: ParallelRobot, mode: Mode, T: ArrayLike, **vectors: ArrayLike
 ) -> tuple[tuple[int, ...], Array, LegStates, list[Array]]:
-    """Batch; poses, states of the legs and vectors in N rows; raises where a leg has no velocity.
-
-    Vectors are twists and wrenches (..., 6), and forces (..., m) under the name of tau.
-    """
+    """Batch; poses, states of legs and vectors in N rows; raises where a leg has no velocity."""
     poses = robot.checked(T)
     given = [as_core(x, (robot.m if k == "tau" else 6,), k) for k, x in vectors.items()]
     flat = (poses.reshape(*poses.shape[:-2], 16), *given)

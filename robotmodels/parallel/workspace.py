@@ -11,15 +11,12 @@ orientation : array_like, shape (3, 3) or (K, 3, 3), or float, optional
     and reachable workspaces 72 angles about z, in space turned from home.
 limits : bool or tuple (lower, upper)
     Whether the robot's limits count, or limits in their place, m or rad.
-joint_cone : float, optional
-    Largest angle between a leg and its direction at home, seen from the base and from the platform,
-    rad.
-leg_radius : float, optional
-    Radius of legs and rods, which must not touch each other, m.
-height : float, optional
-    Makes a section at this z of the world, m.
-resolution : int, optional
-    Cells along each axis; default 300 in a plane, 40 in space.
+joint_cone, leg_radius : float, optional
+    Largest angle between a leg and its direction at home, seen from base and platform, rad; radius
+    of legs and rods, which must not touch each other, m.
+height, resolution : float and int, optional
+    Makes a section at this z of the world, m; cells along each axis, default 300 in a plane, 40 in
+    space.
 
 Returns
 -------
@@ -28,11 +25,6 @@ PlatformWorkspace
     at the centres of the cells: the least distance of lengths or angles from their limits, and of
     joints and legs from theirs, m or rad, negative outside. Areas and volumes are interpolated from
     it. ``rotations`` (K, 3, 3), ``lower`` and ``upper`` (m,) are those that count.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Unknown words, legs of unlimited length, rotations that the platform does not have.
 
 References
 ----------

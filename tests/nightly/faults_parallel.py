@@ -10,7 +10,7 @@ POWER = f"{MOTION} -k balance_of_power"
 # fmt: off
 MUTATIONS = [
     Mutation("parallel: legs", "elbow takes the other sign", "def _angles(robot",
-        "arctan2(y, x) + sign", "arctan2(y, x) - sign", f"{MODELS} -k (elbows or flexpicker)"),
+        "arctan2(y, x) + sign", "arctan2(y, x) - sign", f"{MODELS} -k flexpicker"),
     Mutation("parallel: legs", "a rod's length is added to the crank's", "def _angles(robot",
         "+ robot.crank**2 - robot.rod**2", "+ robot.crank**2", f"{MODELS} -k flexpicker"),
     Mutation("parallel: legs", "moments of lines with the other sign", "def leg_states(",
@@ -44,10 +44,10 @@ MUTATIONS = [
     Mutation("parallel: homotopy", "positions from soma coordinates with the other product",
         "Poses of real soma coordinates", "- np.cross(g, v)", "+ np.cross(g, v)", DIETMAIER, True),
     Mutation("parallel: homotopy", "solutions at infinity count", "def _finite(",
-        "> _FINITE * norm**2", ">= 0.0 * norm**2", f"{MODELS} -k sixteen", True),
+        "> _FINITE * norm**2", ">= 0.0 * norm**2", f"{MODELS} -k (random_platforms and SSM)", True),
     Mutation("parallel: homotopy", "robots that are singular everywhere are tried",
         "def _is_singular_everywhere(", "(s[:, -1] < _FLAT", "(s[:, -1] < 0.0 * _FLAT",
-        f"{MODELS} -k everywhere", True),
+        f"{MODELS} -k locked_legs", True),
     Mutation("parallel: homotopy", "a continuum is taken for lost paths",
         "def spatial(", ">= _MANY", ">= 9 * _MANY", f"{MODELS} -k locked_legs", True),
     Mutation("parallel: homotopy", "Newton's method has one round at a singular pose",
