@@ -38,12 +38,10 @@ from ..kernels._vectors import (
     matrix,
     product,
     put_matrix,
-    put_vector,
     scale,
     subtract,
     times,
     transpose_times,
-    vector,
     whole_matrix,
     whole_vector,
 )
@@ -68,13 +66,25 @@ ARM = types.NamedTuple(
     ),
     Arm,
 )
-WORK = types.NamedTuple(tuple(OUT3 if name in "WRXTAIK" else OUT2 for name in Work._fields), Work)
+WORK = types.NamedTuple(
+    tuple(
+        OUT3 if name in ("W", "R", "X", "T", "A", "I", "G", "K", "all") else OUT2
+        for name in Work._fields
+    ),
+    Work,
+)
 
 
 @compiled(counted=False)
 def part(a: Floats, i: int, c: int) -> Vector:
     """Three entries of row i from column c on."""
     return (a[i, c], a[i, c + 1], a[i, c + 2])
+
+
+@compiled(counted=False)
+def put_part(a: Floats, i: int, c: int, x: Vector) -> None:
+    """Write three entries of row i from column c on."""
+    a[i, c], a[i, c + 1], a[i, c + 2] = x
 
 
 @compiled(counted=False)
@@ -102,7 +112,7 @@ def put_pose(poses: Floats, i: int, k: int, R: Matrix, P: Vector) -> None:
 @compiled(counted=False)
 def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
     """Write inertial parameters, tip and rows of now of deformed body k."""
-    put_vector(work.P, k + 1, vector(arm.tip, k))
+    put_part(work.V, k + 1, 3, part(arm.tip, k, 0))
     for x in range(10):  # a copy by numba would take seconds to compile
         work.body[k, x] = arm.pi[k, x]
     for c in range(arm.start[k], arm.start[k + 1]):
@@ -114,7 +124,7 @@ def body_at(arm: Arm, k: int, e: Floats, work: Work) -> None:
         for x in range(9):
             work.body[k, x] += 0.5 * e[c] * (arm.first[c, x] + work.now[c, x])
         for x in range(3):
-            work.P[k + 1, x] += 0.5 * e[c] * (arm.first[c, x + 12] + work.now[c, x + 12])
+            work.V[k + 1, 3 + x] += 0.5 * e[c] * (arm.first[c, x + 12] + work.now[c, x + 12])
 
 
 @compiled(counted=False)
@@ -171,19 +181,12 @@ def transform(X: Floats, j: int, R: Matrix, P: Vector) -> None:
 
 
 @compiled(counted=False)
-def mapped(out: Floats, j: int, T: Floats, a: Floats, b: int, size: int) -> None:
-    """Write matrix j of T times row b of a into row j."""
-    for x in range(6):
-        out[j, x] = 0.0
-        for y in range(size):
-            out[j, x] += T[j, x, y] * a[b, y]
+def add_back(A: Floats, b: int, B: Floats, j: int, T: Floats, m: int, BT: Floats) -> None:
+    """Add inertia and load in row j of B, behind a transform (6, m), to row b of A.
 
-
-@compiled(counted=False)
-def add_back(
-    A: Floats, h: Floats, b: int, B: Floats, p: Floats, j: int, T: Floats, m: int, BT: Floats
-) -> None:
-    """Add inertia and load in row j of B and p, behind a transform (6, m), to row b of A and h."""
+    Loads are the last columns.
+    """
+    load, own = A.shape[2] - 1, B.shape[2] - 1
     for r in range(6):
         for c in range(m):
             y = 0.0
@@ -194,42 +197,40 @@ def add_back(
         for c in range(m):
             t = T[j, r, c]
             if t != 0.0:  # most are zero
-                h[b, c] += t * p[j, r]
+                A[b, c, load] += t * B[j, r, own]
                 for x in range(m):
                     A[b, c, x] += t * BT[r, x]
 
 
 @compiled(counted=False)
-def eliminate(
-    A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats
-) -> bool:
+def eliminate(A: Floats, j: int, low: int, high: int, G: Floats) -> bool:
     """Remove coordinates from the last on, by their loads if free, else by their accelerations.
 
     False if the inertia of one that is free is not positive.
     """
-    positive = True
+    positive, load = True, A.shape[2] - 1
     for c in range(high - 1, low - 1, -1):
-        a, own = given[j, c], A[j, c, c]
-        if free[j, c]:
-            a, positive = (a - h[j, c]) / own, positive and own > 0.0
+        a, own, is_free = G[j, 1, c], A[j, c, c], G[j, 2, c] != 0.0
+        if is_free:
+            a, positive = (a - A[j, c, load]) / own, positive and own > 0.0
         for r in range(c):
-            h[j, r] += a * A[j, c, r]
-            if free[j, c]:
+            A[j, r, load] += a * A[j, c, r]
+            if is_free:
                 for x in range(c):
                     A[j, r, x] -= A[j, c, r] / own * A[j, c, x]
     return positive
 
 
 @compiled(counted=False)
-def resolve(
-    A: Floats, h: Floats, j: int, low: int, high: int, given: Floats, free: Floats, y: Floats
-) -> None:
+def resolve(A: Floats, j: int, low: int, high: int, G: Floats) -> None:
     """Accelerations and loads of coordinates that were eliminated, from those before them."""
+    load = A.shape[2] - 1
     for c in range(low, high):
         for x in range(c):
-            h[j, c] += A[j, c, x] * y[j, x]
-        y[j, c] = (given[j, c] - h[j, c]) / A[j, c, c] if free[j, c] else given[j, c]
-        h[j, c] += A[j, c, c] * y[j, c]
+            A[j, c, load] += A[j, c, x] * G[j, 0, x]
+        a = G[j, 1, c]
+        G[j, 0, c] = (a - A[j, c, load]) / A[j, c, c] if G[j, 2, c] != 0.0 else a
+        A[j, c, load] += A[j, c, c] * G[j, 0, c]
 
 
 @compiled(counted=False)
@@ -241,12 +242,13 @@ def load_body(
     False if it spins so fast that its elastic stiffness is not positive.
     """
     j, now, second, s, A, T = k + 1, work.now, arm.second, arm.start[k], work.A[k + 1], work.T
-    w, dw, u, m = vector(work.w, j), vector(work.dw, j), vector(work.u, j), arm.start[j] - s
+    load = A.shape[1] - 1
+    w, dw, u, m = part(work.V, j, 6), part(work.V, j, 9), part(work.V, j, 12), arm.start[j] - s
     J, MS, M = inertia_of(work.body, k)
     U = rotation_acceleration(w, dw)
     F = add(scale(M, u), times(U, MS))
     N = add(add(cross(MS, u), inertia_times(J, dw)), cross(w, inertia_times(J, w)))
-    ut = add(u, times(U, vector(work.P, j)))
+    ut = add(u, times(U, part(work.V, j, 3)))
     for i in range(m):
         c = s + i
         a, b, turn = part(now, c, 6), part(now, c, 9), moments_times(now, c, 0, w)
@@ -265,16 +267,16 @@ def load_body(
             work.K[0, i, n] = second[c, o + 16] - softer
         F, N = add(F, scale(ev[c], Ac)), add(N, scale(ev[c], Bc))
         ut = add(ut, scale(ev[c], G))
-        work.h[j, 7 + i] = force
+        A[7 + i, load] = force
         for x in range(6):
             A[x, 7 + i] = A[7 + i, x] = now[c, 6 + x]
             T[j, x, 7 + i] = now[c, 12 + x]
-    h = work.h
-    h[j, 0], h[j, 1], h[j, 2], h[j, 3], h[j, 4], h[j, 5] = F + N
-    put_vector(work.u, j, ut)
-    put_vector(work.w, j, add(w, spin))
-    put_vector(work.dw, j, add(dw, add(cross(w, spin), rest)))
-    transform(T, j, ONE, vector(work.P, j))
+    for x in range(3):
+        A[x, load], A[x + 3, load] = F[x], N[x]
+    put_part(work.V, j, 12, ut)
+    put_part(work.V, j, 6, add(w, spin))
+    put_part(work.V, j, 9, add(dw, add(cross(w, spin), rest)))
+    transform(T, j, ONE, part(work.V, j, 3))
     for x in range(3):
         lever, column = cross(axis(x), MS), inertia_times(J, axis(x))
         for y in range(3):
@@ -290,102 +292,98 @@ def load_body(
             A[6, x] = A[x, 6] = A[z, x]
         for x in range(6):
             T[j, x, 6] = T[j, x, z]
-        A[6, 6], h[j, 6] = A[z, z] + rotor, h[j, z]
-    return eliminate(work.K, work.zeros, 0, 0, m, work.zeros, work.ones)
+        A[6, 6], A[6, load] = A[z, z] + rotor, A[z, load]
+    return eliminate(work.K, 0, 0, m, work.all)
 
 
-@compiled(
-    types.boolean(
-        ARM, MATRIX, MATRIX, MATRIX, MATRIX, INT, kinds.INTS, OUT2, OUT2, kinds.OUT4, WORK
-    ),
-    counted=False,
-)
-def accelerate(
-    arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, i: int, free: Ints, out: Floats,
-    base: Floats, poses: Floats, work: Work,
-) -> bool:  # fmt: skip
-    """The recursion for row i; whether a free joint moves no inertia."""
-    f, n, t = arm.pi.shape[0], arm.deflection.shape[0], arm.end
-    g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
-    A, h, I, p, failed = work.A, work.h, work.I, work.p, False  # noqa: E741
-    to_links(arm, y, dy, given, i, free, work)
-    e, ev = work.q[0, n:], work.v[0, n:]
-    w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
-    put_vector(work.w, 0, w)
-    put_vector(work.dw, 0, part(outer, i, 15))
-    put_vector(work.u, 0, subtract(add(cross(w, part(outer, i, 6)), part(outer, i, 12)), g))
-    for k in range(f):
-        j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
-        R, P = link_pose(arm.chain, k, work.q, 0)
-        R, P = product(matrix(work.R, b), R), times(matrix(work.R, b), P)
-        W = product(matrix(work.W, b), R)
-        x = add(vector(work.x, b), times(matrix(work.W, b), add(vector(work.P, b), P)))
-        put_matrix(work.W, j, W)
-        put_vector(work.x, j, x)
-        put_pose(poses, i, k, W, x)
-        body_at(arm, k, e, work)
-        spin, rest = section_at(arm, k, e, ev, work)
-        MS = add(MS, add(times(W, part(work.body, k, 6)), scale(work.body[k, 9], x)))
-        if len(free):
-            transform(work.X, j, R, P)
-            wb, dwb, ub = vector(work.w, b), vector(work.dw, b), vector(work.u, b)
-            U, rate = rotation_acceleration(wb, dwb), coordinate(work.v, 0, column)
-            w, dw, u = link_acceleration(arm.chain.sigma[k], R, P, rate, 0.0, wb, dwb, U, ub)
-            put_vector(work.w, j, w)
-            put_vector(work.dw, j, dw)
-            put_vector(work.u, j, u)
-            work.given[j, 6] = coordinate(work.load, 0, column)
-            for c in range(arm.start[k], arm.start[j]):
-                work.given[j, 7 + c - arm.start[k]] = work.load[0, n + c]
-            if not load_body(arm, k, e, ev, spin, rest, work):
-                base[i, 9] = 1.0
-    W, lever = matrix(work.W, t), times(matrix(work.R, t), whole_vector(arm.tool))
-    end = add(vector(work.x, t), times(W, add(vector(work.P, t), lever)))
-    put_pose(poses, i, f, product(W, matrix(work.R, t)), end)
-    base[i, 6], base[i, 7], base[i, 8] = MS
-    if not len(free):
-        return False
-    p[:], I[:] = 0.0, 0.0
-    F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
-    N = add(N, cross(lever, F))
-    p[t, 0], p[t, 1], p[t, 2], p[t, 3], p[t, 4], p[t, 5] = F + N
-    for j in range(f, 0, -1):
-        s = 7 + arm.start[j] - arm.start[j - 1]
-        add_back(A, h, j, I, p, j, work.T, s, work.BT)
-        own, positive = A[j, 6, 6], eliminate(A, h, j, 6, s, work.given, work.free)
-        if work.free[j, 6] and not abs(A[j, 6, 6]) > ROUNDING * own:
-            failed = True
-        elif not positive:
-            base[i, 9] = 2.0
-        add_back(I, p, arm.chain.antecedent[j - 1], A, h, j, work.X, 6, work.BT)
-    if not eliminate(I, p, 0, 0, 6, work.given, work.free):
-        base[i, 9] = 2.0
-    resolve(I, p, 0, 0, 6, work.given, work.free, work.y)
-    for x in range(6):
-        base[i, x] = work.y[0, x] if free[n + 1] else p[0, x]
-        p[0, x] = work.y[0, x]
-    for j in range(1, f + 1):
-        s, column = arm.start[j - 1], arm.chain.joint[j - 1]
-        high = 7 + arm.start[j] - s
-        mapped(work.y, j, work.X, p, arm.chain.antecedent[j - 1], 6)
-        resolve(A, h, j, 6, high, work.given, work.free, work.y)
-        mapped(p, j, work.T, work.y, j, high)
-        if column >= 0:
-            out[i, column] = work.y[j, 6] if free[column] else h[j, 6]
-        for c in range(7, high):
-            out[i, n + s + c - 7] = work.y[j, c] if free[n] else h[j, c]
-    to_motors(arm, y, dy, given, i, free, out)
-    return failed
+LOADS = INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, kinds.INTS, WORK, OUT2, OUT2, kinds.OUT4)
 
 
-@compiled(INT(ARM, MATRIX, MATRIX, MATRIX, MATRIX, kinds.INTS, WORK, OUT2, OUT2, kinds.OUT4))
+@compiled(LOADS)
 def loads(
     arm: Arm, y: Floats, dy: Floats, given: Floats, outer: Floats, free: Ints, work: Work,
     out: Floats, base: Floats, poses: Floats,
 ) -> int:  # fmt: skip
     """Accelerations of free coordinates under given loads, and loads of given accelerations."""
-    failed = -1
+    f, n, t, first = arm.pi.shape[0], arm.deflection.shape[0], arm.end, -1
+    g = transpose_times(whole_matrix(arm.chain.base_rotation), whole_vector(arm.gravity))
+    A, G, I, e, ev = work.A, work.G, work.I, work.Q[0, n:], work.Q[1, n:]  # noqa: E741
+    load = A.shape[2] - 1
     for i in range(y.shape[0]):
-        if accelerate(arm, y, dy, given, outer, i, free, out, base, poses, work) and failed < 0:
-            failed = i
-    return failed
+        to_links(arm, y, dy, given, i, free, work)
+        w, MS, base[i, 9] = part(outer, i, 9), ZERO, 0.0
+        put_part(work.V, 0, 6, w)
+        put_part(work.V, 0, 9, part(outer, i, 15))
+        put_part(work.V, 0, 12, subtract(add(cross(w, part(outer, i, 6)), part(outer, i, 12)), g))
+        for k in range(f):
+            j, b, column = k + 1, arm.chain.antecedent[k], arm.chain.joint[k]
+            R, P = link_pose(arm.chain, k, work.Q, 0)
+            R, P = product(matrix(work.R, b), R), times(matrix(work.R, b), P)
+            W = product(matrix(work.W, b), R)
+            x = add(part(work.V, b, 0), times(matrix(work.W, b), add(part(work.V, b, 3), P)))
+            put_matrix(work.W, j, W)
+            put_part(work.V, j, 0, x)
+            put_pose(poses, i, k, W, x)
+            body_at(arm, k, e, work)
+            spin, rest = section_at(arm, k, e, ev, work)
+            MS = add(MS, add(times(W, part(work.body, k, 6)), scale(work.body[k, 9], x)))
+            if len(free):
+                transform(work.X, j, R, P)
+                wb, dwb, ub = part(work.V, b, 6), part(work.V, b, 9), part(work.V, b, 12)
+                U, rate = rotation_acceleration(wb, dwb), coordinate(work.Q, 1, column)
+                w, dw, u = link_acceleration(arm.chain.sigma[k], R, P, rate, 0.0, wb, dwb, U, ub)
+                put_part(work.V, j, 6, w)
+                put_part(work.V, j, 9, dw)
+                put_part(work.V, j, 12, u)
+                G[j, 1, 6] = coordinate(work.Q, 2, column)
+                for c in range(arm.start[k], arm.start[j]):
+                    G[j, 1, 7 + c - arm.start[k]] = work.Q[2, n + c]
+                if not load_body(arm, k, e, ev, spin, rest, work):
+                    base[i, 9] = 1.0
+        W, lever = matrix(work.W, t), times(matrix(work.R, t), whole_vector(arm.tool))
+        end = add(part(work.V, t, 0), times(W, add(part(work.V, t, 3), lever)))
+        put_pose(poses, i, f, product(W, matrix(work.R, t)), end)
+        base[i, 6], base[i, 7], base[i, 8] = MS
+        if not len(free):
+            continue
+        for j in range(f + 1):
+            for x in range(6):
+                for z in range(7):
+                    I[j, x, z] = 0.0
+        F, N = transpose_times(W, part(outer, i, 0)), transpose_times(W, part(outer, i, 3))
+        N = add(N, cross(lever, F))
+        for x in range(3):
+            I[t, x, 6], I[t, x + 3, 6] = F[x], N[x]
+        for j in range(f, 0, -1):
+            s = 7 + arm.start[j] - arm.start[j - 1]
+            add_back(A, j, I, j, work.T, s, work.BT)
+            own, positive = A[j, 6, 6], eliminate(A, j, 6, s, G)
+            if G[j, 2, 6] != 0.0 and not abs(A[j, 6, 6]) > ROUNDING * own:
+                first = i if first < 0 else first
+            elif not positive:
+                base[i, 9] = 2.0
+            add_back(I, arm.chain.antecedent[j - 1], A, j, work.X, 6, work.BT)
+        if not eliminate(I, 0, 0, 6, G):
+            base[i, 9] = 2.0
+        resolve(I, 0, 0, 6, G)
+        for x in range(6):  # from here on the last columns are motions of the tips
+            base[i, x] = G[0, 0, x] if free[n + 1] else I[0, x, 6]
+            I[0, x, 6] = G[0, 0, x]
+        for j in range(1, f + 1):
+            s, column, b = arm.start[j - 1], arm.chain.joint[j - 1], arm.chain.antecedent[j - 1]
+            high = 7 + arm.start[j] - s
+            for x in range(6):
+                G[j, 0, x] = 0.0
+                for z in range(6):
+                    G[j, 0, x] += work.X[j, x, z] * I[b, z, 6]
+            resolve(A, j, 6, high, G)
+            for x in range(6):
+                I[j, x, 6] = 0.0
+                for z in range(high):
+                    I[j, x, 6] += work.T[j, x, z] * G[j, 0, z]
+            if column >= 0:
+                out[i, column] = G[j, 0, 6] if free[column] else A[j, 6, load]
+            for c in range(7, high):
+                out[i, n + s + c - 7] = G[j, 0, c] if free[n] else A[j, c, load]
+        to_motors(arm, y, dy, given, i, free, out)
+    return first

@@ -258,7 +258,7 @@ def _followed(
     report = Workers(progress=progress)
     if steps is not None:
         ends = np.array([end]) if wanted is None else wanted
-        return steps(y, start, ends, np.array([max(rtol, 3e-14), atol, most, 500]), largest, report)
+        return steps(y, start, ends, np.array([max(rtol, 3e-14), atol, most]), largest, report)
     kind: Any = getattr(scipy.integrate, method.value)
 
     def finite(t: float, y: Array) -> Array:
@@ -305,22 +305,24 @@ def _compiled_steps(
     report: Workers,
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """`_followed` under constant torques, by `follow`."""
-    from .steps import follow, table
+    from .steps import address, follow, table
     from .work import workspace
 
-    parts, rows, slopes, state = arm.parts, table(), np.zeros((16, len(y))), y.copy()
-    every, span, first = len(times) == 1, times[-1] - start, np.append(start, y)
-    clock = np.array([start, 1e-3 * span, 0.0, 1.0, 0.0, 0.0, 0.0])
-    found, samples = np.empty((500 if every else len(times), len(first))), [first[None]]
-    fixed = parts.chain, parts.free[2], parts.D, torque, rows, times, bounds, largest
-    work = workspace(parts.chain, parts.free[2])
-    while clock[0] < times[-1] and not clock[4]:
-        count = follow(*fixed, work, state, slopes, clock, found)
-        if every:
-            samples.append(found[:count].copy())
+    parts, state, span, k = arm.parts, y.copy(), times[-1] - start, len(torque[0])
+    every = len(times) == 1
+    clock, samples = np.array([start, 1e-3 * span, *np.zeros(5)]), [np.append(start, y)[None]]
+    ends, bounds = times[times > start], np.append(bounds, every)
+    fixed = address(), parts.chain, parts.free[2], parts.D, torque, table(), ends, bounds, largest
+    scratch = (
+        np.zeros((4, max(k, 18))),
+        np.zeros((1, len(parts.chain.pi) + 1, 3, 4)),
+        np.zeros((1, 10)),
+    )
+    room = workspace(parts.chain, parts.free[2]), *scratch, state, np.zeros((14, len(y)))
+    found = np.empty((500, 1 + len(y)))
+    while clock[3] < len(ends) and not clock[4]:
+        samples.append(found[: follow(*fixed, *room, clock, found)].copy())
         report.done((clock[0] - start) / span)
-    if not every:
-        samples.append(found[1 : int(clock[3])])
     status = _ended(FlexibleMotionStatus(int(clock[4])), clock[5:].tolist())
     t, *states = np.vstack(samples).T
     return t, np.array(states).T.copy(), status, int(clock[2])

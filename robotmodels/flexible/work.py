@@ -18,49 +18,39 @@ ONE: Matrix = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 class Work(NamedTuple):
     """Arrays of the f + 1 bodies (row 0: base) with s coordinates at most, and of the modes."""
 
-    W: Floats  # axes and root in the world
-    x: Floats
-    R: Floats  # tip section in the axes of the body: rotation, position
-    P: Floats
-    w: Floats  # motion of the body, then of its tip
-    dw: Floats
-    u: Floats
+    W: Floats  # axes in the world
+    R: Floats  # rotation of the tip section
+    V: Floats  # (15,) root in the world, tip in the body; w, dw, u of the body, then of its tip
     X: Floats  # (6, 6) from motions of the antecedent's tip to the root
     T: Floats  # (6, s) from coordinates to motions of the tip
-    A: Floats  # (s, s) inertia and (s,) load of the coordinates
-    h: Floats
-    I: Floats  # noqa: E741  # (6, 6) inertia and (6,) load of what follows, then its acceleration
-    p: Floats
+    A: Floats  # (s, s + 1) inertia and load of the coordinates
+    I: Floats  # noqa: E741  # (6, 7) inertia and load of what follows, then its acceleration
     BT: Floats  # (6, s) inertia times T
-    y: Floats  # (s,) accelerations
-    given: Floats  # (s,) loads of coordinates that are free (1), accelerations of others (0)
-    free: Floats
+    G: Floats  # (3, s) accelerations; loads of free coordinates, or accelerations; is free
     body: Floats  # inertial parameters
     now: Floats  # J_k, a, b, Phi and velocity of the section, at e
-    K: Floats  # (1, modes, modes) stiffness of a body, with rows of zeros and of ones
-    zeros: Floats
-    ones: Floats
-    q: Floats  # (1, n + modes) coordinates of the links, velocities and loads
-    v: Floats
-    load: Floats
+    K: Floats  # (1, modes, modes + 1) stiffness of a body
+    all: Floats  # (1, 3, modes) as G, all free
+    Q: Floats  # (3, n + modes) coordinates of the links, velocities and loads
 
 
 def workspace(arm: Arm, free: Ints) -> Work:
     """Work arrays with the pose of the base and the free coordinates."""
     f, m, most, z = arm.pi.shape[0] + 1, arm.first.shape[0], arm.second.shape[1] // 18, np.zeros
     n = arm.deflection.shape[0]
-    s, pose, row, links = 7 + most, (f, 3, 3), (f, 3), (1, n + m)
+    s = 7 + most
     work = Work(
-        *(z(pose), z(row), z(pose), z(row), z(row), z(row), z(row)),
-        *(z((f, 6, 6)), z((f, 6, s)), z((f, s, s)), z((f, s)), z((f, 6, 6)), z((f, 6))),
-        *(z((6, s)), z((f, s)), z((f, s)), z((f, s)), z((f, 10)), z((m, 18))),
-        *(z((1, most, most)), z((1, most)), np.ones((1, most)), z(links), z(links), z(links)),
+        *(z((f, 3, 3)), z((f, 3, 3)), z((f, 15))),
+        *(z((f, 6, 6)), z((f, 6, s)), z((f, s, s + 1)), z((f, 6, 7)), z((6, s)), z((f, 3, s))),
+        *(z((f, 10)), z((m, 18)), z((1, most, most + 1)), z((1, 3, most)), z((3, n + m))),
     )
-    work.W[0], work.x[0], work.R[0] = arm.chain.base_rotation, arm.chain.base_position, np.eye(3)
+    work.all[0, 2] = 1.0
+    work.W[0], work.V[0, :3] = arm.chain.base_rotation, arm.chain.base_position
+    work.R[0] = np.eye(3)
     if len(free):
-        work.free[0], work.free[1:, 7:] = free[n + 1], free[n]
+        work.G[0, 2], work.G[1:, 2, 7:] = free[n + 1], free[n]
         joint = arm.chain.joint
-        work.free[1:, 6] = np.where(joint < 0, 0, free[joint])
+        work.G[1:, 2, 6] = np.where(joint < 0, 0, free[joint])
     return work
 
 
@@ -75,18 +65,18 @@ def to_links(
     arm: Arm, y: Floats, dy: Floats, given: Floats, i: int, free: Ints, work: Work
 ) -> None:
     """Write the coordinates of the links and what is given of them."""
-    n = arm.deflection.shape[0]
-    for c in range(work.q.shape[1]):
-        work.q[0, c], work.v[0, c], work.load[0, c] = y[i, c], dy[i, c], given[i, c]
+    n, Q = arm.deflection.shape[0], work.Q
+    for c in range(Q.shape[1]):
+        Q[0, c], Q[1, c], Q[2, c] = y[i, c], dy[i, c], given[i, c]
     for c in range(n):
         s = arm.deflection[c]
         if len(free) and free[n + 2]:
-            work.load[0, c] -= friction(arm, c, dy[i, c])
+            Q[2, c] -= friction(arm, c, dy[i, c])
         if s >= 0:
-            work.q[0, c] += y[i, s]
-            work.v[0, c] += dy[i, s]
+            Q[0, c] += y[i, s]
+            Q[1, c] += dy[i, s]
             spring = arm.drive[c, 4] * y[i, s] + arm.drive[c, 5] * dy[i, s]
-            work.load[0, c] = -spring if len(free) and free[c] else given[i, c] + given[i, s]
+            Q[2, c] = -spring if len(free) and free[c] else given[i, c] + given[i, s]
 
 
 @compiled(counted=False)

@@ -36,7 +36,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "inertia of the coordinates without what follows",
-        "Add inertia and load in row j of B and p",
+        "Add inertia and load in row j of B, behind",
         "A[b, c, x] += t * BT[r, x]",
         "A[b, x, c] += 0.0 * y",
         POINTS,
@@ -44,9 +44,9 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "load of what follows left out",
-        "Add inertia and load in row j of B and p",
-        "h[b, c] += t * p[j, r]",
-        "h[b, c] += 0.0 * p[j, r]",
+        "Add inertia and load in row j of B, behind",
+        "A[b, c, load] += t * B[j, r, own]",
+        "A[b, c, load] += 0.0 * B[j, r, own]",
         POINTS,
     ),
     Mutation(
@@ -125,8 +125,8 @@ MUTATIONS = [
         "flexible",
         "spring of a flexible joint",
         "Write the coordinates of the links and what is given",
-        "load[0, c] = -spring if",
-        "load[0, c] = spring if",
+        "Q[2, c] = -spring if",
+        "Q[2, c] = spring if",
         f"{ONE} -k (inverse_and_direct or point_masses)",
     ),
     Mutation(
@@ -208,7 +208,7 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "power without friction in compiled steps",
-        "Write the derivative of a state of velocities v",
+        "Steps until the last time, the bounds or a fault",
         "tau[0, c] - friction(arm, c, v[0, c])",
         "tau[0, c]",
         f"{TWO} -k constant_torques",
@@ -216,17 +216,17 @@ MUTATIONS = [
     Mutation(
         "flexible",
         "error of order 3 left out of compiled steps",
-        "Error of a step from y to z beside",
+        "Steps until the last time, the bounds or a fault",
         "third += (three / scale) ** 2",
         "third += 0.0 * (three / scale) ** 2",
         f"{TWO} -k constant_torques",
     ),
     Mutation(
         "flexible",
-        "dense output without its rows of order 7",
-        "Write the polynomial (7, s) of a step from y to z",
-        "h * rows[16 + i, r]",
-        "0.0 * rows[16 + i, r]",
+        "a step begins with the last stage but one",
+        "Steps until the last time, the bounds or a fault",
+        "slopes[STAGES, c]",
+        "slopes[STAGES - 1, c]",
         f"{TWO} -k constant_torques",
     ),
     Mutation(
