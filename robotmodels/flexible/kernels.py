@@ -23,7 +23,11 @@ moment of the arm, code of `SpinStatus`; poses (N, f + 1, 3, 4), the last of the
 tool; the first sample in which a free joint moves no inertia, or -1.
 """
 
+from typing import Any
+
 from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from ..kernels import _compile as kinds
 from ..kernels._compile import INT, MATRIX, OUT2, OUT3, VECTOR, Floats, Ints, compiled
@@ -387,3 +391,29 @@ def loads(
                 out[i, n + s + c - 7] = G[j, 0, c] if free[n] else A[j, c, load]
         to_motors(arm, y, dy, given, i, free, out)
     return first
+
+
+def address() -> int:
+    """Where the compiled recursion is."""
+    if not hasattr(loads, "overloads"):  # compilation is switched off
+        return 0
+    loads.compile(None)
+    made = loads.overloads[LOADS.args]
+    return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+
+
+@intrinsic
+def at_address(typing: Any, place: Any, given: Any) -> Any:
+    """`loads` at an address, its arguments in a tuple."""
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pairs = zip(cgutils.unpack_tuple(builder, values[1]), given.types, LOADS.args, strict=True)
+        arguments = [context.cast(builder, *pair) for pair in pairs]
+        kind, call = context.call_conv.get_function_type(INT, LOADS.args), context.call_conv
+        pointer = builder.inttoptr(values[0], kind.as_pointer())
+        return call.call_function(builder, pointer, INT, LOADS.args, arguments)[1]
+
+    return INT(types.int64, given), code
+
+
+recursion = at_address if hasattr(loads, "overloads") else lambda place, given: loads(*given)

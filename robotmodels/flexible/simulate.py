@@ -305,7 +305,8 @@ def _compiled_steps(
     report: Workers,
 ) -> tuple[Array, Array, FlexibleMotionStatus, int]:
     """`_followed` under constant torques, by `follow`."""
-    from .steps import address, follow, table
+    from .kernels import address
+    from .steps import follow, table
     from .work import workspace
 
     parts, state, span, k = arm.parts, y.copy(), times[-1] - start, len(torque[0])

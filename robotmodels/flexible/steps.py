@@ -16,11 +16,9 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numba.core import cgutils, types
-from numba.extending import intrinsic
 
 from ..kernels._compile import INT, INTS, MATRIX, OUT1, OUT2, OUT4, VECTOR, Floats, Ints, compiled
-from .kernels import ARM, LOADS, WORK, loads
+from .kernels import ARM, WORK, recursion
 from .robot import Arm
 from .work import Work, friction
 
@@ -37,32 +35,6 @@ def table() -> Any:
     rows = np.zeros((15, 13))
     rows[:12, :12], rows[12, :12], rows[13], rows[14] = DOP853.A, DOP853.B, DOP853.E5, DOP853.E3
     return rows
-
-
-def address() -> int:
-    """Where the compiled recursion is."""
-    if not hasattr(loads, "overloads"):  # compilation is switched off
-        return 0
-    loads.compile(None)
-    made = loads.overloads[LOADS.args]
-    return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
-
-
-@intrinsic
-def at_address(typing: Any, place: Any, given: Any) -> Any:
-    """`loads` at an address, its arguments in a tuple."""
-
-    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        pairs = zip(cgutils.unpack_tuple(builder, values[1]), given.types, LOADS.args, strict=True)
-        arguments = [context.cast(builder, *pair) for pair in pairs]
-        kind, call = context.call_conv.get_function_type(INT, LOADS.args), context.call_conv
-        pointer = builder.inttoptr(values[0], kind.as_pointer())
-        return call.call_function(builder, pointer, INT, LOADS.args, arguments)[1]
-
-    return INT(types.int64, given), code
-
-
-recursion = at_address if hasattr(loads, "overloads") else lambda place, given: loads(*given)
 
 
 @compiled(
