@@ -9,44 +9,12 @@ import pytest
 import robotmodels as rm
 from robotmodels import kinematics as kin
 from robotmodels._arrays import (
-    as_core,
-    as_exact,
-    as_floats,
-    as_reals,
     as_vector,
-    batch_rows,
     read_only,
     same_value,
     value_hash,
 )
 from robotmodels.errors import InvalidValueError, ShapeError
-
-NOT_NUMBERS = {
-    "text": "abc",
-    "texts": ["1", "2"],
-    "complex": [1j, 2.0],
-    "ragged": [[1.0], [1.0, 2.0]],
-    "none": [None, 1.0],
-    "booleans": [True, False],
-    "object": object(),
-}
-
-
-@pytest.mark.parametrize("value", NOT_NUMBERS.values(), ids=NOT_NUMBERS)
-@pytest.mark.parametrize(
-    "check",
-    [
-        as_floats,
-        as_reals,
-        lambda value, name: as_core(value, (2,), name),
-        lambda value, name: as_vector(value, 2, name),
-        lambda value, name: as_exact(value, (2,), name),
-    ],
-    ids=["floats", "reals", "core", "vector", "exact"],
-)
-def test_what_is_not_a_real_number_is_named_in_the_error(check, value):
-    with pytest.raises(InvalidValueError, match=r"^speed: expected (real )?numbers"):
-        check(value, "speed")
 
 
 @pytest.mark.parametrize(("bad", "n"), [(np.nan, 3), (-np.inf, 1)])
@@ -70,28 +38,6 @@ def test_wrong_shapes_say_what_came_and_what_to_do(shape, advice):
     assert advice in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("shapes", "batch"),
-    [
-        ([(3,), (3,)], ()),
-        ([(5, 3), (3,)], (5,)),
-        ([(2, 1, 3), (4, 3)], (2, 4)),
-        ([(0, 3), (3,)], (0,)),
-        ([(2, 3), (2, 6)], (2,)),
-        ([(4, 0), (4, 0)], (4,)),
-    ],
-)
-def test_batches_broadcast_and_become_contiguous_rows(shapes, batch):
-    arrays = tuple(np.arange(float(np.prod(s))).reshape(s) for s in shapes)
-    got, rows = batch_rows(arrays, ("q", "v"))
-    assert got == batch
-    for array, row in zip(arrays, rows, strict=True):
-        assert row.flags.c_contiguous
-        wanted = np.broadcast_to(array, (*batch, array.shape[-1]))
-        assert row.shape == (int(np.prod(batch)), array.shape[-1])
-        assert np.array_equal(row.reshape(wanted.shape), wanted)
-
-
 def test_read_only_is_a_private_copy():
     source = np.asfortranarray(np.ones((2, 3)))
     copy = read_only(source)
@@ -109,16 +55,6 @@ def test_equal_values_hash_alike():
     assert value_hash("x", a) == value_hash("x", b)
     assert not same_value(a, a[None])
     assert not same_value(a, np.array([0.0, 2.0]))
-
-
-def test_columns_of_packed_records_are_laid_out_anew():
-    """Strides that are no multiple of eight bytes would be misread by Pinocchio."""
-    records = np.zeros(6, dtype=[("c", "f4"), ("x", "f8")])
-    records["x"] = q = np.linspace(0.1, 0.6, 6)
-    found = as_vector(records["x"], 6, "q")
-    assert found.flags.c_contiguous
-    assert found.flags.aligned
-    np.testing.assert_array_equal(found, q)
 
 
 def test_values_are_read_only_after_a_copy_too():

@@ -452,16 +452,6 @@ def test_null_space_has_no_torque(rng):
     assert {"YY5", "ZZ4"} <= set(base.in_combination)
 
 
-def test_result_is_a_value():
-    base = base_parameters(rm.load("cobra_s600"), drive=True)
-    again = pickle.loads(pickle.dumps(base))
-    assert again.text == base.text
-    assert not again.matrix.flags.writeable
-    with pytest.raises(TypeError):
-        base.regrouping["ZZ1"]["ZZ1"] = 2.0
-    assert repr(base) == "<BaseParameters of 'cobra_s600': 22 of 56, 27 without effect, symbolic>"
-
-
 def test_values_belong_to_the_robot(rng):
     arm = rm.load("rx90")
     base = base_parameters(arm)

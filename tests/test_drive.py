@@ -71,7 +71,7 @@ def test_drive_matrices_state_the_formula_of_the_docstring(seed):
     assert np.allclose(matrices.viscous, matrices.viscous.T)
 
 
-@pytest.mark.parametrize("batch", [(), (7,), (0,), (2, 3)], ids=str)
+@pytest.mark.parametrize("batch", [(), (7,), (2, 3)], ids=str)
 def test_drives_of_many_samples_are_those_of_one(batch):
     """The one pass through many samples, and standing joints, which have no dry friction."""
     drive = random_drive(np.random.default_rng(0), 3)
@@ -129,13 +129,10 @@ def test_parts_of_a_robot_are_values(make):
         (lambda: rm.DriveParameters([1.0], [1.0, 2.0]), ShapeError, r"Ia \(1,\), Fv \(2,\)"),
         (lambda: rm.DriveParameters(Fc=[np.nan]), InvalidValueError, "Fc: .* got nan"),
         (lambda: rm.Transmission(np.ones((2, 3))), ShapeError, r"square \(n, n\) .* \(2, 3\)"),
-        (lambda: rm.Transmission(np.eye(2), [0.0]), ShapeError, "offset: expected shape"),
         (lambda: rm.Transmission(np.eye(2), Iam=[0.1, 0]), InertiaError, "Motor 1 turns one joint"),
         (lambda: rm.Transmission(np.ones((2, 2)), Fvm=[1, 0]), InertiaError, "rank 1 of 2"),
         (lambda: tx40(Fcm=np.eye(6)[0]), InertiaError, r"the motors \[6\]"),
         (lambda: rm.Transmission.from_motor(np.ones((2, 2))), InvalidValueError, "R has rank 1 of"),
-        (lambda: tx40().to_joint(np.zeros(5)), ShapeError, r"\(\.\.\., 6\), got \(5,\)"),
-        (lambda: tx40().to_motor_torque([np.nan] * 6), InvalidValueError, "got nan"),
     ],
 )
 def test_mistakes_in_drives_and_transmissions(make, error, words):

@@ -12,7 +12,6 @@ from robotmodels.errors import (
     FrameNotFoundError,
     RobotModelsError,
     RobotNotFoundError,
-    nearest_names,
 )
 
 ERRORS = [
@@ -47,20 +46,6 @@ def test_errors_about_names_carry_facts_and_pickle(error):
     assert type(again) is error
     assert str(again) == str(raised)
     assert (again.name, again.known, again.nearest) == (raised.name, raised.known, raised.nearest)
-
-
-@pytest.mark.parametrize(
-    ("name", "known", "nearest"),
-    [
-        ("RX9O", ["rx90", "tx40", "ur5e"], ["rx90"]),
-        ("ur5", ["ur5e", "ur10e", "puma560"], ["ur5e"]),
-        ("Base", ["base", "tool"], ["base"]),
-        ("zzz", ["base", "tool"], []),
-        ("", ["base"], []),
-    ],
-)
-def test_nearest_names_ignore_case(name, known, nearest):
-    assert nearest_names(name, known)[: max(1, len(nearest))] == nearest
 
 
 def test_a_first_argument_that_is_no_model_is_named():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import FitStatus, Loss, Prior, confidence_intervals, fit_nonlinear
+from robotmodels.estimation import FitStatus, Loss, Prior, fit_nonlinear
 from robotmodels.estimation.linearised import checked_problem, linear_problem
 from robotmodels.estimation.losses import terms_of
 
@@ -115,33 +115,6 @@ def test_rows_may_come_in_any_order():
     assert set(mixed.outliers.tolist()) == set((7 + 3 * plain.outliers).tolist())
     assert np.allclose(mixed.weights, plain.weights[order], atol=1e-9)
     assert np.allclose(mixed.residuals, plain.residuals[order], atol=1e-14)
-
-
-def decay(seed, outliers=0, N=80):
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0, 2, N)
-    truth = np.array([2.0, 1.3, 0.5])
-    y = truth[0] * np.exp(-truth[1] * t) + truth[2] + 0.02 * rng.normal(size=N)
-    y[rng.permutation(N)[:outliers]] += 1.0
-
-    def linearise(x):
-        e = np.exp(-x[1] * t)
-        return x[0] * e + x[2] - y, np.column_stack((e, -x[0] * t * e, np.ones(N)))
-
-    return linearise, truth, [1.0, 1.0, 0.0], np.arange(N)
-
-
-@pytest.mark.parametrize(("loss", "outliers"), [("squares", 0), ("tukey", 8)])
-@pytest.mark.nightly
-def test_intervals_contain_the_truth_as_often_as_they_should(loss, outliers):
-    inside = []
-    for seed in range(200):
-        linearise, truth, start, block = decay(seed, outliers)
-        fit = fit_nonlinear(linearise, start, block=block, loss=loss)  # sigma 1 is far off
-        low, high = confidence_intervals(fit, 0.95).T
-        inside.append((low <= truth) & (truth <= high))
-        assert fit.converged
-    assert 0.92 <= np.mean(inside) <= 0.97
 
 
 def test_median_of_residuals_counts_what_parameters_take():

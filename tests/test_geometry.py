@@ -19,14 +19,6 @@ from robotmodels.errors import InvalidValueError, ShapeError, TableError
 from robotmodels.geometry import constant_factors
 
 ANGLES, LENGTHS = ("gamma", "beta", "alpha", "theta"), ("b", "d", "r")
-RX90_ROWS = [
-    {"sigma": 0, "alpha": 0, "d": 0, "theta": 0, "r": 0},
-    {"sigma": 0, "alpha": 90, "d": 0, "theta": 0, "r": 0},
-    {"sigma": 0, "alpha": 0, "d": 0.45, "theta": 0, "r": 0},
-    {"sigma": 0, "alpha": -90, "d": 0, "theta": 0, "r": 0.45},
-    {"sigma": 0, "alpha": 90, "d": 0, "theta": 0, "r": 0},
-    {"sigma": 0, "alpha": -90, "d": 0, "theta": 0, "r": 0},
-]
 
 
 # --- fields and defaults -----------------------------------------------------------------------
@@ -106,16 +98,6 @@ def test_a_factor_is_the_product_of_its_seven_motions(seed):
     )
 
 
-@pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
-def test_factors_of_batches(batch, rng):
-    table = random_table(rng, f=5, tree=True, fixed=True)
-    q = rng.normal(size=(*batch, table.n))
-    T = rm.link_transforms(table, q)
-    assert T.shape == (*batch, 5, 4, 4)
-    for i in np.ndindex(*batch):
-        assert np.array_equal(T[i], rm.link_transforms(table, q[i]))
-
-
 @pytest.mark.parametrize("degrees", [False, True])
 @given(seed=seeds)
 def test_classical_tables_become_the_same_robot(seed, degrees):
@@ -147,24 +129,6 @@ def test_classical_tables_become_the_same_robot(seed, degrees):
 
 
 # --- printing ------------------------------------------------------------------------------------
-
-
-def test_rx90_prints_as_table_1_1_of_the_book():
-    """Same columns in the same order (j, sigma, alpha, d, theta, r), same fractions of pi."""
-    assert (
-        str(rm.DHTable.from_rows(RX90_ROWS, degrees=True))
-        == """\
-┌───┬────┬──────┬──────┬────┬──────┐
-│ j │ σj │   αj │   dj │ θj │   rj │
-├───┼────┼──────┼──────┼────┼──────┤
-│ 1 │  0 │    0 │    0 │ θ₁ │    0 │
-│ 2 │  0 │  π/2 │    0 │ θ₂ │    0 │
-│ 3 │  0 │    0 │ 0.45 │ θ₃ │    0 │
-│ 4 │  0 │ -π/2 │    0 │ θ₄ │ 0.45 │
-│ 5 │  0 │  π/2 │    0 │ θ₅ │    0 │
-│ 6 │  0 │ -π/2 │    0 │ θ₆ │    0 │
-└───┴────┴──────┴──────┴────┴──────┘"""
-    )
 
 
 def test_trees_print_antecedents_branches_offsets_and_beta():
@@ -217,18 +181,6 @@ def test_nothing_in_a_table_can_be_written(rng):
     for copied in (table, pickle.loads(pickle.dumps(table)), copy.deepcopy(table)):
         for column in ("antecedent", "sigma", "mu", *ANGLES, *LENGTHS, "lower", "upper"):
             assert not getattr(copied, column).flags.writeable, column
-
-
-def test_replace_changes_one_column_and_knows_the_others():
-    table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0])
-    assert table.replace(r=[0.1, 0.2]).r.tolist() == [0.1, 0.2]
-    with pytest.raises(TableError, match=r"unknown column 'thete'\. Did you mean 'theta'\?"):
-        table.replace(thete=[0, 0])
-
-
-def test_angles_that_look_like_degrees_are_pointed_out():
-    with pytest.warns(rm.errors.RobotModelsWarning, match="degrees=True"):
-        rm.DHTable.from_rows([{"alpha": 90}])
 
 
 # --- mistakes ------------------------------------------------------------------------------------

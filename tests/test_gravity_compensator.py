@@ -7,7 +7,6 @@ from identities.random_robots import random_bodies, random_drive, random_table
 
 import robotmodels as rm
 from robotmodels.dynamics import idm_from_base
-from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.friction import AsymmetricFriction, GravityCompensator
 from robotmodels.identification import Log, choose_processing, fit, predicted_torque
 from robotmodels.regressors import (
@@ -76,23 +75,6 @@ def test_forces_by_hand():
     np.testing.assert_allclose(
         two.torque(np.zeros(3), np.full(3, np.pi / 2)), [8.0 / np.sqrt(0.2), 0.0, 24.0]
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "words"),
-    [
-        ({"joints": 3}, InvalidValueError, r"joints: expected .* 1 to 2"),
-        ({"joints": [1, 1]}, InvalidValueError, "joints: expected different"),
-        ({"joints": 1, "a": 0.1}, InvalidValueError, "b: expected a, b and phi"),
-        ({"joints": 1, "a": 0.1, "b": -1.0, "phi": 0.0}, InvalidValueError, "b: expected pos"),
-        ({"joints": 1, "values": [1.0, 2.0]}, ShapeError, r"values: .*\(4, 1\)"),
-    ],
-)
-def test_mistakes_are_named(arguments, error, words):
-    with pytest.raises(error, match=words):
-        GravityCompensator(2, **arguments)
-    with pytest.raises(InvalidValueError, match="q: the torque"):
-        GravityCompensator(2, 1).torque([0, 0])
 
 
 @pytest.mark.parametrize("options", [SPRING, SERIES])

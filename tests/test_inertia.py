@@ -122,18 +122,6 @@ def test_what_no_body_has_is_reported(values, words):
     assert str(report).startswith("link 1: not physical: ")
 
 
-def test_parameters_print_as_a_table_with_the_problems_below():
-    rows = np.vstack([body((0.1, 0.1, 0.1)).values, [[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, -2.5]]])
-    lines = str(rm.InertialParameters(rows)).splitlines()
-    assert lines[0].split() == ["link", *rm.inertia.PARAMETERS, "physical"]
-    assert lines[2].split() == ["1", "0.1", "0", "0", "0.1", "0", "0.1", "0", "0", "0", "2", "yes"]
-    assert len({len(line) for line in lines[:4]}) == 1
-    assert lines[4].startswith("link 2: not physical: negative mass -2.5 kg")
-    report = rm.InertialParameters(rows).consistency()
-    assert str(report.links[0]) == "link 1: physical"
-    assert report.not_physical.startswith("link 2: negative mass -2.5 kg")
-
-
 # --- mistakes ------------------------------------------------------------------------------------
 
 

@@ -144,26 +144,6 @@ def test_parallel_revolute_axes_share_a_plane_of_origins():
     assert np.allclose(frames.base[:3, 3], [0, 0, 0.5]), "R_0 is R_1 at q = 0"
 
 
-def test_intersecting_axes_meet_in_their_origin():
-    """A spherical wrist: d and r vanish, alpha are right angles."""
-    axes = [Z, np.array([0.0, 1.0, 0.0]), Z]
-    joints = [JointAxis(j, 0, np.eye(4), axes[j]) for j in range(3)]
-    frames = assert_same_robot(joints)
-    assert np.array_equal(frames.d, np.zeros(3))
-    assert np.array_equal(frames.r, np.zeros(3))
-    assert np.abs(frames.alpha).tolist() == [0, np.pi / 2, np.pi / 2]
-
-
-def test_free_signs_are_chosen_with_theta_near_zero():
-    """x may point either way along the perpendicular: theta stays in (-pi/2, pi/2]."""
-    rng = np.random.default_rng(3)
-    for _ in range(30):
-        frames = khalil_frames(random_tree(rng, 6, branching=0.0))
-        assert (np.abs(frames.theta) <= np.pi / 2 + 1e-8).all()
-        assert frames.theta[-1] == 0
-        assert frames.r[-1] == 0, "a last frame has nothing to choose: theta = r = 0"
-
-
 def test_a_main_branch_needs_no_gamma_and_b():
     """Only the second and later children of a link take gamma and b."""
     rng = np.random.default_rng(4)

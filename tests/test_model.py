@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -60,19 +59,6 @@ def test_defaults():
     assert model.frame_names == ("base", "joint_1", "joint_2", "tool")
     assert repr(model) == "<RobotModel 'robot': 2 joints, 2 frames>"
     assert str(TWO) in str(model)
-
-
-def test_named_postures():
-    model = rm.RobotModel.from_table(TWO, configurations={"up": [0.1, 0.2]})
-    assert {k: v.tolist() for k, v in model.configurations.items()} == {
-        "zero": [0, 0],
-        "up": [0.1, 0.2],
-    }
-    assert not model.configurations["up"].flags.writeable
-    with pytest.raises(TypeError):
-        model.configurations["down"] = np.zeros(2)
-    assert list(model.with_configurations({}).configurations) == ["zero"]
-    assert dict(pickle.loads(pickle.dumps(model)).configurations).keys() == {"zero", "up"}
 
 
 MISTAKES = {
@@ -159,42 +145,7 @@ def test_with_methods_change_one_thing_in_a_new_model(change, rng):
 # --- the same numbers in threads and processes ---------------------------------------------------
 
 
-@pytest.mark.parametrize("inertia", ["physical", "any"])
-def test_threads_compute_the_same_numbers(inertia):
-    """Scratch data are each thread's own: eight threads, one model, many calls."""
-    model = tree_model(inertia="physical", drive=True).with_transmission(None)
-    if inertia == "any":
-        model = model.with_inertia(rm.InertialParameters(
-            np.where(np.arange(10) == 9, 0.0, 1.0) * model.inertia.values
-        ))  # fmt: skip
-    states = np.swapaxes(random_state(model, np.random.default_rng(0), 40), 0, 1)
-
-    def work(state):
-        q, v, a = state
-        return np.concatenate(
-            [np.ravel(x) for x in (rm.dgm(model, q), rm.jacobian(model, q), rm.idm(model, q, v, a))]
-        )
-
-    wanted = [work(s) for s in states]
-    with ThreadPoolExecutor(8) as pool:
-        for _ in range(10):
-            for got, want in zip(pool.map(work, states), wanted, strict=True):
-                assert np.array_equal(got, want)
-
-
 # --- Pinocchio's side ----------------------------------------------------------------------------
-
-
-def test_pinocchio_sorts_siblings_and_the_order_says_how():
-    """J10 comes before J2 there; ours is the order of the table."""
-    table = rm.DHTable(
-        antecedent=[0, 1, 1, 3], sigma=[0, 0, 1, 0], names=["J1", "J2", "J10", "J3"],
-        d=[0, 0.1, 0.2, 0.3],
-    )  # fmt: skip
-    model = rm.RobotModel.from_table(table)
-    assert list(model.pin_model.names)[1:] == ["J1", "J10", "J3", "J2"]
-    assert model.pin_order.tolist() == [0, 3, 1, 2]
-    assert not model.pin_order.flags.writeable
 
 
 @given(models(tree=True))

@@ -9,7 +9,6 @@ import pytest
 import robotmodels as rm
 
 URDF = Path(__file__).parents[1] / "urdf"
-REST = np.zeros(6)
 
 
 @pytest.fixture(scope="module")
@@ -38,20 +37,6 @@ def test_a_file_is_loaded_like_a_name(as_path, tmp_path):
         assert rm.load(as_path(path)).n == rm.read_par(path).n
     with pytest.raises(rm.errors.UrdfError, match=r"none\.urdf"):
         rm.load(as_path(tmp_path / "none.urdf"))
-
-
-def test_the_door_lists_public_names_only():
-    shown = [name for name in dir(rm) if not name.startswith("__")]
-    assert sorted(shown) == sorted(rm.__all__)
-    assert {"se3", "load", "igm", "viz"} <= set(shown)
-
-
-def test_velocity_and_acceleration_default_to_rest(rx90):
-    q = np.full(6, 0.3)
-    np.testing.assert_array_equal(rm.idm(rx90, q), rm.idm(rx90, q, REST, REST))
-    np.testing.assert_allclose(rm.idm(rx90, [q, q])[1], rm.idm(rx90, q), rtol=1e-12, atol=1e-12)
-    still = rm.simulate(rx90, q, t=[0.0, 0.01])
-    np.testing.assert_array_equal(still.v[0], REST)
 
 
 @pytest.mark.parametrize("torque", [rm.idm, rm.gravity_torque], ids=["idm", "gravity"])

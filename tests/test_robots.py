@@ -7,8 +7,7 @@ The joint placements below are the facts of the makers' and ROS-Industrial's URD
 import json
 import pickle
 import re
-import sys
-from math import pi, sqrt
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ import pinocchio as pin
 import pytest
 
 import robotmodels as rm
-from robotmodels import errors
 from robotmodels.errors import RobotNotFoundError
 from robotmodels.robots import CATALOGUE, erd, load, source, title
 from robotmodels.robots.generate import generate
@@ -149,18 +147,6 @@ def test_a_robot_is_a_value_has_a_source_and_prints(name):
     assert np.isfinite(rm.dgm(model, model.configurations["zero"])).all()
 
 
-def test_limits_are_ordered_and_postures_are_within_them():
-    for name in CATALOGUE:
-        model = load(name)
-        assert (model.lower < model.upper).all()
-        assert (model.table.velocity > 0).all()
-        assert (model.table.effort > 0).all()
-        for key, q in model.configurations.items():
-            if key != "zero":
-                assert (q >= model.lower - 1e-12).all(), (name, key)
-                assert (q <= model.upper + 1e-12).all(), (name, key)
-
-
 def test_physical_consistency_is_as_the_sources_report():
     faulty = {}
     for name in CATALOGUE:
@@ -185,59 +171,7 @@ def test_poses_are_those_of_the_published_urdf(name, rng):
         np.testing.assert_allclose(rm.dgm(model, q), T @ placement(*tool), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("name", "frame", "q", "expected", "tolerance"),
-    [
-        # the reach in the robot's name (quoted for the CRX, from the lengths for KR 6 and TX40):
-        # wrist centre, for the CRX and the Cobra the flange, arm stretched
-        ("irb120", 5, [0, h, -h + np.arctan2(0.07, 0.302), 0, 0, 0], 0.58, 5e-4),
-        ("irb140", 5, [0, h, -h, 0, 0, 0], 0.81, 1e-12),
-        ("irb6640", 5, [0, h, -h + np.arctan2(0.2, 1.392), 0, 0, 0], 2.8, 2e-3),
-        ("kr6_r900", 5, [0, 0, np.arctan2(0.035, 0.42), 0, 0, 0], 0.9015, 1e-4),
-        ("crx10ia", None, [0, h, h, 0, 0, 0], 1.249, 1e-4),
-        ("crx10ia_l", None, [0, h, h, 0, 0, 0], 1.418, 1e-4),
-        ("cobra_s600", None, [0, 0, 0, 0], 0.6, 1e-12),
-        ("tx40", 5, [0, h, 0, 0, 0, 0], sqrt(0.45**2 + 0.035**2), 1e-12),
-    ],
-)
-def test_reach_from_the_first_axis(name, frame, q, expected, tolerance):
-    x, y = rm.dgm(load(name), q, frame)[:2, 3]
-    assert np.hypot(x, y) == pytest.approx(expected, abs=tolerance)
-
-
-@pytest.mark.parametrize("name", ["ur5", "ur3e", "ur5e", "ur10e", "ur16e"])
-def test_ur_arm_at_zero_lies_along_minus_x(name):
-    """The maker's zero: stretched out along -x, flange looking along -y (classical table)."""
-    model = load(name)
-    d1, d4, d5, d6 = model.table.r[[0, 3, 4, 5]]
-    a2, a3 = model.table.d[[2, 3]]
-    expected = [[1, 0, 0, a2 + a3], [0, 0, -1, -d4 - d6], [0, 1, 0, d1 - d5], [0, 0, 0, 1]]
-    np.testing.assert_allclose(rm.dgm(model, np.zeros(6)), expected, rtol=0, atol=1e-12)
-    assert rm.dgm(model, model.configurations["up"])[2, 3] > d1 - a2 - a3
-
-
 # --- the seed documents -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["rx90", "ur5"])
-def test_every_known_posture_reaches_its_pose(name):
-    data = oracle(f"igm_{name}")
-    model = load(name)
-    for column in ("alpha", "d", "theta", "r"):
-        np.testing.assert_array_equal(data["robot"][column], getattr(model.table, column))
-    for case in data["cases"]:
-        solutions = np.array(case["solutions"])
-        assert len(solutions) == case["n_solutions"]
-        T = rm.dgm(model, solutions)
-        np.testing.assert_allclose(T, np.broadcast_to(case["T"], T.shape), rtol=0, atol=1e-9)
-
-
-def test_lab_trr_reaches_pose_a_and_the_position_of_b():
-    model = load("lab_trr")
-    A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
-    np.testing.assert_allclose(rm.dgm(model, model.configurations["pose_a"]), A, rtol=0, atol=5e-5)
-    T = rm.dgm(model, model.configurations["pose_b_position"])
-    np.testing.assert_allclose(T[:3, 3], [0.4, 0.2, 0.5], rtol=0, atol=1e-12)
 
 
 # --- dynamics of the PUMA and drives of the TX40 ------------------------------------------------
@@ -261,25 +195,6 @@ def test_robots_of_the_toolbox(name, file):
             expected = np.array(sample[key])
             scale = max(1.0, np.abs(expected).max())
             np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12 * scale, err_msg=key)
-
-
-def test_inertia_was_moved_without_loss():
-    """Centres of mass in the world at zero: the published ones plus their joints' positions."""
-    model = load("iiwa14")
-    assert model.inertia.mass.sum() == pytest.approx(22.849622)
-    links = [
-        (5.289529, (0, -0.033795, 0.279904)),
-        (5.688888, (0.000136, 0.037548, 0.436322)),
-        (3.461245, (0, 0.034913, 0.711108)),
-        (4.122995, (0, -0.029293, 0.866944)),
-        (1.563756, (0, -0.029824, 1.063767)),
-        (2.457878, (0, 0.00032, 1.18495)),
-        (0.265331, (3e-06, -2e-06, 1.284782)),
-    ]
-    poses = rm.link_poses(model, np.zeros(7))
-    for j, (mass, com) in enumerate(links):
-        moment = poses[j, :3, :3] @ model.inertia.first_moments[j] + poses[j, :3, 3] * mass
-        np.testing.assert_allclose(moment / mass, com, rtol=0, atol=1e-12)
 
 
 # --- URDF files -----------------------------------------------------------------------------------
@@ -376,11 +291,3 @@ def test_postures_of_an_srdf_are_configurations():
 
 
 # --- mistakes -------------------------------------------------------------------------------------
-
-
-def test_without_example_robot_data_the_message_says_what_to_install(monkeypatch, tmp_path):
-    monkeypatch.setattr(sys, "path", [str(tmp_path)])
-    monkeypatch.setattr(sys, "prefix", str(tmp_path))
-    monkeypatch.setattr(sys, "base_prefix", str(tmp_path))
-    with pytest.raises(errors.MissingExtraError, match="pip install example-robot-data"):
-        load("erd:ur5")

@@ -11,7 +11,6 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.errors import (
-    InvalidValueError,
     ParFileError,
     RobotModelsWarning,
 )
@@ -167,23 +166,6 @@ def test_what_is_added_to_the_variable_is_the_offset(two, entry, offset):
     assert model.table.theta[0] == pytest.approx(offset, abs=1e-15)
 
 
-def test_missing_symbols_are_named_all_at_once(read):
-    robot = {**RX90, "d": [0, 0, "D3", "d4", 0, 0], "theta": ["th1 + off1", *RX90["theta"][1:]]}
-    with pytest.raises(ParFileError, match=r"off1, D3, RL4\..*values=\{'off1': \.\.\.") as error:
-        read(open_symoro(robot), {"d4": 0.1})
-    assert "theta, entry 1: no number for th1" not in str(error.value)  # th1 itself is not missing
-    assert "d4" not in str(error.value)
-
-
-def test_values_must_be_symbols_of_the_file(two, read):
-    with pytest.raises(ParFileError, match=r"'d3'.*Did you mean 'D3'"):
-        read(open_symoro(RX90), {"d3": 0.45, "RL4": 0.45})
-    with pytest.raises(InvalidValueError, match=r"values\['D3'\]"):
-        read(open_symoro(RX90), {"D3": np.nan, "RL4": 0.45})
-    with pytest.raises(InvalidValueError, match="expected a mapping"):
-        two([("D3", 0.45)])
-
-
 @pytest.mark.parametrize(
     ("theta", "values", "message"),
     [
@@ -247,24 +229,6 @@ def test_gravity_of_the_file_is_in_frame_0(two):
     np.testing.assert_allclose(model.gravity, [0, 0, -9.8])
     assert two(extra="G = {0, 0, 0}").gravity.tolist() == [0, 0, 0]
     assert two({"G3": 9.81}, extra="G = {0, 0, -G3}").gravity.tolist() == [0, 0, -9.81]
-
-
-def test_base_needs_numbers_and_a_pose(two):
-    tilted = "Z = {1,0,0,x0, 0,1,0,0, 0,0,1,0, 0,0,0,1}"
-    with pytest.raises(ParFileError, match="no number for x0"):
-        two(extra=tilted)
-    assert two({"x0": 0.5}, extra=tilted).base[0, 3] == 0.5
-    with pytest.raises(ParFileError, match=r"line 19: Z.*row by row"):
-        two(extra="Z = {1,0,0,0, 0,2,0,0, 0,0,1,0, 0,0,0,1}")
-
-
-def test_loads_and_drives_without_a_place_are_noted(read):
-    robot = {**TWO_JOINTS, "sigma": [0, 2], "mu": [0, 0], "r": [0.5, 0]}
-    model = read(open_symoro(robot, extra="IA = {0.1, 0.2}\nFV={1, FV2}\nFX = {0, 3}\nFY={0, FY2}"))
-    assert model.drive.Ia.tolist() == [0.1]
-    assert model.table.mu.tolist() == [0, 0]
-    assert any("IA2 = 0.2 is left out" in note for note in model.notes)
-    assert any("wrenches FX are left out" in note for note in model.notes)
 
 
 # --- frames, trees, loops ------------------------------------------------------------------------

@@ -7,7 +7,6 @@ import pytest
 from identities.random_robots import random_table
 
 import robotmodels as rm
-from robotmodels.igm import IGMStatus
 from robotmodels.kinematics.lengths import characteristic_length
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
 from robotmodels.trajectories import joint_path
@@ -90,12 +89,6 @@ def test_the_arm_ends_before_its_fingers(length, lengths):
     assert wanted in model.notes
 
 
-def test_the_tip_is_the_last_link_that_all_fingers_share():
-    text = urdf(*arm(6), ("hand_base", "palm", "fixed"), *fingers(2, on="palm"),
-                ("hand_base", "thumb"), ("thumb", "thumb_tip"))  # fmt: skip
-    assert tip_of(text) == ["hand_base"]
-
-
 @pytest.mark.parametrize("first", range(len(NAMES)))
 def test_links_named_as_tools_come_first_in_their_order(first):
     """Anywhere on the body that carries the fingers, in any order of the file."""
@@ -149,14 +142,6 @@ def test_tips_of_trees(name):
     model = rm.load(name)
     q = np.random.default_rng(0).uniform(-1, 1, model.n)
     assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, TREES[name]))
-
-
-@pytest.mark.nightly
-def test_all_other_robots_have_no_joint_that_does_not_move_the_tip():
-    for name in rm.robots():
-        model = rm.load(name)
-        if name not in TREES:
-            assert len(model.table.path(model.tip)) == model.f, name
 
 
 def test_a_model_file_of_a_panda_ends_at_its_hand():
@@ -241,26 +226,6 @@ def test_side_joints_change_nothing(name):
 
 
 @pytest.mark.parametrize("name", ["puma560", "lab_trr"])
-def test_side_joints_change_nothing_of_the_other_inverse_models(name):
-    rng = np.random.default_rng(5)
-    alone = rm.load(name)
-    tree, own = with_side_joints(rng, alone, 3)
-    still = np.setdiff1d(np.arange(tree.n), own)
-    q = rng.uniform(-1, 1, (5, tree.n))
-    found = rm.igm_numeric(tree, rm.dgm(tree, q), q)
-    wanted = rm.igm_numeric(alone, rm.dgm(tree, q), q[:, own])
-    assert np.array_equal(found.status, wanted.status)
-    assert np.array_equal(found.q[..., still][found.valid], q[:, still])
-    assert not found.free_joints.any()
-    assert np.array_equal(found.family_joints[..., own], wanted.family_joints)
-    twists = rng.normal(size=(5, 6))
-    found, wanted = rm.ikm(tree, q, twists), rm.ikm(alone, q[:, own], twists)
-    np.testing.assert_allclose(found.v[:, own], wanted.v, rtol=1e-9, atol=1e-9)
-    assert not found.v[:, still].any()
-    assert np.array_equal(found.status, wanted.status)
-
-
-@pytest.mark.parametrize("name", ["puma560", "lab_trr"])
 def test_side_joints_stand_still_on_a_path(name):
     rng = np.random.default_rng(8)
     alone = rm.load(name)
@@ -279,35 +244,6 @@ def test_side_joints_stand_still_on_a_path(name):
         assert [e.kind for e in path.events] == [e.kind for e in wanted.events]
         assert np.all(path.q[:, still] == (0.0 if begin is None else start[still]))
         assert np.all(np.abs(path.v[:, still]) < 1e-12)
-
-
-@pytest.mark.parametrize("name", TREES)
-@pytest.mark.nightly
-def test_postures_of_trees(name):
-    """igm finds the posture again, the other joints at their reference."""
-    model = rm.load(name)
-    rng = np.random.default_rng(1)
-    lower, upper = np.maximum(model.lower, -2), np.minimum(model.upper, 2)
-    q = lower + (upper - lower) * rng.random(model.n)
-    path = model.table.path(model.tip)
-    still = np.array([row + 1 not in path for row in model.table.joint_rows])
-    found = rm.igm(model, rm.dgm(model, q), q)
-    assert found.count > 0
-    assert np.all(found.q[found.valid][:, still] == q[still])
-    np.testing.assert_allclose(found.nearest(q), q, atol=1e-6)
-    assert not (found.free_joints | found.family_joints)[..., still].any()
-    assert (found.status == IGMStatus.REACHED_FAMILY) == (np.count_nonzero(~still) > 6)
-
-
-def test_an_arm_with_fingers_is_solved_in_closed_form():
-    """Six axes and two fingers, as many as eight postures; without q_ref the fingers are at 0."""
-    bravo = rm.load("erd:bravo7_gripper")
-    q = np.array([0.3, 1.0, 0.7, 0.4, -0.9, 0.2, 0.1, 0.05])
-    found = rm.igm(bravo, rm.dgm(bravo, q))
-    assert "numeric" not in found.method
-    assert found.count >= 2
-    assert found.status == IGMStatus.REACHED
-    assert np.all(found.q[:, 6:] == 0.0)
 
 
 def test_fingers_whose_limits_leave_zero_out():

@@ -103,19 +103,6 @@ def test_reading_back_gives_the_same_robot(model):
         assert np.array_equal(got, wanted), limit
 
 
-def test_limits_are_kept_and_infinity_is_a_number_parsers_read():
-    table = ONE.replace(lower=[-np.inf], upper=[0.1], velocity=[np.inf], effort=[1 / 3])
-    text = rm.to_urdf(rm.RobotModel.from_table(table))
-    limit = ET.fromstring(text).find("joint/limit")
-    assert float(limit.get("lower")) == -np.finfo(float).max
-    assert limit.get("upper") == "0.1"
-    assert limit.get("effort") == repr(1 / 3)
-    back = rm.RobotModel.from_urdf(text).table
-    for key in ("lower", "upper", "velocity", "effort"):
-        assert np.array_equal(getattr(back, key), getattr(table, key)), key
-    assert pin.buildModelFromXML(text).nq == 1, "continuous would have nq = 2"
-
-
 @pytest.mark.parametrize(
     "names",
     [
@@ -213,16 +200,6 @@ def test_yourdfpy_loads_and_validates(model):
     names = link_names(model.parts)
     got = robot.get_transform(names.tool, names.world)
     assert np.abs(got - rm.dgm(model, q)).max() < 1e-9 * robot_size(model, q)
-
-
-def test_writing_a_file(tmp_path):
-    model = rm.RobotModel.from_table(ONE.replace(names=["θ"]), name="é")
-    path = tmp_path / "arm.urdf"
-    rm.write_urdf(model, path)
-    assert path.read_text(encoding="utf-8") == rm.to_urdf(model)
-    assert rm.RobotModel.from_urdf(path) == model == rm.RobotModel.from_urdf(str(path))
-    with pytest.raises(UrdfError, match=r"cannot write .*missing.*No such file"):
-        rm.write_urdf(model, tmp_path / "missing" / "arm.urdf")
 
 
 def test_the_tool_survives_a_round_trip():
