@@ -11,7 +11,7 @@ from identities.random_robots import random_model
 import robotmodels as rm
 from robotmodels import trajectories as tr
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
-from robotmodels.obstacles import Box, Plane, Sphere, clearance
+from robotmodels.obstacles import Plane, Sphere, clearance
 from robotmodels.trajectories import (
     Cost,
     MotionLimits,
@@ -141,6 +141,7 @@ def test_speeds_bound_the_duration_too_and_weak_motors_are_named():
     assert weak.status is ScalingStatus.NOT_HELD_STILL
     assert weak.trajectory is None
     assert "Gravity" in weak.reason()
+    assert "joint 1" in weak.reason()
     for result in (weak, by_torque):
         assert pickle.loads(pickle.dumps(result)) == result
         assert len(repr(result).splitlines()) <= 6
@@ -150,6 +151,7 @@ def test_speeds_bound_the_duration_too_and_weak_motors_are_named():
         ((move, planar(), 1.0), ShapeError),
         ((np.zeros(3), arm, 1.0), InvalidValueError),
         ((tr.quintic([0.0], [0.0], duration=0.0), arm, 1.0), InvalidValueError),
+        ((tr.quintic(np.ones(6), np.ones(6), duration=1.0), arm, 150.0), InvalidValueError),
     ):
         with pytest.raises(error):
             time_scaled(*arguments)
@@ -181,7 +183,8 @@ def test_random_profiles():
 @pytest.mark.parametrize("name", CASES)
 def test_free_motions_are_as_quick_as_those_of_optimal_control(name):
     q0, q1, torque, g = CASES[name]
-    plan = kinodynamic(planar(g), q0, q1, FREE, torque, rng=0, seconds=100.0)
+    calls = []
+    plan = kinodynamic(planar(g), q0, q1, FREE, torque, rng=0, seconds=100.0, progress=calls.append)
     assert plan.status is PlanStatus.FOUND
     assert 0.99 <= plan.duration / ORACLE["free"][name] <= 1.05
     use = np.abs(torques(planar(g), plan.trajectory)).max(axis=0) / torque
@@ -194,6 +197,8 @@ def test_free_motions_are_as_quick_as_those_of_optimal_control(name):
     assert (np.diff(plan.history[:, 2]) <= 0.0).all()
     straight = time_optimal(tr.linear(q0, q1, duration=1.0), FREE, planar(g), torque)
     assert plan.duration < straight.duration
+    assert calls == sorted(calls)
+    assert calls[-1] == 1.0
 
 
 @pytest.mark.nightly
@@ -242,23 +247,15 @@ def test_six_joints_through_a_point_and_around_a_body():
 
 
 @pytest.mark.nightly
-def test_limits_of_position_are_kept():
+def test_limits_and_torques_in_the_cost_slow_the_motion_down():
     q0, q1, torque, g = CASES["B"]
-    free = kinodynamic(planar(g), q0, q1, FREE, torque, seconds=20.0)
-    q = free.trajectory.q(np.linspace(0, free.duration, 999))
     ends = np.array([q0, q1])
-    lower, upper = ends.min(axis=0) - 0.1, ends.max(axis=0) + 0.1
-    assert (q > upper).any()
-    assert (q < lower).any()
-    limits = MotionLimits(lower=lower, upper=upper)
-    kept = kinodynamic(planar(g), q0, q1, limits, torque, seconds=20.0)
-    q = kept.trajectory.q(np.linspace(0, kept.duration, 9999))
-    assert ((q >= lower - 1e-9) & (q <= upper + 1e-9)).all()
-
-
-@pytest.mark.nightly
-def test_torques_in_the_cost_slow_the_motion_down():
-    q0, q1, torque, g = CASES["B"]
+    for limits in (
+        MotionLimits(lower=ends.min(axis=0) - 0.1, upper=ends.max(axis=0) + 0.1),
+        MotionLimits(velocity=3.0, acceleration=20.0, jerk=100.0),
+    ):
+        kept = kinodynamic(planar(g), q0, q1, limits, torque, seconds=20.0)
+        assert kept.trajectory.check(limits, 1e-6).kept
     plans = [
         kinodynamic(planar(g), q0, q1, FREE, torque, cost=Cost(1.0, w), timing=t, seconds=10.0)
         for w in (0.0, 3.0)
@@ -299,17 +296,7 @@ def test_ends_that_are_not_allowed_have_a_status():
     hit = kinodynamic(model, [0.5, 0], [-0.6, 0.2], FREE, strong, obstacles=[floor])
     assert hit.status is PlanStatus.ENDS_IN_COLLISION
     assert "q1" in hit.reason()
-    wall = Box([0.4, 0.2, -1], [3, 0.4, 1])
-    shut = kinodynamic(
-        model, [-0.1, 0], [1.4, 0], MotionLimits(lower=-0.2, upper=1.5), strong,
-        obstacles=[wall, Plane([0, -0.3, 0], [0, 1, 0])], seconds=5.0,
-    )  # fmt: skip
-    assert shut.status in (PlanStatus.NONE_FOUND, PlanStatus.FOUND)
-    if shut.trajectory is not None:
-        assert (
-            clearance(model, shut.trajectory.q(np.linspace(0, shut.duration, 999)), wall).min() > 0
-        )
-    for plan in (weak, hit, shut):
+    for plan in (weak, hit):
         assert pickle.loads(pickle.dumps(plan)) == plan
         assert len(repr(plan).splitlines()) <= 6
 
@@ -323,11 +310,8 @@ def test_ends_that_are_not_allowed_have_a_status():
         ({"via": [[0.5, 0.5], [0.5, 0.5]]}, InvalidValueError, r"via\[1\]"),
         ({"via": [0.5, 0.5]}, InvalidValueError, "via"),
         ({"via": Pose(np.eye(4))}, InvalidValueError, "via"),
-        ({"via": 3}, InvalidValueError, "via"),
-        ({"nodes": 10**9}, InvalidValueError, "nodes"),
         ({"limits": MotionLimits(upper=0.5)}, InvalidValueError, "outside its limits"),
         ({"torque": None}, InvalidValueError, "infinite"),
-        ({"torque": [1.0, np.nan]}, InvalidValueError, "torque"),
         ({"obstacles": [3]}, InvalidValueError, "obstacles"),
         ({"clearance": -1.0}, InvalidValueError, "clearance"),
         ({"cost": 1.0}, InvalidValueError, "cost"),
@@ -336,6 +320,11 @@ def test_ends_that_are_not_allowed_have_a_status():
         ({"timing": "slow"}, InvalidValueError, "timing"),
         ({"seconds": 0.0}, InvalidValueError, "seconds"),
         ({"model": "rx90"}, InvalidValueError, "model"),
+        (
+            {"torque": np.inf, "cost": Cost(1.0, 1.0), "limits": MotionLimits(1.0)},
+            InvalidValueError,
+            "torques",
+        ),
     ],
 )
 def test_refused_input(change, error, word):
@@ -344,39 +333,6 @@ def test_refused_input(change, error, word):
         kinodynamic(**(given | change))
     with pytest.raises(InvalidValueError):
         Cost(0.0, 0.0)
-
-
-@pytest.mark.nightly
-def test_jerk_and_equal_postures():
-    q0, q1, torque, g = CASES["B"]
-    limits = MotionLimits(velocity=3.0, acceleration=20.0, jerk=100.0)
-    plan = kinodynamic(planar(g), q0, q1, limits, torque, seconds=10.0)
-    assert plan.trajectory.check(limits, 1e-6).kept
-    here = Pose(rm.dgm(planar(g), q0))
-    with pytest.raises(InvalidValueError, match="same posture"):
-        kinodynamic(planar(g), q0, here, FREE, torque)
-    with pytest.raises(InvalidValueError, match="torques"):
-        kinodynamic(planar(g), q0, q1, limits, cost=Cost(1.0, 1.0))
-
-
-def test_progress_is_called():
-    calls = []
-    q0, q1, torque, g = CASES["A"]
-    plan = kinodynamic(planar(g), q0, q1, FREE, torque, nodes=0, seconds=15.0,
-                       progress=calls.append)  # fmt: skip
-    assert plan.status is PlanStatus.FOUND
-    assert calls == sorted(calls)
-    assert len(calls) > 1
-    assert calls[-1] == 1.0
-
-
-def test_scaling_names_the_joint_that_is_not_held_and_refuses_a_motion_that_rests():
-    arm, q0 = rm.load("ur5e"), [0, -1.5, 1, 0, 0, 0]
-    why = time_scaled(tr.quintic(q0, np.ones(6), duration=1.0), arm, 5.0).reason()
-    assert "joint 2" in why
-    assert "margin of -" in why
-    with pytest.raises(InvalidValueError, match="does not move"):
-        time_scaled(tr.quintic(q0, q0, duration=1.0), arm, 150.0, MotionLimits(1.0))
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning", "ignore:.*no masses")

@@ -36,18 +36,7 @@ def line(q0, q1):
     return tr.linear(q0, q1, duration=1.0)
 
 
-def test_torques_beyond_their_limits_between_points_are_named():
-    rng, arm = np.random.default_rng(4), rm.load("ur5e")
-    arm = arm.with_drive(rm.DriveParameters(*(np.full(6, x) for x in (0.2, 2.0, 0.0, 0.0))))
-    torque = np.array([150.0] * 3 + [28.0] * 3)
-    for _ in range(3):
-        path = tr.random_profile([0, -1.5, 1, 0, 0, 0], rng.normal(size=6), 3, "quintic", rng)
-        timed = time_optimal(path, None, arm, torque, points=50)
-        greatest = used(arm, timed.trajectory, torque).max()
-        assert ("times its limit" in timed.reason()) == (greatest > 1.02)
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_torques_are_held_between_the_points_with_limits_at_both_ends(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, f=4, tree=seed % 2 == 1, drive=True)
@@ -60,11 +49,10 @@ def test_torques_are_held_between_the_points_with_limits_at_both_ends(seed):
         assert used(model, timed.trajectory, torque).max() <= 1.001
         alone = time_optimal(path, FREE, model, torque, points=points)
         assert timed.duration <= 1.05 * alone.duration
-
-
-def test_a_velocity_of_zero_is_named():
-    timed = time_optimal(line([0.0, 0.0], [1.0, 1.0]), MotionLimits([0.0, 1.0], 1.0))
-    assert "velocity" in timed.reason()
+        greatest = used(model, alone.trajectory, torque).max()
+        assert ("times its limit" in alone.reason()) == (greatest > 1.02)
+        assert pickle.loads(pickle.dumps(timed)) == timed != alone
+        assert len(repr(timed).splitlines()) <= 6
 
 
 def spline(rng, n, points=5):
@@ -93,8 +81,8 @@ def test_durations_are_those_of_toppra_on_the_same_grid(case):
     assert timed.duration == pytest.approx(case["duration"], rel=1e-5)
 
 
-@pytest.mark.parametrize("own", [tr.linear, tr.quintic, tr.cubic])
-@pytest.mark.parametrize("end", [[1.0, -2.0], [0.3, 0.5], [-0.2, 0.05]])
+@pytest.mark.parametrize("own", [tr.linear, tr.quintic])
+@pytest.mark.parametrize("end", [[1.0, -2.0], [-0.2, 0.05]])
 def test_a_straight_path_is_the_coordinated_trapezoid(own, end):
     limits = MotionLimits(
         velocity=[1.0, 2.0], acceleration=[2.0, 3.0], acceleration_lower=[-1.0, -2.0]
@@ -119,7 +107,7 @@ def test_the_gap_falls_as_the_intervals_under_torques():
     assert all(abs(t.duration - exact) <= 1.2 * t.grid_gap * exact for t in timed)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_random_robots_use_their_torques_and_no_more(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, f=4, tree=seed % 2 == 1, drive=True)
@@ -141,12 +129,31 @@ def test_random_robots_use_their_torques_and_no_more(seed):
     assert motion.q(t) == pytest.approx(path.q(own), abs=1e-12)
 
 
-def test_most_of_the_time_a_torque_is_at_its_limit():
-    timed = time_optimal(PATHS["spline"], FREE, planar(), [120, 40], points=400)
-    at = timed.trajectory.at(np.linspace(0, timed.duration, 5000))
-    share = (np.abs(rm.idm(planar(), at.q, at.v, at.a)) / [120, 40]).max(axis=1)
-    assert (share > 0.98).mean() > 0.95
-    assert (timed.active != "").mean() > 0.95
+def test_the_own_timing_of_a_path_is_dropped():
+    """Also of motions that rest or jump in it, turn back, or are functions of time."""
+    model, torque = planar(), [120, 40]
+    rests = tr.Trajectory.from_functions(
+        lambda t: np.outer(0.5 + 4 * (t - 0.5) ** 3, [1, 0.5]),
+        1.0,
+        lambda t: np.outer(12 * (t - 0.5) ** 2, [1, 0.5]),
+    )
+    blends = tr.blended_lines([[0, 0], [0.5, 0.25], [1, 0.5]], segment_times=[1, 3],
+                              blend_times=[0.1, 0.0, 0.1])  # fmt: skip
+    laws = [own([0, 0], [1, 0.5], duration=3.0) for own in (tr.linear, tr.quintic)]
+    paths = (*laws, rests, blends)
+    timed = [time_optimal(path, FREE, model, torque, points=400).duration for path in paths]
+    assert np.ptp(timed) < 2e-3 * timed[0]
+    back = tr.cubic_spline([[0, 0], [1, 0.5], [0, 0]], times=[0, 1, 2], ends="not_a_knot")
+    turned = time_optimal(back, FREE, planar(0.0), torque, points=400)
+    assert turned.trajectory.q(turned.duration) == pytest.approx([0, 0], abs=1e-9)
+    # the inertia of joint 2 along the path changes its sign
+    path = tr.cubic_spline([[0, 0], [1, -1.2], [2, -1.6]], [0, 1, 2], ends="not_a_knot")
+    durations = []
+    for points in range(50, 60):
+        timed = time_optimal(path, FREE, planar(0.0), [400, 6], points=points)
+        assert np.isfinite(timed.trajectory.at(np.linspace(0, timed.duration, 99)).a).all()
+        durations.append(timed.duration)
+    assert np.ptp(durations) < 0.01 * durations[0]
 
 
 def test_reversed_and_scaled_paths():
@@ -163,35 +170,6 @@ def test_reversed_and_scaled_paths():
         for i, limit in enumerate(limits)
     )
     assert one == pytest.approx(k * two, rel=1e-9)
-
-
-def test_the_own_timing_of_a_path_is_dropped():
-    model, torque = planar(), [120, 40]
-    durations = [
-        time_optimal(own([0, 0], [1, 0.5], duration=3.0), FREE, model, torque, points=400).duration
-        for own in (tr.linear, tr.quintic, tr.smoothed_trapezoidal)
-    ]
-    assert np.ptp(durations) < 1e-3 * durations[0]
-    blends = tr.blended_lines([[0, 0], [0.5, 0.25], [1, 0.5]], segment_times=[1, 3],
-                              blend_times=[0.1, 0.0, 0.1])  # fmt: skip
-    timed = time_optimal(blends, FREE, model, torque, points=400)
-    assert timed.duration == pytest.approx(durations[0], rel=1e-3)
-
-
-def test_a_path_may_turn_back_on_itself():
-    path = tr.cubic_spline([[0, 0], [1, 0.5], [0, 0]], times=[0, 1, 2], ends="not_a_knot")
-    there = time_optimal(line([0, 0], [1, 0.5]), FREE, planar(0.0), [120, 40], points=400)
-    timed = time_optimal(path, FREE, planar(0.0), [120, 40], points=400)
-    assert timed.duration == pytest.approx(2 * there.duration, rel=0.35)
-    assert timed.trajectory.q(timed.duration) == pytest.approx([0, 0], abs=1e-9)
-    # a motion that rests on its way, in the middle of a straight path
-    rests = tr.Trajectory.from_functions(
-        lambda t: np.outer(0.5 + 4 * (t - 0.5) ** 3, [1, 0.5]),
-        1.0,
-        lambda t: np.outer(12 * (t - 0.5) ** 2, [1, 0.5]),
-    )
-    again = time_optimal(rests, FREE, planar(0.0), [120, 40], points=400)
-    assert again.duration == pytest.approx(there.duration, rel=2e-3)
 
 
 def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
@@ -293,18 +271,6 @@ def test_paths_that_no_motion_follows():
     assert still.status is TimingStatus.NOT_CONTROLLABLE
 
 
-def test_zero_inertia_points_make_no_gaps():
-    # the inertia of joint 2 along the path changes its sign
-    path = tr.cubic_spline([[0, 0], [1, -1.2], [2, -1.6]], [0, 1, 2], ends="not_a_knot")
-    durations = []
-    for points in range(50, 60):
-        timed = time_optimal(path, FREE, planar(0.0), [400, 6], points=points)
-        assert timed.status is TimingStatus.OPTIMAL
-        assert np.isfinite(timed.trajectory.at(np.linspace(0, timed.duration, 99)).a).all()
-        durations.append(timed.duration)
-    assert np.ptp(durations) < 0.01 * durations[0]
-
-
 def test_a_path_of_poses_needs_the_robot():
     arm = rm.load("ur5e")
     q = np.array([0.3, -1.2, 1.4, -1.0, -1.3, 0.2])
@@ -360,19 +326,6 @@ def test_refused_input(change, error, word):
         time_optimal(**given)
 
 
-def test_results_are_values():
-    for timed in (
-        time_optimal(PATHS["spline"], FREE, planar(), [120, 40], points=60),
-        time_optimal(PATHS["line"], FREE, planar(), 1.0),
-    ):
-        again = pickle.loads(pickle.dumps(timed))
-        assert again == timed
-        assert hash(again) == hash(timed)
-        assert not again.rate.flags.writeable
-        assert len(repr(timed).splitlines()) <= 6
-    assert timed != time_optimal(PATHS["line"], FREE, planar(), 2.0)
-
-
 # --- motions by functions, and splines that are one polynomial at the ends ----------------------
 
 
@@ -380,25 +333,21 @@ def test_a_motion_of_functions():
     def q(t):
         return np.stack((np.sin(t), np.cos(2 * t)), axis=-1)
 
-    motion = tr.Trajectory.from_functions(q, 3.0)
-    t = np.linspace(0, 3, 301)
+    motion, t = tr.Trajectory.from_functions(q, 3.0), np.linspace(0, 3, 301)
     assert motion.v(t) == pytest.approx(np.stack((np.cos(t), -2 * np.sin(2 * t)), -1), abs=1e-9)
     assert motion.a(t) == pytest.approx(np.stack((-np.sin(t), -4 * np.cos(2 * t)), -1), abs=1e-6)
-    given = tr.Trajectory.from_functions(
-        np.sin, 3.0, np.cos, lambda t: -np.sin(t), lambda t: -np.cos(t)
-    )
+    given = tr.Trajectory.from_functions(np.sin, 3.0, np.cos, lambda t: -np.sin(t))
     assert given.scalar
-    assert given.jerk(1.0) == -np.cos(1.0)
     assert given.check(MotionLimits(velocity=1.0, acceleration=1.0)).kept
     assert not motion.check(MotionLimits(velocity=1.0)).kept
-    with pytest.raises(ShapeError):
-        tr.Trajectory.from_functions(lambda t: np.zeros((2, 2)), 1.0)
-    with pytest.raises(InvalidValueError, match="finite"):
-        tr.Trajectory.from_functions(lambda t: np.where(t > 0.4, np.nan, t), 1.0)
-    with pytest.raises(InvalidValueError, match="functions"):
-        tr.Trajectory.from_functions(np.sin, 1.0, None, np.cos)
-    with pytest.raises(InvalidValueError, match="duration"):
-        tr.Trajectory.from_functions(np.sin, 0.0)
+    for arguments, error, words in (
+        ((lambda t: np.zeros((2, 2)), 1.0), ShapeError, "q"),
+        ((lambda t: np.where(t > 0.4, np.nan, t), 1.0), InvalidValueError, "finite"),
+        ((np.sin, 1.0, None, np.cos), InvalidValueError, "functions"),
+        ((np.sin, 0.0), InvalidValueError, "duration"),
+    ):
+        with pytest.raises(error, match=words):
+            tr.Trajectory.from_functions(*arguments)
 
 
 def test_a_path_moved_along_by_a_law_has_the_derivatives_of_both():
@@ -419,13 +368,3 @@ def test_a_path_moved_along_by_a_law_has_the_derivatives_of_both():
     assert low == pytest.approx(v.min(axis=0), rel=1e-3, abs=1e-9)
     assert high == pytest.approx(v.max(axis=0), rel=1e-3, abs=1e-9)
     assert np.isinf(motion.motion.extremes(3)[1]).all()  # its acceleration jumps
-
-
-def test_a_spline_without_a_knot_beside_its_ends_is_a_cubic_there():
-    t = np.array([0.0, 0.7, 1.1, 2.0])
-    cubic = np.stack((t**3 - t, 2 * t**3 + t**2), axis=-1)
-    path = tr.cubic_spline(cubic, t, ends="not_a_knot")
-    x = np.linspace(0, 2, 21)
-    assert path.q(x) == pytest.approx(np.stack((x**3 - x, 2 * x**3 + x**2), -1), abs=1e-12)
-    with pytest.raises(InvalidValueError, match="clamped"):
-        tr.cubic_spline(cubic, t, v0=1.0, ends="not_a_knot")

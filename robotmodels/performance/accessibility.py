@@ -77,34 +77,19 @@ def accessibility(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, limits, free, mask, executor, progress
+        See the head of the room; of one component of the orientation 180 angles about its axis,
+        from the orientation of zero joints, stand for every one.
     T : array_like, shape (..., 4, 4)
         World poses of the tool.
     level : {"position", "pose", "every_orientation"}
         What is asked: the position in any orientation, the pose, or the position in every
         orientation, of which 96 stand for all (180 angles for an arm that moves in a plane).
-    limits : bool
-        Whether the joint limits count.
-    free : callable or obstacles, optional
-        Function of q (N, n) that returns bool (N,), or obstacles the links must not touch.
-    mask : array_like, shape (6,), optional
-        Components of the pose that are asked, see `igm`. Of one component of the orientation
-        180 angles about its axis, from the orientation of zero joints, stand for every one.
-    executor : concurrent.futures.Executor, optional
-        Threads or processes that compute; the results do not depend on their number.
-    progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
     Accessibility
         Status and number of postures of each pose.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Matrices that are no poses, an unknown level, ``free`` of the wrong kind.
 
     References
     ----------

@@ -115,18 +115,10 @@ class Aspects(Result):
         return self.status is AspectStatus.FOUND
 
     def of(self, q: ArrayLike) -> Ints:
-        """Aspect of configurations.
+        """Numbers (...), from 0, of the aspects of configurations (..., n), rad or m.
 
-        Parameters
-        ----------
-        q : array_like, shape (..., n)
-            Joint variables, rad or m; angles are turned inside the limits.
-
-        Returns
-        -------
-        ndarray of int64, shape (...)
-            Number of the aspect, from 0; -1 outside the limits, in collision, and so close to a
-            singular position that the grid cannot tell.
+        -1 outside the limits, in collision, and so close to a singular position that the grid
+        cannot tell; angles are turned inside the limits.
         """
         given = as_vector(q, self.model.n, "q")
         joints = JointSpace(self.model, self.limits, self.free)
@@ -170,28 +162,15 @@ def aspects(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
-    limits : bool
-        Whether the joint limits cut the joint space.
-    free : callable or obstacles, optional
-        Function of q (N, n) that returns bool (N,), or obstacles: parts of the free space.
+    arm, limits, free, executor, progress
+        See the head of the room; limits and obstacles cut the joint space.
     resolution : int, optional
         Cells along each joint.
-    executor, progress
-        As for `accessibility`.
 
     Returns
     -------
     Aspects
         The parts with their volumes and signs; none, with a status, for redundant arms.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits that obstacles or a factor of the determinant depend on (the volume
-        is infinite if they do not), a resolution that is no number of cells or needs more than
-        1 GB.
 
     References
     ----------
@@ -229,7 +208,7 @@ def free_components(
     Returns
     -------
     Aspects
-        The components with their volumes; ``signs`` is empty.
+        The components; ``signs`` is empty.
 
     Examples
     --------

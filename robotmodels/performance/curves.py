@@ -110,20 +110,13 @@ def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
-    limits : bool
-        Whether the limits of the last two joints cut the curves and add curves of their own.
+    arm, limits
+        The robot; whether limits of its last two joints cut the curves and add their own.
 
     Returns
     -------
     SingularCurves
         Curves in joint space and in the section; none, with a status, for other arms.
-
-    Raises
-    ------
-    InvalidValueError
-        A slide without limits, or something that is no robot.
 
     References
     ----------
@@ -163,13 +156,13 @@ def cusps(arm: RobotModel) -> SpecialPoints:
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm
+        The robot, as for `singular_curves`.
 
     Returns
     -------
     SpecialPoints
-        One configuration for each cusp; see `singular_curves`.
+        One configuration for each cusp.
 
     References
     ----------
@@ -197,17 +190,13 @@ def nodes(arm: RobotModel) -> SpecialPoints:
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot; limits of revolute joints do not count.
+    arm
+        As for `cusps`.
 
     Returns
     -------
     SpecialPoints
-        Two configurations for each node; see `singular_curves`.
-
-    References
-    ----------
-    As for `cusps`.
+        Two configurations for each node.
 
     Examples
     --------

@@ -103,14 +103,12 @@ def cuspidality(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, executor, progress
+        See the head of the room.
     rng : int or numpy.random.Generator, optional
         Chooses the poses; default the seed 0.
     poses : int
         Random poses that are tried, at least 1.
-    executor, progress
-        As for `accessibility`.
 
     Returns
     -------
@@ -119,11 +117,6 @@ def cuspidality(
         between samples too; NOT_CUSPIDAL if the signs of the factors of the determinant are the
         labels of the postures (of 50 or more), or, in a section, if all postures of every region
         lie in different aspects; NONE_FOUND after a search without success.
-
-    Raises
-    ------
-    InvalidValueError
-        ``poses`` is no number of poses, a slide without limits.
 
     Notes
     -----

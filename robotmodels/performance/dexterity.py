@@ -64,7 +64,7 @@ class GlobalIndex(float):
     _spread: float
 
     def __new__(cls, value: float, spread: float = 0.0) -> GlobalIndex:
-        """A mean with its spread."""
+        """Keep the spread beside the mean."""
         self = super().__new__(cls, value)
         self._spread = float(spread)
         return self
@@ -88,12 +88,10 @@ def isotropy_index(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, mask
+        See the head of the room; by default the components are those of the task of the arm.
     q : array_like, shape (..., n)
         Configurations, rad or m.
-    mask : array_like, shape (6,), optional
-        Components that count; default the task of the arm.
     length : float, optional
         Metres that count as much as a radian; default the reach of the arm.
 
@@ -102,25 +100,15 @@ def isotropy_index(
     ndarray, shape (...)
         1 where the tool moves equally well in all directions, 0 in singular positions.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``q`` of the wrong length, a length that is not above zero.
-
     References
     ----------
     Seed book section 3.6.3.
 
     Examples
     --------
-    The arm of two links is isotropic for ``l1 = sqrt(2) l2`` at ``q2 = 3 pi / 4``.
-
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.se3 import translation
-    >>> table = DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, np.sqrt(2.0)])
-    >>> arm = RobotModel.from_table(table, tool=translation(1, 0, 0))
-    >>> float(isotropy_index(arm, [0.3, 0.75 * np.pi]).round(9))
-    1.0
+    >>> from robotmodels.robots import load
+    >>> isotropy_index(load("planar_2r"), [[0.3, 0.0], [0.3, 1.57]]).round(3)
+    array([0.   , 0.667])
     """
     check_model(arm)
     q = as_vector(q, arm.n, "q")
@@ -141,8 +129,8 @@ def dexterity_map(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, executor, progress
+        See the head of the room.
     over : Workspace, optional
         Of the same arm; default its positions. Its limits and obstacles count.
     index : {"inverse_condition", "manipulability", "least_singular_value", "isotropy"}
@@ -150,19 +138,12 @@ def dexterity_map(
         `isotropy_index`.
     mask, length
         As for `isotropy_index`; linear rows beside angular ones are divided by the length.
-    executor, progress
-        As for `accessibility`.
 
     Returns
     -------
     DexterityMap
         ``best`` and ``mean`` over the postures of each cell, aligned with ``over.points``. Where
         infinitely many postures reach a cell, over 200 000 samples of the joints.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        An unknown index, a length that is not above zero, a workspace of another arm.
 
     References
     ----------
@@ -222,11 +203,6 @@ def global_index(
     -------
     GlobalIndex
         The mean, a float, with its ``spread``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As for `dexterity_map`; a workspace in which nothing is reached.
 
     References
     ----------

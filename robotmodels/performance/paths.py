@@ -103,15 +103,11 @@ def feasible_path(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, limits, mask
+        See the head of the room; whole turns are added so that as much as possible of the path
+        lies within the limits, and three joints are asked for the position by default.
     poses : array_like, shape (N, 4, 4)
         World poses of the tool.
-    limits : bool
-        Whether the joint limits count; whole turns are added so that as much as possible of the
-        path lies within them.
-    mask : array_like, shape (6,), optional
-        Components that are asked; default the task of the arm: the position for three joints.
     through_singular : bool
         Whether a motion may pass singular positions, to the posture that goes on most smoothly.
     cost : {"length", "conditioning"}
@@ -122,15 +118,6 @@ def feasible_path(
     -------
     FeasiblePath
         The best motion, and for every starting posture where it breaks.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Matrices that are no poses, not of shape (N, 4, 4); an unknown cost.
-
-    See Also
-    --------
-    robotmodels.trajectories.joint_path : one motion near given positions, with events.
 
     References
     ----------

@@ -75,7 +75,7 @@ def polytope(
 
     Parameters
     ----------
-    arm : RobotModel
+    arm
         The robot; velocity and effort limits are those of its table.
     q : array_like, shape (n,)
         Configuration, rad or m.
@@ -90,12 +90,6 @@ def polytope(
     -------
     Polytope
         Vertices, faces, and the largest ball inside.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        Several configurations, an unknown kind, a limit that is missing or infinite, no mass for
-        accelerations, more than 16 joints.
 
     References
     ----------

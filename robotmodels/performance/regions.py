@@ -92,28 +92,19 @@ def regions(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, limits, free, executor, progress
+        See the head of the room; limits and obstacles of ``over`` count where it is given.
     connectivity : {"n", "t"}
         Whether any two points of a region are joined by some motion, or every path in it can be
         followed without a change of posture at a singular position.
     over : Workspace, optional
         Positions or an orientation, of the same arm; its limits and obstacles count.
-    limits, free
-        As for `workspace`, without ``over``.
-    executor, progress
-        As for `accessibility`.
 
     Returns
     -------
     Regions
         Cells of each region. Of t-connected ones the cells at the border are left out, as a
         singular position may pass through them.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        An unknown connectivity, a workspace of another arm, obstacles of the wrong kind.
 
     Notes
     -----

@@ -144,17 +144,9 @@ class Workspace(Result):
         return float(0.5 * edges / flags.sum())
 
     def contains(self, points: ArrayLike) -> Flags:
-        """Whether points are reached.
+        """Whether points (..., 2 or 3), in coordinates of ``points`` or the world, are reached.
 
-        Parameters
-        ----------
-        points : array_like, shape (..., 2) or (..., 3)
-            In the coordinates of ``points``, or world positions.
-
-        Returns
-        -------
-        ndarray of bool, shape (...)
-            Solved exactly where the postures of an arm are counted; else that of the cell.
+        Solved exactly where the postures of an arm are counted; else that of the cell.
         """
         given = as_reals(points, "points")
         if given.ndim == 0 or given.shape[-1] not in (2, 3) or given.shape[-1] < len(self.size):
@@ -235,37 +227,25 @@ def workspace(
 
     Parameters
     ----------
-    arm : RobotModel
-        The robot.
+    arm, limits, free, executor, progress
+        See the head of the room.
     kind : {"positions", "primary", "secondary", "orientation", "free"}
         Positions in any orientation; those in every orientation; those in some but not every
         one; those in the given orientation; those free of collisions with ``free``.
     section : {"auto", "plane", "space"}
         Half a plane through the first axis where that joint turns freely, the plane of a planar
         arm, which has no other, or space.
-    limits : bool
-        Whether the joint limits count.
-    free : callable or obstacles, optional
-        Function of q (N, n) that returns bool (N,), or obstacles.
     resolution : int, optional
         Cells along each coordinate.
     orientation : array_like, shape (3, 3), optional
         Rotation of the tool, for kind ``orientation``.
     mask : array_like, shape (6,), optional
         Components that are asked; two positions make a planar workspace.
-    executor, progress
-        As for `accessibility`.
 
     Returns
     -------
     Workspace
         Cells with numbers of postures; areas and volumes.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        An unknown word, no obstacles for kind ``free``, no orientation for kind ``orientation``,
-        a slide without limits, a resolution that is no number of cells or needs more than 1 GB.
 
     Notes
     -----

@@ -1,7 +1,14 @@
 """Trajectories: motion from poses and postures, by laws of time that keep limits.
 
 Seed book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; the plain
-arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`.
+arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`. Requests
+that do not fit or that no motion keeps raise `ShapeError` or `InvalidValueError`, whose message has
+the least duration, limit or factor that would do.
+
+Parameters that come back: ``limits``, `MotionLimits` of the joints; ``torque`` (n,) or a number,
+greatest torques of both signs, N m or N, by default those of the model's table; ``rng``, random
+numbers or their seed, by default a fixed one; ``law`` and ``synchronisation``, members of `TimeLaw`
+and `Synchronisation` or their names; ``duration``, seconds, by default the least.
 """
 
 from .blends import blended_lines

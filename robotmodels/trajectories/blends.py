@@ -42,10 +42,10 @@ def blended_lines(
     points : array_like, shape (m,) or (m, n)
         Positions, rad or m, at least two.
     duration : float, optional
-        Seconds; longer than the least, it slows the whole motion down evenly.
+        Longer than the least, it slows the whole motion down evenly.
     limits : MotionLimits, optional
         Velocity and acceleration, with smooth blends also jerk. Each line is as quick as it may
-        be; where the blends of a line would overlap, it is slowed down.
+        be, or slower where its blends would overlap.
     segment_times : array_like, shape () or (m - 1,), optional
         Seconds from corner to corner instead.
     blend_times : array_like, shape () or (m,), optional
@@ -57,12 +57,6 @@ def blended_lines(
     -------
     Trajectory
         Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Fewer than two points; neither limits nor times; blends that overlap; a duration below the
-        least, which is in the message; limits that are missing, zero, or not kept.
 
     References
     ----------

@@ -40,10 +40,8 @@ class Cost:
 
     Parameters
     ----------
-    time : float
-        Weight of the duration, 1/s.
-    torque : float
-        Weight of the squared torques, each in units of its limit, 1/s.
+    time, torque : float
+        Weights of the duration and of the squared torques, 1/s.
     """
 
     time: float = 1.0
@@ -239,20 +237,13 @@ def random_profile(
         Configurations at the ends, rad or m.
     nodes : int
         Number of free configurations between the ends.
-    law : ProfileLaw or str
+    law, rng
         ``"spline"``, ``"trapezoid"`` (which passes the nodes at a distance) or ``"quintic"``.
-    rng : Generator or int, optional
-        Random numbers, or their seed; by default a fixed one.
 
     Returns
     -------
     Trajectory
-        Of n joints, or scalar, with a duration of 1 s; `time_scaled` gives it the least duration.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors that do not fit, ends that are the same, a number of nodes below zero.
+        Of 1 s, scalar for numbers; `time_scaled` gives it the least duration.
 
     Examples
     --------

@@ -6,26 +6,16 @@ T0, T1 : array_like, shape (4, 4)
     First and last pose, m.
 poses : array_like, shape (m, 4, 4)
     Corners of `blended_poses`, at least two, m.
-duration : float, optional
-    Seconds; default the least that the limits allow.
+duration, law
+    As for joints.
 limits : MotionLimits, optional
-    Of two quantities: translation in m, then rotation in rad, for instance
-    ``MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])``; they bound the lengths of the
-    vectors of velocity, acceleration and jerk. On a circle the parts along it and towards its
-    centre are bounded together.
-law : TimeLaw or str
-    How the motion is distributed over the time; a member or its name.
+    Of translation in m, then of rotation in rad, for instance ``MotionLimits([0.5, 1.0],
+    [2.0, 4.0])``; they bound the lengths of the vectors of velocity, acceleration and jerk.
 
 Returns
 -------
 PoseTrajectory
     The motion, from rest to rest.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Arrays that are no poses; neither duration nor limits; a duration below the least, which is in
-    the message; limits that the law cannot keep.
 
 References
 ----------
@@ -81,21 +71,8 @@ def cartesian_trajectory(
 
     Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
     orientation turns about one fixed axis by the shorter way (slerp), both by the same law, by
-    default a trapezoid of velocity whose ramps take a third of the time each.
-
-    Parameters
-    ----------
-    T0, T1 : array_like, shape (..., 4, 4)
-        First and last poses, m; leading axes broadcast.
-    N : int
-        Number of poses, both ends included; a single one is ``T0``.
-    law : TimeLaw or str
-        A member or its name; not `TimeLaw.JERK_LIMITED`, whose shape depends on limits.
-
-    Returns
-    -------
-    ndarray, shape (..., N, 4, 4)
-        Poses. The first and the last are those given.
+    default a trapezoid of velocity whose ramps take a third of the time each. Leading axes of the
+    poses broadcast. Returns N poses (..., N, 4, 4), both ends included; a single one is ``T0``.
 
     Examples
     --------
@@ -136,8 +113,7 @@ def straight_line(
 ) -> PoseTrajectory:
     """Straight line from rest to rest, with the shorter rotation about a fixed axis.
 
-    Also called ``ctraj``, linear interpolation with slerp, MOVEL. One law of time moves the
-    position and the orientation.
+    Also called ``ctraj``, MOVEL. One law of time moves the position and the orientation.
 
     Examples
     --------

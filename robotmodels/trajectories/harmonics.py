@@ -130,24 +130,13 @@ def fourier(
 
     Parameters
     ----------
-    a, b : array_like, shape (H,) or (H, n)
-        Amplitudes of the velocity ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
-    mean : array_like, shape () or (n,)
-        Middle of the motion, rad or m.
-    period : float
-        Seconds; ``w = 2 pi / period``.
-    periods : float
-        How many the motion lasts.
+    a, b, mean, period, periods
+        As for `FourierSeries`; a and b (H,) for a scalar motion.
 
     Returns
     -------
     Trajectory
         Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Amplitudes that do not fit each other, a period that is not positive.
 
     References
     ----------

@@ -47,28 +47,18 @@ def jerk_limited(
 
     Parameters
     ----------
-    q0, q1 : array_like, shape () or (n,)
-        Positions at the ends, rad or m.
-    duration : float, optional
-        Seconds; default the least.
+    q0, q1, v0, v1, a0, a1 : array_like, shape () or (n,)
+        Positions, velocities and accelerations at the ends, rad or m, per s and s^2.
     limits : MotionLimits
         All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
         both ways.
-    v0, v1, a0, a1 : array_like, shape () or (n,)
-        Velocities and accelerations at the ends, rad or m, per s and s^2.
-    synchronisation : Synchronisation or str
-        How the joints are kept in step; a member or its name.
+    duration, synchronisation
+        See the head of the room.
 
     Returns
     -------
     Trajectory
         Of n joints, or scalar.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or not
-        along the line; a duration that cannot be had, with the least that can; a limit of zero.
 
     References
     ----------

@@ -95,7 +95,7 @@ def joint_path(
 
     Parameters
     ----------
-    model : RobotModel
+    model
         The robot, n joints.
     poses : PoseTrajectory or array_like, shape (N, 4, 4)
         World poses of the tool, m.
@@ -108,10 +108,8 @@ def joint_path(
         Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
         Into how many poses a `PoseTrajectory` is divided.
-    mask, mask_axes
-        Components ``x y z rx ry rz`` that are asked for, and their axes, as in `igm`.
-    position_tolerance, orientation_tolerance : float
-        When a pose counts as met, m and rad.
+    mask, mask_axes, position_tolerance, orientation_tolerance
+        As in `igm`.
     singular_below : float
         Conditioning below which a position is reported as singular.
 
@@ -119,11 +117,6 @@ def joint_path(
     -------
     JointPath
         Postures, velocities and events.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        What are no poses, times or postures; as `igm`.
 
     References
     ----------

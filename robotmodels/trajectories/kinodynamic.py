@@ -160,10 +160,8 @@ def kinodynamic(
         The robot, n joints, with its drives.
     q0, q1 : array_like, shape (n,), or Pose
         The ends, rad or m. Of a pose the planner chooses the posture.
-    limits : MotionLimits
-        Of velocity, acceleration, jerk and position; see `MotionLimits.of_model` for the table's.
-    torque : array_like, shape () or (n,), optional
-        Greatest torques of both signs, N m or N; default those of the model's table.
+    limits, torque, rng
+        See the head of the room, and `MotionLimits.of_model` for the limits of the table.
     via : sequence of array_like, shape (n,), or Pose
         Configurations on the way, in this order.
     obstacles : Sphere, Box, Plane, Capsule, or iterable of these
@@ -179,8 +177,6 @@ def kinodynamic(
     timing : Timing or str
         ``"optimal"`` times every path exactly; ``"profile"`` stretches a profile over time, as
         `time_scaled`.
-    rng : Generator or int, optional
-        Random numbers, or their seed; by default a fixed one.
     seconds : float
         Greatest duration of the search, of up to 500 evaluations for each second; results with one
         seed differ only where the clock ends it.
@@ -191,12 +187,6 @@ def kinodynamic(
     -------
     Plan
         The motion, or why there is none.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors of the wrong length, ends outside of the limits of position, ends or via points
-        that coincide, NaN, limits that are all infinite.
 
     Examples
     --------

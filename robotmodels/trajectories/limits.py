@@ -30,13 +30,6 @@ class MotionLimits(Value):
     lower, upper : array_like, shape () or (n,)
         Limits of position, rad or m.
 
-    Raises
-    ------
-    InvalidValueError
-        NaN, a limit on the wrong side of zero, ``lower`` above ``upper``.
-    ShapeError
-        Limits for different numbers of joints.
-
     Examples
     --------
     >>> limits = MotionLimits(velocity=[1.0, 2.0], acceleration=4.0)

@@ -12,15 +12,12 @@ law : TimeLaw or str
 q0, q1 : array_like, shape () or (n,)
     Positions at the ends, rad or m.
 duration : float, optional
-    Seconds; default the least with which the law keeps the limits. A longer one slows the quickest
-    motion down evenly.
+    A longer one than the least slows the quickest motion down evenly.
 limits : MotionLimits, optional
-    Of velocity, acceleration, jerk and position, kept inside the motion; they may be asymmetric.
-    Coordinated joints share the law that none of them exceeds. Independent joints that arrive
-    early have the end of their law inside the motion: limits that its jump does not keep are
-    refused.
+    Kept inside the motion; they may be asymmetric. Coordinated joints share the law that none of
+    them exceeds; where independent joints arrive early the end of their law is inside the motion.
 synchronisation : Synchronisation or str
-    How the joints are kept in step; a member or its name.
+    How the joints are kept in step.
 v0, v1, a0, a1 : array_like, shape () or (n,)
     Velocities and accelerations at the ends, rad or m, per s and s^2.
 
@@ -29,17 +26,9 @@ Returns
 Trajectory
     Of n joints, or scalar.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Vectors that do not fit, NaN; neither duration nor limits; a duration with which the limits are
-    not kept (the message has the least that keeps them, or that none does); a limit of zero for a
-    joint that has to move; a limit of jerk for ``bang_bang`` and ``trapezoidal``.
-
 References
 ----------
-Seed book section 4.2. Khalil and Dombre, Modeling, identification and control of robots, section
-13.3.
+Seed book section 4.2; Khalil and Dombre, Modeling, identification and control of robots, 13.3.
 """
 
 from __future__ import annotations

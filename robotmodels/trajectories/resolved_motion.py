@@ -98,23 +98,14 @@ def resolved_motion(
         Postures, from the start to the end.
     feedback : float
         Rate at which errors die out, 1/s; at most one over the time of a step.
-    mask : array_like, shape (6,), optional
-        Ones for the components of the twist, in world axes, that are asked for.
-    method, joint_weights, secondary, augmented, tasks
-        As in `ikm`, taken at every step.
-    limits : JointBounds or bool, optional
-        As in `ikm`; their step is that of the motion, so that no sample passes a limit.
+    mask, method, joint_weights, secondary, augmented, tasks, limits
+        As in `ikm`, world axes; the step of the limits is that of the motion, so that no sample
+        passes one.
 
     Returns
     -------
     ResolvedMotion
         Postures, velocities, and how far the tool is behind.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        A posture of the wrong length; fewer than two samples; a feedback that is negative or faster
-        than the steps; limits with a shorter step; what is no `PoseTrajectory`.
 
     References
     ----------

@@ -22,15 +22,6 @@ Returns
 Trajectory
     Of n joints, or scalar.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Fewer than two points, times that do not ascend from 0, limits that the times do not keep (the
-    message has the least factor that keeps them) or that no times keep.
-
-References
-----------
-Khalil and Dombre, Modeling, identification and control of robots, section 13.5.
 """
 
 from __future__ import annotations

@@ -112,10 +112,8 @@ def time_optimal(
         n joints, continuous in direction, or poses (which need ``model``, see `joint_path`).
     limits : MotionLimits
         Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
-    model : RobotModel, optional
-        The robot, n joints, for limits of torque.
-    torque : array_like, shape () or (n,), optional
-        Greatest torques of both signs, N m or N; default those of the model's table.
+    model, torque
+        The robot, for limits of torque; see the head of the room.
     torque_rate : array_like, shape () or (n,), optional
         Greatest rates of the torques, N m/s or N/s, without jumps of dry friction. The motion is
         then a local optimum that keeps them within 1 %.
@@ -125,19 +123,11 @@ def time_optimal(
         Number of intervals of the grid.
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
-    both_ends : bool
-        Whether torques are limited at both ends of each interval, and inside.
 
     Returns
     -------
     TimedPath
         The motion, or why there is none.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No path, numbers of joints that differ, NaN, negative torques or rates, no finite limit, a
-        path outside the limits of position.
 
     References
     ----------

@@ -88,23 +88,13 @@ def time_scaled(
     ----------
     trajectory : Trajectory
         The profile, n joints; its own duration does not matter.
-    model : RobotModel
-        The robot, n joints, with its drives.
-    torque : array_like, shape () or (n,), optional
-        Greatest torques of both signs, N m or N; default those of the model's table.
-    limits : MotionLimits, optional
-        Of velocity, acceleration, jerk and position.
+    model, torque, limits
+        The robot with its drives, and what the motion keeps.
 
     Returns
     -------
     ScaledTrajectory
         The motion, or why there is none, and the windows.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Numbers of joints that differ, NaN, negative torques, no finite limit, a motion outside
-        its limits of position or without duration.
 
     References
     ----------
