@@ -9,9 +9,8 @@ import dataclasses
 import numpy as np
 
 import robotmodels as rm
-from robotmodels.calibration import KnownDistance, ParameterPrior, PointContact, Position, fit
+from robotmodels.calibration import KnownDistance, PointContact, Position, fit
 
-PRIOR = ParameterPrior()
 TEMPLATES = ("rx90", "tx40", "ur10e", "irb140", "panda", "xarm5")
 POSITION = [1, 1, 1, 0, 0, 0]
 NOISE = 5e-5
@@ -136,29 +135,12 @@ def markers(arm):
     return [arm.seen(q) for _ in range(3)], [arm.seen(fresh)]
 
 
-def motion(arm):
-    """Positions during a motion of three harmonics, 60 to 200 of them; ten other motions."""
-    around = arm.postures(400)
-    middle, size, n = around.mean(axis=0), 0.8 * around.std(axis=0), arm.nominal.n
-    count = int(arm.rng.integers(60, 201))
-    t = np.linspace(0.0, 1.0, count)[:, None]
-
-    def one():
-        turns = (k * t + arm.rng.uniform(size=n) for k in (1, 2, 3))
-        return middle + sum(size * arm.rng.normal(size=n) * np.sin(2 * np.pi * x) for x in turns)
-
-    return [arm.seen(one())], [arm.seen(np.concatenate([one() for _ in range(10)]))]
-
-
-PROTOCOLS = {f.__name__: f for f in (points, sockets, markers, motion)}
-
-
-def stated_over_true(protocol, seed, prior=PRIOR):
+def stated_over_true(protocol, seed):
     """What folds and the fit itself state, each over the error at new places."""
     arm = Arm(seed)
     measured, fresh = protocol(arm)
     far = np.full(arm.nominal.n, np.inf)  # simulated postures do not keep the limits
     table = arm.nominal.table.replace(lower=-far, upper=far)
-    found = fit(arm.nominal.with_table(table), measured, prior=prior, held_out=fresh)
+    found = fit(arm.nominal.with_table(table), measured, held_out=fresh)
     stated = (found.validation.folds, found.validation.in_sample)
     return [errors.rms["m"] / found.validation.held_out.rms["m"] for errors in stated]

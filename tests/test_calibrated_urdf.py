@@ -14,11 +14,10 @@ import robotmodels as rm
 from robotmodels import calibration, se3
 from robotmodels.calibration import calibrated_model, calibrated_urdf, candidate_parameters
 from robotmodels.datasets import panda_double_socket
-from robotmodels.errors import InvalidValueError, UrdfError, UrdfWarning
-from robotmodels.robots.erd import ERD_ARMS, erd_folder
+from robotmodels.errors import UrdfWarning
 
 EXACT = 1e-9
-SEEDS = range(6)
+SEEDS = range(3)
 
 
 # --- robots as people write them ------------------------------------------------------------------
@@ -289,64 +288,12 @@ def test_a_tool_that_is_no_link_becomes_one_and_the_tip_link_stays(tip_link, rng
         np.testing.assert_allclose(after, before, 0, EXACT)
 
 
-def test_the_tip_link_or_another_measured_end_as_tool(rng):
-    text = arm_text(rng)
-    model = rm.RobotModel.from_urdf(text, tip_link="tip")
-    robot = calibrated(model, rng, ("tip", "camera"), base=False)
-    assert robot.end().frame == "tip"
-    assert_same_poses(calibrated_urdf(robot), robot, rng, None, "tip", {"tip_link": "tip"})
-    robot = calibrated(model, rng, (None, "camera"), base=False)
-    assert calibrated_urdf(robot.with_tool_at("camera")) == calibrated_urdf(robot)
-
-
-def test_a_robot_keeps_its_source(rng):
-    text = arm_text(rng)
-    model = rm.RobotModel.from_urdf(text, "base", "tip", mimic=True, dynamics=True)
-    assert model.source.text == text
-    for other in (
-        pickle.loads(pickle.dumps(model)), model.with_base(None), model.with_gravity([0, 0, 0]),
-        model.with_inertia(None), model.with_table(model.table.replace(d=model.table.d + 1e-3)),
-    ):  # fmt: skip
-        assert other.source == model.source
-    assert rm.load("rx90").source is None
-
-
 def test_nothing_off_writes_the_text_as_it_was(rng):
     text = arm_text(rng, mount=True)
     for options in ({}, {"tip_link": "tip"}, {"base_link": "base"}, {"mimic": True}):
         model = rm.RobotModel.from_urdf(text, **options)
         robot = pickle.loads(pickle.dumps(calibrated(model, rng, size=0.0)))
         assert calibrated_urdf(robot) == text
-
-
-def test_coupled_fingers_and_a_table_changed_by_hand_keep_the_text(rng):
-    text = arm_text(rng)
-    model = rm.RobotModel.from_urdf(text, mimic=True).with_drive(None)
-    named = model.source.tool_link
-    shifted = model.with_table(
-        model.table.replace(r=model.table.r + 0.01 * (np.arange(model.f) == 1))
-    )
-    robot = calibrated(shifted, rng, base=False)
-    written = calibrated_urdf(robot)
-    assert '<mimic joint="hand_finger_1" multiplier="-1"/>' in written
-    assert_same_poses(written, robot, rng, None, named)
-
-
-def test_a_result_is_written_as_its_robot_and_other_types_are_refused(rng):
-    model = rm.RobotModel.from_urdf(arm_text(rng), tip_link="tip")
-    q = rng.uniform(-1.5, 1.5, (40, model.n))
-    measured = calibration.Pose(q, rm.dgm(calibrated(model, rng, size=1e-3).model, q))
-    result = calibration.fit(model, measured, folds=0, held_out=0.0)
-    assert calibrated_urdf(result) == calibrated_urdf(result.robot)
-    with pytest.raises(InvalidValueError, match=r"expected a CalibratedRobot.*got RobotModel"):
-        calibrated_urdf(model)
-
-
-def test_a_table_with_other_joints_than_the_text_is_refused(rng):
-    model = rm.RobotModel.from_urdf(arm_text(rng), tip_link="tip")
-    other = model.with_table(model.table.replace(names=[f"j{k}" for k in range(model.f)]))
-    with pytest.raises(UrdfError, match=r"other joints \(names\) than the URDF"):
-        calibrated_urdf(calibrated(other, rng))
 
 
 def test_what_the_text_cannot_hold_is_warned_of(rng):
@@ -382,29 +329,3 @@ def test_the_panda_that_was_calibrated_by_its_own_ball_is_right_at_the_ball():
 
     assert spread(written) < 3e-4 < 3e-3 < spread(data.urdf)
     assert without_origins(written) == without_origins(data.urdf)
-
-
-@pytest.mark.parametrize("name", sorted(ERD_ARMS)[::4])
-def test_arms_of_example_robot_data_keep_all_but_origins(name):
-    rng = np.random.default_rng(1)
-    arm = ERD_ARMS[name]
-    text = (erd_folder() / arm.urdf).read_text(encoding="utf-8")
-    model = rm.load(f"erd:{name}")
-    robot = calibrated(model, rng, base=False, size=0.003)
-    written = calibrated_urdf(robot)
-    tip = arm.tool or model.source.tool_link
-    for q in rng.uniform(-1.0, 1.0, (3, model.n)):
-        at = pin_pose(written, model, q, tip, arm.base_link)
-        np.testing.assert_allclose(at, rm.dgm(robot.model, q), 0, EXACT)
-    old, new = ET.fromstring(text), ET.fromstring(written)
-    for kind in ("link", "transmission", "gazebo", "material", "joint"):
-        before, after = ([plain(e) for e in tree.findall(kind)] for tree in (old, new))
-        assert after[: len(before)] == before
-
-
-def plain(element):
-    """An element as text; of joints without origin, and child, which another link may carry."""
-    for name in ("origin", "child") if element.tag == "joint" else ():
-        for part in element.findall(name):
-            element.remove(part)
-    return "".join(ET.tostring(element, encoding="unicode").split())

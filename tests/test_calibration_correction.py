@@ -1,7 +1,5 @@
 """The calibrated robot, its inverse model, and the correction of controllers that keep theirs."""
 
-import pickle
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,21 +9,18 @@ from identities.random_robots import random_model, random_pose, robot_size
 import robotmodels as rm
 from robotmodels.calibration import (
     Compliance,
-    GeometricParameters,
     calibrated_model,
     calibrated_pose,
-    calibrated_urdf,
     candidate_parameters,
     corrected_igm,
     differential_model,
     joint_offsets,
     pose_offsets,
 )
-from robotmodels.calibration.extended_table import Element
 from robotmodels.calibration.inverse import pose_errors
-from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
+from robotmodels.calibration.parameters import ErrorLaw
 from robotmodels.calibration.robot import joint_errors_of
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError
 
 LAWS = {"gains": True, "eccentricity": True}
 
@@ -60,8 +55,8 @@ def readings_of(model, rng, N):
 
 def assert_reached(robot, solutions, T, mask=None):
     """An independent forward pass from all readings meets the poses, or their positions."""
-    i, s = solutions.valid.nonzero()
-    difference = np.abs(calibrated_pose(robot, solutions.q[i, s]) - T[i])
+    i = np.nonzero(np.atleast_2d(solutions.valid))[0]
+    difference = np.abs(calibrated_pose(robot, solutions.q[solutions.valid]) - T[i])
     assert (difference if mask is None else difference[:, :3, 3]).max(initial=0.0) < 3e-12
 
 
@@ -75,6 +70,7 @@ def away(model, a, b):
 # --- the calibrated robot ---------------------------------------------------------------------
 
 
+@pytest.mark.sampled(7)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_calibrated_model_is_the_generalised_differential_model(seed):
     rng = np.random.default_rng(seed)
@@ -107,22 +103,6 @@ def test_the_calibrated_model_is_the_generalised_differential_model(seed):
                 np.testing.assert_allclose(rm.dgm(robot.model, actual, frame), T, **close)
 
 
-def test_no_correction_changes_nothing_and_a_calibrated_robot_is_a_value(rng):
-    model = with_frames(random_model(rng, tree=True, fixed=True), rng)
-    robot = off(model, rng, 0.0, frames=(None, "camera"), compliance="links", **LAWS)
-    assert robot.model == model
-    assert robot.notes == robot.bent_rows == ()
-    q = rng.normal(size=(3, model.n))
-    np.testing.assert_array_equal(robot.joint_errors.actual(q), q)
-    np.testing.assert_array_equal(robot.joint_errors.reading(q), q)
-    with pytest.raises(InvalidValueError, match="measured ends"):
-        robot.with_tool_at("elsewhere")
-    robot = off(model, rng, compliance="isotropic")
-    copy = pickle.loads(pickle.dumps(robot))
-    np.testing.assert_array_equal(calibrated_pose(copy, q), calibrated_pose(robot, q))
-    assert not copy.corrections.flags.writeable
-
-
 @pytest.mark.parametrize("size", [1e-3, 5e-2])
 def test_readings_are_found_again(size, rng):
     robot = off(random_model(rng, f=6), rng, size, compliance="joints", couplings=[(4, 2)], **LAWS)
@@ -149,42 +129,6 @@ def test_readings_of_strong_laws_and_joint_variables_without_any(rng):
     np.testing.assert_allclose(errors.actual(readings[1:]), wanted[1:], rtol=0, atol=1e-13)
 
 
-def test_laws_that_no_joint_has_are_refused():
-    parameters = candidate_parameters(rm.load("rx90"))
-    odd = GeometricParameter(3, Element.D, ErrorLaw.GAIN, 3)
-    with pytest.raises(InvalidValueError, match="variable of a joint"):
-        calibrated_model(GeometricParameters(parameters.table, (odd,)), [1e-3])
-    with pytest.raises(ShapeError):
-        calibrated_model(parameters, [1e-3])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_calibrated_robot_comes_back_from_its_urdf(seed):
-    rng = np.random.default_rng(seed)
-    model = random_model(rng, f=6, tree=seed % 2 == 1, fixed=seed % 3 == 0, gravity=False)
-    model = rm.load("rx90") if seed == 0 else with_frames(model, rng)  # parallel axes: beta
-    frames = (None,) if seed == 0 else (None, "camera")
-    robot = off(model, rng, frames=frames)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", message="A URDF has no place")
-        back = rm.RobotModel.from_urdf(calibrated_urdf(robot))
-    order = [back.table.joint_names.index(name) for name in model.table.joint_names]
-    q = rng.uniform(-2.0, 2.0, size=(10, model.n))
-    there = np.empty_like(q)
-    there[:, order] = q
-    close = 1e-12 * robot_size(robot.model, q[0])
-    for frame in frames:
-        T = calibrated_pose(robot, q, frame)
-        np.testing.assert_allclose(rm.dgm(back, there, frame), T, rtol=0, atol=close)
-
-
-def test_errors_that_a_model_cannot_hold_are_named(rng):
-    robot = off(random_model(rng, f=4), rng, frames=(None, 2), compliance="links", **LAWS)
-    for word in ("Gains", "Eccentricity", "Compliance", "end 2", "mount", "bending"):
-        assert word in " ".join(robot.notes)
-
-
 # --- the inverse model of the calibrated robot --------------------------------------------------
 
 CASES = [(name, laws) for name in ("rx90", "erd:ur10", "gantry", "panda") for laws in ({}, LAWS)]
@@ -208,12 +152,6 @@ def test_every_posture_of_the_calibrated_robot(name, laws):
     # as many as the calibrated table's own inverse model finds
     own = rm.igm(robot.model, T, q_ref=robot.joint_errors.actual(q), mask=mask)
     assert (found.count >= own.count).mean() > 0.98
-    if not laws:
-        for i in range(len(q)):
-            theirs, mine = own.q[i][own.valid[i]], found.q[i][found.valid[i]]
-            gap = away(model, theirs[:, None], mine[None])
-            # the same postures, save at double roots, which two methods place differently
-            assert (gap.max(axis=-1).min(axis=1) < 1e-5).mean() > 0.85
 
 
 def test_a_locked_joint_reads_what_it_is_locked_at(rng):
@@ -236,17 +174,6 @@ def test_limits_are_those_of_the_readings(rng):
     assert np.abs(found.nearest(q) - q).max() < 1e-7
     every = corrected_igm(robot, calibrated_pose(robot, q), q_ref=q)
     assert (found.count < every.count).any()
-
-
-def test_a_tip_on_a_tree(rng):
-    model = random_model(rng, f=7, tree=True, prismatic=False, fixed=True, tip="any")
-    robot = off(with_frames(model, rng), rng, frames=(None, "camera"), gains=True)
-    q = rng.uniform(-1.5, 1.5, size=(3, model.n))
-    T = differential_model(robot.parameters, q, robot.corrections, "camera").T
-    robot = robot.with_tool_at("camera")
-    found = corrected_igm(robot, T, q_ref=q)
-    assert found.valid.any(axis=-1).all()
-    assert_reached(robot, found, T)
 
 
 @pytest.mark.parametrize(("name", "wrist"), [("rx90", 5), ("erd:ur10", 4)])
@@ -274,27 +201,19 @@ def test_at_and_beyond_the_edge_of_reach(name, wrist, rng):
     np.testing.assert_array_equal(reached, found.count > 0)
 
 
-def test_singular_wrists(rng):
+def test_a_batch_is_its_poses_one_by_one_also_at_singular_wrists(rng):
     model = rm.load("puma560")
     robot = off(model, rng, gains=True)
     q = readings_of(model, rng, 12)
     q[:, 4] = np.repeat([0.0, 1e-4, -1e-3], 4)
-    for T in (calibrated_pose(robot, q), rm.dgm(robot.nominal, q)):
-        found = corrected_igm(robot, T, q_ref=q)
-        assert_reached(robot, found, T)
-    assert corrected_igm(robot, calibrated_pose(robot, q), q_ref=q).valid.any(axis=-1).all()
-
-
-def test_a_batch_is_its_poses_one_by_one(rng):
-    model = rm.load("puma560")
-    robot = off(model, rng, gains=True)
-    T = calibrated_pose(robot, readings_of(model, rng, 6).reshape(2, 3, 6))
-    together = corrected_igm(robot, T)
-    for i in np.ndindex(2, 3):
-        alone = corrected_igm(robot, T[i])
-        assert alone.count == together.count[i]
+    T = calibrated_pose(robot, q)
+    together = corrected_igm(robot, T.reshape(2, 6, 4, 4))
+    assert together.valid.any(axis=-1).all()
+    for i in np.ndindex(2, 6):
+        alone = corrected_igm(robot, T.reshape(2, 6, 4, 4)[i])
+        assert_reached(robot, alone, T.reshape(2, 6, 4, 4)[i][None])
         there = together.q[i][together.valid[i]]
-        np.testing.assert_allclose(alone.q, there, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(alone.q, there, rtol=0, atol=1e-7)
     empty = corrected_igm(robot, np.empty((0, 4, 4)))
     assert empty.q.shape[0] == empty.status.size == 0
     with pytest.raises(InvalidValueError, match="CalibratedRobot"):

@@ -12,7 +12,6 @@ from robotmodels.calibration import (
     ParameterPrior,
     PointContact,
     Position,
-    RelativePose,
     candidate_parameters,
     fit,
     report,
@@ -21,47 +20,32 @@ from robotmodels.calibration.alignment import best_motion
 from robotmodels.calibration.other_tool import other_tool_error
 
 ALONE = {"folds": 0, "held_out": 0}
-ARMS = range(100, 112)
 
 
-def flange_error(arm, model, q):
-    """Rms distance of another tool from where it is, the base put where it suits best, m."""
+def apart(model, real, q, read=None):
+    """Rms distance of another tool on two robots, the base put where it suits best, m."""
     tool = rm.se3.translation(-0.1, 0.12, 0.05)
-    real = rm.dgm(arm.real.with_tool(tool), q)[:, :3, 3]
-    said = rm.dgm(model.with_tool(tool), arm.read(q))[:, :3, 3]
-    Z = best_motion(said, real)
-    return np.sqrt(np.mean(np.sum((said @ Z[:3, :3].T + Z[:3, 3] - real) ** 2, axis=1)))
-
-
-def one_arm(seed):
-    """Errors with another tool: nominal, calibrated, and that predicted."""
-    arm = Arm(seed)
-    measured, _ = points(arm)
-    q = arm.postures(300)
-    result = fit(arm.nominal, measured, **ALONE)
-    models = arm.nominal, result.model
-    return *(flange_error(arm, m, q) for m in models), other_tool_error(result, q, 0.16).rms
-
-
-@pytest.fixture(scope="module")
-def fleet():
-    return np.array([one_arm(seed) for seed in ARMS])
+    said, p = (rm.dgm(m.with_tool(tool), x)[:, :3, 3]
+               for m, x in ((model, q if read is None else read), (real, q)))  # fmt: skip
+    Z = best_motion(said, p)
+    return np.sqrt(np.mean(np.sum((said @ Z[:3, :3].T + Z[:3, 3] - p) ** 2, axis=1)))
 
 
 @pytest.mark.nightly
-def test_another_tool_is_better_off_after_every_calibration(fleet):
+def test_the_error_of_another_tool_is_smaller_and_predicted():
     """Geometric errors and unmodelled bending, contacts with one tool, checked with another."""
-    nominal, calibrated, _ = fleet.T
+    found = []
+    for seed in range(100, 112):
+        arm = Arm(seed)
+        result = fit(arm.nominal, points(arm)[0], **ALONE)
+        q = arm.postures(300)
+        errors = (apart(m, arm.real, q, arm.read(q)) for m in (arm.nominal, result.model))
+        found.append((*errors, other_tool_error(result, q, 0.16).rms))
+    nominal, calibrated, predicted = np.array(found).T
     assert (calibrated < nominal).all()
     assert np.median(calibrated / nominal) < 0.4
-
-
-@pytest.mark.nightly
-def test_the_error_of_another_tool_is_predicted(fleet):
-    _, calibrated, predicted = fleet.T
-    ratio = predicted / calibrated
-    assert 0.7 < np.exp(np.log(ratio).mean()) < 1.4
-    assert (ratio > 1.0 / 3.0).all()  # a fleet of standard errors, and bending besides
+    assert 0.7 < np.exp(np.log(predicted / calibrated).mean()) < 1.4
+    assert (predicted > calibrated / 3.0).all()  # standard errors, and bending besides
 
 
 @pytest.fixture(scope="module")
@@ -72,50 +56,31 @@ def panda():
     return data, [touched, KnownDistance("point:0", "point:1", data.distance)]
 
 
-def test_a_real_arm_keeps_its_flange(panda):
+def test_a_real_arm_keeps_its_flange_and_says_how_far_another_tool_could_be_off(panda):
     """README's example: with no prior, or told by name only, the flange moved by centimetres."""
     data, measured = panda
-    nominal = data.model
     everywhere = []
     for k, (in_0, in_1) in enumerate(data.places.values()):
         touched = PointContact([*in_0, *in_1], [f"{k}:0"] * len(in_0) + [f"{k}:1"] * len(in_1))
         known = KnownDistance(f"point:{k}:0", f"point:{k}:1", data.distance)
         everywhere += [touched, known]
-    best = fit(nominal, everywhere, **ALONE).model
-    q = measured[0].q
-    tool = rm.se3.translation(0.1, 0.05, 0.15)
-
-    def apart(model):
-        said, real = (rm.dgm(m.with_tool(tool), q)[:, :3, 3] for m in (model, best))
-        Z = best_motion(said, real)
-        return np.linalg.norm(said @ Z[:3, :3].T + Z[:3, 3] - real, axis=1).mean()
-
-    for options in ({}, {"prior": None}):
-        result = fit(nominal, measured, **options, **ALONE)
-        assert apart(result.model) < 0.2 * apart(nominal)
+    best, q = fit(data.model, everywhere, **ALONE).model, measured[0].q
+    for options in ({"prior": None}, {}):
+        result = fit(data.model, measured, **options, **ALONE)
+        assert apart(result.model, best, q) < 0.2 * apart(data.model, best, q)
         assert result.validation.in_sample.mean["m"] < 2.2e-4
         assert np.abs(result.corrections).max() < 0.03
-
-
-def test_the_headline_says_how_far_another_tool_could_be_off(panda):
-    data, measured = panda
-    result = fit(data.model, measured, **ALONE)
     found = result.other_tool
     assert found == other_tool_error(result)
-    assert found.rms < found.largest
-    assert found.rms < 0.3 * found.nominal
-    outcome = report(result).split("Notes")[0]
-    words = " ".join(outcome.split())
+    assert found.rms < min(found.largest, 0.3 * found.nominal)
+    words = " ".join(report(result).split())
     assert f"in the measured postures: {1e3 * found.rms:.2g} mm" in words
     assert "Prior standard deviations of the table: 1 mm, 5 mrad." in words
-    assert f"another tool about {found.rms:.2g} m" in repr(result)
     # a longer tool, and postures elsewhere, are further off
     assert other_tool_error(result, length=2.0 * found.length).rms > found.rms
     low, high = np.maximum(data.model.lower, -2.5), np.minimum(data.model.upper, 2.5)
     elsewhere = np.random.default_rng(0).uniform(low, high, (200, 7))
     assert other_tool_error(result, elsewhere).rms > found.rms
-    with pytest.raises(rm.errors.InvalidValueError, match="length: expected a positive length"):
-        other_tool_error(result, length=0.0)
 
 
 def test_the_prediction_is_the_spread_of_what_it_predicts():
@@ -127,7 +92,7 @@ def test_the_prediction_is_the_spread_of_what_it_predicts():
     q = rng.uniform(-2.0, 2.0, (40, 6))
     tool = rm.se3.translation(0.15, 0.0, 0.0), rm.se3.translation(0.0, 0.0, 0.15)
     squares, predicted = [], []
-    for _ in range(25):
+    for _ in range(12):
         real = rm.calibration.calibrated_model(p, size * rng.normal(size=len(p))).model
         seen = rm.dgm(real, q)[:, :3, 3] + 1e-4 * rng.normal(size=(40, 3))
         result = fit(arm, Position(q, seen), base=False, **ALONE)
@@ -153,6 +118,7 @@ def test_what_the_measurements_do_not_tell_is_held_by_the_prior(panda):
     assert np.abs(result.corrections[held]).max() < 5e-3
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_far_from_nominal_is_not_taken_for_noise(seed):
     """Zeros of joints that are 0.1 rad off contradict the prior, which is widened and says so."""
@@ -208,64 +174,3 @@ def test_measurements_of_one_kind_lend_each_other_their_noise():
     good, bad = fit(arm, [seen(200, 1e-4), seen(200, 1e-3)], **ALONE).solution.scales
     assert good[0] < 4e-4
     assert bad[0] > 8e-4
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_nearly_parallel_axes_do_not_drive_lengths_away(seed):
-    """A small error of beta is not carried by centimetres of others that nothing measures."""
-    rng = np.random.default_rng(seed)
-    arm = rm.load("rx90")
-    table = arm.table
-    alpha, d = table.alpha.copy(), table.d.copy()
-    alpha[5], d[5] = 0.03, 0.3
-    arm = arm.with_table(
-        dataclasses.replace(table, alpha=alpha, d=d, r=np.array([0, 0.1, 0.1, 0.45, 0.1, 0.1]))
-    ).with_tool(rm.se3.translation(0.05, 0.02, 0.15))
-    p = candidate_parameters(arm)
-    size = np.array([1e-3 if e.element.is_length else 4e-3 for e in p.entries])
-    real = rm.calibration.calibrated_model(p, size * rng.normal(size=len(p))).model
-    q, other = rng.uniform(-2.0, 2.0, (2, 60, 6))
-    relative = np.linalg.inv(rm.dgm(real, q)) @ rm.dgm(real, other)
-    relative[:, :3, 3] += 1e-4 * rng.normal(size=(60, 3))
-    result = fit(arm, RelativePose(q, other, relative), **ALONE)
-    tool = rm.se3.translation(-0.1, 0.12, 0.05)
-
-    def apart(model):
-        said, there = (rm.dgm(m.with_tool(tool), q)[:, :3, 3] for m in (model, real))
-        Z = best_motion(said, there)
-        return np.linalg.norm(said @ Z[:3, :3].T + Z[:3, 3] - there, axis=1).mean()
-
-    shared = fit(
-        arm, RelativePose(q, other, relative), prior=ParameterPrior(truncated=False), **ALONE
-    )
-    assert apart(result.model) < 0.6 * apart(arm)
-    assert apart(result.model) < 1.1 * apart(shared.model)
-    assert np.abs(result.corrections[np.array(result.units) == "m"]).max() < 0.01
-
-
-def test_the_prior_of_lengths_is_that_of_a_small_robot():
-    """An arm of 5 cm has errors of some hundredths of a millimetre, and so has another tool."""
-    rng = np.random.default_rng(2)
-    arm = rm.load("rx90")
-    table = dataclasses.replace(arm.table, d=0.05 * arm.table.d, r=0.05 * arm.table.r)
-    arm = arm.with_table(table).with_tool(rm.se3.translation(0.0025, 0.001, 0.01))
-    q = rng.uniform(-2.0, 2.0, (60, 6))
-    p = rm.dgm(arm, q)[:, :3, 3] + 1e-5 * rng.normal(size=(60, 3))
-    result = fit(arm, Position(q, p), **ALONE)
-    sizes = result.solution.fit.prior.sigma[: len(result.names)]
-    lengths = [e.element.is_length and 0 < e.row <= 6 for e in result.parameters.entries]
-    assert sizes[lengths] == pytest.approx(1e-3 * result.parameters.table.size)
-    assert result.other_tool.rms < 1e-4
-
-
-def test_what_only_the_solution_tells_joins_the_fit():
-    """Axes that meet at the nominal robot and not at the real one make more identifiable."""
-    rng = np.random.default_rng(4)
-    arm = rm.load("rx90").with_tool(rm.se3.translation(0.05, 0.02, 0.15))
-    table = arm.table
-    real = arm.with_table(dataclasses.replace(table, alpha=table.alpha + 0.03 * rng.normal(size=6)))
-    q = rng.uniform(-2.0, 2.0, (80, 6))
-    p = rm.dgm(real, q)[:, :3, 3] + 1e-5 * rng.normal(size=(80, 3))
-    result = fit(arm, Position(q, p), **ALONE)
-    assert set(result.identifiable_after.names) <= set(result.names)
-    assert result.validation.in_sample.rms["m"] < 3e-5

@@ -14,7 +14,7 @@ from robotmodels.calibration import (
 )
 from robotmodels.calibration.extended_table import Element, extend_table
 from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
-from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import FIXED, PRISMATIC
 
 STRUCTURES = {
@@ -67,17 +67,6 @@ def test_psi_is_the_derivative_of_the_pose(structure, corrected):
             column = psi[0, :, k] * unit[k]
             close = 1e-7 * max(1.0, np.abs(column).max())
             np.testing.assert_allclose(np.r_[rate[0, :3, 3], w], column, rtol=0, atol=close)
-
-
-def test_parameters_off_the_path_have_no_effect_but_couplings_from_other_branches_have():
-    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 0, 1], d=[0, 0.3, 0.2], alpha=[0, 1.0, 0.5])
-    parameters = every_parameter(rm.RobotModel.from_table(table), (2, 3))
-    psi = differential_model(parameters, np.array([[0.3, 0.4, 0.5]]), None, 2).psi[0]
-    for k, entry in enumerate(parameters.entries):
-        if entry.law is not ErrorLaw.COMPLIANCE:  # this robot has no masses
-            assert np.any(psi[:, k]) == (entry.row in parameters.table.path(2)), entry.name
-    coupling = parameters.names.index("gain2_3")
-    np.testing.assert_allclose(psi[:, coupling], 0.5 * psi[:, parameters.names.index("theta2")])
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -137,18 +126,6 @@ def test_laws_are_changes_of_the_joint_variables(structure):
     np.testing.assert_allclose(T, rm.dgm(model, moved), atol=1e-11)
 
 
-def test_mistakes_are_named():
-    candidates = candidate_parameters(rm.load("rx90"))
-    with pytest.raises(ShapeError, match="q"):
-        differential_model(candidates, np.zeros(5))
-    with pytest.raises(ShapeError, match="corrections"):
-        differential_model(candidates, np.zeros(6), np.zeros(3))
-    with pytest.raises(InvalidValueError, match="finite"):
-        differential_model(candidates, np.full(6, np.nan))
-    with pytest.raises(InvalidValueError, match="measured ends"):
-        differential_model(candidates, np.zeros(6), frame=3)
-
-
 # --- two robots ----------------------------------------------------------------------------------
 
 
@@ -172,20 +149,6 @@ def test_two_robots_side_by_side_move_as_they_did(seed):
     np.testing.assert_allclose(rm.idm(pair, q, v, acceleration), torque, atol=1e-9)
     np.testing.assert_array_equal(pair.lower, np.r_[a.lower, b.lower])
     np.testing.assert_array_equal(pair.table.effort, np.r_[a.table.effort, b.table.effort])
-
-
-def test_robots_read_from_urdf_keep_their_frames_combine_arms():
-    panda = rm.load("erd:panda")
-    place = rm.se3.translation(0.0, 1.0, 0.0) @ panda.base
-    pair = combine_arms(panda, panda, place, ("left", "right"))
-    q = np.random.default_rng(0).uniform(-1, 1, (3, panda.n))
-    both = np.hstack([q, q])
-    for frame in panda.frames:
-        there = rm.dgm(panda, q, frame.name)
-        np.testing.assert_allclose(rm.dgm(pair, both, f"left_{frame.name}"), there, atol=1e-12)
-        there[:, 1, 3] += 1.0
-        np.testing.assert_allclose(rm.dgm(pair, both, f"right_{frame.name}"), there, atol=1e-12)
-    assert len(pair.visuals) == 2 * len(panda.visuals)
 
 
 def test_what_cannot_stand_side_by_side_is_named():

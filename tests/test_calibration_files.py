@@ -17,30 +17,20 @@ from robotmodels.calibration.measurements import (
 from robotmodels.calibration.read import read_measurements
 from robotmodels.calibration.robot import calibrated_pose
 from robotmodels.calibration.write import result_data, write_result
-from robotmodels.csv_table import open_table
-from robotmodels.errors import InvalidValueError, NotARotationError
-from robotmodels.geometry import DHTable
+from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics import dgm, operational_coordinates
 from robotmodels.model import RobotModel
 from robotmodels.robots import load
 
 RX90 = load("rx90")
-SCARA = RobotModel.from_table(
-    DHTable.from_rows([
-        {"sigma": 0, "name": "waist"}, {"sigma": 0, "d": 0.35, "name": "elbow"},
-        {"sigma": 1, "d": 0.3, "alpha": np.pi, "name": "lift"},
-    ]),
-    name="scara",
-)  # fmt: skip
 Q = np.random.default_rng(3).uniform(-1.8, 1.8, (12, 6))
 T = dgm(RX90.with_tool(se3.translation(0.02, 0.01, 0.1)), Q)
 NAMES = list(RX90.table.joint_names)
 
 
 def written(path, header, rows, delimiter=",", **more):
-    lines = [] if header is None else [delimiter.join(header)]
-    lines += [delimiter.join(f"{v:.12g}" if isinstance(v, float) else str(v) for v in row)
-              for row in rows]  # fmt: skip
+    rows = [*([] if header is None else [header]), *rows]
+    lines = [delimiter.join(map(str, row)) for row in rows]
     path.write_text("\n".join(lines) + "\n", **{"encoding": "utf-8", **more})
     return path
 
@@ -76,30 +66,16 @@ def test_columns_by_argument_and_by_number(tmp_path):
         found = read_measurements(file, Position, RX90, **more)
         np.testing.assert_allclose(found.q, Q, rtol=1e-11)
         np.testing.assert_allclose(found.p, T[:, :3, 3], rtol=1e-10)
-    for file, model, more, message in (
-        (named, RX90, {}, r"expected columns x, y, z; the header is q1"),
-        (named, RX90, {"columns": ["pu", "py", "pz"]}, r"no column 'pu'; near it: p"),
-        (named, RX90, {"columns": ["px", "py"]}, "expected 3 columns"),
-        (named, SCARA, {"joints": ["q1"]}, "a column for each of the 3 joints"),
-        (bare, RX90, {"columns": [0, 1, 2]}, "no header says which of its 9 columns"),
-        (bare, RX90, {"joints": range(3, 9), "columns": [0, 1, 9]}, "columns 0 to 8, got 9"),
-        (bare, RX90, {"joints": range(3, 9), "columns": list("xyz")}, "has no header, so that 'x'"),
-        (written(tmp_path / "b.csv", ["a", "b"], [[1.0, 2.0]]), SCARA, {}, "joints of scara"),
+    for file, more, message in (
+        (named, {}, r"expected columns x, y, z; the header is q1"),
+        (named, {"columns": ["pu", "py", "pz"]}, r"no column 'pu'; near it: p"),
+        (named, {"joints": ["q1"]}, "a column for each of the 6 joints"),
+        (bare, {"columns": [0, 1, 2]}, "no header says which of its 9 columns"),
+        (bare, {"joints": range(3, 9), "columns": [0, 1, 9]}, "columns 0 to 8, got 9"),
+        (written(tmp_path / "b.csv", ["a", "b"], [[1.0, 2.0]]), {}, "joints of rx90"),
     ):
         with pytest.raises(InvalidValueError, match=message):
-            read_measurements(file, "position", model, **more)
-
-
-def test_millimetres_and_degrees_give_the_same_as_metres_and_radians(tmp_path):
-    q = np.random.default_rng(0).uniform(-1.0, 1.0, (9, 3))
-    p = dgm(SCARA, q)[:, :3, 3]
-    header = ["waist", "elbow", "lift", "x", "y", "z"]
-    # a prismatic joint is read in the unit of lengths
-    rows = rows_of(np.rad2deg(q[:, :2]), 1e3 * q[:, 2], 1e3 * p)
-    file = written(tmp_path / "mm.csv", header, rows)
-    found = read_measurements(file, "position", SCARA, lengths="mm", angles="deg")
-    np.testing.assert_allclose(found.q, q, rtol=1e-10)
-    np.testing.assert_allclose(found.p, p, rtol=1e-10, atol=1e-15)
+            read_measurements(file, "position", RX90, **more)
 
 
 @pytest.mark.parametrize(
@@ -110,9 +86,7 @@ def test_millimetres_and_degrees_give_the_same_as_metres_and_radians(tmp_path):
         ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Use joint_angles='rad'"),
         ((1.0, 1e3), {}, "look like millimetres. Use lengths='mm'"),
         ((1.0, 1.0), {"lengths": "mm"}, "look like metres. Use lengths='m'"),
-        ((1.0, 1.0), {"lengths": "inch"}, "lengths: expected 'm' or 'mm', got 'inch'"),
         ((1.0, 1.0), {"label": "x"}, "label: position does not use it"),
-        ((1.0, 1.0), {"other_joints": NAMES}, "other_joints: position does not use it"),
     ],
 )
 def test_units_and_arguments_that_cannot_be_right_are_named(tmp_path, scale, options, message):
@@ -142,30 +116,6 @@ def test_poses_in_every_way_to_write_them(tmp_path, written_as):
     np.testing.assert_allclose(turned.T[:, :3, :3], T[:, :3, :3], atol=1e-10)
 
 
-def test_quaternions_of_few_digits_scalar_last_and_angles_in_degrees(tmp_path):
-    x = operational_coordinates(T, "quaternion").round(5)
-    header = [*NAMES, "x", "y", "z", "qx", "qy", "qz", "qw"]
-    file = written(tmp_path / "a.csv", header, rows_of(Q, x[:, :3], x[:, 4:], x[:, 3]))
-    pose = read_measurements(file, "pose", RX90, orientation="quaternion")
-    np.testing.assert_allclose(pose.T, T, atol=5e-5)
-    wrong = {"orientation": "quaternion", "columns": ["x", "y", "z", "x", "qx", "qy", "qz"]}
-    with pytest.raises(InvalidValueError, match="quaternion of row 1 has length"):
-        read_measurements(file, "pose", RX90, **wrong)
-    with pytest.raises(InvalidValueError, match="orientation: expected 'rpy_urdf'"):
-        read_measurements(file, "pose", RX90)
-    y = operational_coordinates(T, "rpy_urdf")
-    header = [*NAMES, "x", "y", "z", "roll", "pitch", "yaw"]
-    file = written(tmp_path / "b.csv", header, rows_of(Q, y[:, :3], np.rad2deg(y[:, 3:])))
-    units = {"angles": "deg", "joint_angles": "rad"}
-    pose = read_measurements(file, "pose", RX90, orientation="rpy_urdf", **units)
-    np.testing.assert_allclose(pose.T, T, atol=1e-10)
-    cosines = 1.1 * operational_coordinates(T, "direction_cosines")
-    file = written(tmp_path / "c.csv", None, rows_of(Q, cosines))
-    numbers = {"joints": range(6), "columns": range(6, 18)}
-    with pytest.raises(NotARotationError):
-        read_measurements(file, "pose", RX90, orientation="direction_cosines", **numbers)
-
-
 # --- contacts and pairs ---------------------------------------------------------------------------
 
 
@@ -188,9 +138,6 @@ def test_contacts_with_labels_of_a_column_or_of_files(tmp_path, kind, built, fie
     for option in ({"columns": ["touched"]}, {"rows": [1, 1, 0]}):
         with pytest.raises(InvalidValueError, match="does not use it here"):
             read_measurements(file, kind, RX90, **option)
-    bare = written(tmp_path / "bare.csv", None, [[row[-1], *row[:-1]] for row in rows])
-    found = read_measurements(bare, kind, RX90, joints=range(1, 7), label=0)
-    assert getattr(found, field) == tuple(labels)
     folder = tmp_path / "place"
     folder.mkdir()
     for name, q in (("hole_1", Q[5:]), ("hole_0", Q[:5]), ("other", Q)):
@@ -199,28 +146,6 @@ def test_contacts_with_labels_of_a_column_or_of_files(tmp_path, kind, built, fie
     assert found.name == "place"
     assert getattr(found, field) == ("hole_0",) * 5 + ("hole_1",) * 7
     np.testing.assert_allclose(found.q, Q, rtol=1e-11)
-    with pytest.raises(InvalidValueError, match=r"no file 'pin_\*'"):
-        read_measurements(folder, kind, RX90, pattern="pin_*")
-
-
-def test_the_same_file_name_in_two_folders_is_two_points(tmp_path):
-    files = []
-    for name in ("front", "back"):
-        (tmp_path / name).mkdir()
-        files.append(written(tmp_path / name / "hole.csv", None, rows_of(Q)))
-    found = read_measurements(files, "point_contact", RX90)
-    assert set(found.point) == {"front/hole", "back/hole"}
-
-
-def test_files_of_a_folder_with_other_contents_are_refused(tmp_path):
-    written(tmp_path / "a.csv", None, rows_of(Q))
-    for other, message in (
-        (np.hstack([Q, Q]), "do not have the same columns"),
-        (np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], (9, 1)), "unit quaternions: poses"),
-    ):
-        written(tmp_path / "b.csv", None, rows_of(other))
-        with pytest.raises(InvalidValueError, match=message):
-            read_measurements(tmp_path, "point_contact", RX90, joints=range(6))
 
 
 def test_distances_and_relative_poses(tmp_path):
@@ -244,12 +169,6 @@ def test_distances_and_relative_poses(tmp_path):
         read_measurements(file, RelativePose, RX90, **more)
 
 
-def test_kinds_that_files_cannot_hold_are_refused(tmp_path):
-    for kind in ("positions", "known_distance", KnownDistance, "linked_frames", "axis_position"):
-        with pytest.raises(InvalidValueError, match=r"expected one of .*'camera_pose', 'distance'"):
-            read_measurements(tmp_path, kind, RX90)
-
-
 # --- mistakes in a file ---------------------------------------------------------------------------
 
 HEADER = ",".join(NAMES)
@@ -262,35 +181,15 @@ HEADER = ",".join(NAMES)
             f"# a comment\n{HEADER}\n\n1,1,nan,1,1,1",
             r"line 4: column 2 \(joint_3\) is 'nan'. A row",
         ),
-        (f"{HEADER}\n1,1,inf,1,1,1", r"line 2: column 2 \(joint_3\) is 'inf'"),
-        (f"{HEADER}\n1,1,,1,1,1", r"line 2: column 2 \(joint_3\) is empty"),
         (f"{HEADER}\n1,1,n/a,1,1,1", r"line 2: column 2 \(joint_3\) is 'n/a', not a number"),
         (f"{HEADER}\n1,1,1,1,1,1\n1,2,3", "line 3: expected 6 columns as in the first"),
-        (HEADER.replace(",", ";") + "\n0,5;1;1;1;1;1", r"is '0,5', not a number\. Write a point"),
         ("# nothing\n\n", "the file is empty"),
-        (HEADER, "no line of numbers"),
-        ("\xff\xfe\x00\x81", "expected a text file"),
     ],
 )
 def test_mistakes_in_a_file_are_named_with_their_line(tmp_path, text, message):
     (tmp_path / "a.csv").write_bytes(text.encode("latin-1"))
     with pytest.raises(InvalidValueError, match=message):
         read_measurements(tmp_path / "a.csv", "point_contact", RX90)
-
-
-def test_missing_files_and_labels(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        read_measurements(tmp_path / "missing.csv", "point_contact", RX90)
-    with pytest.raises(InvalidValueError, match="several files, got none"):
-        read_measurements([], "point_contact", RX90)
-    file = tmp_path / "a.csv"
-    file.write_text(f"{HEADER},label\n1,1,1,1,1,1,a\n1,1,1,1,1,1,\n")
-    with pytest.raises(InvalidValueError, match=r"line 3: column 6 \(label\) is empty"):
-        read_measurements(file, "point_contact", RX90, label="label")
-    file.write_text("hole a,1,2,3\n")
-    assert open_table(file).names == ()
-    file.write_text("hole,q1,q2,q3\nhole a,1,2,3\n")
-    assert open_table(file).names == ("hole", "q1", "q2", "q3")
 
 
 # --- results --------------------------------------------------------------------------------------
@@ -324,9 +223,6 @@ def test_json_and_yaml_hold_the_result(result, tmp_path):
     np.testing.assert_allclose(
         [p["standard_error"] for p in data["parameters"]], result.standard_errors
     )
-    inside = [p["interval_95"][0] < p["correction"] < p["interval_95"][1]
-              for p in data["parameters"]]  # fmt: skip
-    assert all(inside)
     np.testing.assert_allclose(data["covariance"], result.covariance)
     assert {f["name"]: f["value"] for f in data["fixtures"]} == result.fixtures
     assert len(data["fixtures"]) == 6

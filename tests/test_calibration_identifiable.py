@@ -18,7 +18,7 @@ from robotmodels.calibration import (
     identifiable_parameters,
 )
 from robotmodels.calibration.identifiable import DEPENDENT, identifiable_on
-from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
+from robotmodels.calibration.measurements.kinds import drawn_groups
 from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics.lengths import spread_configurations
 
@@ -64,18 +64,6 @@ def test_full_poses_identify_four_for_a_revolute_two_for_a_prismatic_joint_and_s
     assert basis.gap[1] < 1e-9 < 1e-4 < basis.gap[0]
 
 
-def test_coinciding_consecutive_revolute_axes_lack_a_parameter():
-    # such an axis has no direction for its common perpendicular: d and theta are polar
-    # coordinates at their pole, and the table lacks one displacement
-    model = serial(np.random.default_rng(2), 6, 0, False)
-    for row in (2, 4):
-        alpha, d = model.table.alpha.copy(), model.table.d.copy()
-        alpha[row], d[row] = 0.0, 0.0
-        before = identifiable_parameters(model, "pose").count
-        model = model.with_table(model.table.replace(alpha=alpha, d=d))
-        assert identifiable_parameters(model, "pose").count == before - 1
-
-
 @pytest.mark.parametrize(
     ("name", "kind", "count"),
     [
@@ -96,6 +84,7 @@ def test_counts_of_known_robots(name, kind, count):
         assert not {e.name for e in basis.kept.entries if e.element.is_length}
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("chunk", range(4))
 def test_counts_equal_the_rank_of_the_singular_values_on_random_robots(chunk):
     rng = np.random.default_rng(chunk)
@@ -150,18 +139,6 @@ def test_regrouped_parameters_move_the_end_as_all_of_them_do(seed):
     assert np.abs(moved - kept @ (basis.matrix @ d)).max() < DEPENDENT * np.abs(moved).max()
 
 
-def test_the_regrouping_of_contacts_holds_up_to_the_touched_point():
-    basis = identifiable_parameters(rm.load("puma560"), "point_contact", known_lengths=["d3"])
-    rng = np.random.default_rng(9)
-    q, label = drawn_groups(basis.candidates, "point_contact", 9, 5, rng)
-    stays = {*basis.of_reason(Reason.GAUGE), *basis.of_reason(Reason.KNOWN)}
-    d = np.array([0.0 if name in stays else rng.normal() for name in basis.candidates.names])
-    left = differential_model(basis.candidates, q).psi[:, :3] @ d
-    left -= differential_model(basis.kept, q).psi[:, :3] @ (basis.matrix @ d)
-    for g in set(label):
-        assert np.ptp(left[label == g], axis=0).max() < 1e-10
-
-
 def test_every_candidate_is_kept_or_has_a_reason_and_the_text_says_so():
     basis = identifiable_parameters(rm.load("rx90"), "point_contact", known_lengths=["d3"])
     assert sorted([*basis.names, *basis.reasons]) == sorted(basis.candidates.names)
@@ -196,15 +173,6 @@ def test_contacts_without_a_known_length_are_refused_with_names(kind):
         identifiable_parameters(rm.load("rx90"), kind, known_lengths=["theta2", "d5"])
 
 
-def test_small_corrections_make_parameters_identifiable_but_badly():
-    model = rm.load("rx90")
-    nominal = identifiable_parameters(model, "position")
-    calibrated = identifiable_parameters(model, "position", corrections={"d7": 1e-3})
-    assert nominal.reasons["theta5"] is Reason.NO_EFFECT
-    assert "theta5" in calibrated.names
-    assert calibrated.gap[0] < 1e-2 * nominal.gap[0]
-
-
 def test_contacts_are_judged_where_the_corrected_robot_meets_them():
     model = rm.load("ur10e")
     rng = np.random.default_rng(3)
@@ -222,51 +190,7 @@ def test_contacts_are_judged_where_the_corrected_robot_meets_them():
         assert of_data.count == structure.count
 
 
-def test_data_identify_no_more_than_the_structure():
-    model = rm.load("puma560")
-    structure = identifiable_parameters(model, "pose")
-    q = spread_configurations(model, 50, np.random.default_rng(1))
-    assert identifiable_parameters(model, Pose(q, rm.dgm(model, q))).names == structure.names
-    few = Pose(q[:3], rm.dgm(model, q[:3]))
-    assert identifiable_parameters(model, few).count <= 18
-    q[:, 4:] = 0.3  # two joints at rest
-    still = identifiable_parameters(model, Pose(q, rm.dgm(model, q)))
-    assert still.count < structure.count
-
-
-def test_subsets_of_parameters_and_known_ones():
-    model = rm.load("rx90")
-    some = ["theta2", "theta3", "d3", "r4"]
-    assert list(identifiable_parameters(model, "pose", parameters=some).names) == some
-    basis = identifiable_parameters(model, "pose", known=["theta2"])
-    assert basis.of_reason(Reason.KNOWN) == ("theta2",)
-    assert basis.count == 29
-    bare = identifiable_parameters(model, "pose", base=False, tool=False)
-    assert all(1 <= row <= 6 for row in bare.candidates.rows)
-
-
-def test_mistakes_are_named():
-    model = rm.load("rx90")
-    for wrong, options, match in (
-        ("laser tracker", {}, "pose"),
-        ([], {}, "got none"),
-        ("pose", {"known_lengths": ["d33"]}, "d33"),
-        ("pose", {"parameters": candidate_parameters(rm.load("puma560"))}, "another robot"),
-    ):
-        with pytest.raises(InvalidValueError, match=match):
-            identifiable_parameters(model, wrong, **options)
-    one = serial(np.random.default_rng(0), 1, 0, False)
-    with pytest.raises(InvalidValueError, match="two postures"):
-        identifiable_parameters(one, "point_contact", known_lengths=["r1"])
-    wrist = rm.RobotModel.from_table(
-        rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1}, {"sigma": 0, "alpha": -1}])
-    )
-    with pytest.raises(InvalidValueError, match="would do here: none"):
-        identifiable_parameters(wrist, "point_contact")
-    assert as_kind("point-contact") is as_kind(PointContact) is PointContact
-
-
-@pytest.mark.parametrize("unit", [1e-6, 1e-2, 1e2, 1e6])
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_the_unit_of_length_does_not_change_what_is_identifiable(unit):
     rng = np.random.default_rng(3)
     q, noise = rng.uniform(-1.0, 1.0, (30, 4)), rng.normal(size=(30, 3))

@@ -1,4 +1,19 @@
-"""Geometric calibration from measurements or contacts (section 1.4)."""
+"""Geometric calibration from measurements or contacts (seed book section 1.4).
+
+Arguments that come back in this room:
+
+- ``model``: the nominal `RobotModel`, n joints; ``q (..., n)``: readings of its joints, rad or m.
+- ``frame``: the measured end, a name or a number of a frame; None is the tool.
+- ``parameters``: `GeometricParameters`, or names of some of those that `candidate_parameters` makes
+  of ``base, tool, gains, couplings, compliance, eccentricity``; default all.
+- ``known_lengths``, ``known``: names of parameters that are known and stay as they are. Contacts,
+  measurements without a length, need one of ``known_lengths``, which gives the scale.
+- ``corrections (P,)``: xi, added to the nominal values of P parameters; m, rad or their unit.
+- ``sigma``: standard deviations of the rows of a measurement, m or rad.
+- ``robot``: a `CalibratedRobot`, or the `CalibrationResult` that holds it.
+- ``mask, mask_axes, lock``: as `igm`. ``rng``: a generator or a seed. ``progress``: a function that
+  is called with the fraction done; True writes it to the log of Python.
+"""
 
 from ..obstacles import Box, Sphere
 from .candidates import candidate_parameters

@@ -1,8 +1,4 @@
-"""Base and tool that suit a robot best: where a fit begins, and what true errors are relative to.
-
-Source: W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
-Crystallographica A32, 1976.
-"""
+"""Base and tool that suit a robot best: where a fit begins, what true errors are relative to."""
 
 from __future__ import annotations
 
@@ -23,6 +19,7 @@ from .candidates import candidate_parameters
 from .extended_table import Frame
 from .identifiable import identifiable_on
 from .measurements import Measurement, Pose, Position
+from .measurements.motions import best_motion, nearest_rotation
 from .parameters import ErrorLaw, GeometricParameters
 from .problem import problem_of
 from .robot import as_calibrated, calibrated_model, calibrated_pose, with_moved_tool
@@ -34,23 +31,6 @@ _ALIKE = 1.0 + 2.0 * np.cos(0.5)
 """Mean trace of the rotations from nominal to measured poses below which they are too."""
 
 
-def best_motion(points: Array, targets: Array) -> Array:
-    """Least-squares rigid motion from points to targets (Kabsch).
-
-    Shapes: points, targets (N, 3) -> (4, 4).
-    """
-    a, b = points.mean(axis=0), targets.mean(axis=0)
-    T = np.eye(4)
-    T[:3, :3] = _nearest_rotation((targets - b).T @ (points - a))
-    T[:3, 3] = b - T[:3, :3] @ a
-    return T
-
-
-def _nearest_rotation(M: Array) -> Array:
-    U, _, Vt = np.linalg.svd(M)
-    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
-
-
 def align_base_and_tool(
     candidates: GeometricParameters, measured: Sequence[Measurement], fixed: Collection[str]
 ) -> tuple[RobotModel, Errors] | None:
@@ -59,7 +39,7 @@ def align_base_and_tool(
     names = [
         e.name
         for e in candidates.entries
-        if e.law is ErrorLaw.CONSTANT and not 0 < e.row <= model.f and e.name not in fixed
+        if e.law is ErrorLaw.CONSTANT and not candidates.is_of_table(e) and e.name not in fixed
     ]
     if not names:
         return None
@@ -110,7 +90,7 @@ def _kabsch_alignment(
     if tool and poses:
         found = np.concatenate([se3.inverse(dgm(model, m.q)) @ m.T for m in poses])
         offset = found.mean(axis=0)
-        offset[:3, :3] = _nearest_rotation(offset[:3, :3])
+        offset[:3, :3] = nearest_rotation(offset[:3, :3])
         model = with_moved_tool(model, model.tool @ offset)
     return model
 

@@ -39,10 +39,8 @@ def candidate_parameters(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    frames : sequence of str, int or None
-        The measured ends; None is the tool.
+    model, frames
+        See `robotmodels.calibration`; all measured ends.
     base, tool : bool
         Whether the base, and the ends, have errors.
     gains : bool

@@ -18,16 +18,15 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..estimation import Loss
 from ..estimation.outlying import outlying
+from .identifiable import needs_a_length
 from .measurements import KnownDistance
 from .prior import ParameterPrior
 from .problem import Problem, problem_of, satisfying, stacked
-from .scale import needs_a_length
 from .solve import Solution, refitted
 from .validation import errors_of
 
 _CONTRADICTED = 3.0  # difference from which a distance is reported, standard errors
-_COMMON = 0.5
-"""Part of the residuals assumed systematic, so that averaging over postures does not reduce it."""
+_COMMON = 0.5  # part of the residuals that is systematic: averaging postures does not reduce it
 _REFITS = 2  # largest number of fits without the outliers
 
 
@@ -48,38 +47,37 @@ def contradictions(
     measurements = solution.problem.measurements
     numbers = [k for k, m in enumerate(measurements) if isinstance(m, KnownDistance)]
     rival = ""
-    if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0]):
+    if numbers and not size_is_known and needs_a_length(_part(solution, numbers, False)[0]):
         # if they alone determine the scale, the first one is taken as correct
         first, *numbers = numbers
-        rival = _named(measurements[first])  # type: ignore[arg-type]
+        rival = _named(measurements[first])
     if not numbers:
         return []
-    problem, scales = _without(solution, numbers)
+    problem, scales = _part(solution, numbers, False)
     others = refitted(solution, problem, solution.fit.x, scales, given)
     if len(others.fit.dropped) > len(solution.fit.dropped):
         return []
-    known = [m for m in measurements if isinstance(m, KnownDistance)][-len(numbers) :]
-    sigma = np.array([_sigma(m, solution.scales[k]) for k, m in zip(numbers, known, strict=True)])
-    shift, covariance = _predicted_differences(solution, others, numbers, sigma)
+    shift, covariance, sigma = _predicted_differences(solution, others, numbers)
     firsts = np.cumsum([0, *(m.blocks for m in measurements)])
     source = "the other measurements"
     source += " and the prior" if np.isfinite(solution.fit.prior.sigma).any() else ""
-    found = []
-    lengths = [m.length for m in known]
-    for group, mean, deviation in _wrong_groups(shift, covariance, sigma, lengths):
-        m, many = known[group[0]], len(group)
+    known, found = [measurements[k] for k in numbers], []
+    lengths = [m.length for m in known]  # type: ignore[attr-defined]
+    for group, mean, deviation in _wrong_groups(shift, covariance + np.diag(sigma**2), lengths):
+        length, many = lengths[group[0]], len(group)
         size = float(np.linalg.norm(sigma[group])) / many
         error = math.sqrt(max(0.0, deviation**2 - size**2))
         digits = max(0, 1 - math.floor(math.log10(max(1e3 * error, 1e-6))))
-        stated, its = f"{_named(m)}: stated {1e3 * m.length:.6g} mm, but", "the length, its points,"
+        stated = f"{_named(known[group[0]])}: stated {1e3 * length:.6g} mm, but"
+        its = "the length, its points,"
         if many > 1:
-            stated = f"{many} known distances of {1e3 * m.length:.6g} mm:"
+            stated = f"{many} known distances of {1e3 * length:.6g} mm:"
             its = "the lengths, their points,"
         note = (
-            f"{stated} {source} predict {1e3 * (m.length + mean):.{digits}f} +- "
-            f"{1e3 * error:.{digits}f} mm (a difference of "
-            f"{abs(mean) / deviation:.0f} standard errors). Check {its} and the "
-            f"standard deviation of {1e3 * size * math.sqrt(many):.2g} mm."
+            f"{stated} {source} predict {1e3 * (length + mean):.{digits}f} +- "
+            f"{1e3 * error:.{digits}f} mm (a difference of {abs(mean) / deviation:.0f} standard "
+            f"errors). Check {its} and the standard deviation of "
+            f"{1e3 * size * math.sqrt(many):.2g} mm."
         )
         note += f" Either this distance or {rival} is wrong." if rival else ""
         found.append(Contradiction(tuple(int(firsts[numbers[k]]) for k in group), note))
@@ -87,70 +85,61 @@ def contradictions(
 
 
 def _wrong_groups(
-    shift: Array, covariance: Array, sigma: Array, lengths: Sequence[float]
+    shift: Array, variance: Array, lengths: Sequence[float]
 ) -> list[tuple[list[int], float, float]]:
-    """Groups of wrong distances; equal lengths are one group if only their mean is wrong.
+    """Wrong distances, or all those of equal length, with their mean shift and its deviation.
 
-    With each its mean difference, given that the distances in no group are right, and the standard
-    deviation of it. Shapes: shift, sigma (K,); covariance (K, K).
+    One after another, the most significant first. Shapes: shift (K,), variance (K, K).
     """
-    variance = covariance + np.diag(sigma**2)
-    limit = _CONTRADICTED**2
-    groups, left, rest = [], [], [*range(len(lengths))]
+    inverse, rest, groups = np.linalg.inv(variance), [*range(len(lengths))], []
+    alike = [[j for j in rest if math.isclose(lengths[j], x, rel_tol=1e-9)] for x in lengths]
+    found: list[tuple[list[int], float, float]] = []
     while rest:
-        alike = [k for k in rest if math.isclose(lengths[k], lengths[rest[0]], rel_tol=1e-9)]
-        rest = [k for k in rest if k not in alike]
-        mean = float(shift[alike].mean())
-        apart = (shift[alike] - mean) ** 2 <= limit * variance[alike, alike]
-        total = float(variance[np.ix_(alike, alike)].sum()) / len(alike) ** 2
-        if len(alike) > 1 and apart.all() and mean**2 > limit * total:
-            groups.append(alike)
-        else:
-            left += alike
-    while left:  # differences given that the others are right
-        inverse = np.linalg.inv(variance[np.ix_(left, left)])
-        beyond = (inverse @ shift[left]) ** 2 > limit * np.diagonal(inverse)
-        alone = shift[left] ** 2 / variance[left, left]
-        if not beyond.any():
+        tried = []
+        for group in (*([k] for k in rest), *(g for g in alike if set(g) <= set(rest))):
+            H = np.array([np.isin(np.arange(len(lengths)), g) for g in (*groups, group)], float).T
+            covariance = np.linalg.inv(H.T @ inverse @ H)
+            means = covariance @ H.T @ inverse @ shift
+            tried.append((abs(means[-1]) / math.sqrt(covariance[-1, -1]), group, means, covariance))
+        ratio, group, means, covariance = max(tried, key=lambda trial: trial[0])
+        if ratio <= _CONTRADICTED:
             break
-        groups.append([left.pop(int(np.argmax(np.where(beyond, alone, -1.0))))])
-    found = []
-    for group in groups:  # a wrong distance may have let another one appear wrong
-        kept, many = [*group, *left], len(group)
-        inverse = np.linalg.inv(variance[np.ix_(kept, kept)])[:many]
-        conditional = np.linalg.inv(inverse[:, :many])
-        mean = float((conditional @ inverse @ shift[kept]).mean())
-        total = float(conditional.sum()) / many**2
-        if mean**2 > limit * total:
-            found.append((group, mean, math.sqrt(total)))
-        else:
-            left += group
-    return found
+        groups.append(group)
+        rest = [k for k in rest if k not in group]
+        deviations = np.sqrt(np.diag(covariance))
+        found = list(zip(groups, means.tolist(), deviations.tolist(), strict=True))
+    return [x for x in found if abs(x[1]) > _CONTRADICTED * x[2]]
 
 
 def _predicted_differences(
-    solution: Solution, others: Solution, numbers: list[int], sigma: Array
-) -> tuple[Array, Array]:
-    """Predicted less stated lengths (K,), m, and the covariance of the prediction (K, K)."""
-    rest = [k for k in range(len(solution.scales)) if k not in numbers]
-    distances, scales = _without(solution, rest)
+    solution: Solution, others: Solution, numbers: list[int]
+) -> tuple[Array, Array, Array]:
+    """Predicted less stated lengths (K,), m, covariance of the prediction (K, K), noise (K,)."""
+    distances, scales = _part(solution, numbers, True)
+    sigma = np.array([
+        math.sqrt(m.covariance[0, 0, 0]) if m.covariance is not None
+        else scale[0] if m.sigma is None else m.sigma[0, 0]
+        for m, scale in zip(distances.measurements, scales, strict=True)
+    ])  # fmt: skip
     x = _unbiased(others)
     residual, jacobian = stacked(distances, x, scales)
     T = sigma[:, None] * (jacobian @ others.fit.basis)
     rms = errors_of(solution.problem, others.corrections, others.fixture_values).rms["m"]
-    return sigma * residual, T @ T.T + (_COMMON * rms) ** 2 * np.eye(len(numbers))
+    return sigma * residual, T @ T.T + (_COMMON * rms) ** 2 * np.eye(len(numbers)), sigma
 
 
-def _without(solution: Solution, left_out: Sequence[int]) -> tuple[Problem, tuple[Array, ...]]:
-    """The problem without some measurements, and the noise of the others."""
+def _part(
+    solution: Solution, numbers: Sequence[int], kept: bool
+) -> tuple[Problem, tuple[Array, ...]]:
+    """The problem with some measurements alone, or without them, and their noise."""
     problem = solution.problem
-    kept = [k for k in range(len(problem.measurements)) if k not in left_out]
+    chosen = [k for k in range(len(problem.measurements)) if (k in numbers) is kept]
     part = replace(
         problem,
-        measurements=tuple(problem.measurements[k] for k in kept),
-        factors=tuple(problem.factors[k] for k in kept),
+        measurements=tuple(problem.measurements[k] for k in chosen),
+        factors=tuple(problem.factors[k] for k in chosen),
     )
-    return part, tuple(solution.scales[k] for k in kept)
+    return part, tuple(solution.scales[k] for k in chosen)
 
 
 def _unbiased(solution: Solution) -> Array:
@@ -165,13 +154,6 @@ def _unbiased(solution: Solution) -> Array:
         return fit.x
     change = stacked(exact, fit.x, solution.scales)[1] - fit.jacobian
     return fit.x - fit.basis @ (fit.basis.T @ (change.T @ fit.residuals))
-
-
-def _sigma(m: KnownDistance, scale: Array) -> float:
-    """Standard deviation of a known distance, m."""
-    if m.covariance is not None:
-        return math.sqrt(m.covariance[0, 0, 0])
-    return float(scale[0] if m.sigma is None else m.sigma[0, 0])
 
 
 def _named(m: KnownDistance) -> str:
@@ -191,21 +173,19 @@ def with_outliers(
     problem, fit = solution.problem, solution.fit
     if fit.loss is not Loss.SQUARES:
         return solution
-    trusted = np.repeat(
-        [not m.views for m in problem.measurements], [m.blocks for m in problem.measurements]
-    )
+    counts = [m.blocks for m in problem.measurements]
+    trusted = np.repeat([not m.views for m in problem.measurements], counts)
     wrong = np.array([b for c in contradicted for b in c.blocks], dtype=np.int64)
-    outliers = wrong if len(wrong) else fit.outliers
-    if trusted.any() and not len(wrong):
+    outliers = wrong
+    if not len(wrong):
         rows = fit.orthonormal_rows
         outliers = outlying(rows, fit.whitened, fit.block, fit.freedom, trusted)
     for _ in range(_REFITS):
         rest = _rows_without(solution, outliers, given) if len(outliers) else None
         if rest is None:
             break
-        before = outliers
         rows, residual, freedom = rest
-        outliers = outlying(rows, residual, fit.block, freedom, trusted, before)
+        before, outliers = outliers, outlying(rows, residual, fit.block, freedom, trusted, outliers)
         outliers = np.concatenate([wrong, outliers[~np.isin(outliers, wrong)]])
         if set(outliers) == set(before):
             break
@@ -219,16 +199,15 @@ def _rows_without(
 
     None where too little is left.
     """
-    problem = solution.problem
+    problem, scales = solution.problem, list(solution.scales)
     parts = np.split(np.arange(problem.blocks), np.cumsum([m.blocks for m in problem.measurements]))
     kept = [np.flatnonzero(~np.isin(part, outliers)) for part in parts]
-    numbers = [k for k, _ in enumerate(problem.measurements) if len(kept[k])]
-    rest = problem_of(
-        problem.parameters, [problem.measurements[k].subset(kept[k]) for k in numbers]
-    )
+    numbers = [k for k in range(len(scales)) if len(kept[k])]
+    measurements = [problem.measurements[k].subset(kept[k]) for k in numbers]
+    rest = problem_of(problem.parameters, measurements)
     if len(rest.fixtures) < problem.F or rest.rows <= problem.P + problem.F:
         return None
-    values, scales = solution.fixture_values, list(solution.scales)
+    values = solution.fixture_values
     start = np.array([*solution.corrections, *(values[f.name] for f in rest.fixtures)])
     found = refitted(solution, rest, start, tuple(scales[k] for k in numbers), given)
     for k, scale in zip(numbers, found.scales, strict=True):

@@ -35,14 +35,8 @@ def differential_model(
 
     Parameters
     ----------
-    parameters : GeometricParameters
-        P parameters.
-    q : array_like, shape (..., n)
-        Readings of the joints, rad or m.
-    corrections : array_like, shape (P,), optional
-        xi, added to the nominal values of the parameters; default zero.
-    frame : str, int or None
-        The end; one of those the parameters were made for.
+    parameters, q, corrections, frame
+        See `robotmodels.calibration`; the frame is one that the parameters were made for.
     factors : ndarray, shape (N, A), optional
         ``parameters.factors(q)`` where it is known already.
 

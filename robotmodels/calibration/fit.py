@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
 
 import numpy as np
 
+from .._arrays import Array
 from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
+from ..estimation.linearised import inverse_factor
 from ..model import RobotModel, check_model
 from .alignment import align_base_and_tool
 from .candidates import candidate_parameters
+from .checks import notes_before
 from .contradiction import contradictions, with_outliers
-from .identifiable import Reason, identifiable_on
+from .identifiable import IdentifiableParameters, Reason, identifiable_on
 from .measurements import KnownDistance, Measurement
-from .notes import implausible, notes_after, notes_before, notes_of_errors
+from .notes import implausible, notes_after, notes_of_errors
 from .parameters import Compliance, GeometricParameters, as_names
-from .prior import ParameterPrior, estimated_with, note_of_prior, sized, widened
-from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
+from .prior import (
+    ParameterPrior,
+    estimated_with,
+    largest_factors,
+    note_of_prior,
+    sized,
+    widened,
+)
+from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of, stacked
 from .result import CalibrationResult
-from .significance import adjusted, check_enough, insignificant_parameters
-from .solve import solve
+from .solve import Solution, solve
 from .structure import note_of_structure, structure_of, trials_of
 from .validation import (
     Validation,
@@ -39,6 +48,9 @@ from .validation import (
 _PRIOR = ParameterPrior()
 _SEED = 1
 _TRIES = 6  # largest number of fits for the choice of parameters and of the prior's width
+_LARGEST_LENGTH, _LARGEST_ANGLE = 0.01, 0.02
+"""Standard errors above which a parameter is not estimated: relative to the robot's size, and rad
+(of the largest effect)."""
 _DEPENDENT = 1e-4  # sine of the angle below which a column counts as dependent
 
 
@@ -73,18 +85,13 @@ def fit(
 
     Parameters
     ----------
-    model : RobotModel
-        The nominal robot; its base and tool are where the fit begins (if they are far off, it
-        begins where the measured positions are).
+    model, known, known_lengths, base, tool, gains, couplings, compliance, eccentricity, progress
+        See `robotmodels.calibration`. The fit begins with base and tool of the model, or, if they
+        are far off, where the measured positions are.
     measurements : Measurement or iterable of Measurement
         One or more, of any kinds.
     parameters : GeometricParameters or iterable of str, optional
-        Candidates, or their names; default all of `candidate_parameters`.
-    known, known_lengths : iterable of str
-        Parameters that are known and stay as they are. Measurements without a length (contacts)
-        need one of ``known_lengths``.
-    base, tool, gains, couplings, compliance, eccentricity
-        As `candidate_parameters`.
+        Candidates, or their names; default all.
     loss : Loss or str, optional
         ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
@@ -102,8 +109,6 @@ def fit(
         measurements for that, which never take part.
     rng : numpy.random.Generator or int, optional
         For the folds; default a fixed seed.
-    progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
@@ -113,8 +118,7 @@ def fit(
     Raises
     ------
     InvalidValueError, ShapeError
-        Measurements of another robot, no known length where one is needed, too few measurements,
-        units that cannot be right; with what to measure or to change.
+        Too few or other measurements, no known length, units that cannot be right; with advice.
 
     References
     ----------
@@ -171,7 +175,7 @@ def fit(
     given_prior = prior
     identify = partial(identifiable_on, dependent=_DEPENDENT, known_lengths=known_lengths)
     identifiable = identify(candidates, measured, known=known)
-    check_enough(identifiable, measured)
+    _check_enough(identifiable, measured)
     for attempt in range(1, _TRIES + 1):
         estimated = identifiable.kept
         if prior is not None:
@@ -181,7 +185,7 @@ def fit(
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
         used = settled_prior(prior, problem, loss, rng)
         solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
-        insignificant = [] if truncation else insignificant_parameters(solution, start)
+        insignificant = [] if truncation else _insignificant_parameters(solution, start)
         identify_there = partial(
             identify,
             measurements=measured,
@@ -196,7 +200,7 @@ def fit(
         gained = set(after.names) - set(estimated.names) if prior is not None else set()
         if attempt == _TRIES or not (insignificant or gained or wider is not prior):
             break
-        prior, identifiable = wider, adjusted(identifiable, insignificant, gained)
+        prior, identifiable = wider, _adjusted(identifiable, insignificant, gained)
     expected = given_prior and replace(given_prior, strength=solution.fit.prior.strength)
     contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
     solution = with_outliers(solution, contradicted, expected)
@@ -268,3 +272,72 @@ def _held_out(
             f"held_out: expected a share from 0 to under 1, or measurements, got {held_out}."
         )
     return float(held_out), ()
+
+
+# --- parameters that the measurements do not determine --------------------------------------------
+
+
+def _check_enough(identifiable: IdentifiableParameters, measured: Sequence[Measurement]) -> None:
+    """Refuse fewer rows than unknowns."""
+    problem = problem_of(identifiable.kept, measured)
+    P, F = problem.P, problem.F
+    if P and problem.rows > P + F:
+        return
+    if not P:
+        raise InvalidValueError(
+            "No parameter is identifiable from these measurements. See identifiable_parameters, "
+            "and measure with all joints spread over their ranges."
+        )
+    rows = max(len(m.axes) for m in measured if m.views)
+    missing = -(-(P + F + 1 - problem.rows) // rows)
+    raise InvalidValueError(
+        f"{problem.rows} rows cannot determine {P} parameters and {F} unknown coordinates of "
+        f"fixtures: measure at least {missing} more configurations (better three times as many "
+        "rows as unknowns), or name fewer parameters."
+    )
+
+
+def _insignificant_parameters(solution: Solution, start: Array) -> list[str]:
+    """Names of insignificant parameters, given noise and prior."""
+    # The larger standard error of start and solution counts: a fit may have diverged along a
+    # parameter, and constraints violated at the start seem to hold information. The worst is
+    # removed first, as it may hide others.
+    problem, prior = solution.problem, solution.fit.prior
+    length = _LARGEST_LENGTH * problem.parameters.table.size
+    sizes = [length if e.element.is_length else _LARGEST_ANGLE for e in problem.parameters.entries]
+    limit = np.full(problem.P + problem.F, np.inf)
+    limit[: problem.P] = sizes / np.maximum(largest_factors(problem), 1e-300)
+    information = np.diag(np.sqrt(prior.strength) / prior.sigma)
+    factors = [
+        np.asarray(
+            np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1]
+        )
+        for x in (start, solution.fit.x)
+    ]
+    kept = list(range(len(limit)))
+    names: list[str] = []
+    while kept:
+        ratio = np.max(
+            [np.linalg.norm(inverse_factor(R[:, kept]), axis=1) / limit[kept] for R in factors],
+            axis=0,
+        )
+        worst = int(np.argmax(ratio))
+        if ratio[worst] <= 1.0:
+            break
+        names.append(problem.parameters.names[kept.pop(worst)])
+    return names
+
+
+def _adjusted(
+    found: IdentifiableParameters, insignificant: Collection[str], gained: Collection[str]
+) -> IdentifiableParameters:
+    """Without insignificant parameters, and with those that the solution makes identifiable."""
+    names = ({*found.names} - {*insignificant}) | {*gained}
+    reasons = {**found.reasons, **dict.fromkeys(insignificant, Reason.NOISE)}
+    regrouping = {name: found.regrouping.get(name, {name: 1.0}) for name in names}
+    return replace(
+        found,
+        kept=found.candidates.subset(n for n in found.candidates.names if n in names),
+        reasons={name: why for name, why in reasons.items() if name not in gained},
+        regrouping={n: regrouping[n] for n in found.candidates.names if n in names},
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -13,20 +13,21 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, as_exact
 from ..errors import InvalidValueError
 from ..estimation import column_basis
+from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..table_text import boxed
 from .candidates import candidate_parameters
 from .extended_table import Frame
-from .measurements import Measurement
+from .measurements import Measurement, scale_is_observable
 from .measurements.kinds import Kind, as_kind, drawn_groups, measurement_of
 from .parameters import Compliance, ErrorLaw, GeometricParameters, as_names
 from .problem import Problem, guessed_fixtures, linearised, measured_frames, problem_of, satisfying
-from .scale import check_scale
 
 DEPENDENT = 1e-7
 """Sine of the angle to the columns before, below which a parameter acts like a combination."""
 _EMPTY = 1e-9  # length of a column beside the longest, below which it has no effect
 _SEED = 14
+_LEAST = 1e-6  # length that counts as zero, relative to the robot's size
 _CONTACTS = 14  # number of contacts that are drawn for structural identifiability
 
 
@@ -184,36 +185,21 @@ def identifiable_parameters(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
+    model, frame, known_lengths, known, base, tool, gains, couplings, compliance, eccentricity, rng
+        See `robotmodels.calibration`; measured data have their own frames. The seed is fixed.
     measurements : kinds or data, one or more
         Classes (`Pose`, `Position`, `PointContact`) or their names (``"pose"``), or measured
         data; kinds and data together as well.
-    frame : str, int or None
-        The end of kinds; None is the tool. Data have their own.
-    known_lengths, known : iterable of str
-        Parameters that are known and stay as they are. Measurements without any known length need
-        one of ``known_lengths``, which gives the scale.
     parameters : GeometricParameters or names, optional
-        Candidates, in the order of preference, or which of them; default all that the next
-        arguments make.
+        Candidates, in the order of preference, or which of them; default all.
     corrections : array_like, shape (P,), or mapping of names to values, optional
         Corrections of the candidates (m, rad) at which the rank is computed, as estimated by a
         fit; default the nominal robot.
-    base, tool, gains, couplings, compliance, eccentricity
-        As for `candidate_parameters`.
-    rng : numpy.random.Generator, optional
-        For random configurations; default one with a fixed seed.
 
     Returns
     -------
     IdentifiableParameters
         Kept, left out and why, regrouping; it prints as a table.
-
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        No length is known; no contact can be reached in two postures; unknown names.
 
     Examples
     --------
@@ -354,6 +340,45 @@ def identifiable_on(
         condition=float(singular[0] / singular[-1]) if len(singular) else 1.0,
         factor=np.asarray(np.linalg.qr(chosen, mode="r"))[first:, first:],
         configurations=exact.blocks,
+    )
+
+
+def needs_a_length(problem: Problem, known: Collection[str] = ()) -> bool:
+    """Whether the scale has to come from a parameter that is known."""
+    if all(unit == "rad" for m in problem.measurements for unit in m.units):
+        return False  # orientations do not depend on lengths at all
+    p = problem.parameters
+    constant = [e for e in p.entries if e.law is ErrorLaw.CONSTANT]
+    base_is_known = all(e.name in known for e in constant if e.row == 0)
+    if scale_is_observable(problem.measurements, p.model.base[:3, 3] if base_is_known else None):
+        return False
+    return any(e.element.is_length and 0 < e.row <= p.model.f for e in constant)
+
+
+def check_scale(problem: Problem, known: Collection[str], named: Collection[str]) -> None:
+    """Refuse measurements without a length if no length of the table is known.
+
+    The readings of prismatic joints are lengths as well.
+    """
+    p = problem.parameters
+    if not needs_a_length(problem, known) or (p.table.sigma == PRISMATIC).any():
+        return
+    lengths = [
+        entry.name
+        for entry, value in zip(p.entries, p.nominal, strict=True)
+        if entry.law is ErrorLaw.CONSTANT
+        and entry.element.is_length
+        and abs(value) > _LEAST * p.table.size
+        and 0 < entry.row <= p.model.f
+    ]
+    if not set(lengths).isdisjoint(named):
+        return
+    fixed = f", and fixing {', '.join(named)} gives none" if named else ""
+    raise InvalidValueError(
+        f"These measurements contain no length{fixed}: a robot scaled to zero size would satisfy "
+        "them. Measure a distance (KnownDistance, Distance), or name a parameter whose length is "
+        f"known: known_lengths=({lengths[0] if lengths else 'd3'!r},). Lengths that would do here: "
+        f"{', '.join(lengths) or 'none'}."
     )
 
 

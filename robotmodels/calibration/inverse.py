@@ -47,15 +47,13 @@ def corrected_igm(
 
     Parameters
     ----------
-    robot : CalibratedRobot
-        The robot, n joints.
+    robot, mask, mask_axes, lock
+        See `robotmodels.calibration`; locked joints keep a reading.
     T : array_like, shape (..., 4, 4)
         World poses of the tool, metres.
     q_ref : array_like, shape (..., n), optional
         Reference readings, rad or m: order of the solutions, and the choice of redundant arms,
         whose free joints keep them.
-    mask, mask_axes, lock
-        As `igm`; locked joints (column of q, from 0, or name) keep a reading, rad or m.
     limits : bool
         Whether readings must lie within the joint limits, whole turns of the joints added.
     tolerance : float
@@ -65,15 +63,6 @@ def corrected_igm(
     -------
     IGMSolutions
         ``q (..., S, n)`` are readings, ``residual`` is that of the calibrated robot at them.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        As `igm`.
-
-    References
-    ----------
-    Seed book section 1.4.6.
 
     Examples
     --------

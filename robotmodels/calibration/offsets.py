@@ -100,8 +100,8 @@ def joint_offsets(
 
     Parameters
     ----------
-    robot : CalibratedRobot or CalibrationResult
-        The robot, n joints.
+    robot
+        See `robotmodels.calibration`.
     q : array_like, shape (N, n)
         Configurations over which the errors are least, as commanded: rad or m.
     mask : array_like, shape (6,), optional
@@ -116,10 +116,6 @@ def joint_offsets(
     JointOffsets
         Offsets, and the errors before and after. Constant errors of the joint variables are
         cancelled exactly.
-
-    References
-    ----------
-    Seed book section 1.4.6.
 
     Examples
     --------
@@ -175,8 +171,8 @@ def pose_offsets(
 
     Parameters
     ----------
-    robot : CalibratedRobot or CalibrationResult
-        The robot.
+    robot
+        See `robotmodels.calibration`.
     T : array_like, shape (..., 4, 4)
         World poses that the tool shall reach, metres.
     q_ref, mask, mask_axes, limits, lock

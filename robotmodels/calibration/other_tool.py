@@ -1,8 +1,7 @@
 """Predicted error of another tool after a calibration.
 
-Corrections that do not move the measured tool can move another. The covariance of the fit, and the
-default prior of parameters that were not estimated, are propagated to other tools. If the
-measurements do not determine the base, a rigid motion is fitted to the error.
+The covariance of the fit, and the default prior of parameters that were not estimated, are
+propagated to other tools; if the base is unknown, a rigid motion is fitted to the error.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from .identifiable import Reason
 from .parameters import ErrorLaw, GeometricParameters
 from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
-from .robot import CalibratedRobot
 
 _POSTURES = 200  # largest number of the measured postures that a prediction is made for
 _LEAST_LENGTH = 0.1  # smallest length of the tool, relative to the size of the robot
@@ -31,23 +29,19 @@ _LEAST_LENGTH = 0.1  # smallest length of the tool, relative to the size of the 
 class PredictedError(NamedTuple):
     """Standard errors of a tool that took no part in the calibration, m and rad."""
 
-    rms: float
+    rms: float  # of the tool's point, over postures and directions
     largest: float
-    """Of the tool's point: root mean square over postures and directions, and the worst."""
     angle: float
-    nominal: float
-    """Rms distance between the nominal and the calibrated robot for the same tools."""
-    length: float
-    """Distance of the tool's point from the last frame of the table."""
+    nominal: float  # rms distance between nominal and calibrated robot for the same tools
+    length: float  # distance of the tool's point from the last frame of the table
 
 
 def other_tool_error(
     result: Any, q: ArrayLike | None = None, length: float | None = None
 ) -> PredictedError:
-    """Predicted error of another tool whose pose on the flange is known.
+    """Predicted error of another tool, its pose on the flange known, along the six half-axes.
 
-    ``q`` (N, n): readings at which it works; ``length``: of its point from the last frame, m, by
-    default that of the present tool. It points along the six half-axes of the frame.
+    ``q (N, n)``: where it works, default as measured; ``length``: default as the present tool, m.
     """
     problem, robot = result.solution.problem, result.robot
     if q is None:
@@ -64,9 +58,22 @@ def other_tool_error(
     parameters, factor, corrections = _posterior(result)
     if not len(parameters):  # base and tool alone were unknown
         return PredictedError(0.0, 0.0, 0.0, 0.0, length)
-    points, moved = _moved(parameters, corrections, robot, postures, length)
-    columns = moved @ np.column_stack([factor, corrections])
-    if not problem.sees_base:
+    frame = parameters.table.frames[0]
+    end = robot.end(frame)
+    assert end is not None
+    T, psi = differential_model(parameters, postures, corrections, frame)
+    tip = T @ se3.inverse(end.pose)
+    axes = length * np.concatenate([np.eye(3), -np.eye(3)])
+    points = tip[:, None, :3, 3] + axes @ np.swapaxes(tip[:, :3, :3], 1, 2)
+    # effects of the parameters, base and tool aside, on six tools at N postures, (6 N, 6, .)
+    psi = (psi * (parameters.rows <= parameters.model.f))[:, None] @ np.column_stack(
+        [factor, corrections]
+    )
+    moved = psi[:, :, :3] - skew(points - T[:, None, :3, 3]) @ psi[:, :, 3:]
+    turned = np.broadcast_to(psi[:, :, 3:], moved.shape)
+    columns = np.concatenate([moved, turned], axis=2).reshape(-1, 6, moved.shape[-1])
+    if not problem.sees_base:  # up to a rigid motion
+        points = points.reshape(-1, 3)
         rigid = np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=2)
         fitted = np.linalg.lstsq(rigid.reshape(-1, 6), columns[:, :3].reshape(3 * len(points), -1))
         columns[:, :3] -= rigid @ fitted[0]
@@ -76,8 +83,7 @@ def other_tool_error(
     angle = squares[:, 3:, :-1].sum(axis=(1, 2))
     nominal = squares[:, :3, -1].sum(axis=1)
     means = (position.mean(), position.max(), angle.mean(), nominal.mean())
-    rms, largest, turned, before = (float(np.sqrt(x)) for x in means)
-    return PredictedError(rms, largest, turned, before, float(length))
+    return PredictedError(*(float(np.sqrt(x)) for x in means), float(length))
 
 
 def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
@@ -88,7 +94,7 @@ def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
     known |= {
         e.name
         for e in identifiable.candidates.entries
-        if e.law is ErrorLaw.CONSTANT and not 0 < e.row <= estimated.model.f
+        if e.law is ErrorLaw.CONSTANT and not estimated.is_of_table(e)
     }
     parameters = identifiable.candidates.without(known - {*estimated.names})
     problem = problem_of(parameters, solution.problem.measurements)
@@ -105,24 +111,3 @@ def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
     # directions without information (a tool that is not measured) move no other tool
     factor = inverse_factor(np.asarray(np.linalg.qr(rows, mode="r")))
     return parameters, factor[: problem.P], corrections
-
-
-def _moved(
-    parameters: GeometricParameters,
-    corrections: Array,
-    robot: CalibratedRobot,
-    q: Array,
-    length: float,
-) -> tuple[Array, Array]:
-    """Points of six tools at N postures (6 N, 3), and how parameters move them (6 N, 6, P)."""
-    frame = parameters.table.frames[0]
-    T, psi = differential_model(parameters, q, corrections, frame)
-    end = robot.end(frame)
-    assert end is not None
-    tip = T @ se3.inverse(end.pose)
-    axes = length * np.concatenate([np.eye(3), -np.eye(3)])
-    points = tip[:, None, :3, 3] + axes @ np.swapaxes(tip[:, :3, :3], 1, 2)
-    psi = psi[:, None] * (parameters.rows <= parameters.model.f)
-    moved = psi[:, :, :3] - skew(points - T[:, None, :3, 3]) @ psi[:, :, 3:]
-    both = np.concatenate([moved, np.broadcast_to(psi[:, :, 3:], moved.shape)], axis=2)
-    return points.reshape(-1, 3), both.reshape(-1, 6, len(parameters))

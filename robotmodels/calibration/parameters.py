@@ -222,6 +222,10 @@ class GeometricParameters(Rebuilt):
                 factor[:, c] = law.factor(q[:, self.table.joint[source]])
         return factor
 
+    def is_of_table(self, entry: GeometricParameter) -> bool:
+        """Whether a parameter is a constant error of a frame, not of the base or an end."""
+        return entry.law is ErrorLaw.CONSTANT and 0 < entry.row <= self.model.f
+
     def bends(self, entry: GeometricParameter) -> bool:
         """Whether a parameter is a compliance of a link or of the mount, not of a joint."""
         variable = JOINT_VARIABLE[int(self.table.sigma[entry.row])]

@@ -130,17 +130,12 @@ def estimated_with(
 def widened(prior: ParameterPrior, problem: Problem, fit: NonlinearFit) -> ParameterPrior:
     """Prior widened by maximum evidence where the corrections contradict it."""
     # D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992
-    f = problem.parameters.model.f
-    size = fit.prior.sigma / np.sqrt(fit.prior.strength)
-    wider = {}
+    p, size, wider = problem.parameters, fit.prior.sigma / np.sqrt(fit.prior.strength), {}
     for name, is_length in (("length", True), ("angle", False)):
         of_kind = [
             k
-            for k, e in enumerate(problem.parameters.entries)
-            if e.law is ErrorLaw.CONSTANT
-            and 0 < e.row <= f
-            and e.name not in prior.named
-            and e.element.is_length is is_length
+            for k, e in enumerate(p.entries)
+            if p.is_of_table(e) and e.name not in prior.named and e.element.is_length is is_length
         ]
         determined = 1.0 - np.diagonal(fit.covariance)[of_kind] / size[of_kind] ** 2
         count = max(float(determined.sum()), 1.0)

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel
 from .differential import differential_model
-from .joint_readings import expected_joints_text
 from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact, whitened
 from .measurements.kinds import satisfied_measurement
 from .parameters import GeometricParameters
@@ -46,6 +47,12 @@ class Problem(Rebuilt):
     def rows(self) -> int:
         """Number of residuals."""
         return sum(m.blocks * len(m.axes) for m in self.measurements)
+
+    @property
+    def row_slices(self) -> list[slice]:
+        """Rows of each measurement among all."""
+        ends = np.cumsum([0, *(m.blocks * len(m.axes) for m in self.measurements)]).tolist()
+        return [slice(*both) for both in pairwise(ends)]
 
     @property
     def block(self) -> NDArray[np.int64]:
@@ -98,6 +105,21 @@ def _problem(
 ) -> Problem:
     factors = tuple(tuple(parameters.factors(view.q) for view in m.views) for m in measurements)
     return Problem(parameters, measurements, fixtures, factors)
+
+
+def expected_joints_text(model: RobotModel) -> str:
+    """Sentence on the expected joints; empty if all move the tool."""
+    moving = model.twin.frame(None).path.tolist()
+    names = model.table.joint_names
+    rows = zip(names, model.table.joint_rows, strict=True)
+    idle = [name for name, row in rows if row + 1 not in moving]
+    if not idle:
+        return ""
+    return (
+        f" Readings of all {model.n} joints of the model are needed: {', '.join(names)}. "
+        f"{', '.join(idle)} do not move the tool; read the robot with tip_link='LINK' to leave "
+        "them out."
+    )
 
 
 def as_measurements(
@@ -170,10 +192,8 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
     """
     P = problem.P
     residual, jacobian = np.empty(problem.rows), np.zeros((problem.rows, P + problem.F))
-    first, parts = 0, linearised(problem, x[:P], x[P:])
-    for m, part, scale in zip(problem.measurements, parts, scales, strict=True):
-        rows = slice(first, first + part.residual.size)
-        first = rows.stop
+    parts = zip(linearised(problem, x[:P], x[P:]), scales, problem.row_slices, strict=True)
+    for m, (part, scale, rows) in zip(problem.measurements, parts, strict=True):
         residual[rows] = whitened(m, part.residual, scale).ravel()
         if part.by_parameters.shape[-1]:
             jacobian[rows, :P] = whitened(m, part.by_parameters, scale).reshape(-1, P)

@@ -19,12 +19,12 @@ from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.orientations import orientation_kind
 from ..model import RobotModel, check_model
+from .checks import beyond_limits, unit_error_of_positions
 from .extended_table import Frame
-from .joint_readings import beyond_limits, expected_joints_text
-from .length_units import unit_error_of_positions
 from .measurements import FileRow, Measurement, Pose
 from .measurements.base import fields_of, required
 from .measurements.kinds import Kind, as_kind
+from .problem import expected_joints_text
 
 _QUATERNION_TOLERANCE = 1e-3  # largest deviation from 1 of the length of a quaternion of few digits
 _LARGEST_ANGLE = 30.0  # largest plausible angle, rad; beyond it, degrees are assumed
@@ -64,8 +64,8 @@ def read_measurements(
     kind : str or class
         Such as ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``,
         ``"point_contact"``, ``"relative_pose"``; or the class of a kind.
-    model : RobotModel
-        The robot: names, number and types of its joints.
+    model, sigma, frame
+        See `robotmodels.calibration`; the model gives names, number and types of the joints.
     joints, other_joints : sequence of str or int, length n, optional
         Columns of the readings; default those named as the joints of the robot, or q1 to qn. Of
         the other end of a distance (without them it is from a pivot) or of a relative pose.
@@ -89,8 +89,8 @@ def read_measurements(
     pattern, delimiter : str
         Of the files in a folder; between cells, default the first of semicolon, tab, comma in the
         first line, else blanks.
-    sigma, frame, name
-        As `Measurement`; default name the folder's, or as the kind.
+    name : str, optional
+        In reports, and in front of labels; default the folder's name, or as the kind.
 
     Returns
     -------
@@ -99,11 +99,8 @@ def read_measurements(
 
     Raises
     ------
-    InvalidValueError
-        Missing columns; a cell that is empty or no finite number, with its line; units that cannot
-        be right; files of a folder with different contents.
-    OSError
-        A file cannot be opened.
+    InvalidValueError, OSError
+        Missing columns; a cell that is no finite number, with its line; units that cannot be right.
 
     Examples
     --------
@@ -133,13 +130,16 @@ def read_measurements(
             raise InvalidValueError(f"{argument}: {kind.word} does not use it here; leave it out.")
     files, folder = _files(path, pattern)
     tables = [open_table(file, delimiter) for file in files]
-    if folder is not None:
-        _check_same_columns(tables)
+    if folder is not None and len({(t.names, t.width) for t in tables}) > 1:
+        listed = "; ".join(f"{t.path.name}: {', '.join(t.names) or t.width}" for t in tables)
+        raise InvalidValueError(
+            f"path: the files of {folder} do not have the same columns ({listed}). Select the "
+            "files by pattern='*.csv', or name them."
+        )
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
 
     def readings(given: Sequence[Column] | None, what: str) -> list[Array]:
-        found = [_joint_columns(t, model, given, what, alone=not needs) for t in tables]
-        parts = [t.numbers(c) for t, c in zip(tables, found, strict=True)]
+        parts = [t.numbers(_joint_columns(t, model, given, what, alone=not needs)) for t in tables]
         units = "joint_angles" if joint_angles else "angles"
         _check_angles(np.concatenate(parts)[:, revolute], turn, files[0], units)
         return [part * np.where(revolute, turn.factor, length.factor) for part in parts]
@@ -150,32 +150,34 @@ def read_measurements(
         _check_contents(tables, parts, model, frame)
     values = np.zeros((len(q), 0))
     if needs:
-        found = [t.numbers(_measured_columns(t, needs, columns)) for t in tables]
-        values = np.concatenate(found)
+        values = np.concatenate([t.numbers(_measured_columns(t, needs, columns)) for t in tables])
     given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
     for f in fields(kind):
-        content = f.metadata.get("content")
+        content, p = f.metadata.get("content"), None
         if content == "joints" and f.name != "q":
             if other_joints is not None or "joints" in required(kind):
                 given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
         elif content == "point":
-            given[f.name] = length.factor * values
-            _check_lengths(given[f.name], q, model, length, files[0], frame)
+            given[f.name] = p = length.factor * values
         elif content == "length":
             given[f.name] = length.factor * values[:, 0]
         elif content == "pose" and written is not None:
-            given[f.name] = _poses(written, values, length, angle, files[0])
-            if issubclass(kind, Pose) and _pose_parts(kind)[0]:
-                _check_lengths(given[f.name][:, :3, 3], q, model, length, files[0], frame)
+            given[f.name] = poses = _poses(written, values, length, angle, files[0])
+            p = poses[:, :3, 3] if issubclass(kind, Pose) and _pose_parts(kind)[0] else None
         elif content == "label" and other_joints is None:
             given[f.name] = _labels(tables, label, parts)
+        if p is not None:
+            _check_lengths(p, q, model, length, files[0], frame)
     if rows is not None:
         given["rows"] = rows
     if name or folder is not None:
         given["name"] = name or Path(folder or "").resolve().name
-    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
-    numbers = [(name, k + 1) for name, q in zip(names, parts, strict=True) for k in range(len(q))]
-    return kind(**given, origin=tuple(FileRow(*number) for number in numbers))
+    origin = [
+        FileRow(f"{t.path.resolve().parent.name}/{t.path.name}", k + 1)
+        for t, part in zip(tables, parts, strict=True)
+        for k in range(len(part))
+    ]
+    return kind(**given, origin=tuple(origin))
 
 
 def is_readable(kind: Kind) -> bool:
@@ -294,20 +296,6 @@ def _labels(
 # --- plausibility ---------------------------------------------------------------------------------
 
 
-def _check_same_columns(tables: Sequence[CsvTable]) -> None:
-    """Refuse files of a folder whose columns differ in number or name."""
-    kinds: dict[str, list[str]] = {}
-    for t in tables:
-        columns = f"columns {', '.join(t.names)}" if t.names else f"{t.width} columns, no header"
-        kinds.setdefault(columns, []).append(t.path.name)
-    if len(kinds) > 1:
-        listed = "; ".join(f"{', '.join(names)}: {columns}" for columns, names in kinds.items())
-        raise InvalidValueError(
-            f"path: the files of {tables[0].path.parent} do not have the same columns ({listed}). "
-            "Select the files by pattern='*.csv', or name them."
-        )
-
-
 def _check_contents(
     tables: Sequence[CsvTable], readings: Sequence[Array], model: RobotModel, frame: Frame
 ) -> None:
@@ -354,15 +342,16 @@ def _poses(
 
 def _check_angles(values: Array, unit: AngleUnit, file: Path, argument: str) -> None:
     largest = float(np.abs(values).max(initial=0.0))
+    look = ""
     if unit is AngleUnit.RADIAN and largest > _LARGEST_ANGLE:
-        raise InvalidValueError(
-            f"{file}: an angle of {largest:.4g} rad; these look like degrees. Use {argument}='deg'."
+        look = f"an angle of {largest:.4g} rad; these look like degrees. Use {argument}='deg'"
+    elif unit is AngleUnit.DEGREE and largest <= 2 * np.pi and values.size and np.ptp(values) > 1.0:
+        look = (
+            f"no angle is larger than {largest:.4g} deg; these look like radians. Use "
+            f"{argument}='rad'"
         )
-    if unit is AngleUnit.DEGREE and values.size and largest <= 2 * np.pi and np.ptp(values) > 1.0:
-        raise InvalidValueError(
-            f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Use "
-            f"{argument}='rad'."
-        )
+    if look:
+        raise InvalidValueError(f"{file}: {look}.")
 
 
 def _check_lengths(

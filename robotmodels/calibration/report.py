@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,11 @@ from ..estimation import confidence_intervals, fit_diagnostics
 from ..estimation.correlation import correlated_pairs
 from ..geometry import PRISMATIC
 from ..kinematics import operational_coordinates
-from ..table_text import (
-    ReportSection,
-    ReportTable,
-    degrees,
-    in_unit,
-    millimetres,
-    percent_text,
-    printed_unit,
-    table_of,
-)
+from ..table_text import ReportSection as Section
+from ..table_text import degrees, in_unit, millimetres, percent_text, printed_unit, table_of
 from .identifiable import Reason
 from .measurements import Measurement
-from .notes import implausible
-from .parameters import ErrorLaw
+from .notes import has_prior, implausible
 from .problem import evaluations, linearised
 from .result import CalibrationResult
 from .solve import states_noise
@@ -64,24 +55,14 @@ def report(result: CalibrationResult) -> str:
     return "\n\n".join([f"{title}\n{'=' * len(title)}", *parts]) + "\n"
 
 
-def report_sections(result: CalibrationResult) -> tuple[ReportSection, ...]:
+def report_sections(result: CalibrationResult) -> tuple[Section, ...]:
     """Sections of a report, for text and page."""
-    sections = (
-        _outcome(result),
-        _notes(result),
-        _measurements(result),
-        _errors(result),
-        _noise(result),
-        _parameters(result),
-        _base_and_tool(result),
-        _left_out(result),
-        _trust(result),
-        _outliers(result),
-    )
+    parts = (_outcome, _notes, _measurements, _errors, _noise, _parameters, _base_and_tool)
+    sections = [part(result) for part in (*parts, _left_out, _trust, _outliers)]
     return tuple(section for section in sections if section.body)
 
 
-def _outcome(result: CalibrationResult) -> ReportSection:
+def _outcome(result: CalibrationResult) -> Section:
     problem, fit, validation = result.solution.problem, result.solution.fit, result.validation
     sentences = [
         result.reason(),
@@ -93,13 +74,12 @@ def _outcome(result: CalibrationResult) -> ReportSection:
     test = validation.held_out  # measurements that the user held out come first, then all folds
     if test is None or test.description:
         test = validation.folds or test
-    kept_aside = {} if test is None else test.rms
     for unit, rms in validation.in_sample.rms.items():
         text = f"Rms {'position' if unit == 'm' else 'angle'} error "
         text += f"{in_unit(validation.nominal.rms[unit], unit)} -> {in_unit(rms, unit)} "
         text += printed_unit(unit)
-        if unit in kept_aside:
-            text += f"; on held-out data {in_unit(kept_aside[unit], unit)} {printed_unit(unit)}"
+        if test is not None and unit in test.rms:
+            text += f"; on held-out data {in_unit(test.rms[unit], unit)} {printed_unit(unit)}"
         sentences.append(f"{text}.")
     if not implausible(result.solution):
         tool = result.other_tool
@@ -109,28 +89,27 @@ def _outcome(result: CalibrationResult) -> ReportSection:
             f"{1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg; with the nominal robot "
             f"{1e3 * tool.nominal:.2g} mm."
         )
-    return ReportSection("Outcome", tuple(sentences))
+    return Section("Outcome", tuple(sentences))
 
 
 def _prior_text(result: CalibrationResult) -> str:
     """Prior standard deviations of the table's lengths and angles, as used."""
-    prior, f = result.solution.fit.prior, result.nominal.f
-    used = {}
+    prior, used = result.solution.fit.prior, {}
     for entry, size in zip(result.parameters.entries, prior.sigma, strict=False):
-        if np.isfinite(size) and 0 < entry.row <= f and entry.law is ErrorLaw.CONSTANT:
+        if np.isfinite(size) and result.parameters.is_of_table(entry):
             used.setdefault(entry.element.is_length, size / np.sqrt(prior.strength))
     texts = [f"{1e3 * used[k]:.3g} {'mm' if k else 'mrad'}" for k in (True, False) if k in used]
     if texts:
         return f" Prior standard deviations of the table: {', '.join(texts)}."
-    return " With a prior." if np.isfinite(prior.sigma).any() else " Without a prior."
+    return " With a prior." if has_prior(result.solution) else " Without a prior."
 
 
-def _notes(result: CalibrationResult) -> ReportSection:
+def _notes(result: CalibrationResult) -> Section:
     notes = (note for note in (*result.notes, *result.robot.notes) if note != result.reason())
-    return ReportSection("Notes", tuple(f"* {note}" for note in notes))
+    return Section("Notes", tuple(f"* {note}" for note in notes))
 
 
-def _measurements(result: CalibrationResult) -> ReportSection:
+def _measurements(result: CalibrationResult) -> Section:
     measurements = result.solution.problem.measurements
     rows = []
     for k, m in enumerate(measurements):
@@ -138,12 +117,18 @@ def _measurements(result: CalibrationResult) -> ReportSection:
         counts = str(m.blocks), " ".join(m.axes), str(len(m.fixtures))
         rows.append((str(k + 1), m.name, type(m).__name__, *counts, ", ".join(ends) or "-"))
     headings = ("", "name", "kind", "number", "rows", "unknown fixtures", "end")
-    body: list[str | ReportTable] = [table_of(headings, rows)]
-    body += filter(None, map(files_sentence, measurements))
-    views = [view.q for m in measurements for view in m.views]
-    if views:
-        body += ["Readings of the joints:", _ranges(result, np.concatenate(views))]
-    return ReportSection("Measurements", tuple(body))
+    body = [table_of(headings, rows), *filter(None, map(files_sentence, measurements))]
+    model, q = result.nominal, [view.q for m in measurements for view in m.views]
+    joints = []
+    for j, (name, values) in enumerate(zip(model.table.joint_names, np.vstack(q).T, strict=True)):
+        slides = model.table.sigma[model.table.joint_rows[j]] == PRISMATIC
+        width = float(model.upper[j] - model.lower[j])
+        share = f"{100.0 * np.ptp(values) / width:.0f} %" if 0 < width < np.inf else "-"
+        factor = 1e3 if slides else 180.0 / np.pi
+        sizes = (f"{factor * x:.1f}" for x in (values.min(), values.max(), values.std()))
+        joints.append((str(j + 1), name, printed_unit("m" if slides else "rad"), *sizes, share))
+    headings = ("", "joint", "unit", "from", "to", "spread (std)", "of its range")
+    return Section("Measurements", (*body, "Readings of the joints:", table_of(headings, joints)))
 
 
 def files_sentence(measurement: Measurement) -> str:
@@ -152,20 +137,7 @@ def files_sentence(measurement: Measurement) -> str:
     return f"Read for {measurement.name}: {files}." if files else ""
 
 
-def _ranges(result: CalibrationResult, q: Array) -> ReportTable:
-    model, rows = result.nominal, []
-    for j, name in enumerate(model.table.joint_names):
-        slides = model.table.sigma[model.table.joint_rows[j]] == PRISMATIC
-        factor = 1e3 if slides else 180.0 / np.pi
-        low, high = float(q[:, j].min()), float(q[:, j].max())
-        width = float(model.upper[j] - model.lower[j])
-        share = f"{100.0 * (high - low) / width:.0f} %" if 0 < width < np.inf else "-"
-        numbers = (f"{factor * x:.1f}" for x in (low, high, float(q[:, j].std())))
-        rows.append((str(j + 1), name, printed_unit("m" if slides else "rad"), *numbers, share))
-    return table_of(("", "joint", "unit", "from", "to", "spread (std)", "of its range"), rows)
-
-
-def _errors(result: CalibrationResult) -> ReportSection:
+def _errors(result: CalibrationResult) -> Section:
     validation = result.validation
     named: list[tuple[str, Errors]] = [
         ("robot as given", validation.given),
@@ -185,28 +157,23 @@ def _errors(result: CalibrationResult) -> ReportSection:
                 sentences.append(f"{name.capitalize()}: {held.description} held out.")
     if validation.folds is None and validation.held_out is None:
         sentences.append("No measurements were held out: the prediction error is unknown.")
-    units = tuple(validation.in_sample.count)
-    headings = [""]
+    units, headings, rows = tuple(validation.in_sample.count), [""], []
     for unit in units:
         headings += ["n", f"rms {printed_unit(unit)}", "mean", "max"]
-    rows = []
     for name, errors in named:
         cells = [name]
         for unit in units:
             sizes = (x.get(unit, np.nan) for x in (errors.rms, errors.mean, errors.max))
             cells += [str(errors.count.get(unit, 0)), *(in_unit(x, unit) for x in sizes)]
         rows.append(tuple(cells))
-    return ReportSection("Errors before and after", (*sentences, table_of(tuple(headings), rows)))
+    return Section("Errors before and after", (*sentences, table_of(tuple(headings), rows)))
 
 
-def _noise(result: CalibrationResult) -> ReportSection:
-    solution = result.solution
-    rows, first = [], 0
-    parts = zip(solution.problem.measurements, solution.scales, strict=True)
-    for k, (m, scale) in enumerate(parts):
-        count = m.blocks * len(m.axes)
-        whitened = solution.fit.residuals[first : first + count].reshape(m.blocks, -1)
-        first += count
+def _noise(result: CalibrationResult) -> Section:
+    solution, rows = result.solution, []
+    parts = zip(solution.scales, solution.problem.row_slices, strict=True)
+    for k, (m, (scale, at)) in enumerate(zip(solution.problem.measurements, parts, strict=True)):
+        whitened = solution.fit.residuals[at].reshape(m.blocks, -1)
         variance = np.broadcast_to(scale**2, whitened.shape)
         if m.sigma is not None:
             variance = m.sigma**2
@@ -219,31 +186,26 @@ def _noise(result: CalibrationResult) -> ReportSection:
             cells = printed_unit(unit), in_unit(float(std), unit), source, f"{rms:.3g}"
             rows.append((str(k + 1), m.name, *cells))
     headings = ("", "name", "unit", "std of a row", "", "rms residual / std")
-    return ReportSection("Noise", (table_of(headings, rows),))
+    return Section("Noise", (table_of(headings, rows),))
 
 
-def _parameters(result: CalibrationResult) -> ReportSection:
+def _parameters(result: CalibrationResult) -> Section:
     interval = confidence_intervals(result.solution.fit)[: len(result.names)]
     f, entries = result.nominal.f, result.parameters.entries
-    body: list[str | ReportTable] = [
+    body: list[Any] = [
         f"Row 0 is the base, rows 1 to {f} are the frames of the table, rows from {f + 1} the "
         "measured ends. Corrections of base and ends count from where the fit placed them, the "
         "others from the nominal robot. Intervals are of the corrections."
     ]
     order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
-    start, relative = result.parameters.nominal, result.relative_errors
-    columns = start, result.corrections, result.values, result.standard_errors
+    relative = result.relative_errors
+    columns = result.parameters.nominal, result.corrections, result.values, result.standard_errors
     for unit in dict.fromkeys(("m", "rad", *result.units)):
-        rows = [
-            (
-                result.names[k],
-                *(in_unit(column[k], unit) for column in columns),
-                percent_text(relative[k]),
-                *(in_unit(end, unit) for end in interval[k]),
-            )
-            for k in order
-            if result.units[k] == unit
-        ]
+        rows = []
+        for k in (k for k in order if result.units[k] == unit):
+            sizes = (in_unit(column[k], unit) for column in columns)
+            ends = (in_unit(end, unit) for end in interval[k])
+            rows.append((result.names[k], *sizes, percent_text(relative[k]), *ends))
         if rows:
             words = ("start", "correction", "value", "std err", "rel.", "95 % from", "to")
             body.append(table_of((printed_unit(unit), *words), rows))
@@ -255,10 +217,10 @@ def _parameters(result: CalibrationResult) -> ReportSection:
             f"{len({name.rsplit('.', 1)[0] for name in result.fixtures})} points, planes or "
             "targets were estimated too (result.fixtures)."
         )
-    return ReportSection("Parameters", tuple(body))
+    return Section("Parameters", tuple(body))
 
 
-def _base_and_tool(result: CalibrationResult) -> ReportSection:
+def _base_and_tool(result: CalibrationResult) -> Section:
     rows = []
     for name in ("base", "tool"):
         given, found = getattr(result.nominal, name), getattr(result.model, name)
@@ -269,17 +231,15 @@ def _base_and_tool(result: CalibrationResult) -> ReportSection:
             rpy = np.rad2deg(operational_coordinates(T, "rpy_urdf")[3:])
             rows.append((label, *(f"{x:.3f}" for x in (*(1e3 * T[:3, 3]), *rpy)), *end))
     headings = ("", "x mm", "y", "z", "roll deg", "pitch", "yaw", "moved mm", "turned deg")
-    return ReportSection("Base and tool", (table_of(headings, rows),))
+    return Section("Base and tool", (table_of(headings, rows),))
 
 
-def _left_out(result: CalibrationResult) -> ReportSection:
+def _left_out(result: CalibrationResult) -> Section:
     found = result.identifiable
-    body: list[str | ReportTable] = [
-        f"{found.count} of {len(found.candidates)} parameters are identifiable."
-    ]
-    reasons = (Reason.KNOWN, Reason.GAUGE, Reason.NO_EFFECT, Reason.NOISE)
-    names = {why: ", ".join(found.of_reason(why)) for why in reasons}
-    body += [f"{listed}: {why.value}." for why, listed in names.items() if listed]
+    body = [f"{found.count} of {len(found.candidates)} parameters are identifiable."]
+    for why in (Reason.KNOWN, Reason.GAUGE, Reason.NO_EFFECT, Reason.NOISE):
+        names = ", ".join(found.of_reason(why))
+        body += [f"{names}: {why.value}."] if names else []
     if found.regrouped_into:
         body.append(
             f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has "
@@ -292,13 +252,13 @@ def _left_out(result: CalibrationResult) -> ReportSection:
         f"Sines of the angles to the columns before: {found.gap[0]:.1e} is the smallest that was "
         f"kept, {found.gap[1]:.1e} the largest left out."
     )
-    return ReportSection("Known, and not identifiable", tuple(body))
+    return Section("Known, and not identifiable", tuple(body))
 
 
-def _trust(result: CalibrationResult) -> ReportSection:
+def _trust(result: CalibrationResult) -> Section:
     fit = result.solution.fit
     found = fit_diagnostics(fit)
-    body: list[str | ReportTable] = [
+    body: list[Any] = [
         f"Condition number {result.identifiable_after.condition:.3g} (columns of length 1). "
         f"Residuals are {fit.scale:.3g} times their standard deviations; {fit.freedom_left:.0f} "
         "degrees of freedom are left."
@@ -315,34 +275,31 @@ def _trust(result: CalibrationResult) -> ReportSection:
         body.append(table_of(("", "with", "correlation"), rows))
     else:
         body.append(f"No two estimates are correlated by more than {_STRONG}.")
-    return ReportSection("Quality of the fit", tuple(body))
+    return Section("Quality of the fit", tuple(body))
 
 
-def _outliers(result: CalibrationResult) -> ReportSection:
+def _outliers(result: CalibrationResult) -> Section:
     fit, errors = result.solution.fit, result.validation.in_sample
     blocks = [(m, b) for m in result.solution.problem.measurements for b in range(m.blocks)]
     place = np.cumsum([bool(m.views) for m, _ in blocks]) - 1
     rows = []
     for block in fit.outliers[:_LISTED].tolist():
         m, inside = blocks[block]
-        lengths = ("-", "-")
+        at, lengths = place[block], ("-", "-")
         if m.views:
-            at = place[block]
             lengths = millimetres(float(errors.position[at])), degrees(float(errors.angle[at]))
-        origin = m.origin
-        where = (origin[inside].name, origin[inside].row) if origin else (m.name, inside + 1)
+        where = m.origin[inside] if m.origin else (m.name, inside + 1)
         weight = float(fit.weights[fit.block == block].mean())
         rows.append((str(block + 1), where[0], str(where[1]), *lengths, f"{weight:.2g}"))
     if not rows:
-        return ReportSection("Outliers", ())
-    more = len(fit.outliers) > _LISTED
+        return Section("Outliers", ())
+    more = f" The worst {_LISTED} of {len(fit.outliers)}:" if len(fit.outliers) > _LISTED else ""
     text = (
         "Measurements whose residuals are larger than noise explains; they stay in the fit with "
-        "their weights. Numbers and rows count from 1."
-        + (f" The worst {_LISTED} of {len(fit.outliers)}:" if more else "")
+        f"their weights. Numbers and rows count from 1.{more}"
     )
     headings = ("number", "measurement or file", "row", "mm", "deg", "weight")
-    return ReportSection("Outliers", (text, table_of(headings, rows)))
+    return Section("Outliers", (text, table_of(headings, rows)))
 
 
 # --- residuals row by row -------------------------------------------------------------------------
@@ -367,15 +324,19 @@ def measured_residuals(result: CalibrationResult) -> tuple[MeasuredResiduals, ..
     """Residuals of every measurement of a calibration, before and after it."""
     solution = result.solution
     problem, fit, nominal = solution.problem, solution.fit, np.zeros(solution.problem.P)
-    before = linearised(problem, nominal, suited_fixtures(problem, nominal))
-    after = linearised(problem, solution.corrections, solution.fixtures)
-    seen = evaluations(problem, solution.corrections)
-    found, row, block = [], 0, 0
-    for m, old, new, views in zip(problem.measurements, before, after, seen, strict=True):
-        whitened = fit.whitened[row : row + m.blocks * len(m.axes)].reshape(m.blocks, -1)
+    parts = zip(
+        problem.measurements,
+        linearised(problem, nominal, suited_fixtures(problem, nominal)),
+        linearised(problem, solution.corrections, solution.fixtures),
+        evaluations(problem, solution.corrections),
+        problem.row_slices,
+        strict=True,
+    )
+    found, block = [], 0
+    for m, old, new, views, rows in parts:
         blocks = np.arange(block, block + m.blocks)
+        block += m.blocks
         p = views[0].T[:, :3, 3] if views else np.full((m.blocks, 3), np.nan)
-        outlier = np.isin(blocks, fit.outliers)
+        whitened, outlier = fit.whitened[rows].reshape(m.blocks, -1), np.isin(blocks, fit.outliers)
         found.append(MeasuredResiduals(m, old.residual, new.residual, whitened, p, blocks, outlier))
-        row, block = row + whitened.size, block + m.blocks
     return tuple(found)

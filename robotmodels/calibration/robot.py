@@ -158,14 +158,9 @@ class CalibratedRobot(Frozen):
     @property
     def notes(self) -> tuple[str, ...]:
         """Errors that ``model`` alone, or a URDF of it, does not hold, in sentences."""
-        present = {e.law for e in self.joint_errors.laws.entries}
-        table, bent = self.parameters.table, self.bent_rows
-        words = [
-            _LAW_WORDS.get(law, "Eccentricity of the encoders is")
-            for law in ErrorLaw
-            if law in present
-        ]
-        notes = [f"{what} in joint_errors, not in model." for what in dict.fromkeys(words)]
+        table, bent, present = self.parameters.table, self.bent_rows, self.joint_errors.laws.entries
+        words = {_LAW_WORDS.get(e.law, "Eccentricity of the encoders is") for e in present}
+        notes = [f"{what} in joint_errors, not in model." for what in sorted(words, reverse=True)]
         if bent:
             places = ["tilt of the mount"] if bent[0] == 0 else []
             links = ", ".join(table.row_name(row) for row in bent if row)
@@ -174,12 +169,8 @@ class CalibratedRobot(Frozen):
                 f"Compliance of links and mount ({' and '.join(places)}) is in calibrated_pose, "
                 "not in model."
             )
-        elsewhere = [
-            table.row_name(end.row)
-            for end in self.ends
-            if end.frame not in _tool_names(self.model)
-            and all(named.name != end.frame for named in self.model.frames)
-        ]
+        held = {*_tool_names(self.model), *(named.name for named in self.model.frames)}
+        elsewhere = [table.row_name(end.row) for end in self.ends if end.frame not in held]
         if elsewhere:
             notes.append(
                 f"The errors of {', '.join(elsewhere)} are in ends: the model has no frame that "
@@ -216,10 +207,8 @@ def calibrated_model(parameters: GeometricParameters, corrections: ArrayLike) ->
 
     Parameters
     ----------
-    parameters : GeometricParameters
-        P parameters of a nominal robot.
-    corrections : array_like, shape (P,)
-        Added to the nominal values (rad, m, or the unit of the parameter).
+    parameters, corrections
+        See `robotmodels.calibration`.
 
     Returns
     -------
@@ -299,12 +288,8 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
 
     Parameters
     ----------
-    robot : CalibratedRobot
-        The robot, n joints.
-    q_read : array_like, shape (..., n)
-        Readings, rad or m.
-    frame : str, int or None
-        A measured end or any frame of the model; None is the tool.
+    robot, q_read, frame
+        See `robotmodels.calibration`; the frame is a measured end or any frame of the model.
 
     Returns
     -------

@@ -19,20 +19,30 @@ from ..model import RobotModel, check_model
 from ..obstacles.clearance import checked_obstacles, clearance, links
 from ..obstacles.shapes import Obstacle
 from .candidates import candidate_parameters
-from .exchange import exchanged, greedy, index_of, information, moved_configurations, nested
 from .extended_table import Frame
 from .identifiable import identifiable_on
 from .measurements import Measurement, whitened
+from .measurements.fields import as_sigma
 from .measurements.kinds import Kind, as_kind, drawn_groups, groups_of, measurement_of
-from .observability import Criterion, Observability, observability
+from .observability import (
+    Criterion,
+    Observability,
+    exchanged,
+    greedy,
+    index_of,
+    information,
+    moved_configurations,
+    nested,
+    observability,
+    whole_number,
+)
 from .parameters import GeometricParameters
 from .problem import guessed_fixtures, linearised, problem_of
 
-LENGTH_NOISE = 1e-4  # standard error of a length where none is given, m
+_LENGTH_NOISE = 1e-4  # standard error of a length where none is given, m
 _RANKED = 150  # number of candidate configurations used for the rank test
 _DRAWS = 12
-_CONTACT_TOLERANCE = 1e-6
-"""Distance (m) and angle (rad) up to which given postures of a contact count as meeting."""
+_CONTACT_TOLERANCE = 1e-6  # m and rad up to which given postures of a contact count as meeting
 _CHUNK = 32
 
 
@@ -179,8 +189,8 @@ def select_configurations(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
+    model, parameters, known_lengths, frame, rng, progress
+        See `robotmodels.calibration`. The identifiable ones among the parameters count.
     kind : class or str
         What shall be measured: `Pose`, `PointContact`, ... or ``"point_contact"``, ...
     count : int
@@ -189,17 +199,11 @@ def select_configurations(
         To choose from: configurations, or groups of m postures; default ``drawn`` random ones.
     drawn : int
         How many candidates to draw.
-    parameters : GeometricParameters or names, optional
-        What shall be estimated; default all. The identifiable ones among these count.
-    known_lengths : iterable of str
-        Parameters that are known; contacts need one.
     criterion : Criterion
         Observability index to maximise; default O1, the determinant.
     sigma : float or array_like, shape (k,), optional
         Standard errors of the rows of a measurement, m or rad; default 0.1 mm, and the angle that
         turns the end by as much at the robot's reach.
-    frame : str, int or None
-        The measured end; None is the tool.
     postures : int, optional
         Postures of a contact; default by the kind.
     obstacles, radius
@@ -209,26 +213,15 @@ def select_configurations(
         obstacles, as long as that helps. Not for contacts.
     starts : int
         Sets to start from: a greedy one, the others random.
-    rng : numpy.random.Generator or int, optional
-        Source of randomness; default a fresh one.
-    progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
 
     Returns
     -------
     SelectedConfigurations
         The set, its indices, and the expected error for each count.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Fewer candidates than ``count``, or fewer than the parameters need; contacts that do not
-        meet; no length known; unknown names.
-
     References
     ----------
-    Seed book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972; D. Daney, Y.
-    Papegay, B. Madeline, Int. J. Robotics Research 24(6), 2005.
+    Seed book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972.
 
     Examples
     --------
@@ -240,7 +233,7 @@ def select_configurations(
     check_model(model)
     kind = as_kind(kind)
     criterion = chosen(Criterion, criterion, "criterion")
-    count, starts = _whole(count, "count"), _whole(starts, "starts")
+    count, starts = whole_number(count, "count"), whole_number(starts, "starts")
     rng = np.random.default_rng(rng)
     work = Workers(progress=progress)
     if optimise and kind.is_constraint:
@@ -259,8 +252,10 @@ def select_configurations(
         return np.asarray((far > 0.0).all(axis=1))
 
     if candidates is None:
-        size = kind.postures if postures is None else _whole(postures, "postures")
-        pool, notes = _drawn(parameters, kind, _whole(drawn, "drawn"), size, rng, frame, is_clear)
+        size = kind.postures if postures is None else whole_number(postures, "postures")
+        pool, notes = _drawn(
+            parameters, kind, whole_number(drawn, "drawn"), size, rng, frame, is_clear
+        )
         numbers = np.arange(len(pool))
     else:
         given = _given(parameters, kind, candidates, frame)
@@ -291,24 +286,42 @@ def select_configurations(
         )
     effect = np.sqrt((rows**2).sum(axis=(0, 1)) / len(rows))
     scaled = rows / effect
-    best = _best(scaled, count, criterion, starts, rng, work.part(0.0, 0.5 if optimise else 1.0))
-    groups, members, part = pool[best], numbers[best], scaled[best]
+    best, value = np.zeros(0, dtype=np.int64), -np.inf
+    for k in range(starts):  # the best of several local optima
+        start = rng.permutation(len(rows))[:count] if k else greedy(scaled, count, criterion)
+        members = exchanged(scaled, start, criterion, work.part(k / starts, (k + 1) / starts))
+        after = float(index_of(information(scaled[members]), criterion))
+        if after > value or not len(best):
+            best, value = members, after
+    groups, numbers, part = pool[best], numbers[best], scaled[best]
     if optimise:
-        groups = moved_configurations(
-            groups, part, criterion, lambda q: group_rows(kept, kind, q, sigma, frame) / effect,
-            lambda q: _within_limits(model, q) & is_clear(q), model, work.part(0.5, 1.0),
-        )  # fmt: skip
-        members = np.where((groups == pool[best]).all(axis=(1, 2)), members, -1)
-        part = group_rows(kept, kind, groups, sigma, frame) / effect
-    order = nested(part, np.arange(count), criterion)
+
+        def is_allowed(q: Array) -> NDArray[np.bool_]:
+            return _within_limits(model, q) & is_clear(q)
+
+        def scaled_rows(q: Array) -> Array:
+            return group_rows(kept, kind, q, sigma, frame) / effect
+
+        groups = moved_configurations(groups, part, criterion, scaled_rows, is_allowed, model)
+        numbers = np.where((groups == pool[best]).all(axis=(1, 2)), numbers, -1)
+        part = scaled_rows(groups)
+    order = nested(part, criterion)
     part = part[order]
     counts, values, errors = _curve(part, criterion)
     return SelectedConfigurations(
-        kind=kind, groups=groups[order], candidates=members[order], parameters=kept,
-        criterion=criterion, observability=observability(part), counts=counts, values=values,
-        standard_errors=errors / effect, errors=np.sqrt((errors**2).mean(axis=1)), pool=len(pool),
+        kind=kind,
+        groups=groups[order],
+        candidates=numbers[order],
+        parameters=kept,
+        criterion=criterion,
+        observability=observability(part),
+        counts=counts,
+        values=values,
+        standard_errors=errors / effect,
+        errors=np.sqrt((errors**2).mean(axis=1)),
+        pool=len(pool),
         left_out=notes,
-    )  # fmt: skip
+    )
 
 
 def group_rows(
@@ -347,17 +360,9 @@ def _noise(
     """Standard errors of the rows of a block."""
     units = measurement.units
     if sigma is None:
-        turn = LENGTH_NOISE / characteristic_length(parameters.model, frame)
-        return np.array([LENGTH_NOISE if unit == "m" else turn for unit in units])
-    values = as_floats(sigma, "sigma")
-    if values.shape not in ((), (len(units),)):
-        raise ShapeError(
-            f"sigma: expected a number or one for each of {measurement.axes}, got shape "
-            f"{values.shape}."
-        )
-    if not (values > 0.0).all():
-        raise InvalidValueError(f"sigma: expected positive numbers, got {sigma!r:.80}.")
-    return np.broadcast_to(values, (len(units),))
+        turn = _LENGTH_NOISE / characteristic_length(parameters.model, frame)
+        return np.array([_LENGTH_NOISE if unit == "m" else turn for unit in units])
+    return as_sigma(sigma, 1, len(units))[0]
 
 
 def _within_limits(model: RobotModel, q: Array) -> NDArray[np.bool_]:
@@ -427,25 +432,6 @@ def _given(
     return q
 
 
-def _best(
-    rows: Array,
-    count: int,
-    criterion: Criterion,
-    starts: int,
-    rng: np.random.Generator,
-    work: Workers,
-) -> NDArray[np.int64]:
-    """The best of several sets, each a local optimum."""
-    best, value = np.zeros(0, dtype=np.int64), -np.inf
-    for k in range(starts):
-        start = rng.permutation(len(rows))[:count] if k else greedy(rows, count, criterion)
-        members = exchanged(rows, start, criterion, work.part(k / starts, (k + 1) / starts))
-        after = float(index_of(information(rows[members]), criterion))
-        if after > value or not len(best):
-            best, value = members, after
-    return best
-
-
 def _curve(rows: Array, criterion: Criterion) -> tuple[NDArray[np.int64], Array, Array]:
     """Counts, criterion and expected standard errors of the first parts of a set."""
     counts, values, errors = [], [], []
@@ -463,10 +449,3 @@ def _curve(rows: Array, criterion: Criterion) -> tuple[NDArray[np.int64], Array,
             "other candidates."
         )
     return np.array(counts, dtype=np.int64), np.array(values), np.array(errors)
-
-
-def _whole(value: Any, name: str) -> int:
-    """A whole number from 1."""
-    if isinstance(value, bool) or int(value) != value or value < 1:
-        raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
-    return int(value)

@@ -178,10 +178,8 @@ def _estimated_scales(
     """Noise of each measurement and unit, shrunk to the common value of its kind."""
     leverage = (fit.orthonormal_rows**2).sum(axis=1)
     estimates: dict[tuple[type, str], list[tuple[int, Array, float, float]]] = {}
-    first = 0
-    for k, (m, scale) in enumerate(zip(problem.measurements, scales, strict=True)):
-        rows = slice(first, first + m.blocks * len(m.axes))
-        first = rows.stop
+    parts = zip(problem.measurements, scales, problem.row_slices, strict=True)
+    for k, (m, scale, rows) in enumerate(parts):
         if states_noise(m):
             continue
         for unit in sorted(set(m.units)):

@@ -19,25 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..geometry import FIXED, PRISMATIC
+from ..geometry import PRISMATIC
 from ..table_text import in_unit, printed_unit
 from .candidates import candidate_parameters
-from .extended_table import Element
-from .identifiable import IdentifiableParameters, Reason
+from .extended_table import JOINT_VARIABLE
+from .identifiable import IdentifiableParameters, Reason, needs_a_length
 from .measurements import Evaluation, whitened
 from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
-from .scale import needs_a_length
 from .solve import ROUGH, Solution, refitted
 from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of
 
-_SIGNIFICANCE = 0.01  # significance level of all tests together
+_SIGNIFICANCE = 0.01  # level of all tests together
 _INDICATED = 0.05  # significance level at which a family is tried
 _FLIPS = 999
-_LEAST_P = 4.0 / (1 + _FLIPS)
-"""Smallest p-value that four tests with so many draws of signs can give."""
-_FEWEST = 20  # smallest numbers of postures and of residual degrees of freedom for the test
+_LEAST_P = 4.0 / (1 + _FLIPS)  # smallest p-value that four tests with so many signs can give
+_FEWEST = 20  # postures, and residual degrees of freedom, for the test
 _ROUNDING = 1e-8  # largest residuals of exact data, relative to the robot's size, or rad
 _DEPENDENT = 1e-4  # sine of the angle to the columns of the fit below which a column is one of them
 _SURE = 3.0  # standard errors by which the mean square of errors on held-out data must fall
@@ -75,20 +73,18 @@ class Structure(NamedTuple):
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
     """Test the residuals of a fit; None without structure, for exact data and few postures."""
-    fit = solution.fit
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
     corrections = np.zeros(problem.P)
     corrections[whole.index(solution.problem.parameters.names)] = solution.corrections
-    errors = errors_of(problem, corrections, solution.fixture_values)
+    largest = errors_of(problem, corrections, solution.fixture_values).max
     sizes = {"m": whole.table.size, "rad": 1.0}
-    largest = max((e / sizes[unit] for unit, e in errors.max.items()), default=0.0)
     posture = _posture_of_rows(problem)
     count = int(posture.max()) + 1
-    if largest < _ROUNDING or count < _FEWEST:
+    if count < _FEWEST or all(e < _ROUNDING * sizes[unit] for unit, e in largest.items()):
         return None
     r, J = stacked(problem, np.concatenate([corrections, solution.fixtures]), solution.scales)
-    weight = np.sqrt(fit.weights)
+    weight = np.sqrt(solution.fit.weights)
     r, J = weight * r, weight[:, None] * J
     included = {e.law for e in found.candidates.entries} | {ErrorLaw.CONSTANT}
     taken = [k for k, e in enumerate(whole.entries) if e.law in included]
@@ -120,13 +116,9 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
         columns = _basis(projected(J[:, terms]), _DEPENDENT)
         if included.isdisjoint(family.laws) and columns.shape[1]:
             p_values[family] = p_value(by_posture(columns))
-    tests = [*p_values.values()]
-    smooth = [
-        by_posture(projected(weight[:, None] * columns))
-        for columns in _smooth_columns(problem, corrections, solution)
-    ]
-    if smooth:
-        tests.append(p_value(np.hstack(smooth)))
+    smooth = _smooth_columns(problem, corrections, solution)
+    smooth = [by_posture(projected(weight[:, None] * columns)) for columns in smooth]
+    tests = [*p_values.values(), *([p_value(np.hstack(smooth))] if smooth else [])]
     p = min(1.0, len(tests) * min(tests, default=1.0))
     if p >= _SIGNIFICANCE:
         return None
@@ -150,13 +142,13 @@ def _all_parameters(
     )
     entries = {e.name: e for e in (*solution.problem.parameters.entries, *found.candidates.entries)}
     others = {e.name: e for e in everything.entries if e.name not in entries}
-    left_out: set[str] = set()
     missing = {name for name, e in others.items() if e.law is ErrorLaw.CONSTANT}
-    is_open = needs_a_length(problem_of(everything, solution.problem.measurements))
-    if is_open:  # with all lengths free the robot shrinks until nothing is left of a residual
-        left_out = missing.union(*(found.of_reason(why) for why in (Reason.KNOWN, Reason.GAUGE)))
+    if not needs_a_length(problem_of(everything, solution.problem.measurements)):
+        return GeometricParameters(table, tuple((entries | others).values())), True
+    # with all lengths free the robot shrinks until nothing is left of a residual
+    left_out = missing.union(*(found.of_reason(why) for why in (Reason.KNOWN, Reason.GAUGE)))
     kept = (e for name, e in (entries | others).items() if name not in left_out)
-    return GeometricParameters(table, tuple(kept)), not (is_open and missing)
+    return GeometricParameters(table, tuple(kept)), not missing
 
 
 def _posture_of_rows(problem: Problem) -> NDArray[np.int64]:
@@ -185,12 +177,11 @@ def _basis(columns: Array, least: float) -> Array:
 def _smooth_columns(problem: Problem, corrections: Array, solution: Solution) -> list[Array]:
     """Jacobian columns of smooth position errors of each joint: sines, cosines and products."""
     table = problem.parameters.table
-    variables = []
-    for k, e in enumerate(problem.parameters.entries):
-        variable = Element.R if table.sigma[e.row] == PRISMATIC else Element.THETA
-        moves = 0 < e.row <= table.model.f and table.sigma[e.row] != FIXED
-        if e.law is ErrorLaw.CONSTANT and moves and e.element is variable:
-            variables.append((k, e.row))
+    variables = [
+        (k, e.row)
+        for k, e in enumerate(problem.parameters.entries)
+        if problem.parameters.is_of_table(e) and e.element is JOINT_VARIABLE[table.sigma[e.row]]
+    ]
     rows = [row for _, row in variables]
     joints, slides = table.joint[rows], table.sigma[rows] == PRISMATIC
     readings = np.concatenate([view.q for m in problem.measurements for view in m.views])[:, joints]
@@ -226,17 +217,13 @@ def _harmonics(q: Array) -> Array:
 
 
 class Trial(NamedTuple):
-    """A fit with one more family, judged on held-out data.
-
-    ``gain``: relative decrease of their mean square; ``helps``: whether it is significant;
-    ``explains_all``: whether the residuals of this fit show no structure.
-    """
+    """A fit with one more family: what it gains on held-out data, and whether surely."""
 
     family: TermFamily
     errors: Errors
     gain: float
     helps: bool
-    explains_all: bool = False
+    explains_all: bool = False  # its residuals show no structure
 
 
 def trials_of(
@@ -254,17 +241,16 @@ def trials_of(
     ``identify`` gives the identifiable ones of some candidates; ``validation`` are the errors of
     the parts without the family.
     """
-    measurements, old = solution.problem.measurements, solution.problem.parameters
-    trials: list[Trial] = []
-    fits: dict[TermFamily, tuple[Solution, IdentifiableParameters]] = {}
+    old, trials, fits = solution.problem.parameters, [], {}
     for family in structure.indicated:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
         identifiable = identify(replace(candidates, entries=(*candidates.entries, *new)))
         kept = identifiable.kept
         if solution.prior is not None:
-            kept = estimated_with(solution.prior, identifiable, measurements)
+            kept = estimated_with(solution.prior, identifiable, solution.problem.measurements)
         added = [e for e in new if e.name in kept.names]
-        wider = problem_of(replace(old, entries=(*old.entries, *added)), measurements)
+        parameters = replace(old, entries=(*old.entries, *added))
+        wider = problem_of(parameters, solution.problem.measurements)
         start = np.concatenate([solution.corrections, np.zeros(len(added)), solution.fixtures])
         found = refitted(solution, wider, start, solution.scales, tolerance=ROUGH)
         done()
@@ -272,13 +258,11 @@ def trials_of(
         trials.append(Trial(family, errors, *_gain(validation, errors)))
         fits[family] = found, identifiable
     trials.sort(key=lambda trial: -trial.gain)
-    best = next((trial.family for trial in trials if trial.helps), None)
-    return [
-        trial._replace(
-            explains_all=trial.family == best and structure_of(*fits[trial.family]) is None
-        )
-        for trial in trials
-    ]
+    for k, trial in enumerate(trials):
+        if trial.helps:  # the best one alone
+            trials[k] = trial._replace(explains_all=structure_of(*fits[trial.family]) is None)
+            break
+    return trials
 
 
 def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
@@ -288,46 +272,44 @@ def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
         np.nansum([(errors.position / scale[0]) ** 2, (errors.angle / scale[1]) ** 2], axis=0)
         for errors in (before, after)
     )
-    decrease = was - now
-    mean = float(decrease.mean())
+    mean = float((was - now).mean())
     gain = mean / float(was.mean())
-    is_sure = mean > _SURE * float(decrease.std()) / np.sqrt(len(decrease))
+    is_sure = mean > _SURE * float((was - now).std()) / np.sqrt(len(was))
     return gain, bool(is_sure and gain > _GAIN)
 
 
 def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Errors | None) -> str:
     """Note on residual structure and the recommended term."""
     p = f"p {'<=' if structure.p <= _LEAST_P else '='} {structure.p:.2g}"
-    text = [
-        f"The residuals depend on the posture ({p}), and no geometric parameter explains it."
+    text = f"The residuals depend on the posture ({p}), and no "
+    text += (
+        "geometric parameter explains it."
         if structure.is_complete
-        else f"The residuals depend on the posture ({p}), and no estimated parameter explains it; "
-        "parameters of the table that were left out may be the cause.",
-        "Standard errors assume independent residuals and are too small.",
-    ]
+        else "estimated parameter explains it; parameters of the table that were left out may be "
+        "the cause."
+    )
+    text += " Standard errors assume independent residuals and are too small."
     helpful = [trial for trial in trials if trial.helps]
     is_explained = bool(helpful) and helpful[0].explains_all
     if without is None and structure.indicated:
         terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
-        text.append(f"A fit with folds shows whether {terms} explains it.")
+        text += f" A fit with folds shows whether {terms} explains it."
     if without is not None and helpful:
-        found = [
+        found = "; ".join(
             f"{t.family.word} ({t.family.option}) from {_change(without, t.errors)}"
             for t in helpful
-        ]
-        text.append(
-            f"Try {helpful[0].family.word} next. Rms error on held-out data: {'; '.join(found)}."
         )
+        text += f" Try {helpful[0].family.word} next. Rms error on held-out data: {found}."
         if not is_explained:
-            text.append(f"With {helpful[0].family.word} the residuals still depend on the posture.")
+            text += f" With {helpful[0].family.word} the residuals still depend on the posture."
     if not structure.parameters.model.inertia.values.any():
-        text.append("Give the model masses (with_inertia) to try joint compliance.")
+        text += " Give the model masses (with_inertia) to try joint compliance."
     if (trials or not structure.indicated) and not is_explained:
-        text.append(
-            "Backlash, friction, drift or bending links may be the cause: approach every posture "
+        text += (
+            " Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."
         )
-    return " ".join(text)
+    return text
 
 
 def _change(before: Errors, after: Errors) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,27 +62,27 @@ class Errors(Frozen):
     @property
     def mean(self) -> dict[str, float]:
         """Mean length, m or rad."""
-        return {unit: float(lengths.mean()) for unit, lengths in self._lengths()}
+        return self._of_lengths(np.mean)
 
     @property
     def rms(self) -> dict[str, float]:
         """Root mean square length, m or rad."""
-        return {unit: float(np.sqrt(np.mean(lengths**2))) for unit, lengths in self._lengths()}
+        return self._of_lengths(lambda lengths: np.sqrt(np.mean(lengths**2)))
 
     @property
     def max(self) -> dict[str, float]:
         """Largest length, m or rad."""
-        return {unit: float(lengths.max()) for unit, lengths in self._lengths()}
+        return self._of_lengths(np.max)
 
     @property
     def count(self) -> dict[str, int]:
         """Number of measurements."""
-        return {unit: len(lengths) for unit, lengths in self._lengths()}
+        return {unit: int(number) for unit, number in self._of_lengths(len).items()}
 
-    def _lengths(self) -> list[tuple[str, Array]]:
+    def _of_lengths(self, function: Callable[[Array], Any]) -> dict[str, float]:
         by_unit = (("m", self.position), ("rad", self.angle))
-        measured = [(unit, lengths[~np.isnan(lengths)]) for unit, lengths in by_unit]
-        return [(unit, lengths) for unit, lengths in measured if len(lengths)]
+        measured = ((unit, lengths[~np.isnan(lengths)]) for unit, lengths in by_unit)
+        return {unit: float(function(lengths)) for unit, lengths in measured if len(lengths)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,17 +199,12 @@ def settled_prior(
     """The prior with a strength: that given, or chosen by cross-validation."""
     if prior is None or prior.strength is not None:
         return prior
-    if problem.blocks < 2 * _FOLDS:
-        raise InvalidValueError(
-            f"strength: choosing it needs {2 * _FOLDS} measurements or more, got "
-            f"{problem.blocks}; give the strength."
-        )
-    parts = partition(problem.parameters.model, problem.measurements, _FOLDS, rng)
+    enough = problem.blocks >= 2 * _FOLDS
+    parts = partition(problem.parameters.model, problem.measurements, _FOLDS if enough else 0, rng)
     if not parts.splits:
         raise InvalidValueError(
-            "strength: choosing it by cross-validation needs measurements in several postures, got "
-            "one posture for each object; give a number for the strength, or measure in more "
-            "postures."
+            f"strength: choosing it by cross-validation needs {2 * _FOLDS} measurements or more in "
+            "several postures of each object; give a number for the strength, or measure more."
         )
     whole = solve(problem, loss=loss, prior=prior)
     nominal = errors_of(problem, np.zeros(problem.P))
@@ -253,10 +248,15 @@ def partition(
     seen = [m for m in measurements if m.views]
     if not seen or not folds:
         return Partition((), "", "")
-    posture, label = _postures(seen), _label_numbers(seen)
+    posture, names = _postures(seen), [name for m in seen for name in _labels(m)]
+    number = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    label = np.array([number[name] for name in names])
     fold = np.full(len(posture), -1, dtype=np.int64)
     near = _NEAR * characteristic_length(model)
-    place = _places(model, seen, posture, label, near)
+    p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
+    held = np.concatenate([np.full(m.blocks, isinstance(m, Labelled)) for m in seen])
+    held &= ~np.isin(names, [*single_observations(seen)])
+    place = _places(p, posture, np.where(held, label, -1), near)
     count = len(np.unique(place[place >= 0]))
     whole, note = np.zeros(len(posture), dtype=np.bool_), ""
     if count >= _FEWEST:
@@ -308,39 +308,25 @@ def _postures(seen: Sequence[Measurement]) -> Numbers:
     return np.array(numbers, dtype=np.int64)
 
 
-def _label_numbers(seen: Sequence[Measurement]) -> Numbers:
-    """Index of the touched or observed object of each block."""
-    found: dict[tuple[str, ...], int] = {}
-    numbers = []
-    for m in seen:
-        names = [(m.name,) if m.fixtures else ()] * m.blocks
-        if isinstance(m, Labelled):
-            names = [(m.name, label) for label in m.label]
-        numbers += [found.setdefault(name, len(found)) for name in names]
-    return np.array(numbers, dtype=np.int64)
+def _labels(m: Measurement) -> list[str | None]:
+    """Touched or observed object of each block; None where there is none."""
+    if isinstance(m, Labelled):
+        return [f"{m.name}:{label}" for label in m.label]
+    return [m.name if m.fixtures else None] * m.blocks
 
 
-def _places(
-    model: RobotModel, seen: Sequence[Measurement], posture: Numbers, label: Numbers, near: float
-) -> Numbers:
-    """Place index of each block, -1 for blocks without a place."""
-    place = np.full(len(posture), -1, dtype=np.int64)
-    p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
-    single = set(single_observations(seen))
-    names = (
-        (f"{m.name}:{x}" for x in m.label) if isinstance(m, Labelled) else [None] * m.blocks
-        for m in seen
-    )
-    labelled = np.array([x is not None and x not in single for some in names for x in some])
-    centres, at = np.zeros((0, 3)), np.full(len(posture), -1, dtype=np.int64)
-    for one in np.unique(label[labelled]):
+def _places(p: Array, posture: Numbers, label: Numbers, near: float) -> Numbers:
+    """Place index of each block at p (N, 3), -1 for blocks without a label or a place."""
+    place, at = np.full((2, len(posture)), -1, dtype=np.int64)
+    centres: list[Array] = []
+    for one in np.unique(label[label >= 0]):
         blocks = label == one
         centre = p[blocks].mean(axis=0)
         if np.linalg.norm(p[blocks] - centre, axis=1).max() < near:
             at[blocks] = len(centres)
-            centres = np.vstack([centres, centre])
+            centres.append(centre)
     held = at >= 0
-    if not held.any():
+    if not centres:
         return place
     region = np.ones(1, dtype=np.int64)
     if len(centres) > 1:

@@ -3,7 +3,8 @@
 A pose that depends on C unknowns is an `Evaluation`: T (N, 4, 4) and psi (N, 6, C), the twist
 ``[v; w]`` of the pose's origin by each unknown, in the axes in which the pose is given.
 
-Source: T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
+Source: T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76); W. Kabsch, Acta
+Crystallographica A32, 1976 (motion between points).
 """
 
 from __future__ import annotations
@@ -104,3 +105,21 @@ def difference(a: Evaluation, T: Array, psi: Array | None = None) -> tuple[Array
         # a rotation of T is applied before the rotation vector, which changes the sign of u
         J[:, 3:] -= inverse_left_jacobians(-u) @ psi[:, 3:]
     return np.hstack([a.T[:, :3, 3] - T[:, :3, 3], u]), J
+
+
+def best_motion(points: Array, targets: Array) -> Array:
+    """Least-squares rigid motion from points to targets (Kabsch).
+
+    Shapes: points, targets (N, 3) -> (4, 4).
+    """
+    a, b = points.mean(axis=0), targets.mean(axis=0)
+    T = np.eye(4)
+    T[:3, :3] = nearest_rotation((targets - b).T @ (points - a))
+    T[:3, 3] = b - T[:3, :3] @ a
+    return T
+
+
+def nearest_rotation(M: Array) -> Array:
+    """Rotation nearest to a matrix, (3, 3)."""
+    U, _, Vt = np.linalg.svd(M)
+    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt

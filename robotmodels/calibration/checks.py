@@ -1,4 +1,4 @@
-"""Check of length units against the nominal robot."""
+"""Checks of measurements before a fit: readings and limits, repeated rows, units of lengths."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from .. import se3
 from .._arrays import Array
 from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .alignment import best_motion
 from .extended_table import Frame
 from .measurements import (
     CameraPose,
@@ -26,8 +26,17 @@ from .measurements import (
     Pose,
     Position,
     RelativePose,
+    single_observations,
 )
+from .measurements.motions import best_motion
+from .problem import Problem, measured_frames
 
+_TURNS = 30.0  # largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed
+_TOLERANCE = 0.02  # tolerance beyond a limit, rad or m and relative to the range
+_MOST = 0.6
+"""Share of readings beyond a limit above which they are refused; simulated readings over a
+symmetric range have a share of 0.5 where a limit is at zero."""
+_HARDLY = 0.02  # standard deviation of a joint's readings below which it hardly moves, rad or m
 _UNITS = {"metres": 1.0, "centimetres": 1e-2, "inches": 0.0254, "millimetres": 1e-3}
 _SLIPS = {
     (unit, taken): _UNITS[taken] / _UNITS[unit]
@@ -46,6 +55,112 @@ _FAR = 3.0
 """Difference of a known distance, in scatters of the nominal points, for a check of its unit."""
 _SPREAD = 50.0  # implausible ratio of measured lengths to the robot's reach
 _FEW = 7  # smallest number of lengths for the check of a pivot
+
+
+def notes_before(problem: Problem) -> tuple[str, ...]:
+    """Notes on the measurements before the fit; errors that no fit can repair are raised."""
+    model, measurements = problem.parameters.model, problem.measurements
+    path = problem.parameters.table.path
+    moving = {row for frame in measured_frames(measurements) for row in path(frame)}
+    notes = check_readings(model, measurements, moving)
+    check_units(model, measurements)
+    fixtures: dict[str, set[str]] = {}
+    shared: dict[str, None] = {}
+    for k, m in enumerate(measurements):
+        if not m.views:
+            continue
+        if twice := _duplicates(m):
+            notes.append(
+                f"measurements[{k}] ({m.name}): {twice} of {m.blocks} rows repeat another row "
+                "exactly; they add no information, but make the standard errors too small. Leave "
+                "them out."
+            )
+        names = {fixture.name for fixture in m.fixtures}
+        if names & fixtures.setdefault(m.name, set()):
+            shared[m.name] = None
+        fixtures[m.name] |= names
+    notes += [
+        f"More than one measurement is called {name!r}: equal labels are taken as the same point, "
+        "plane or pose. Give them names of their own (name=...) if they are not."
+        for name in shared
+    ]
+    notes += single_observations(measurements).values()
+    readings = [view.q for m in measurements for view in m.views]
+    for j, q in enumerate(np.concatenate(readings).T if readings else ()):
+        row = model.table.joint_rows[j]
+        if row + 1 in moving and float(np.std(q)) < _HARDLY:
+            unit = "rad" if model.table.sigma[row] == REVOLUTE else "m"
+            notes.append(
+                f"Joint {j + 1} ({model.table.joint_names[j]}) moves by {np.ptp(q):.2g} {unit} "
+                "only: the frames before and after it can hardly be distinguished. Measure with "
+                "that joint spread over its range."
+            )
+    return tuple(notes)
+
+
+def _duplicates(m: Measurement) -> int:
+    """Number of blocks whose readings and measured values repeat those of another one."""
+    rows = [*(view.q for view in m.views), m.groups[:, None].astype(np.float64)]
+    if isinstance(m, Pose | Position):
+        rows.append((m.T if isinstance(m, Pose) else m.p).reshape(m.blocks, -1))
+    return m.blocks - len(np.unique(np.hstack(rows), axis=0))
+
+
+# --- readings and limits --------------------------------------------------------------------------
+
+
+def check_readings(
+    model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
+) -> list[str]:
+    """Compare readings with the limits of the joints: notes, or an error."""
+    notes: list[str] = []
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    for k, m in enumerate(measurements):
+        if not m.views:
+            continue
+        where = f"measurements[{k}] ({m.name})"
+        q = np.concatenate([view.q for view in m.views])
+        largest = float(np.abs(q[:, revolute]).max(initial=0.0))
+        if largest > _TURNS:
+            raise InvalidValueError(
+                f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
+                "Pass radians: np.deg2rad(q)."
+            )
+        sentences, most = beyond_limits(model, q, rows)
+        if not sentences:
+            continue
+        note = (
+            f"{where}: readings beyond the limits of the joints: {'; '.join(sentences)}. Check "
+            "that the columns are readings in the order of the joints, with the signs and zeros "
+            "of the model, in rad and m. If the limits of the model are wrong, give it others: "
+            "model.with_table(model.table.replace(lower=..., upper=...))."
+        )
+        if most:
+            raise InvalidValueError(note)
+        notes.append(note)
+    return notes
+
+
+def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
+    """Sentences on joints beyond their limits, and whether to refuse them. Shapes: q (N, n)."""
+    lower, upper = model.lower, model.upper
+    width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    tolerance = _TOLERANCE * np.maximum(1.0, width)
+    checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
+    over = np.where(checked, np.maximum(lower - q, q - upper), -np.inf)
+    number = (over > tolerance).sum(axis=0)
+    sentences = []
+    for j in np.flatnonzero(number):
+        is_revolute = model.table.sigma[model.table.joint_rows[j]] == REVOLUTE
+        sentences.append(
+            f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
+            f"up to {over[:, j].max():.3g} {'rad' if is_revolute else 'm'} (reads "
+            f"{q[:, j].min():.4g} to {q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
+        )
+    return sentences, bool((number > _MOST * len(q)).any())
+
+
+# --- units of lengths -----------------------------------------------------------------------------
 
 
 class UnitError(NamedTuple):
