@@ -8,7 +8,6 @@ import yaml
 
 import robotmodels as rm
 from robotmodels.cli import main
-from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.identification import exciting_trajectory, write_trajectory
 from robotmodels.trajectories import quintic
 
@@ -68,36 +67,6 @@ def test_json_makes_the_same_motion_bit_by_bit(kind, tmp_path):
     assert data["limits"]["torque"] == [None, None]
 
 
-def test_wrong_arguments_of_writing(found, tmp_path):
-    for motion, name, options, error in (
-        (found, "a.txt", {}, InvalidValueError),
-        (found, "a.csv", {"rate": 0.0}, InvalidValueError),
-        (found, "a.csv", {"names": ["x"]}, ShapeError),
-        (found, "a.yaml", {"degrees": True}, InvalidValueError),
-        (found.trajectory, "a.json", {}, InvalidValueError),
-    ):
-        with pytest.raises(error):
-            write_trajectory(motion, tmp_path / name, **options)
-    assert not list(tmp_path.iterdir())
-
-
-def test_lines_of_the_figure_are_the_motion_and_its_torques(found):
-    axes = {" ".join(x.get_ylabel().split()): x for x in rm.viz.plot_excitation(found).axes}
-    assert {"position (m)", "position (rad)", "force (N)", "torque (N m)"} <= set(axes)
-    line = axes["torque (N m)"].get_lines()[1]
-    t = line.get_xdata()
-    q, v, a = (f(t) for f in (found.trajectory.q, found.trajectory.v, found.trajectory.a))
-    assert np.allclose(line.get_ydata(), rm.idm(found.model, q, v, a)[:, 1])
-    assert np.allclose(axes["velocity (rad/s)"].get_lines()[1].get_ydata(), v[:, 1])
-    curves = axes["smooth condition number"].get_lines()
-    starts = [len(x.get_xdata()) for x in curves if x.get_label() == "_start"]
-    assert starts == [len(start.history) for start in found.starts]
-    random = axes["condition number"].get_lines()[0].get_ydata()
-    assert sorted(random) == pytest.approx(list(found.baseline_conditions))
-    with pytest.raises(InvalidValueError, match="ExcitingTrajectory"):
-        rm.viz.plot_excitation(found.model)
-
-
 # --- the command ----------------------------------------------------------------------------------
 
 FEW = ["--starts", "1", "--random", "2", "--iterations", "5", "--harmonics", "3", "--seed", "4"]
@@ -139,18 +108,3 @@ def test_excite_prints_json_and_reports_limits_that_cannot_be_kept(capsys):
     code, out, _ = run(capsys, "ur10e", "--torque-limits", 0.1)
     assert code == 1
     assert "No motion was found that keeps every limit." in out
-
-
-def test_wrong_arguments_of_excite(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for words, message in (
-        (["--box", "0", "0", "1"], "six numbers"),
-        (["--box", "0 0 0 1 1 1", "--box", "2 2 2 3 3 3"], "no common point"),
-        (["--out", "new", "--rate", "0"], "--rate: expected a positive"),
-        (["--seed", "-1"], "--seed"),
-        (["--out", "new", "--degrees", "--format", "yaml"], "radians"),
-    ):
-        code, _, err = run(capsys, "rx90", *words)
-        assert code == 2
-        assert message in err
-    assert not list(tmp_path.iterdir())

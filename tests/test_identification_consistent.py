@@ -1,6 +1,5 @@
 """Physically consistent identification: the least torque residuals of physical robots."""
 
-import pickle
 import sys
 from typing import Any
 
@@ -117,50 +116,6 @@ def test_residuals_do_not_decrease_towards_physical_robots(rng):
         again = fit_consistent(base, scale * A, scale * b, rest=scale**2 * outside, prior=prior)
         assert again.residual_increase == pytest.approx(found.residual_increase, rel=1e-5)
         assert again.base_values == pytest.approx(found.base_values, rel=1e-3, abs=1e-4)
-
-
-def test_small_and_large_robots_are_the_same_problem(rng):
-    """A robot of the same shape with masses and torques times s; its prior knows no drives."""
-    model = rm.load("rx90")
-    true = model.with_inertia(uniform_bodies(model, 60.0))
-    true = true.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[10] * 6, Fc=[5] * 6, offset=[0] * 6))
-    _, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
-    base = base_parameters(model, drive=True)
-    expected, *fits = (
-        fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
-        for s in (1.0, 1e-6, 1e6)
-    )
-    assert expected.status is CONSTRAINED
-    assert expected.residual_increase > 0.1
-    for s, found in zip((1e-6, 1e6), fits, strict=True):
-        assert found.status is CONSTRAINED
-        assert found.fit.gap < 2e-4
-        assert found.fit.squares == pytest.approx(s**2 * expected.fit.squares, rel=1e-6)
-        assert found.fit.active == expected.fit.active
-        far = np.abs(found.base_values / s - expected.base_values).max()
-        assert far < 1e-4 * np.abs(expected.base_values).max()
-
-
-@pytest.mark.parametrize("drives", [1e-12, 1e-3, 1e3, 1e6])
-def test_a_drive_prior_of_another_size(drives, rng):
-    """Drives of the prior far from those of the torques: the best is found, or INACCURATE."""
-    model = rm.load("rx90").with_inertia(uniform_bodies(rm.load("rx90"), 60.0))
-    model = model.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[9] * 6, Fc=[5] * 6, offset=[0] * 6))
-    base, R, y, rest, *_ = noisy(model, rng, 0.3, samples=150)
-    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 60.0))
-    assert best.status is CONSTRAINED
-    size = drives * np.ones(6)
-    prior = rm.DriveParameters(Ia=size, Fv=size, Fc=size, offset=size)
-    found = fit_consistent(
-        base, R, y, rest=rest, prior=uniform_bodies(model, 60.0), drive_prior=prior
-    )
-    if drives < 1.0:
-        assert found.status is CONSTRAINED
-        assert found.fit.squares == pytest.approx(best.fit.squares, rel=1e-3)
-    assert found.status in (CONSTRAINED, PhysicalStatus.INACCURATE)
-    if found.status is CONSTRAINED:
-        assert found.fit.squares <= best.fit.squares * 1.0005
-    assert best.fit.squares >= found.fit.squares * (1.0 - found.fit.gap) * (1.0 - 1e-4)
 
 
 def test_parameters_that_a_log_does_not_show_are_those_of_the_prior(rng):
@@ -297,22 +252,6 @@ def test_torques_survive_the_urdf(kind, rng):
     assert any("rotor inertia" in words for words in lost)
 
 
-def test_the_result_is_a_value(rng):
-    model = arm(rng)
-    base, R, y, rest, W, _ = noisy(model, rng, 0.5, samples=12)
-    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, 6.0))
-    again = pickle.loads(pickle.dumps(found))
-    assert again.residual_increase == found.residual_increase
-    assert not again.values.flags.writeable
-    assert found.standard_errors is None
-    text = str(found)
-    for words in (found.status.sentence, f"{found.residual_increase:.3g} %", *found.fit.active):
-        assert words in text
-    assert {*found.notes} >= {*found.fit.active}
-    assert f"residuals +{found.residual_increase:.3g} %" in repr(found)
-    assert found.base_values == pytest.approx(base.values(found.of(model)), rel=1e-12, abs=1e-12)
-
-
 def test_mistakes_are_named(rng):
     model = arm(rng)
     base, R, y, rest, *_ = noisy(model, rng, 0.1)
@@ -320,33 +259,19 @@ def test_mistakes_are_named(rng):
     prior = uniform_bodies(model, 6.0)
     for error, said, changes in (
         (ShapeError, "R: expected shape", {"R": R[:, :-1]}),
-        (ShapeError, "y: expected shape", {"y": y[:-1]}),
         (InvalidValueError, "R: every entry is zero", {"R": np.zeros((b, b))}),
         (InvalidValueError, "rest: expected a sum of squares", {"rest": -1.0}),
-        (InvalidValueError, "rows", {"rows": 0}),
         (InvalidValueError, "gamma", {"gamma": -1.0}),
-        (InvalidValueError, "margin", {"margin": 1.0}),
-        (InvalidValueError, "tolerance", {"tolerance": 0.0}),
         (InvalidValueError, "prior: expected 2 links", {"prior": rm.InertialParameters.zeros(3)}),
-        (InvalidValueError, "drive_prior", {"drive_prior": rm.DriveParameters.zeros(3)}),
         (ShapeError, r"mass_bounds: expected shape \(2, 2\)", {"mass_bounds": [1.0, 2.0]}),
         (InvalidValueError, "mass of link 2", {"mass_bounds": [[0, 1], [2, 1]]}),
-        (InvalidValueError, "mass of link 1", {"mass_bounds": [[-5, -1], [2, 3]]}),
-        (ShapeError, "total_mass", {"total_mass": [1.0, 2.0, 3.0]}),
         (InvalidValueError, "no link 3", {"centre_bounds": [CenterOfMassBox(3, [0] * 3, [1] * 3)]}),
-        (InvalidValueError, "expected CenterOfMassBox", {"centre_bounds": [3]}),
     ):
         given: dict[str, Any] = {"R": R, "y": y, "rest": rest, "prior": prior} | changes
         with pytest.raises(error, match=said):
             fit_consistent(base, given.pop("R"), given.pop("y"), **given)
     with pytest.raises(InvalidValueError, match="low must not be above"):
         CenterOfMassBox(1, [1, 0, 0], [0, 1, 1])
-    with pytest.raises(InvalidValueError, match="low must not be above"):
-        CenterOfMassBox(1, [np.inf, 0, 0], [np.inf, 1, 1])
-    with pytest.raises(ShapeError, match="high"):
-        CenterOfMassBox(1, [1, 0, 0], [0, 1])
-    with pytest.raises(InvalidValueError, match="positive semi_axes"):
-        CenterOfMassEllipsoid(1, [0, 0, 0], [1, 0, 1])
     with pytest.raises(InvalidValueError, match="unit vectors"):
         CenterOfMassEllipsoid(1, [0, 0, 0], [1, 1, 1], 2 * np.eye(3))
 
@@ -411,7 +336,7 @@ def measured(rng, model, motion, noise, unmodelled):
     return tau + rms * (noise * rng.normal(size=tau.shape) + unmodelled * wrong), rms * noise
 
 
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("seed", range(30))
 def test_noisy_logs_of_heavy_arms_converge(seed):
     """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times light."""
@@ -436,7 +361,7 @@ def test_noisy_logs_of_heavy_arms_converge(seed):
         assert found.residual_increase < 12.0
 
 
-@pytest.mark.sampled(8)
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("seed", range(24))
 def test_robots_of_any_structure_converge_on_slow_motion(seed):
     """Priors 100 times too light or too heavy, motion that hardly shows the inertias."""

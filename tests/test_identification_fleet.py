@@ -9,7 +9,7 @@ from identification_fleet import KINDS, case, pair, textbook
 
 import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
-from robotmodels.identification import Log, Wls, fit, predicted_torque
+from robotmodels.identification import Wls, fit, predicted_torque
 
 pytestmark = pytest.mark.nightly
 
@@ -65,25 +65,6 @@ def test_parameters_of_two_logs_of_one_robot_agree():
     half, N = len(data.log) // 2, len(data.log)
     halves = data.log.rows(0, half), data.log.rows(half, N)
     assert apart(*(fit(data.model, part) for part in halves)) < 1.5
-
-
-def test_a_log_may_begin_at_rest_with_a_coarse_encoder():
-    one = case(61)
-    rest, step = round(5.0 / one.log.dt), 2.0 * np.pi / 2**13
-    q, tau = (np.concatenate((np.repeat(x[:1], rest, axis=0), x)) for x in (one.q, one.tau))
-    found = fit(one.model, Log(one.log.dt, np.round(q / step) * step, tau), checked=False)
-    assert found.equations.processing.motion < 10.0
-    assert one.error(partial(predicted_torque, found)) < 0.1
-
-
-@pytest.mark.filterwarnings("ignore:Poor prediction")
-@pytest.mark.parametrize("seed", [61, 65, 69, 73])
-def test_a_correct_short_log_is_not_refused(seed):
-    one = case(seed)
-    for seconds in (0.6, 2.0):
-        rows = round(seconds / one.log.dt)
-        if 4 * len(one.log.q[:rows]) * one.log.n > 5 * len(rm.base_parameters(one.model)):
-            fit(one.model, one.log.rows(0, rows), drive=("Ia", "Fv", "Fc"))
 
 
 def test_few_equations_shrink_by_default_and_say_so():

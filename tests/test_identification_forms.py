@@ -34,8 +34,9 @@ def collected(system):
     return {name: np.concatenate([getattr(b, name) for b in blocks]) for name in fields}
 
 
-@pytest.mark.parametrize("decimation", [1, 7])
+@pytest.mark.sampled(16)
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("decimation", [1, 7])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_form_recovers_exact_parameters(name, form, decimation):
     model = ROBOTS[name]

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from identification_logs import clean_log, swinging
+from identification_logs import swinging
 from identities.random_robots import random_model
 
 import robotmodels as rm
@@ -13,7 +13,6 @@ from robotmodels.errors import InvalidValueError, RobotModelsWarning
 from robotmodels.estimation.estimate import EstimateStatus
 from robotmodels.identification import (
     Log,
-    compare_methods,
     consistent_robot,
     fit,
     identify_payload,
@@ -109,38 +108,6 @@ def test_the_sentence_names_joints_parts_and_the_log():
     assert "signs" in sentence
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_of_random_robots_joints_are_named_from_thirty_per_cent_on(seed):
-    rng = np.random.default_rng(seed)
-    model = random_model(rng, 4, drive=True, prismatic=seed % 2 == 1)
-    named = []
-    for size in (0.05, 0.2, 0.4, 0.8):
-        joint = int(rng.integers(model.n))
-
-        def loaded(log, size=size, joint=joint):
-            """A torque that no parameter explains, such as a forgotten spring."""
-            tau, extra = np.array(log.tau), np.sin(7.0 * log.q[:, joint])
-            tau[:, joint] += size * extra * np.sqrt(np.mean(tau[:, joint] ** 2 / np.mean(extra**2)))
-            return Log(log.dt, log.q, tau, log.v, log.a)
-
-        log, other = (loaded(clean_log(model, rng)) for _ in range(2))
-        found, sentences = noticed(model, log, test=other, checked=False)
-        fitted, held_out = found.validation.in_sample, found.validation.held_out
-        text = " ".join(sentences)
-        for j, name in enumerate(model.table.joint_names):
-            if fitted.filtered_relative[j] > 0.31:
-                assert f"{name} (" in text.split("; on the held-out log")[0]
-            if max(fitted.filtered_relative[j], held_out.filtered_relative[j]) < 0.29:
-                assert f"{name} (" not in text
-            if held_out.relative[j] > 1.05:
-                assert name in text.split("zero torque: ")[1]
-        poor = found.estimate.status is EstimateStatus.POOR_PREDICTION
-        assert poor == bool(sentences)
-        named.append(poor)
-    assert not named[0]
-    assert named[-1]
-
-
 def test_noise_and_ripple_that_no_model_explains_are_no_poor_prediction():
     rng = np.random.default_rng(0)
     t = DT * np.arange(len(moved()[0]))[:, None]
@@ -218,37 +185,3 @@ def test_a_robot_that_diverged_has_no_numbers_that_look_like_results(tmp_path):
         with pytest.raises(InvalidValueError, match="diverged, so that there are no parameters"):
             refused()
     assert not list(tmp_path.iterdir())
-
-
-def test_report_and_tables_of_a_robot_that_diverged_show_no_parameters():
-    found, _ = diverged()
-    text = report(found)
-    assert plain(text).split(" * ")[1].startswith(found.estimate.status.sentence)
-    for absent in ("negative", "\nParameters\n", "\nErrors\n"):
-        assert absent not in text
-    assert "cannot be simulated" in text
-    compared = compare_methods(arm(), found.equations.log, ("wls", "iv"), checked=False)
-    rows = compared.fit_table.splitlines()
-    row = next(line for line in rows if "unstable" in line)
-    cells = [cell.strip() for cell in row.split("│")[1:-1]]
-    assert cells.count("-") >= 4  # residual, errors of both joints, largest deviation
-    assert "nan" not in str(compared)
-    assert np.isnan(compared.values[1]).all()
-    swapped = log_of(lambda q, v, tau: tau[:, ::-1])
-    poor = compare_methods(arm(), swapped, ("wls", "sequential"), checked=False)
-    assert poor.fit_table.count("poor prediction") == 2
-
-
-def test_the_command_line_prints_the_sentence_and_ends_with_its_status(tmp_path, capsys):
-    from robotmodels.cli import main
-
-    q, _, tau = moved()
-    for name, rows in (("q", q), ("tau", -tau)):
-        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header="1,2", comments="")
-    call = ["identify", "--robot", "planar_2r", "--log", str(tmp_path / "q.csv"), "--torques-from",
-            str(tmp_path / "tau.csv"), "--dt", str(DT), "--no-check"]  # fmt: skip
-    assert main([*call, "--method", "iv", "--out", str(tmp_path / "out")]) == 1
-    out, err = capsys.readouterr()
-    assert "diverged" in err
-    assert "│" not in out
-    assert not (tmp_path / "out" / "result.json").exists()

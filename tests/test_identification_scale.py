@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 import tracemalloc
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
@@ -21,8 +21,7 @@ import robotmodels as rm
 from robotmodels.errors import InvalidValueError
 from robotmodels.estimation.factor import merged
 from robotmodels.estimation.linear import weighted
-from robotmodels.identification import choose_processing, equations, fit, reduce_equations
-from robotmodels.identification.common_equations import CommonEquations
+from robotmodels.identification import choose_processing, equations, reduce_equations
 from robotmodels.identification.forms import EquationForm
 from robotmodels.logs import Log
 from robotmodels.minimal_parameters import base_parameters
@@ -106,75 +105,6 @@ def test_the_factor_is_that_of_all_equations():
     size = np.sqrt(np.diag(N))
     np.testing.assert_allclose(found / np.outer(size, size), N / np.outer(size, size), atol=1e-12)
     assert factors.rows == len(rows)
-
-
-class Counting(Executor):
-    """Does tasks when they are asked for, and counts those that wait."""
-
-    def __init__(self, fails_at=None):
-        self.waiting, self.most, self.done, self.cancelled = 0, 0, 0, 0
-        self.fails_at, self.bytes = fails_at, 0
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.waiting += 1
-        self.most = max(self.most, self.waiting)
-        self.bytes = max(self.bytes, len(pickle.dumps((fn, args, kwargs))))
-        return Later(self, lambda: fn(*args, **kwargs))
-
-
-class Later(Future):
-    def __init__(self, owner, work):
-        super().__init__()
-        self.owner, self.work = owner, work
-
-    def result(self, timeout=None):
-        self.owner.waiting -= 1
-        self.owner.done += 1
-        if self.owner.done == self.owner.fails_at:
-            raise RuntimeError("a worker died")
-        return self.work()
-
-    def cancel(self):
-        self.owner.cancelled += 1
-        return super().cancel()
-
-
-def test_no_more_pieces_wait_than_the_window_and_none_after_an_error():
-    whole = system(decimation=1)
-    pool = Counting()
-    assert bits(reduce_equations(whole, pool, window=4)) == bits(reduce_equations(whole))
-    assert (pool.most, pool.done, pool.cancelled) == (4, len(whole.pieces()), 0)
-    assert pool.done > 20
-    failing = Counting(fails_at=3)
-    with pytest.raises(RuntimeError, match="a worker died"):
-        reduce_equations(whole, failing, window=5)
-    assert failing.cancelled == 4
-    with pytest.raises(InvalidValueError, match="window"):
-        reduce_equations(whole, failing, window=0)
-
-
-def test_common_equations_are_sent_piece_by_piece():
-    whole = system()
-    every = CommonEquations((whole, whole), whole.names, (None, 2.0 * np.eye(len(whole.names))))
-    pool = Counting()
-    assert bits(every.reduced(pool)) == bits(every.reduced())
-    assert pool.done == 2 * len(whole.pieces()) > 2 * pool.most
-    assert pool.bytes < len(pickle.dumps(whole.log)) / 4
-
-
-def test_progress_never_falls_and_ends_at_one():
-    whole = system()
-    logs = [whole, whole.with_log(whole.log.rows(0, 50_000)), whole]
-    with ThreadPoolExecutor(2) as pool:
-        for executor in (None, pool):
-            done: list[float] = []
-            reduce_equations(logs, executor, done.append)
-            assert len(done) == sum(len(part.pieces()) for part in logs)
-            assert (np.diff(done) > 0.0).all()
-            assert done[-1] == 1.0
-            done.clear()
-            reduce_equations(iter(logs), executor, done.append)
-            assert done == [1.0]
 
 
 def test_files_opened_one_at_a_time_give_what_merging_gives():
@@ -261,10 +191,3 @@ def test_blocks_are_kept_as_far_as_memory_allows_of_their_log_and_choices_alone(
     assert bits(reduce_equations(some)) == first
     assert 0 < some.cache.size <= 10**6
     assert some.with_log(some.log.rows(0, 20_000)).cache is None
-
-
-def test_a_result_keeps_no_blocks():
-    log = recorded("planar_2r", 8_000, noise=0.01)
-    found = fit(rm.load("planar_2r"), log, drive=("Fv", "Fc"))
-    assert found.equations.cache is None
-    assert len(pickle.dumps(found)) < 2 * 8 * log.q.size * 3

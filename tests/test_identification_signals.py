@@ -152,15 +152,9 @@ def test_measured_velocities_are_taken_and_filtered_alike():
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"cutoff": 600.0}, "half the sampling rate"),
         ({"cutoff": 5.0, "filtered": False}, "filtered=False"),
         ({"decimation": 0}, "decimation"),
-        ({"decimation": 2.5}, "decimation"),
-        ({"dead_band": -1.0}, "no negative"),
         ({"dead_band": [0.1, 0.2]}, "expected one velocity"),
-        ({"edges": -0.1}, "edges"),
-        ({"edges": 6.0}, "shorter edges"),
-        ({"order": 4.0}, "order"),
         ({"accuracy": 3}, "2, 4 or 6"),
     ],
 )

@@ -114,37 +114,24 @@ def compare_methods(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    log : Log
-        The log, the same for all.
-    methods : iterable of Method or str
-        Methods that solve the equations.
-    forms : iterable of EquationForm or str
-        Forms of the equations; each method with each form.
-    test : Log, optional
-        Held out; errors of predicted torques are then on it.
-    progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+    model, log, test, progress
+        As for `fit`, the same for all; errors of predicted torques are those on ``test``, if given.
+    methods, forms : iterables
+        Methods that solve the equations, and forms of the equations; each with each.
     **options
-        Other arguments of `fit`, the same for all.
+        Other arguments of `fit`.
 
     Returns
     -------
     MethodComparison
-        Prints as tables; a combination that does not exist, such as joint by joint with a power,
-        is listed with the reason. ``.fits`` has ``label, result, seconds, rmse`` of each;
-        ``.names, .values, .standard_errors`` (rows, p) are the parameters side by side.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No method or form; options that no combination takes.
+        Prints as tables, with combinations that were refused. ``.fits`` has ``label, result,
+        seconds, rmse`` of each; ``.names, .values, .standard_errors`` (rows, p) are the parameters
+        side by side.
 
     References
     ----------
-    Seed book section 1.6; Q. Leboutet, J. Roux, A. Janot, J. R. Guadarrama-Olvera and G. Cheng,
-    "Inertial parameter identification in robotics: a survey", Applied Sciences 11(9), 2021.
+    Q. Leboutet, J. Roux, A. Janot, J. R. Guadarrama-Olvera and G. Cheng, "Inertial parameter
+    identification in robotics: a survey", Applied Sciences 11(9), 2021.
 
     Examples
     --------

@@ -35,12 +35,9 @@ def consistent_robot(
 
     Raises
     ------
-    InertiaError
-        A prior that is not physical; a model without any masses, and no prior.
-    InvalidValueError
-        The simulated robot diverged: there are no parameters.
-    MissingExtraError
-        CVXPY or Clarabel is not installed.
+    InertiaError, InvalidValueError, MissingExtraError
+        A prior that is not physical, or no masses and no prior; a result without parameters; CVXPY
+        or Clarabel is not installed.
 
     References
     ----------

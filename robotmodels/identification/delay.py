@@ -80,20 +80,16 @@ class Synchronisation(Rebuilt):
 def synchronisation(
     log: Log, model: RobotModel, *, cutoff: float | None = None, within: float | None = None
 ) -> Synchronisation:
-    """Estimate the delay of the torques of a log behind its positions.
+    """Estimate the delay of the torques of a log behind its positions (seed book 1.6.2.4).
 
     For each delay the torques are shifted back, and the residual of the dynamic model with free
-    parameters is computed; the minimum over the delays is interpolated, to well below a sample.
-    Inertia and friction of the model are not used. Logs of more than 1e5 samples are represented by
-    up to 20 stretches spread evenly over them. The model is rigid: at high cutoffs (40 Hz on the
-    log of the TX40) joint flexibility looks like a delay.
+    parameters is computed; the minimum over the delays is interpolated. Long logs are represented
+    by stretches. The model is rigid: at high cutoffs joint flexibility looks like a delay.
 
     Parameters
     ----------
-    log : Log
-        Positions and torques.
-    model : RobotModel
-        The robot.
+    log, model : Log, RobotModel
+        The log and its robot, whose inertia and friction are not used.
     cutoff : float, optional
         Cutoff of positions and torques, Hz; default 15, or a tenth of the sampling rate
         if that is less.
@@ -106,25 +102,11 @@ def synchronisation(
     Synchronisation
         The delay; `robotmodels.logs.with_delay` removes it from the log.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        The model has other joints; the log is too short for the filter and the delays.
-
-    References
-    ----------
-    Seed book section 1.6.2.4.
-
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> t = np.arange(0.0, 4.0, 0.001)[:, None]
-    >>> q = np.sin(3.0 * t) + np.sin(7.0 * t)
-    >>> late = t - 0.004
-    >>> tau = -9.0 * np.sin(3.0 * late) - 49.0 * np.sin(7.0 * late)
-    >>> estimate = synchronisation(Log(0.001, q, tau), one)
-    >>> abs(estimate.delay - 0.004) < 1e-4
+    >>> from robotmodels.datasets import example_log
+    >>> arm, log = example_log()
+    >>> abs(synchronisation(log, arm).delay) < 1e-4
     True
     """
     check_log_and_model(log, model)

@@ -117,7 +117,7 @@ def identify_drive_gains(
     The torques of the logs are motor currents times gear ratios. Currents alone fix the gains and
     the parameters up to a common factor, which the known load fixes. The currents of coupled
     motors are separated by the transmission of the model. The estimate is that of maximum
-    likelihood for noise of the currents, to which total least squares is an approximation.
+    likelihood for noise of the currents.
 
     Parameters
     ----------
@@ -127,12 +127,8 @@ def identify_drive_gains(
         Without load; may be empty where loads differ.
     loaded : LoadedLog or sequence of LoadedLog
         With loads whose masses are known at least.
-    drive, friction, base
-        As for `fit`.
-    processing : Processing, optional
-        Processing of all logs; default the choice for the first.
-    executor : concurrent.futures.Executor, optional
-        Computes the pieces of the logs.
+    drive, friction, base, processing, executor
+        As for `fit`; processing of all logs.
 
     Returns
     -------
@@ -141,12 +137,6 @@ def identify_drive_gains(
         ``.applied(log)``, the log with torques; ``.names, .values, .standard_errors, .covariance``
         of the base parameters, of the unknown parameters of loads (``"MX load 1"``) and of the
         gains (``"gain 1"``); ``.noise`` of the currents; ``.status``, ``.notes``.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No loaded log; logs of other joints or of different sampling periods; a transmission that
-        cannot be inverted.
 
     References
     ----------

@@ -108,32 +108,18 @@ def equations(
     processing: Processing,
     form: EquationForm = EquationForm.TORQUE,
 ) -> Equations:
-    """Equations of a log for a robot.
+    """Equations of a log for a robot (seed book section 1.6.2).
 
     Parameters
     ----------
-    base : BaseParameters
-        Base parameters of the robot.
-    log : Log
-        Log with the joints of the robot.
-    processing : Processing
-        Processing, such as that of `choose_processing`.
-    form : EquationForm
-        Quantity that is balanced.
+    base, log, processing, form
+        Base parameters of the robot; a log with its joints; such as from `choose_processing`;
+        quantity that is balanced.
 
     Returns
     -------
     Equations
         In all base parameters.
-
-    Raises
-    ------
-    InvalidValueError
-        A log of another number of joints.
-
-    References
-    ----------
-    Seed book section 1.6.2.
 
     Examples
     --------

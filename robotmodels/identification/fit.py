@@ -78,10 +78,8 @@ def fit(
         "irls", "robust", "tls", "ridge", "sequential", "recursive", "iv", "didim", "cloe".
     drive : bool or collection of DriveKind or str
         Drive parameters that are identified.
-    friction : Friction, optional
-        A friction model besides them, linear in its parameters.
-    base : BaseParameters, optional
-        Parameters to identify, instead of ``drive`` and ``friction``.
+    friction, base : optional
+        A friction model besides them, linear in its parameters; or base parameters to identify.
     form : EquationForm or str
         Quantity that the equations balance: "torque", "filtered", "power" or "energy".
     processing : Processing or mapping, optional
@@ -95,10 +93,9 @@ def fit(
         Whether the log is checked first: units, signs, order of the joints, constant channels,
         delay. Errors that make a fit meaningless are raised, warnings become notes; outliers and
         frozen samples are interpolated or left out. False uses the log unchanged.
-    executor : concurrent.futures.Executor, optional
-        Computes the pieces of the log; the result does not depend on it.
-    progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+    executor, progress : optional
+        A `concurrent.futures.Executor` for the pieces of the log, on which the result does not
+        depend; a function that is called with the fraction done, or True to log it.
 
     Returns
     -------
@@ -109,8 +106,7 @@ def fit(
     Warns
     -----
     RobotModelsWarning
-        More than 30 % of the torques of the log, or of ``test``, is unexplained: joints, causes and
-        advice, also in the notes.
+        More than 30 % of the torques of the log, or of ``test``, is unexplained.
 
     Raises
     ------
@@ -126,8 +122,7 @@ def fit(
     Examples
     --------
     >>> from robotmodels.datasets import example_log
-    >>> arm, log = example_log()
-    >>> result = fit(arm, log, drive=("Fv", "Fc"))
+    >>> result = fit(*example_log(), drive=("Fv", "Fc"))
     >>> round(result.value("Fv1"), 3), result.standard_error("Fv1") < 1e-3
     (2.0, True)
     """

@@ -119,7 +119,7 @@ def signals_block(
     """Torque equations of given signals, such as simulated ones, at the instants of a piece."""
     chunks = source.chunks(torque_regressor, x.q, x.v, x.a)
     rows = _rows(chunks, x.tau, x.v, outside_dead_band(source, x), form)
-    return _decimated_block(rows, x.t, x.v, _grid(source, piece))
+    return _decimated_block(rows, x.t, x.v, decimated_samples(source, piece))
 
 
 def filtered_block(source: EquationSource, piece: Piece) -> Block:
@@ -160,7 +160,7 @@ def power_block(source: EquationSource, piece: Piece) -> Block:
     power = (x.tau * x.v).sum(axis=1, keepdims=True)
     chunks = (d[:, None] for d in source.chunks(power_regressor, x.q, x.v, x.a))
     rows = _rows(chunks, power, x.v, np.ones(power.shape, dtype=bool))
-    block = _decimated_block(rows, x.t, x.v, _grid(source, piece), 0.0)
+    block = _decimated_block(rows, x.t, x.v, decimated_samples(source, piece), 0.0)
     moving = moving_joints(source.base.model, source.processing.dead_band, block.v)
     return replace(block, use=moving.any(axis=1, keepdims=True))
 
@@ -247,8 +247,8 @@ def _no_equations(source: EquationSource, groups: int) -> Block:
     return Block(np.zeros(0), np.zeros((*y.shape, len(source.names))), y, y > 0.0, v)
 
 
-def _grid(source: EquationSource, piece: Piece) -> Grid:
-    """Decimated samples of a piece."""
+def decimated_samples(source: EquationSource, piece: Piece) -> Grid:
+    """Decimation of a piece, first of the decimated samples, and their number."""
     step = source.processing.decimation
     first = piece.start - max(piece.start - source.processing.reach, piece.low)
     return step, first, -(-(piece.stop - piece.start) // step)

@@ -97,24 +97,18 @@ def fit_friction(
 
     Stribeck friction adds ``drop exp(-|v / vs|^exponent) sign(v)`` to viscous and Coulomb friction,
     ``drop = Fs - Fc``; load-dependent friction adds ``Fl |load| sign(v)``, where the load is the
-    torque of the links' identified parameters (the measured torque would bring its noise into the
-    columns). A rotor inertia regrouped into a link is part of the load.
+    torque of the links' identified parameters.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    log : Log
-        Its log: with slow motion outside of the dead band for Stribeck friction, with different
-        loads for load-dependent friction.
+    model, log, processing
+        As for `fit`; with slow motion outside of the dead band, or with different loads.
     curve : {"stribeck", "load"}
         The friction.
     exponents : sequence of float
         Exponents of Stribeck's curve that are tried, such as ``(1.0, 2.0)``.
     base : BaseParameters, optional
         With Coulomb friction; default all drive parameters.
-    processing : Processing, optional
-        Default the choice for the log.
 
     Returns
     -------
@@ -126,12 +120,6 @@ def fit_friction(
         negative curves) and ``.sigma`` (residual standard deviation) of each joint; ``.status``,
         ``.notes``.
 
-    Raises
-    ------
-    InvalidValueError
-        Another curve; exponents that are not positive; a log of other joints; no Coulomb friction
-        in ``base``.
-
     References
     ----------
     Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica
@@ -140,14 +128,10 @@ def fit_friction(
 
     Examples
     --------
-    >>> from robotmodels.dynamics import idm
-    >>> from robotmodels.robots import load
-    >>> arm, t, w = load("rx90"), 0.01 * np.arange(2000)[:, None], np.linspace(1.0, 5.0, 6)
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> dry = np.sign(v) * (1.0 + np.exp(-((v / 0.3) ** 2)))
-    >>> result = fit_friction(arm, Log(0.01, q, idm(arm, q, v, a) + dry, v, a))
-    >>> result.status.name, round(result.value("drop2"), 2), round(result.value("vs2"), 2)
-    ('SOLVED', 1.0, 0.3)
+    >>> from robotmodels.datasets import example_log
+    >>> arm, log = example_log()
+    >>> fit_friction(arm, log).status.name  # the example has no Stribeck friction
+    'INSIGNIFICANT'
     """
     check_model(model)
     if curve not in ("stribeck", "load"):

@@ -32,15 +32,9 @@ class KnownPayload(Rebuilt):
     com : array_like, shape (3,), optional
         Centre of mass in the frame, metres; default not known.
     inertia : array_like, shape (3, 3), optional
-        About the centre of mass, in the axes of the frame, kg m^2; default not known. It needs
-        ``com``.
+        About the centre of mass, in the axes of the frame, kg m^2; it needs ``com``.
     frame : str or int, optional
         Frame that carries the load; default the tool.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError, InertiaError
-        A mass that is not positive, an inertia without centre of mass, wrong shapes.
 
     Examples
     --------
@@ -90,10 +84,8 @@ class LoadedLog:
 
     Parameters
     ----------
-    log : Log
-        The log.
-    payload : KnownPayload
-        The load. Logs that share one object share its unknown parameters.
+    log, payload : Log, KnownPayload
+        Logs that share one payload object share its unknown parameters.
     """
 
     log: Log

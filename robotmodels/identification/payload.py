@@ -149,10 +149,8 @@ def identify_payload(
     ----------
     model : RobotModel
         The robot; its inertia is not used.
-    loaded : Log
-        With the load.
-    reference : IdentificationResult or Log
-        The robot without it.
+    loaded, reference : Log, IdentificationResult or Log
+        With the load, and without it.
     frame : str or int, optional
         Frame of the parameters; default the tool.
     consistent : bool
@@ -161,12 +159,8 @@ def identify_payload(
     changed : tuple of str
         Kinds of drive and friction parameters that differ between the logs, such as
         ``("offset", "Fc")``.
-    friction : Friction, optional
-        Additional friction model, with a log as reference.
-    processing : Processing, optional
-        Processing of both logs; default that of the reference.
-    executor : concurrent.futures.Executor, optional
-        Computes the pieces of the logs.
+    friction, processing, executor
+        As for `fit`; friction with a log as reference, processing of both logs.
 
     Returns
     -------
@@ -177,13 +171,6 @@ def identify_payload(
         ``.status``, ``.notes``; ``.sigma``, the residual standard deviation of each joint;
         ``.cost``, the relative increase of the sum of squares by ``consistent``.
 
-    Raises
-    ------
-    InvalidValueError, ShapeError, FrameNotFoundError
-        Logs or a result of another robot; a frame of the base; kinds that are not identified.
-    MissingExtraError
-        ``consistent=True`` without its extra.
-
     References
     ----------
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
@@ -192,15 +179,15 @@ def identify_payload(
 
     Examples
     --------
+    >>> from robotmodels.datasets import example_log
     >>> from robotmodels.dynamics import idm, with_payload
-    >>> from robotmodels.robots import load
-    >>> arm, t, w = load("rx90"), 0.01 * np.arange(900)[:, None], np.linspace(1.0, 5.0, 6)
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> carrying = with_payload(arm, 2.0, [0.1, 0.02, 0.05])
-    >>> bare, loaded = (Log(0.01, q, idm(each, q, v, a), v, a) for each in (arm, carrying))
-    >>> body = identify_payload(arm, loaded, bare)
-    >>> round(body.mass, 2), body.com.round(2), body.status.name
-    (2.0, array([0.1 , 0.02, 0.05]), 'COMPLETE')
+    >>> arm, log = example_log()
+    >>> both = arm, with_payload(arm, 2.0, [0.1, 0.0, 0.0])
+    >>> bare, loaded = (
+    ...     Log(log.dt, log.q, idm(each, log.q, log.v, log.a), log.v, log.a) for each in both
+    ... )
+    >>> round(identify_payload(arm, loaded, bare).value("M"), 2)
+    2.0
     """
     check_model(model)
     if isinstance(reference, IdentificationResult):

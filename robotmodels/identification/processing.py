@@ -46,11 +46,10 @@ def choose_processing(
     """Choose the processing of a log: given choices, the others from the log alone.
 
     The motion has the frequency below which the velocities have 99.9 % of their power (less the
-    noise power). Positions are cut off at ten times that, so that they are not distorted; regressor
-    and torque at two and a half times that, by the decimation. Velocities below 0.3 % of a joint's
-    greatest velocity, or below four standard deviations of its velocity noise, form its dead band;
-    samples within 0.3 periods of the cutoff beside it are left out as well. `fit` also uses the
-    robot for its choice.
+    noise power). Positions are cut off at ten times that, regressor and torque at two and a half
+    times that, by the decimation. Velocities below 0.3 % of a joint's greatest velocity, or below
+    four standard deviations of its velocity noise, form its dead band; samples within 0.3 periods
+    of the cutoff beside it are left out as well. `fit` also uses the robot for its choice.
 
     Parameters
     ----------
@@ -73,11 +72,6 @@ def choose_processing(
     -------
     Processing
         Every choice, with its reason.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Numbers out of range; a recording that is shorter than its edges.
 
     References
     ----------

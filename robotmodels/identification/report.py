@@ -19,7 +19,7 @@ from .report_tables import (
     standard_error_ratio,
 )
 from .residuals import SIGNIFICANCE, ResidualDiagnostics, residual_diagnostics
-from .result import IdentificationResult, check_is_result
+from .result import IdentificationResult, check_result
 from .validation import poor_prediction
 from .weak_parameters import (
     CORRELATED,
@@ -53,10 +53,6 @@ def report(result: IdentificationResult, robot: StandardParameters | None = None
     str
         Verdict, data, processing, errors, parameters, diagnostics, notes.
 
-    References
-    ----------
-    Seed book section 1.6.5.
-
     Examples
     --------
     >>> from robotmodels.datasets import example_log
@@ -65,7 +61,7 @@ def report(result: IdentificationResult, robot: StandardParameters | None = None
     >>> print(report(fit(arm, log, drive=("Fv",))).splitlines()[0])
     Dynamic identification of planar_2r
     """
-    check_is_result(result)
+    check_result(result, solved=False)
     title = f"Dynamic identification of {result.model.name}"
     parts = [section.text() for section in report_sections(result, robot)]
     return "\n\n".join([f"{title}\n{'=' * len(title)}", *parts]) + "\n"
@@ -99,49 +95,37 @@ def _verdict(
     """Outcome, quality of the predictions, and parameters that are not determined."""
     estimate, details, names = result.estimate, result.details, result.names
     iterations = f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."
-    title, bound = result.method.title, f"{100.0 * WEAK:.0f} %"
+    title, k = result.method.title, int(np.argmax(result.relative_errors))
+    weak, scaled = weak_parameters(estimate), result.scaled_condition
     sentences = [warning] if warning else []
     sentences += [
         f"{result.reason()} {title[:1].upper()}{title[1:]} of {len(names)} parameters on "
         f"{result.factors.rows} equations ({result.equations.form.value}){iterations}",
         _prediction(result, bool(warning)),
+        f"Largest relative standard error: {percent_text(result.relative_errors[k])} ({names[k]}). "
+        f"Poorly determined (above {100.0 * WEAK:.0f} %): {', '.join(weak) or 'none'}.",
     ]
-    if weak := weak_parameters(estimate):
-        sentences.append(
-            f"{len(weak)} of {len(names)} parameters are poorly determined (relative standard "
-            f"error above {bound}), the worst first: {', '.join(weak)}."
-        )
-    else:
-        k = int(np.argmax(result.relative_errors))
-        largest = percent_text(result.relative_errors[k])
-        sentences.append(
-            f"All parameters are determined: no relative standard error is above {bound} (largest "
-            f"{largest}, {names[k]})."
-        )
     if details.unidentifiable:
         sentences.append(f"The log does not determine: {', '.join(details.unidentifiable)}.")
     if details.dropped:
         sentences.append(f"Left out as not essential: {', '.join(details.dropped)}.")
-    sentences += [_excitation(result, bool(weak)), _whiteness(result, diagnostics)]
+    sentences.append(
+        f"The condition number of the regressor is {result.condition:.3g}, and {scaled:.3g} with "
+        "columns of length one"
+        + ("; use an exciting trajectory." if scaled > _GOOD_CONDITION else ".")
+    )
+    sentences.append(_whiteness(result, diagnostics))
     sentences += [one.sentence for one in negative_parameters(result.base, estimate)]
     return ReportSection("Verdict", tuple(f"* {sentence}" for sentence in sentences))
 
 
 def _prediction(result: IdentificationResult, poor: bool) -> str:
     fitted, test = result.validation.in_sample, result.validation.held_out
-    text = (
-        f"Predicted torques differ from those of the log by {_span(fitted.relative)} of their "
-        f"size, joint by joint (both filtered: {_span(fitted.filtered_relative)})"
-    )
+    text = "Errors of predicted torques relative to their size, joint by joint (both filtered): "
+    text += f"{_span(fitted.relative)} ({_span(fitted.filtered_relative)}) on the log"
     if test is None:
-        return (
-            f"{text}. There is no held-out log: prediction of other motion is not tested; "
-            "give test= (--test)."
-        )
-    text += (
-        f"; from those of the held-out log by {_span(test.relative)} (both filtered: "
-        f"{_span(test.filtered_relative)})."
-    )
+        return f"{text}. There is no held-out log: prediction of other motion is not tested."
+    text += f", {_span(test.relative)} ({_span(test.filtered_relative)}) on the held-out log."
     if poor:
         return text
     worse = [
@@ -150,57 +134,25 @@ def _prediction(result: IdentificationResult, poor: bool) -> str:
         if test.rmse[j] > _WORSE * fitted.rmse[j] and test.relative[j] > _WORSE * fitted.relative[j]
     ]
     if worse:
-        return (
-            f"{text} Errors of some joints are much larger there than on the log: "
-            f"{', '.join(worse)}; a log that excites these joints more would generalise better."
-        )
+        return f"{text} Much larger there: {', '.join(worse)}; excite these joints more."
     return f"{text} The parameters generalise to motion that was not fitted."
 
 
 def _span(values: Array) -> str:
     known = 100.0 * values[np.isfinite(values)]
-    if not known.size:
-        return "-"
-    low, high = f"{known.min():.3g}", f"{known.max():.3g}"
-    return f"{low} %" if len(values) == 1 else f"{low} to {high} %"
-
-
-def _excitation(result: IdentificationResult, weak: bool) -> str:
-    whole, scaled = result.condition, result.scaled_condition
-    text = (
-        f"The condition number of the regressor is {whole:.3g}, and {scaled:.3g} with columns of "
-        "length one: "
-    )
-    if scaled > _GOOD_CONDITION:
-        return (
-            f"{text}above {_GOOD_CONDITION:.0f}, the motion poorly distinguishes some parameters; "
-            "use an exciting trajectory."
-        )
-    text += "the motion distinguishes the parameters"
-    if weak and whole > _GOOD_CONDITION:
-        return f"{text}; those that are poorly determined have little effect on the torques."
-    return f"{text}."
+    return f"{known.min():.3g} to {known.max():.3g} %" if known.size else "-"
 
 
 def _whiteness(result: IdentificationResult, diagnostics: ResidualDiagnostics) -> str:
     coloured = np.flatnonzero(diagnostics.white_p < SIGNIFICANCE)
-    names = group_names(result)
-    some = "" if len(coloured) == len(names) else f" of {', '.join(names[j] for j in coloured)}"
-    text = f"The residuals{some} are correlated in time."
-    text = text if len(coloured) else "The residuals are white."
+    names = ", ".join(group_names(result)[j] for j in coloured)
     ratio = standard_error_ratio(result)
     ratio = ratio[np.isfinite(ratio)]
-    lags = result.details.correlation_lags
-    if not ratio.size:
-        return text
-    if not lags:
-        return f"{text} The standard errors assume white residuals."
-    middle = float(np.median(ratio))
+    middle = float(np.median(ratio)) if ratio.size else 1.0
     return (
-        f"{text} The standard errors take correlation over {lags} equations into account; those "
-        "for white residuals, which are usually published, are "
-        f"{'smaller' if middle >= 1.0 else 'larger'} by a factor of "
-        f"{max(middle, 1.0 / max(middle, 1e-9)):.2g} (median)."
+        f"Residuals that are correlated in time: {names or 'none'}. Standard errors take "
+        f"{result.details.correlation_lags} lags into account; they are {middle:.2g} times "
+        "(median) those for white residuals, which are usually published."
     )
 
 
@@ -229,13 +181,10 @@ def _diagnostics(result: IdentificationResult, diagnostics: ResidualDiagnostics)
         f"kept, {high:.1e} the largest of one that is not.",
     ]
     pairs = correlated_estimates(result.estimate)
-    if not pairs:
-        body.append(f"No two estimates are correlated by more than {CORRELATED}.")
-        return ReportSection("Diagnostics", tuple(body))
-    more = f" (the {_PAIRS} strongest of {len(pairs)})" if len(pairs) > _PAIRS else ""
-    body.append(f"Estimates correlated by more than {CORRELATED}{more}:")
-    listed = [(a, b, f"{c:+.3f}") for a, b, c in pairs[:_PAIRS]]
-    body.append(table_of(("", "with", "correlation"), listed))
+    body.append(f"Estimates correlated by more than {CORRELATED}: {len(pairs) or 'none'}.")
+    if pairs:
+        listed = [(a, b, f"{c:+.3f}") for a, b, c in pairs[:_PAIRS]]
+        body.append(table_of(("the strongest", "with", "correlation"), listed))
     return ReportSection("Diagnostics", tuple(body))
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from .._arrays import Array
 from ..estimation.estimate import Estimate
 from ..geometry import PRISMATIC
-from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
 from ..table_text import ReportSection, ReportTable, number_text, percent_text, table_of
@@ -73,40 +72,30 @@ def data_section(result: IdentificationResult) -> ReportSection:
     if log.sources:
         rows = [(source.name, str(source.rows), source.sha256[:16]) for source in log.sources]
         body.append(table_of(("source", "samples", "SHA-256 begins"), rows))
-    body += [_refused(log), _ranges(result)]
-    return ReportSection("Data", tuple(body))
-
-
-def _refused(log: Log) -> str:
-    if not log.refused:
-        return "No rows were refused."
-    total = sum(len(part.rows) for part in log.refused)
     parts = [
         f"{part.source}: {len(part.rows)} (rows {part.rows[0]} to {part.rows[-1]}), "
         f"{part.reason.rstrip('.')}"
         for part in log.refused
     ]
-    return f"{total} rows were refused. {'; '.join(parts)}."
+    total = sum(len(part.rows) for part in log.refused)
+    body.append(f"{total} rows were refused. {'; '.join(parts)}".strip())
+    body.append(_ranges(result))
+    return ReportSection("Data", tuple(body))
 
 
 def _ranges(result: IdentificationResult) -> ReportTable:
     log, factors = result.equations.log, result.factors
     rms = np.sqrt(np.einsum("ij,ij->j", log.tau, log.tau) / len(log))
-    largest = np.maximum(log.tau.max(axis=0), -log.tau.min(axis=0))
-    counted = len(factors.counts) == log.n
-    rows = []
-    for j, (name, unit) in enumerate(
-        zip(result.model.table.joint_names, effort_units(result.model), strict=True)
-    ):
-        numbers = (log.q[:, j].min(), log.q[:, j].max(), rms[j], largest[j])
-        low, high, size, top = (f"{x:.4g}" for x in numbers)
-        cells = [name, "m" if unit == "N" else "rad", low, high, unit, size, top]
-        if counted:
-            cells += [str(int(factors.counts[j])), str(int(factors.left_out[j]))]
-        rows.append(tuple(cells))
+    numbers = (log.q.min(axis=0), log.q.max(axis=0), rms, np.abs(log.tau).max(axis=0))
+    low, high, size, top = ([f"{x:.4g}" for x in row] for row in numbers)
+    units = effort_units(result.model)
+    lengths = ["m" if unit == "N" else "rad" for unit in units]
+    columns = [result.model.table.joint_names, lengths, low, high, units, size, top]
     headings = ["joint", "unit", "from", "to", "unit", "rms torque", "largest"]
-    headings += ["equations", "in dead band"] if counted else []
-    return table_of(tuple(headings), rows)
+    if len(factors.counts) == log.n:
+        columns += [[str(int(x)) for x in row] for row in (factors.counts, factors.left_out)]
+        headings += ["equations", "in dead band"]
+    return table_of(tuple(headings), list(zip(*columns, strict=True)))
 
 
 def processing_section(result: IdentificationResult) -> ReportSection:
@@ -120,16 +109,13 @@ def processing_section(result: IdentificationResult) -> ReportSection:
             f"one of {chosen.decimation}, low-pass at {chosen.torque_cutoff:.4g} Hz, "
             f"{chosen.rate:.4g} Hz after it"
         )
-    units = ("m/s" if unit == "N" else "rad/s" for unit in effort_units(result.model))
-    joints = zip(result.model.table.joint_names, chosen.dead_band.tolist(), units, strict=True)
-    bands = ", ".join(f"{name} {width:.2g} {unit}" for name, width, unit in joints)
+    bands = ", ".join(f"{width:.2g}" for width in chosen.dead_band)
     lines = (
         f"* Low-pass of the positions: {filtered}.",
         f"* Derivatives: central differences of order {chosen.accuracy}.",
         f"* Decimation of regressor and torque: {decimated}.",
-        f"* Dead band of the velocities: {bands}.",
-        f"* Cut at both ends of each recording: {chosen.edges} samples "
-        f"({chosen.edges * chosen.dt:.3g} s).",
+        f"* Dead bands of the velocities, rad/s or m/s: {bands}.",
+        f"* Cut at both ends of each recording: {chosen.edges} samples.",
         "Why: " + " ".join(chosen.notes),
     )
     return ReportSection("Processing", lines)
@@ -143,10 +129,7 @@ def errors_section(result: IdentificationResult) -> ReportSection:
         "out. All: root mean square of the relative errors.",
         _error_table(result, result.validation.in_sample, "on the log"),
     ]
-    test = result.validation.held_out
-    if test is None:
-        body.append("There is no held-out log.")
-    else:
+    if (test := result.validation.held_out) is not None:
         body.append(f"Held out: {test.samples} samples that were not fitted.")
         body.append(_error_table(result, test, "held out"))
     return ReportSection("Errors", tuple(body))

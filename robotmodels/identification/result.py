@@ -44,24 +44,12 @@ class IdentificationResult(NamedValues):
 
     Parameters
     ----------
-    equations : Equations
-        Robot, base parameters, log and every choice of the processing.
-    factors : TriangularFactors
-        Triangular factors of the equations in the identified parameters.
-    method : Method
-        The method with its options.
-    estimate : Estimate
-        Parameters and their covariance.
-    validation : Validation
-        Errors of the predicted torques.
-    details : FitDetails
-        Facts about the equations and the covariance.
-    notes : tuple of str
-        Findings and advice.
-
-    References
-    ----------
-    Seed book section 1.6.
+    equations, factors
+        Robot, base parameters, log and processing; triangular factors of these equations.
+    method, estimate
+        The method with its options; parameters and their covariance.
+    validation, details, notes
+        Errors of the predicted torques; facts about the equations; findings and advice.
     """
 
     equations: Equations
@@ -130,19 +118,15 @@ class IdentificationResult(NamedValues):
         )
 
 
-def check_is_result(result: object) -> None:
-    """Raise unless it is a result of `fit`."""
+def check_result(result: IdentificationResult, solved: bool = True) -> None:
+    """Raise unless it is a result of `fit`, with parameters."""
     if not isinstance(result, IdentificationResult):
         raise InvalidValueError(
             "result: expected an IdentificationResult of identification.fit, got "
             f"{type(result).__name__}."
         )
-
-
-def check_result(result: IdentificationResult) -> None:
-    """Raise unless it is a result of `fit` with parameters."""
-    check_is_result(result)
-    check_solved(result.estimate)
+    if solved:
+        check_solved(result.estimate)
 
 
 def predicted_torque(
@@ -162,21 +146,11 @@ def predicted_torque(
     ndarray, shape (..., n)
         N m or N. Near zero velocity dry friction is linear, within `FitDetails.friction_ramp`.
 
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        A result without parameters; arrays that do not fit, NaN.
-
-    References
-    ----------
-    Seed book sections 1.5.1.4 and 1.6.5.
-
     Examples
     --------
     >>> from robotmodels.datasets import example_log
     >>> from robotmodels.identification import fit
-    >>> arm, log = example_log()
-    >>> result = fit(arm, log, drive=("Fv",))
+    >>> result = fit(*example_log(), drive=("Fv",))
     >>> predicted_torque(result, [0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(2)
     array([46.74, 10.11])
     """
@@ -199,15 +173,6 @@ def validate(result: IdentificationResult, log: Log) -> Errors:
     -------
     Errors
         Errors by joint.
-
-    Raises
-    ------
-    InvalidValueError
-        A result without parameters; a log that is too short.
-
-    References
-    ----------
-    Seed book section 1.6.5.
 
     Examples
     --------

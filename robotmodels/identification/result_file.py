@@ -37,50 +37,36 @@ def write_result(
 ) -> None:
     """Write an identification to a file whose suffix gives the format.
 
-    ``.json`` contains SI units (null where not finite) and the facts that repeat the fit: hashes of
-    the data, options, versions. ``.urdf`` contains a physically consistent robot.
-
     Parameters
     ----------
     result : IdentificationResult
         Result of `fit`.
     path : str or Path
-        A file named ``.json`` or ``.urdf``.
+        ``.json``: SI units (null where not finite) and the facts that repeat the fit: hashes of the
+        data, options, versions. ``.urdf``: a physically consistent robot.
     robot : StandardParameters, optional
-        Result of `consistent_robot`; without it a URDF is that of the consistent robot nearest to
-        the model's inertia.
+        Result of `consistent_robot`; default that nearest to the model's inertia.
 
     Raises
     ------
-    InvalidValueError
-        Another suffix; no consistent robot was found; a result without parameters.
-    UrdfError
-        As `to_urdf`.
-    InertiaError, MissingExtraError
-        As `consistent_robot`.
-    OSError
-        The file cannot be written.
+    InvalidValueError, UrdfError, InertiaError, MissingExtraError, OSError
+        Another suffix; a result without parameters; as `to_urdf` and `consistent_robot`; the file
+        cannot be written.
 
     Warns
     -----
     UrdfWarning
         Properties that URDF cannot represent.
 
-    References
-    ----------
-    Seed book section 1.6.5.
-
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
+    >>> from tempfile import mkdtemp
     >>> from robotmodels.datasets import example_log
     >>> from robotmodels.identification import fit
-    >>> arm, log = example_log()
-    >>> with TemporaryDirectory() as folder:
-    ...     write_result(fit(arm, log, drive=("Fv",)), Path(folder) / "arm.json")
-    ...     data = json.loads((Path(folder) / "arm.json").read_text(encoding="utf-8"))
-    >>> data["chapter"], len(data["parameters"])
-    ('identification', 8)
+    >>> path = Path(mkdtemp()) / "arm.json"
+    >>> write_result(fit(*example_log(), drive=("Fv",)), path)
+    >>> len(json.loads(path.read_text(encoding="utf-8"))["parameters"])
+    8
     """
     check_result(result)
     path = Path(path)
@@ -180,21 +166,10 @@ def _option(base: BaseParameters, value: Any) -> Any:
 
 def log_data(log: Log) -> dict[str, Any]:
     """Origin of a log, with hashes of its data."""
-    return {
-        "samples": len(log),
-        "joints": log.names,
-        "dt": log.dt,
-        "duration": log.duration,
-        "starts": log.starts,
-        "delay": log.delay,
-        "sha256": _hash(log),
-        "sources": log.sources,
-        "refused": log.refused,
-        "measured": [
-            name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None
-        ],
-        "notes": log.notes,
-    }
+    names = ("dt", "duration", "starts", "delay", "sources", "refused", "notes")
+    measured = [name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None]
+    data = {"samples": len(log), "joints": log.names, "sha256": _hash(log), "measured": measured}
+    return data | {name: getattr(log, name) for name in names}
 
 
 def _hash(log: Log) -> str:

@@ -41,11 +41,9 @@ class Processing(Rebuilt):
     ----------
     dt : float
         Sampling period of the log, seconds.
-    cutoff : float or None
+    cutoff, order : float or None, int
         Hz, where the zero-phase filter of positions (and of velocities and accelerations, where the
-        log has them) is at -3 dB; None for no filter.
-    order : int
-        Order of each of the filter's two passes.
+        log has them) is at -3 dB, None for no filter; order of each of its two passes.
     accuracy : int
         Order of the central differences: 2, 4 or 6.
     decimation : int
@@ -59,20 +57,6 @@ class Processing(Rebuilt):
         Hz: frequency below which the velocities have 99.9 % of their power.
     notes : tuple of str
         Reasons for the values.
-
-    Raises
-    ------
-    InvalidValueError
-        Invalid order of the filter or of the differences.
-
-    References
-    ----------
-    Seed book sections 1.6.2.4 and 1.6.2.5.
-
-    Examples
-    --------
-    >>> Processing(0.001, 10.0, 4, 4, 50, np.zeros(6), 200, 1.0, ()).torque_cutoff
-    8.0
     """
 
     dt: float

@@ -28,19 +28,12 @@ class Errors(Frozen):
 
     Parameters
     ----------
-    rmse : ndarray, shape (n,)
-        Root mean square of measured less predicted torque at the rate of the log, N m or N.
-    relative : ndarray, shape (n,)
-        The same relative to the measured torque.
-    bias : ndarray, shape (n,)
-        Mean of measured less predicted torque, N m or N.
-    filtered_rmse : ndarray, shape (n,)
-        Root mean square of the residuals of the equations, in which both sides are filtered and
-        dead bands left out; NaN for a joint without equations.
-    filtered_relative : ndarray, shape (n,)
-        The same relative to the filtered torque.
-    correlation : ndarray, shape (n,)
-        Correlation of successive residuals of the equations.
+    rmse, relative, bias : ndarray, shape (n,)
+        Root mean square of measured less predicted torque at the rate of the log (N m or N), the
+        same relative to the measured torque, and its mean.
+    filtered_rmse, filtered_relative, correlation : ndarray, shape (n,)
+        The same of the equations, both sides filtered and dead bands left out (NaN for a joint
+        without equations), and the correlation of their successive residuals.
     noise : ndarray, shape (n,)
         Root mean square of the white part of the errors, from their second differences.
     samples : int
@@ -63,16 +56,12 @@ class Validation:
 
     Parameters
     ----------
-    in_sample : Errors
-        On the log that was fitted.
-    held_out : Errors or None
-        On the log given as ``test``.
+    in_sample, held_out : Errors, Errors or None
+        On the log that was fitted, and on that given as ``test``.
     nominal : Errors or None
-        Errors of the given robot on the fitted log, without equations (NaN in these
-        fields); None for a robot without masses.
+        Of the given robot on the fitted log (NaN for the equations); None for one without masses.
     folds : None
-        None: neighbouring samples of a log are correlated, so that its parts are not independent;
-        give ``test``.
+        Neighbouring samples are correlated, so that parts of a log are not independent.
     """
 
     in_sample: Errors

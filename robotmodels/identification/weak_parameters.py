@@ -41,17 +41,12 @@ def negative_parameters(base: BaseParameters, estimate: Estimate) -> tuple[Negat
         terms = np.flatnonzero(rows[name])
         if value < 0.0 and positive[terms].all() and (rows[name][terms] > 0.0).all():
             certain = value < -2.0 * error
-            why = (
-                "more than noise explains: the model may be incomplete, or the log has wrong signs "
-                "or units"
-                if certain
-                else "within its standard error: the log does not determine it"
-            )
+            why = "more than noise explains" if certain else "within its standard error"
             added = " + ".join(base.parameter_names[k] for k in terms[:4])
             added += " + ..." if len(terms) > 4 else ""
             sentence = (
-                f"{name} = {value:.3g} is negative, but {added} cannot be; it is {why}. A "
-                "physically consistent fit avoids it."
+                f"{name} = {value:.3g} is negative, but {added} cannot be; it is "
+                f"{why}. A physically consistent fit avoids it."
             )
             negative.append(NegativeParameter(name, certain, sentence))
     return tuple(negative)

@@ -27,10 +27,9 @@ class Controller(Rebuilt):
 
     Parameters
     ----------
-    kp, kd : array_like, scalar or shape (n,)
-        Gains of position (N m/rad or N/m) and velocity; at least one of the arrays has shape (n,).
-    ki : array_like, scalar or shape (n,), optional
-        Gain of the integral of the position error, per second; default none.
+    kp, kd, ki : array_like, scalar or shape (n,)
+        Gains of position (N m/rad or N/m), velocity, and the integral of the position error (per
+        second, default none); at least one of the arrays has shape (n,).
     limit : array_like, scalar or shape (n,), optional
         Largest torque, N m or N; default none.
     feed_forward : RobotModel, optional
@@ -38,16 +37,9 @@ class Controller(Rebuilt):
     period : float, optional
         Seconds from one torque to the next; default that of the log.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays that do not fit each other, NaN, a limit or a period that is not positive.
-
     References
     ----------
-    Seed book chapter 5 (position control); M. Gautier, A. Janot and P.-O. Vandanjon, "A new
-    closed-loop output error method for parameter identification of robot dynamics", IEEE T-CST
-    21(2), 2013, section II.
+    Seed book chapter 5 (position control).
 
     Examples
     --------
@@ -102,12 +94,9 @@ def tuned_controller(
         The robot, which is also the feed-forward model.
     q : array_like, shape (N, n)
         Postures.
-    bandwidth : float
-        Hz; less where the velocity loop would be too fast for the period.
-    damping : float
-        Damping ratio.
-    period : float
-        Seconds from one torque to the next.
+    bandwidth, damping, period : float
+        Hz (less where the velocity loop would be too fast for the period), damping ratio, and
+        seconds from one torque to the next.
     feed_forward : bool
         Whether the torques of the robot on the references are added.
 
@@ -120,10 +109,6 @@ def tuned_controller(
     ------
     InertiaError, InvalidValueError
         A mass matrix that is not positive definite; a number that is not positive.
-
-    References
-    ----------
-    Seed book chapter 5.
 
     Examples
     --------

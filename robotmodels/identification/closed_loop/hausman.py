@@ -77,9 +77,9 @@ def hausman_test(
 ) -> HausmanResult:
     """Durbin-Wu-Hausman test: whether least squares and instrumental variables differ too much.
 
-    Noise of the positions is in the regressor and biases least squares; instrumental variables are
-    consistent. The test is whether the difference of a parameter exceeds half a standard error of
-    least squares; its variance holds for residuals that are correlated in time and between joints.
+    Noise of the positions in the regressor biases least squares. The test is whether the difference
+    of a parameter exceeds half a standard error of least squares; its variance holds for residuals
+    that are correlated in time and between joints.
 
     Parameters
     ----------
@@ -97,17 +97,10 @@ def hausman_test(
     HausmanResult
         Differences, standard errors, p-values, and a sentence.
 
-    Raises
-    ------
-    InvalidValueError
-        A level that is not between 0 and 1; an estimate of other parameters.
-
     References
     ----------
-    J. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978; A. Janot, P.-O.
-    Vandanjon and M. Gautier, "A Durbin-Wu-Hausman test for industrial robot identification", IEEE
-    ICRA 2014; J. Hodges and E. Lehmann, "Testing the approximate validity of statistical
-    hypotheses", J. Royal Statistical Society B 16(2), 1954 (effects above a bound).
+    J. Hausman, Econometrica 46(6), 1978; A. Janot, P.-O. Vandanjon and M. Gautier, IEEE ICRA 2014;
+    J. Hodges and E. Lehmann, J. Royal Statistical Society B 16(2), 1954 (effects above a bound).
 
     Examples
     --------

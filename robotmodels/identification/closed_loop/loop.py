@@ -128,16 +128,14 @@ def closed_loop(
     goal = _goal(system, references) if given is None else np.broadcast_to(given, (n,))
     needed = rates.steps(log.dt, goal)
     parts, hold = steps_of(controller, log.dt, min(needed, MOST) if substeps is None else substeps)
-    step = log.dt / parts
-    rest, stable = step * rates.dry, rates.stable(step)
+    rest, stable = log.dt / parts * rates.dry, rates.stable(log.dt / parts)
     if (parts < needed and substeps is None) or not stable:
         joint = int(np.argmax(rest / np.where(goal > 0.0, goal, np.inf))) if stable else rates.joint
-        effect = f"dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
         notes.append(
             f"{robot.table.joint_names[joint]} is stiff: friction stops it too fast for {parts} "
-            f"steps of a sample of {log.dt:.3g} s, so that "
-            f"{effect if stable else 'the simulation is not stable'}; give the method more "
-            "substeps=, or use least squares."
+            f"integration steps of a sample of {log.dt:.3g} s, so that dry friction is linear up "
+            f"to {rest[joint]:.2g} rad/s or m/s{'' if stable else ' and the simulation unstable'}; "
+            "give the method more substeps=, or use least squares."
         )
     if given is None:
         given = np.where(rest > 0.0, np.maximum(processing.dead_band, rest), 0.0)

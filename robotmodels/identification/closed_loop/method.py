@@ -1,8 +1,6 @@
 """Common part of the methods that simulate the controlled robot: step, iteration and result.
 
-Sources: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
-industrial robot identification", IEEE T-CST 22(1), 2014; H. Walker and P. Ni, "Anderson
-acceleration for fixed-point iterations", SIAM J. Numerical Analysis 49(4), 2011.
+Source: H. Walker and P. Ni, SIAM J. Numerical Analysis 49(4), 2011 (Anderson mixing).
 """
 
 from __future__ import annotations

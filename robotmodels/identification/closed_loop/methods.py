@@ -1,4 +1,33 @@
-"""Instrumental variables, direct and inverse models, and closed-loop output error."""
+"""Instrumental variables, direct and inverse models, and closed-loop output error.
+
+All simulate the controlled robot with the last parameters, and share these options.
+
+Parameters
+----------
+controller : Controller, optional
+    Controller of the robot; default one tuned for small tracking errors.
+start : array_like, shape (b,), optional
+    Initial parameters; default weighted least squares.
+iterations : int
+    Largest number of steps.
+lags : int, optional
+    Lags of the covariance, see `correlated_covariance`.
+width : array_like, scalar or shape (n,), optional
+    Velocities below which the simulated dry friction is linear; default by the log.
+substeps : int, optional
+    Runge-Kutta steps of a sample; default as many as friction requires, up to 64.
+
+References
+----------
+A. Janot, P.-O. Vandanjon and M. Gautier, IEEE T-CST 22(1), 2014, section III (IV); M. Gautier, A.
+Janot and P.-O. Vandanjon, IEEE T-CST 21(2), 2013, section III (DIDIM); A. Janot, M. Gautier, A.
+Jubien and P.-O. Vandanjon, IEEE T-CST 22(5), 2014, sections II and III (CLOE).
+
+Examples
+--------
+>>> Instrumental(iterations=5).name, OutputError(output="both").output
+('iv', 'both')
+"""
 
 from __future__ import annotations
 
@@ -14,7 +43,7 @@ from ...errors import InvalidValueError
 from ...estimation.estimate import Estimate
 from ...estimation.factor import TriangularFactors
 from ..equations import Block, Equations
-from ..forms import decimated
+from ..forms import decimated, decimated_samples
 from ..signals import Piece
 from .loop import ClosedLoop, closed_loop
 from .method import Pairs, SimulatingMethod
@@ -31,33 +60,8 @@ _OUTPUTS = ("torque", "position", "both")
 class Instrumental(SimulatingMethod):
     """Instrumental variables (IDIM-IV): consistent although noise is in the regressor.
 
-    The controlled robot is simulated with the last parameters; the regressor Z of its motion, which
-    the noise of the sensors does not reach, is the instrument: ``Z^T S (y - W b) = 0``.
-
-    Parameters
-    ----------
-    controller : Controller, optional
-        Controller of the robot; default one tuned for small tracking errors.
-    start : array_like, shape (b,), optional
-        Initial parameters; default weighted least squares.
-    iterations : int
-        Largest number of steps.
-    lags : int, optional
-        Lags of the covariance, see `correlated_covariance`.
-    width : array_like, scalar or shape (n,), optional
-        Velocities below which the simulated dry friction is linear; default by the log.
-    substeps : int, optional
-        Runge-Kutta steps of a sample; default as many as friction requires, up to 64.
-
-    References
-    ----------
-    A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
-    industrial robot identification", IEEE T-CST 22(1), 2014, section III.
-
-    Examples
-    --------
-    >>> Instrumental(iterations=5).name
-    'iv'
+    The regressor Z of the simulated motion, which the noise of the sensors does not reach, is the
+    instrument: ``Z^T S (y - W b) = 0``.
     """
 
     name: ClassVar[str] = "iv"
@@ -84,24 +88,8 @@ def instrument_pairs(simulator: ClosedLoopSimulator, values: Array) -> Pairs:
 class Didim(SimulatingMethod):
     """Direct and inverse dynamic identification models (DIDIM): torques alone are measured.
 
-    The controlled robot is simulated with the last parameters; weighted least squares then explain
-    the measured torque by the regressor of the simulated motion. Where the log has references, the
-    measured positions serve only for the initial parameters.
-
-    Parameters
-    ----------
-    controller, start, iterations, lags, width, substeps
-        See `Instrumental`.
-
-    References
-    ----------
-    M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter
-    identification of robot dynamics", IEEE T-CST 21(2), 2013, section III.
-
-    Examples
-    --------
-    >>> Didim().iterations
-    50
+    Weighted least squares explain the measured torque by the regressor of the simulated motion.
+    Where the log has references, measured positions serve only for the initial parameters.
     """
 
     iterations: int = 50
@@ -110,8 +98,7 @@ class Didim(SimulatingMethod):
     _memory: ClassVar[int] = 6
     _advice: ClassVar[tuple[str, ...]] = (
         "DIDIM does not converge where the simulated motion depends on the parameters more than "
-        "the torques determine them (a joint of little inertia under friction, for instance): use "
-        "instrumental variables, which use the measured motion too.",
+        "the torques determine them: use instrumental variables, which use the measured motion.",
     )
 
     def _simulated(self, simulator: ClosedLoopSimulator, values: Array, size: Array) -> Pairs:
@@ -130,9 +117,8 @@ class Didim(SimulatingMethod):
         quick = replace(loop.controller, period=system.log.dt / _PARTS)
         quicker = closed_loop(system, values, quick, self.width, self.substeps)
         note = (
-            f"Its torques are held for one of {_PARTS} parts of a sample. DIDIM explains torques "
-            "by a motion that it simulates: without the robot's controller and references (q_ref "
-            "of the log) its standard errors do not include the difference of the controllers."
+            f"Its torques are held for one of {_PARTS} parts of a sample. Standard errors of DIDIM "
+            "do not include the difference between this controller and that of the robot."
         )
         return quicker and replace(quicker, notes=(*loop.notes, note))
 
@@ -141,31 +127,9 @@ class Didim(SimulatingMethod):
 class OutputError(SimulatingMethod):
     """Closed-loop output error (CLOE): simulated outputs are fitted to the measured ones.
 
-    Gauss-Newton steps on the differences of measured and simulated outputs, both through the same
-    decimation, weighted by their standard deviations. Sensitivities are differences of b
-    simulations. Torques are compared where the references keep a joint out of its dead band.
-
-    Parameters
-    ----------
-    controller, start, iterations, lags, width, substeps
-        See `Instrumental`.
-    output : str
-        "torque", "position" or "both"; ``sigma`` then has an entry for each output, torques first.
-
-    Raises
-    ------
-    InvalidValueError
-        Another output.
-
-    References
-    ----------
-    A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, "Comparison between the CLOE method and the
-    DIDIM method for robots identification", IEEE T-CST 22(5), 2014, sections II and III.
-
-    Examples
-    --------
-    >>> OutputError(output="both").output
-    'both'
+    Gauss-Newton steps on the differences, both through the same decimation; sensitivities are
+    differences of b simulations. Torques are compared where the references keep a joint out of its
+    dead band. ``output`` is "torque", "position" or "both" (``sigma`` has the torques first).
     """
 
     output: Literal["torque", "position", "both"] = "torque"
@@ -219,7 +183,4 @@ class OutputError(SimulatingMethod):
 
 def _decimated(system: Equations, piece: Piece, rows: Array) -> Array:
     """Decimation as for the measured equations."""
-    step = system.processing.decimation
-    centre = piece.start - max(piece.start - system.processing.reach, piece.low)
-    count = -(-(piece.stop - piece.start) // step)
-    return decimated([rows], step, centre, count)
+    return decimated([rows], *decimated_samples(system, piece))

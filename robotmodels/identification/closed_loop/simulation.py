@@ -45,7 +45,7 @@ class ClosedLoopSimulator:
                 self.references[piece.begin] = self._references(piece)
 
     def _references(self, piece: Piece) -> References:
-        """References of the recording of a piece: those of the log, or its filtered positions."""
+        """Those of the log, or its filtered positions, of the recording of a piece."""
         log, processing, loop = self.system.log, self.system.processing, self.loop
         ahead = loop.controller.feed_forward
         if log.q_ref is not None:
@@ -60,9 +60,10 @@ class ClosedLoopSimulator:
 
     def signals(self, values: Array) -> dict[int, Signals]:
         """Signals of the simulated robot for each recording, by its first row."""
-        log = self.system.log
-        robot = robot_of(self.system, values)
-        loop = with_enough_steps(robot, self.loop, log)
+        log, loop, robot = self.system.log, self.loop, robot_of(self.system, values)
+        rates = friction_rates(robot, log.q)
+        if rates is None or not rates.stable(log.dt / loop.substeps):
+            raise SimulationDivergedError
         signals = {}
         for begin, references in self.references.items():
             t = log.dt * (references.first + np.arange(len(references.q) - 1.0))
@@ -148,19 +149,6 @@ def follow(robot: RobotModel, loop: ClosedLoop, dt: float, references: Reference
     return out
 
 
-def with_enough_steps(robot: RobotModel, loop: ClosedLoop, log: Log) -> ClosedLoop:
-    """Closed loop with enough integration steps for these parameters."""
-    rates = friction_rates(robot, log.q)
-    if rates is None:
-        raise SimulationDivergedError
-    if rates.stable(log.dt / loop.substeps):
-        return loop
-    times = -(-rates.steps(log.dt) // loop.substeps)
-    if loop.substeps * times > MOST:
-        raise SimulationDivergedError
-    return replace(loop, substeps=loop.substeps * times, hold=loop.hold * times)
-
-
 def simulated_log(
     model: RobotModel,
     controller: Controller,
@@ -183,11 +171,9 @@ def simulated_log(
         References at the samples, rad or m; the robot starts on them.
     dt : float
         Sampling period, seconds.
-    width : array_like, scalar or shape (n,), optional
-        Velocities below which dry friction is linear; default the least for a step of the
-        integration.
-    substeps : int, optional
-        Runge-Kutta steps of a sample; default 1, or as many as viscous friction requires.
+    width, substeps : optional
+        See `Instrumental`; default the least width for a step of the integration, and one step of
+        a sample or as many as viscous friction requires.
 
     Returns
     -------
@@ -197,8 +183,7 @@ def simulated_log(
     Raises
     ------
     InvalidValueError, ShapeError
-        The simulation diverged; a mass matrix that is not positive definite; references that do
-        not fit the robot.
+        The simulation diverged, a mass matrix is not positive definite, or references do not fit.
 
     Examples
     --------
@@ -220,8 +205,7 @@ def simulated_log(
         if substeps > MOST:
             raise InvalidValueError(
                 f"substeps: viscous friction requires {substeps} in a sample of {dt:g} s, more "
-                f"than the {MOST} that are chosen; give substeps=, or more inertia (of rotors, for "
-                "instance)."
+                f"than {MOST}; give substeps=, or more inertia (of rotors, for instance)."
             )
     parts, hold = steps_of(controller, dt, substeps)
     least = np.zeros(n) if rates is None else dt / parts * rates.dry

@@ -58,9 +58,8 @@ def exciting_trajectory(
     """Optimal exciting trajectory for the identification of the base parameters.
 
     Random motions within the limits are drawn, the best of them are improved by quasi-Newton steps
-    with analytic gradients, and the best result is kept. Positions, velocities and accelerations
-    keep their limits everywhere, torques and distances on a fine grid with an allowance for the
-    extremes between its samples.
+    with analytic gradients. Positions, velocities and accelerations keep their limits everywhere,
+    torques and distances on a fine grid with an allowance for extremes between its samples.
 
     Parameters
     ----------
@@ -76,25 +75,21 @@ def exciting_trajectory(
     criterion : {"condition", "log_det"}
         Condition number of the base regressor stacked over samples, or the volume of the
         confidence ellipsoid.
-    drive : bool or collection of DriveKind or str
-        Kinds of drive parameters that are to be identified.
-    base : BaseParameters, optional
-        Parameters to be identified; default those of the model with ``drive``.
-    limits : MotionLimits, optional
-        Limits of position, velocity, acceleration and jerk; default the table's. Missing ones are
-        assumed, and named in ``notes``.
-    torque_limits : array_like, shape () or (n,), optional
-        N m or N, for the model's own parameters; default the table's, where the model has masses.
+    drive, base
+        As for `fit`: the parameters to be identified.
+    limits, torque_limits : MotionLimits, array_like of shape () or (n,), optional
+        Limits of position, velocity, acceleration and jerk, and of torques (N m or N) for the
+        model's own parameters; default the table's. Missing ones of motion are assumed, see
+        ``notes``.
     workspace : Box, optional
         Box in which the origins of ``frames`` stay.
     obstacles : Sphere, Box, Plane, Capsule, or iterable of these
         Bodies of `obstacles` outside of which these origins stay, such as a floor.
     frames : sequence of str, int or None
         Names or numbers of frames; None is the tool.
-    sigma : array_like, shape () or (n,), optional
-        Standard deviations of the torques' noise, by which rows are divided; default 1.
-    scale : array_like, shape (b,), optional
-        Expected sizes of the base parameters, not 0, which multiply columns; default 1.
+    sigma, scale : array_like, shapes () or (n,), (b,), optional
+        Standard deviations of the torques' noise, by which rows are divided, and expected sizes of
+        the base parameters, which multiply columns; default 1.
     samples : int, optional
         Samples in a period; default 20 for each harmonic, or 10 for each point.
     margin : float
@@ -102,13 +97,11 @@ def exciting_trajectory(
     rest : bool
         Whether velocity and acceleration vanish at the ends of a Fourier series, as of a spline.
     starts, baseline : int, optional
-        Numbers of random motions that are improved and drawn; default 8 and 100, fewer for robots
-        whose evaluations exceed the budget.
+        Numbers of random motions that are improved and drawn; default 8 and 100, or fewer.
     iterations : int, optional
         Largest number of iterations of each of the four stages of a start; a stage ends earlier
-        where the criterion falls by less than 1 % over 25 of them. Default 200 and a budget of
-        evaluations (about 10 s of a processor for 8 starts). The budget counts multiplications, so
-        that searches repeat exactly.
+        where the criterion falls by less than 1 % over 25 of them. Default 200, within a budget of
+        multiplications (about 10 s of a processor), so that searches repeat exactly.
     rng : Generator or int, optional
         Random generator, or its seed; default a fresh one.
     progress : bool or callable, optional
@@ -120,13 +113,6 @@ def exciting_trajectory(
         The motion, its quality and that of the random ones, and a status. Where no motion is within
         all limits the status is ``INFEASIBLE``, and ``limits.violations()`` lists the broken ones.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments out of range; too few samples for the parameters; friction in ``base``.
-    FrameNotFoundError
-        Unknown ``frames``.
-
     References
     ----------
     Seed book section 1.6.2.3; M. Gautier and W. Khalil, "Exciting trajectories for the
@@ -136,9 +122,8 @@ def exciting_trajectory(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> result = exciting_trajectory(
-    ...     load("planar_2r"), harmonics=3, starts=1, baseline=5, iterations=20, rng=0
-    ... )
+    >>> options = {"harmonics": 3, "starts": 1, "baseline": 5, "iterations": 20, "rng": 0}
+    >>> result = exciting_trajectory(load("planar_2r"), **options)
     >>> result.limits.kept, bool(result.condition < result.baseline_conditions[0])
     (True, True)
     """

@@ -44,17 +44,9 @@ def write_trajectory(
         Samples per second, Hz. The last sample is the last multiple within the motion.
     degrees : bool
         Whether revolute joints are written in degrees; not for ROS, whose unit is the radian.
-    names : sequence of str, length n, optional
-        Names of the joints; default those of the robot, else ``joint_1`` and so on.
-    turns : sequence of bool, length n, optional
-        Flags of revolute joints; default those of the robot, else all.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Another ending; a rate that is not positive; degrees for ROS; names of other joints.
-    OSError
-        The file cannot be written.
+    names, turns : sequences of str and bool, length n, optional
+        Names of the joints, and whether they are revolute; default those of the robot, else
+        ``joint_1`` and so on, and all.
 
     Examples
     --------

@@ -107,25 +107,15 @@ class ExcitingTrajectory(Rebuilt):
 
     Parameters
     ----------
-    trajectory : Trajectory
-        One period, n joints, from 0 to ``basis.duration``.
-    model : RobotModel
-        The robot.
-    base : BaseParameters
-        The parameters to be identified.
-    criterion : str
-        ``"condition"`` or ``"log_det"``, which was minimised.
+    trajectory, model, base, criterion
+        One period, n joints; the robot; the parameters to be identified; what was minimised.
     limits : ExcitationLimits
         Extremes and limits: ``kept``, ``violations()``, ``motion``, ``torque``,
         ``torque_limits``, ``clearance``.
-    starts : tuple of ExcitationStart
-        Every start: ``before``, ``after``, ``history``, ``stages``, ``status``.
-    baseline : tuple of ExcitationQuality
-        Random motions that keep the same limits.
-    basis : MotionBasis
-        Functions that the motion is made of: ``kind``, ``duration``, ``order``, ``rest``.
-    coefficients : ndarray, shape (P, n)
-        Their coefficients.
+    starts, baseline : tuples of ExcitationStart and ExcitationQuality
+        Every start (``before, after, history, stages, status``); random motions within the limits.
+    basis, coefficients : MotionBasis, ndarray of shape (P, n)
+        Functions that the motion is made of, and their coefficients.
     notes : tuple of str
         Limits that were assumed, and how far the starts agree.
     """

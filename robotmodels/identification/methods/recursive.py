@@ -46,22 +46,13 @@ class Recursive(Method):
     Parameters
     ----------
     forgetting : float
-        Weight of the squares of an instant relative to those of the next, above 0 and at most 1, so
-        that the effective number of instants is about ``1 / (1 - forgetting)``.
+        Weight of the squares of an instant relative to those of the next, above 0 and at most 1;
+        the effective number of instants is about ``1 / (1 - forgetting)``.
 
     References
     ----------
     Seed book section 1.6.4; G. Bierman, "Factorization Methods for Discrete Sequential Estimation",
     1977, chapter V (square-root information form).
-
-    Examples
-    --------
-    >>> from robotmodels.datasets import example_log
-    >>> from robotmodels.identification import Recursive, fit
-    >>> arm, log = example_log()
-    >>> result = fit(arm, log, Recursive(forgetting=0.99), drive=("Fv",))
-    >>> result.estimate.details.values.shape[1] == len(result.names)
-    True
     """
 
     forgetting: float = 1.0

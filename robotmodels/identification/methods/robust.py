@@ -57,8 +57,7 @@ class Robust(Method):
     """Robust least squares; weighted least squares is the start.
 
     ``sigma`` of the estimate are residual standard deviations from medians, the covariance takes
-    variances that differ between equations into account, and ``details`` has the outliers by joint
-    and time.
+    variances that differ between equations into account, ``details`` has the outliers.
 
     Parameters
     ----------
@@ -69,18 +68,6 @@ class Robust(Method):
     ----------
     P. J. Huber and E. M. Ronchetti, "Robust Statistics", 2nd ed., 2009, sections 7.6 to 7.8;
     V. Yohai, Annals of Statistics 15(2), 1987 (fixed scale for redescending losses).
-
-    Examples
-    --------
-    >>> from robotmodels.datasets import example_log
-    >>> from robotmodels.identification import Log, Robust, fit
-    >>> arm, log = example_log()
-    >>> tau = log.tau.copy()
-    >>> tau[::50] += 50.0  # one sample in fifty is wrong
-    >>> spoilt = Log(log.dt, log.q, tau)
-    >>> result = fit(arm, spoilt, Robust("tukey"), drive=("Fv",), processing={"decimation": 1})
-    >>> round(result.value("Fv1"), 2)
-    2.0
     """
 
     loss: Loss | str = Loss.HUBER

@@ -39,25 +39,14 @@ class SequentialStep:
 class Sequential(Method):
     """Sequential least squares, joint by joint from the last to the first.
 
-    The torque of a joint depends on the links beyond it alone: the last joint's equations give
-    parameters of the last link, with these the equations of the joint before give those of its
-    link, and so on. Parameters that a step determines only in combination are left to later steps.
-    Errors of known values enter the covariance, but values are not improved later; weighted least
-    squares has smaller standard errors. ``details`` is a tuple of steps, with
-    ``joints, names, waiting, equations, sigma, condition``.
+    The torque of a joint depends on the links beyond it alone. Parameters that a step determines
+    only in combination are left to later steps. Errors of known values enter the covariance, but
+    values are not improved later; weighted least squares has smaller standard errors. ``details``
+    is a tuple of steps, with ``joints, names, waiting, equations, sigma, condition``.
 
     References
     ----------
     Seed book section 1.6.4.
-
-    Examples
-    --------
-    >>> from robotmodels.datasets import example_log
-    >>> from robotmodels.identification import fit
-    >>> arm, log = example_log()
-    >>> result = fit(arm, log, "sequential", drive=("Fv",))
-    >>> [step.joints for step in result.estimate.details]
-    [(2,), (1,)]
     """
 
     name: ClassVar[str] = "sequential"
