@@ -7,7 +7,6 @@ from identities.random_robots import random_model, random_state
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.identification import exciting_trajectory
-from robotmodels.identification.excitation import search
 from robotmodels.identification.excitation.limits import (
     excitation_limits,
     excitation_torques,
@@ -137,21 +136,6 @@ def test_coupled_wrist_and_seven_joints(name, b):
     keeps_limits(found)
 
 
-def test_weights_count():
-    drive, sigma = ("Ia", "Fv", "Fc"), np.array([1.0, 0.2])
-    base = rm.base_parameters(rm.load("planar_2r"), drive=drive)
-    options = {"starts": 2, "baseline": 6, "iterations": 60, "harmonics": 3}
-    scale = np.where(np.arange(len(base)) == 0, 30.0, 1.0)
-    plain, weighted = quick(**options), quick(base=base, sigma=sigma, scale=scale, **options)
-    assert plain.quality.weighted_condition == pytest.approx(plain.condition)
-    t = np.arange(300) * 10.0 / 300
-    motion = [f(t) for f in (plain.trajectory.q, plain.trajectory.v, plain.trajectory.a)]
-    W = rm.torque_regressor(plain.model, *motion, drive=drive, columns=base)
-    of_plain = np.linalg.cond((W * scale / sigma[:, None]).reshape(-1, len(base)))
-    assert weighted.quality.weighted_condition < of_plain
-    assert plain.condition < weighted.condition
-
-
 def test_infeasible_limits_are_a_status_that_names_them():
     bodies, box = [Sphere([0, 0, 0], 9.0)], Box([-3, -3, 0.6], [3, 3, 0.8])
     weak = [330, 0.5, 0.5, 56, 56, 56]
@@ -163,15 +147,6 @@ def test_infeasible_limits_are_a_status_that_names_them():
     assert found.baseline == ()
     assert any("larger torque_limits" in note for note in found.notes)
     assert "limits that are not kept" in str(found)
-
-
-def test_limits_of_jerk_are_kept():
-    limits = (MotionLimits(2.0, 6.0, jerk, lower=-2.0, upper=2.0) for jerk in (np.inf, 2.0))
-    free, bound = (quick(kind="spline", limits=each) for each in limits)
-    jerks = [np.abs(x.trajectory.jerk(np.linspace(0.0, 10.0, 4001))).max() for x in (free, bound)]
-    assert bound.limits.kept
-    assert jerks[0] > 2.5
-    assert 1.0 < jerks[1] <= 2.0
 
 
 def test_missing_limits_are_assumed_and_noted():
@@ -206,23 +181,3 @@ def test_mistakes_are_named():
     ):
         with pytest.raises(error, match=message):
             quick(**options)
-
-
-def test_the_budget_bounds_the_multiplications(monkeypatch):
-    budget, works, done = 6e8, [], []
-    value = ExcitationProblem.value
-
-    def counting(self, *arguments):
-        works.append(self.work)
-        return value(self, *arguments)
-
-    monkeypatch.setattr(ExcitationProblem, "value", counting)
-    monkeypatch.setattr(search, "BUDGET", budget)
-    found = exciting_trajectory(rm.load("ur10e"), rng=0, progress=done.append)
-    assert 0.5 * budget < sum(works) < 1.2 * budget
-    assert done == [0.25, 0.5, 0.75, 1.0]
-    assert found.status.name == "LIMIT_OF_ITERATIONS"
-    assert found.limits.kept
-    assert found.condition < min(60.0, found.baseline_conditions[0])
-    # given iterations are made, whatever the budget
-    assert quick(iterations=20).starts[0].stages.tolist() == [20, 20, 20, 20]

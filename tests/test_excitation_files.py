@@ -97,14 +97,3 @@ def test_excite_writes_what_a_controller_needs(capsys, tmp_path):
     assert (np.abs(rows[:, 13:]).max(axis=0) <= [3, 3, 4, 5, 5, 6]).all()
     assert np.abs(rows[:, 7:13]).max() <= 1.5
     assert "every limit is kept" in (folder / "summary.txt").read_text(encoding="utf-8")
-
-
-def test_excite_prints_json_and_reports_limits_that_cannot_be_kept(capsys):
-    words = ["--kind", "spline", "--points", 6, "--drive", "--json"]
-    code, out, err = run(capsys, "planar_2r", *words)
-    data = json.loads(out)
-    assert (code, err) == (0, "")
-    assert data["base_parameters"] == ["ZZ1", "ZZ2", "MX2", "MY2"]
-    code, out, _ = run(capsys, "ur10e", "--torque-limits", 0.1)
-    assert code == 1
-    assert "No motion was found that keeps every limit." in out

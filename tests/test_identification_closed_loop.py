@@ -341,25 +341,3 @@ def test_stiff_joints_are_integrated_in_more_steps(inertia, Fv, Fc, dt):
     rough = closed_loop(system, truth, substeps=1)
     assert rough.substeps == 1
     assert "joint_2 is stiff" in " ".join(rough.notes)
-
-
-def test_a_joint_too_stiff_for_any_steps_is_named_and_not_simulated():
-    log, system, factors, truth = stiff_problem(stiff_robot(2e-6, 2.0, 0.0), 2.0, 1e-3)
-    found = Instrumental(start=truth).solve(system, factors)
-    loop = found.details.loop
-    assert loop.substeps == 64
-    assert found.status is EstimateStatus.UNSTABLE
-    assert "joint_2 is stiff" in (notes := " ".join(found.notes))
-    assert "simulation unstable" in notes
-    with pytest.raises(InvalidValueError, match="substeps"):
-        simulated_log(robot_of(system, truth), loop.controller, log.q_ref, log.v_ref, log.dt)
-
-
-def test_didim_that_does_not_converge_has_a_status_and_finite_numbers():
-    _, system, factors, truth = stiff_problem(stiff_robot(2e-4, 2.0, 1.0), 4.0, 1e-3, 20)
-    found = Didim(start=truth, substeps=12, iterations=4).solve(system, factors)
-    assert found.status is EstimateStatus.NOT_CONVERGED
-    assert "instrumental variables" in found.notes[-1]
-    assert off(found.values, truth, factors) < 0.02
-    assert np.isfinite(found.standard_errors).all()
-    assert found.details.condition < 1e3

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from identities.random_robots import random_bodies, random_drive, random_model, random_state
-from urdf_parity import urdf_parity
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, MissingExtraError, ShapeError
@@ -108,29 +107,6 @@ def test_residuals_do_not_decrease_towards_physical_robots(rng):
     # the nearest base parameters fit worse: the torques are fitted here
     near = rm.standard_parameters(base, found.requested, prior=prior)
     assert np.sum((W @ near.base_values - tau) ** 2) >= least
-    for scale, (A, b, outside) in {
-        1.0: (W, tau, 0.0),
-        1e-4: (R, y, rest),
-        1e4: (R, y, rest),
-    }.items():
-        again = fit_consistent(base, scale * A, scale * b, rest=scale**2 * outside, prior=prior)
-        assert again.residual_increase == pytest.approx(found.residual_increase, rel=1e-5)
-        assert again.base_values == pytest.approx(found.base_values, rel=1e-3, abs=1e-4)
-
-
-def test_parameters_that_a_log_does_not_show_are_those_of_the_prior(rng):
-    """A log that never moves joint 2: its columns are empty."""
-    model = arm(rng)
-    base = base_parameters(model, drive=True)
-    q, v, a = rng.normal(size=(3, 40, 2))
-    v[:, 1] = a[:, 1] = 0.0
-    R, y, rest, W, tau = weighted(base, (q, v, a))
-    prior = uniform_bodies(model, 6.0)
-    found = fit_consistent(base, R, y, rest=rest, prior=prior, drive_prior=model.drive)
-    assert found.status is EXACT
-    assert abs(W @ found.base_values - tau).max() < 1e-8 * abs(tau).max()
-    assert found.drive.Fv[1] == pytest.approx(model.drive.Fv[1], rel=1e-6)
-    assert found.inertia.mass[0] == pytest.approx(prior.mass[0], rel=0.9)
 
 
 def test_bounds_on_masses_are_kept_and_named(rng):
@@ -153,44 +129,6 @@ def test_bounds_on_masses_are_kept_and_named(rng):
     assert found.fit.squares >= loose.fit.squares * (1 - 1e-5)
     between = fit_consistent(base, R, y, rest=rest, prior=prior, total_mass=[30.0, 40.0])
     assert between.inertia.mass.sum() >= 30.0 * (1 - 1e-7)
-
-
-def test_bounds_on_centres_are_kept(rng):
-    model = arm(rng)
-    base, R, y, rest, *_ = noisy(model, rng, 0.01)
-    prior = uniform_bodies(model, 6.0)
-    centre = model.inertia.first_moments[1] / model.inertia.mass[1]
-    low = centre + np.array([0.05, -0.1, -np.inf])
-    high = centre + np.array([0.1, 0.1, np.inf])
-    known = [0.1, 0.02, -0.03]
-    found = fit_consistent(
-        base, R, y, rest=rest, prior=prior, mass_bounds=[[1.0, 9.0], [2.0, 2.5]],
-        centre_bounds=[CenterOfMassBox(2, low, high), CenterOfMassBox(1, known, known)],
-    )  # fmt: skip
-    centres = found.inertia.first_moments / found.inertia.mass[:, None]
-    assert (centres[1] >= low - 1e-7).all()
-    assert (centres[1] <= high + 1e-7).all()
-    assert centres[0] == pytest.approx(known, abs=1e-8)
-    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    ball = CenterOfMassEllipsoid(2, centre + np.array([0.3, 0.0, 0.0]), [0.1, 0.05, 0.2], turned)
-    found = fit_consistent(
-        base, R, y, rest=rest, prior=prior, centre_bounds=[ball],
-        total_mass=model.inertia.mass.sum(),
-    )  # fmt: skip
-    own = found.inertia.first_moments[1] / found.inertia.mass[1]
-    inside = np.linalg.norm((turned.T @ (own - ball.center)) / ball.semi_axes)
-    assert found.status is CONSTRAINED
-    assert inside == pytest.approx(1.0, abs=1e-4)
-    assert "The centre of mass of link 2 is on the surface of its ellipsoid." in found.fit.active
-    contradiction = [CenterOfMassBox(2, [0.1, -1, -1], [0.2, 1, 1])]
-    contradiction.append(CenterOfMassEllipsoid(2, [0.9, 0, 0], [0.1, 0.1, 0.1]))
-    light = {"mass_bounds": [[6.0, np.inf], [7.0, np.inf]], "total_mass": 10.0}
-    for more in (light, {"centre_bounds": contradiction}):
-        found = fit_consistent(base, R, y, rest=rest, prior=prior, **more)
-        assert found.status is PhysicalStatus.INFEASIBLE
-        assert found.reason().startswith("No physical robot satisfies the bounds; widen one")
-        with pytest.raises(InvalidValueError, match="No physical robot"):
-            found.of(model)
 
 
 @pytest.mark.parametrize(
@@ -241,17 +179,6 @@ def test_the_weight_trades_residuals_for_nearness(rng):
     assert not last.fit.active
 
 
-@pytest.mark.parametrize("kind", ["tree", "tx40"])
-def test_torques_survive_the_urdf(kind, rng):
-    model = robot(kind, rng)
-    base, R, y, rest, *_ = noisy(model, rng, 0.05)
-    found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 3.0 * model.f))
-    links, drives, friction, lost = urdf_parity(found.of(model), rng)
-    assert max(links, drives) < 1e-9
-    assert friction < 1e-12
-    assert any("rotor inertia" in words for words in lost)
-
-
 def test_mistakes_are_named(rng):
     model = arm(rng)
     base, R, y, rest, *_ = noisy(model, rng, 0.1)
@@ -287,46 +214,6 @@ def test_without_the_solver(monkeypatch, rng):
 # --- noisy logs ----------------------------------------------------------------------------------
 
 
-def heavy_arm(rng):
-    """An arm of a tonne with heavy drives, and the same without parameters (6 joints)."""
-    s = rng.uniform(0.7, 1.3, 6)
-    table = rm.DHTable(
-        antecedent=range(6), sigma=[0] * 6, theta=[0, -QUARTER, 0, 0, 0, 0],
-        alpha=[0.0, -QUARTER, 0.0, -QUARTER, QUARTER, -QUARTER],
-        d=[0.0, 0.35 * s[1], 1.15 * s[2], -0.05 * s[3], 0.0, 0.0],
-        r=[0.7 * s[0], 0.0, 0.0, 1.2 * s[4], 0.0, 0.2 * s[5]],
-    )  # fmt: skip
-    bare = rm.RobotModel.from_table(table)
-    mass = np.array([400.0, 300.0, 250.0, 60.0, 30.0, 80.0]) * rng.uniform(0.6, 1.6, 6)
-    size = np.array([0.4, 0.6, 0.4, 0.3, 0.15, 0.15])
-    second = []
-    for j in range(6):
-        points = rng.normal(size=(12, 3)) * size[j] * rng.uniform(0.2, 0.6, 3)
-        S = mass[j] * points.T @ points / 12.0
-        second.append(np.trace(S) * np.eye(3) - S)
-    com = rng.uniform(-0.5, 0.5, (6, 3)) * size[:, None]
-    arm = bare.with_inertia(rm.InertialParameters.from_com(mass, com, np.array(second)))
-    sizes = {
-        "Ia": [150.0, 150.0, 100.0, 15.0, 10.0, 5.0],
-        "Fv": [1200.0, 1500.0, 1000.0, 200.0, 150.0, 80.0],
-        "Fc": [600.0, 700.0, 500.0, 150.0, 120.0, 60.0],
-    }
-    drive = {kind: np.array(size) * rng.uniform(0.3, 2.0, 6) for kind, size in sizes.items()}
-    return arm.with_drive(rm.DriveParameters(**drive, offset=np.zeros(6))), bare
-
-
-def slow_motion(rng, t):
-    """Five harmonics of 0.1 Hz."""
-    w = 0.2 * np.pi * np.arange(1.0, 6.0)[:, None]
-    size = rng.normal(size=(5, 6)) * np.array([0.6, 0.4, 0.4, 0.8, 0.6, 1.0]) / 5.0
-    phase = w * t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 6))
-    return (
-        (size * np.sin(phase)).sum(axis=1),
-        (size * w * np.cos(phase)).sum(axis=1),
-        -(size * w**2 * np.sin(phase)).sum(axis=1),
-    )
-
-
 def measured(rng, model, motion, noise, unmodelled):
     """Torques with noise and with what no parameter explains, and the noise of each joint."""
     q, v, _ = motion
@@ -334,31 +221,6 @@ def measured(rng, model, motion, noise, unmodelled):
     rms = np.sqrt(np.mean(tau**2, axis=0)) + 1e-9
     wrong = np.sin(3.0 * q) + 0.5 * np.tanh(20.0 * v) * np.cos(q)
     return tau + rms * (noise * rng.normal(size=tau.shape) + unmodelled * wrong), rms * noise
-
-
-@pytest.mark.sampled(3)
-@pytest.mark.parametrize("seed", range(30))
-def test_noisy_logs_of_heavy_arms_converge(seed):
-    """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times light."""
-    rng = np.random.default_rng(seed)
-    arm, bare = heavy_arm(rng)
-    unmodelled = rng.uniform(0.0, 0.3) if seed % 3 else 0.0
-    motion = slow_motion(rng, np.linspace(0.0, 10.0, int(rng.integers(30, 200))))
-    tau, sigma = measured(rng, arm, motion, rng.uniform(0.05, 0.3), unmodelled)
-    drive = ("Ia", "Fv", "Fc")
-    base = base_parameters(bare, drive=drive)
-    R, y, rest, W, _ = weighted(base, motion, tau, sigma)
-    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(bare, 100.0))
-    assert found.status in (EXACT, CONSTRAINED), found.reason()
-    assert found.fit.stopped == ""
-    assert found.fit.gap <= PROVED
-    assert found.inertia.is_physical.all()
-    truth = base_parameters(arm, drive=drive).values(arm)
-    squares = rest + np.sum((R @ truth - y) ** 2)
-    assert found.fit.squares <= squares * (1.0 + found.fit.gap)
-    if unmodelled == 0.0:
-        assert found.residual_increase <= 100.0 * (np.sqrt(squares / found.fit.least) - 1.0) + 0.02
-        assert found.residual_increase < 12.0
 
 
 @pytest.mark.sampled(4)
@@ -390,20 +252,14 @@ def test_robots_of_any_structure_converge_on_slow_motion(seed):
 
 def test_a_solver_that_stops_early_is_reported(monkeypatch):
     rng = np.random.default_rng(0)
-    arm, bare = heavy_arm(rng)
-    motion = slow_motion(rng, np.linspace(0.0, 10.0, 60))
-    tau, sigma = measured(rng, arm, motion, 0.2, 0.1)
-    base = base_parameters(bare, drive=("Ia", "Fv", "Fc"))
-    R, y, rest, *_ = weighted(base, motion, tau, sigma)
-    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
+    model = arm(rng, "rx90")
+    base, R, y, rest, *_ = noisy(model, rng, 0.5, samples=15)
+    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 20.0))
     monkeypatch.setitem(physical._SOLVER, "max_iter", 5)
-    early = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
+    early = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 20.0))
     assert best.status is CONSTRAINED
     assert early.status is PhysicalStatus.INACCURATE
     assert early.fit.gap > best.fit.gap
     assert best.fit.squares >= early.fit.squares * (1.0 - early.fit.gap)  # the gap holds there too
     assert early.fit.stopped == "The solver stopped: MaxIterations after 5 iterations."
-    for text in (early.reason(), str(early)):
-        assert early.fit.stopped in text
-        assert f"The sum of squares is within {100.0 * early.fit.gap:.1g} % of the optimum." in text
-    assert best.fit.stopped == ""
+    assert early.fit.stopped in early.reason()

@@ -13,7 +13,7 @@ from robotmodels.identification import (
     fit,
     validate,
 )
-from robotmodels.identification.torques import parameter_torque
+from robotmodels.identification.validation import parameter_torque
 
 ROBOTS = odd_robots()
 
@@ -234,9 +234,13 @@ def test_joints_that_rest_are_named():
         ("robust:strength=3", {}, "robust has the options essential, loss"),
         ("wls", {"processing": {"filter": 10.0}}, r"choices by name \(cutoff, decimation"),
         ("wls", {"processing": {"cutoff": 3000.0}}, "half the sampling rate"),
-        ("wls", {"processing": {"edges": 5.0}}, "cut at both ends"),
+        ("wls", {"processing": {"edges": 50.0}}, "cut at both ends"),
         ("wls", {"processing": {"decimation": 0}}, "decimation: expected a whole number"),
-        ("wls", {"processing": {"decimation": 1500}}, "too few for 12 parameters"),
+        (
+            "wls",
+            {"processing": {"decimation": 1200, "edges": 0.0, "dead_band": 0.0}},
+            "too few for 8 parameters",
+        ),
         ("wls", {"processing": {"dead_band": [0.1]}}, "dead_band"),
     ],
 )

@@ -5,9 +5,8 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from identification_fleet import KINDS, case, pair, textbook
+from identification_fleet import KINDS, case, textbook
 
-import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
 from robotmodels.identification import Wls, fit, predicted_torque
 
@@ -45,26 +44,6 @@ def test_intervals_hold_over_the_fleet():
     kept = [x for x in (fitted(seed)[1] for seed in ARMS) if x is not None]
     assert len(kept) >= 7
     assert 0.92 <= np.mean(kept) <= 0.97
-
-
-def apart(first, second):
-    """Differences of the values in standard errors, root mean square."""
-    assert first.names == second.names
-    errors = np.hypot(first.standard_errors, second.standard_errors)
-    return np.sqrt(np.mean(((first.values - second.values) / errors) ** 2))
-
-
-def test_parameters_of_two_logs_of_one_robot_agree():
-    # friction of the load, of low speeds, and a spring that no model of the fit has
-    ratios = []
-    for seed in range(8):
-        model, logs = pair(seed)
-        ratios.append(apart(*(fit(model, x, Wls(shrinkage=False), checked=False) for x in logs)))
-    assert 0.8 < np.mean(ratios) < 1.2
-    data = rm.datasets.load_tx40()
-    half, N = len(data.log) // 2, len(data.log)
-    halves = data.log.rows(0, half), data.log.rows(half, N)
-    assert apart(*(fit(data.model, part) for part in halves)) < 1.5
 
 
 def test_few_equations_shrink_by_default_and_say_so():

@@ -106,23 +106,6 @@ def test_exact_logs_give_the_exact_payload(name, together):
     assert not again.values.flags.writeable
 
 
-def test_payloads_of_an_inner_link_and_of_a_planar_robot_are_identified_in_part():
-    model, bare, full = pair("rx90", carried=(MASS, COM, INERTIA, 3))
-    inner = identify_payload(model, full, bare, 3, processing=raw(bare))
-    known = [PARAMETERS.index(name) for name in inner.identifiable]
-    assert {"MX", "MY"} <= set(inner.identifiable)
-    np.testing.assert_allclose(inner.parameters[known], TRUE[known], atol=1e-8)
-    model, bare, full = pair()
-    planar = identify_payload(model, full, bare, processing=raw(bare))
-    assert planar.status.name == "PARTIAL"
-    assert planar.identifiable == ("ZZ", "MX", "MY", "M")
-    assert "XX, XY, XZ, YY, YZ, MZ" in planar.notes[0]
-    assert planar.mass == pytest.approx(MASS, abs=1e-8)
-    assert np.isnan(planar.com[2])
-    with pytest.raises(InvalidValueError, match="MZ"):
-        _ = planar.carried
-
-
 def test_friction_that_differs_between_the_logs():
     model, bare, _ = pair()
     full = logged(with_payload(robot(offset=-1.0), MASS, COM, INERTIA), motion(2, 800, 2))
@@ -198,19 +181,6 @@ def test_exact_logs_give_exact_gains(name, known):
     assert replace(found, covariance=unsure).status.name == "NOT_IDENTIFIABLE"
 
 
-@pytest.mark.nightly
-def test_noise_leaves_no_bias_and_standard_errors_of_gains_are_true():
-    gains, scores = np.array([0.5, 2.0]), []
-    base = base_parameters(robot(), drive=True)
-    for seed in range(40):
-        model, bare, full = pair(noise=1.0, seed=seed, samples=1500, gains=gains)
-        found = identify_drive_gains(
-            model, bare, LoadedLog(full, KnownPayload(MASS)), base=base, processing=raw(bare, 5)
-        )
-        scores.append((found.gains - gains) / found.gain_standard_errors)
-    check_scores(scores)
-
-
 def test_a_load_that_the_logs_do_not_show():
     model, bare, full = pair(noise=0.3, carried=(1e-9, COM), gains=np.array([0.5, 2.0]))
     for logs, known in ((bare, (MASS, COM, INERTIA)), ((), (MASS,))):
@@ -249,26 +219,6 @@ def test_an_exact_log_gives_the_exact_stribeck_curve(exponent):
     np.testing.assert_allclose(friction.Fs - friction.Fc, [2.0, 0.0], atol=1e-8)
     np.testing.assert_allclose(friction.Fc, 3.0, atol=1e-8)
     assert friction.exponent[0] == exponent
-
-
-@pytest.mark.nightly
-def test_a_stribeck_curve_in_noise_is_significant_where_it_is():
-    scores = []
-    for seed in range(6):
-        curve = StribeckFriction([0, 0], [0, 0], [0.0, 1.0], [0.05, 0.05])
-        model, log = friction_log(curve, noise=0.2, seed=seed)
-        found = fit_friction(model, log, processing=raw(log, 3, 0.005))
-        assert found.significant.tolist() == [False, True]
-        errors = found.value("drop2") - 1.0, found.value("vs2") - 0.05
-        scores.append(errors / np.array([found.standard_error(x) for x in ("drop2", "vs2")]))
-    assert (np.abs(np.mean(scores, axis=0)) < 1.4).all()
-    assert (np.abs(scores) < 4.5).all()
-    log = logged(model, motion(2, 4000, 1, 0.3), 0.2)
-    found = fit_friction(model, log, processing=raw(log, 3, 0.005))
-    assert found.status.name == "INSIGNIFICANT"
-    assert found.names == base_parameters(model, drive=True).names
-    assert (found.p_value > 1e-3).all()
-    assert len(found.notes) == 2
 
 
 def test_an_exact_log_gives_the_exact_friction_by_load():

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from identification_logs import clean_log, odd_robots, swinging
+from identification_logs import clean_log, odd_robots
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError
-from robotmodels.estimation import column_basis
 from robotmodels.estimation.estimate import EstimateStatus
 from robotmodels.estimation.factor import TriangularFactors, factors_of
 from robotmodels.estimation.linear import first_weights, ordinary, ridge, weighted
@@ -23,10 +22,10 @@ from robotmodels.identification import (
     fit,
     reduce_equations,
 )
+from robotmodels.identification.equations import segments
 from robotmodels.identification.forms import EquationForm
-from robotmodels.identification.method_names import METHODS, method_of
+from robotmodels.identification.method_names import method_of
 from robotmodels.identification.methods.essential import RULES, essential
-from robotmodels.identification.reduction import segments
 from robotmodels.minimal_parameters import base_parameters
 
 ROBOTS = odd_robots()
@@ -99,20 +98,6 @@ def test_covariances_hold_over_many_logs(method):
     # the mean of 30 chi squares of b degrees, within four standard deviations
     assert abs(np.mean(sums) / b - 1.0) < 4.0 * np.sqrt(2.0 / (30 * b)) + 0.06
     assert 0.8 < np.median(np.std(errors, axis=0) / np.mean(stated, axis=0)) < 1.25
-
-
-def test_names_and_options_of_methods():
-    for name, kind in METHODS.items():
-        assert method_of(name.upper()).options() == {}
-        assert (kind.name, bool(kind.title)) == (name, True)
-    given = method_of("wls:essential=30, shrinkage=False").options()
-    assert given == {"essential": 30, "shrinkage": False}
-    assert method_of("recursive:forgetting=1.0").options() == {}
-    for text, words in (("gls", "expected one of ols"), ("robust:loss", "given as name=value")):
-        with pytest.raises(InvalidValueError, match=words):
-            method_of(text)
-    with pytest.raises(InvalidValueError, match="loss: expected one of"):
-        Robust("none")
 
 
 # --- weights ----------------------------------------------------------------------------------
@@ -245,44 +230,7 @@ def test_steps_go_from_the_last_joint_to_the_first(name):
         Sequential().solve(*prepared(name, form=EquationForm.POWER)[:2])
 
 
-def resting_first_joint(seed, noise):
-    """A planar arm whose first joint rests: the second determines ZZ2 + Ia2, the first ZZ2."""
-    rng = np.random.default_rng(seed)
-    model = rm.load("planar_2r").with_drive(
-        rm.DriveParameters(Ia=[0.4, 0.3], Fv=[1.0, 2.0], Fc=[0.5, 0.7], offset=[0.1, -0.2])
-    )
-    q, v, a = swinging(model, rng, samples=600, dt=1e-2)
-    q[:, 0], v[:, 0], a[:, 0] = 0.4, 0.0, 0.0
-    tau = rm.idm(model, q, v, a)
-    log = Log(1e-2, q, tau + noise * rng.normal(size=tau.shape), v, a)
-    base = base_parameters(model, drive=True)
-    every, factors = system_of(base, log)
-    kept = column_basis(factors.stacked()[0], negligible=1e-7).kept.tolist()
-    system = every.with_names(tuple(base.names[k] for k in kept))
-    return system, reduce_equations(system)
-
-
-def test_combined_parameters_wait_for_the_joint_before():
-    exact, factors = resting_first_joint(0, 0.0)
-    found = Sequential().solve(exact, factors)
-    assert found.details[0].waiting == ("ZZ2", "Ia2")
-    assert {"ZZ2", "Ia2"} <= set(found.details[1].names)
-    np.testing.assert_allclose(found.values, weighted(factors).values, atol=1e-10)
-
-
 # --- in time ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["serial", "tree"])
-def test_recursion_ends_at_weighted_least_squares(name):
-    system, factors, _ = prepared(name, 0.3)
-    found, expected = Recursive().solve(system, factors), weighted(factors)
-    size = np.abs(expected.values).max()
-    assert np.abs(found.values - expected.values).max() < 1e-10 * size
-    np.testing.assert_allclose(found.standard_errors, expected.standard_errors, rtol=1e-8)
-    assert (len(found.details), found.details.memory) == (200, 2000.0)
-    # fewer instants than parameters determine none
-    assert np.isnan(found.details.values[0]).all()
 
 
 def test_forgetting_follows_a_parameter_that_drifts():

@@ -20,21 +20,19 @@ from robotmodels.identification import (
     write_result,
 )
 from robotmodels.identification.report_tables import (
-    group_names,
-    group_units,
-    intervals,
-    regrouped_text,
-    standard_error_ratio,
-)
-from robotmodels.identification.residuals import residual_diagnostics
-from robotmodels.identification.result_file import result_data
-from robotmodels.identification.weak_parameters import (
     CORRELATED,
     WEAK,
     correlated_estimates,
+    group_names,
+    group_units,
+    intervals,
     negative_parameters,
+    regrouped_text,
+    standard_error_ratio,
     weak_parameters,
 )
+from robotmodels.identification.residuals import residual_diagnostics
+from robotmodels.identification.result_file import result_data
 from robotmodels.logs.log import LogSource, RefusedRows
 from robotmodels.minimal_parameters import uniform_bodies
 
@@ -126,32 +124,6 @@ def test_gaps_and_recordings_are_no_neighbours():
             product = ((e[lag:, j] - mu) * (e[:-lag, j] - mu))[both].mean()
             assert seen.autocorrelation[j, lag] == pytest.approx(product / gamma, abs=1e-9)
             assert seen.bounds[j, lag] == pytest.approx(1.959964 / np.sqrt(both.sum()))
-
-
-def test_white_normal_residuals_pass_and_others_are_named():
-    model = arm()
-
-    def coloured(rng, shape):
-        e = rng.normal(0.0, 0.05, shape)
-        for k in range(1, len(e)):
-            e[k] += 0.7 * e[k - 1]
-        return e
-
-    def tailed(rng, shape):
-        return rng.laplace(0.0, 0.05, shape)
-
-    base = rm.base_parameters(model)
-    for noise, white, normal in (
-        (None, True, True),
-        (coloured, False, True),
-        (tailed, True, False),
-    ):
-        log = log_of(model, noise=noise)
-        seen = residual_diagnostics(equations(base, log, raw(log)), base.values(model))
-        assert (seen.white_p > 0.01).tolist() == [white] * 3
-        assert (seen.normal_p > 0.01).tolist() == [normal] * 3
-        if noise is coloured:
-            np.testing.assert_allclose(seen.autocorrelation[:, 1], 0.7, atol=0.05)
 
 
 # --- parameters -----------------------------------------------------------------------------------

@@ -18,8 +18,6 @@ import pytest
 from identification_logs import recorded
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError
-from robotmodels.estimation.factor import merged
 from robotmodels.estimation.linear import weighted
 from robotmodels.identification import choose_processing, equations, reduce_equations
 from robotmodels.identification.forms import EquationForm
@@ -105,29 +103,6 @@ def test_the_factor_is_that_of_all_equations():
     size = np.sqrt(np.diag(N))
     np.testing.assert_allclose(found / np.outer(size, size), N / np.outer(size, size), atol=1e-12)
     assert factors.rows == len(rows)
-
-
-def test_files_opened_one_at_a_time_give_what_merging_gives():
-    whole = system()
-    opened: list[int] = []
-
-    def files():
-        for seed in range(4):
-            opened.append(seed)
-            yield whole.with_log(recorded("planar_2r", 30_000, seed, 0.01))
-
-    one = reduce_equations(files())
-    assert opened == [0, 1, 2, 3]
-    parts = [reduce_equations(part) for part in files()]
-    other = merged(merged(parts[3], parts[1]), merged(parts[0], parts[2]))
-    a, b = weighted(one), weighted(other)
-    np.testing.assert_allclose(a.values, b.values, rtol=1e-9, atol=1e-9 * abs(b.values).max())
-    np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-18)
-    assert (one.counts == other.counts).all()
-    with pytest.raises(InvalidValueError, match="same parameters"):
-        reduce_equations([whole, system(25, "rx90")])
-    with pytest.raises(InvalidValueError, match="got none"):
-        reduce_equations([])
 
 
 @pytest.mark.parametrize("cutoff", [None, 20.0])

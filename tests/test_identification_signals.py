@@ -10,7 +10,6 @@ from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.identification import choose_processing, equations
 from robotmodels.identification.signals import (
     central_differences,
-    decimation_window,
     piece_signals,
     pieces,
     settling,
@@ -66,21 +65,6 @@ def test_central_differences_have_their_order(accuracy):
         error.append(off[10:-10].max())
     assert abs(np.log2(error[0] / error[1]) - accuracy) < 0.05
     assert central_differences(np.array([1.0, 3.0]), 0.5, accuracy).tolist() == [4.0, 4.0]
-
-
-@pytest.mark.parametrize("step", [2, 5, 40])
-def test_the_gain_of_the_decimation_is_half_at_four_tenths_of_the_new_rate(step):
-    taps = decimation_window(step)
-    k = np.arange(len(taps)) - len(taps) // 2
-
-    def response(f):
-        return float(taps @ np.cos(2.0 * np.pi * f / step * k))
-
-    np.testing.assert_array_equal(taps, taps[::-1])
-    for frequency, expected, bound in ((0.0, 1.0, 1e-14), (0.4, 0.5, 0.01), (0.2, 1.0, 0.01)):
-        assert abs(response(frequency) - expected) < bound
-    # frequencies above the new rate less that of the motion would appear as lower ones
-    assert max(abs(response(f)) for f in np.linspace(0.62, 0.5 * step, 200)) < 0.02
 
 
 def moved(N: int) -> Log:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
-from robotmodels.datasets import load_tx40
 from robotmodels.identification import synchronisation
 from robotmodels.identification.checks import check_joints
 from robotmodels.identification.delay import SynchronisationStatus
@@ -53,20 +52,6 @@ def test_a_delay_that_is_removed_is_not_found_again(robot):
     assert again.status.is_success
     assert not again.is_out_of_step
     assert abs(again.delay) < 0.05e-3
-
-
-@pytest.mark.nightly
-def test_delays_of_the_tx40_are_found():
-    tx40 = load_tx40()
-    before = synchronisation(tx40.log, tx40.model)
-    assert not before.is_out_of_step
-    late = with_delay(tx40.log, -13.4 * tx40.log.dt)
-    found = synchronisation(late, tx40.model)
-    assert found.delay - before.delay == pytest.approx(13.4 * tx40.log.dt, abs=0.5e-3)
-    assert check_joints(tx40.log, tx40.model) == ()
-    (finding,) = check_joints(with_delay(tx40.log, -0.004), tx40.model)
-    assert finding.kind is FindingKind.OUT_OF_STEP
-    assert "with_delay(log, 0.004" in finding.sentence
 
 
 def test_delays_beyond_those_that_are_tried_are_reported(robot):

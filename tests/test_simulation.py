@@ -201,20 +201,6 @@ def test_motion_fits_the_inverse_model(seed):
     assert np.abs(a - sim.a[moving]).max(initial=0.0) < 1e-8 * np.abs(sim.a).max()
 
 
-def test_torques_at_times_are_linear_between_them():
-    t, tau = np.array([0.0, 0.5, 0.6, 2.0]), np.array([[0.0], [4.0], [-1.0], [2.0]])
-    sim = simulate(slider(), [0.0], [0.0], tau, t)
-    # the integral of piecewise linear forces is exact by trapezes
-    v = np.concatenate([[0.0], np.cumsum(np.diff(t) * (tau[1:, 0] + tau[:-1, 0]) / 2)]) / 2.0
-    assert np.allclose(sim.v[:, 0], v, atol=1e-13)
-    assert np.allclose(sim.tau, tau)
-    held = simulate(slider(), [0.0], [0.0], [4.0], t)
-    assert np.allclose(held.control_work, 4.0 * t**2, atol=1e-12)
-    against = simulate(slider(), [0.0], [0.0], None, t, np.tile([0.0, 0.0, 4.0, 0, 0, 0], (4, 1)))
-    assert np.allclose(against.q, -held.q, atol=1e-13)
-    assert np.allclose(against.wrench_work, -4.0 * t**2, atol=1e-12)
-
-
 def test_friction_models_beside_the_drives():
     t, rail = np.linspace(0.0, 2.0, 41), slider()
 
@@ -258,17 +244,6 @@ def test_falling_arms_keep_their_energy_and_return_when_time_is_reversed():
         assert np.abs(back.q[-1] - q).max() < 1e-6
     resting = simulate(pendulum(), [-np.pi / 2], [0.0], t=1.0)  # moves by rounding errors
     assert resting.relative_drift < 1e-15
-
-
-def test_no_joints_and_no_duration():
-    fixed = RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), points([1.0], [0.3]))
-    for t in (1.0, [0.0, 0.5, 1.0]):
-        sim = simulate(fixed, [], [], lambda t, q, v: [], t, np.ones(6), stop_at_limits=True)
-        assert sim.q.shape == (len(sim.t), 0)
-        assert sim.t[-1] == 1.0
-    for t in (0.0, [3.0]):
-        sim = simulate(pendulum(), [0.0], [0.0], t=t)
-        assert sim.a == pytest.approx(np.array([[-G / 0.4]]))
 
 
 def test_a_limit_stops_the_motion():

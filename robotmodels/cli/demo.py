@@ -262,7 +262,7 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
 
 def comparison(data: Tx40Log, result: IdentificationResult) -> str:
     """Identified and published values side by side, and how many agree."""
-    from ..identification.weak_parameters import weak_parameters
+    from ..identification.report_tables import weak_parameters
 
     both = [one for one in data.published if one.name in result.names]
     weak = weak_parameters(result.estimate)

@@ -19,7 +19,7 @@ from .comparison import compare_methods
 from .consistent import consistent_robot
 from .delay import synchronisation
 from .drive_gains import identify_drive_gains
-from .equations import equations
+from .equations import equations, reduce_equations
 from .excitation import ExcitingTrajectory, exciting_trajectory, write_trajectory
 from .fit import fit
 from .friction import fit_friction
@@ -30,7 +30,6 @@ from .methods.robust import Robust
 from .methods.sequential import Sequential
 from .payload import identify_payload
 from .processing import choose_processing
-from .reduction import reduce_equations
 from .report import report
 from .result import IdentificationResult, predicted_torque, validate
 from .result_file import write_result

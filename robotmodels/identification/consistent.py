@@ -10,8 +10,8 @@ from ..inertia import InertialParameters
 from ..minimal_parameters import StandardParameters, fit_consistent, uniform_bodies
 from ..minimal_parameters.bodies import has_extent
 from ..model import RobotModel
+from .equations import reduce_equations
 from .methods.linear import Wls, used_weights
-from .reduction import reduce_equations
 from .result import IdentificationResult, check_result
 
 

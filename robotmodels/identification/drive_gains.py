@@ -27,16 +27,17 @@ from ..friction import Friction
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
-from .common_equations import (
+from .equations import Block, parameters_of
+from .forms import FormedRows
+from .loads import (
     UNIDENTIFIABLE,
     CommonEquations,
+    LoadedLog,
     NamedEstimate,
+    common_unknowns,
     equations_of,
     scaled_inverse,
 )
-from .equations import Block, parameters_of
-from .forms import FormedRows
-from .loads import LoadedLog, common_unknowns
 from .signals import Processing
 
 _SIGNIFICANT = 3.0

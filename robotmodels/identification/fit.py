@@ -23,19 +23,17 @@ from ..loops import LoopedParameters, LoopedRobot
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
 from .checks import accepted_log, accepted_test
-from .equations import Equations, equations, parameters_of
+from .equations import Equations, equations, parameters_of, reduce_equations
 from .forms import EquationForm
 from .looped import looped_equations, looped_method
 from .method_names import method_of
 from .methods.base import Method
 from .methods.essential import essential
 from .processing import LEAST_EQUATIONS, checked_processing, processing_for
-from .reduction import reduce_equations
 from .result import FitDetails, IdentificationResult
 from .signals import Processing
-from .torques import friction_ramp
 from .uncertainty import with_uncertainty
-from .validation import Validation, no_errors, poor_prediction, prediction_errors
+from .validation import Validation, friction_ramp, no_errors, poor_prediction, prediction_errors
 
 _NO_EFFECT = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""

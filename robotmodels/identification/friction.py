@@ -26,7 +26,9 @@ from ..inertia import PARAMETERS
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
-from .common_equations import (
+from .equations import Equations, parameters_of, reduce_equations
+from .forms import FormedRows
+from .loads import (
     UNIDENTIFIABLE,
     CommonEquations,
     NamedEstimate,
@@ -34,9 +36,6 @@ from .common_equations import (
     equations_of,
     scaled_inverse,
 )
-from .equations import Equations, parameters_of
-from .forms import FormedRows
-from .reduction import reduce_equations
 from .signals import Processing
 
 _Curve = Callable[[Array, Array, Array, Array], tuple[Array, Array, Array]]

@@ -22,13 +22,14 @@ from ..logs import Log
 from ..minimal_parameters import base_parameters
 from ..minimal_parameters.physical import nearest_body
 from ..model import RobotModel, check_model
-from .common_equations import (
+from .loads import (
     UNIDENTIFIABLE,
     CommonEquations,
     NamedEstimate,
+    UnknownPayload,
+    common_unknowns,
     equations_of,
 )
-from .loads import UnknownPayload, common_unknowns
 from .methods.base import check_solved
 from .result import IdentificationResult
 from .signals import Processing

@@ -10,24 +10,22 @@ from .._arrays import Array
 from ..estimation.estimate import EstimateStatus
 from ..table_text import ReportSection, ReportTable, number_text, percent_text, table_of
 from .report_tables import (
+    CORRELATED,
+    WEAK,
+    correlated_estimates,
     data_section,
     errors_section,
     group_names,
     group_units,
+    negative_parameters,
     parameters_section,
     processing_section,
     standard_error_ratio,
+    weak_parameters,
 )
 from .residuals import SIGNIFICANCE, ResidualDiagnostics, residual_diagnostics
 from .result import IdentificationResult, check_result
 from .validation import poor_prediction
-from .weak_parameters import (
-    CORRELATED,
-    WEAK,
-    correlated_estimates,
-    negative_parameters,
-    weak_parameters,
-)
 
 if TYPE_CHECKING:
     from ..minimal_parameters import StandardParameters

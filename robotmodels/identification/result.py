@@ -17,8 +17,7 @@ from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
 from .equations import Equations
 from .methods.base import Method, check_solved
-from .torques import parameter_torque
-from .validation import Errors, Validation, prediction_errors
+from .validation import Errors, Validation, parameter_torque, prediction_errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

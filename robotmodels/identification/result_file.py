@@ -18,10 +18,17 @@ from ..errors import InvalidValueError
 from ..logs import Log
 from ..model import RobotModel, to_urdf
 from .consistent import consistent_robot
-from .report_tables import group_names, intervals, parameter_units, standard_error_ratio
+from .report_tables import (
+    correlated_estimates,
+    group_names,
+    intervals,
+    negative_parameters,
+    parameter_units,
+    standard_error_ratio,
+    weak_parameters,
+)
 from .residuals import residual_diagnostics
 from .result import IdentificationResult, check_result
-from .weak_parameters import correlated_estimates, negative_parameters, weak_parameters
 
 if TYPE_CHECKING:
     from ..minimal_parameters import BaseParameters, StandardParameters

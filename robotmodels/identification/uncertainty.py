@@ -16,11 +16,10 @@ from ..estimation.estimate import Estimate
 from ..estimation.factor import TriangularFactors
 from ..estimation.linear import group_leverage, solved
 from .delay import representative_part
-from .equations import Equations
+from .equations import Equations, segments
 from .methods.base import Method
 from .methods.linear import Wls, used_weights
 from .processing import LEAST_EQUATIONS
-from .reduction import segments
 from .signals import signals
 from .weak_prior import plausible_sizes, shrunk
 

@@ -1,7 +1,7 @@
 """Methods that simulate the controlled robot: instruments, DIDIM, output error, and a test."""
 
-from .controller import Controller, tuned_controller
 from .hausman import hausman_test
+from .loop import Controller, tuned_controller
 from .methods import Didim, Instrumental, OutputError
 from .simulation import simulated_log
 

@@ -21,8 +21,7 @@ from ...estimation.factor import TriangularFactors, reduced, triangle
 from ...estimation.linear import check_count, inverse_triangle, value_sizes, weighted
 from ..equations import Block, Equations
 from ..methods.base import Covariance, Method
-from .controller import Controller
-from .loop import ClosedLoop, closed_loop
+from .loop import ClosedLoop, Controller, closed_loop
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _STILL, _ROUNDING = 1e-3, 1e-11

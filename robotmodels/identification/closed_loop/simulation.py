@@ -17,8 +17,7 @@ from ...model import RobotModel, check_model
 from ..equations import Block, Equations
 from ..forms import moving_joints, signals_block
 from ..signals import Piece, Signals, central_differences, piece_signals
-from .controller import Controller
-from .loop import MOST, ClosedLoop, friction_rates, robot_of, steps_of
+from .loop import MOST, ClosedLoop, Controller, friction_rates, robot_of, steps_of
 
 
 class SimulationDivergedError(Exception):

@@ -49,8 +49,7 @@ from ...estimation.linear import (
 )
 from ...estimation.total import total
 from ...model import RobotModel
-from ..equations import Equations
-from ..reduction import segments
+from ..equations import Equations, segments
 from .base import Covariance, Method
 
 _FOLDS = 5
