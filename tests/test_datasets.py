@@ -10,16 +10,6 @@ import pytest
 import robotmodels as rm
 from robotmodels.datasets import load_tx40, panda_double_socket, ur10_camera
 
-LIMIT = 1_500_000
-
-
-def every_file(folder):
-    for entry in folder.iterdir():
-        if entry.is_dir():
-            yield from every_file(entry)
-        else:
-            yield entry
-
 
 @pytest.mark.parametrize(("robot", "places", "rows"), [("panda_1", 3, 182), ("panda_2", 9, 559)])
 def test_sockets_have_all_their_readings(robot, places, rows):
@@ -77,20 +67,6 @@ def test_the_camera_moves_with_the_wrist():
     assert len(data.simulated.q) == 29
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("panda_double_socket", "Copyright (c) 2024 platonics"),
-        ("ur10_camera", "Apache License"),
-        ("tx40_log", "Copyright [2021-2025] Thanh Nguyen"),
-    ],
-)
-def test_licence_and_provenance_are_beside_the_data(name, words):
-    folder = files("robotmodels.datasets") / name
-    assert words in (folder / "LICENSE").read_text(encoding="utf-8")
-    assert "commit" in (folder / "PROVENANCE.md").read_text(encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def tx40():
     return load_tx40()
@@ -140,9 +116,3 @@ def test_published_parameters_of_the_tx40_are_grouped_as_those_of_the_model(tx40
     assert by_name["offset3"].wls_deviation == pytest.approx(0.3476 * 0.5902)
     assert by_name["Fv1"].ols == 8.107054
     assert by_name["Fv1"].ols_deviation == pytest.approx(0.041346, rel=1e-4)
-
-
-def test_no_file_is_large():
-    sizes = [len(entry.read_bytes()) for entry in every_file(files("robotmodels.datasets"))]
-    assert max(sizes) < LIMIT
-    assert sum(sizes) < LIMIT

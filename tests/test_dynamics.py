@@ -223,21 +223,6 @@ def test_joints_that_mimic_others_follow(matrix, drive):
     close(a[0, 1], rm.ddm(model, q[0, 1], v[0, 1], tau[0, 1], w[0, 1], drive), 1e-10)
 
 
-def test_mimic_joints_that_do_not_follow_are_named():
-    bodies = rm.InertialParameters.from_com([0.1] * 2, np.zeros((2, 3)), np.zeros((2, 3, 3)))
-    slides = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 0], sigma=[1, 1]), bodies)
-    gripper = slides.with_transmission(rm.Transmission([[1, 0], [-1, 0]], [0.0, 0.02]))
-    q = gripper.transmission.to_joint([0.01, 0.0])
-    for model, q_bad, v_bad, error, words in (
-        (gripper, [0.01, 0.3], [0.1, -0.1], InvalidValueError, r"^q: .*mimic.*to_joint"),
-        (gripper, [q, q], [[0, 0], [0, 0.1]], InvalidValueError, r"^v: .*joint 2 is off"),
-        (gripper.with_inertia(None), q, [0.1, -0.1], SingularMassMatrixError,
-         r"rank 0 of 1, .*joints 1, 2 moves no"),
-    ):  # fmt: skip
-        with pytest.raises(error, match=words):
-            rm.ddm(model, q_bad, v_bad, [1.0, 0.0])
-
-
 # --- bodies that no body is ------------------------------------------------------------------
 
 

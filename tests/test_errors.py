@@ -3,10 +3,8 @@
 import inspect
 import pickle
 
-import numpy as np
 import pytest
 
-import robotmodels as rm
 from robotmodels import errors
 from robotmodels.errors import (
     FrameNotFoundError,
@@ -46,18 +44,3 @@ def test_errors_about_names_carry_facts_and_pickle(error):
     assert type(again) is error
     assert str(again) == str(raised)
     assert (again.name, again.known, again.nearest) == (raised.name, raised.known, raised.nearest)
-
-
-def test_a_first_argument_that_is_no_model_is_named():
-    rx90 = rm.load("rx90")
-    q = np.zeros(6)
-    mistakes = [
-        (lambda: rm.dgm("rx90", q), "load\\('rx90'\\)"),
-        (lambda: rm.idm(rx90.table, q, q, q), "from_table"),
-        (lambda: rm.torque_regressor(rx90.pin_model, q, q, q), "Pinocchio"),
-        (lambda: rm.to_urdf(5), "got int"),
-        (lambda: rm.link_transforms(rx90, q), "pass model.table"),
-    ]
-    for call, words in mistakes:
-        with pytest.raises(rm.errors.InvalidValueError, match=words):
-            call()

@@ -79,12 +79,12 @@ def test_leverage_is_reduced_by_the_prior():
 
 def test_residual_tests_reject_what_they_should_and_seldom_else():
     false = np.zeros(3)
-    for seed in range(100):
+    for seed in range(200):
         _, _, linearise = linear(seed, M=120)
         found = fit_diagnostics(fit_nonlinear(linearise, np.zeros(4), sigma=0.1))
         tests = (found.chi_squared, found.normality, found.independence)
         false += [not test.passed for test in tests]
-    assert (false <= 5).all()  # 1 expected, as the level is 1 %
+    assert (false <= 9).all()  # 2 expected, as the level is 1 %
     A, y, linearise = linear(M=600)
     for sigma, words in ((0.05, "times as large"), (0.2, "only")):
         size = fit_diagnostics(fit_nonlinear(linearise, np.zeros(4), sigma=sigma)).chi_squared

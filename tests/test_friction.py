@@ -63,14 +63,6 @@ def test_leading_axes_are_the_batch_and_columns_make_the_torque(friction, batch)
         np.testing.assert_array_equal(friction.torque(v[index]), torque[index])
 
 
-def test_a_joint_sticks_between_its_breakaway_torques():
-    np.testing.assert_array_equal(MODELS["asymmetric"].breakaway, [[-7.0, -8.0], [3.0, 4.0]])
-    np.testing.assert_array_equal(MODELS["Stribeck"].breakaway, [[-5.0, -6.0], [5.0, 6.0]])
-    np.testing.assert_array_equal(MODELS["viscous"].breakaway, np.zeros((2, 2)))
-    both = FrictionSum((CoulombFriction([3.0, 4.0]), TorqueOffset(TWO)))
-    np.testing.assert_array_equal(both.breakaway, [[-2.0, -2.0], [4.0, 6.0]])
-
-
 def test_models_add_up_and_their_columns_come_last():
     robot, v = arm(), np.array([[0.3, -0.2], [0.0, 4.0]])
     a, b = MODELS["asymmetric"], MODELS["Stribeck"]

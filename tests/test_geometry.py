@@ -1,8 +1,5 @@
 """The table: fields and defaults, degrees, classical tables, printing, and being a value."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -170,19 +167,6 @@ def test_equality_and_hash_follow_the_numbers(rng):
     assert len({table, same}) == 1
 
 
-def test_nothing_in_a_table_can_be_written(rng):
-    table = random_table(rng, f=3)
-    source = np.zeros(3)
-    mine = table.replace(d=source)
-    source[0] = 7.0
-    assert mine.d[0] == 0.0, "a table keeps its own copy"
-    with pytest.raises(AttributeError):
-        table.d = source
-    for copied in (table, pickle.loads(pickle.dumps(table)), copy.deepcopy(table)):
-        for column in ("antecedent", "sigma", "mu", *ANGLES, *LENGTHS, "lower", "upper"):
-            assert not getattr(copied, column).flags.writeable, column
-
-
 # --- mistakes ------------------------------------------------------------------------------------
 
 MISTAKES = [
@@ -216,23 +200,13 @@ def test_mistakes_in_a_table(fields, error, words):
 @pytest.mark.parametrize(
     ("rows", "error", "words"),
     [
-        (
-            [{"sigma": 0}, {"alhpa": 1}],
-            TableError,
-            r"Row 2: unknown key 'alhpa'\. Did you mean 'al",
-        ),
+        ([{}, {"alhpa": 1}], TableError, r"Row 2: unknown key 'alhpa'\. Did you mean 'al"),
         ([{"sigma": 0}, [1, 2]], TableError, "Row 2: expected a mapping .* got list"),
-        (None, TableError, "expected a list with a mapping per row"),
         ([], TableError, "at least one row"),
-        ([{"sigma": 2, "lower": 1}], TableError, "a fixed frame has no limits, got lower"),
-        ([{"sigma": "R"}], InvalidValueError, "Row 1: sigma: expected real numbers"),
         ([{"d": [1, 2]}], InvalidValueError, "Row 1: d must be one number"),
-        ([{"upper": "2"}], InvalidValueError, "Row 1: upper: expected real numbers"),
     ],
 )
 def test_mistakes_in_rows(rows, error, words):
-    with pytest.raises(error, match=words):
-        rm.DHTable.from_rows(rows)
-    if not words.startswith("a fixed"):
-        with pytest.raises((TableError, InvalidValueError)):
-            rm.DHTable.from_standard(rows)
+    for make in (rm.DHTable.from_rows, rm.DHTable.from_standard):
+        with pytest.raises(error, match=words):
+            make(rows)

@@ -49,58 +49,6 @@ def test_torques_without_masses_warn_once(torque):
         torque(arm, [0.1, 0.2])
 
 
-def mat_7_3(path, variables):
-    """A file as MATLAB's save(..., '-v7.3') writes it: HDF5 behind a header of 512 bytes."""
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, value in variables.items():
-            if isinstance(value, str):
-                data, kind = np.array([[ord(c)] for c in value], np.uint16), b"char"
-            else:
-                data, kind = np.atleast_2d(value).T, b"double"
-            file.create_dataset(name, data=data).attrs["MATLAB_class"] = np.bytes_(kind)
-    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
-    with open(path, "r+b") as file:
-        file.write(head)
-
-
-@pytest.mark.parametrize("version", ["7", "7.3"])
-def test_logs_of_matlab_are_read_with_their_structures(tmp_path, rng, version):
-    from scipy.io import savemat
-
-    t = np.arange(200) * 1e-3
-    q, tau = rng.normal(size=(2, 200, 3))
-    path = tmp_path / "log.mat"
-    if version == "7":
-        savemat(path, {"log": {"t": t, "q": q.T, "tau": tau, "robot": "rx90"}})
-    else:
-        mat_7_3(path, {"log/t": t[:, None], "log/q": q.T, "log/tau": tau, "log/robot": "rx90"})
-    from robotmodels.identification import read_log
-
-    log = read_log(path)  # found by the usual names
-    np.testing.assert_array_equal(log.q, q)
-    np.testing.assert_array_equal(log.tau, tau)
-    assert log.dt == pytest.approx(1e-3)
-    with pytest.raises(rm.errors.InvalidValueError, match=r"log\.tau"):
-        read_log(path, time="log.t", positions="log.q", torques="effort")
-
-
-def test_a_name_with_a_comma_stays_one_cell_of_a_table(tmp_path):
-    import csv
-
-    from robotmodels.identification import write_trajectory
-
-    motion = rm.trajectories.quintic([0.0, 0.0], [1.0, 2.0], duration=1.0)
-    path = tmp_path / "move.csv"
-    write_trajectory(motion, path, rate=10.0, names=["a,=1+1", "b"])
-    with path.open(newline="") as file:
-        head, *rows = csv.reader(file)
-    assert len(head) == 7
-    assert head[1] == "q a,=1+1 (rad)"
-    assert all(len(row) == 7 for row in rows)
-    assert not any(cell.startswith(("=", "+", "-", "@")) for cell in head)
-
-
 """Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
 
 

@@ -151,28 +151,6 @@ def test_energy_of_base_parameters(model, drive):
 # --- samples in time -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending"),
-        ({"t": [0.0, 1.0]}, ShapeError, "^q: expected shape"),
-        ({"t": [0.0]}, InvalidValueError, "the log has 1 sample; expected at least 2"),
-        ({"knots": [0, 3]}, InvalidValueError, "knots: .*from 0 to 2"),
-        ({"knots": [1, 0]}, InvalidValueError, "knots"),
-        ({"knots": [0.0, 1.0]}, InvalidValueError, "knots"),
-    ],
-    ids=str,
-)
-def test_mistakes_in_times(model, change, error, words):
-    q, v, _ = states(model, 3, 3)
-    arguments = {"t": [0.0, 1.0, 2.0], "knots": None} | change
-    with pytest.raises(error, match=words):
-        energy_difference_regressor(model, arguments["t"], q, v, knots=arguments["knots"])
-    if "^q" not in words:
-        with pytest.raises(error, match=words):
-            joint_work(arguments["t"], v, v, arguments["knots"])
-
-
 # --- filters ---------------------------------------------------------------------------------
 
 
@@ -216,20 +194,18 @@ def test_the_filtered_regressor_gives_the_filtered_torques(model, sections):
 
 
 @pytest.mark.parametrize(
-    ("low_pass", "error", "words"),
+    ("call", "error", "words"),
     [
-        (FILTER[0], ShapeError, r"^low_pass: expected second-order sections \(k, 6\)"),
-        (np.zeros((0, 6)), ShapeError, "^low_pass: "),
-        ([[1.0, 1.0, 0, 1.0, -1.5, 0]], InvalidValueError, r"not stable, \|pole\| = 1.5"),
-        ("butter", InvalidValueError, "^low_pass: "),
+        (lambda m, q: energy_difference_regressor(m, [0, 1, 1], q, q), InvalidValueError, "ascend"),
+        (lambda m, q: energy_difference_regressor(m, [0, 1], q, q), ShapeError, "^q: expected"),
+        (lambda m, q: joint_work([0, 1, 2], q, q, [1, 0]), InvalidValueError, "knots"),
+        (lambda m, q: filtered_torque(q, FILTER[0]), ShapeError, "^low_pass: expected second"),
+        (lambda m, q: filtered_torque(q, [[1, 1, 0, 1, -1.5, 0]]), InvalidValueError, "not stable"),
+        (lambda m, q: filtered_torque(q[:0], FILTER), InvalidValueError, "^tau: the log is emp"),
+        (lambda m, q: filtered_regressor(m, 0.0, q, q, FILTER), InvalidValueError, "^dt: expect"),
+        (lambda m, q: chunked(torque_regressor, m, q, q), InvalidValueError, "got 2 arrays"),
     ],
-    ids=str,
 )
-def test_mistakes_in_filters(model, low_pass, error, words):
-    q, v, _ = states(model, 3, 3)
-    for call in (
-        lambda: filtered_regressor(model, 0.1, q, v, low_pass),
-        lambda: filtered_torque(q, low_pass),
-    ):
-        with pytest.raises(error, match=words):
-            call()
+def test_mistakes_in_logs_and_filters(model, call, error, words):
+    with pytest.raises(error, match=words):
+        call(model, states(model, 1, 3)[0])

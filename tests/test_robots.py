@@ -147,16 +147,6 @@ def test_a_robot_is_a_value_has_a_source_and_prints(name):
     assert np.isfinite(rm.dgm(model, model.configurations["zero"])).all()
 
 
-def test_physical_consistency_is_as_the_sources_report():
-    faulty = {}
-    for name in CATALOGUE:
-        model = load(name)
-        if model.inertia.values.any():
-            bad = [link.link for link in model.inertia.consistency().links if not link.is_physical]
-            faulty |= {name: bad} if bad else {}
-    assert faulty == {"puma560": [1, 3]}
-
-
 # --- geometry against other descriptions --------------------------------------------------------
 
 

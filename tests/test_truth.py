@@ -43,14 +43,6 @@ def test_what_base_and_tool_explain_is_taken_away(arm, far):
     assert both < 1e-13
 
 
-def test_what_the_table_is_to_blame_for_is_left(arm):
-    real = moved(arm, rm.se3.rotation("y", 0.4), rm.se3.translation(0.004, 0.0, 0.01), 1e-3)
-    stands, placed, both = rms(true_errors(arm, real, Q))
-    assert stands > placed > both > 1e-4
-    # the robot itself has no errors
-    assert max(rms(true_errors(real, real, Q))) < 1e-13
-
-
 def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
     real = moved(arm, rm.se3.rotation("y", 0.02), rm.se3.translation(0.004, 0.0, 0.01), 2e-3)
     truth = cal.Position(Q, rm.dgm(real, Q)[:, :3, 3])
@@ -60,19 +52,6 @@ def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
         fitted = cal.fit(arm, truth, parameters=free, folds=0, held_out=0.0)
         # the fit fixes what it cannot tell, which moves no position
         assert errors.rms["m"] == pytest.approx(fitted.validation.in_sample.rms["m"], rel=1e-9)
-
-
-def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
-    parameters = cal.candidate_parameters(arm, gains=True, compliance="uniform")
-    xi = 1e-3 * rng.normal(size=len(parameters)) * [not u.startswith("rad/") for u in
-                                                    parameters.units]  # fmt: skip
-    xi[parameters.names.index("compliance_joints")] = 2e-5
-    real = cal.calibrated_model(parameters, xi)
-    # the model alone has neither gains nor compliance, the calibrated robot has
-    assert max(rms(true_errors(real, real, Q))) < 1e-13
-    assert rms(true_errors(real.model, real, Q))[2] > 1e-4
-    apart = np.linalg.norm((cal.calibrated_pose(real, Q) - rm.dgm(arm, Q))[:, :3, 3], axis=1)
-    assert np.allclose(true_errors(arm, real, Q).as_given.position, apart, atol=1e-15)
 
 
 def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):

@@ -80,21 +80,9 @@ class DriveParameters(Value):
     Ia : array_like, shape (n,), optional
         Inertia of rotor and gears on the joint side (gear ratio squared times rotor inertia),
         kg m^2 or kg.
-    Fv : array_like, shape (n,), optional
-        Viscous friction, N m s/rad or N s/m.
-    Fc : array_like, shape (n,), optional
-        Coulomb friction, N m or N.
-    offset : array_like, shape (n,), optional
-        Constant torque or force, N m or N. Those left out are zero; give at least one.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Lengths that differ; NaN or infinity.
-
-    References
-    ----------
-    Seed book sections 1.5.1.4 and 1.5.1.5.
+    Fv, Fc, offset : array_like, shape (n,), optional
+        Viscous friction, N m s/rad or N s/m; Coulomb friction and constant torque or force, N m or
+        N. Those left out are zero; give at least one.
 
     Examples
     --------

@@ -28,10 +28,8 @@ class Transmission(Value):
         tau_j += sum over k != j of w_j w_k (Iam a_k + Fvm v_k)  +  w_j Fcm sign(w . v)
 
     The diagonal parts (k = j) belong to ``Ia`` and ``Fv`` of `DriveParameters`, as in the
-    published TX40 identifications.
-
-    Where the motors are given by the joints, ``q_motor = R q``, ``K`` is the inverse of ``R``:
-    `from_motor`.
+    published TX40 identifications. Where the motors are given by the joints, ``q_motor = R q``,
+    ``K`` is the inverse of ``R``: `from_motor`.
 
     Parameters
     ----------
@@ -43,13 +41,6 @@ class Transmission(Value):
         Coupling inertia, viscous and Coulomb friction of motor m, joint side, default zero.
         They must be zero for motors that turn one joint only.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not square, lengths that differ, NaN or infinity.
-    InertiaError
-        A coupling term on a motor that is not coupled.
-
     References
     ----------
     Seed book section 1.2.1 (last note) and 1.6.2.5; A. Janot, P.-O. Vandanjon and M. Gautier,
@@ -58,10 +49,8 @@ class Transmission(Value):
     Examples
     --------
     >>> wrist = Transmission([[1 / 45, 0], [-1 / 45, 1 / 32]])
-    >>> wrist.coupled_motors
-    (2,)
-    >>> wrist.to_joint([45.0, 0.0])
-    array([ 1., -1.])
+    >>> wrist.coupled_motors, wrist.to_joint([45.0, 0.0])
+    ((2,), array([ 1., -1.]))
     """
 
     matrix: Array

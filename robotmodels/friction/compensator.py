@@ -22,15 +22,13 @@ class GravityCompensator(JointFriction):
     the axis and on the same side of it at ``q = phi``. Across the axis its length is
     ``l(q) = sqrt(a^2 + b^2 - 2 a b cos(q - phi))``, and it pulls the points together with the force
     ``Kc l + Pc``: a spring of stiffness k and free length l0 has ``Kc = k, Pc = -k l0``; a cylinder
-    with an accumulator, of force F0 at the length l1, ``Kc = k, Pc = F0 - k l1``; one of constant
-    force ``Kc = 0``. The joint needs ``tau = (Kc l + Pc) dl/dq``.
-
-    Without geometry it is a Fourier series of the angle:
+    with an accumulator, of force F0 at the length l1, ``Kc = k, Pc = F0 - k l1``. The joint needs
+    ``tau = (Kc l + Pc) dl/dq``. Without geometry it is a Fourier series of the angle:
     ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
 
-    Unlike friction it depends on positions and dissipates no energy. Where gravity turns a link as
-    a compensator does, base parameters regroup ``Kc``, ``Gs`` and ``Gc`` into first moments of the
-    link: only their sum is identifiable.
+    It dissipates no energy. Where gravity turns a link as a compensator does, base parameters
+    regroup ``Kc``, ``Gs`` and ``Gc`` into first moments of the link: only their sum is
+    identifiable.
 
     Parameters
     ----------
@@ -44,24 +42,11 @@ class GravityCompensator(JointFriction):
         ``Kc`` (N/m) and ``Pc`` (N) with geometry, the four amplitudes (N m) without; default zeros,
         as for a model that is to be identified.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Joints that do not exist or are given twice; a part of the geometry; distances that are not
-        positive; values of another shape; NaN or infinity.
-
-    References
-    ----------
-    The potential energy of the element is ``Kc l^2 / 2 + Pc l``, and the torque its derivative by
-    the joint variable (seed book section 1.5.1.2 for potential energy).
-
     Examples
     --------
     >>> spring = GravityCompensator(n=2, joints=2, a=0.3, b=0.4, phi=0.0, values=[1000.0, 0.0])
     >>> spring.torque([0.0, 0.0], q=[0.0, np.pi / 2]).round(9)
     array([  0., 120.])
-    >>> GravityCompensator(n=2, joints=2).kinds
-    ('Gs', 'Gc', 'Gss', 'Gcc')
     """
 
     needs_position: ClassVar[bool] = True

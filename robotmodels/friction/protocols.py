@@ -61,17 +61,11 @@ class FrictionSum:
     parts : tuple of Friction
         Models of the same joints, at least one.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Numbers of joints that differ; no part; an object that is not a friction model.
-
     Examples
     --------
     >>> from robotmodels.friction import CoulombFriction, ViscousFriction
-    >>> both = ViscousFriction([1.0]) + CoulombFriction([2.0])
-    >>> both.torque([3.0]), both.kinds
-    (array([5.]), ('Fv', 'Fc'))
+    >>> (ViscousFriction([1.0]) + CoulombFriction([2.0])).torque([3.0])
+    array([5.])
     """
 
     parts: tuple[Friction, ...]

@@ -37,15 +37,6 @@ class InertialParameters(Value):
         Rows ``XX XY XZ YY YZ ZZ MX MY MZ M``: inertia about the origin O_j in the axes of R_j
         (kg m^2; products with the sign of the tensor's entries), first moments (kg m), mass (kg).
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not ``(f, 10)``; NaN or infinity.
-
-    References
-    ----------
-    Seed book section 1.5.2.1.
-
     Examples
     --------
     >>> link = InertialParameters([[0, 0, 0, 0.1, 0, 0.1, 0.5, 0, 0, 2.0]])

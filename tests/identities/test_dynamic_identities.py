@@ -9,7 +9,6 @@ from identities.random_robots import (
     close,
     models,
     random_drive,
-    random_parameters,
     random_pose,
     random_state,
     seeds,
@@ -20,13 +19,12 @@ import robotmodels as rm
 from robotmodels.dynamics import (
     base_model,
     christoffel_blocks,
-    ddm,
     idm,
     idm_from_base,
     with_payload,
     without_payload,
 )
-from robotmodels.friction import AsymmetricFriction, StribeckFriction
+from robotmodels.friction import AsymmetricFriction
 from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import parameter_vector, torque_regressor
 
@@ -148,86 +146,6 @@ def test_mass_matrix_is_symmetric_and_holds_the_rotors(model, seed):
         columns = [rm.idm(model, q, 0 * v, e, drive=drive) for e in np.eye(model.n)]
         still = rm.idm(model, q, 0 * v, 0 * v, drive=drive)
         close(np.moveaxis(np.array(columns) - still, 0, -1), M)
-
-
-@given(model=any_models(), seed=seeds)
-def test_torque_is_linear_in_the_inertial_parameters(model, seed):
-    rng = np.random.default_rng(seed)
-    q, v, a = random_state(model, rng)
-    first, second = random_parameters(rng, model.f), random_parameters(rng, model.f)
-    x, y = rng.normal(size=2)
-    mixed = rm.InertialParameters(x * first.values + y * second.values)
-
-    def everything(inertia):
-        robot = model.with_inertia(inertia)
-        return np.concatenate([
-            rm.idm(robot, q, v, a, drive=False),
-            rm.gravity_torque(robot, q),
-            rm.mass_matrix(robot, q, drive=False).ravel(),
-            rm.coriolis_matrix(robot, q, v).ravel(),
-            [rm.kinetic_energy(robot, q, v, drive=False), rm.potential_energy(robot, q)],
-        ])  # fmt: skip
-
-    close(everything(mixed), x * everything(first) + y * everything(second))
-
-
-@given(model=models(fixed=True, drive=False), seed=seeds)
-def test_a_body_may_be_given_on_any_frame_fixed_to_it(model, seed):
-    """Bodies of fixed frames moved to their antecedents: the same robot, the same torques."""
-    q, v, a = random_state(model, np.random.default_rng(seed))
-    factors = rm.link_transforms(model.table, q)
-    values = model.inertia.values.copy()
-    for j in reversed(range(model.f)):
-        antecedent = model.table.antecedent[j] - 1
-        if model.table.sigma[j] == 2 and antecedent >= 0:
-            body = rm.InertialParameters(values[j : j + 1]).moved(factors[j : j + 1])
-            values[antecedent] += body.values[0]
-            values[j] = 0.0
-    merged = model.with_inertia(rm.InertialParameters(values))
-    for robot, q_, v_, a_ in ((merged, q, v, a), (merged, [q], [v], [a])):
-        tau = np.reshape(rm.idm(robot, q_, v_, a_), model.n)
-        close(tau, rm.idm(model, q, v, a))
-        close(np.ravel(rm.potential_energy(robot, q_))[0], rm.potential_energy(model, q))
-
-
-@given(model=models(tree=True, drive=True, tip="any"), seed=seeds)
-def test_the_order_of_the_rows_changes_no_physics(model, seed):
-    """The same tree with its rows numbered in another order that keeps antecedents first."""
-    rng = np.random.default_rng(seed)
-    table, f = model.table, model.f
-    order, waiting = [], list(range(f))
-    while waiting:
-        ready = [j for j in waiting if table.antecedent[j] == 0 or table.antecedent[j] - 1 in order]
-        chosen = ready[rng.integers(len(ready))]
-        order.append(chosen)
-        waiting.remove(chosen)
-    number = np.zeros(f + 1, dtype=int)
-    number[np.array(order) + 1] = np.arange(1, f + 1)
-    joints = [int(np.flatnonzero(table.joint_rows == j)[0]) for j in order if table.sigma[j] != 2]
-    columns = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
-    other = rm.RobotModel.from_table(
-        rm.DHTable(
-            antecedent=number[table.antecedent[order]],
-            names=[table.names[j] for j in order],
-            **{key: getattr(table, key)[order] for key in columns},
-        ),
-        rm.InertialParameters(model.inertia.values[order]),
-        rm.DriveParameters(
-            *(getattr(model.drive, k)[joints] for k in ("Ia", "Fv", "Fc", "offset"))
-        ),
-        model.base,
-        model.tool,
-        int(number[model.tip]),
-        model.gravity,
-    )
-    plain = model.with_transmission(None)
-    q, v, a = random_state(model, rng)
-    w = rng.normal(size=6)
-    close(rm.dgm(other, q[joints]), rm.dgm(plain, q))
-    close(rm.jacobian(other, q[joints]), rm.jacobian(plain, q)[:, joints])
-    tau = rm.idm(plain, q, v, a, w)
-    close(rm.idm(other, q[joints], v[joints], a[joints], w), tau[joints])
-    close(rm.idm(other, [q[joints]], v[joints], a[joints], w)[0], tau[joints])
 
 
 # --- Coriolis --------------------------------------------------------------------------------
@@ -424,31 +342,6 @@ def test_christoffel_blocks_are_the_coriolis_torques(model, seed):
     close(torque, np.einsum("sij,sj->si", rm.coriolis_matrix(model, q, v), v), 1e-12)
     for one, many in zip(christoffel_blocks(model, q[0]), (B[0], C[0]), strict=True):
         np.testing.assert_array_equal(one, many)
-
-
-@given(model=models(drive=True), seed=seeds, kind=st.booleans())
-def test_friction_adds_its_torque_to_both_models(model, seed, kind):
-    rng = np.random.default_rng(seed)
-    n = model.n
-    model = model.with_drive(random_drive(rng, n))
-    q, v, a = random_state(model, rng, 3)
-    Fv, Fc, fall, vs = rng.uniform(0.1, 3, (4, n))
-    friction = (
-        AsymmetricFriction(*rng.uniform(0.1, 3, (4, n)))
-        if kind
-        else StribeckFriction(Fv, Fc, Fc + fall, vs)
-    )
-    for drive in (True, False):
-        plain = idm(model, q, v, a, drive=drive)
-        tau = idm(model, q, v, a, drive=drive, friction=friction)
-        close(tau, plain + friction.torque(v))
-        close(idm(model, q[0], v[0], a[0], drive=drive, friction=friction), tau[0], 1e-11)
-        np.testing.assert_array_equal(
-            ddm(model, q, v, tau, friction=friction), ddm(model, q, v, tau - friction.torque(v))
-        )
-        assert ((friction.torque(v) * v) >= 0).all()
-    close(ddm(model, q, v, tau, drive=False, friction=friction),
-          ddm(model, q, v, plain, drive=False), 1e-9)  # fmt: skip
 
 
 @given(model=models(tip="any"), seed=seeds)

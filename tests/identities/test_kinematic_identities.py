@@ -66,17 +66,6 @@ def test_pinocchio_is_the_kernels_is_the_plain_product(model, seed):
         close([rm.dgm(model, row, frame) for row in q], expected, tolerance)
 
 
-@given(model=models(), seed=seeds)
-def test_poses_are_rigid(model, seed):
-    q, _, _ = random_state(model, np.random.default_rng(seed), 3)
-    for poses in (rm.link_poses(model, q), rm.link_poses(model, q[0])):
-        R = poses[..., :3, :3]
-        close(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), 1e-14 * model.f)
-        np.testing.assert_array_equal(
-            poses[..., 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*poses.shape[:-2], 4))
-        )
-
-
 def twist_of_poses(before, now, after, reference):
     """Twists (..., 6) of the motion from one pose to another, by central differences."""
     rate = (after - before) / (2 * STEP)
@@ -213,17 +202,6 @@ def test_the_base_moves_everything_along(model, seed):
     for function in (rm.jacobian, lambda m, x, *k: rm.jacobian_rate(m, x, v, *k)):
         close(function(moved, q, None, "local"), function(model, q, None, "local"),
               tolerance * speed)  # fmt: skip
-
-
-@given(model=models(tool=False), seed=seeds)
-def test_the_tool_is_carried_by_its_frame(model, seed):
-    rng = np.random.default_rng(seed)
-    q, _, _ = random_state(model, rng, 2)
-    E, tip = random_pose(rng), int(rng.integers(1, model.f + 1))
-    equipped = model.with_tool(E, tip)
-    size = max(robot_size(equipped, row) for row in q)
-    for x in (q, q[0]):
-        close(rm.dgm(equipped, x), rm.dgm(model, x, tip) @ E, 1e-12 * size)
 
 
 @given(model=models(tree=True, max_frames=10), seed=seeds)

@@ -18,7 +18,6 @@ from scipy.signal import butter
 import robotmodels as rm
 from robotmodels.dynamics import idm
 from robotmodels.friction import AsymmetricFriction, StribeckFriction
-from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import (
     energy_difference_regressor,
     energy_parameter_names,
@@ -69,24 +68,6 @@ def test_power_is_the_torque_regressor_on_the_velocity(model, seed, drive):
     tau = idm(model, q, v, a, drive=drive, friction=friction)
     close(W @ parameters, tau)
     close(d @ parameters, (tau * v).sum(axis=1), 1e-11)
-
-
-@given(model=any_models(), seed=seeds)
-def test_power_is_the_rate_of_the_energy_column_by_column(model, seed):
-    """Analytic power against differences of the energy along the motion, without dissipation."""
-    q, v, a = random_state(model, np.random.default_rng(seed))
-    kept = energy_parameter_names(model)
-    d = power_regressor(model, q, v, a, columns=kept)
-    h = 1e-3
-    # eighth-order central difference along q + v t + a t^2 / 2
-    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
-
-    def energy(t):
-        return energy_regressor(model, q + v * t + a * t**2 / 2, v + a * t)
-
-    slope = sum(w * (energy(k * h) - energy(-k * h)) for k, w in weights.items()) / h
-    scale = 1.0 + np.linalg.norm(v) + np.linalg.norm(a)
-    close(d, slope, 1e-11 * scale**2)
 
 
 @given(model=any_models(), seed=seeds, drive=st.booleans())
@@ -142,23 +123,6 @@ def test_any_subset_of_columns_is_that_of_the_whole(model, seed):
         energy_regressor(model, q, v, columns=part), energy_regressor(model, q, v)[..., where]
     )
     assert parameter_names(model, columns=some) == tuple(chosen)
-
-
-@given(model=models(max_frames=6), seed=seeds)
-def test_base_parameters_choose_their_columns(model, seed):
-    q, v, a = random_state(model, np.random.default_rng(seed), 3)
-    base = base_parameters(model, drive=True)
-    W = torque_regressor(model, q, v, a, columns=base)
-    np.testing.assert_array_equal(W, base.reduce(torque_regressor(model, q, v, a)))
-    d = power_regressor(model, q, v, a, columns=base)
-    close(d, np.einsum("kj,kjb->kb", v, W))
-    t = np.array([0.0, 0.4, 1.0])
-    rows = energy_difference_regressor(model, t, q, v, columns=base)
-    whole = energy_difference_regressor(model, t, q, v)
-    np.testing.assert_array_equal(rows, whole[:, base.kept])
-    few, all_ = (momentum_regressor(model, q, v, columns=c) for c in (base, None))
-    np.testing.assert_array_equal(few.momentum, base.reduce(all_.momentum))
-    np.testing.assert_array_equal(few.force, base.reduce(all_.force))
 
 
 @given(model=models(max_frames=5, transmission=True, drive=True), seed=seeds)
