@@ -17,6 +17,7 @@ from robotmodels.cli.program import parser_of
 from robotmodels.minimal_parameters import uniform_bodies
 
 POINT = ["--mask", "1", "1", "1", "0", "0", "0"]
+Q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
 
 
 @pytest.fixture
@@ -41,85 +42,74 @@ def solved(run, *words):
     return json.loads(out)
 
 
-# --- lists of numbers -----------------------------------------------------------------------------
+def refused(run, message, *words):
+    """Wrong input: one line on standard error."""
+    code, out, err = run(*words)
+    assert (code, out, err.count("\n")) == (2, "", 1), words
+    assert err.startswith("robotmodels: ")
+    assert message in err, err
 
 
 @pytest.mark.parametrize(
     "words",
     [
         ["--q", "-1", "1e-3", "-2.5E+1"],
-        ["--q", "-1,1e-3,-2.5E+1"],
         ["--q=-1,1e-3,-2.5E+1"],
         ["--q", "-1, 1e-3", "-2.5E+1"],
         ["--q", "[-1,", "1e-3,", "-2.5E+1]"],
     ],
 )
 def test_numbers_may_be_negative_and_written_in_any_way(words):
-    (word,) = joined(words)
+    (word,) = joined(words, ["--q"])
     option, _, text = word.partition("=")
     assert option == "--q"
     assert numbers(text, 3, "--q").tolist() == [-1.0, 1e-3, -25.0]
-
-
-def test_only_numbers_are_joined():
-    words = ["igm", "--xyz", "1", "2", "rx90", "--q-ref", "home", "--limits", "--out", "1"]
-    assert joined(words) == ["igm", "--xyz=1,2", "rx90", *words[5:]]
-    assert joined(["--q"]) == ["--q"]
+    rest = ["rx90", "--rows", "0", "-10", "--q", "home", "1"]
+    assert joined(rest, ["--q"]) == rest
 
 
 # --- igm ------------------------------------------------------------------------------------------
 
 
 def test_igm_prints_every_posture(run):
-    q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
-    code, out, err = run("igm", "rx90", "--q", *q)
+    code, out, err = run("igm", "rx90", "--q", *Q)
     assert (code, err) == (0, "")
     assert out.startswith("rx90: 8 postures. The pose is reached.\nmethod: ")
     rx90 = rm.load("rx90")
-    found = rm.igm(rx90, rm.dgm(rx90, q))
+    found = rm.igm(rx90, rm.dgm(rx90, Q))
     rows = [line.split("│")[1:-1] for line in out.splitlines() if re.match(r"│ \d", line)]
     assert [row[1].strip() for row in rows] == found.branch.tolist()
     printed = np.array([[float(cell) for cell in row[2:8]] for row in rows])
     np.testing.assert_allclose(printed, found.q, atol=5.1e-7)
-    assert all(float(row[8]) < 1e-9 for row in rows)
 
 
 def test_the_three_ways_to_give_a_pose_agree(run):
     model = rm.load("rx90")
-    q = np.radians([20.0, 60.0, -110.0, 30.0, 50.0, -20.0])
-    T = rm.dgm(model, q)
-    rpy = np.degrees(se3.to_rpy(T[:3, :3]))
+    T = rm.dgm(model, Q)
     ways = (
-        ["--q", *np.degrees(q), "--degrees"],
-        ["--xyz", *T[:3, 3], "--rpy", *rpy, "--degrees"],
-        ["--matrix", *T.ravel(), "--degrees"],
+        ["--q", *np.degrees(Q)],
+        ["--xyz", *T[:3, 3], "--rpy", *np.degrees(se3.to_rpy(T[:3, :3]))],
+        ["--matrix", *T.ravel()],
     )
-    results = [solved(run, "rx90", *way) for way in ways]
-    for result in results:
+    for way in ways:
+        result = solved(run, "rx90", *way, "--degrees")
         assert result["units"] == ["deg"] * 6
         np.testing.assert_allclose(result["pose"], T, atol=1e-15)
         postures = np.radians([posture["q"] for posture in result["postures"]])
-        assert len(postures) == 8
         np.testing.assert_allclose(rm.dgm(model, postures), np.tile(T, (8, 1, 1)), atol=1e-12)
 
 
 def test_json_holds_what_the_call_returns(run):
-    model = rm.load("lab_trr")
-    q = [-0.3, -0.7, 1.1]
+    model, q = rm.load("lab_trr"), [-0.3, -0.7, 1.1]
     result = solved(run, "lab_trr", "--q", *q, *POINT, "--q-ref", *q)
     found = rm.igm(model, rm.dgm(model, q), q_ref=q, mask=[1, 1, 1, 0, 0, 0])
-    assert result["robot"] == "lab_trr"
-    assert result["units"] == ["m", "rad", "rad"]
-    assert result["mask"] == [1, 1, 1, 0, 0, 0]
-    assert result["status"] == "REACHED"
-    assert result["reason"] == found.reason()
-    assert result["method"] == found.method
-    assert result["closest"] is None
+    assert (result["robot"], result["units"]) == ("lab_trr", ["m", "rad", "rad"])
+    assert (result["mask"], result["status"]) == ([1, 1, 1, 0, 0, 0], "REACHED")
+    assert (result["reason"], result["method"]) == (found.reason(), found.method)
     rows = result["postures"]
     np.testing.assert_allclose([row["q"] for row in rows], found.q, atol=0)
     assert [row["branch"] for row in rows] == found.branch.tolist()
-    assert [row["within_limits"] for row in rows] == found.within_limits.tolist()
-    np.testing.assert_allclose(rows[0]["q"], q, atol=1e-6)
+    assert solved(run, "lab_trr", "--q", *q, "--mask", "xyz", "--q-ref", *q) == result
 
 
 def test_degrees_leave_slides_in_metres(run):
@@ -138,16 +128,17 @@ def test_tolerance_for_a_pose_of_four_digits(run):
     result = solved(run, "lab_trr", "--matrix", *pose, "--tolerance", "1e-4", "--degrees")
     np.testing.assert_allclose(result["postures"][0]["q"], [-0.3, -45, -45], atol=0.02)
     # metres, then radians: the position is what has four digits
-    assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", "1e-4", "1e-6")[0] == 0
-    assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", "1e-6", "1e-6")[0] == 1
+    for tolerance, code in ((["1e-4", "1e-6"], 0), (["1e-6", "1e-6"], 1)):
+        assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", *tolerance)[0] == code
 
 
 def test_a_pose_that_is_not_reached_says_why(run):
-    code, out, err = run("igm", "rx90", "--xyz", 2, 0, 0, "--rpy", 0, 0, 0)
+    words = ("igm", "rx90", "--xyz", 2, 0, 0, "--rpy", 0, 0, 0)
+    code, out, err = run(*words)
     assert (code, err) == (1, "")
     assert out.startswith("rx90: 0 postures. The position is out of reach: too far.")
     assert "closest posture: joint_1 " in out
-    code, out, _ = run("igm", "rx90", "--xyz", 2, 0, 0, "--rpy", 0, 0, 0, "--json")
+    code, out, _ = run(*words, "--json")
     result = json.loads(out)
     assert code == 1
     assert (result["reached"], result["status"], result["postures"]) == (False, "TOO_FAR", [])
@@ -165,49 +156,31 @@ def test_a_singular_pose_names_the_joint_that_took_the_reference(run):
     np.testing.assert_allclose(rows[0]["q"], q, atol=1e-9)
 
 
-def test_limits_drop_postures(run, tmp_path):
-    urdf = tmp_path / "arm.urdf"
-    q = [0.3, 1.0, -1.8, 0.4, 0.8, -0.2]
+def test_limits_drop_postures_and_a_mask_may_be_in_tool_axes(run, tmp_path):
     table = rm.load("rx90").table.replace(lower=[-1.0] + [-4.0] * 5, upper=[1.0] + [4.0] * 5)
-    rm.write_urdf(rm.RobotModel.from_table(table, name="arm"), urdf)
-    words = [urdf, "--q", *q]
+    rm.write_urdf(rm.RobotModel.from_table(table, name="arm"), tmp_path / "arm.urdf")
+    words = [tmp_path / "arm.urdf", "--q", *Q]
     every = solved(run, *words)["postures"]
     assert sorted(row["within_limits"] for row in every) == [False] * 4 + [True] * 4
-    inside = solved(run, *words, "--limits", "--q-ref", *q)["postures"]
+    inside = solved(run, *words, "--limits", "--q-ref", *Q)["postures"]
     assert [row["within_limits"] for row in inside] == [True] * 4
-    np.testing.assert_allclose(inside[0]["q"], q, atol=1e-9)
-    assert run("igm", *words)[1].count("outside") == 4
-
-
-def test_the_mask_may_be_a_word(run):
-    pose = ("planar_2r", "--xyz", 0.3, 0.2, 0, "--mask")
-    by_word, by_numbers = solved(run, *pose, "xyz"), solved(run, *pose, 1, 1, 1, 0, 0, 0)
-    assert by_word == by_numbers == solved(run, *pose, "position")
-
-
-def test_mask_axes_of_the_tool(run):
-    """Pointing: the turn about the tool's z axis is free."""
-    q = [0.3, 1.0, -1.8, 0.4, 0.8, -0.2]
-    words = ["rx90", "--q", *q, "--mask", 1, 1, 1, 1, 1, 0, "--mask-axes", "tool"]
-    result = solved(run, *words)
-    T = np.array(result["pose"])
+    np.testing.assert_allclose(inside[0]["q"], Q, atol=1e-9)
+    pointing = ["rx90", "--q", *Q, "--mask", 1, 1, 1, 1, 1, 0, "--mask-axes", "tool"]
+    result = solved(run, *pointing)  # the turn about the tool's z axis is free
     for row in result["postures"]:
         reached = rm.dgm(rm.load("rx90"), row["q"])
-        np.testing.assert_allclose(reached[:3, 2:], T[:3, 2:], atol=1e-7)
-    assert "asked for: x y z rx ry in tool axes" in run("igm", *words)[1]
+        np.testing.assert_allclose(reached[:3, 2:], np.array(result["pose"])[:3, 2:], atol=1e-7)
+    assert "asked for: x y z rx ry in tool axes" in run("igm", *pointing)[1]
 
 
 def test_seven_joints_by_arm_angle_or_a_locked_joint(run):
     iiwa = rm.load("iiwa14")
     q = np.radians([10.0, 30.0, -15.0, -80.0, 20.0, 40.0, 5.0])
     words = ["iiwa14", "--q", *np.degrees(q), "--degrees"]
-    T = rm.dgm(iiwa, q)
     swung = solved(run, *words, "--arm-angle", -20)
-    wanted = rm.igm(iiwa, T, arm_angle=np.radians(-20.0))
-    assert len(swung["postures"]) == wanted.count
-    np.testing.assert_allclose(
-        np.radians([row["q"] for row in swung["postures"]]), wanted.q, atol=1e-9
-    )
+    wanted = rm.igm(iiwa, rm.dgm(iiwa, q), arm_angle=np.radians(-20.0))
+    found = np.radians([row["q"] for row in swung["postures"]])
+    np.testing.assert_allclose(found, wanted.q, atol=1e-9)
     for name in ("3", iiwa.table.joint_names[2]):
         locked = solved(run, *words, "--lock", f"{name}=-15", "--q-ref", *np.degrees(q))
         rows = np.array([row["q"] for row in locked["postures"]])
@@ -223,72 +196,34 @@ def test_seven_joints_by_arm_angle_or_a_locked_joint(run):
         (["rx90", "--q", "zero", "--rpy", 1, 2, 3], "--rpy belongs to --xyz"),
         (["rx90", "--xyz", 1, 2], "--xyz: expected 3 finite numbers, got '1,2'"),
         (["rx90", "--xyz", 1, 2, "nan", "--rpy", 0, 0, 0], "--xyz: expected 3 finite numbers"),
-        (["rx90", "--xyz", 1, 2, 3], "the orientation is missing"),
         (["rx90", "--xyz", 1, 2, 3, "--mask", 1, 1, 1, 1, 0, 0], "the orientation is missing"),
-        (["rx90", "--matrix", *range(16)], "last row"),
         (["rx90", "--matrix", *(np.eye(4) * [1, 1, -1, 1]).ravel()], "det R = -1"),
         (["rx90", "--q", 1, 2], "expected 6 numbers, or the name of a configuration"),
-        (["rx90", "--q", "zero", "--q-ref", "nowhere"], "--q-ref: expected 6 numbers"),
-        (["rx90", "--q", "zero", "--mask", 1, 1], "--mask: expected 6"),
         (["rx90", "--q", "zero", "--mask", 0, 0, 0, 0, 0, 0], "nothing is asked for"),
-        (["rx90", "--q", "zero", "--tolerance", 0], "above 0"),
-        (["rx90", "--q", "zero", "--tolerance", 1, 2, 3], "--tolerance: expected 1 or 2"),
-        (["rx90", "--q", "zero", "--lock", "7=1"], "number from 1 to 6"),
         (["rx90", "--q", "zero", "--lock", "0=1"], "number from 1 to 6"),
         (["rx90", "--q", "zero", "--lock", "joint_1"], "expected JOINT=VALUE"),
-        (["rx90", "--q", "zero", "--lock", "1=two"], "--lock 1: expected 1 finite number, got"),
         (["rx90", "--q", "zero", "--lock", "1=0", "--lock", "joint_1=0"], "given twice"),
-        (["rx90", "--q", "zero", "--arm-angle", "1", "2"], "--arm-angle: expected 1"),
-        (["rx91", "--q", "zero"], "rx90"),
-        (["missing.urdf", "--q", "zero"], "missing.urdf"),
+        (["rx90", "--mask-axes", "joint"], "--mask-axes: invalid choice"),
     ],
 )
 def test_wrong_arguments_of_igm(run, words, message):
-    code, out, err = run("igm", *words)
-    assert (code, out) == (2, "")
-    assert err.startswith("robotmodels: ")
-    assert message in err
+    refused(run, message, "igm", *words)
 
 
-def test_what_argparse_refuses_has_the_same_status(run):
-    for words in (["igm"], ["igm", "rx90", "--mask-axes", "joint"], ["igm", "rx90", "--xyz"]):
-        code, _, err = run(*words)
-        assert code == 2
-        assert err.startswith("robotmodels: ")
-        assert err.endswith(". See robotmodels igm --help.\n")
-        assert err.count("\n") == 1
-
-
-def test_a_closed_pipe_keeps_the_status():
-    """``robotmodels igm ... | head -1``: no traceback."""
-    code = "import sys; from robotmodels.cli import main; sys.exit(main())"
-    words = [sys.executable, "-c", code, "igm", "lab_rr", "--q", "0.1", "0.2"]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    process.stdout.close()
-    err = process.stderr.read()
-    process.stderr.close()
-    assert process.wait(timeout=60) == 0
-    assert err == ""
-
-
-# --- the other commands ---------------------------------------------------------------------------
+# --- view and demo --------------------------------------------------------------------------------
 
 
 def test_view_takes_numbers_names_and_degrees(run, tmp_path):
     page = tmp_path / "arm.html"
-    for words in (["--q", "-0.5", "1e-1"], ["--q", "-0.5,1e-1"], ["--q=-0.5,0.1"]):
-        code, out, _ = run("view", "planar_2r", *words, "--out", page)
+    for words, q in (
+        (["planar_2r", "--q", "-0.5,1e-1"], "[-0.5  0.1]"),
+        (["planar_2r", "--q", 90, 0, "--degrees"], "[1.5708 0.    ]"),
+        (["lab_trr", "--q", "pose_a"], "[-0.3    -0.7854 -0.7854]"),
+    ):
+        code, out, _ = run("view", *words, "--out", page)
         assert (code, page.stat().st_size > 500_000) == (0, True)
-        assert "q = [-0.5  0.1]" in out
-    assert "q = [1.5708 0.    ]" in run(
-        "view", "planar_2r", "--q", 90, 0, "--degrees", "--out", page
-    )[1]  # fmt: skip
-    assert "q = [-0.3    -0.7854 -0.7854]" in run(
-        "view", "lab_trr", "--q", "pose_a", "--out", page
-    )[1]  # fmt: skip
-    code, _, err = run("view", "planar_2r", "--q", 1, 2, 3, "--out", page)
-    assert code == 2
-    assert "--q: expected 2 numbers" in err
+        assert f"q = {q}" in out
+    refused(run, "--q: expected 2 numbers", "view", "planar_2r", "--q", 1, 2, 3, "--out", page)
 
 
 def test_demo_draws_the_eight_postures(run, tmp_path):
@@ -296,7 +231,6 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
     assert code == 0
     pages = {path.name for path in tmp_path.glob("*.html")}
     assert pages == {"arms.html", "rx90-postures.html", "ur5-postures.html"}
-    assert {path.name for path in tmp_path.glob("*.urdf")} == {"rx90.urdf", "ur5.urdf"}
     for name in ("rx90", "ur5"):
         text = (tmp_path / f"{name}-postures.html").read_text(encoding="utf-8")
         assert re.findall(r"</span>(\d): shoulder", text) == list("12345678")
@@ -306,7 +240,6 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
     lost = [float(number) for number in re.findall(r"its postures to (\S+) rad", out)]
     assert len(lost) == 2
     assert max(lost) < 1e-6
-    assert "robotmodels demo --real" in out
 
 
 @pytest.mark.nightly  # `.ci/run` runs the demonstration from the wheel
@@ -327,13 +260,9 @@ def test_demo_identifies_the_real_robot(run, tmp_path, monkeypatch):
     )
     assert ours.shape == (6,)
     assert (ours < best).all()
-    price = float(re.search(r"residuals (\S+) % above least squares", out)[1])
-    assert 0.0 < price < 3.0
     again = rm.RobotModel.from_urdf(tmp_path / "identified.urdf")
     assert again.inertia.is_physical.all()
-    data = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
-    assert len(data["parameters"]) == 61
-    assert "Verdict" in (tmp_path / "report.txt").read_text(encoding="utf-8")
+    assert len(json.loads((tmp_path / "result.json").read_text())["parameters"]) == 61
 
 
 @pytest.mark.nightly
@@ -363,7 +292,6 @@ def test_demo_of_the_real_robot_goes_on_without_extras(tmp_path):
     assert done.returncode == 0
     assert "no report.html: figures need Matplotlib" in done.stderr
     assert "no identified.urdf: " in done.stderr
-    assert "60 of 60" in done.stdout
     assert {path.name for path in tmp_path.iterdir()} == {"report.txt", "result.json"}
 
 
@@ -380,51 +308,40 @@ def tracker(tmp_path):
     file = tmp_path / "tracker.csv"
     header = ",".join([*real.table.joint_names, "x", "y", "z"])
     np.savetxt(file, np.hstack([np.degrees(q), 1e3 * p]), delimiter=",", header=header, comments="")
-    return file, real
+    return ["calibrate", "--robot", "rx90", "--measurements", file, "--kind", "position"], real
 
 
 def test_calibrate_writes_a_report_and_a_robot(run, tracker, tmp_path):
-    file, real = tracker
-    words = ["calibrate", "--robot", "rx90", "--measurements", file, "--kind", "position",
-             "--lengths", "mm", "--angles", "deg", "--parameters", "b7", "d7", "r7"]  # fmt: skip
+    words, real = tracker
+    words += ["--lengths", "mm", "--angles", "deg", "--parameters", "b7", "d7", "r7"]
     folder = tmp_path / "new" / "report"
     code, out, _ = run(*words, "--out", folder)
     assert code == 0
     assert "The fit has converged" in out
     names = {"report.txt", "report.html", "result.json", "calibrated.urdf"}
     assert {path.name for path in folder.iterdir()} == names
-    assert {path.name for path in tmp_path.iterdir()} == {"tracker.csv", "new"}
     robot = rm.RobotModel.from_urdf(folder / "calibrated.urdf")
-    q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
-    missed = rm.dgm(robot, q)[:3, 3] - rm.dgm(real, q)[:3, 3]
-    assert np.linalg.norm(missed) < 2e-4
-    data = json.loads((folder / "result.json").read_text())
+    assert np.linalg.norm((rm.dgm(robot, Q) - rm.dgm(real, Q))[:3, 3]) < 2e-4
     code, out, err = run(*words, "--json")
     assert (code, err) == (0, "")
-    assert json.loads(out) == data
-    code, out, _ = run(*words)
-    assert (code, out) == (0, (folder / "report.txt").read_text())
+    assert json.loads(out) == json.loads((folder / "result.json").read_text())
+    assert run(*words)[:2] == (0, (folder / "report.txt").read_text())
 
 
 def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path):
-    arm = rm.load("rx90")
-    real = arm.with_tool(se3.translation(0.05, 0.03, 0.1))
-    rng = np.random.default_rng(1)
-    balls = {"a": [0.5, 0.1, 0.4], "b": [0.6, 0.1, 0.4], "c": [0.3, -0.4, 0.5]}
-    for name, place in balls.items():
+    real, rng = (
+        rm.load("rx90").with_tool(se3.translation(0.05, 0.03, 0.1)),
+        np.random.default_rng(1),
+    )
+    for name, place in {"a": [0.5, 0.1, 0.4], "b": [0.6, 0.1, 0.4], "c": [0.3, -0.4, 0.5]}.items():
         turns = [se3.from_rpy(rng.uniform(-1.0, 1.0, 3), place) for _ in range(25)]
         found = rm.igm(real, np.array(turns))
-        q = found.q[found.valid][::3]
-        np.savetxt(tmp_path / f"{name}.csv", q, delimiter=",")
+        np.savetxt(tmp_path / f"{name}.csv", found.q[found.valid][::3], delimiter=",")
     files = [tmp_path / "a.csv", tmp_path / "b.csv"]
     words = ["calibrate", "--robot", "rx90", "--kind", "point-contact", "--measurements", *files,
              "--parameters", "b7", "d7", "r7", "d3", "r4", "--folds", 0]  # fmt: skip
-    code, _, err = run(*words)
-    assert code == 2
-    assert "contain no length" in err
-    code, _, err = run(*words, "--known-distance", "a", "b", "zero")
-    assert code == 2
-    assert "--known-distance: expected 1 finite number" in err
+    refused(run, "contain no length", *words)
+    refused(run, "expected 1 finite number", *words, "--known-distance", "a", "b", "zero")
     words += ["--known-distance", "a", "b", 0.1, "--test", tmp_path / "c.csv", "--json"]
     code, out, _ = run(*words)
     data = json.loads(out)
@@ -433,27 +350,18 @@ def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path)
     assert data["errors"]["held_out"]["m"]["rms"] < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
+def test_wrong_arguments_of_calibrate(run, tracker):
+    right = ["--angles", "deg", "--lengths", "mm"]
+    for words, message in (
         (["--lengths", "mm"], "look like degrees. Use --angles deg"),
         (["--angles", "deg"], "look like millimetres. Use --lengths mm"),
-        (["--angles", "deg", "--lengths", "mm", "--columns", "x", "y", "w"], "no column 'w'"),
-        (["--angles", "deg", "--lengths", "mm", "--parameters", "d9"], "'d9' is not a parameter"),
-        (["--angles", "deg", "--lengths", "mm", "--sigma", "-1"], "--sigma: expected positive"),
-        (["--angles", "deg", "--lengths", "mm", "--prior", "1"], "--prior: expected two positive"),
-        (["--robot", "rx91"], "rx90"),
+        ([*right, "--columns", "x", "y", "w"], "no column 'w'"),
+        ([*right, "--parameters", "d9"], "'d9' is not a parameter"),
+        ([*right, "--sigma", "-1"], "--sigma: expected positive"),
+        ([*right, "--prior", "1"], "--prior: expected two positive"),
         (["--measurements", "missing.csv"], "missing.csv"),
-    ],
-)
-def test_wrong_arguments_of_calibrate(run, tracker, words, message):
-    file, _ = tracker
-    code, out, err = run("calibrate", "--robot", "rx90", "--measurements", file, "--kind",
-                         "position", *words)  # fmt: skip
-    assert (code, out) == (2, "")
-    assert err.startswith("robotmodels: ")
-    assert message in err
-    assert err.count("\n") == 1
+    ):
+        refused(run, message, *tracker[0], *words)
 
 
 # --- identify -------------------------------------------------------------------------------------
@@ -462,29 +370,32 @@ def test_wrong_arguments_of_calibrate(run, tracker, words, message):
 @pytest.fixture(scope="module")
 def motion(tmp_path_factory):
     """A log of two joints in degrees, torques in a file of their own, and the robot it is of."""
-    rng = np.random.default_rng(0)
-    n, dt = 2, 0.002
+    rng, dt = np.random.default_rng(0), 0.002
     real = rm.load("planar_2r")
     real = real.with_inertia(uniform_bodies(real, 6.0)).with_drive(
-        rm.DriveParameters(*(np.full(n, x) for x in (0.4, 3.0, 2.0, 0.5)))
+        rm.DriveParameters(*(np.full(2, x) for x in (0.4, 3.0, 2.0, 0.5)))
     )
     t = np.arange(0.0, 16.0, dt)[:, None]
     q = v = a = 0.0
     for k in (1, 2, 3):
-        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(n)), rng.uniform(0.0, 6.0, n)
+        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(2)), rng.uniform(0.0, 6.0, 2)
         q = q + 0.4 / k * np.sin(w * t + phase)
         v, a = v + 0.4 / k * w * np.cos(w * t + phase), a - 0.4 / k * w**2 * np.sin(w * t + phase)
     tau = rm.idm(real, q, v, a) + 0.05 * rng.normal(size=q.shape)
     folder = tmp_path_factory.mktemp("motion")
-    for name, values in (("q", np.degrees(q)), ("tau", tau)):
-        header = ",".join(f"{name}{j + 1}" for j in range(n))
-        np.savetxt(folder / f"{name}.csv", values, delimiter=",", header=header, comments="")
+    both = np.column_stack([np.degrees(q), 2.0 * np.gradient(np.degrees(q), dt, axis=0)])
+    for name, values, head in (
+        ("q", np.degrees(q), "q1,q2"), ("tau", tau, "tau1,tau2"), ("both", both, "q1,q2,dq1,dq2"),
+        ("late", np.roll(tau, 100, axis=0), "tau1,tau2"),
+    ):  # fmt: skip
+        np.savetxt(folder / f"{name}.csv", values, delimiter=",", header=head, comments="")
     return folder, real
 
 
-def identify(folder):
-    return ["identify", "--robot", "planar_2r", "--log", folder / "q.csv", "--torques-from",
-            folder / "tau.csv", "--dt", "2e-3", "--angles", "deg"]  # fmt: skip
+def identify(folder, positions="q", torques="tau"):
+    return ["identify", "--robot", "planar_2r", "--log", folder / f"{positions}.csv",
+            "--torques-from", folder / f"{torques}.csv", "--dt", "2e-3", "--angles",
+            "deg"]  # fmt: skip
 
 
 def test_identify_writes_a_report_and_a_robot(run, motion, tmp_path):
@@ -514,10 +425,7 @@ def test_identify_writes_a_report_and_a_robot(run, motion, tmp_path):
     assert np.abs(missed).max() < 0.05
     # one process gives the same bits, and JSON what the file has
     code, out, _ = run(*words, "--consistent", "--json")
-    assert code == 0
-    assert json.loads(out) == data
-    code, out, _ = run(*words, "--consistent")
-    assert (code, out) == (0, (out_folder / "report.txt").read_text())
+    assert (code, json.loads(out)) == (0, data)
 
 
 def test_identify_takes_choices_and_files_that_only_test(run, motion):
@@ -529,13 +437,11 @@ def test_identify_takes_choices_and_files_that_only_test(run, motion):
     code, out, _ = run(*words)
     data = json.loads(out)
     assert code == 0
-    assert data["method"]["name"] == "ols"
-    assert data["method"]["drive"] == ["Fv", "Fc"]
+    assert (data["method"]["name"], data["method"]["drive"]) == ("ols", ["Fv", "Fc"])
     chosen = data["processing"]
     assert (chosen["cutoff"], chosen["decimation"], chosen["edges"]) == (30.0, 10, 100)
     assert chosen["dead_band"] == [0.05] * 2
-    assert data["data"]["delay"] == 0.004
-    assert data["data"]["samples"] == 4000
+    assert (data["data"]["delay"], data["data"]["samples"]) == (0.004, 4000)
     assert data["errors"]["held_out"]["samples"] == 7998 - 200
 
 
@@ -580,24 +486,17 @@ def test_choices_are_those_of_the_package():
         (["--motor-side", "--gears", "100"], "give one of them"),
         (["--gears", "1", "2", "3"], "--gears: expected 1 or 2 finite numbers"),
         (["--workers", "0"], "--workers"),
-        (["--positions", "nothing*"], "nothing"),
-        (["--cutoff", "1e6"], "half the sampling rate"),
         (["--prior", "rx90"], "has 6 links, the robot 2"),
         (["--consistent"], "has no masses"),
         (["--log", "missing.csv"], "missing.csv: there is no such file"),
-        (["--rows", "0", "5000", "--test-rows", "10", "5000"], "rows that do not overlap"),
         (["--rows", "0", "-10", "--test-rows", "7000", "8000"], "rows that do not overlap"),
         (["--rows", "0", "90000"], "--rows: expected a first row"),
-        (["--rows", "0", "10", "--test-rows", "10", "9000"], "within the 8000 rows"),
         (["--angles", "rad"], "with --gears or --motor-side if they are motor angles"),
         (["--delay", "0.2", "--rows", "0", "8000"], "7900 rows"),
     ],
 )
 def test_wrong_arguments_of_identify(run, motion, words, message):
-    code, out, err = run(*identify(motion[0]), *words)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1
+    refused(run, message, *identify(motion[0]), *words)
 
 
 @pytest.mark.parametrize(
@@ -605,16 +504,9 @@ def test_wrong_arguments_of_identify(run, motion, words, message):
     [
         ("say angles='deg', or", "say --angles deg, or"),
         ("(checked=False uses the log unchanged.)", "(--no-check uses the log unchanged.)"),
-        (
-            "say drive_gains= (N m) or drive_gains=1 to",
-            "say --drive-gains (N m) or --drive-gains 1 to",
-        ),
         ("say dt=, the period, and time=False to", "say --dt, the period, and --time none to"),
-        ("give them as positions=[...], names", "give them as --positions, names"),
-        ("say transmission=model.transmission if", "say --motor-side if"),
         ("signs= and drive_gains= of read_log.", "--signs and --drive-gains."),
         ("times='ms', 'us' or 'ns' if", "--times ms, us or ns if"),
-        ("leave them out (velocities=False of read_log)", "leave them out (--velocities none)"),
         ("largest_gap= to split, b2=3", "largest_gap= to split, b2=3"),
     ],
 )
@@ -623,32 +515,14 @@ def test_messages_speak_of_options(message, words):
     assert in_options(message, own.options()) == words
 
 
-def test_velocities_that_are_wrong_are_left_out(run, motion, tmp_path):
+def test_velocities_that_are_wrong_are_left_out_and_late_torques_refused(run, motion):
     folder, _ = motion
-    q = np.loadtxt(folder / "q.csv", delimiter=",", skiprows=1)
-    both = tmp_path / "both.csv"
-    table = np.column_stack([q, 2.0 * np.gradient(q, 0.002, axis=0)])
-    np.savetxt(both, table, delimiter=",", header="q1,q2,dq1,dq2", comments="")
-    words = identify(folder)
-    words[words.index("--log") + 1] = both
-    code, _, err = run(*words)
-    assert code == 2
-    assert "leave them out (--velocities none)" in err
+    refused(run, "leave them out (--velocities none)", *identify(folder, "both"))
     values = []
-    for given in ([*words, "--velocities", "none"], identify(folder)):
+    for given in ([*identify(folder, "both"), "--velocities", "none"], identify(folder)):
         code, out, _ = run(*given, "--json")
         assert code == 0
         values.append([one["value"] for one in json.loads(out)["parameters"]])
     np.testing.assert_allclose(values[0], values[1], rtol=1e-9)
-
-
-def test_delays_that_are_not_found_are_not_taken_out(run, motion, tmp_path):
-    folder, _ = motion
-    tau = np.loadtxt(folder / "tau.csv", delimiter=",", skiprows=1)
-    late = tmp_path / "late.csv"
-    np.savetxt(late, np.roll(tau, 100, axis=0), delimiter=",", header="tau1,tau2", comments="")
-    words = identify(folder)
-    words[words.index("--torques-from") + 1] = late
-    code, out, err = run(*words, "--delay", "auto")
-    assert (code, out) == (2, "")
-    assert "--delay auto: the torques fit best at an end of the delays" in err
+    late = [*identify(folder, "q", "late"), "--delay", "auto"]
+    refused(run, "--delay auto: the torques fit best at an end of the delays", *late)

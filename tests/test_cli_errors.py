@@ -4,7 +4,6 @@ import ctypes
 import io
 import json
 import os
-import pty
 import signal
 import subprocess
 import sys
@@ -52,18 +51,12 @@ def failing(monkeypatch, error):
         (["info", "rx90", "more"], "nothing takes 'more'"),
         (["igm", "rx90", "--deg", "--q", "zero"], "no option --deg. Did you mean --degrees"),
         (["igm", "rx90", "--q", "zeroo"], "Did you mean 'zero'?"),
-        (["info", "rx9"], "Did you mean 'rx90'"),
         (["info", "missing.urdf"], "cannot read 'missing.urdf'"),
-        (["info", "missing.par"], "cannot read 'missing.par'"),
         (["info", "."], "is a folder"),
         (["info", "taken.csv"], "read from files named .urdf"),
-        (["demo", "--out", "taken.csv"], "'taken.csv' is a file; give a folder"),
         (["excite", "--robot", "rx90", "--out", "taken.csv/new"], "is a file; give a folder"),
         (["excite", "--robot", "rx90", "--rate", 500], "--rate: describes the file of --out"),
-        (["excite", "--robot", "rx90", "--format", "csv"], "--format: describes the file of --out"),
-        (["excite", "--robot", "rx90", "--degrees"], "--degrees: describes the file of --out"),
         (["excite", "--robot", "rx90", "--out", "new", "--rate", 0], "--rate: expected a positive"),
-        (["excite", "--robot", "rx90", "--duration", "-1e-3"], "--duration: expected positive"),
         (["excite", "--robot", "rx90", "--box", 1, 1, 1, 0, 0, 0], "--box: lower, upper"),
         (["identify", "--robot", "rx90", "--log", "a.csv", "--delimiter", ""], "one character"),
         (["identify", "--robot", "rx90", "--log", "taken.csv"], "taken.csv: the file is empty"),
@@ -84,13 +77,6 @@ def test_wrong_input_is_one_line(run, words, message, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["taken.csv"]
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_the_work(run, tmp_path, monkeypatch):
-    # root may write everywhere, so a folder without rights would not do
-    monkeypatch.setattr(os, "access", lambda path, mode: path != tmp_path)
-    code, out, err = run("excite", "--robot", "rx90", "--out", tmp_path / "new")
-    assert (code, out, err) == (2, "", f"robotmodels: Permission denied: {tmp_path}\n")
-
-
 def test_a_bug_is_said_in_one_line_and_told_when_asked_for(run, monkeypatch):
     failing(monkeypatch, ZeroDivisionError("by nothing"))
     monkeypatch.delenv("ROBOTMODELS_TRACEBACK", raising=False)
@@ -101,10 +87,6 @@ def test_a_bug_is_said_in_one_line_and_told_when_asked_for(run, monkeypatch):
     assert code == ExitStatus.BUG
     assert err.startswith("Traceback (most recent call last):")
     assert "in fail" in err
-    monkeypatch.setenv("ROBOTMODELS_TRACEBACK", "1")
-    assert run("robots")[2].startswith("Traceback (most recent call last):")
-    monkeypatch.setenv("ROBOTMODELS_TRACEBACK", "0")
-    assert "Traceback" not in run("robots")[2]
 
 
 @pytest.mark.parametrize(
@@ -189,45 +171,10 @@ def test_closed_and_full_outputs():
     assert (full.returncode, full.stderr) == (2, "robotmodels: No space left on device.\n")
 
 
-# --- progress -------------------------------------------------------------------------------------
-
-SHORT = ["excite", "--robot", "planar_2r", "--starts", "1", "--random", "2", "--iterations", "1",
-         "--harmonics", "2"]  # fmt: skip
+# --- progress and JSON ----------------------------------------------------------------------------
 
 
-def on_terminal(words):
-    """Status, standard output, and what a terminal gets on standard error."""
-    leader, follower = pty.openpty()
-    child = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=follower, text=True)
-    os.close(follower)
-    drawn = b""
-    while True:
-        try:
-            part = os.read(leader, 4096)
-        except OSError:  # how Linux says that nobody writes any more
-            break
-        if not part:
-            break
-        drawn += part
-    out, _ = child.communicate(timeout=60)
-    os.close(leader)
-    return child.returncode, out, drawn.decode()
-
-
-@pytest.mark.nightly
-def test_a_bar_is_drawn_on_terminals_only():
-    code, out, drawn = on_terminal(SHORT)
-    assert code == 0
-    assert "\r[" in drawn
-    assert "stages of the search" in drawn
-    assert drawn.endswith("\r" + " " * 79 + "\r")
-    assert all(len(line) <= 79 for line in drawn.split("\r"))
-    assert on_terminal([*SHORT, "--quiet"]) == (0, out, "")
-    plain = subprocess.run([*COMMAND, *SHORT], capture_output=True, text=True)
-    assert (plain.returncode, plain.stdout, plain.stderr) == (0, out, "")
-
-
-def test_the_bar_grows_and_is_taken_away(monkeypatch):
+def test_a_bar_is_drawn_on_terminals_only_and_taken_away(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self):
             return True
@@ -235,19 +182,15 @@ def test_the_bar_grows_and_is_taken_away(monkeypatch):
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     with progress(SimpleNamespace(quiet=False), "fits") as bar:
-        bar.steps(0, 4, "first")
-        monkeypatch.setattr("robotmodels.cli.output._OFTEN", 0.0)
-        bar.steps(2, 4, "second")
-        bar.fraction(1.0)
-        bar.fraction(2.0)
+        bar(0.0)
+        bar(1.0)
     drawn = [line.rstrip() for line in stream.getvalue().split("\r")]
-    assert [line.count("#") for line in drawn if line] == [0, 15, 30, 30]
-    assert "2/4" in drawn[2]
-    assert drawn[2].endswith("fits: second")
+    assert "100 %" in drawn[-3]
     assert drawn[-2:] == ["", ""]
-
-
-# --- JSON -----------------------------------------------------------------------------------------
+    for quiet, where in ((True, stream), (False, io.StringIO())):
+        monkeypatch.setattr(sys, "stderr", where)
+        with progress(SimpleNamespace(quiet=quiet), "fits") as bar:
+            assert bar is None
 
 
 def strict(text):
@@ -275,17 +218,10 @@ def test_json_of_robots_and_info(run):
         lower = [joint["lower"] for joint in data["joints"]]
         assert lower == [v if np.isfinite(v) else None for v in model.lower.tolist()]
         assert (data["transmission"] is None) == (model.transmission is None)
-        known = model.inertia.values.any()
-        assert data["total_mass"] == (model.inertia.mass.sum() if known else None)
         assert (data["tip"], data["frames"]) == (model.tip, list(model.frame_names))
-        np.testing.assert_array_equal([data["base"], data["tool"]], [model.base, model.tool])
 
 
 def test_json_has_no_token_that_readers_refuse(capsys):
-    data = {"a": [np.nan, np.float64(np.inf), 1e300], "b": {}, "c": [], "d": ((1, 2), [True]),
-            "θ": np.array([[1, 2], [3, 4]]), "e": ExitStatus.BUG, 3: None}  # fmt: skip
-    print_json(data)
-    assert strict(capsys.readouterr().out) == {
-        "a": [None, None, 1e300], "b": {}, "c": [], "d": [[1, 2], [True]],
-        "θ": [[1, 2], [3, 4]], "e": "BUG", "3": None,
-    }  # fmt: skip
+    print_json({"a": [np.nan, 1e300], "b": {}, "θ": np.array([[1, 2]]), "e": ExitStatus.BUG})
+    expected = {"a": [None, 1e300], "b": {}, "θ": [[1, 2]], "e": "BUG"}
+    assert strict(capsys.readouterr().out) == expected

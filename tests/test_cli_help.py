@@ -15,14 +15,11 @@ import umsgpack
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.cli import main
-from robotmodels.cli.arguments import NUMBER_OPTIONS
 from robotmodels.cli.program import COMMANDS, parser_of
 from robotmodels.cli.terminal import ExitStatus
 from robotmodels.minimal_parameters import uniform_bodies
 
 Q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
-NUMBERED = {"NUMBERS", "X Y Z", "R P Y", "ANGLE", "SECONDS"}
-"""Words for numbers in the usage of options."""
 
 
 def examples(command):
@@ -115,11 +112,6 @@ def run(capsys):
 def test_every_command_has_examples_that_are_tried():
     assert {*FILES, "demo", "compile", "follow", "workspace"} == set(COMMANDS)
     assert all(examples(command) for command in COMMANDS)
-    assert examples("demo") == [
-        ["demo"],
-        ["demo", "--real", "--out", "tx40/"],
-        ["demo", "--chapter", "3"],
-    ]
 
 
 @pytest.mark.parametrize("command", FILES)
@@ -144,7 +136,7 @@ def test_examples_run_as_printed(run, command, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_is_narrow_and_says_how_it_ends(run, command):
+def test_every_command_has_help_with_examples(run, command):
     code, out, err = run(command, "--help")
     assert (code, err) == (0, "")
     assert "examples:\n  robotmodels " in out
@@ -154,23 +146,10 @@ def test_help_is_narrow_and_says_how_it_ends(run, command):
 def test_help_of_everything_has_every_command_and_status(run):
     code, out, _ = run("--help")
     assert code == 0
-    for name, summary in COMMANDS.items():
-        assert re.search(rf"^    {name} +{summary[:30]}", out, re.MULTILINE)
-    for status in ExitStatus:
-        assert re.search(
-            rf"^  {status.value} +{re.escape(status.sentence[:40])}", out, re.MULTILINE
-        )
+    assert all(f"\n    {name} " in out for name in COMMANDS)
+    assert all(f"\n  {status.value} " in out for status in ExitStatus)
     assert run("--version") == (0, f"robotmodels {rm.__version__}\n", "")
-    for words in (("--version", "-v"), ("--version", "--verbose")):
-        assert run(*words) == (0, f"{rm.show_versions()}\n", "")
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_options_that_take_numbers_take_negative_ones(command):
-    _, own = parser_of(command)
-    for action in own._actions:
-        if action.type is float or action.metavar in NUMBERED:
-            assert set(action.option_strings) <= set(NUMBER_OPTIONS), action.option_strings
+    assert run("--version", "-v") == (0, f"{rm.show_versions()}\n", "")
 
 
 # --- every option that is parsed changes something ------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,27 +123,15 @@ def robot_of(arguments: argparse.Namespace) -> RobotModel:
     return load(name)
 
 
-NUMBER_OPTIONS = (
-    "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
-    "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
-    "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band", "--kp", "--kd", "--delay",
-    "--dt", "--cutoff", "--edges", "--test-share",
-    "--held-out", "--duration", "--rate",
-)  # fmt: skip
-"""Options that take numbers, which may be negative."""
-
-
-def joined(argv: Sequence[str]) -> list[str]:
-    """Put the numbers behind an option into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``."""
+def joined(argv: Sequence[str], options: Collection[str]) -> list[str]:
+    """Put numbers behind one of the options into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``."""
     words: list[str] = []
-    rest = list(argv)
-    while rest:
-        word = rest.pop(0)
-        taken: list[str] = []
-        if word in NUMBER_OPTIONS:
-            while rest and _is_list(rest[0]):
-                taken.append(rest.pop(0))
-        words.append(f"{word}={','.join(taken)}" if taken else word)
+    for word in argv:
+        option, equals, taken = words[-1].partition("=") if words else ("", "", "")
+        if option in options and _is_list(word) and (not equals or _is_list(taken)):
+            words[-1] += f"{',' if equals else '='}{word}"
+        else:
+            words.append(word)
     return words
 
 

@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> Report:
             result = fit(
                 model, [measured, *known], base=not arguments.fixed_base,
                 tool=not arguments.fixed_tool, prior=prior, held_out=aside,
-                progress=bar and bar.fraction,
+                progress=bar,
                 **given(arguments, "parameters", "known", "known_lengths", "gains",
                         "eccentricity", "compliance", "loss", "folds"),
             )  # fmt: skip

@@ -24,6 +24,6 @@ def run(arguments: argparse.Namespace) -> None:
     """Compile, with a progress bar."""
     start = time.monotonic()
     with progress(arguments, "compiling") as bar:
-        count, folder = compile_all(arguments.processes, None if bar is None else bar.steps)
+        count, folder = compile_all(arguments.processes, bar and (lambda k, of, _: bar(k / of)))
     place = "They could not be kept." if folder is None else f"They are kept in {folder}."
     print(f"{count} functions are ready, after {time.monotonic() - start:.0f} s. {place}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import textwrap
 import time
 from collections.abc import Callable
@@ -129,18 +128,8 @@ def _show_base(model: RobotModel) -> None:
 
 def _narrow(text: str) -> str:
     """A printed table whose long lines are wrapped anew for a narrow terminal."""
-    lines: list[str] = []
-    for line in text.splitlines():
-        # a list that goes on: no formula begins so far to the right without its equals sign
-        goes_on = line.startswith(" " * 8) and not line.lstrip().startswith("=")
-        if goes_on and lines:
-            lines[-1] += " " + line.strip()
-        else:
-            lines.append(line)
-    return "\n".join(
-        textwrap.fill(line, _TERMINAL, subsequent_indent=" " * 4, break_on_hyphens=False)
-        for line in lines
-    )
+    shape = {"width": _TERMINAL, "subsequent_indent": " " * 4, "break_on_hyphens": False}
+    return "\n".join(textwrap.fill(line, **shape) for line in text.splitlines())
 
 
 def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
@@ -166,9 +155,6 @@ def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
     difference = np.abs(pinocchio - table_poses(model, Q)).max()
     print(f"\nLargest difference between Pinocchio and the plain product of the table's factors\n"
           f"  over {_SAMPLES} random configurations: {difference:.1e}")  # fmt: skip
-    if "robotmodels.kernels.poses" not in sys.modules:
-        print("Compiling the batch kernel (the first time on this machine only) ...", flush=True)
-        print(f"  ready after {_timed(lambda: dgm(model, Q))[0]:.1f} s")
     Q = np.random.default_rng(1).uniform(-np.pi, np.pi, (_BATCH, model.n))
     seconds, _ = _timed(lambda: dgm(model, Q), 5)
     print(
@@ -180,9 +166,7 @@ def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
     from ..viz import show
 
     T = dgm(model, q)
-    print("Preparing (compiles the first time on this machine only) ...", flush=True)
-    seconds, found = _timed(lambda: igm(model, T))
-    print(f"  ready after {seconds:.1f} s")
+    found = igm(model, T)
     print(as_text(as_json(model, T, found, degrees=True)))
     path = folder / f"{model.name}-postures.html"
     words = [f"{k + 1}: {branch}" for k, branch in enumerate(found.branch)]
@@ -234,15 +218,13 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     print(_narrow("\n".join(map(str, findings)) or "The checks of the log found nothing."))
     print(_narrow(str(synchronisation(log, model))))
     with progress(arguments, "the whole log") as bar:
-        whole = fit(model, log, progress=bar and bar.fraction)
+        whole = fit(model, log, progress=bar)
     print(f"  identified after {time.perf_counter() - started:.1f} s\n")
     print(comparison(data, whole))
     first = log.rows(data.training.start, data.training.stop)
     last = log.rows(data.held_out.start, data.held_out.stop)
     with progress(arguments, "without the rows that test") as bar:
-        seconds, trained = _timed(
-            lambda: fit(model, first, test=last, progress=bar and bar.fraction)
-        )
+        seconds, trained = _timed(lambda: fit(model, first, test=last, progress=bar))
     print(f"\nFitted on samples {data.training.start} to {data.training.stop} ({seconds:.1f} s, "
           f"with all checks); torques of samples {data.held_out.start}\nto {data.held_out.stop} as "
           "predicted, root mean square error in N m, unfiltered:")  # fmt: skip

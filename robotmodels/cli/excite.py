@@ -99,11 +99,10 @@ def run(arguments: argparse.Namespace) -> Report:
             sigma=_each(arguments.sigma, n, "--sigma"), workspace=workspace,
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
             baseline=arguments.random, rng=arguments.seed,
-            progress=bar and bar.fraction,
+            progress=bar,
             **given(arguments, "duration", "harmonics", "points", "kind", "criterion", "starts",
                     "iterations"),
         )  # fmt: skip
-    text = str(found)
 
     def write(folder: Path) -> list[str]:
         from ..viz import plot_excitation
@@ -112,12 +111,12 @@ def run(arguments: argparse.Namespace) -> Report:
         rate = _RATE if arguments.rate is None else arguments.rate
         write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
         write_trajectory(found, folder / "trajectory.json")
-        (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
+        (folder / "summary.txt").write_text(f"{found}\n", encoding="utf-8")
         picture = folder / "trajectory.png"
         return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
 
     is_feasible = found.status.name != "INFEASIBLE"
-    return Report(text, lambda: excitation_data(found), is_feasible, text, write)
+    return Report(str(found), lambda: excitation_data(found), is_feasible, str(found), write)
 
 
 def _check_file(arguments: argparse.Namespace) -> None:

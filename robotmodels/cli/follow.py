@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .._arrays import Array
-from ..csv_table import is_number
+from ..csv_table import open_table
 from ..errors import InvalidValueError
 from ..performance import FeasiblePath, feasible_path
 from .arguments import revolute, robot_of
@@ -83,25 +83,18 @@ def read_poses(path: Path, degrees: bool) -> Array:
     """Poses (N, 4, 4) of a file."""
     from scipy.spatial.transform import Rotation
 
-    text = path.read_text(encoding="utf-8-sig").replace(";", ",")
-    rows = [line.replace(",", " ").split() for line in text.splitlines() if line.strip()]
-    if rows and not all(map(is_number, rows[0])):
-        rows = rows[1:]
-    width = len(rows[0]) if rows else 0
-    if width not in _WIDTHS or any(len(row) != width for row in rows):
+    table = open_table(path)
+    if table.width not in _WIDTHS:
         raise InvalidValueError(
-            f"{path}: expected rows of 3, 6, 7 or 16 numbers, all alike; see robotmodels follow "
-            "--help."
+            f"{path}: expected rows of 3, 6, 7 or 16 numbers, got {table.width} columns; see "
+            "robotmodels follow --help."
         )
-    bad = next((k for k, row in enumerate(rows) if not all(map(is_number, row))), None)
-    if bad is not None:
-        raise InvalidValueError(f"{path}: row {bad + 1} of the poses has a word that is no number.")
-    values = np.array(rows, dtype=np.float64)
-    if width == 16:
+    values = table.numbers(range(table.width))
+    if table.width == 16:
         return values.reshape(-1, 4, 4)
     T = np.tile(np.eye(4), (len(values), 1, 1))
     T[:, :3, 3], turns = values[:, :3], values[:, 3:]
-    if width == 7:
+    if table.width == 7:
         lengths = np.linalg.norm(turns, axis=1)
         if np.abs(lengths - 1.0).max() > 1e-3:
             wrong = lengths[np.abs(lengths - 1.0).argmax()]
@@ -109,6 +102,6 @@ def read_poses(path: Path, degrees: bool) -> Array:
                 f"expected unit quaternions qx qy qz qw, got one of {wrong:.4g}."
             )
         T[:, :3, :3] = Rotation.from_quat(turns).as_matrix()
-    elif width == 6:  # roll, pitch, yaw about fixed axes
+    elif table.width == 6:  # roll, pitch, yaw about fixed axes
         T[:, :3, :3] = Rotation.from_euler("xyz", turns, degrees=degrees).as_matrix()
     return T

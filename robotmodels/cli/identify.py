@@ -114,7 +114,7 @@ def run(arguments: argparse.Namespace) -> Report | ExitStatus:
             test=test,
             checked=not arguments.no_check,
             executor=executor,
-            progress=bar and bar.fraction,
+            progress=bar,
         )
     if result.status is EstimateStatus.UNSTABLE:
         say(text_of(result).rstrip())
@@ -223,23 +223,21 @@ def real_bodies(
     """Physically consistent robot; unless requested, a failure is only reported."""
     from ..identification.consistent import consistent_robot, prior_bodies
 
+    robot = None
     try:
         if prior is None:
             prior, sentences = prior_bodies(result.model)
             for sentence in sentences:
                 say(sentence)
         robot = consistent_robot(result, prior)
+        reason = None if robot.is_usable else f"--consistent: {robot.reason()}"
     except RobotModelsError as error:
-        if asked:
-            raise
-        say(f"no identified.urdf: {error}")
-        return None
-    if not robot.is_usable:
-        if asked:
-            raise InvalidValueError(f"--consistent: {robot.reason()}")
-        say(f"no identified.urdf: {robot.reason()}")
-        return None
-    return robot
+        reason = str(error)
+    if reason is not None and asked:
+        raise InvalidValueError(reason)
+    if reason is not None:
+        say(f"no identified.urdf: {reason}")
+    return robot if reason is None else None
 
 
 def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | None]:
@@ -263,9 +261,8 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
             delay = float(numbers(arguments.delay, 1, "--delay")[0])
         whole = with_delay(whole, delay)
         other = None if other is None else with_delay(other, delay)
-    first, last = (0, len(whole))
-    if arguments.rows is not None:
-        first, last = _range(arguments.rows, len(whole), "--rows")
+    first, last = _range(arguments.rows or [0, len(whole)], len(whole), "--rows")
+    share = arguments.test_share
     if arguments.test_rows is not None:
         if arguments.rows is None:
             raise InvalidValueError("--test-rows: give the fitted rows by --rows.")
@@ -276,14 +273,13 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
                 "are fitted; give rows that do not overlap."
             )
         other = whole.rows(start, stop)
-    elif (share := arguments.test_share) is not None:
+    elif share is not None:
         if not 0.0 < share < 1.0:
             raise InvalidValueError(
                 f"--test-share: expected a share between 0 and 1, got {share:g}."
             )
-        middle = first + round((1.0 - share) * (last - first))
-        other = whole.rows(middle, last)
-        last = middle
+        last, end = first + round((1.0 - share) * (last - first)), last
+        other = whole.rows(last, end)
     return whole.rows(first, last), other
 
 

@@ -186,18 +186,18 @@ def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
         asked = " ".join(c for c, m in zip(_COMPONENTS, data["mask"], strict=True) if m)
         lines.append(f"asked for: {asked} in {mask_axes} axes")
     if rows:
-        columns = [("", [str(k + 1) for k in range(len(rows))])]
-        columns.append(("branch", [row["branch"] for row in rows]))
-        columns += [
-            (f"q{j + 1} [{unit}]", [_number(row["q"][j], unit) for row in rows])
-            for j, unit in enumerate(units)
+        columns = [
+            ("", [str(k + 1) for k in range(len(rows))]),
+            ("branch", [row["branch"] for row in rows]),
+            *(
+                (f"q{j + 1} [{unit}]", [_number(row["q"][j], unit) for row in rows])
+                for j, unit in enumerate(units)
+            ),
+            ("residual", [f"{row['residual']:.1e}" for row in rows]),
+            ("limits", ["inside" if row["within_limits"] else "outside" for row in rows]),
+            ("root", ["double" if row["double"] else "" for row in rows]),
         ]
-        columns.append(("residual", [f"{row['residual']:.1e}" for row in rows]))
-        inside = ["inside" if row["within_limits"] else "outside" for row in rows]
-        columns.append(("limits", inside))
-        if any(row["double"] for row in rows):
-            columns.append(("root", ["double" if row["double"] else "" for row in rows]))
-        lines += [f"q: {', '.join(names)}", boxed(columns)]
+        lines += [f"q: {', '.join(names)}", boxed([c for c in columns if any(c[1])])]
     families: dict[tuple[str, str], list[str]] = {}  # of postures with the same free joints
     for k, row in enumerate(rows, start=1):
         free, others = ", ".join(row["free_joints"]), ", ".join(row["family_joints"])

@@ -30,6 +30,7 @@ _WHOLE = (
     (" (named=...)", " (in Python: named=...)"),
     ("Give the model masses (with_inertia)", "Give the URDF of the robot masses (<inertial>)"),
     ("Pass metres: multiply by", "See --lengths, or multiply the lengths by"),
+    ("Pass metres: ", "See --lengths; in metres: "),
 )  # fmt: skip
 """Words of the package, and the option that says the same."""
 _OTHER_NAMES = {
@@ -45,7 +46,6 @@ _ARGUMENT = re.compile(
     r"(?<![\w-])([a-z_]+)="
     r"(?:\[\.{3}\]|\(\.{3}\)|\.{3}|True|\(([^()]*)\)|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?"
 )
-_LENGTH = re.compile(r"Pass metres: ([0-9.e+-]*[0-9])")
 _FIRST = re.compile(r"^([a-z_]+)(?=: )")
 
 
@@ -68,12 +68,5 @@ def in_options(message: str, options: Collection[str]) -> str:
         values += [each.strip(" '") for each in (words or "").split(",") if each.strip(" '")]
         return " ".join([option, *values])
 
-    if "--lengths" in options:
-        message = _LENGTH.sub(
-            lambda match: (
-                f"Write {match[1]} without --lengths mm, or {1e3 * float(match[1]):.5g} with it"
-            ),
-            message,
-        )
     message = _ARGUMENT.sub(with_value, message)
     return _FIRST.sub(lambda match: option_of(match[1]) or match[1], message)

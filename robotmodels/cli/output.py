@@ -10,9 +10,9 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from .._json_data import json_data
 from ..errors import InvalidValueError, MissingExtraError
@@ -91,53 +91,33 @@ def _json(data: Any, encoder: json.JSONEncoder, indent: str = "\n") -> str:
 _CELLS = 30
 _WIDTH = 79  # of a narrow terminal, less one so that no line is broken
 _OFTEN = 0.05  # s
-
-
-@dataclass(slots=True)
-class Bar:
-    """Progress bar on one line of the terminal."""
-
-    doing: str
-    stream: TextIO
-    _started: float = field(default_factory=time.monotonic)
-    _drawn: float = -1.0
-
-    def fraction(self, done: float) -> None:
-        """Draw."""
-        self._draw(done, f"{100.0 * done:3.0f} %", self.doing)
-
-    def steps(self, done: int, of: int, doing: str = "") -> None:
-        """Draw a number of steps."""
-        text = f"{self.doing}: {doing}" if doing else self.doing
-        self._draw(done / of if of else 1.0, f"{done}/{of}", text)
-
-    def clear(self) -> None:
-        """Take the bar away."""
-        if self._drawn >= 0.0:
-            self.stream.write("\r" + " " * _WIDTH + "\r")
-            self.stream.flush()
-
-    def _draw(self, done: float, count: str, doing: str) -> None:
-        now = time.monotonic()
-        if now - self._drawn < _OFTEN and done < 1.0:
-            return
-        self._drawn = now
-        full = round(_CELLS * min(max(done, 0.0), 1.0))
-        seconds = f"{now - self._started:.0f} s"
-        line = f"[{'#' * full}{'.' * (_CELLS - full)}] {count} {seconds}  {doing}"
-        self.stream.write("\r" + line[:_WIDTH].ljust(_WIDTH))
-        self.stream.flush()
+Bar = Callable[[float], None]
+"""Draws a progress bar, given the fraction that is done."""
 
 
 @contextlib.contextmanager
 def progress(arguments: argparse.Namespace, doing: str) -> Iterator[Bar | None]:
-    """Context that shows a progress bar."""
+    """Context with a progress bar on one line of the terminal, which it takes away at its end."""
     stream = sys.stderr
     if arguments.quiet or stream is None or not stream.isatty():
         yield None
         return
-    bar = Bar(doing, stream)
+    started, drawn = time.monotonic(), -1.0
+
+    def draw(done: float) -> None:
+        nonlocal drawn
+        now = time.monotonic()
+        if now - drawn < _OFTEN and done < 1.0:
+            return
+        drawn = now
+        bar = "#" * round(_CELLS * min(max(done, 0.0), 1.0))
+        line = f"[{bar:.<{_CELLS}}] {100.0 * done:3.0f} % {now - started:.0f} s  {doing}"
+        stream.write("\r" + line[:_WIDTH].ljust(_WIDTH))
+        stream.flush()
+
     try:
-        yield bar
+        yield draw
     finally:
-        bar.clear()
+        if drawn >= 0.0:
+            stream.write("\r" + " " * _WIDTH + "\r")
+            stream.flush()

@@ -47,9 +47,10 @@ class Parser(argparse.ArgumentParser):
         meant = f" Did you mean {' or '.join(near)}?" if near else ""
         self.error(f"no option {option}.{meant}")
 
-    def options(self) -> list[str]:
-        """The names of all options."""
-        return [name for action in self._actions for name in action.option_strings]
+    def options(self, of_one_text: bool = False) -> list[str]:
+        """The names of all options, or of those that take one text, such as a list of numbers."""
+        some = [x for x in self._actions if x.nargs is None] if of_one_text else self._actions
+        return [name for action in some for name in action.option_strings]
 
 
 class HelpText(argparse.HelpFormatter):
@@ -60,18 +61,11 @@ class HelpText(argparse.HelpFormatter):
         super().__init__(prog, max_help_position=28, width=max(width, 40))
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        paragraphs = []
-        for paragraph in text.strip().split("\n\n"):
-            if any(line.startswith("  ") for line in paragraph.splitlines()):
-                paragraphs.append(textwrap.indent(paragraph, indent))
-            else:
-                paragraphs.append(
-                    textwrap.fill(
-                        " ".join(paragraph.split()), width, initial_indent=indent,
-                        subsequent_indent=indent, break_on_hyphens=False,
-                    )
-                )  # fmt: skip
-        return "\n\n".join(paragraphs)
+        paragraphs = text.strip().split("\n\n")
+        return "\n\n".join(
+            part if "\n  " in f"\n{part}" else textwrap.fill(part, width, break_on_hyphens=False)
+            for part in paragraphs
+        )
 
 
 COMMANDS = {
@@ -155,7 +149,7 @@ def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
         parser, own = parser_of(command)
         if own is not None:
             options = own.options()
-            arguments, rest = parser.parse_known_args(joined(words))
+            arguments, rest = parser.parse_known_args(joined(words, own.options(True)))
             if rest:
                 own.refuse(rest)
             result = arguments.run(arguments)

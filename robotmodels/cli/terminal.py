@@ -22,13 +22,7 @@ class ExitStatus(IntEnum):
     sentence: str
 
     DONE = 0, "done"
-    NOT_REACHED = (
-        1,
-        (
-            "no solution: a pose out of reach, a fit that has not converged or predicts badly, no "
-            "motion within the limits"
-        ),
-    )
+    NOT_REACHED = 1, "no solution: a pose out of reach, a fit that has not converged, no motion"
     WRONG_INPUT = 2, "an argument or a file is wrong, or an optional package is missing"
     BUG = 70, "an error inside robotmodels; --traceback shows where"
     INTERRUPTED = 130, "interrupted (Ctrl-C)"

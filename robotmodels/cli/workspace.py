@@ -71,11 +71,9 @@ def numbers_of(w: Workspace) -> dict[str, Any]:
         "area": w.area if planar else None,
         "volume": w.volume if swept else None,
         "by_postures": [
-            {
-                "postures": n,
-                "area": w.area_of(n) if planar else None,
-                "volume": w.volume_of(n) if swept else None,
-            }
+            {"postures": n}
+            | {"area": w.area_of(n) if planar else None}
+            | {"volume": w.volume_of(n) if swept else None}
             for n in counts
         ],
         "grid_error": w.grid_error if counts else None,
