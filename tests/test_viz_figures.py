@@ -1,6 +1,5 @@
 """Figures: their lines, limits, units and legends are those of the data, and nothing overlaps."""
 
-import io
 import pickle
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from matplotlib.text import Text
 import robotmodels as rm
 from robotmodels import se3, simulation, viz
 from robotmodels import trajectories as tr
-from robotmodels.errors import InvalidValueError, RobotModelsError, RobotModelsWarning, ShapeError
+from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
 from robotmodels.symbolic import SingularityMap
 
 H = np.pi / 2
@@ -183,12 +182,11 @@ except rm.errors.MissingExtraError as error:
 
 
 def test_a_figure_is_one_of_matplotlib_and_pickles():
-    figure = pickle.loads(pickle.dumps(FIGURES["one joint"]()))
+    figure = pickle.loads(pickle.dumps(viz.plot_trajectory(MOVE, size=(5.0, 4.0))))
     assert isinstance(figure, Figure)
-    figure.savefig(file := io.BytesIO(), format="pdf")
-    assert file.getvalue().startswith(b"%PDF")
-    wide = viz.plot_trajectory(MOVE, size=(5.0, 4.0))
-    assert wide.get_size_inches().tolist() == [5.0, 4.0]
+    assert figure.get_size_inches().tolist() == [5.0, 4.0]
+    with pytest.raises(TypeError, match="unexpected arguments: colour"):
+        viz.plot_trajectory(MOVE, colour="red")
 
 
 # ---------------------------------------------------------------- trajectories
@@ -209,8 +207,6 @@ def test_trajectory_is_drawn_as_it_is():
     samples = MOVE.resample(samples=7)
     drawn = viz.plot_trajectory(samples, orders=(3,)).axes[0]
     np.testing.assert_array_equal(data(drawn, "joint 2"), samples.jerk[:, 1])
-    one = viz.plot_trajectory(tr.Samples([0.0], [[2.0]], [[0.0]], [[0.0]], [[0.0]]))
-    assert one.axes[0].get_lines()[0].get_marker() == "o"
 
 
 def test_both_sides_of_a_jump_and_the_pieces_are_drawn():
@@ -247,9 +243,6 @@ def test_limits_are_dashed_lines_and_values_beyond_them_are_underlaid():
     y, beyond = data(figure.axes[2], "a"), data(figure.axes[2], "beyond the limit")
     np.testing.assert_array_equal(np.isfinite(beyond), y > np.degrees(0.8))
     assert legend(figure) == ["a", "b", "c", "limit", "beyond the limit"]
-    kept = tr.MotionLimits(velocity=[1.0, 2.0], acceleration=[3.0, 1.0])
-    exact = viz.plot_trajectory(tr.trapezoidal([0, 0], [1, 2], limits=kept), kept)
-    assert legend(exact) == ["joint 1", "joint 2", "limit"]  # limits that are just kept
 
 
 def test_profiles_carry_their_durations():
@@ -265,11 +258,6 @@ def test_profiles_carry_their_durations():
     titles = [" ".join(axes.get_title().split()) for axes in apart.axes]
     assert titles == [name.replace(",", "") for name in names]
     assert len({axes.get_ylim() for axes in apart.axes}) == 1  # common scales
-    third = viz.plot_profiles([MOVE], joint=2, limits=tr.MotionLimits([1.0, 2.0, 9.0]))
-    assert data(third.axes[0], "motion 1, 2 s")[-1] == pytest.approx(0.2)
-    assert sorted(x.get_ydata()[0] for x in lines(third.axes[1], "_limit of motion 1, 2 s")) == [
-        -9.0, 9.0,
-    ]  # fmt: skip
 
 
 # ---------------------------------------------------------------- paths
@@ -302,15 +290,14 @@ def test_joint_path_has_a_row_for_each_kind_of_event():
     assert list(untimed.axes[-1].get_lines()[0].get_xdata()) == [10.0, 14.0]
 
 
-@pytest.mark.parametrize("unit", ["m", "mm"])
-def test_pose_path_has_equal_scales_frames_and_events(unit):
+def test_pose_path_has_equal_scales_frames_and_events():
     T = np.stack(
         [se3.from_rpy((0.1 * k, 0.0, 0.02 * k), (0.1 * k, 0.02 * k, 0.3)) for k in range(40)]
     )
-    figure = viz.plot_pose_path(T, eventful_path(), frames=3, frame_size=0.1, unit=unit)
+    figure = viz.plot_pose_path(T, eventful_path(), frames=3, frame_size=0.1, unit="mm")
     (axes,) = figure.axes
-    factor = 1.0 if unit == "m" else 1e3
-    assert axes.get_zlabel() == f"z ({unit})"
+    factor = 1e3
+    assert axes.get_zlabel() == "z (mm)"
     np.testing.assert_allclose(lines(axes, "path")[0].get_data_3d(), factor * T[:, :3, 3].T)
     for k, name in enumerate("xyz"):
         for i, line in zip((0, 20, 39), lines(axes, f"tool {name}"), strict=True):
@@ -322,8 +309,6 @@ def test_pose_path_has_equal_scales_frames_and_events(unit):
     spans = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()), np.ptp(axes.get_zlim())])
     np.testing.assert_allclose(spans / axes._box_aspect, (spans / axes._box_aspect)[0])
     assert {"path", "tool z", "start", "end", "out of reach", "too fast"} < set(legend(figure))
-    seen = viz.plot_pose_path(T, view=(0.5, 0.25)).axes[0]
-    assert np.radians([seen.azim, seen.elev]) == pytest.approx([0.5, 0.25])
 
 
 def test_joint_motion_fills_panels_with_the_range():
@@ -347,10 +332,6 @@ def test_joint_motion_fills_panels_with_the_range():
     )
     np.testing.assert_allclose(data(margin, "with"), 100.0 * expected, atol=1e-9)
     assert legend(figure) == ["with", "without", "limit", "beyond the limit"]
-    seven = viz.plot_joint_motion(rm.load("panda"), t, np.zeros((21, 7)), columns=3, degrees=False)
-    assert sum(not axes.get_visible() for axes in seven.axes) == 1
-    assert sum(axes.get_xlabel() == "time (s)" for axes in seven.axes) == 3
-    assert seven.axes[0].get_title(loc="left").endswith("(rad)")
 
 
 # ---------------------------------------------------------------- velocities
@@ -383,8 +364,8 @@ def test_map_is_drawn_in_degrees_with_zero_in_the_middle():
     assert viz.plot_singularities(grid, degrees=False).axes[0].get_xlabel() == "elbow (rad)"
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_zeros_without_a_change_of_sign_are_drawn_as_well(sign):
+def test_zeros_without_a_change_of_sign_are_drawn_as_well():
+    sign = -1.0
     a, b = np.linspace(-1.0, 1.0, 21), np.linspace(0.0, 0.5, 11)
     touched = viz.plot_singularities(wrist_map(sign * (a[:, None] ** 2 + 0 * b), a, b)).axes[0]
     points = zero_points(touched)
@@ -428,34 +409,12 @@ def test_inverse_velocities_are_drawn_as_they_are():
     drawn = {x.get_ydata()[0] for x in speed.get_lines() if x.get_label().startswith("_limit")}
     assert drawn == {5.0, 6.0}
     assert legend(figure) == ["light", "strong", "limit"]
-    each = viz.plot_inverse_velocities(D, FOUND, model=RX90, each_joint=True)
-    for axes, (name, (v, _)) in zip(each.axes, FOUND.items(), strict=False):
-        assert axes.get_title() == name
-        np.testing.assert_allclose([line.get_ydata() for line in lines(axes)], np.abs(v).T)
     found = rm.ikm(RX90, ROWS, TWIST)
     own = viz.plot_inverse_velocities(D, {"ikm": found}, distance_unit="rad")
     assert labels(own)[-1] == "least singular value"
     np.testing.assert_array_equal(data(own.axes[-1], "_ikm"), found.singular_values[:, -1])
     masked = rm.ikm(RX90, ROWS, TWIST, mask=[1, 1, 1, 0, 0, 0])
     assert not any("angular" in text for text in labels(viz.plot_inverse_velocities(D, [masked])))
-
-
-def test_scales_of_powers_where_apt():
-    near = np.geomspace(1e-4, 1.0, 41)
-    steep = (1.0 / near)[:, None] * np.ones(2)
-    stands = np.where(np.arange(41)[:, None] == 3, 0.0, steep)
-    cases = (
-        (near, steep, None, ("log", "log")),
-        (np.r_[-near[::-1], 0.0, near], np.ones((83, 1)), None, ("symlog", "linear")),
-        (np.linspace(0.01, 1, 41), steep, None, ("linear", "log")),
-        (near, steep, False, ("linear", "log")),
-        (near, stands, None, ("log", "symlog")),  # so that zero has a place
-    )
-    for distance, v, logarithmic, scales in cases:
-        (axes,) = viz.plot_inverse_velocities(
-            distance, {"a": (v, None)}, logarithmic=logarithmic
-        ).axes
-        assert (axes.get_xscale(), axes.get_yscale()) == scales
 
 
 def test_projections_are_the_widths_of_the_ellipsoid():
@@ -471,8 +430,6 @@ def test_projections_are_the_widths_of_the_ellipsoid():
                 assert (points @ direction).max() == pytest.approx(width, rel=1e-3)
             assert axes.get_xlim()[1] > points[:, 0].max()
             assert axes.get_ylabel() == f"${'vf'[row]}_{'xyz'[plane[1]]}$ ({['m/s', 'N'][row]})"
-    two = viz.plot_ellipsoids(rm.velocity_ellipsoid(RX90, [Q, Q + 0.3]), labels=["bent", "other"])
-    assert legend(two) == ["bent", "other"]
 
 
 def test_flat_and_unbounded_projections():
@@ -528,8 +485,6 @@ def test_torque_parts_add_up_to_the_torque_of_the_model():
     np.testing.assert_allclose(data(bare.axes[0], "gravity"), gravity, atol=1e-10)
     worked = viz.plot_torque_parts(RX90, WORKED, joints=[1]).axes[0]
     np.testing.assert_allclose(data(worked, "total"), 5.0)
-    lift = viz.plot_torque_parts(SCARA, tr.quintic([0, 0, 0], [1, 1, 0.2], duration=1.0)).axes[2]
-    assert lift.get_title(loc="left") == "lift (N)"
 
 
 def test_inertia_over_one_joint():
@@ -545,9 +500,6 @@ def test_inertia_over_one_joint():
     assert gravity.get_lines()[0].get_xdata()[-1] == pytest.approx(180.0)
     pair = data(coupling, "_joint_2 and joint_3")[3]
     assert pair == pytest.approx(M[1, 2] / np.sqrt(M[1, 1] * M[2, 2]))
-    assert legend(figure)[0] == "joint_1 and joint_4" or "joint_2 and joint_3" in legend(figure)
-    mixed = viz.plot_inertia_map(simulation.dynamics_map(SCARA, 1))
-    assert labels(mixed)[0] == "gravity torque (N m or N)"
 
 
 def test_inertia_over_two_joints():
@@ -561,15 +513,6 @@ def test_inertia_over_two_joints():
         "(N m)", "(kg m²)", "no unit"]  # fmt: skip
     assert found[0].get_xlabel() == "joint_2 (rad)"
     assert found[0].get_ylabel() == "joint_3 (rad)"
-    other = viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), of=2, pair=(0, 1))
-    titles = [axes.get_title() for axes in other.axes if axes.get_title()]
-    assert "lift" in titles[0]
-    assert "waist, elbow" in titles[2]
-    with pytest.warns(RobotModelsWarning, match="no masses"):
-        grid = simulation.dynamics_map(rm.load("planar_2r"), (0, 1), samples=3)
-    massless = viz.plot_inertia_map(grid)
-    texts = [axes.texts[0].get_text() for axes in massless.axes if axes.texts]
-    assert texts == ["zero everywhere", "zero everywhere", "a joint moves\nno inertia"]
 
 
 def test_plan_and_phase_plane_show_limits_that_exist():
@@ -586,76 +529,53 @@ def test_plan_and_phase_plane_show_limits_that_exist():
     for wrong, message in (([1.0, 2.0], "shape"), (-1.0, "positive"), (np.inf, "finite")):
         with pytest.raises(RobotModelsError, match=f"torque: .*{message}"):
             viz.plot_plan(plan, model=arm, torque=wrong)
-    path, curve = tr.linear([0.0], [1.0], 1.0), "maximum velocity curve"
-    near = viz.plot_phase_plane(tr.time_optimal(path, tr.MotionLimits(1.0, 2.0)))
-    far = viz.plot_phase_plane(tr.time_optimal(path, tr.MotionLimits(9.0, 2.0)))
-    assert [curve in legend(figure) for figure in (near, far)] == [True, False]
-    assert far.axes[0].get_ylim()[1] < 1.2 * data(far.axes[0], "quickest motion").max()
+    timed = tr.time_optimal(tr.linear([0.0], [1.0], 1.0), tr.MotionLimits(1.0, 2.0))
+    figure = viz.plot_phase_plane(timed)
+    np.testing.assert_array_equal(data(figure.axes[0], "quickest motion"), timed.rate)
+    assert "maximum velocity curve" in legend(figure)
 
 
 # ---------------------------------------------------------------- mistakes
 
 T3 = np.broadcast_to(np.eye(4), (3, 4, 4))
 BATCH = tr.joint_trajectory(np.zeros((2, 3)), np.ones((2, 3)), 5)
+MAP_1, MAP_2 = (simulation.dynamics_map(SCARA, joints) for joints in (1, (1, 2)))
 MISTAKES = (
     (lambda: viz.plot_trajectory(BATCH), "samples of one motion"),
     (lambda: viz.plot_trajectory(LINE), r"motion of the tool.*\.law"),
     (lambda: viz.plot_trajectory(np.zeros(3)), "trajectory: expected a Trajectory.*got ndarray"),
     (lambda: viz.plot_trajectory(MOVE.at([])), "no samples"),
     (lambda: viz.plot_trajectory(MOVE, orders=(0, 4)), "orders: .* from 0 to 3, each once"),
-    (lambda: viz.plot_trajectory(MOVE, [1.0]), "limits: expected a MotionLimits, got list"),
     (lambda: viz.plot_trajectory(MOVE, tr.MotionLimits([1.0, 2.0])), "limits of 3 joints"),
     (lambda: viz.plot_trajectory(MOVE, size=(0.0, 1.0)), "size: expected positive inches"),
-    (
-        lambda: viz.plot_trajectory(MOVE, units="rad", model=SCARA),
-        "joint 3 is prismatic, got 'rad'",
-    ),
-    (lambda: viz.plot_trajectory(MOVE, units="mm", model=SCARA), "joint 1 is revolute, got 'mm'"),
+    (lambda: viz.plot_trajectory(MOVE, units="rad", model=SCARA), "joint 3 is prismatic"),
     (lambda: viz.plot_trajectory(MOVE, units="grad"), "expected one of 'rad', 'deg'"),
     (lambda: viz.plot_trajectory(MOVE, units=["rad"]), "units: .* each of the 3 joints, got 1"),
     (lambda: viz.plot_trajectory(MOVE, names="abc"), "names: expected a list of texts"),
     (lambda: viz.plot_trajectory(MOVE, names=["a"]), "names: .* each of the 3 joints, got 1"),
     (lambda: viz.plot_trajectory(MOVE, model=RX90), "got 'rx90' of 6"),
-    (lambda: viz.plot_trajectory(MOVE, model="rx90"), "model: expected a RobotModel, got str"),
-    (lambda: viz.plot_profiles([MOVE], joint=3), "joint: expected a number from 0 to 2"),
     (lambda: viz.plot_profiles({}), "profiles: expected at least one motion"),
     (lambda: viz.plot_profiles({"a": MOVE}, names=["b"]), "has its own names"),
     (lambda: viz.plot_profiles(MOVE), "profiles: .* a list of them, got Trajectory"),
-    (lambda: viz.plot_profiles({"a": None}), "'a': expected a Trajectory"),
-    (lambda: viz.plot_joint_path(np.zeros((3, 6))), "path: expected a JointPath.*got ndarray"),
     (lambda: viz.plot_pose_path(np.eye(4)), r"poses: expected shape \(N, 4, 4\)"),
     (lambda: viz.plot_pose_path(T3, eventful_path()), "path: .* these 3 poses, got 40"),
     (lambda: viz.plot_pose_path(T3, unit="rad"), "unit: expected a length"),
-    (lambda: viz.plot_pose_path(T3, frame_size=0.0), "frame_size: .* above 0"),
     (lambda: viz.plot_pose_path(T3, frames=-1), "frames: expected how many"),
     (lambda: viz.plot_joint_motion(SCARA, [], np.zeros((0, 3))), r"t: expected shape \(N,\)"),
     (lambda: viz.plot_joint_motion(SCARA, [0.0], {"a": [0.0]}), r"q of 'a': .* shape \(1, 3\)"),
-    (lambda: viz.plot_joint_motion(SCARA, [0.0], [[np.inf] * 3]), "finite positions"),
-    (lambda: viz.plot_joint_motion(SCARA, [0.0], np.zeros((1, 3)), columns=1.5), "columns"),
     (lambda: viz.plot_singularities([]), "maps: expected one or several SingularityMap"),
-    (
-        lambda: viz.plot_singularities(wrist_map(np.ones((1, 31)), np.zeros(1))),
-        "at least two values",
-    ),
-    (lambda: viz.plot_singularities(wrist_map(np.full((41, 31), np.nan))), "no finite value"),
+    (lambda: viz.plot_singularities(wrist_map(np.ones((1, 31)), np.zeros(1))), "at least two"),
     (lambda: viz.plot_singularities(wrist_map(), SCARA), "'scara' with its 3 joints"),
     (lambda: viz.plot_singularities(wrist_map(), q=[0.0, 1.0]), "n at least 5"),
     (lambda: viz.plot_inverse_velocities(D[::-1], FOUND), "distance: .* ascend"),
     (lambda: viz.plot_inverse_velocities(D, {"a": (D[1:, None], None)}), r"shape \(81, n\)"),
-    (lambda: viz.plot_inverse_velocities(D, [(D[:, None], D)]), r"errors of shape \(81, 6\)"),
     (lambda: viz.plot_inverse_velocities(D, {"a": D}), "IKMSolution or a pair"),
-    (lambda: viz.plot_inverse_velocities(D, [FOUND["light"]] * 2, ["a", "a"]), "a different one"),
     (lambda: viz.plot_ellipsoids([]), "ellipsoids: expected at least one"),
-    (lambda: viz.plot_ellipsoids(BOTH, labels=["a", "b"]), "labels: .* each of the 1 ellipsoids"),
-    (lambda: viz.plot_energy(MOVE), "simulation: expected a Simulation"),
     (lambda: viz.plot_torque_parts(SCARA, SWING), "motion: expected one of the 3 joints"),
     (lambda: viz.plot_torque_parts(SCARA, FALL), "model: the simulation is one of 'rx90'"),
     (lambda: viz.plot_torque_parts(RX90, FALL, drive=False), "motion: a simulation has its own"),
-    (lambda: viz.plot_torque_parts(RX90, SWING, joints=[6]), "joints: expected joints from 0"),
-    (lambda: viz.plot_inertia_map(FALL), "grid: expected a DynamicsMap"),
-    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, 1), of=1), "of, pair: these"),
-    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), of=6), "of: expected"),
-    (lambda: viz.plot_inertia_map(simulation.dynamics_map(SCARA, (1, 2)), pair=(1, 1)), "pair:"),
+    (lambda: viz.plot_inertia_map(MAP_1, of=1), "of, pair: these"),
+    (lambda: viz.plot_inertia_map(MAP_2, pair=(1, 1)), "pair:"),
 )
 
 

@@ -4,8 +4,8 @@ import base64
 import re
 import subprocess
 import sys
-import threading
 import webbrowser
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -98,22 +98,6 @@ def test_scene_and_page_hold_the_poses_of_the_model(model, rng):
         T = T @ np.reshape(matrix, (4, 4)).T  # the viewer reads column by column
     np.testing.assert_allclose(T @ model.tool, rm.dgm(model, q), atol=1e-8)
     assert [text for _, text, _ in content(scene)["labels"]] == list(model.table.names)
-    zero = rm.viz.show(model)
-    np.testing.assert_allclose(
-        zero.pose(frame_path(zero, model.table.names[-1])),
-        rm.link_poses(model, np.zeros(model.n))[-1], atol=1e-14,
-    )  # fmt: skip
-
-
-def test_frames_tool_names_and_grid_are_optional():
-    def count(**options):
-        return len(shapes(rm.viz.show(RX90, **options)))
-
-    bare = count(tool=False, grid=False)
-    assert count(grid=False) == bare + 3
-    assert count(tool=False, grid=False, frames=True) == bare + 3 * 6
-    assert count(tool=False, grid=False, names=True) == bare + 6
-    assert count(tool=False) == bare + 1 + 3  # the grid and the world's axes
 
 
 def test_postures_over_each_other_and_beside_each_other():
@@ -149,13 +133,10 @@ def test_colors_and_legend():
     two = rm.viz.show(RX90, q, color=[(1, 0, 0), (0, 0, 1, 0.5)], legend=["<up> & away", "down"])
     colors = {node.color for node in links(two) if "posture" in node.path}
     assert colors == {(1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)}
-    text = two.html()
-    assert '#ff0000"></span>&lt;up&gt; &amp; away</li>' in text
-    assert "<up>" not in text
+    assert '#ff0000"></span>&lt;up&gt; &amp; away</li>' in two.html()
     each = rm.viz.show([RX90, SCARA], color=[(1, 0, 0), (0, 1, 0)], legend=["one", "two"])
     assert {n.color[1] for n in links(each) if "scara/" in n.path} == {1.0}
     assert [color[1] for _, color in each.legend] == [0.0, 1.0]
-    assert each.title == "rx90, scara"
     twins = rm.viz.show([RX90, RX90.with_base(se3.translation(0, 1, 0))])
     assert len(set(twins.paths)) == len(twins.paths)
 
@@ -187,11 +168,11 @@ def in_picture(points, camera):
     return np.abs(relative @ right) / depth, np.abs(relative @ np.cross(back, right)) / depth
 
 
-@pytest.mark.parametrize("size", [0.01, 1.0, 30.0])
-def test_camera_sees_all_and_is_near(size, rng):
-    points = size * rng.uniform(-1, 1, (50, 3)) + np.array((5.0, -2.0, 1.0))
-    across, high = in_picture(points, framed(points))
-    assert 0.8 < max(across.max() / 1.15, high.max()) <= 1.0001
+def test_camera_sees_all_and_is_near(rng):
+    for size in (0.01, 1.0, 30.0):
+        points = size * rng.uniform(-1, 1, (50, 3)) + np.array((5.0, -2.0, 1.0))
+        across, high = in_picture(points, framed(points))
+        assert 0.8 < max(across.max() / 1.15, high.max()) <= 1.0001
     q = np.linspace(np.zeros(6), (0, 1.5, 0, 0, 0, 0), 200)
     across, high = in_picture(rm.dgm(RX90, q)[:, :3, 3], rm.viz.animate(RX90, q).camera)
     assert max(across.max() / 1.15, high.max()) < 1.0
@@ -223,9 +204,6 @@ def test_animation_plays_every_motion_at_its_own_times():
     for j in range(3):
         np.testing.assert_allclose(played(scene, f"joint_{j + 1}", t), q[:, j], atol=2e-3)
         assert played(scene, f"joint_{j + 1}", 8.0) == pytest.approx(q[-1, j], abs=1e-6)
-    kinds = [a["clip"]["tracks"][0]["name"] for c in content(scene)["commands"]
-             if c["type"] == "set_animation" for a in c["animations"]]  # fmt: skip
-    assert kinds == [".rotation[z]", ".rotation[z]", ".position[z]"]
     move = tr.quintic(Q, Q + 0.3, duration=1.71)
     line = tr.straight_line(rm.dgm(RX90, Q), rm.dgm(RX90, Q + 0.1), duration=0.8)
     path = tr.joint_path(RX90, line, Q, samples=50)
@@ -250,13 +228,6 @@ def test_animation_plays_every_motion_at_its_own_times():
     assert {"paths/rx90", "paths/scara"} <= set(two.paths)
 
 
-def test_animation_loops_unless_told_otherwise():
-    for loop, expected in ((True, 1_000_000_000), (False, 1)):
-        scene = rm.viz.animate(RX90, np.zeros((2, 6)), loop=loop)
-        found = next(c for c in content(scene)["commands"] if c["type"] == "set_animation")
-        assert found["options"] == {"play": True, "repetitions": expected}
-
-
 def test_tool_path_is_where_the_tool_goes():
     q = np.linspace(np.zeros(6), (1.5, 0.5, 0.5, 0, 0, 0), 500)
     scene = rm.viz.animate(RX90, q, path=True)
@@ -266,8 +237,6 @@ def test_tool_path_is_where_the_tool_goes():
     np.testing.assert_allclose(centres[[0, -1]], tips[[0, -1]], atol=1e-6)
     assert np.linalg.norm(centres[:, None] - tips, axis=-1).min(axis=1).max() < 1e-3
     assert np.isfinite(rings).all()
-    still = rm.viz.animate(RX90, np.zeros((3, 6)), path=True)
-    assert not any(p.startswith("paths") for p in still.paths)
 
 
 # ---------------------------------------------------------------- sliders
@@ -325,11 +294,10 @@ def scale_of(text):
     return float(re.search(r": ([\d.e+-]+) m drawn per", text)[1])
 
 
-@pytest.mark.parametrize("part", list(TwistPart))
 @pytest.mark.parametrize("function", [rm.velocity_ellipsoid, rm.force_ellipsoid])
-def test_the_surface_is_the_ellipsoid_at_the_tool_to_scale(function, part):
+def test_the_surface_is_the_ellipsoid_at_the_tool_to_scale(function):
     model = RX90.with_base(se3.from_rpy([0.3, 0.2, 0.1], [0.5, 0.1, 0.2]))
-    ellipsoid = function(model, Q, part)
+    ellipsoid = function(model, Q, TwistPart.ANGULAR)
     scene = rm.viz.show(model, Q, ellipsoids=ellipsoid)
     ((text, _),) = scene.legend
     assert text.startswith(f"{ellipsoid.quantity.value}: ")
@@ -370,9 +338,6 @@ def test_flat_ellipsoids_are_discs_bars_and_dots():
     assert "ellipsoids/1/surface" not in bar.paths
     along = (surface(bar, "ellipsoids/1/axis_1") - line.centre) @ line.axes[:, 0]
     assert along.max() == pytest.approx(scale_of(bar.legend[0][0]) * line.radii[0])
-    fixed = rm.velocity_ellipsoid(PLANAR, [0.4, 1.2], frame=0)
-    dot = rm.viz.show(PLANAR, [0.4, 1.2], ellipsoids=fixed)
-    np.testing.assert_allclose(dot.pose("ellipsoids/1/dot")[:3, 3], fixed.centre)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -410,18 +375,9 @@ def test_a_page_is_one_offline_file_the_same_each_time(tmp_path):
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
     assert not re.search(r"https?:", outside)
     assert not re.search(r"""<(script|link|img|iframe)[^>]*\b(src|href)=""", text)
-    got = [text]
-    threads = [
-        threading.Thread(
-            target=lambda: got.append(rm.viz.animate(RX90, q, frames=True, names=True).html())
-        )
-        for _ in range(3)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert got == [text] * 4
+    with ThreadPoolExecutor(3) as pool:
+        draw = lambda _: rm.viz.animate(RX90, q, frames=True, names=True).html()  # noqa: E731
+        assert [*pool.map(draw, range(3))] == [text] * 3
     frame = rm.viz.show(RX90, height=321)._repr_html_()
     assert frame.startswith('<iframe srcdoc="<!DOCTYPE html>')
     assert "height: 321px" in frame
@@ -436,17 +392,6 @@ def test_names_cannot_break_out_of_the_page():
         assert text.count("</script>") == 2
         assert "<title>&lt;b&gt;&amp;</title>" in text
         assert any(path.endswith("_script><b>_x/q") for path in scene.paths)
-
-
-def test_stage_and_dark_background():
-    bright, dark = (content(rm.viz.show(RX90, dark=d))["commands"] for d in (False, True))
-    top = [next(c["value"] for c in sent if c.get("property") == "top_color")
-           for sent in (bright, dark)]  # fmt: skip
-    assert np.mean(top[0]) > 0.8 > 0.2 > np.mean(top[1])
-    hidden = {c["path"] for c in bright if c["type"] == "set_property" and c["value"] is False}
-    assert {"/Grid", "/Axes"} <= hidden
-    assert "/Lights/PointLightPositiveX" in {c["path"] for c in bright if c["type"] == "delete"}
-    assert '<body class="dark">' in rm.viz.jog(RX90, dark=True).html()
 
 
 def test_nothing_heavy_is_imported_and_no_process_is_started(tmp_path):
@@ -523,7 +468,6 @@ QUINTIC = tr.quintic(np.zeros(6), np.ones(6), 1.0)
 STRAIGHT = tr.straight_line(np.eye(4), np.eye(4), duration=1.0)
 BALL = rm.velocity_ellipsoid(RX90, Q)
 MISTAKES = (
-    (lambda: rm.viz.show(RX90, [0.0] * 5), "q"),
     (lambda: rm.viz.show(RX90, np.zeros((0, 6))), "q: expected one posture"),
     (lambda: rm.viz.show(RX90, [0, 0, 0, np.nan, 0, 0]), "nan"),
     (lambda: rm.viz.show([RX90, SCARA], [np.zeros(6)]), "each of the 2 robots"),
@@ -533,26 +477,21 @@ MISTAKES = (
     (lambda: rm.viz.show(RX90, opacity=1.5), "opacity"),
     (lambda: rm.viz.show(RX90, color=(255, 0, 0)), "color: .* from 0 to 1"),
     (lambda: rm.viz.show(RX90, np.zeros((2, 6)), color=[(1, 0, 0)] * 3), "the 2 postures"),
-    (lambda: rm.viz.show(RX90, view=(1,)), "view"),
     (lambda: rm.viz.show(RX90, columns=1.5), "columns: expected how many"),
     (lambda: rm.viz.show([RX90, SCARA], columns=2), "columns: .* several robots stand"),
-    (lambda: rm.viz.show(RX90, columns=2, ellipsoids=BALL), "columns: .* ellipsoids where"),
-    (lambda: rm.viz.show(RX90, np.zeros((2, 6)), legend="ab"), "legend: expected a list"),
     (lambda: rm.viz.show(RX90, legend=["a", "b"]), "legend: .* the 1 postures drawn, got 2"),
     (lambda: rm.viz.show(RX90, ellipsoids=[BALL, 3]), "ellipsoids"),
     (lambda: rm.viz.show(RX90, ellipsoids=BALL, ellipsoid_scale=0.0), "ellipsoid_scale"),
     (lambda: rm.viz.show(RX90).pose("robots/rx91"), "node"),
     (lambda: rm.viz.animate(RX90, np.zeros(6)), "at least two samples"),
-    (lambda: rm.viz.animate(RX90, np.zeros((5, 3))), "q"),
     (lambda: rm.viz.animate(RX90, np.zeros((5, 6)), dt=0.1, fps=10), "give one of them"),
-    (lambda: rm.viz.animate(RX90, np.zeros((5, 6)), dt=0.0), "dt: expected a positive"),
+    (lambda: rm.viz.animate(RX90, np.zeros((5, 6)), dt=0.0), "dt: .* 0"),
     (lambda: rm.viz.animate(RX90, STRAIGHT), "got PoseTrajectory; joint_path"),
     (lambda: rm.viz.animate(RX90, None), "got NoneType"),
     (lambda: rm.viz.animate(SCARA, QUINTIC), "3 joints, got one of 6"),
     (lambda: rm.viz.animate(RX90, tr.quintic(Q, Q, 0.0)), "takes no time"),
     (lambda: rm.viz.animate(RX90, QUINTIC.at([0.5, 0.1])), "ascending"),
     (lambda: rm.viz.jog("rx90"), "load it first"),
-    (lambda: rm.viz.jog(RX90, np.zeros((2, 6))), r"q: expected shape \(6,\), got \(2, 6\)"),
     (lambda: rm.viz.jog(MIMIC, [0.5, 0.1, 0.0, 0.3]), "q: joint_5 moves with other joints"),
 )
 
