@@ -13,238 +13,125 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 import robotmodels as rm
-from benchmarks import igm_arms
-from benchmarks.igm_checks import (
-    CLOSE,
-    branch_given_back,
-    difference,
-    gaps,
-    given_back,
-    newton_search,
-    residual,
-)
-from benchmarks.igm_postures import Kind, sample, sigma_of
+from benchmarks.igm_checks import CLOSE, given_back, newton_search, residual
+from benchmarks.igm_postures import Kind, sample
 from benchmarks.machine import head, machine
 from benchmarks.peers.igm import eaik
 from benchmarks.works import OURS, RESULTS, Row, keep, table
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Solve = Callable[[Array, Array], tuple[Array, Flags, Flags]]
+"""Poses and the postures that made them, to postures, which there are, and which are exact."""
 
 ARMS = ("rx90", "puma560", "irb6640", "kr6_r900", "stanford_arm", "ur5", "ur5e", "crx10ia", "xarm6")
 SINGULAR = 0.03
 SEARCHED, STARTS = 200, 250  # poses given to the independent search, and its starts for each
-WITH_LIMITS = 2000  # poses solved within the limits
 CHUNK = 10_000
 GOAL = 1e-12
-FAR_FROM_FOLDS = 1e-4  # smallest singular value of the Jacobian of every posture returned
 
 
-def postures_of(name: str, count: int) -> tuple[rm.RobotModel, Array, Array, Flags]:
-    """The arm, its postures, what is singular in each, which are so to rounding."""
+def ours(model: rm.RobotModel) -> Solve:
+    """`rm.igm`, with the posture as reference."""
+
+    def solve(T: Array, q: Array) -> tuple[Array, Flags, Flags]:
+        found = rm.igm(model, T, q_ref=q)
+        return found.q, found.valid, found.valid
+
+    return solve
+
+
+def theirs(model: rm.RobotModel) -> Solve | None:
+    """EAIK, None where it does not serve the arm or is not installed."""
+    peer = next(eaik(model), None)
+    if peer is None or peer.batch is None:
+        return None
+    batch = peer.batch
+
+    def solve(T: Array, _: Array) -> tuple[Array, Flags, Flags]:
+        answers = batch(T)
+        most = max(len(a.Q) for a in answers)
+        q = np.full((len(answers), most, model.n), np.nan)
+        claimed = np.zeros((len(answers), most), np.bool_)
+        for i, a in enumerate(answers):
+            q[i, : len(a.Q)] = np.reshape(a.Q, (-1, model.n))
+            claimed[i, : len(a.Q)] = ~np.asarray(a.is_LS, np.bool_)
+        there = np.isfinite(q).all(axis=2)
+        return q, there, claimed & there
+
+    return solve
+
+
+def judged(name: str, solver: str, solve: Solve, count: int) -> Row:
+    """How many of the postures that made the poses a solver gives back, and how exact it is."""
     model, rng = rm.load(name), np.random.default_rng(0)
-    found = sample(model, name in ("crx10ia", "xarm6"), count, SINGULAR, rng)
+    made = sample(model, name in ("crx10ia", "xarm6"), count, SINGULAR, rng)
     order = rng.permutation(count)
-    return model, found.q[order], found.kind[order], found.exact[order]
-
-
-def ours(name: str, count: int) -> Row:
-    """`rm.igm` on one arm of the catalogue."""
-    model, q, kind, exact = postures_of(name, count)
-    # kernels of singular poses are compiled when the first one comes, which is not to be timed
-    found = rm.igm(model, rm.dgm(model, q[kind > 0][:50]))
-    counts: Counter[str] = Counter()
-    kinds: Counter[str] = Counter()
-    worst, seconds = 0.0, 0.0
+    q, kind = made.q[order], made.kind[order]
+    first = q[kind > 0][:50]  # kernels of singular poses are compiled before the time is taken
+    solve(rm.dgm(model, first), first)
+    counts, kinds = Counter[str](), Counter[str]()
+    worst = seconds = 0.0
     for start in range(0, count, CHUNK):
         part = slice(start, start + CHUNK)
         T, singular = rm.dgm(model, q[part]), kind[part] > 0
         began = time.process_time()
-        found = rm.igm(model, T, q_ref=q[part])
+        rows, there, claimed = solve(T, q[part])
         seconds += time.process_time() - began
-        there = given_back(model, T, q[part], found.q, found.valid)
-        itself = gaps(model, found.q, found.valid, q[part]).min(axis=1, initial=np.inf) < 1e-4
-        i, s = np.nonzero(found.valid)
-        error = np.zeros(found.valid.shape)
-        error[i, s] = residual(model, T[i], found.q[i, s])
-        worst = max(worst, float(error.max(initial=0.0)))
-        kinds.update(tuple(Kind)[k].value for k in kind[part][~there])
-        for word, flags in {
-            "lost": ~there & ~singular,
-            "lost_singular": ~there & singular,
-            "not_at_reference": there & exact[part] & ~itself,
-            "above_goal": error.max(axis=1, initial=0.0) > GOAL,
-            "nan": (np.isnan(found.q).any(axis=2) & found.valid).any(axis=1),
-            "odd": odd(model, found.q, found.valid, found.double),
-        }.items():
-            counts[word] += int(flags.sum())
-    rng = np.random.default_rng(1)
-    unknown, checked = beside_search(model, q[kind == 0][:SEARCHED], rng)
-    outside, wrong_order = within_limits(model, rng)
-    words = ("lost", "lost_singular", "not_at_reference", "above_goal", "nan", "odd")
-    return {
-        "arm": name, "solver": OURS, "method": found.method, "poses": count,
-        "singular": int((kind > 0).sum()), **{word: counts[word] for word in words},
-        "residual": worst, "unknown": unknown, "checked_by_search": checked, "limits": outside,
-        "order": wrong_order, "microseconds": seconds / count * 1e6, "lost_by_kind": dict(kinds),
-    }  # fmt: skip
+        i, s = np.nonzero(there)
+        error = np.full(there.shape, np.inf)
+        error[i, s] = residual(model, T[i], rows[i, s])
+        # whatever meets the pose counts, also what is called least squares
+        back = given_back(model, T, q[part], rows, error < CLOSE, families=solver != OURS)
+        promised = np.where(claimed, error, 0.0).max(axis=1, initial=0.0)
+        worst = max(worst, float(promised.max(initial=0.0)))
+        kinds.update(tuple(Kind)[k].value for k in kind[part][~back])
+        counts["lost"] += int((~back & ~singular).sum())
+        counts["lost_singular"] += int((~back & singular).sum())
+        counts["above_goal"] += int((promised > GOAL).sum())
+    row = {"arm": name, "solver": solver, "poses": count, "singular": int((kind > 0).sum())}
+    row |= {word: counts[word] for word in ("lost", "lost_singular", "above_goal")}
+    row |= {"residual": worst, "microseconds": seconds / count * 1e6, "lost_by_kind": dict(kinds)}
+    if solver == OURS:
+        unknown, checked = beside_search(model, q[kind == 0][:SEARCHED])
+        row |= {"unknown": unknown, "checked_by_search": checked}
+    return row
 
 
-def odd(model: rm.RobotModel, q: Array, valid: Flags, double: Flags | None = None) -> Flags:
-    """Poses with an odd number of postures, none of them near a fold."""
-    total = valid.sum(axis=1) + (0 if double is None else (double & valid).sum(axis=1))
-    poses = np.flatnonzero(total % 2 == 1)
-    far = np.zeros(len(valid), np.bool_)
-    for i in poses:
-        J = rm.jacobian(model, q[i][valid[i]])
-        far[i] = np.linalg.svd(J, compute_uv=False)[:, -1].min() > FAR_FROM_FOLDS
-    return far
-
-
-def beside_search(model: rm.RobotModel, q: Array, rng: np.random.Generator) -> tuple[int, int]:
+def beside_search(model: rm.RobotModel, q: Array) -> tuple[int, int]:
     """Postures that Newton's method finds from many starts and `rm.igm` does not, of how many."""
     T = rm.dgm(model, q)
     found = rm.igm(model, T)
-    search = newton_search(model, T, STARTS, rng).postures
-    unknown = total = 0
-    for i, rows in enumerate(search):
-        total += len(rows)
-        if len(rows):
-            every = np.repeat(found.q[i][None], len(rows), axis=0)
-            there = np.repeat(found.valid[i][None], len(rows), axis=0)
-            pose = np.repeat(T[i][None], len(rows), axis=0)
-            away = ~given_back(model, pose, rows, every, there)
-            unknown += int(away.sum())
-    return unknown, total
-
-
-def within_limits(model: rm.RobotModel, rng: np.random.Generator) -> tuple[int, int]:
-    """Poses whose rows within the limits are not what they should be; rows out of order."""
-    low = np.where(np.isfinite(model.lower), model.lower, -np.pi)
-    high = np.where(np.isfinite(model.upper), model.upper, np.pi)
-    q = rng.uniform(low, high, (WITH_LIMITS, model.n))
-    T = rm.dgm(model, q)
-    every = rm.igm(model, T, q_ref=q)
-    found = rm.igm(model, T, q_ref=q, limits=True)
-    rows = np.where(found.valid[..., None], found.q, 0.5 * (low + high))
-    bad = ((rows < model.lower) | (rows > model.upper)).any(axis=(1, 2))
-    # the posture itself, not a whole turn away from it
-    bad |= ~(np.abs(np.nan_to_num(found.q, nan=np.inf) - q[:, None]).max(axis=2) < CLOSE).any(
-        axis=1
-    )
-    # every posture that a whole turn brings within the limits, and no other
-    turning = np.flatnonzero(sigma_of(model) == 0)
-    shifted = every.q.copy()
-    for k in turning:
-        up = np.ceil((model.lower[k] - every.q[..., k] - 1e-12) / (2 * np.pi))
-        shifted[..., k] += 2 * np.pi * np.where(np.isfinite(up), up, 0.0)
-    inside = every.valid & ((shifted >= model.lower) & (shifted <= model.upper)).all(axis=2)
-    bad |= inside.sum(axis=1) != found.count
-    wrong = np.zeros(len(q), np.bool_)
-    for result in (every, found):
-        way = result.q - q[:, None]
-        if result is every:
-            way = difference(model, result.q, np.broadcast_to(q[:, None], result.q.shape))
-        distance = np.where(result.valid, np.linalg.norm(way, axis=2), np.inf)
-        wrong |= (distance[:, 1:] < distance[:, :-1] - 1e-9).any(axis=1)
-    return int(bad.sum()), int(wrong.sum())
-
-
-# --- EAIK ----------------------------------------------------------------------------------------
-
-
-def theirs(name: str, count: int) -> Row | None:
-    """EAIK on the same poses, None where it does not serve the arm or is not installed."""
-    model, q, kind, _ = postures_of(name, count)
-    peers = list(eaik(model))
-    if not peers or peers[0].batch is None:
-        return None
-    counts: Counter[str] = Counter()
-    kinds: Counter[str] = Counter()
-    worst, seconds = 0.0, 0.0
-    for start in range(0, count, CHUNK):
-        part = slice(start, start + CHUNK)
-        T, singular = rm.dgm(model, q[part]), kind[part] > 0
-        began = time.process_time()
-        answers = peers[0].batch(T)
-        seconds += time.process_time() - began
-        rows, valid, claimed = packed(answers, model.n)
-        i, s = np.nonzero(valid)
-        error = np.full(valid.shape, np.inf)
-        error[i, s] = residual(model, T[i], rows[i, s])
-        # whatever meets the pose counts, also what it calls least squares
-        met = error < CLOSE
-        there = branch_given_back(model, T, q[part], rows, met)
-        counts["lost"] += int((~there & ~singular).sum())
-        counts["lost_singular"] += int((~there & singular).sum())
-        kinds.update(tuple(Kind)[k].value for k in kind[part][~there])
-        promised = np.where(claimed, error, 0.0)
-        worst = max(worst, float(promised.max(initial=0.0)))
-        counts["above_goal"] += int((promised > GOAL).any(axis=1).sum())
-        counts["odd"] += int(odd(model, rows, met).sum())
-    words = ("lost", "lost_singular", "above_goal", "odd")
-    return {
-        "arm": name, "solver": "EAIK", "poses": count, "singular": int((kind > 0).sum()),
-        **{word: counts[word] for word in words}, "residual": worst,
-        "microseconds": seconds / count * 1e6, "lost_by_kind": dict(kinds),
-    }  # fmt: skip
-
-
-def packed(answers: list, n: int) -> tuple[Array, Flags, Flags]:
-    """EAIK's answers as arrays: postures (N, S, n), which there are, which it claims exact."""
-    most = max(len(a.Q) for a in answers)
-    q = np.full((len(answers), most, n), np.nan)
-    there, claimed = np.zeros((2, len(answers), most), np.bool_)
-    for i, a in enumerate(answers):
-        k = len(a.Q)
-        if k:
-            q[i, :k], there[i, :k] = a.Q, np.isfinite(a.Q).all(axis=1)
-            claimed[i, :k] = ~np.asarray(a.is_LS, np.bool_)
-    return q, there, claimed & there
-
-
-def printed_postures() -> tuple[int, float]:
-    """How many of the 16 printed postures of Manocha and Canny come, and how far off [deg]."""
-    model = igm_arms.manocha_canny()
-    found = rm.igm(model, igm_arms.manocha_canny_pose(model))
-    printed = np.deg2rad(igm_arms.MANOCHA_CANNY_POSTURES)
-    gap = np.abs(difference(model, found.q[found.valid][:, None], printed[None])).max(axis=2)
-    near = gap.argmin(axis=1)
-    return len(set(near[gap.min(axis=1) < np.deg2rad(0.05)])), float(
-        np.rad2deg(gap.min(axis=1).max())
-    )
+    search = newton_search(model, T, STARTS, np.random.default_rng(1))
+    pose = np.repeat(np.arange(len(T)), [len(rows) for rows in search])
+    rows = np.concatenate(search)
+    there = given_back(model, T[pose], rows, found.q[pose], found.valid[pose])
+    return int((~there).sum()), len(rows)
 
 
 NOTES = """
 - lost: postures that made a pose of which no row is within 1e-6 of them in every joint, and none
   is joined to them by a path on which the pose is kept to 1e-12 (the pose does not tell those
   apart). For EAIK, which takes no reference, also members of the same infinite family count.
-- off q_ref: poses singular to rounding where the posture that made it, given as `q_ref`, is not
-  itself among the rows, only another member of its family.
 - residual: the largest one of any row returned [m or rad]; above: poses with a row above 1e-12.
   For EAIK, of the rows that it does not call least squares.
-- odd: poses with an odd number of postures though none is near a fold.
 - unknown: postures that damped Newton steps from {starts} random starts find for {searched} regular
   poses and the model does not, of how many they find.
-- limits: of {limited} poses, those where the rows within the limits are not those postures that
-  whole turns bring there, or the posture that made it is not among them; order: those whose rows
-  are not ordered by their distance to `q_ref`.
 """
-
-
 COLUMNS = (
-    "arm", "solver", "poses", "singular", "lost", "lost_singular", "not_at_reference", "residual",
-    "above_goal", "nan", "odd", "unknown", "checked_by_search", "limits", "order", "microseconds",
+    "arm", "solver", "poses", "singular", "lost", "lost_singular", "residual", "above_goal",
+    "unknown", "checked_by_search", "microseconds",
 )  # fmt: skip
 
 
-def report(rows: list[Row], printed: tuple[int, float], about: dict[str, str]) -> str:
+def report(rows: list[Row], about: dict[str, str]) -> str:
     """The results as Markdown."""
     lines = head("Inverse geometric models: completeness and accuracy", about)
     shown = {"residual": "{:.1e}", "microseconds": "{:.1f}"}
@@ -252,15 +139,10 @@ def report(rows: list[Row], printed: tuple[int, float], about: dict[str, str]) -
         [word.replace("_", " ") for word in COLUMNS],
         [[shown.get(w, "{}").format(r[w]) if w in r else "" for w in COLUMNS] for r in rows],
     )
-    lines.append(NOTES.format(starts=STARTS, searched=SEARCHED, limited=WITH_LIMITS).rstrip())
-    for r in rows:
-        if r["lost_by_kind"]:
-            kinds = ", ".join(f"{kind} {number}" for kind, number in r["lost_by_kind"].items())
-            lines.append(f"- lost, {r['arm']}, {r['solver']}, by what is singular: {kinds}")
-    lines.append(
-        f"- Manocha and Canny's arm: {printed[0]} of the 16 printed postures, the farthest "
-        f"{printed[1]:.3f} deg from the print (two decimals)."
-    )
+    lines.append(NOTES.format(starts=STARTS, searched=SEARCHED).rstrip())
+    for r in (r for r in rows if r["lost_by_kind"]):
+        kinds = ", ".join(f"{kind} {number}" for kind, number in r["lost_by_kind"].items())
+        lines.append(f"- lost, {r['arm']}, {r['solver']}, by what is singular: {kinds}")
     return "\n".join(lines) + "\n"
 
 
@@ -271,17 +153,17 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=100_000)
     parser.add_argument("--only", nargs="*", default=ARMS, help="arms of the catalogue")
     given = parser.parse_args()
-    rows = []
+    rows: list[Row] = []
     for name in given.only:
-        for row in (ours(name, given.poses), theirs(name, given.poses)):
-            if row is not None:
-                rows.append(row)
-                print({word: row[word] for word in COLUMNS if word in row}, flush=True)
-    about, printed = machine(["eaik"]), printed_postures()
-    text = report(rows, printed, about)
+        model = rm.load(name)
+        for solver, solve in ((OURS, ours(model)), ("EAIK", theirs(model))):
+            if solve is not None:
+                rows.append(judged(name, solver, solve, given.poses))
+                print({word: rows[-1][word] for word in COLUMNS if word in rows[-1]}, flush=True)
+    about = machine(["eaik"])
+    text = report(rows, about)
     print(text)
-    kept = {"machine": about, "rows": rows, "printed_postures": printed}
-    keep(given.out, "accuracy_igm", text, kept)
+    keep(given.out, "accuracy_igm", text, {"machine": about, "rows": rows})
 
 
 if __name__ == "__main__":

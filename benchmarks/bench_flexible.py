@@ -1,4 +1,4 @@
-"""Recursions of flexible robots beside a dense direct model, and simulated seconds."""
+"""Recursions of flexible robots, and simulated seconds beside Exudyn."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ from benchmarks.works import (
     Work,
     at_most,
     module,
-    same,
 )
 from robotmodels import flexible
-from robotmodels.flexible.models import forces
 
 
 def chain(n: int) -> flexible.FlexibleRobot:
@@ -33,25 +31,13 @@ def chain(n: int) -> flexible.FlexibleRobot:
 
 
 def direct(settings: Settings) -> Iterator[Work]:
-    """The direct model of chains, alone and in a batch, and by a mass matrix and a system."""
+    """The direct model of chains, alone and in a batch."""
     for n in (3, 6, 12, 30):
         arm, rng = chain(n), np.random.default_rng(n)
         q, v, tau = rng.normal(size=(3, n))
         e, ev = 0.01 * rng.normal(size=(2, arm.m))
 
-        def dense(arm=arm, x=(q, e, v, ev), tau=tau) -> np.ndarray:
-            rows = [np.concatenate(pair)[None] for pair in (x[:2], x[2:])]
-            rest = forces(arm, *rows, 0.0 * rows[0])[0][0]
-            M = flexible.mass_matrix(arm, *x[:2])
-            return np.linalg.solve(M, np.append(tau, np.zeros(arm.m)) - rest)
-
-        found = np.concatenate(flexible.ddm(arm, q, e, v, ev, tau))
-        ways = [
-            Contestant(OURS, lambda r=arm, x=(q, e, v, ev, tau): flexible.ddm(r, *x)),
-            Contestant(
-                "mass matrix and linear system", dense, said=same("ddm", found, dense(), 1e-8)
-            ),
-        ]
+        ways = [Contestant(OURS, lambda r=arm, x=(q, e, v, ev, tau): flexible.ddm(r, *x))]
         goals = [at_most(60.0, "us")] if n == 6 else []
         yield Work(f"direct model, {n} links with two modes", "us", ways, goals)
         many = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 import robotmodels as rm
-from benchmarks import igm_arms
+from benchmarks.igm_checks import residual
 from benchmarks.measure import Contestant, loop
 from benchmarks.peers.igm import CLOSE, NOT_EVERY_POSTURE, Peer, peers_of
 from benchmarks.works import OURS, DisagreementError, Goal, Settings, Work, at_most, module
@@ -17,6 +17,40 @@ from benchmarks.works import OURS, DisagreementError, Goal, Settings, Work, at_m
 FEW, THOUSAND = 200, 1000
 STRUCTURED = ("puma560", "ur5e")
 TOLERANCE = 1e-6  # of the iteration, m and rad
+
+
+def from_classical(rows: list[tuple[float, float, float]]) -> rm.RobotModel:
+    """An arm of turning joints from classical ``(a, d, alpha)``, metres and radians."""
+    table, tool = rm.DHTable.from_standard(
+        [{"theta": 0.0, "d": d, "a": a, "alpha": alpha} for a, d, alpha in rows]
+    )
+    return rm.RobotModel.from_table(table, tool=tool)
+
+
+def random_arm(seed: int) -> rm.RobotModel:
+    """Six turning joints with nothing special about them."""
+    rng = np.random.default_rng(seed)
+    a, d = rng.uniform(-0.5, 0.5, (2, 6))
+    alpha = rng.uniform(-np.pi, np.pi, 6)
+    return from_classical(list(zip(a.tolist(), d.tolist(), alpha.tolist(), strict=True)))
+
+
+def calibrated(
+    model: rm.RobotModel, metres: float, radians: float, rng: np.random.Generator
+) -> rm.RobotModel:
+    """The arm as calibration finds it: every parameter a little off."""
+    table = model.table
+    f = len(table.sigma)
+
+    def off(size: float) -> np.ndarray:
+        return rng.uniform(-size, size, f)
+
+    return model.with_table(
+        replace(
+            table, alpha=table.alpha + off(radians), theta=table.theta + off(radians),
+            beta=table.beta + off(radians), d=table.d + off(metres), r=table.r + off(metres),
+        )
+    )  # fmt: skip
 
 
 def reachable(model: rm.RobotModel, count: int, seed: int = 0) -> np.ndarray:
@@ -87,10 +121,8 @@ def general(settings: Settings) -> Iterator[Work]:
     count = settings.number(THOUSAND, FEW)
     arms = {
         "crx10ia": rm.load("crx10ia"),
-        "a random 6R": igm_arms.random_arm(0),
-        "a calibrated Puma": igm_arms.calibrated(
-            rm.load("puma560"), 1e-3, 2e-3, np.random.default_rng(0)
-        ),
+        "a random 6R": random_arm(0),
+        "a calibrated Puma": calibrated(rm.load("puma560"), 1e-3, 2e-3, np.random.default_rng(0)),
     }
     for name, model in arms.items():
         T = reachable(model, count)
@@ -99,7 +131,7 @@ def general(settings: Settings) -> Iterator[Work]:
         one = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:20]), 20)]
         one += [alone(model, peer) for peer in peers_of(model, name)]
         yield Work(f"up to 16 postures, one pose, {name}", "us", one)
-    fresh = (igm_arms.random_arm(seed) for seed in range(1000, 2000))
+    fresh = (random_arm(seed) for seed in range(1000, 2000))
 
     def new_robot() -> None:
         model = next(fresh)
@@ -119,19 +151,14 @@ def numeric(settings: Settings) -> Iterator[Work]:
     model, count = rm.load("puma560"), settings.number(2000, 200)
     rng = np.random.default_rng(0)
     poses = rm.dgm(model, rng.uniform(model.lower, model.upper, (count, model.n)))
-    few = poses[: count // 4]
 
-    def ours() -> tuple[np.ndarray, np.ndarray]:
-        found = rm.igm_numeric(model, poses)
-        return found.closest, found.valid[:, 0]
+    def said(found: rm.IGMSolutions) -> str:
+        q, claims = found.closest, found.valid[:, 0]
+        met = residual(model, poses, q) <= 1.1 * TOLERANCE
+        reached, false = (100.0 * float(x.mean()) for x in (claims & met, claims & ~met))
+        return f"{reached:.2f} % reached, {false:.2f} % false"
 
-    ways = [Contestant(OURS, ours, count, lambda answer: verdict(model, poses, answer))]
-    ways.append(
-        Contestant(
-            "Pinocchio CLIK, a loop", lambda: clik(model, few), len(few),
-            lambda answer: verdict(model, few, answer),
-        )
-    )  # fmt: skip
+    ways = [Contestant(OURS, lambda: rm.igm_numeric(model, poses), count, said)]
     if module("roboticstoolbox-python") is not None:
         from roboticstoolbox import models
 
@@ -146,37 +173,6 @@ def numeric(settings: Settings) -> Iterator[Work]:
     )
     goals = [at_most(120.0, "us"), sound]
     yield Work("numeric inverse, one solution, Puma 560, batch", "us", ways, goals)
-
-
-def verdict(model: rm.RobotModel, T: np.ndarray, answer: tuple[np.ndarray, np.ndarray]) -> str:
-    """Shares that were reached, and that were claimed and are not met."""
-    q, claims = answer
-    off = np.array([pin.log6(pin.SE3(a).actInv(pin.SE3(b))).vector for a, b in zip(
-        rm.dgm(model, q), T, strict=True)])  # fmt: skip
-    met = np.abs(off).max(axis=1) <= 1.1 * TOLERANCE
-    return (
-        f"{100 * (claims & met).mean():.2f} % reached, {100 * (claims & ~met).mean():.2f} % false"
-    )
-
-
-def clik(model: rm.RobotModel, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pinocchio's closed-loop inverse kinematics as in its examples, from mid-range."""
-    pm, data = model.pin_model, model.pin_model.createData()
-    tip = pm.getFrameId("tool", pin.FrameType.BODY)
-    found, claims = np.empty((len(poses), model.n)), np.zeros(len(poses), bool)
-    for i, T in enumerate(poses):
-        q = 0.5 * (model.lower + model.upper)
-        for _ in range(200):
-            pin.forwardKinematics(pm, data, q)
-            inverse = pin.updateFramePlacement(pm, data, tip).actInv(pin.SE3(T))
-            error = pin.log6(inverse).vector
-            if np.linalg.norm(error[:3]) < TOLERANCE and np.linalg.norm(error[3:]) < TOLERANCE:
-                claims[i] = True
-                break
-            J = -pin.Jlog6(inverse.inverse()) @ pin.computeFrameJacobian(pm, data, q, tip)
-            q = q - J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), error)
-        found[i] = q
-    return found, claims
 
 
 WORKS = {"postures": postures, "general": general, "numeric": numeric}

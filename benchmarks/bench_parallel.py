@@ -1,4 +1,4 @@
-"""Parallel robots beside plain NumPy.
+"""Parallel robots.
 
 No package on the index lists all assembly modes of a hexapod; the elimination of E. Martyushev
 (fkSGP, Python code) states 8.4 ms with errors up to 1.3e-7.
@@ -10,31 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from benchmarks.measure import Contestant
-from benchmarks.works import OURS, Settings, Work, at_most, same
+from benchmarks.works import OURS, Settings, Work, at_most
 from robotmodels import parallel as pr
 
 Array = NDArray[np.float64]
 ROWS = 2000
-
-
-def newton_in_numpy(robot: pr.ParallelRobot, q: Array, T: Array) -> Array:
-    """One pose as textbooks do it: the direct model by Newton's method."""
-    R, p = T[:3, :3].copy(), T[:3, 3].copy()
-    for _ in range(20):
-        arm = robot.platform @ R.T
-        d = p + arm - robot.base
-        size = np.linalg.norm(d, axis=1)
-        u = d / size[:, None]
-        step = np.linalg.solve(np.c_[u, np.cross(arm, u)], q - size)
-        p, R = p + step[:3], Rotation.from_rotvec(step[3:]).as_matrix() @ R
-        if np.abs(step).max() < 1e-9:
-            break
-    out = np.eye(4)
-    out[:3, :3], out[:3, 3] = R, p
-    return out
 
 
 def modes(settings: Settings) -> Iterator[Work]:
@@ -66,13 +48,7 @@ def models(settings: Settings) -> Iterator[Work]:
     rng, hexapod = np.random.default_rng(0), pr.gough_symmetric(1.0)
     T = hexapod.pose(hexapod.coordinates(hexapod.home) + 0.2 * rng.uniform(-1, 1, (ROWS, 6)))
     q = pr.igm(hexapod, T).q[:, 0]
-    said = same("direct model", T[0], newton_in_numpy(hexapod, q[0], hexapod.home), 1e-9)
-    ways = [
-        Contestant(OURS, lambda: pr.dgm(hexapod, q), ROWS),
-        Contestant(
-            "NumPy", lambda: [newton_in_numpy(hexapod, x, hexapod.home) for x in q[:50]], 50, said
-        ),
-    ]
+    ways = [Contestant(OURS, lambda: pr.dgm(hexapod, q), ROWS)]
     yield Work("hexapod, iterative direct model, batch", "us", ways, [at_most(15.0, "us")])
     ways = [Contestant(OURS, lambda: pr.inverse_jacobian(hexapod, T), ROWS)]
     yield Work("hexapod, inverse Jacobian, batch", "us", ways, [at_most(5.0, "us")])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
 from benchmarks.igm_postures import sigma_of, uniform
@@ -24,14 +23,8 @@ DAMPING = (1e-5, 1e-5, 1e-7, 1e-7, 1e-9, 1e-9, 1e-11, 1e-11)
 def missing(model: rm.RobotModel, T: Array, q: Array) -> Array:
     """Translation and rotation from the pose of ``q (N, n)`` to ``T (N, 4, 4)``, shape (N, 6)."""
     P = rm.dgm(model, q)
-    R = T[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2)
-    twice = np.stack(
-        [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
-    )
-    length = np.linalg.norm(twice, axis=1)
-    angle = np.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
-    grow = np.where(length > 1e-12, angle / np.maximum(length, 1e-300), 0.5)
-    return np.hstack([T[:, :3, 3] - P[:, :3, 3], grow[:, None] * twice])
+    turn = Rotation.from_matrix(T[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
+    return np.hstack([T[:, :3, 3] - P[:, :3, 3], turn.as_rotvec()])
 
 
 def residual(model: rm.RobotModel, T: Array, q: Array) -> Array:
@@ -95,69 +88,45 @@ def newton_step(model: rm.RobotModel, T: Array, q: Array, damping: float) -> tup
     return (np.swapaxes(right, 1, 2) @ along[..., None])[..., 0], e
 
 
-def given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
-    """Whether ``q`` is among the rows, or a posture that its pose to 1e-12 cannot tell from it."""
+def given_back(
+    model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags, families: bool = False
+) -> Flags:
+    """Whether ``q`` is among the rows, or a posture that its pose to 1e-12 cannot tell from it.
+
+    With families also another member of its infinite family.
+    """
     there = gaps(model, rows, valid, q).min(axis=1, initial=np.inf) < CLOSE
-    return _or_joined(model, T, q, rows, valid, there, ON_PATH, 24)
-
-
-def branch_given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
-    """Whether ``q``, or another member of its infinite family, is among the rows."""
-    there = given_back(model, T, q, rows, valid)
     # families have a direction in which the tool stays at rest
     flat = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] < FLAT
-    return _or_joined(model, T, q, rows, valid & flat[:, None], there, ON_FAMILY, 80)
-
-
-def _or_joined(
-    model: rm.RobotModel,
-    T: Array,
-    q: Array,
-    rows: Array,
-    valid: Flags,
-    there: Flags,
-    most: float,
-    steps: int,
-) -> Flags:
-    there = there.copy()
-    pose, row = np.nonzero(valid & ~there[:, None])
-    if pose.size:
-        a, b = q[pose], rows[pose, row]
-        found = joined(model, T[pose], a, b, most, steps)
-        found |= joined(model, T[pose], b, a, most, steps)
-        there[pose[found]] = True
+    ways = [(np.ones_like(flat), ON_PATH, 24), (flat & families, ON_FAMILY, 80)]
+    for some, most, steps in ways:
+        pose, row = np.nonzero(valid & (some & ~there)[:, None])
+        if pose.size:
+            a, b = q[pose], rows[pose, row]
+            found = joined(model, T[pose], a, b, most, steps)
+            found |= joined(model, T[pose], b, a, most, steps)
+            there[pose[found]] = True
     return there
-
-
-@dataclass(frozen=True)
-class Search:
-    """What a search from many starts found: ``postures[i] (k, n)`` for pose i."""
-
-    postures: list[Array]
 
 
 def newton_search(
     model: rm.RobotModel, T: Array, starts: int, rng: np.random.Generator, steps: int = 30
-) -> Search:
-    """Every posture that damped Newton steps reach from random starts, independent of families."""
+) -> list[Array]:
+    """Postures of each pose that damped Newton steps reach from random starts."""
     N = len(T)
     pose = np.repeat(np.arange(N), starts)
     q = uniform(model, N * starts, rng)
     done: list[tuple[NDArray[np.int64], Array]] = []
     for _ in range(steps):
-        e, J = missing(model, T[pose], q), rm.jacobian(model, q)
-        Jt = np.swapaxes(J, 1, 2)
-        # a little damping keeps the steps finite at singular postures
-        step = (Jt @ np.linalg.solve(J @ Jt + 1e-12 * np.eye(6), e[..., None]))[..., 0]
+        step, e = newton_step(model, T[pose], q, 1e-6)
         met = np.abs(e).max(axis=1) < 1e-11
         done.append((pose[met], q[met]))
         pose, q, step = pose[~met], q[~met], step[~met]
         if pose.size == 0:
             break
         q = q + step * np.minimum(1.0, 0.6 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
-    where = np.concatenate([p for p, _ in done])
-    found = np.concatenate([x for _, x in done])
-    return Search([_distinct(model, found[where == i]) for i in range(N)])
+    where, found = (np.concatenate(some) for some in zip(*done, strict=True))
+    return [_distinct(model, found[where == i]) for i in range(N)]
 
 
 def _distinct(model: rm.RobotModel, q: Array) -> Array:

@@ -53,16 +53,6 @@ class Sample:
     kind: NDArray[np.int64]
     away: Array
 
-    @property
-    def singular(self) -> NDArray[np.bool_]:
-        """Singular or nearly so, shape (N,)."""
-        return self.kind > 0
-
-    @property
-    def exact(self) -> NDArray[np.bool_]:
-        """Singular to rounding, shape (N,)."""
-        return self.singular & (self.away == 0.0)
-
 
 def sample(
     model: rm.RobotModel, general: bool, count: int, share: float, rng: np.random.Generator

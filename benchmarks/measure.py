@@ -5,16 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 LEAST_ROUNDS = 3
 
 
-@dataclass(frozen=True, slots=True)
-class Spent:
-    """What a run took that was timed by the process that did it, seconds."""
+class Spent(NamedTuple):
+    """Seconds of a run, of the processor and on the clock, told by the process that did it."""
 
     processor: float
     clock: float
@@ -38,24 +37,17 @@ class Contestant:
     whole: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Spread:
+class Spread(NamedTuple):
     """Median, least and most over the rounds."""
 
     median: float
     least: float
     most: float
 
-    def times(self, factor: float) -> Spread:
-        """In another unit."""
-        return Spread(self.median * factor, self.least * factor, self.most * factor)
 
-
-@dataclass(frozen=True, slots=True)
-class Timing:
+class Timing(NamedTuple):
     """Seconds for each of the ``count`` of a run, of the processor and on the clock."""
 
-    name: str
     processor: Spread
     clock: Spread
     rounds: int
@@ -70,43 +62,36 @@ def in_turns(
     The rounds end early, but not before `LEAST_ROUNDS`, when ``budget`` seconds are over.
     """
     field = list(contestants)
-    spent: dict[str, list[tuple[float, float]]] = {c.name: [] for c in field}
+    spent: dict[str, list[Spent]] = {c.name: [] for c in field}
     if len(spent) < len(field):
         raise ValueError(f"Two contestants have one name: {[c.name for c in field]}.")
-    notes = dict.fromkeys(spent, "")
-    for c in field:
-        if c.rounds != 1:
-            notes[c.name] = _timed(c)[1]  # compile, page in
+    # a run before the rounds compiles and pages in
+    notes = {c.name: _timed(c).note if c.rounds != 1 else "" for c in field}
     start = time.perf_counter()
     for r in range(rounds):
         if r >= LEAST_ROUNDS and time.perf_counter() - start > budget:
             break
         for c in field:
-            if c.rounds is not None and r >= c.rounds:
-                continue
-            took, note = _timed(c)
-            spent[c.name].append(took)
-            notes[c.name] = notes[c.name] or note
-    return {
-        c.name: Timing(
-            c.name, _spread([p for p, _ in spent[c.name]]), _spread([t for _, t in spent[c.name]]),
-            len(spent[c.name]), notes[c.name],
+            if c.rounds is None or r < c.rounds:
+                spent[c.name].append(_timed(c))
+    found = {}
+    for name, runs in spent.items():
+        processor, clock = (
+            Spread(float(np.median(x)), min(x), max(x))
+            for x in ([run.processor for run in runs], [run.clock for run in runs])
         )
-        for c in field
-    }  # fmt: skip
+        note = next((run.note for run in runs if run.note), notes[name])
+        found[name] = Timing(processor, clock, len(runs), note)
+    return found
 
 
-def _timed(c: Contestant) -> tuple[tuple[float, float], str]:
+def _timed(c: Contestant) -> Spent:
+    """One run, for each of its count."""
     clock, processor = time.perf_counter(), time.process_time()
     answer = c.run()
-    took = time.process_time() - processor, time.perf_counter() - clock
-    if isinstance(answer, Spent):
-        return (answer.processor / c.count, answer.clock / c.count), answer.note
-    return (took[0] / c.count, took[1] / c.count), c.said(answer)
-
-
-def _spread(values: list[float]) -> Spread:
-    return Spread(float(np.median(values)), min(values), max(values))
+    took = Spent(time.process_time() - processor, time.perf_counter() - clock)
+    took = answer if isinstance(answer, Spent) else took._replace(note=c.said(answer))
+    return Spent(took.processor / c.count, took.clock / c.count, took.note)
 
 
 def loop(call: Callable[..., object], *arrays: Any) -> Callable[[], None]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,8 +57,7 @@ class Settings:
         return quick if self.quick else full
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
+class Goal(NamedTuple):
     """A goal as a sentence, and whether the timings (ours first) and notes meet it."""
 
     text: str
@@ -68,6 +67,11 @@ class Goal:
 def at_most(limit: float, unit: str) -> Goal:
     """The median of ours is at most this long."""
     return Goal(f"<= {limit:g} {unit}", lambda t: t[0].processor.median * UNITS[unit] <= limit)
+
+
+def no_longer(times: float, text: str) -> Goal:
+    """The median of ours is at most so many times that of the second way."""
+    return Goal(text, lambda t: t[0].processor.median <= times * t[1].processor.median)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,18 +89,14 @@ class Work:
         timings = [found[c.name] for c in self.contestants]
         ways = []
         for c, t in zip(self.contestants, timings, strict=True):
-            p = t.processor.times(UNITS[self.unit])
-            ways.append({
-                "name": c.name, "median": p.median, "least": p.least, "most": p.most,
-                "clock": t.clock.median * UNITS[self.unit], "rounds": t.rounds, "note": t.note,
-                "whole": c.whole,
-            })  # fmt: skip
+            factor = UNITS[self.unit]
+            times = {word: factor * x for word, x in t.processor._asdict().items()}
+            told = {"clock": factor * t.clock.median, "rounds": t.rounds, "note": t.note}
+            ways.append({"name": c.name} | times | told | {"whole": c.whole})
         others = [w["median"] for w in ways[1:] if w["whole"]]
-        return {
-            "work": self.title, "unit": self.unit, "ways": ways,
-            "ratio": min(others) / ways[0]["median"] if others else None,
-            "goals": [{"text": g.text, "met": bool(g.met(timings))} for g in self.goals],
-        }  # fmt: skip
+        ratio = min(others) / ways[0]["median"] if others else None
+        goals = [{"text": g.text, "met": bool(g.met(timings))} for g in self.goals]
+        return {"work": self.title, "unit": self.unit, "ways": ways, "ratio": ratio, "goals": goals}
 
 
 class DisagreementError(RuntimeError):
