@@ -150,14 +150,13 @@ def test_every_candidate_is_kept_or_has_a_reason_and_the_text_says_so():
     again = pickle.loads(pickle.dumps(basis))
     assert again.names == basis.names
     assert not again.factor.flags.writeable
-    headings = (
-        "Not identifiable",
-        "Gauge",
+    for part in (
+        "14 identifiable parameters of 34",
+        "d3: it is known and fixed.",
+        "theta0: the base pose is not measured",
         "Only in combination",
-        "has the effect of",
         "combination",
-    )
-    for part in (*headings, "14 identifiable parameters of 34", "(it is known and fixed):\n  d3"):
+    ):
         assert part in str(basis)
 
 

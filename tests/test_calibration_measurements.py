@@ -397,7 +397,7 @@ def test_a_new_kind_is_drawn_read_selected_and_fitted(tmp_path):
         (InvalidValueError, "axis: expected a direc", lambda: AxisPosition(Q4, 0.0, [0, 0, 0])),
         (InvalidValueError, r"positive lengths .* offset=True", lambda: Distance(Q4, -0.1)),
         (InvalidValueError, "not both", lambda: Distance(Q4, 0.1, Q4 + 1, pivot=[0] * 4)),
-        (ShapeError, "a pose for each row of q", lambda: CameraPose(Q4, STILL[:2])),
+        (ShapeError, r"T: expected shape \(4, 4, 4\)", lambda: CameraPose(Q4, STILL[:2])),
         (NotARotationError, "T", lambda: RelativePose(Q4, Q4, 2 * STILL)),
         (InvalidValueError, "rows: expected 6 numbers", lambda: Pose(Q4, STILL, rows=[0] * 6)),
         (InvalidValueError, "another end than 'a'", lambda: LinkedFrames(Q4, "a", "a")),

@@ -116,47 +116,44 @@ class IdentifiableParameters(Frozen):
                 C[row, number[other]] = c
         return C
 
-    def __str__(self) -> str:
-        lines = [f"{self.count} identifiable parameters of {len(self.candidates)}"]
-        if self.count:
-            sums = [_sum_text(self.regrouping[name]) for name in self.names]
-            lines[0] += ":"
-            lines.append(boxed([("parameter", list(self.names)), ("combination", sums)]))
-        headings = {
-            Reason.NO_EFFECT: "Not identifiable",
-            Reason.REGROUPED: "Only in combination",
-            Reason.GAUGE: "Gauge",
-            Reason.KNOWN: "Known",
-            Reason.NOISE: "Smaller than the noise",
-        }
-        for reason, heading in headings.items():
-            names = self.of_reason(reason)
-            if not names:
-                continue
-            lines.append(f"{heading} ({reason.value}):")
-            if reason is Reason.REGROUPED:
-                lines += [
-                    f"  {name} has the effect of {_sum_text(terms) or 'the unknown fixtures'}"
-                    for name, terms in self.regrouped_into.items()
-                ]
-            else:
-                lines.append(f"  {', '.join(names)}")
+    def left_out(self) -> list[str]:
+        """Sentences on the parameters that cannot be estimated, and on the rank."""
+        lines = []
+        for reason in (why for why in Reason if why is not Reason.REGROUPED):
+            names = ", ".join(self.of_reason(reason))
+            lines += [f"{names}: {reason.value}."] if names else []
+        if self.regrouped_into:
+            lines.append(
+                f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has "
+                "the effect of:"
+            )
+        lines += [
+            f"* {name}: {_sum_text(terms) or 'the unknown fixtures'}"
+            for name, terms in self.regrouped_into.items()
+        ]
         low, high = self.gap
         lines.append(
-            f"Smallest angle kept {low:.1e}, largest left out {high:.1e} (sines); condition "
-            f"{self.condition:.3g}."
+            f"Sines of the angles to the columns before: {low:.1e} is the smallest that was kept, "
+            f"{high:.1e} the largest left out; condition {self.condition:.3g}."
         )
-        return "\n".join(lines)
+        return lines
+
+    def __str__(self) -> str:
+        sums = [_sum_text(self.regrouping[name]) for name in self.names]
+        head = f"{self.count} identifiable parameters of {len(self.candidates)}:"
+        table = boxed([("parameter", list(self.names)), ("combination", sums)])
+        return "\n".join([head, table, *self.left_out()])
 
 
 def _sum_text(terms: dict[str, float]) -> str:
     """A sum of parameters with their coefficients."""
-    text = ""
+    parts = []
     for name, c in terms.items():
-        size = "" if abs(abs(c) - 1.0) < 1e-9 else f"{abs(c):.4g} "
-        sign = ("-" if c < 0 else "") if not text else (" - " if c < 0 else " + ")
-        text += f"{sign}{size}{name}"
-    return text
+        if abs(c) > 1e-9:
+            size = "" if abs(abs(c) - 1.0) < 1e-9 else f"{abs(c):.4g} "
+            parts.append(f"{'-' if c < 0 else '+'} {size}{name}")
+    text = " ".join(parts).removeprefix("+ ")
+    return f"-{text[2:]}" if text.startswith("- ") else text
 
 
 def identifiable_parameters(

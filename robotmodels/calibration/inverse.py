@@ -105,7 +105,8 @@ def corrected_igm(
     q = np.where(found.valid[..., None], found.q, 0.0)
     low, high = (model.lower, model.upper) if limits else (np.full(n, -pi), np.full(n, pi))
     bounded = np.isfinite(low) & np.isfinite(high)
-    goal = references[:, None] if given and limits else np.where(bounded, low + high, 0.0) / 2.0
+    middle = sum(np.where(bounded, 0.5 * x, 0.0) for x in (low, high))
+    goal = references[:, None] if given and limits else middle
     reading = errors.reading(q)
     whole = np.nan_to_num(np.round((turned_inside(reading, low, high, goal) - reading) / (2 * pi)))
     if whole.any():  # turns of the joints, not of their readings

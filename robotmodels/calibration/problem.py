@@ -91,10 +91,7 @@ def problem_of(
                     f"(N, {n}), got {view.q.shape}.{expected_joints_text(parameters.model)}"
                 )
         for fixture in m.fixtures:
-            if fixtures.setdefault(fixture.name, fixture).unit != fixture.unit:
-                raise InvalidValueError(
-                    f"fixture {fixture.name!r} is in m for one measurement and rad for another."
-                )
+            fixtures.setdefault(fixture.name, fixture)
     return _problem(parameters, measurements, tuple(fixtures.values()))
 
 
@@ -149,7 +146,7 @@ def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
     """Poses and Psi of every view of every measurement. Shapes: xi (P,)."""
     return [
         [
-            Evaluation(*differential_model(problem.parameters, view.q, xi, view.frame, factor))
+            differential_model(problem.parameters, view.q, xi, view.frame, factor)
             for view, factor in zip(m.views, factors, strict=True)
         ]
         for m, factors in zip(problem.measurements, problem.factors, strict=True)

@@ -15,7 +15,6 @@ from ..geometry import PRISMATIC
 from ..kinematics import operational_coordinates
 from ..table_text import ReportSection as Section
 from ..table_text import degrees, in_unit, millimetres, percent_text, printed_unit, table_of
-from .identifiable import Reason
 from .measurements import Measurement
 from .notes import has_prior, implausible
 from .problem import evaluations, linearised
@@ -236,23 +235,8 @@ def _base_and_tool(result: CalibrationResult) -> Section:
 
 def _left_out(result: CalibrationResult) -> Section:
     found = result.identifiable
-    body = [f"{found.count} of {len(found.candidates)} parameters are identifiable."]
-    for why in (Reason.KNOWN, Reason.GAUGE, Reason.NO_EFFECT, Reason.NOISE):
-        names = ", ".join(found.of_reason(why))
-        body += [f"{names}: {why.value}."] if names else []
-    if found.regrouped_into:
-        body.append(
-            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) has "
-            "the effect of:"
-        )
-    for name, terms in found.regrouped_into.items():
-        words = (f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9)
-        body.append(f"* {name}: {' '.join(words) or 'the unknown fixtures'}")
-    body.append(
-        f"Sines of the angles to the columns before: {found.gap[0]:.1e} is the smallest that was "
-        f"kept, {found.gap[1]:.1e} the largest left out."
-    )
-    return Section("Known, and not identifiable", tuple(body))
+    head = f"{found.count} of {len(found.candidates)} parameters are identifiable."
+    return Section("Known, and not identifiable", (head, *found.left_out()))
 
 
 def _trust(result: CalibrationResult) -> Section:

@@ -81,9 +81,8 @@ class JointErrors(Frozen):
         return (self.laws.factors(q.reshape(-1, q.shape[-1])) @ effect).reshape(q.shape)
 
 
-def joint_errors_of(parameters: GeometricParameters, corrections: ArrayLike) -> JointErrors:
-    """The parameters whose laws add to joint variables, with their nonzero corrections."""
-    xi = as_exact(corrections, (len(parameters),), "corrections")
+def joint_errors_of(parameters: GeometricParameters, xi: Array) -> JointErrors:
+    """The parameters whose laws add to joint variables, with their nonzero corrections (P,)."""
     table, chosen = parameters.table, []
     for k, entry in enumerate(parameters.entries):
         if entry.law is ErrorLaw.CONSTANT or parameters.bends(entry):

@@ -14,7 +14,7 @@ from ..estimation import confidence_intervals
 from ..model import to_urdf
 from ..urdf.in_place import urdf_in_place
 from .result import CalibrationResult
-from .robot import CalibratedRobot
+from .robot import CalibratedRobot, as_calibrated
 from .solve import states_noise
 from .validation import Errors, HeldOutErrors
 
@@ -203,13 +203,7 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     >>> RobotModel.from_urdf(text).n
     2
     """
-    if isinstance(robot, CalibrationResult):
-        robot = robot.robot
-    if not isinstance(robot, CalibratedRobot):
-        raise InvalidValueError(
-            "robot: expected a CalibratedRobot, or the CalibrationResult of fit, got "
-            f"{type(robot).__name__}; to_urdf writes a RobotModel."
-        )
+    robot = as_calibrated(robot)
     notes, K = [*robot.notes], robot.model.transmission
     if robot.model.source is None:
         text = to_urdf(robot.model)

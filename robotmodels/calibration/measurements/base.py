@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...errors import InvalidValueError
+from ..differential import DifferentialModel as Evaluation
 from ..extended_table import Frame
 from .fields import NOISE, FileRow, FileRows, Given, as_covariance, as_sigma
 
@@ -34,16 +35,6 @@ class View(NamedTuple):
 
     frame: Frame
     q: Array
-
-
-class Evaluation(NamedTuple):
-    """Poses of a view and their derivatives by the parameters.
-
-    Shapes: T (N, 4, 4), psi (N, 6, P).
-    """
-
-    T: Array
-    psi: Array
 
 
 class Fixture(NamedTuple):

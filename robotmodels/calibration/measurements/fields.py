@@ -60,13 +60,7 @@ def as_readings(m: Any, name: str, value: Any) -> Any:
 
 def as_poses(m: Any, name: str, value: Any) -> Array:
     """Check a measured pose for each block."""
-    poses = se3.as_pose(value, name)
-    if poses.shape != (m.blocks, 4, 4):
-        raise ShapeError(
-            f"{name}: expected a pose for each row of q, shape ({m.blocks}, 4, 4), got "
-            f"{poses.shape}."
-        )
-    return read_only(poses)
+    return read_only(as_exact(se3.as_pose(value, name), (m.blocks, 4, 4), name))
 
 
 def as_points(m: Any, name: str, value: Any) -> Array:
@@ -77,12 +71,7 @@ def as_points(m: Any, name: str, value: Any) -> Array:
 def as_values(m: Any, name: str, value: Any) -> Array:
     """Check a number for each block; one number counts for all."""
     numbers = as_floats(value, name)
-    if numbers.shape not in ((), (m.blocks,)):
-        raise ShapeError(
-            f"{name}: expected a number for each row of q, shape ({m.blocks},), got "
-            f"{numbers.shape}."
-        )
-    return read_only(np.broadcast_to(numbers, (m.blocks,)))
+    return read_only(as_exact(numbers if numbers.ndim else [numbers] * m.blocks, (m.blocks,), name))
 
 
 def as_labels(m: Any, name: str, given: Any) -> tuple[str, ...]:

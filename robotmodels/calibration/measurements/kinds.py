@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, read_only
+from ..._arrays import Array
 from ...errors import InvalidValueError
-from ...geometry import FIXED, PRISMATIC, REVOLUTE
+from ...geometry import REVOLUTE
 from ...kinematics.lengths import spread_configurations
 from ..differential import differential_model
-from ..extended_table import Element, ExtendedTable, Frame
+from ..extended_table import JOINT_VARIABLE, Frame
 from ..parameters import GeometricParameter, GeometricParameters
 from .base import Contact, Evaluation, Labelled, Measurement, required
 
@@ -112,7 +112,10 @@ def drawn_groups(
     met = satisfied_measurement(moving, start, xi, np.zeros(0))
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
     if isinstance(met, Contact):
-        q = _turned_inside(parameters, met.q)
+        bounded = np.isfinite(model.lower) & np.isfinite(model.upper)
+        middle = sum(np.where(bounded, 0.5 * x, 0.0) for x in (model.lower, model.upper))
+        turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+        q = met.q - 2.0 * np.pi * np.round((met.q - middle) / (2.0 * np.pi)) * turns
         allowed = np.all((q >= model.lower - 1e-9) & (q <= model.upper + 1e-9), axis=1)
         for row, g, inside in zip(q, met.label, allowed, strict=True):
             members = found[int(g)]
@@ -126,17 +129,6 @@ def drawn_groups(
     )
 
 
-def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:
-    """Revolute joints by whole turns into their limits, or near the middle without limits."""
-    model = parameters.model
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    both = np.isfinite(model.lower) & np.isfinite(model.upper)
-    lower, upper = (np.where(both, limit, 0.0) for limit in (model.lower, model.upper))
-    middle = 0.5 * (lower + upper)
-    turned = middle + np.remainder(q - middle + np.pi, 2.0 * np.pi) - np.pi
-    return read_only(np.where(revolute, turned, q))
-
-
 def satisfied_measurement(
     parameters: GeometricParameters, measurement: Measurement, xi: Array, fixtures: Array
 ) -> Measurement | None:
@@ -146,49 +138,26 @@ def satisfied_measurement(
     """
     if not measurement.views:
         return measurement
-    motions = _joint_motions(parameters.table)
-    size, P, count = parameters.table.size, len(parameters), len(motions)
-    scale = np.array([size if unit == "m" else 1.0 for unit in measurement.units])
-    both = replace(parameters, entries=parameters.entries + motions.entries)
-    values = np.concatenate([xi, np.zeros(count)])
-    views = measurement.views
-    q = [view.q.copy() for view in views]
-    # ends at the same readings (two arms of a tree) move together
-    first = [next(i for i, v in enumerate(views) if v.q is view.q) for view in views]
-    distinct = sorted(set(first))
-    off = np.full(measurement.blocks, np.inf)
+    table, P = parameters.table, len(parameters)
+    rows = sorted(np.flatnonzero(table.joint >= 0).tolist(), key=lambda r: int(table.joint[r]))
+    motions = [GeometricParameter(r, JOINT_VARIABLE[table.sigma[r]], source=r) for r in rows]
+    both = replace(parameters, entries=(*parameters.entries, *motions))
+    values = np.concatenate([xi, np.zeros(len(motions))])
+    scale = np.array([table.size if unit == "m" else 1.0 for unit in measurement.units])
+    q, off = measurement.views[0].q, np.full(measurement.blocks, np.inf)
     for _ in range(_STEPS):
+        measurement = measurement.with_configurations([q])
         ends = []
-        for view in measurement.with_configurations(q).views:
+        for view in measurement.views:  # of a linked pair, at the same readings
             # bending changes with the readings, so that Newton's step is not exact
             found = differential_model(both, view.q, values, view.frame)
             ends.append(Evaluation(found.T, found.psi[..., P:]))
-        parts = [
-            measurement.linearise(
-                [Evaluation(T, psi * (f == g)) for f, (T, psi) in zip(first, ends, strict=True)],
-                fixtures,
-            )
-            for g in distinct
-        ]
-        residual = parts[0].residual
-        off = np.abs(residual / scale).max(axis=1)
+        part = measurement.linearise(ends, fixtures)
+        off = np.abs(part.residual / scale).max(axis=1)
         if (off < 1e-13).all():
             break
-        J = np.concatenate([part.by_parameters for part in parts], axis=-1)
-        step = -(np.linalg.pinv(J, rcond=1e-6) @ residual[..., None])[..., 0]
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-        for k, f in enumerate(first):
-            at = distinct.index(f) * count
-            q[k] = q[k] + step[:, at : at + count]
+        step = -(np.linalg.pinv(part.by_parameters, rcond=1e-6) @ part.residual[..., None])[..., 0]
+        longest = np.abs(step).max(axis=1, initial=_LONGEST)
+        q = q + step * (_LONGEST / longest)[:, None]
     kept = np.flatnonzero(off < 1e-10)
-    return measurement.with_configurations(q).subset(kept) if len(kept) else None
-
-
-def _joint_motions(table: ExtendedTable) -> GeometricParameters:
-    """The motion of every joint as a parameter, in the order of the joints."""
-    rows = [r for r in range(table.rows) if table.sigma[r] != FIXED]
-    entries = [
-        GeometricParameter(r, Element.R if table.sigma[r] == PRISMATIC else Element.THETA, source=r)
-        for r in sorted(rows, key=lambda r: int(table.joint[r]))
-    ]
-    return GeometricParameters(table, tuple(entries))
+    return measurement.subset(kept) if len(kept) else None

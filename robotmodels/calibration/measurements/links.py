@@ -32,8 +32,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Self
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -106,17 +105,6 @@ class LinkedFrames(Labelled):
         P = evaluations[0].psi.shape[-1]
         end, other = (widened(e, len(fixtures)) for e in evaluations)
         return self.split(*difference(other, *product(end, target_poses(self, fixtures, P))), P)
-
-    def with_configurations(self, configurations: Sequence[Array]) -> Self:
-        """The same object held at other readings.
-
-        Where the readings for the two ends differ, each joint takes those of the end that moved
-        it; joints moved for both take the mean.
-        """
-        q, other = configurations
-        moved, moved_other = q != self.q, other != self.q
-        both = 0.5 * (q + other)
-        return replace(self, q=np.where(moved & moved_other, both, np.where(moved, q, other)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
