@@ -24,6 +24,7 @@ from robotmodels.trajectories import (
     time_optimal,
     time_scaled,
 )
+from robotmodels.trajectories.path_limits import PathLimits
 from robotmodels.trajectories.time_scaling import stretched, torque_parts, windows_of
 
 ORACLE = json.loads((Path(__file__).parent / "oracles/kinodynamic.json").read_text())
@@ -68,7 +69,8 @@ def test_torques_of_a_stretched_profile_are_quadratic_in_the_inverse_duration(se
     model = random_model(rng, f=5, tree=seed % 2 == 1, drive=True)
     profile = random_profile(rng.normal(size=model.n), rng.normal(size=model.n), 3, rng=rng)
     fraction = np.linspace(0, 1, 41)
-    A, B, C = torque_parts(model, stretched(profile.motion, 1.7), fraction)
+    problem = PathLimits(model.n, model, None, 1e9, True, True)
+    A, B, C = torque_parts(problem, stretched(profile.motion, 1.7), fraction)
     for T in (0.3, 1.0, 4.0):
         q, v, a = stretched(profile.motion, T).derivatives(fraction * T, (0, 1, 2))
         tau = rm.idm(model, q, v, a)
@@ -92,7 +94,8 @@ def test_the_least_duration_is_the_root_that_bisection_finds(seed):
     assert scaled.status is ScalingStatus.SCALED
 
     def over(T):
-        parts = torque_parts(model, profile.motion, np.linspace(0, 1, 20_001))
+        problem = PathLimits(model.n, model, None, torque, True, True)
+        parts = torque_parts(problem, profile.motion, np.linspace(0, 1, 20_001))
         return (np.abs(parts[0] / T**2 + parts[1] / T + parts[2]) / torque).max()
 
     low, high = 0.5 * scaled.duration, 2.0 * scaled.duration

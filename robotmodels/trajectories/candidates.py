@@ -23,7 +23,7 @@ from ..obstacles.shapes import Obstacle
 from .blends import blended_lines
 from .checks import joint_vectors
 from .limits import ranges_of
-from .path_limits import SLOWEST, PathLimits
+from .path_limits import PathLimits
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_scaling import windows_of
 from .trajectory import Trajectory
@@ -31,6 +31,7 @@ from .trajectory import Trajectory
 _GRID = 60  # intervals
 _SHORTEST = 0.05  # share of the parameter of a leg
 _PENALTY = 20.0  # of the duration, for each unit of violation
+_SLOWER, _TRIED = 20.0, 600  # durations beside the least, where torques cost something
 _LEAST_RAMP = 0.1  # of the time between two points
 
 
@@ -145,22 +146,19 @@ class Candidates:
 
     def _by_windows(self, q: Array, rate: Array, bend: Array) -> tuple[float, float]:
         """Least duration of the profile itself, from the windows at the points of the grid."""
-        rows, limits = self.limits.rows(q, rate, bend), self.limits.limits
-        k, scale = self.limits.acceleration.size, self.limits.scale
+        limits = self.limits
+        load, unit = limits.loaded, limits.scale[limits.acceleration.size :]
         with np.errstate(divide="ignore", invalid="ignore"):
+            ranges = zip((rate, bend), ranges_of(limits.limits)[1:3], strict=True)
             pace, rise = (
-                np.nanmax(np.where(x > 0.0, x / most, x / least), initial=0.0)
-                for x, (_, least, most) in zip((rate, bend), ranges_of(limits)[1:3], strict=True)
+                np.nanmax(np.where(x > 0.0, x / most, x / low), initial=0.0)
+                for x, (_, low, most) in ranges
             )
         least = max(float(pace), float(np.sqrt(rise)))
-        A, C = rows.b[:, k:], rows.c[:, k:]
-        # rows hold the torques of q'' and of q' apart: together those of the profile in one second
-        B = (self.limits.drag(q, rate) - self.limits.drag(q, SLOWEST * rate))[:, self.limits.loaded]
-        B = B / scale[k:]
-        if not A.shape[1]:
+        if not load.size:
             return least, self.cost.time * least
-        flat, bound = (A.reshape(-1), B.reshape(-1), C.reshape(-1)), np.ones(A.size)
-        T, most = windows_of(flat, bound, least)  # type: ignore[arg-type]
+        A, B, C = (x[:, load] / unit for x in limits.parts(q, rate, bend))
+        T, most = windows_of((A.ravel(), B.ravel(), C.ravel()), np.ones(A.size), least)
         if not np.isfinite(T):
             return np.inf, np.inf
         share = np.full(len(q), 1.0 / (len(q) - 1))
@@ -174,21 +172,13 @@ class Candidates:
         time, torque = self.cost.time, self.cost.torque
         if not torque:
             return T, time * T
-        aa, ab, ac, bb, bc, cc = (
-            float(share @ (x * y).sum(axis=1))
-            for x, y in ((A, A), (A, B), (A, C), (B, B), (B, C), (C, C))
-        )
         if most == np.inf and (np.abs(C) > 1.0).any():
             most = T
-        # of (time + torque mean((A z^2 + B z + C)^2)) / z with z = 1 / T
-        roots = np.roots(
-            [3.0 * torque * aa, 4.0 * torque * ab, torque * (bb + 2.0 * ac), 0.0,
-             -(time + torque * cc)]
-        )  # fmt: skip
-        z = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
-        tried = np.unique(np.clip([T, *(1.0 / z)], T, most))
-        squares = [cc, 2.0 * bc, bb + 2.0 * ac, 2.0 * ab, aa]
-        costs = [t * (time + torque * sum(c / t**k for k, c in enumerate(squares))) for t in tried]
+        squares = [(A, A), (A, 2.0 * B), (A, 2.0 * C), (B, B), (B, 2.0 * C), (C, C)]
+        aa, ab, ac, bb, bc, cc = (float(share @ (x * y).sum(axis=1)) for x, y in squares)
+        # the mean square of the torques is a polynomial of 1 / T
+        tried = np.geomspace(T, min(most, _SLOWER * T), _TRIED)
+        costs = tried * (time + torque * np.polyval([aa, ab, ac + bb, bc, cc], 1.0 / tried))
         k = int(np.argmin(costs))
         return float(tried[k]), float(costs[k])
 

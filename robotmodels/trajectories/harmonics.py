@@ -21,6 +21,7 @@ _TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
     lambda a, b: (b, -a),
     lambda a, b: (-a, -b),
 )
+_GRID, _NEWTON = 16, 4  # points for each harmonic from which extremes are sought, and steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,33 +94,17 @@ class FourierSeries(Motion):
         return out
 
     def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value (n,) of a derivative over a period.
-
-        They are at the zeros of the next derivative, the roots of a polynomial in ``exp(i w t)``.
-        Its last harmonics below the rounding of its largest would spoil the roots: they are left
-        out, and the values widened by their possible effect.
-        """
-        H, w = len(self.a), 2.0 * np.pi / self.period
-        k = np.arange(1, H + 1)
-        # the next derivative in harmonics: sum_k c_k cos(k w t) + s_k sin(k w t)
-        c, s = (
-            (k * w)[:, None] ** order * part for part in _TURNED[(order + 1) % 4](self.a, self.b)
-        )
+        """Least and greatest value (n,) of a derivative over a period: Newton steps from a grid."""
+        start = np.linspace(0.0, self.period, _GRID * len(self.a) + 1)
         low, high = np.empty(self.n), np.empty(self.n)
         for j in range(self.n):
-            size = max(np.abs(c[:, j]).max(initial=0.0), np.abs(s[:, j]).max(initial=0.0))
-            # as parts of the largest, which may itself be next to nothing
-            unit = size if size > 0.0 else 1.0
-            half = c[:, j] / unit - 1j * (s[:, j] / unit)
-            kept = np.flatnonzero(np.abs(half) > np.finfo(float).eps)
-            last = int(kept[-1]) + 1 if kept.size else 0
-            part = half[:last]
-            roots = np.roots(np.concatenate((part[::-1], (0.0,), part.conj())))
-            angles = np.concatenate(((0.0,), np.angle(roots[roots != 0.0])))
-            (value,) = self.derivatives(angles / w, (order,))
-            # what was left out shifts the series by at most its amplitudes, here and at the extreme
-            slack = 2.0 * size * float((np.abs(half[last:]) / (k[last:] * w)).sum())
-            low[j], high[j] = value[:, j].min() - slack, value[:, j].max() + slack
+            t = start.copy()
+            for _ in range(_NEWTON):
+                first, second = (x[:, j] for x in self.derivatives(t, (order + 1, order + 2)))
+                step = np.divide(first, second, out=np.zeros(t.size), where=np.abs(second) > 0.0)
+                t -= np.clip(step, -start[1], start[1])
+            (values,) = self.derivatives(np.concatenate((start, t)), (order,))
+            low[j], high[j] = values[:, j].min(), values[:, j].max()
         return low, high
 
 

@@ -31,6 +31,7 @@ from .trajectory import Trajectory
 _FREE = MotionLimits()
 SLOWEST = 1e-30  # rate at which friction is that of a joint that only just moves
 _ROUNDING = 1e-9  # of the greatest rate: a joint that is slower does not move
+_STOPPED = 1e-12  # of the greatest velocity
 _SWEEPS = 60
 _SETTLED = 1e-10  # relative change of the duration
 _SLOW, _STILL = 1e-3, 2e-5  # of the greatest rate: slower ends, and rests inside, need the length
@@ -134,6 +135,21 @@ class PathLimits:
             return np.zeros(q.shape)
         tau = rigid_torques(self.model, q, v, a) + self.drag(q, v)
         return tau if self.drives is None else tau + a @ self.drives.rotor + self.drives.offset
+
+    def parts(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """A, B and C (N, n) of the torques ``A / T^2 + B / T + C`` of a motion in T seconds.
+
+        Shapes: q (N, n) and its derivatives by the fraction of T.
+        """
+        assert self.model is not None
+        v = at_rest(v)
+        C = rigid_torques(self.model, q, 0.0 * q, 0.0 * q)
+        A = rigid_torques(self.model, q, v, a) - C
+        dry = self.drag(q, SLOWEST * v)
+        B = self.drag(q, v) - dry
+        if self.drives is not None:
+            A, C = A + a @ self.drives.rotor, C + self.drives.offset
+        return A, B, C + dry
 
     def not_held(self, q: Array, place: Callable[[int], str], stuck: bool) -> str:
         """Sentence on the posture (N, n) whose torques at rest exceed their limits most, if any.
@@ -249,6 +265,11 @@ class PathLimits:
         b[:, k:] += slope / self.scale[k:]
         c[:, k:] += np.where(x[:, None] > 0.0, here - slope * x[:, None], 0.0) / self.scale[k:]
         return rows._replace(b=b, c=c)
+
+
+def at_rest(v: Array) -> Array:
+    """Velocities (N, n) with those that are nothing but rounding made zero: no dry friction."""
+    return np.where(np.abs(v) > _STOPPED * np.abs(v).max(initial=0.0), v, 0.0)
 
 
 def checked_torque(

@@ -20,8 +20,9 @@ from .candidates import Candidates, Evaluated
 from .descent import descended
 from .limits import MotionLimits, ranges_of
 from .motions import TimedMotion
+from .path_limits import at_rest
 from .time_optimal import law_of, time_optimal
-from .time_scaling import at_rest, stretched, time_scaled
+from .time_scaling import stretched, time_scaled
 from .trajectory import Samples, Trajectory
 
 RATE = 500  # evaluations for each second

@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from .._outcomes import Outcome
-from ..dynamics.inverse import rigid_torques
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .checks import checked_limits
 from .limits import MotionLimits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
-from .path_limits import PathLimits
+from .path_limits import PathLimits, at_rest
 from .trajectory import TimingResult, Trajectory
 
 _FINE, _SHOWN = 4001, 8  # samples, and which of them have windows
@@ -29,7 +28,6 @@ _ROUNDS = 4
 _WORST = 4
 """Samples around which the least duration is refined between samples."""
 _MARGIN = 1.0 + 1e-12
-_STILL = 1e-12  # of the greatest velocity
 
 
 class ScalingStatus(Outcome):
@@ -128,15 +126,15 @@ def time_scaled(
             "limits, torque: all are infinite or the motion is none, so any duration keeps them."
         )
     fraction = np.linspace(0.0, 1.0, _FINE)
-    parts = torque_parts(model, motion, fraction)
+    parts = torque_parts(problem, motion, fraction)
     fraction, (A, B, C) = fraction[::_SHOWN], (part[::_SHOWN] for part in parts)
     windows = windows_of((A, B, C), bound, least)
     # torques and dry friction have to hold the robot at the ends where it rests
     q, v = motion.derivatives(fraction * end, (0, 1))
-    rests = [k for k in (0, -1) if np.abs(v[k]).max() <= _STILL * np.abs(v).max()]
+    rests = [k for k in (0, -1) if not at_rest(v)[k].any()]
     T = np.inf
     if not problem.not_held(q[rests], str, True):
-        T = _least_duration(model, motion, parts, bound, least)
+        T = _least_duration(problem, motion, parts, least)
     if np.isinf(T):
         place = "the fraction {:.4g} of the motion"
         why = problem.not_held(q, lambda i: place.format(fraction[i]), False)
@@ -146,24 +144,13 @@ def time_scaled(
     return ScaledTrajectory(result, ScalingStatus.SCALED, fraction, windows)
 
 
-def torque_parts(model: RobotModel, motion: Motion, fraction: Array) -> tuple[Array, Array, Array]:
-    """A, B and C of ``A / T^2 + B / T + C`` at fractions (N,) of a motion, each (N, n)."""
+def torque_parts(
+    problem: PathLimits, motion: Motion, fraction: Array
+) -> tuple[Array, Array, Array]:
+    """`PathLimits.parts` at fractions (N,) of a motion, each (N, n)."""
     T = motion.duration
     q, v, a = motion.derivatives(fraction * T, (0, 1, 2))
-    v, a, rest = at_rest(v) * T, a * T * T, np.zeros(q.shape)
-    C = rigid_torques(model, q, rest, rest)
-    A = rigid_torques(model, q, v, a) - C
-    B = rest
-    if (drives := model.drive_matrices) is not None:
-        A = A + a @ drives.rotor
-        B = v @ drives.viscous
-        C = C + drives.torque(v, None) - B
-    return A, B, C
-
-
-def at_rest(v: Array) -> Array:
-    """Velocities (N, n) with those that are nothing but rounding made zero: no dry friction."""
-    return np.where(np.abs(v) > _STILL * np.abs(v).max(initial=0.0), v, 0.0)
+    return problem.parts(q, v * T, a * T * T)
 
 
 def windows_of(parts: tuple[Array, Array, Array], bound: Array, least: float) -> Array:
@@ -204,16 +191,16 @@ def _forbidden(parts: tuple[Array, Array, Array], bound: Array) -> tuple[Array, 
 
 
 def _least_duration(
-    model: RobotModel, motion: Motion, parts: tuple[Array, Array, Array], bound: Array, least: float
+    problem: PathLimits, motion: Motion, parts: tuple[Array, Array, Array], least: float
 ) -> float:
     """Least duration that keeps the limits at all samples, and between those that decide."""
-    fraction, every = np.linspace(0.0, 1.0, _FINE), [parts]
+    fraction, every, bound = np.linspace(0.0, 1.0, _FINE), [parts], problem.torque
     latest = windows_of(parts, bound, least)[:, 0]
     for k in np.argsort(-latest, kind="stable")[:_WORST]:
         low, high = fraction[max(k - 1, 0)], fraction[min(k + 1, _FINE - 1)]
         for _ in range(_ROUNDS):
             fine = np.linspace(low, high, _ZOOM)
-            every.append(torque_parts(model, motion, fine))
+            every.append(torque_parts(problem, motion, fine))
             i = int(windows_of(every[-1], bound, least)[:, 0].argmax())
             low, high = fine[max(i - 1, 0)], fine[min(i + 1, _ZOOM - 1)]
     A, B, C = (np.concatenate(rows).reshape(-1) for rows in zip(*every, strict=True))
