@@ -25,7 +25,7 @@ from .arrangement import counted_cut, cut, lines_of
 from .aspects import aspects
 from .curves import cusps_of
 from .level_curves import level_set
-from .singularity import Bound, Factors, bound_of, certified, sign_factors
+from .singularity import Bound, Factors, bound_of, certified, determinant, sign_factors
 
 _LEVELS = 24  # of the determinant, each 0.6 of the one before
 _KNOTS = 33
@@ -139,12 +139,15 @@ def cuspidality(
     if isinstance(poses, bool) or not isinstance(poses, (int, np.integer)) or poses < 1:
         raise InvalidValueError(f"poses: expected a number of poses of at least 1, got {poses!r}.")
     rng, work = generator_of(0 if rng is None else rng), Workers(executor, progress)
-    factors, section = sign_factors(arm), section_arm(arm)
+    section = section_arm(arm)
+    cusped = section is not None and len(cusps_of(section, lines_of(arm, False)[0])[0]) > 0
+    # beside cusps the sign of the determinant serves: what is found is proved
+    factors = determinant(arm) if cusped else sign_factors(arm)
     if factors is None:
         return _result(arm, CuspidalityStatus.NOT_DEFINED)
     if not factors.joints:  # the determinant is constant
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL)
-    if section is not None and len(cusps_of(section, lines_of(arm, False)[0])[0]) == 0:
+    if section is not None and not cusped:
         apart = _all_apart(arm, section)
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL if apart else _NONE)
     found = _by_search(arm, factors, rng, int(poses), work)
@@ -242,8 +245,9 @@ def _by_search(
 ) -> Cuspidality:
     """Labels of a closed form, else straight lines between postures with equal signs."""
     mask = None if factors.rows.sum() == 6 else factors.rows
-    found = igm(arm, dgm(arm, spread_configurations(arm, poses, rng)),
-                mask=mask if section_arm(arm) is None else PLACE)  # fmt: skip
+    # pose by pose, for which nothing is compiled
+    T = np.array([dgm(arm, q) for q in spread_configurations(arm, poses, rng)])
+    found = igm(arm, T, mask=mask if section_arm(arm) is None else PLACE)
     several = found.valid & ~found.double & ~found.free_joints.any(axis=-1)
     several &= _within_strokes(arm, found.q)
     codes = np.full(found.valid.shape, -1)

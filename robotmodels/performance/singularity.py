@@ -73,7 +73,13 @@ def sign_factors(model: RobotModel, mask: ArrayLike | str | None = None) -> Fact
             return None
         if np.isfinite(explained.constant) and not explained.factors:
             return Factors(model, (), (), (), rows)
-    joints = tuple(int(c) for c in columns)
+    return determinant(model, rows)
+
+
+def determinant(model: RobotModel, rows: Flags | None = None) -> Factors:
+    """The determinant itself as the only factor, for a task or that of the arm."""
+    joints = tuple(int(c) for c in joint_chain(model).columns)
+    rows = task_rows(model) if rows is None else rows
     return Factors(model, ("determinant",), (joints,), (), rows)
 
 
