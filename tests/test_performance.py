@@ -219,16 +219,6 @@ def test_annulus():
     np.testing.assert_array_equal(w.contains([[[1, 1, 0], [0, 0, 3]]]), [[True, False]])
 
 
-def test_counts_of_the_published_arm_are_those_of_igm():
-    w = pf.workspace(WENGER, resolution=60)
-    assert set(np.unique(w.count)) == {0, 2, 4}
-    assert w.coordinates == "half plane"
-    T = np.tile(np.eye(4), (len(w.points), 1, 1))
-    T[:, [0, 2], 3] = w.points
-    np.testing.assert_array_equal(w.count, rm.igm(WENGER, T, mask=POSITION).count)
-    assert w.grid_area == pytest.approx(w.area, rel=5e-3)
-
-
 @pytest.mark.parametrize(
     "arm",
     [WENGER, three(0.5, 0.4, 0.7), three(1.3, 0.9, 0.4, alpha3=1.1, r3=0.3), TWO],
@@ -270,6 +260,13 @@ def test_primary_space_of_a_planar_arm_is_a_disc_and_a_ring():
 
 
 def test_workspaces_of_other_kinds():
+    w, other = (pf.workspace(three(2, 1.5, r2), resolution=60) for r2 in (1, -1))
+    assert set(np.unique(w.count)) == {0, 2, 4}
+    np.testing.assert_array_equal(w.count, rm.igm(WENGER, w.poses, mask=POSITION).count)
+    assert w.grid_area == pytest.approx(w.area, rel=5e-3)
+    mirrored = other.count.reshape(60, 60)[:, ::-1].ravel()
+    assert (w.count == mirrored).mean() > 0.999
+    assert w.volume_of(4) == pytest.approx(other.volume_of(4), rel=1e-6)
     puma, R = rm.load("puma560"), rotation("y", 0.4)[:3, :3]
     w = pf.workspace(puma, kind="orientation", orientation=R, resolution=10, limits=False)
     np.testing.assert_array_equal(w.count, rm.igm(puma, w.poses).count)
@@ -310,6 +307,7 @@ def test_what_is_not_defined_has_a_status():
         found = pf.aspects(arm, limits=False)
         assert found.status is pf.AspectStatus.NOT_DEFINED
         assert (found.of(np.zeros(arm.n)) == -1).all()
+    assert pf.regions(iiwa, "t", limits=False).status is pf.RegionStatus.NOT_DEFINED
     assert pf.cuspidality(iiwa).status is pf.CuspidalityStatus.NOT_DEFINED
     assert pf.cuspidality(SLIDES).status is pf.CuspidalityStatus.NOT_CUSPIDAL
     assert pf.aspects(SLIDES).count == 1
@@ -319,15 +317,6 @@ def test_what_is_not_defined_has_a_status():
     assert (pf.accessibility(fixed, home, "every_orientation").count <= 1).all()
     assert pf.isotropy_index(fixed, np.zeros((2, 0)), POSITION).tolist() == [0.0, 0.0]
     assert pf.global_index(fixed, measure="joints") == 0.0
-
-
-def test_a_mirrored_arm_has_a_mirrored_workspace():
-    arm, other = three(2, 1.5, 1), three(2, 1.5, -1)
-    a, b = (pf.workspace(x, resolution=40) for x in (arm, other))
-    grid = b.count.reshape(40, 40)[:, ::-1].ravel()
-    assert (a.count == grid).mean() > 0.999
-    assert a.volume_of(4) == pytest.approx(b.volume_of(4), rel=1e-6)
-    assert len(pf.cusps(other)) == 4
 
 
 # --- accessibility -------------------------------------------------------------------------------
@@ -500,6 +489,9 @@ def test_every_path_in_a_t_region_is_followed(arm, free):
     w = pf.workspace(arm, "positions" if free is None else "free", free=free, resolution=50)
     n, t = (pf.regions(arm, c, w) for c in "nt")
     assert t.count >= 1
+    if arm is LIMITED and free is None:
+        gap = pf.workspace(arm, "free", free=lambda q: np.abs(q[:, 0]) > 0.3, resolution=50)
+        assert pf.regions(arm, "n", gap).count == 2
     assert all(any((cells <= outer).all() for outer in n.cells) for cells in t.cells)
     rng, followed = np.random.default_rng(6), 0
     frame = w.frame[:3]
@@ -515,13 +507,6 @@ def test_every_path_in_a_t_region_is_followed(arm, free):
                 assert pf.feasible_path(arm, T, mask=POSITION).status == 0
                 followed += 1
     assert followed > 10
-
-
-def test_components_make_n_regions():
-    gap = lambda q: np.abs(q[:, 0]) > 0.3  # noqa: E731
-    w = pf.workspace(LIMITED, "free", free=gap, resolution=50)
-    assert pf.regions(LIMITED, "n", w).count == 2
-    assert pf.regions(rm.load("iiwa14"), "t", limits=False).status is pf.RegionStatus.NOT_DEFINED
 
 
 # --- refusals ------------------------------------------------------------------------------------

@@ -28,7 +28,6 @@ from robotmodels.trajectories import (
     straight_line,
 )
 from robotmodels.trajectories.follow import following
-from robotmodels.trajectories.path_events import inverted
 from robotmodels.trajectories.pose_trajectory import axis_and_angle, rotation_about
 
 
@@ -75,32 +74,23 @@ def test_cartesian_trajectory_is_a_trapezoid_with_slerp(rng):
     assert np.abs(missed).max() < 16.0 * np.finfo(float).eps * size
     assert np.array_equal(T[[0, -1]], [T0, T1])
     assert (T[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()
-
-
-def test_cartesian_trajectory_shapes_and_laws(rng):
-    T0, T1 = random_pose(rng), random_pose(rng)
-    assert cartesian_trajectory(T0, T1, 0).shape == (0, 4, 4)
-    assert np.array_equal(cartesian_trajectory(T0, T1, 1), [T0])
-    assert np.array_equal(cartesian_trajectory(T0, T0, 5), [T0] * 5)
+    move = straight_line(T0, T1, duration=3.0)
+    assert np.abs(np.asarray(move.resample(50)) - T).max() < 1e-14
+    assert pickle.loads(pickle.dumps(move)) == move
     many = cartesian_trajectory(np.stack([T0, T1, T0]), T1, 7)
-    assert many.shape == (3, 7, 4, 4)
     assert np.array_equal(many[0], cartesian_trajectory(T0, T1, 7))
     assert cartesian_trajectory(np.zeros((0, 4, 4)), T1, 7).shape == (0, 7, 4, 4)
-    x = np.linspace(0.0, 1.0, 9)
-    for law, s in ((TimeLaw.LINEAR, x), (TimeLaw.CUBIC, 3 * x**2 - 2 * x**3),
-                   (TimeLaw.QUINTIC, 10 * x**3 - 15 * x**4 + 6 * x**5)):  # fmt: skip
-        T = cartesian_trajectory(T0, T1, 9, law)
-        assert np.abs(T[:, :3, 3] - T0[:3, 3] - s[:, None] * (T1 - T0)[:3, 3]).max() < 1e-14
+    assert np.array_equal(cartesian_trajectory(T0, T1, 1), [T0])
     half = cartesian_trajectory(np.eye(4), se3.rotation("y", np.pi), 5)
     assert np.abs(half[2] - se3.rotation("y", np.pi / 2)).max() < 1e-15
-    with pytest.raises(InvalidValueError, match="whole number"):
-        cartesian_trajectory(T0, T1, 2.5)
-    with pytest.raises(InvalidValueError, match="whole number"):
-        cartesian_trajectory(T0, T1, -1)
-    with pytest.raises(NotARotationError):
-        cartesian_trajectory(2 * T0, T1, 5)
-    with pytest.raises(InvalidValueError, match="limits"):
-        cartesian_trajectory(T0, T1, 5, TimeLaw.JERK_LIMITED)
+    for call, error, words in (
+        (lambda: cartesian_trajectory(T0, T1, -1), InvalidValueError, "whole number"),
+        (lambda: cartesian_trajectory(2 * T0, T1, 5), NotARotationError, "T0"),
+        (lambda: cartesian_trajectory(T0, T1, 5, "jerk_limited"), InvalidValueError, "limits"),
+        (lambda: straight_line(T0, T1), InvalidValueError, "duration, limits"),
+    ):
+        with pytest.raises(error, match=words):
+            call()
 
 
 def check_motion(move, limits=SPACE, corner=1e-4):
@@ -158,22 +148,6 @@ def test_limits_in_space_are_of_translation_and_rotation():
         end = se3.translation(1, 0, 0)
         assert straight_line(start, end, limits=no_turn).duration > 2.0
         assert blended_poses([start, end], no_turn).duration > 2.0
-
-
-def test_straight_line_of_a_duration_is_ctraj(rng):
-    T0, T1 = random_pose(rng), random_pose(rng)
-    move = straight_line(T0, T1, duration=3.0)
-    grid = move.resample(50)
-    assert np.abs(np.asarray(grid) - cartesian_trajectory(T0, T1, 50)).max() < 1e-14
-    assert len(grid) == 50
-    assert straight_line(T0, T0, limits=SPACE).duration == 0.0
-    turn = straight_line(np.eye(4), se3.rotation("z", 1.0), limits=MotionLimits([0.0, 1.0], 2.0))
-    assert abs(turn.duration - 1.5) < 1e-12  # no translation: its limit does not matter
-    assert pickle.loads(pickle.dumps(move)) == move
-    with pytest.raises(InvalidValueError, match="alike both ways"):
-        straight_line(T0, T1, limits=MotionLimits(1.0, 1.0, velocity_lower=-2.0))
-    with pytest.raises(InvalidValueError, match="duration, limits"):
-        straight_line(T0, T1)
 
 
 def test_circles(rng):
@@ -460,15 +434,6 @@ def test_too_fast_near_a_singular_wrist():
     assert (np.abs(path.v[0 : fast[0].first]) <= 3.0).all()
 
 
-def test_a_jump_is_reported():
-    arm, q = load("rx90"), np.array(Q["rx90"])
-    T = np.concatenate((dgm(arm, q + np.linspace(0, 0.1, 20)[:, None]),
-                        dgm(arm, q + 1.5 + np.linspace(0, 0.1, 20)[:, None])))  # fmt: skip
-    path = joint_path(arm, T, q)
-    assert [(e.first, e.last) for e in path.of_kind(PathEventKind.JUMP)] == [(19, 20)]
-    assert not path.complete
-
-
 def test_a_jump_across_what_is_out_of_reach_is_between_poses_with_postures():
     arm, q = load("ur5"), np.radians([0, -60, 80, -20, 60, 10])
     A = dgm(arm, q)
@@ -532,26 +497,6 @@ def test_redundant_arms_go_on_smoothly(name, q, monkeypatch):
         assert np.abs(np.einsum("ki,ki->k", null, step)).max() < 1e-3 * np.abs(step).max()
 
 
-def test_redundant_arms_find_back_into_their_reach():
-    arm, q = load("panda"), np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
-    near = dgm(arm, q)
-    far = near.copy()
-    far[0, 3] += 0.5
-    out = cartesian_trajectory(near, far, 12)
-    path = joint_path(arm, np.concatenate((out, out[::-1])), q)
-    (gap,) = path.of_kind(PathEventKind.OUT_OF_REACH)
-    reached = np.isfinite(path.q).all(axis=-1)
-    assert 0 < gap.first < 12 <= gap.last < 23
-    assert np.array_equal(np.flatnonzero(~reached), np.arange(gap.first, gap.last + 1))
-    assert (
-        np.abs(dgm(arm, path.q[reached]) - np.concatenate((out, out[::-1]))[reached]).max() < 2e-9
-    )
-    back = path.of_kind(PathEventKind.JUMP)
-    assert bool(back) == bool(
-        np.abs(path.q[gap.last + 1] - path.q[gap.first - 1]).max() > np.pi / 2
-    )
-
-
 def test_limits_and_whole_turns():
     arm = load("kr6_r900")
     q = np.array([arm.upper[0] - 0.1, -1.0, 1.0, 0.4, 0.7, 0.6])
@@ -583,26 +528,6 @@ def test_joint_path_shapes_and_refusals():
         joint_path(arm, straight_line(T[0], T[0], 1.0), t=[0.0, 1.0])
     with pytest.raises(InvalidValueError, match="RobotModel"):
         joint_path("rx90", T)
-
-
-def test_small_inverses_beside_lapack(rng):
-    for n in (1, 3, 6):
-        A = rng.normal(size=(200, n, n))
-        A[:, :, 0] *= 10.0 ** rng.uniform(-8.0, 2.0, (200, 1))
-        inverse, conditioning, sign = inverted(A)
-        want = np.linalg.inv(A)
-        norm = np.linalg.norm
-        bound = 1e-14 * np.linalg.cond(A) * norm(want, axis=(1, 2))
-        assert (norm(inverse - want, axis=(1, 2)) <= bound).all()
-        by_norms = n / (norm(A, axis=(1, 2)) * norm(want, axis=(1, 2)))
-        assert np.abs(conditioning / by_norms - 1.0).max() < 1e-6
-        assert np.array_equal(sign, np.sign(np.linalg.det(A)))
-    A[7, 2] = 0.0  # one singular matrix: the others are as before
-    pseudo, conditioning, sign = inverted(A)
-    assert conditioning[7] < 1e-15
-    assert sign[7] == 0.0
-    assert np.abs(pseudo[7] - np.linalg.pinv(A[7])).max() < 1e-8 * np.abs(pseudo[7]).max()
-    assert np.abs(pseudo[8] - inverse[8]).max() <= bound[8]
 
 
 def test_postures_go_on_by_the_shortest_step(rng):

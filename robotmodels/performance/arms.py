@@ -242,12 +242,17 @@ def plane_normal(model: RobotModel) -> Array | None:
     """Normal of the plane in which all joints move the tool; None if there is none."""
     if joint_chain(model).k == 0:
         return None
-    q = spread_configurations(model, 16, np.random.default_rng(3))
-    columns = np.concatenate(np.moveaxis(jacobian(model, q)[:, :3], -1, 1), axis=0)
+    columns = np.concatenate(np.moveaxis(_some_jacobians(model, 16)[:, :3], -1, 1), axis=0)
     _, s, vectors = np.linalg.svd(columns)
     if s[1] <= 1e-9 * s[0] or s[2] > 1e-9 * s[0]:
         return None
     return np.asarray(vectors[2])
+
+
+def _some_jacobians(model: RobotModel, count: int) -> Array:
+    """Jacobians (count, 6, n) at random configurations, one by one: nothing is compiled."""
+    spread = spread_configurations(model, count, np.random.default_rng(3))
+    return np.array([jacobian(model, q) for q in spread])
 
 
 def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> Flags:
@@ -260,7 +265,7 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> Flags:
     if mask is not None:
         return as_mask(mask)
     k = joint_chain(model).k
-    J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
+    J = _some_jacobians(model, 8)
     length = characteristic_length(model)
     moved = np.abs(J).max(axis=(0, 2), initial=0.0) > 1e-9 * np.repeat((length, 1.0), 3)
     position = np.linalg.matrix_rank(J[:, :3] / length, tol=1e-9).max(initial=0)
@@ -276,7 +281,7 @@ def leaves_a_family(model: RobotModel, mask: Flags | None = None) -> bool:
         return False
     rows = as_mask(mask)
     weights = np.repeat((1.0 / characteristic_length(model), 1.0), 3)[rows]
-    J = jacobian(model, spread_configurations(model, 8, np.random.default_rng(4)))
+    J = _some_jacobians(model, 8)
     rank = np.linalg.matrix_rank(J[:, rows] * weights[:, None], tol=1e-9) if rows.any() else 0
     return int(np.max(rank)) < k
 

@@ -79,10 +79,7 @@ class GlobalIndex(float):
 
 
 def isotropy_index(
-    arm: RobotModel,
-    q: ArrayLike,
-    mask: ArrayLike | str | None = None,
-    length: float | None = None,
+    arm: RobotModel, q: ArrayLike, mask: ArrayLike | str | None = None, length: float | None = None
 ) -> Array:
     """Isotropy index: geometric over arithmetic mean of the eigenvalues of ``J J^T``.
 

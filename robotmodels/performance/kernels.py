@@ -16,7 +16,7 @@ from ..kernels._compile import INTS, MATRIX, NOTHING, OUT2, STACK, Floats, Ints,
 VALUES = 9  # of a point of the section, see `section_values`
 
 
-@compiled()
+@compiled(counted=False)
 def triple(A: Floats, i: int, B: Floats, j: int, C: Floats, k: int) -> float:
     """Determinant of the columns i of A, j of B, k of C (each with three rows)."""
     return (
@@ -26,7 +26,7 @@ def triple(A: Floats, i: int, B: Floats, j: int, C: Floats, k: int) -> float:
     )
 
 
-@compiled()
+@compiled(counted=False)
 def section_point(
     kinds: Ints, D: Floats, a: float, b: float, T: Floats, J: Floats, H: Floats
 ) -> tuple[float, float, float]:

@@ -184,15 +184,13 @@ class LevelSet:
 
     def _spread(self, arc: _Arc, step: float) -> Array:
         """Points (K, 2) of a curve at nearly equal distances."""
-        from scipy.interpolate import PchipInterpolator
-
         points = partial(self._points, arc)
         t, unit = np.linspace(-1.0, 1.0, _GRID // 2 + 1), self.unit
         for _ in range(2):
             x = points(t) / unit
             s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1) + 1e-12))
             count = int(np.clip(s[-1] / step, _LEAST, _MOST))
-            t = np.clip(PchipInterpolator(s, t)(np.linspace(0.0, s[-1], count)), -1.0, 1.0)
+            t = np.interp(np.linspace(0.0, s[-1], count), s, t)
         return points(t)
 
     def _inside(self, x: Array) -> list[Array]:

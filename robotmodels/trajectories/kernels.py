@@ -17,7 +17,7 @@ _ROUNDING = 1e-12  # relative, of a limit
 _ACTIVE = 1e-6  # of a limit: nearer than this it binds
 
 
-@compiled()
+@compiled(counted=False)
 def _collect(
     i: int, step: float, a: Floats, b: Floats, c: Floats, lower: Floats, upper: Floats,
     ends: Ints, rows: Floats,
@@ -37,7 +37,7 @@ def _collect(
     return count
 
 
-@compiled()
+@compiled(counted=False)
 def _range(rows: Floats, count: int, top: float) -> tuple[float, float]:
     """Least and greatest x for which some u keeps all rows; least > greatest if there is none."""
     low, high = 0.0, top
@@ -67,7 +67,7 @@ def _range(rows: Floats, count: int, top: float) -> tuple[float, float]:
     return low, high
 
 
-@compiled()
+@compiled(counted=False)
 def _acceleration(rows: Floats, count: int, x: float) -> float:
     """Greatest u that keeps all rows at x, or the one that exceeds them least by rounding."""
     low, high, over, under = -np.inf, np.inf, -1, -1
@@ -137,7 +137,7 @@ def path_rates(
     return -1
 
 
-@compiled()
+@compiled(counted=False)
 def _within(rows: Floats, count: int, step: float, low: float, high: float) -> int:
     """Rows that lead from x to a range at the next point of the grid."""
     if high < np.inf:
