@@ -369,7 +369,7 @@ def test_joints_bound_to_each_other(rng):
     assert again.names == base.names
     assert "constrained: rank 2 of 3" in base.text
     mistake = base_parameters(rm.load("rx90"), "numeric", constraint=np.ones((6, 6)))
-    assert "rank 1 of 6, so that the torques are those of one free variable." in mistake.text
+    assert "rank 1 of 6, torques of 1 free variables." in mistake.text
     assert "6 columns of the constraint depend on each other" in mistake.notes[0]
     assert "is singular, rank 2 of 3" in base_parameters(model.with_transmission(mimic)).text
 

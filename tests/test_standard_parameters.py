@@ -119,7 +119,7 @@ def test_mistakes_are_named(rng):
         standard_parameters(base, values[:-1])
     for k, value, words in (
         (9, -2.0, "link 2 .joint_2. is not a body .*its mass is -2 kg"),
-        (5, 90.0, "greatest below the sum of the others"),
+        (5, 90.0, "triangle inequality fails"),
     ):
         bodies = uniform_bodies(model, 10.0).values.copy()
         bodies[1, k] = value

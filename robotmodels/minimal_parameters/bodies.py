@@ -77,14 +77,11 @@ def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] 
         link = f"link {j + 1}" + (f" ({frames[j]})" if len(frames) > j else "")
         more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
         mass = float(bodies.mass[j])
-        S = skew(bodies.first_moments[j] / (mass or 1.0))
-        moments = np.linalg.eigvalsh(bodies.tensors[j] + mass * S @ S)
+        report = bodies.consistency().links[j]
         raise InertiaError(
             f"{name}: {link} is not a body with mass and extent in three directions: its mass is "
-            f"{mass:.4g} kg, its moments about its centre of mass are "
-            f"{', '.join(f'{x:.4g}' for x in moments)} kg m^2 (expected: the greatest below the "
-            f"sum of the others).{more} Pass {name}=uniform_bodies(model, mass=...), or a CAD "
-            "model of every link."
+            f"{mass:.4g} kg ({report}).{more} Pass {name}=uniform_bodies(model, mass=...), or a "
+            "CAD model of every link."
         )
     return P
 

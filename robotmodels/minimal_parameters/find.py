@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core, as_floats, as_vector, batch_rows
+from .._arrays import Array, as_core, as_number, as_vector, batch_rows
 from .._choices import chosen
 from ..drive import Drives, Transmission, drive_kinds
 from ..errors import InvalidValueError, ShapeError
@@ -117,9 +117,7 @@ def base_parameters(
     elif model.transmission is not None and not model.transmission.is_invertible:
         notes += (
             f"The transmission of {model.name} is singular, rank {model.transmission.rank} of "
-            f"{model.n}: its joint variables are constrained, which these parameters of "
-            "independent joints leave out; with constraint=model.transmission they are those of "
-            "the free variables.",
+            f"{model.n}; constraint=model.transmission gives the parameters of its free variables.",
         )
     columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
     neglected, error, gap = (), None, None
@@ -178,13 +176,10 @@ def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int6
 
 def _part(tolerance: Any) -> float:
     """Check a tolerance, a part of the largest torque."""
-    value = as_floats(tolerance, "tolerance")
-    if value.ndim != 0 or not 0.0 < value <= _LARGEST:
-        raise InvalidValueError(
-            f"tolerance: expected a number above 0 and up to {_LARGEST:g}, the part of the largest "
-            f"torque that counts as zero, got {tolerance!r:.60}."
-        )
-    return float(value)
+    value = as_number(tolerance, "tolerance", above=0.0)
+    if value > _LARGEST:
+        raise InvalidValueError(f"tolerance: expected at most {_LARGEST:g}, got {value:g}.")
+    return value
 
 
 def _samples(model: RobotModel, motion: Any) -> Samples:
@@ -224,13 +219,7 @@ def _constraint(
     lengths = np.linalg.norm(G, axis=0)
     kept = column_basis(G, scale=1.0 / np.where(lengths > 0.0, lengths, 1.0)).kept
     rank, columns = len(kept), np.count_nonzero(lengths)
-    note = (
-        f"Joint variables are constrained: rank {rank} of {n}, so that the torques are those of "
-        f"{'one free variable' if rank == 1 else f'{rank} free variables'}."
-    )
+    note = f"Joint variables are constrained: rank {rank} of {n}, torques of {rank} free variables."
     if rank < columns:
-        note += (
-            f" The {columns} columns of the constraint depend on each other; if no joint is meant "
-            "to follow others, the matrix is wrong."
-        )
+        note += f" The {columns} columns of the constraint depend on each other."
     return np.ascontiguousarray(G[:, kept]), (note,) if rank < n else ()

@@ -171,20 +171,17 @@ class TorqueColumns:
         basis, names, notes = self.basis, np.array(self.names), ()
         kept, other = basis.gap
         if _ratio(basis) < _CLEAR:
-            is_kept = np.zeros(len(names), dtype=bool)
-            is_kept[basis.kept] = True
+            is_kept = np.isin(np.arange(len(names)), basis.kept)
             uncertain = np.where(
                 is_kept,
                 basis.distance < _CLEAR * other,
                 basis.distance > max(kept / _CLEAR, _ROUNDING),
             )
-            advice = "State" if self.samples is None else "Use a richer motion, or state"
             notes += (
-                f"No clear gap: {names[is_kept & (basis.distance == kept)][0]} is kept with "
-                f"{kept:.1e} of the largest torque beyond the others, "
-                f"{names[~is_kept & (basis.distance == other)][0]} left out with {other:.1e}. "
-                f"Uncertain: {_listed(names[uncertain])}. {advice} the zero tolerance= (here "
-                f"{self.tolerance:.0e}).",
+                f"No clear gap: a parameter is kept with {kept:.1e} of the largest torque beyond "
+                f"the others, one left out with {other:.1e}. Uncertain: "
+                f"{_listed(names[uncertain])}. Use a richer motion, or state the zero tolerance= "
+                f"(here {self.tolerance:.0e}).",
             )
         if self.samples is not None:
             whole = replace(self, samples=None).basis.kept

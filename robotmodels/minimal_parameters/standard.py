@@ -179,20 +179,14 @@ class StandardParameters(Rebuilt):
         return model.with_transmission(robot.transmission)
 
     def __str__(self) -> str:
-        percent = self.residual_increase
-        increase = "without bound" if percent == inf else f"{percent:.3g} %"
         worst = float(abs(self.deviation).max(initial=0.0))
-        lines = [
-            f"{self.status.sentence} {self.fit.stopped}".strip(),
-            f"Residuals: {increase} above least squares (root of weighted squares "
-            f"{sqrt(self.fit.squares):.6g}, unconstrained {sqrt(self.fit.least):.6g}). "
-            f"{self.optimality}",
-            f"Largest deviation of a base parameter {worst:.2e}, distance from the prior "
-            f"{self.distance:.3g}.",
-            *(f"- {sentence}" for sentence in self.fit.active),
+        lines = (
+            self.reason(),
+            f"Residuals: {self.residual_increase:.3g} % above least squares; largest deviation of "
+            f"a base parameter {worst:.2e}; distance from the prior {self.distance:.3g}.",
             boxed(self._columns()),
             "SI units: XX to ZZ kg m^2, MX to MZ kg m, M kg; drives as in their tables.",
-        ]
+        )
         return "\n".join(lines)
 
     def _columns(self) -> list[tuple[str, list[str]]]:

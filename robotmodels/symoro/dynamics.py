@@ -37,24 +37,15 @@ def dynamics(
 def gravity_of(
     file: ParFile, numbers: Numbers, base: Array, gravity: ArrayLike | None
 ) -> tuple[ArrayLike, list[str]]:
-    """Gravity in the world frame, and sentences about where it comes from."""
+    """Gravity in the world frame, and a note where the file has no numbers for it."""
     entries = file.entries("G", 3, "x, y and z in frame 0")
     if gravity is not None:
         return gravity, []
-    if not entries:
-        return GRAVITY, ["Gravity is not in the file; it is 9.81 m/s^2 downwards."]
-    free = [bool(numbers.free(entry)) for entry in entries]
-    if not any(free):
+    if entries and not any(numbers.free(entry) for entry in entries):
         return base[:3, :3] @ [numbers.number(entry) for entry in entries], []
-    sideways = [not free[i] and numbers.number(entries[i]) != 0.0 for i in (0, 1)]
-    upright = np.allclose(base[:3, 2], (0.0, 0.0, 1.0), atol=1e-12)
-    if not free[2] or any(sideways) or not upright:
-        for entry in entries:
-            numbers.number(entry)
-        return GRAVITY, []
-    written = ", ".join(entry.text for entry in entries)
+    written = f"symbolic in the file, G = {{{', '.join(e.text for e in entries)}}}"
     return GRAVITY, [
-        f"Gravity is symbolic in the file, G = {{{written}}}; it is 9.81 m/s^2 downwards."
+        f"Gravity is {written if entries else 'not in the file'}; it is 9.81 m/s^2 downwards."
     ]
 
 
@@ -76,35 +67,13 @@ def check_rigid_fixed(file: ParFile, numbers: Numbers) -> None:
 
 
 def left_out(file: ParFile, numbers: Numbers, sigma: list[int]) -> list[str]:
-    """Sentences about numbers that have no place in a model."""
-    notes = []
-    for key in DRIVES:
-        for j, entry in enumerate(file.all_entries(key)):
-            if sigma[j] == FIXED and not numbers.free(entry) and numbers.number(entry):
-                notes.append(
-                    f"{key}{j + 1} = {entry.text} is left out: frame {j + 1} is fixed and has no "
-                    "drive."
-                )
-    loads = [
-        key
-        for key in WRENCHES
-        if any(not numbers.free(e) and numbers.number(e) for e in file.all_entries(key))
-    ]
-    if loads:
-        notes.append(
-            f"The external wrenches {', '.join(loads)} are left out: they are arguments of the "
-            "dynamic models."
-        )
-    return notes
-
-
-def listed_parameters(names: list[str], links: int) -> str:
-    """Names in short: a parameter that is missing for every link only once."""
-    by_key: dict[str, list[str]] = {}
-    for name in names:
-        found = STANDARD_NAME.fullmatch(name)
-        by_key.setdefault(found[1] if found else name, []).append(name)
-    whole = [key for key, members in by_key.items() if len(members) >= links > 1]
-    single = [name for key, members in by_key.items() if key not in whole for name in members]
-    parts = [f"{' '.join(whole)} of all links"] if whole else []
-    return " and ".join([*parts, ", ".join(single)] if single else parts)
+    """Sentences about numbers that have no place in a model: drives of fixed frames, wrenches."""
+    return [
+        f"{key}{j + 1} = {entry.text} is left out: "
+        + ("wrenches are arguments of the dynamic models." if key in WRENCHES
+           else f"frame {j + 1} is fixed and has no drive.")
+        for key in (*DRIVES, *WRENCHES)
+        for j, entry in enumerate(file.all_entries(key))
+        if not numbers.free(entry) and numbers.number(entry)
+        and (key in WRENCHES or sigma[j] == FIXED)
+    ]  # fmt: skip

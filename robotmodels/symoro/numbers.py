@@ -31,9 +31,8 @@ class Numbers:
         for symbol in missing:
             if symbol in self.variables:
                 raise ParFileError(
-                    f"{entry.place}: {symbol!r} is the variable of joint "
-                    f"{self.variables[symbol]} and cannot stand here as well: every other "
-                    "parameter is a constant of the table. Replace it by a number."
+                    f"{entry.place}: {symbol!r} is the variable of joint {self.variables[symbol]} "
+                    "and cannot stand here as well; replace it by a number."
                 )
             self._missing.setdefault(symbol, entry.place)
         return 0.0 if missing else entry.value({**self.values, **dict.fromkeys(zero, 0.0)})
@@ -57,12 +56,11 @@ class Numbers:
             return entry.value({})
         # R4 and RL4 are lengths, r4 is a variable
         likely = [s for s in entry.symbols if re.fullmatch(rf"((?i:th|theta|t|q)|r)_?{j}", s)]
-        fixed = [s for s in likely if s not in free]
-        likely = [s for s in likely if s in free]
-        if fixed and not likely:
+        if likely and not {*likely} & {*free}:
             raise ParFileError(
-                f"{entry.place}: {fixed[0]!r} is the variable of joint {j}; take it out of values."
+                f"{entry.place}: {likely[0]!r} is the variable of joint {j}; take it out of values."
             )
+        likely = [s for s in likely if s in free]
         variable = free if len(free) == 1 else likely
         if len(variable) != 1:
             raise ParFileError(
@@ -72,9 +70,8 @@ class Numbers:
         q = variable[0]
         if self.variables.setdefault(q, j) != j:
             raise ParFileError(
-                f"{entry.place}: {q!r} is already the variable of joint {self.variables[q]}; "
-                "coupled joints are not a matter of the table: give each joint its own symbol "
-                "and couple them with a Transmission."
+                f"{entry.place}: {q!r} is already the variable of joint {self.variables[q]}: give "
+                "each joint its own symbol and couple them with a Transmission."
             )
         others = [s for s in free if s != q]
         for symbol in others:
@@ -85,12 +82,9 @@ class Numbers:
         slope = at_1 - at_0
         rounding = 1e-12 * max(1.0, abs(at_0))
         if abs(slope - 1.0) > rounding or abs(at_3 - at_0 - 3.0) > 3.0 * rounding:
-            what = "has the sign of its variable turned" if abs(slope + 1.0) <= rounding else (
-                "is not its variable plus a constant"
-            )  # fmt: skip
             raise ParFileError(
-                f"{entry.place}: {entry.text!r} {what}; the table keeps the sign and scale of q, "
-                f"so write it as {q} + constant and measure joint {j} that way."
+                f"{entry.place}: {entry.text!r} is not its variable plus a constant; the table "
+                f"keeps the sign and scale of q: write it as {q} + constant."
             )
         return at_0
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import ParFileError, RobotModelsWarning
 from ..geometry import FIXED, DHTable
 from ..model import RobotModel
-from .dynamics import check_rigid_fixed, dynamics, gravity_of, left_out, listed_parameters
+from .dynamics import check_rigid_fixed, dynamics, gravity_of, left_out
 from .frames import base_pose, counts, geometry
 from .numbers import Numbers, checked_values
 from .statements import ParFile
@@ -112,9 +112,10 @@ def read_tree(
 
     alarms = [f"{word!r} is not a keyword of SYMORO and is left out" for word in file.unknown]
     if silent:
+        more = len(silent) - 6
         alarms.append(
-            f"{listed_parameters(silent, links)} have no numbers and are 0 (pass values="
-            f"{{{silent[0]!r}: ...}} for the dynamic models)"
+            f"{', '.join(silent[:6])}{f' and {more} more' if more > 0 else ''} have no numbers "
+            f"and are 0 (pass values={{{silent[0]!r}: ...}} for the dynamic models)"
         )
     if alarms:
         warnings.warn(f"{file.label}: {'; '.join(alarms)}.", RobotModelsWarning, stacklevel=3)
