@@ -10,7 +10,6 @@ import robotmodels as rm
 from robotmodels import kinematics as kin
 from robotmodels._arrays import (
     as_vector,
-    read_only,
     same_value,
     value_hash,
 )
@@ -36,16 +35,6 @@ def test_wrong_shapes_say_what_came_and_what_to_do(shape, advice):
         as_vector(np.zeros(shape), 6, "q")
     assert str(shape) in str(caught.value)
     assert advice in str(caught.value)
-
-
-def test_read_only_is_a_private_copy():
-    source = np.asfortranarray(np.ones((2, 3)))
-    copy = read_only(source)
-    source[0, 0] = 5.0
-    assert copy[0, 0] == 1.0
-    assert copy.flags.c_contiguous
-    with pytest.raises(ValueError, match="read-only"):
-        copy[0, 0] = 2.0
 
 
 def test_equal_values_hash_alike():

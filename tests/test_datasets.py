@@ -37,20 +37,6 @@ def test_the_ball_is_in_its_socket_within_a_centimetre(robot):
         assert apart == pytest.approx(data.distance, abs=0.004)
 
 
-@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
-def test_masses_of_the_panda_are_those_of_the_catalogue(robot):
-    model = panda_double_socket(robot).model
-    catalogue = rm.load("panda").inertia
-    assert np.array_equal(model.inertia.values[:6], catalogue.values[:6])
-    assert model.inertia.is_physical.all()
-    bare = model.with_inertia(catalogue)
-    carrying = rm.with_payload(
-        bare, 0.73, [-0.01, 0.0, 0.03], inertia=np.diag((0.001, 0.0025, 0.0017)),
-        frame="panda_hand",
-    )  # fmt: skip
-    np.testing.assert_allclose(model.inertia.values, carrying.inertia.values, atol=1e-15)
-
-
 def test_the_camera_moves_with_the_wrist():
     # distances between poses of a rigid body on the wrist do not depend on Z; those of the angle
     # depend on E no more

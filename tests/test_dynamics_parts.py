@@ -7,12 +7,11 @@ from identities.random_robots import random_model, random_state
 import robotmodels as rm
 from robotmodels.dynamics import (
     base_model,
-    christoffel_blocks,
     idm_from_base,
     with_payload,
     without_payload,
 )
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError
 from robotmodels.friction import AsymmetricFriction
 from robotmodels.inertia import InertiaWarning
 from robotmodels.minimal_parameters import base_parameters, uniform_bodies
@@ -22,21 +21,6 @@ def planar(l1=0.5, m=(1.0, 2.0), c=(0.2, 0.1)):
     links = rm.InertialParameters.from_com(m, [[x, 0, 0] for x in c], np.zeros((2, 3, 3)))
     table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, l1])
     return rm.RobotModel.from_table(table, links, gravity=(0, -9.81, 0))
-
-
-def test_blocks_of_the_planar_arm_are_the_textbooks():
-    """h = -m2 l1 c2 sin q2: tau1 = ... + h (2 v1 v2 + v2^2), tau2 = ... - h v1^2."""
-    q2 = 0.7
-    h = -2.0 * 0.5 * 0.1 * np.sin(q2)
-    B, C = christoffel_blocks(planar(), [[0.3, q2]])
-    np.testing.assert_allclose(B, [[[2 * h], [0.0]]], atol=1e-15)
-    np.testing.assert_allclose(C, [[[0.0, h], [-h, 0.0]]], atol=1e-15)
-    assert [x.shape for x in christoffel_blocks(planar(), np.zeros((0, 2)))] == [
-        (0, 2, 1),
-        (0, 2, 2),
-    ]
-    with pytest.raises(ShapeError, match=r"^q: "):
-        christoffel_blocks(planar(), np.zeros(3))
 
 
 def test_rotors_of_a_tx40_wrist_turn_with_two_joints():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError
 from robotmodels.estimation import column_basis
 from robotmodels.estimation.covariance import jackknife_inflation
 from robotmodels.estimation.factor import factors_of, merged, merged_all
@@ -64,21 +64,6 @@ def test_coefficients_that_are_rounding_are_zero(rng):
     assert basis.kept.tolist() == [0, 1, 2, 3, 4]
     assert ((basis.coefficients[:, 5:] != 0) == (C != 0)).all()
     assert np.allclose(basis.coefficients[:, 5:], C, atol=1e-14)
-
-
-def test_matrices_without_rows_or_columns_and_mistakes():
-    assert column_basis(np.zeros((3, 2))).rank == 0
-    assert column_basis(np.zeros((0, 2))).empty.tolist() == [0, 1]
-    assert column_basis(np.zeros((3, 0))).rank == 0
-    wide = column_basis([[1.0, 2.0, 3.0]])
-    assert (wide.kept.tolist(), wide.coefficients.tolist()) == ([0], [[1.0, 2.0, 3.0]])
-    for W, scale, error, words in (
-        ([1.0, 2.0], None, ShapeError, "expected a matrix"),
-        (np.eye(2), [1.0, 0.0], InvalidValueError, "scale"),
-        ([[np.nan, 1.0]], None, InvalidValueError, "finite"),
-    ):
-        with pytest.raises(error, match=words):
-            column_basis(W, scale=scale)
 
 
 def test_merged_factors_have_the_products_of_both(rng):

@@ -21,23 +21,6 @@ ANGLES, LENGTHS = ("gamma", "beta", "alpha", "theta"), ("b", "d", "r")
 # --- fields and defaults -----------------------------------------------------------------------
 
 
-def test_defaults():
-    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 2, 1])
-    assert (table.f, table.n) == (3, 2)
-    assert table.mu.tolist() == [1, 0, 1], "a fixed frame is not actuated"
-    for column in (*ANGLES, *LENGTHS):
-        assert getattr(table, column).tolist() == [0, 0, 0]
-    assert table.names == ("joint_1", "frame_2", "joint_3")
-    assert table.joint_names == ("joint_1", "joint_3")
-    assert table.joint_rows.tolist() == [0, 2]
-    assert table.lower.tolist() == [-np.inf] * 2
-    for limit in (table.upper, table.velocity, table.effort):
-        assert limit.tolist() == [np.inf] * 2
-    assert not table.is_serial
-    assert table.path(3) == [1, 3]
-    assert table.path(0) == []
-
-
 def test_rows_carry_every_field():
     row = {
         "antecedent": 0, "sigma": 1, "mu": 0, "gamma": 0.1, "b": 0.2, "beta": 0.3, "alpha": 0.4,

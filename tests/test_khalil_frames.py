@@ -144,20 +144,6 @@ def test_parallel_revolute_axes_share_a_plane_of_origins():
     assert np.allclose(frames.base[:3, 3], [0, 0, 0.5]), "R_0 is R_1 at q = 0"
 
 
-def test_a_main_branch_needs_no_gamma_and_b():
-    """Only the second and later children of a link take gamma and b."""
-    rng = np.random.default_rng(4)
-    for _ in range(30):
-        joints = random_tree(rng, 7, branching=0.6)
-        frames = khalil_frames(joints)
-        seen = set()
-        for k, joint in enumerate(joints):
-            if joint.antecedent not in seen:
-                assert frames.gamma[k] == 0
-                assert frames.b[k] == 0
-            seen.add(joint.antecedent)
-
-
 # --- tables that already follow the rules come back -----------------------------------------------
 
 # alpha (degrees), d, r, theta (degrees), index of a prismatic joint

@@ -165,19 +165,6 @@ def test_pin_order_leads_to_each_joint_in_the_twin(model):
 # --- frames --------------------------------------------------------------------------------------
 
 
-def test_frames_by_name_by_number_and_none():
-    model = rm.load("erd:ur5")
-    q = np.arange(6) / 3
-    poses = rm.link_poses(model, q)
-    for j, name in enumerate(model.table.names, start=1):
-        assert np.allclose(rm.dgm(model, q, j), poses[j - 1], atol=1e-15)
-        assert np.array_equal(rm.dgm(model, q, name), rm.dgm(model, q, np.int64(j)))
-    assert np.allclose(rm.dgm(model, q, 0), model.base, atol=1e-15)
-    assert np.allclose(rm.dgm(model, q), poses[model.tip - 1] @ model.tool, atol=1e-15)
-    assert "wrist_3_link" in model.frame_names
-    assert "ee_link" in model.merged_links
-
-
 @pytest.mark.parametrize("frame", ["wrist_3_lnk", 7, -1, True, 1.0, np.zeros(2)])
 def test_unknown_frames(frame):
     model = rm.load("erd:ur5")

@@ -49,9 +49,6 @@ def test_torques_without_masses_warn_once(torque):
         torque(arm, [0.1, 0.2])
 
 
-"""Packages that meshcat and yourdfpy bring and that robotmodels has no use for."""
-
-
 def test_degrees_warn_once():
     arm, slide = rm.load("rx90"), rm.load("stanford_arm")
     with pytest.warns(

@@ -44,20 +44,6 @@ def test_nothing_is_nearer_to_the_prior(rng):
         assert nearer >= distance - 1e-4 or least < 1e-3
 
 
-def test_a_prior_that_is_the_robot_is_returned_as_it_is(rng):
-    for name in ("rx90", "cobra_s600", "tx40"):
-        model = rm.load(name)
-        model = model.with_inertia(random_bodies(rng, model.f))
-        for kinds in (True, ("Ia", "Fc"), ()):
-            base = base_parameters(model, drive=kinds)
-            found = standard_parameters(base, base.values(model))
-            assert found.status is PhysicalStatus.EXACT
-            assert found.distance == 0.0
-            assert found.inertia == model.inertia
-            assert found.drive == model.drive
-            assert found.model.transmission == model.transmission
-
-
 def test_drives_of_the_prior_stay_where_they_are_not_parameters(rng):
     model, drives = robot("planar_2r", rng), random_drive(rng, 2)
     base = base_parameters(model, drive=False)

@@ -208,18 +208,6 @@ def test_parameters_that_only_name_themselves_are_zero_with_one_warning(read):
         assert read(text, {**RX90_VALUES, "XX1": 0.0}) == model
 
 
-def test_numbers_among_symbols_are_kept(two):
-    extra = "M = {2.5, M2}\nZZ={ZZ1, ZZR2}\nFS = {0.1*k, FS2}\nXX = {0.2 + YY1, 0}"
-    with pytest.warns(RobotModelsWarning, match="YY1, ZZ1, M2, FS2 have no numbers"):
-        model = two({"k": 3.0, "ZZR2": 0.6}, extra=extra)
-    assert model.inertia.mass.tolist() == [2.5, 0.0]
-    assert model.inertia.values[:, 5].tolist() == [0.0, 0.6]
-    assert model.inertia.values[:, 0].tolist() == [0.2, 0.0]
-    assert model.drive.Fc.tolist() == pytest.approx([0.3, 0.0])
-    with pytest.raises(ParFileError, match="no number for rod"):
-        two(extra="M = {rod, 1}")
-
-
 def test_gravity_of_the_file_is_in_frame_0(two):
     turned = "Z = {0,0,1,0.1, 0,1,0,0.2, -1,0,0,0.3, 0,0,0,1}"
     model = two({"g": 9.8}, extra=f"G = {{g, 0, 0}}\n{turned}")
@@ -245,15 +233,6 @@ def test_fixed_frames_are_kept_also_after_the_links(read):
     assert end.inertia.mass.tolist() == [1, 2, 0]
     with pytest.raises(ParFileError, match="only fixed frames"):
         read(open_symoro({**robot, "sigma": [0, 1, 1]}, counts=(2, 2, 3)), {"L3": 0.3})
-
-
-def test_continued_lines_comments_and_semicolons(two, read):
-    text = open_symoro(TWO_JOINTS)
-    text = text.replace("d = {0,0.2}", "d = {0, (* one *)\\\n 0.2 (* two\nlines *)};")
-    text = text.replace("r = {0.5,r2}", "r\n=\n{0.5,\nr2\n}").replace("r\n=", "r =")
-    assert read(text).table == two().table
-    repeated = open_symoro(TWO_JOINTS, extra="FX = {FX1, FX2}\nFX = {FX1,FX2}")
-    assert read(repeated).table == two().table
 
 
 def test_loops_are_refused_by_name(read):

@@ -8,7 +8,6 @@ from identities.random_robots import random_table
 
 import robotmodels as rm
 from robotmodels.kinematics.lengths import characteristic_length
-from robotmodels.robots.erd import ERD_ARMS, erd_folder
 from robotmodels.trajectories import joint_path
 
 LIMIT = '<limit lower="-2" upper="2" velocity="3" effort="4"/>'
@@ -100,21 +99,6 @@ def test_links_named_as_tools_come_first_in_their_order(first):
     assert tip_of(text) == ["hand_base"]
 
 
-def test_a_named_link_ends_the_arm_before_a_single_finger():
-    assert tip_of(urdf(*arm(6), ("hand_base", "tcp", "fixed"), *fingers(1))) == ["tcp"]
-    assert "finger0_0" in tip_of(urdf(*arm(6), *fingers(1))), "as in version 0.1"
-
-
-def test_named_links_do_not_move_the_tip_of_a_robot_without_fingers():
-    """UR arms keep wrist_3_link, beside ee_link and tool0."""
-    text = urdf(*arm(6, "ee_link"), ("wrist", "tool0", "fixed"))
-    assert tip_of(text) == ["wrist"]
-    for name in ("ur5", "ur5_gripper", "ur10_limited"):
-        model = rm.load(f"erd:{name}")
-        q = np.linspace(-1, 1, model.n)
-        assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "wrist_3_link")), name
-
-
 @pytest.mark.parametrize(
     ("joints", "tip"),
     [
@@ -142,17 +126,6 @@ def test_tips_of_trees(name):
     model = rm.load(name)
     q = np.random.default_rng(0).uniform(-1, 1, model.n)
     assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, TREES[name]))
-
-
-def test_a_model_file_of_a_panda_ends_at_its_hand():
-    """The catalogue names panda_hand_tcp; the file alone has a hand with two fingers."""
-    path = erd_folder() / ERD_ARMS["panda"].urdf
-    model = rm.RobotModel.from_urdf(path)
-    q = np.linspace(-0.2, 0.4, 9)
-    assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "panda_hand"))
-    alone = rm.RobotModel.from_urdf(path, tip_link="panda_hand")
-    assert alone.n == 7, "a tip that is given locks what is beyond it"
-    assert np.abs(rm.dgm(alone, q[:7]) - rm.dgm(model, q)).max() < 1e-14
 
 
 # --- joints that do not move the tip ------------------------------------------------------------

@@ -52,14 +52,3 @@ def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
         fitted = cal.fit(arm, truth, parameters=free, folds=0, held_out=0.0)
         # the fit fixes what it cannot tell, which moves no position
         assert errors.rms["m"] == pytest.approx(fitted.validation.in_sample.rms["m"], rel=1e-9)
-
-
-def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):
-    real = moved(arm, d3=1e-3)
-    found = cal.fit(arm, cal.Position(Q, rm.dgm(real, Q)[:, :3, 3]), folds=0, held_out=0.0)
-    assert rms(true_errors(found, real, Q + 0.3))[0] < 1e-9
-    elbow = true_errors(arm, real, Q, frame=3)
-    assert elbow.as_given.position == pytest.approx(
-        np.full(60, 1e-3)
-    )  # frame 3 is d3 behind frame 2
-    assert np.isnan(elbow.as_given.angle).all()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .. import se3
 from .._arrays import Array
 from ..estimation import confidence_intervals, fit_diagnostics
-from ..estimation.correlation import correlated_pairs
+from ..estimation.estimate import correlated_pairs
 from ..geometry import PRISMATIC
 from ..kinematics import operational_coordinates
 from ..table_text import ReportSection as Section

@@ -161,17 +161,11 @@ def _chi_squared(fit: NonlinearFit) -> ResidualTest:
     statistic, left = float(fit.whitened @ fit.whitened), fit.freedom_left
     if left <= 0:
         return _untested("There are no degrees of freedom: nothing can be tested.", statistic)
-    ratio = np.sqrt(statistic / left)
-    text = f"Residuals are only {ratio:.3g} of the stated standard deviations, which are too large."
     p = min(1.0, 2 * min(float(chdtr(left, statistic)), float(chdtrc(left, statistic))))
-    if not p < _LEVEL:
-        text = f"Residuals are as large as stated ({ratio:.3g} of the stated standard deviations)."
-    elif ratio > 1:
-        text = (
-            f"Residuals are {ratio:.3g} times as large as stated: the model lacks something, there "
-            "are outliers, or the stated standard deviations are too small."
-        )
-    return ResidualTest(statistic, p, text)
+    text = f"Residuals are {np.sqrt(statistic / left):.3g} times as large as stated"
+    if p < _LEVEL:
+        text += ": missing effects or outliers, or the stated standard deviations are wrong"
+    return ResidualTest(statistic, p, f"{text}.")
 
 
 def _normality(fit: NonlinearFit) -> ResidualTest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -115,3 +116,18 @@ class Estimate(NamedValues):
     iterations: int = 1
     notes: tuple[str, ...] = ()
     details: Any = None
+
+
+def correlated_pairs(
+    correlation: Array, names: Sequence[str], least: float
+) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of estimates whose correlation is above a bound, the strongest first.
+
+    Shapes: correlation (p, p).
+    """
+    first, second = np.nonzero(np.triu(np.abs(np.nan_to_num(correlation)) > least, k=1))
+    pairs = [
+        (names[i], names[j], float(correlation[i, j]))
+        for i, j in zip(first.tolist(), second.tolist(), strict=True)
+    ]
+    return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))

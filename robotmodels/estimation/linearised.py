@@ -88,25 +88,19 @@ def checked_problem(
     x = as_floats(x0, "x0").copy()
     if x.ndim != 1 or not len(x):
         raise ShapeError(f"x0: expected parameters of shape (P,), P at least 1, got {x.shape}.")
-    if not callable(linearise):
-        raise InvalidValueError(f"linearise: expected a function of x, got {linearise!r:.60}.")
     r, J = (as_floats(part, name) for part, name in zip(linearise(x), ("r", "J"), strict=True))
     M = r.size
     sigmas = as_floats(sigma, "sigma")
     sigmas = as_exact(sigmas, (M,), "sigma") if sigmas.ndim else np.full(M, sigmas)
     if not (sigmas > 0).all():
-        raise InvalidValueError(
-            f"sigma: expected positive standard deviations, got {sigmas.min()}; remove a row that "
-            "should not count."
-        )
+        raise InvalidValueError(f"sigma: expected positive numbers, got {sigmas.min()}.")
     prior = Prior.none(len(x)) if prior is None else prior
-    if len(prior.mean) != len(x):
-        raise ShapeError(f"prior: expected one of {len(x)} parameters, got {len(prior.mean)}.")
     numbers = np.arange(M) if block is None else np.asarray(block)
-    if numbers.shape != (M,):
-        raise ShapeError(f"block: expected one number for each row ({M},), got {numbers.shape}.")
-    if numbers.dtype.kind not in "iu":
-        raise InvalidValueError(f"block: expected whole numbers, got {numbers.dtype}.")
+    if len(prior.mean) != len(x) or numbers.shape != (M,) or numbers.dtype.kind not in "iu":
+        raise ShapeError(
+            f"expected a prior of {len(x)} parameters and a block of {M} whole numbers, got "
+            f"{len(prior.mean)} and {numbers.dtype} of shape {numbers.shape}."
+        )
     labels, place, rows = np.unique(numbers, return_inverse=True, return_counts=True)
     problem = Problem(linearise, sigmas, prior, labels, place, rows)
     point = problem.point(x, r, J)

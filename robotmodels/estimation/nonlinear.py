@@ -8,12 +8,12 @@ and 8 to 11 times (robust losses) as long in calibrations of 30 to 500 poses.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen, as_number
 from .._choices import chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
@@ -59,7 +59,7 @@ class FitStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NonlinearFit(Rebuilt):
+class NonlinearFit(Frozen):
     """Parameters fitted to measurements. Read-only.
 
     Parameters
@@ -110,12 +110,6 @@ class NonlinearFit(Rebuilt):
     dropped: Array
     basis: Array
     iterations: int
-
-    def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, read_only(value, value.dtype.type))
 
     @property
     def standard_errors(self) -> Array:
@@ -213,8 +207,10 @@ def fit_nonlinear(
     array([2., 3.])
     """
     loss = chosen(Loss, loss, "loss")
-    tolerance = _fraction(tolerance, "tolerance")
-    threshold = SINGULAR if truncation is None else _fraction(truncation, "truncation")
+    tolerance = as_number(tolerance, "tolerance", least=0.0, below=1.0)
+    threshold = SINGULAR
+    if truncation is not None:
+        threshold = as_number(truncation, "truncation", least=0.0, below=1.0)
     if isinstance(iterations, bool) or int(iterations) != iterations or iterations < 1:
         raise InvalidValueError(f"iterations: expected a number from 1, got {iterations!r}.")
     problem, point = checked_problem(linearise, x0, sigma, block, prior)
@@ -334,9 +330,3 @@ def _outliers(problem: Problem, loss: Loss, point: Point, linear: Linear) -> NDA
     u = point.length / _scale(problem, point, linear.freedom)
     excess = u / length_quantile(problem.rows, 1 - FALSE_OUTLIERS / len(u))
     return np.argsort(-excess, kind="stable")[: int((excess > 1).sum())]
-
-
-def _fraction(value: float, name: str) -> float:
-    if not 0.0 <= float(value) < 1.0:
-        raise InvalidValueError(f"{name}: expected a number from 0 below 1, got {value!r}.")
-    return float(value)

@@ -85,13 +85,6 @@ def test_one_line_of_a_hundred_megabytes(tmp_path):
     refused(lambda: read_measurements(path, "position", planar()), "longer than")
 
 
-def test_a_grid_that_nobody_measured(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text(LOG_CSV)
-    refused(lambda: read_log(path, dt=1e-9), "dt=")
-    assert len(read_log(path, dt=0.001)) == 231
-
-
 def test_a_quotation_mark_without_end_loses_no_rows(tmp_path):
     # NumPy takes the lines up to the next one into the cell, and says nothing
     lines = LOG_CSV.split("\n")
@@ -102,10 +95,3 @@ def test_a_quotation_mark_without_end_loses_no_rows(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("\n".join(lines))
     refused(lambda: read_log(path), "quotation mark")
-
-
-@pytest.mark.parametrize("data", [b"", b"PK\x03\x04" + bytes(40), b"\x93NUMPY\x01\x00v\x00{'a': ("])
-def test_npz_files_that_are_none(tmp_path, data):
-    path = tmp_path / "run.npz"
-    path.write_bytes(data)
-    refused(lambda: read_log(path, dt=0.01), "NPZ")
