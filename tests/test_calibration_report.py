@@ -10,7 +10,7 @@ from robotmodels.calibration.candidates import candidate_parameters
 from robotmodels.calibration.differential import differential_model
 from robotmodels.calibration.problem import linearised
 from robotmodels.calibration.report import measured_residuals, report_sections
-from robotmodels.estimation.correlation import correlated_pairs
+from robotmodels.estimation.estimate import correlated_pairs
 from robotmodels.kinematics import dgm
 from robotmodels.robots import load
 from robotmodels.table_text import ReportTable, in_unit

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError
-from robotmodels.estimation.correlation import correlated_pairs
+from robotmodels.estimation.estimate import correlated_pairs
 from robotmodels.identification import (
     Log,
     choose_processing,

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._arrays import Array
-from ..estimation.correlation import correlated_pairs
-from ..estimation.estimate import Estimate
+from ..estimation.estimate import Estimate, correlated_pairs
 from ..geometry import PRISMATIC
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
