@@ -1,12 +1,19 @@
 """Pictures of robots: `show`, `animate` and `jog` give a `Scene`, `plot_*` a Matplotlib figure.
 
-A scene is a meshcat page that needs no network. Figures need the extra ``plots``; Matplotlib is
-imported when the first one is drawn.
+A scene is a meshcat page that needs no network: it shows itself in a notebook, and
+``.save("arm.html")`` writes it. Figures need the extra ``plots``; Matplotlib is imported when the
+first one is drawn. A figure is a `matplotlib.figure.Figure` that shows itself in a notebook, and
+``.savefig("arm.pdf")`` writes it. Arguments that do not fit raise `InvalidValueError` or
+`ShapeError`, a package that is not installed `MissingExtraError`.
 
-Every ``plot_*`` returns a `matplotlib.figure.Figure` that shows itself in a notebook
-(``.savefig("arm.pdf")`` writes it), and raises `InvalidValueError` or `ShapeError` for arguments
-that do not fit, `MissingExtraError` without Matplotlib. ``title`` is a text over the figure,
-``size`` its width and height in inches, shape (2,).
+Arguments of several of them: ``title``, a text over a figure, and ``size``, its width and height in
+inches, shape (2,); ``model``, the robot of n joints, whose names and units of joints are used;
+``names`` and ``units`` (``rad``, ``deg``, ``m``, ``mm``, or a `Unit`) in place of these, n each;
+``limits``, the MotionLimits drawn as dashed lines, in the colour of their joint or grey where all
+joints share them, with values beyond them underlaid in red; ``degrees``, whether angles are in
+degrees instead of radians; ``columns``, how many panels stand in a row; ``view``, azimuth and
+elevation from which a scene or axes in space are seen, rad, shape (2,); ``height``, pixels of a
+scene in a notebook; ``dark``, whether its background is dark.
 """
 
 from .calibration import (

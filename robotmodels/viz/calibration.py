@@ -2,8 +2,10 @@
 
 Parameters
 ----------
-result : CalibrationResult
-    Of `calibration.fit`.
+result, selected : CalibrationResult and SelectedConfigurations
+    Of `calibration.fit` and `calibration.select_configurations`.
+view, **look
+    See `robotmodels.viz`.
 level : float
     Probability of the intervals.
 truth : array_like, shape (P,), or mapping of str to float, optional
@@ -13,16 +15,8 @@ truth : array_like, shape (P,), or mapping of str to float, optional
     and those that are not named count as zero. They count from the robot as it was given.
 magnification : float, optional
     Of the arrows in all panels; default for each panel so that they can be seen.
-view : array_like, shape (2,), optional
-    Azimuth and elevation of the eye, rad; default for each measurement across its longest
-    horizontal direction.
-selected : SelectedConfigurations
-    Of `calibration.select_configurations`.
 gain : float
-    Part of the expected error below which a further configuration is not worth it, as for
-    `SelectedConfigurations.enough`.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
+    Part of the expected error below which a further configuration is not worth it.
 
 Returns
 -------
@@ -41,9 +35,6 @@ Examples
 >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
 >>> [axes.get_xlabel() for axes in plot_calibration_parameters(result).axes]
 ['correction (mm)', 'correction (deg)']
->>> selected = calibration.select_configurations(arm, "position", 20, drawn=60, rng=rng)
->>> plot_selection(selected).axes[0].get_ylabel()
-'criterion O1'
 """
 
 from __future__ import annotations

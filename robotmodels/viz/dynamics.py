@@ -2,8 +2,8 @@
 
 Parameters
 ----------
-model : RobotModel
-    The robot, n joints; of a simulation its own.
+model, degrees, columns, **look
+    See `robotmodels.viz`; the model of a simulation is its own.
 motion : Trajectory, Samples or Simulation
     One motion of n joints. A simulation brings its own friction, wrench and drives.
 wrench : array_like, shape (6,), optional
@@ -14,22 +14,15 @@ friction : Friction, optional
     A friction model that acts besides them.
 joints : sequence of int, optional
     Which joints, columns of q from 0; default all.
-columns : int, optional
-    How many panels stand in a row; default one, or two from five joints on.
 simulation : Simulation
     As `simulate` gives it. Many samples make smooth lines: give it times.
 events : bool
     Whether thin lines mark where joints stick and break away.
 grid : DynamicsMap
     As `dynamics_map` gives it.
-of : int, optional
-    Of two joints that vary: whose gravity torque and inertia, from 0; default the first.
-pair : array_like of int, shape (2,), optional
-    Of two joints that vary: whose coupling, from 0; default these two.
-degrees : bool
-    Whether angles are in degrees instead of radians.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
+of, pair : int and array_like of int, shape (2,), optional
+    Of two joints that vary: whose gravity torque and inertia, and whose coupling, from 0; default
+    the first, and these two.
 
 Returns
 -------
@@ -42,14 +35,11 @@ Seed book sections 1.5.1.1 to 1.5.1.5.
 Examples
 --------
 >>> from robotmodels.robots import load
->>> from robotmodels.simulation import dynamics_map
 >>> from robotmodels.trajectories import quintic
 >>> move = quintic(np.zeros(6), np.ones(6), duration=1.0)
 >>> figure = plot_torque_parts(load("rx90"), move, joints=[0, 1])
 >>> [axes.get_title(loc="left") for axes in figure.axes]
 ['joint_1 (N m)', 'joint_2 (N m)']
->>> len(plot_inertia_map(dynamics_map(load("rx90"), 2)).axes)
-3
 """
 
 from __future__ import annotations

@@ -2,14 +2,12 @@
 
 Parameters
 ----------
-result : IdentificationResult
-    Of `identification.fit`.
+result, found : IdentificationResult and ExcitingTrajectory
+    Of `identification.fit` and `identification.excitation.exciting_trajectory`.
 test : Log, optional
     Held-out log of the same joints.
-found : ExcitingTrajectory
-    Of `identification.excitation.exciting_trajectory`.
 **look
-    ``title`` and ``size``, see `robotmodels.viz`.
+    See `robotmodels.viz`.
 
 Returns
 -------
@@ -26,8 +24,6 @@ Examples
 >>> result = fit(*example_log())
 >>> [axes.get_ylabel() for axes in plot_identification_torques(result).axes]
 ['torque (N m)', 'torque (N m)']
->>> [axes.get_title() for axes in plot_identification_parameters(result).axes]
-['bodies', 'drives and friction']
 """
 
 from __future__ import annotations

@@ -14,10 +14,8 @@ workspace : PlatformWorkspace
     From `parallel.workspace`, planar or a section.
 title : str, optional
     Of the page; default the family.
-height, dark : int and bool
-    Pixels in a notebook; whether the background is dark.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
+height, dark, **look
+    See `robotmodels.viz`.
 
 Returns
 -------

@@ -11,13 +11,6 @@ test : Log, optional
 robot : StandardParameters, optional
     Result of `consistent_robot`; the increase of its residuals is reported.
 
-Raises
-------
-InvalidValueError, ShapeError
-    Not a result; not a log of its joints.
-OSError
-    The file cannot be written.
-
 References
 ----------
 Seed book sections 1.4 and 1.6.5.

@@ -38,36 +38,20 @@ loop : bool
     (4,)): of the links, red, green, blue and opacity in [0, 1], in `show` also one for each
     posture or robot; opacity (float): of the links, in [0, 1]; box (array_like, shape (6,)):
     workspace to draw, ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, m; grid (bool): whether
-    the floor z = 0 and the axes of the world are drawn; view (array_like, shape (2,)): azimuth and
-    elevation of the camera seen from the robot, rad; height (int): pixels in a notebook; dark
-    (bool): whether the background is dark.
+    the floor z = 0 and the axes of the world are drawn; view; height (int); dark (bool).
 
 Returns
 -------
 Scene
-    Shows itself in a notebook; ``.save("arm.html")`` writes one offline page.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Wrong joint variables or options; a motion that is not a joint motion; coupled joints at values
-    that contradict their coupling.
-UrdfError
-    A mesh file cannot be read.
-MissingExtraError
-    A package that draws is not installed.
 
 Examples
 --------
 >>> from robotmodels.geometry import DHTable
->>> from robotmodels.trajectories import quintic
 >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 1], d=[0, 0.3]))
 >>> show(arm, [[0.0, 0.5], [0.4, -0.5]], frames=True)
 <Scene 'robot': 31 shapes>
 >>> animate(arm, np.linspace([0.0, 0.0], [1.0, 0.5], 1001), dt=0.002)
 <Scene 'robot': 12 shapes, 2 s from 1001 samples in 122 keyframes>
->>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
-1.5
 >>> jog(arm, [0.5, 0.1])
 <Scene 'robot': 12 shapes, 2 sliders>
 """

@@ -6,8 +6,8 @@ timed : TimedPath
     From `robotmodels.trajectories.time_optimal`, with a motion.
 plan : Plan
     From `robotmodels.trajectories.kinodynamic`, with a motion.
-model : RobotModel
-    The robot, n joints; of a plan optional, to draw its torques.
+model, degrees, columns, **look
+    See `robotmodels.viz`; of a plan the torques of its model are drawn.
 torque : array_like, shape () or (n,), optional
     Limits of torque, N m or N: torques are drawn as shares of them, but for joints without a
     limit; default those of the model's table.
@@ -15,12 +15,6 @@ t : array_like, shape (N,)
     Times, s.
 q : array_like, shape (N, n), or mapping of str to such arrays
     Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
-degrees : bool
-    Whether angles are in degrees instead of radians.
-columns : int, optional
-    How many panels stand in a row; default one, or two from five joints on.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
 
 Returns
 -------
@@ -28,15 +22,10 @@ matplotlib.figure.Figure
 
 Examples
 --------
->>> from robotmodels.robots import load
 >>> from robotmodels.trajectories import MotionLimits, linear, time_optimal
 >>> timed = time_optimal(linear([0.0], [1.0], 1.0), MotionLimits(1.0, 2.0))
 >>> plot_phase_plane(timed).axes[0].get_ylabel()
 'rate s′ (1/s)'
->>> t = np.linspace(0.0, 1.0, 11)
->>> figure = plot_joint_motion(load("panda"), t, np.zeros((11, 7)))
->>> figure.axes[0].get_title(loc="left")
-'panda_joint1 (deg)'
 """
 
 from __future__ import annotations

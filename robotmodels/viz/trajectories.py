@@ -2,19 +2,11 @@
 
 Parameters
 ----------
+model, names, units, limits, view, **look
+    See `robotmodels.viz`. Names of `plot_profiles` are those of a sequence of motions; the limits
+    of `plot_joint_path` are by default those of its model.
 trajectory : Trajectory or Samples
     One motion of n joints; rad or m, and per s.
-limits : MotionLimits, optional
-    Drawn as dashed lines, in the colour of their joint or grey where all joints share them; values
-    beyond them are underlaid in red. `plot_joint_path` takes those of its model by default.
-names : sequence of str, optional
-    Of the joints, default those of the model, else ``joint 1`` and so on; of `plot_profiles` those
-    of a sequence of motions.
-units : Unit or str, or sequence of them, length n, optional
-    ``rad``, ``deg``, ``m``, ``mm`` for the axes; default rad or m by the joint types of the model,
-    and "rad or m" without one.
-model : RobotModel, optional
-    The robot, n joints.
 orders : sequence of int
     Which panels: 0 position, 1 velocity, 2 acceleration, 3 jerk.
 breakpoints : bool
@@ -22,10 +14,8 @@ breakpoints : bool
     pieces together, else by dots on the lines of the joints.
 profiles : mapping of str to Trajectory, or sequence of Trajectory
     Motions by their names; `Samples` may stand for a trajectory. The legend gives the durations.
-joint : int
-    Which joint, from 0.
-unit : Unit or str
-    As ``units``; of `plot_pose_path` ``m`` or ``mm``.
+joint, unit : int, and Unit or str
+    Which joint, from 0, and its unit; of `plot_pose_path` ``m`` or ``mm``.
 side_by_side : bool
     Whether each motion stands in a column of its own, with common scales, instead of all
     motions over each other.
@@ -34,15 +24,9 @@ path : JointPath
     `plot_pose_path` optional, for its events.
 poses : PoseTrajectory, PoseSamples or array_like, shape (N, 4, 4)
     World poses of the tool, m.
-frames : int
-    At how many poses, evenly spaced in time, the axes of the tool are drawn, both ends included.
-frame_size : float, optional
-    Length of the axes, m; default a tenth of the extent of the path.
-view : array_like, shape (2,), optional
-    Azimuth and elevation from which the path is seen, rad; default obliquely, across its
-    longest horizontal direction.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
+frames, frame_size : int and float, optional
+    At how many poses, evenly spaced in time, the axes of the tool are drawn, both ends included,
+    and their length, m; default a tenth of the extent of the path.
 
 Returns
 -------
@@ -50,14 +34,11 @@ matplotlib.figure.Figure
 
 Examples
 --------
->>> from robotmodels.trajectories import MotionLimits, bang_bang, cubic, trapezoidal
+>>> from robotmodels.trajectories import MotionLimits, trapezoidal
 >>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
 >>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], limits=limits), limits, units="rad")
 >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
 ['position (rad)', 'velocity (rad/s)']
->>> laws = {"bang-bang": bang_bang(0, 1, duration=1.0), "cubic": cubic(0, 1, duration=1.2)}
->>> [line.get_label() for line in plot_profiles(laws, unit="rad").axes[0].get_lines()]
-['bang-bang, 1 s', 'cubic, 1.2 s']
 """
 
 from __future__ import annotations

@@ -10,12 +10,9 @@ solutions : mapping of str to IKMSolution, or sequence
     angular. NaN rows leave a gap.
 names : sequence of str, optional
     Of the methods of a sequence; default ``method 1`` and so on.
-model : RobotModel, optional
-    The robot, n joints: their names and units; of maps, areas outside its joint limits are hatched.
-units : Unit or str, or sequence of them, length n, optional
-    Of the joints, as in `plot_trajectory`; joints of different units have panels of their own.
-limits : MotionLimits, optional
-    Whose velocities are drawn as dashed lines (the greater of both directions).
+model, units, limits, degrees, columns, **look
+    See `robotmodels.viz`. Of the limits the velocities are drawn, the greater of both directions;
+    in maps, areas outside the joint limits of the model are hatched.
 each_joint : bool
     Whether each method has a column with the speeds of all joints, instead of lines for the
     greatest speed of each method.
@@ -32,14 +29,7 @@ labels : sequence of str, optional
 maps : SingularityMap or sequence of them
     From `singularity_map`; several stand beside each other.
 q : array_like, shape (n,) or (N, n), optional
-    Postures to mark, rad or m; several are joined by a line in their order. A map shows their
-    two joints only.
-degrees : bool
-    Whether angles are in degrees on the axes instead of radians.
-columns : int, optional
-    How many maps stand in a row; default two, or one for a single map.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
+    Postures to mark, rad or m; several are joined by a line in their order.
 
 Returns
 -------
@@ -57,9 +47,6 @@ Examples
 >>> figure = plot_inverse_velocities(d, {"damped": (bounded, missing)}, units="rad")
 >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes][::2]
 ['greatest joint speed (rad/s)', 'missing angular velocity (rad/s)']
->>> egg = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), [20.0, 10.0, 5.0], 3)
->>> [(a.get_xlabel(), a.get_ylabel()) for a in plot_ellipsoids(egg).axes][1]
-('$f_x$ (N)', '$f_z$ (N)')
 """
 
 from __future__ import annotations

@@ -4,12 +4,10 @@ Parameters
 ----------
 run : ServoMotion
     Result of `servo`.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
 model : RobotModel, optional
     The robot of the run; it moves, and a camera on its tool moves with it.
-height, dark : int and bool
-    Of the picture in a notebook, pixels; whether the background is dark.
+height, dark, **look
+    See `robotmodels.viz`.
 
 Returns
 -------
