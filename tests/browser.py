@@ -17,20 +17,12 @@ from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
-OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-extensions",
-    "--hide-scrollbars",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
-)
+OPTIONS = """
+--headless --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-quic --no-first-run
+--disable-background-networking --disable-component-update --disable-sync --disable-extensions
+--hide-scrollbars
+"""
+NO_NETWORK = "--host-resolver-rules=MAP * ~NOTFOUND"
 TIMEOUT = 300.0  # seconds; a page takes 3 to 10, on a busy machine ten times as long
 
 
@@ -69,7 +61,7 @@ def picture(page: Path, folder: Path, size: tuple[int, int], milliseconds: int =
 
 def _run(url: str, folder: Path, milliseconds: int, *options: str) -> str:
     words = [
-        chromium(), *OPTIONS, f"--user-data-dir={folder / 'profile'}",
+        chromium(), *OPTIONS.split(), NO_NETWORK, f"--user-data-dir={folder / 'profile'}",
         f"--virtual-time-budget={milliseconds}", *options, url,
     ]  # fmt: skip
     # a session of its own, so that its helper processes end with it

@@ -163,14 +163,6 @@ def test_pipes_that_close_and_terminals_without_unicode():
     assert "| j | sj |" in rest
 
 
-def test_closed_and_full_outputs():
-    shell = f"{' '.join(COMMAND)} robots"
-    closed = subprocess.run(["bash", "-c", f"{shell} >&-"], capture_output=True, text=True)
-    assert (closed.returncode, closed.stderr) == (0, "")
-    full = subprocess.run(["bash", "-c", f"{shell} > /dev/full"], capture_output=True, text=True)
-    assert (full.returncode, full.stderr) == (2, "robotmodels: No space left on device.\n")
-
-
 # --- progress and JSON ----------------------------------------------------------------------------
 
 

@@ -129,13 +129,6 @@ def test_the_index_has_all_notebooks_and_their_titles():
         assert sources(path, "markdown")[0].startswith(f"# {number} {title}")
 
 
-@every
-def test_something_is_drawn(path):
-    assert any(
-        re.search(r"^rm\.viz\.(show|animate|plot_)", text, re.M) for text in sources(path, "code")
-    )
-
-
 # --- the book's numbers --------------------------------------------------------------------------
 
 

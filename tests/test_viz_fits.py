@@ -55,11 +55,15 @@ def calibrated():
     }
 
 
-@pytest.mark.parametrize("name", ["few", "many", "sockets"])
 @pytest.mark.nightly
-def test_figures_of_calibrations_hold_together(calibrated, name):
-    for plot in CALIBRATION:
-        assert overlaps(plot(calibrated[name], title="A robot")) == [], plot.__name__
+def test_texts_and_panels_do_not_cover_each_other(calibrated, found):
+    for result in calibrated.values():
+        for plot in CALIBRATION:
+            assert overlaps(plot(result, title="A robot")) == [], plot.__name__
+    for word in ("torques", "residuals", "parameters", "standard_errors", "correlations"):
+        plot = getattr(viz, f"plot_identification_{word}")
+        assert overlaps(plot(found, title="A robot")) == [], word
+    assert overlaps(viz.plot_processing(found, title="A robot")) == []
 
 
 def test_residuals_are_those_of_the_result(calibrated):
@@ -212,19 +216,6 @@ def found():
     return idn.fit(model, log, test=log_of(model, seconds=4.0, seed=1), checked=False)
 
 
-@pytest.mark.nightly
-def test_figures_of_identifications_hold_together(found):
-    for plot in (
-        viz.plot_identification_torques,
-        viz.plot_identification_residuals,
-        viz.plot_identification_parameters,
-        viz.plot_identification_standard_errors,
-        viz.plot_identification_correlations,
-        viz.plot_processing,
-    ):
-        assert overlaps(plot(found, title="A robot")) == [], plot.__name__
-
-
 def test_torques_are_those_of_the_log_and_the_result(found):
     test = log_of(found.model, seconds=4.0, seed=1)
     figure = viz.plot_identification_torques(found, test)
@@ -306,26 +297,6 @@ def test_processing_shows_cutoffs_and_the_noise_they_cut(found):
         np.testing.assert_allclose(after[f < 0.5 * cutoff], before[f < 0.5 * cutoff], rtol=0.15)
     noise = float(re.search(r": (\S+) m", figure.axes[0].get_title(loc="left"))[1])
     assert noise == pytest.approx(1e-5 * np.sqrt(1.0 - 2.0 * DT * chosen.cutoff), rel=0.1)
-
-
-def test_processing_of_a_result_shows_the_criteria_of_its_choice(found):
-    chosen = found.equations.processing
-    figure = viz.plot_processing(found)
-    bias, count = figure.axes[6:]
-    bound = "bounds: 0.1 standard errors, 20 equations"
-    assert (data(bias, bound)[0], data(count, bound)[0]) == (0.1, 20)
-    lower = min(chosen.cutoff, chosen.torque_cutoff)
-    for axes, cutoff in ((bias, lower), (count, chosen.torque_cutoff)):
-        f, curve = lines(axes, "at other cutoffs")[0].get_data()
-        [x], [y] = lines(axes, "choice")[0].get_data()
-        assert x == cutoff
-        assert y == curve[np.flatnonzero(f == cutoff)[0]]  # the choice lies on the curve
-    # one equation of each joint for each sample that is kept
-    expected = len(found.equations.log) * 3 / chosen.decimation / len(found.base)
-    assert data(count, "choice")[0] == pytest.approx(expected)
-    share = re.search(r": (\S+) N rms \((\S+) %\) cut", figure.axes[1].get_title(loc="left"))
-    rms = np.sqrt(np.mean(found.equations.log.tau[:3500, 0] ** 2))  # of the longest recording
-    assert float(share[2]) == pytest.approx(100.0 * float(share[1]) / rms, rel=0.1)
 
 
 def test_excitation_shows_its_motion_and_its_search():
