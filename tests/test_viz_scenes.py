@@ -244,9 +244,9 @@ def test_sliders_are_the_independent_joints_in_their_limits():
     ends = [joint["ends"] for joint in joints]
     np.testing.assert_allclose(ends, [(-np.pi, np.pi), (-4.0, -2.0), (0.5, 0.5 + 2 * np.pi)])
     assert [joint["note"] for joint in joints] == [
-        "no limits, slider -180 to 180 deg",
-        "up to -2 m, no lower limit, slider from -4 m, passive",
-        "from 28.648 deg, no upper limit, slider to 388.65 deg",
+        "-180 to 180 deg, no limits",
+        "-4 to -2 m, no lower limit, passive",
+        "28.648 to 388.65 deg, no upper limit",
     ]
 
 

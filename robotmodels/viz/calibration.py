@@ -60,7 +60,6 @@ from .space import across, fill_cells, space
 from .style import ALERT, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Look
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _SIDES = (
@@ -69,7 +68,6 @@ _SIDES = (
 )
 _RING: dict[str, Any] = {"marker": "o", "linestyle": "", "color": ALERT, "markersize": 6.0}
 _RING |= {"markerfacecolor": "none", "markeredgewidth": 0.9, "clip_on": False}
-_FEW = 60  # configurations up to which every residual has a stem
 _UNITS = {
     "m": (1e3, "mm", "lengths"),
     "rad": (Unit.DEGREE.factor, "deg", "angles"),
@@ -107,20 +105,31 @@ def plot_calibration_residuals(result: CalibrationResult, **look: Unpack[Look]) 
     rows = list(dict.fromkeys(row for own in every for row in own))
     figure, grid = style.panels(PAGE, 0.75 + len(rows), look, len(rows), 2, sharex=True)
     count = int(parts[-1].blocks[-1]) + 1
+    dot = min(3.2, 3.2 * np.sqrt(60.0 / count) + 0.4)
     for places, row in zip(grid, rows, strict=True):
         columns = [(p, own.index(row)) for p, own in zip(parts, every, strict=True) if row in own]
         x = np.concatenate([part.blocks for part, _ in columns]) + 1
         outlier = np.concatenate([part.outlier for part, _ in columns])
         factor, symbol, _ = _UNITS[row[1]]
-        for axes, (side, *drawn) in zip(places, _SIDES, strict=True):
+        usual = ~outlier if not outlier.all() else outlier
+        for axes, (side, color, marker, label) in zip(places, _SIDES, strict=True):
             y = factor * np.concatenate([getattr(part, side)[:, k] for part, k in columns])
-            _residual_panel(axes, x, y, outlier, count, *drawn)
+            most = 1.12 * float(np.abs(y[usual]).max(initial=0.0))
+            most = most if most > 1e-9 else 1.0  # rounding errors do not fill a scale
+            axes.axhline(0.0, **ZERO)
+            axes.vlines(x, 0.0, y, color=color, linewidth=0.8, alpha=min(0.6, 36.0 / count))
+            line = {"color": color, "markersize": dot, "markeredgewidth": 0.0, "label": label}
+            axes.plot(x, y, marker, **line)
+            if outlier.any():
+                far = np.clip(y[outlier], -most, most)
+                axes.plot(x[outlier], far, label="outlier (at the edge: beyond it)", **_RING)
+            axes.set_ylim(-most, most)
+            axes.locator_params(axis="y", nbins=5)
             rms, raised = float(np.sqrt(np.mean(y**2))), bool(outlier.any())
             axes.set_title(f"rms {rms:.3g} {symbol}", loc="right", pad=5.0 if raised else 2.0)
         places[0].set_ylabel(f"{row[0]} ({symbol})")
     for axes in grid[-1]:
-        axes.set_xlabel("configuration")
-        axes.set_xlim(0.0, count + 1.0)
+        axes.set(xlabel="configuration", xlim=(0.0, count + 1.0))
     for k, part in enumerate(parts if len(parts) > 1 else ()):
         for axes in grid.flat if k else ():
             axes.axvline(part.blocks[0] + 0.5, color=PALE, linewidth=0.8)
@@ -129,25 +138,6 @@ def plot_calibration_residuals(result: CalibrationResult, **look: Unpack[Look]) 
             place = grid[0, 0].get_xaxis_transform()
             grid[0, 0].text(part.blocks[0] + 0.7, 0.98, name, transform=place, va="top")
     return style.finished(figure, look, [side[-1] for side in _SIDES])
-
-
-def _residual_panel(
-    axes: Axes, x: Array, y: Array, outlier: Array, count: int, color: Any, marker: str, label: str
-) -> None:
-    """Residuals of one row; a scale that outliers do not set."""
-    usual = ~outlier if not outlier.all() else outlier
-    most = 1.12 * float(np.abs(y[usual]).max(initial=0.0))
-    most = most if most > 1e-9 else 1.0  # rounding errors do not fill a scale
-    axes.axhline(0.0, **ZERO)
-    if len(x) <= _FEW:
-        axes.vlines(x, 0.0, y, color=color, linewidth=0.8, alpha=0.6)
-    dot = 3.2 if count <= _FEW else 3.2 * np.sqrt(_FEW / count) + 0.4
-    axes.plot(x, y, marker, color=color, markersize=dot, markeredgewidth=0.0, label=label)
-    if outlier.any():
-        far = np.clip(y[outlier], -most, most)
-        axes.plot(x[outlier], far, label="outlier (at the edge: beyond it)", **_RING)
-    axes.set_ylim(-most, most)
-    axes.locator_params(axis="y", nbins=5)
 
 
 @style.plot
@@ -220,8 +210,7 @@ def plot_calibration_parameters(
             {"table": at_table, "base and ends": ~at_table},
             None if known is None else factor * known[some],
         )
-        axes.set_xlabel(f"correction ({symbol})")
-        axes.set_title(kind)
+        axes.set(xlabel=f"correction ({symbol})", title=kind)
     look["title"] = look.get("title") or f"corrections and {100.0 * level:g} % intervals"
     return style.finished(figure, look, ("table", "base and ends"))
 
@@ -381,8 +370,7 @@ def plot_selection(
     marker = "o" if len(counts) <= 25 else ""
     first.plot(counts, selected.values, marker=marker, color=PALETTE[0], label="_criterion")
     first.set_ylabel(f"criterion {selected.criterion.name}")
-    first.set_ylim(0.0, 1.08 * float(selected.values.max()))
-    first.set_title("criterion, larger is better")
+    first.set(ylim=(0.0, 1.08 * float(selected.values.max())), title="criterion, larger is better")
     for axes, unit in zip(others, kinds, strict=True):
         factor, symbol, kind = _UNITS[unit]
         own = factor * selected.standard_errors[:, units == unit]
@@ -394,8 +382,7 @@ def plot_selection(
             axes.plot(counts, values, marker=marker, label=label, **style.line(k))
         axes.set_yscale("log")
         style.plain_logarithmic(axes.yaxis, 8)
-        axes.set_ylabel(f"expected standard error ({symbol})")
-        axes.set_title(kind)
+        axes.set(ylabel=f"expected standard error ({symbol})", title=kind)
     for axes in (first, *others):
         axes.set_xlabel("contacts" if selected.groups.shape[1] > 1 else "configurations")
         axes.margins(x=0.03)

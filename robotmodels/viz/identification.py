@@ -28,6 +28,7 @@ Examples
 
 from __future__ import annotations
 
+from math import ceil
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -35,7 +36,6 @@ import numpy as np
 from .._arrays import Array
 from ..dynamics import idm
 from ..errors import ShapeError
-from ..identification.equations import Equations
 from ..identification.excitation import ExcitingTrajectory
 from ..identification.excitation.result import ExcitationStatus
 from ..identification.report_tables import WEAK, group_names, group_units
@@ -139,7 +139,9 @@ def _envelope(t: Array, y: Array, step: int) -> tuple[Array, Array]:
     rows = -(-N // step)
     # the last samples are repeated until the last group is full
     groups = y[np.minimum(np.arange(rows * step), N - 1).reshape(rows, step)]
-    pairs = np.sort(np.stack((groups.argmin(axis=1), groups.argmax(axis=1)), axis=1), axis=1)
+    least = np.nan_to_num(groups, nan=np.inf).argmin(axis=1)
+    greatest = np.nan_to_num(groups, nan=-np.inf).argmax(axis=1)
+    pairs = np.sort(np.stack((least, greatest), axis=1), axis=1)
     place = np.minimum(pairs + (np.arange(rows) * step)[:, None, None], N - 1).reshape(-1, m)
     return t[place], np.take_along_axis(y, place, axis=0)
 
@@ -156,7 +158,13 @@ def plot_identification_residuals(
     found = as_result(result, test)
     system = found.equations if test is None else found.equations.with_log(test)
     names, units, sigma = group_names(found), group_units(found), found.estimate.sigma
-    t, e, far = _residuals(system, found.values, sigma)
+    step = ceil(len(system.log) / system.processing.decimation / _RESIDUALS)
+    far, parts = np.zeros((2, system.groups)), list[tuple[Array, Array]]()
+    for block in system.blocks():
+        e = np.where(block.use, block.y - block.W @ found.values, np.nan)
+        far += (np.abs(e) > 2.0 * sigma).sum(axis=0), block.use.sum(axis=0)
+        parts.append(_envelope(block.t, e, step))
+    t, e = (np.concatenate(some) for some in zip(*parts, strict=True))
     correlation = residual_diagnostics(system, found.values)
     lag = np.arange(1, correlation.lags + 1) / found.equations.processing.rate
     shared: dict[str, Any] = {"sharex": "col", "width_ratios": [2.2, 1.0]}
@@ -165,9 +173,10 @@ def plot_identification_residuals(
     both = "two standard deviations; 95 % of white residuals"
     for j, (left, right) in enumerate(grid):
         left.axhspan(-2.0 * sigma[j], 2.0 * sigma[j], label=both, **_BAND)
-        left.plot(t, e[:, j], "o", label="residual; its autocorrelation", **dot)
+        left.plot(t[:, j], e[:, j], "o", label="residual; its autocorrelation", **dot)
         left.set_ylabel(f"residual ({units[j]})")
-        left.set_title(f"{names[j]}: {100.0 * far[j]:.2g} % outside", loc="left")
+        share = 100.0 * far[0, j] / max(far[1, j], 1.0)
+        left.set_title(f"{names[j]}: {share:.2g} % outside", loc="left")
         bound = correlation.bounds[j, 1:]
         right.fill_between(lag, -bound, bound, **_BAND)
         right.vlines(lag, 0.0, correlation.autocorrelation[j, 1:], color=PALETTE[0], linewidth=1.2)
@@ -178,26 +187,6 @@ def plot_identification_residuals(
     grid[-1, 0].set_xlabel("time (s)")
     grid[-1, 1].set_xlabel("lag (s)")
     return style.finished(figure, look, (both,))
-
-
-def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, Array, Array]:
-    """Times and residuals (NaN where excluded), the largest of each group if there are many.
-
-    Also the share of residuals beyond two standard deviations.
-    """
-    step = max(1, int(np.ceil(len(system.log) / system.processing.decimation / _RESIDUALS)))
-    far, total = np.zeros(system.groups), np.zeros(system.groups)
-    times, rows = [], []
-    for block in system.blocks():
-        e = np.where(block.use, block.y - block.W @ values, np.nan)
-        far += (np.abs(e) > 2.0 * sigma).sum(axis=0)
-        total += block.use.sum(axis=0)
-        for start in range(0, len(e), step):
-            group = np.nan_to_num(np.abs(e[start : start + step]), nan=-1.0)
-            times.append(block.t[start])
-            rows.append(e[start + group.argmax(axis=0), np.arange(e.shape[1])])
-    with np.errstate(invalid="ignore"):
-        return np.array(times), np.array(rows).reshape(-1, system.groups), far / total
 
 
 @style.plot
@@ -222,8 +211,7 @@ def plot_identification_parameters(result: IdentificationResult, **look: Unpack[
         kinds = {"determined": ~weak[some], weakly: weak[some]}
         names = [found.names[k] for k in some]
         style.interval_panel(axes, names, value[some], half[some], kinds)
-        axes.set_xlabel("effect on the torques (%)")
-        axes.set_title(word)
+        axes.set(xlabel="effect on the torques (%)", title=word)
     return style.finished(figure, look)
 
 
@@ -256,21 +244,20 @@ def plot_identification_standard_errors(
     each = -(-len(order) // rows)
     figure, grid = style.panels(PAGE, 0.7 + 1.8 * rows, look, rows, 1, sharey=True)
     finite = relative[np.isfinite(relative) & (relative > 0.0)]
-    low = float(finite.min(initial=100.0 * WEAK)) / 2.0
-    high = 1.3 * float(finite.max(initial=100.0 * WEAK))
+    low, high = (float(f(initial=100.0 * WEAK)) for f in (finite.min, finite.max))
+    low, high = 0.5 * low, 1.3 * high
     for row, axes in enumerate(grid[:, 0]):
         some = order[row * each : (row + 1) * each]
         x = np.arange(len(some))
         # a value of zero has an infinite relative standard error: full bar
-        height = np.clip(np.where(np.isfinite(relative[some]), relative[some], high), low, None)
+        height = np.clip(relative[some], low, high)
         weak = relative[some] > 100.0 * WEAK
         for k, (mask, label) in enumerate(((~weak, "determined"), (weak, "poorly determined"))):
             if mask.any():
                 axes.bar(x[mask], height[mask] - low, 0.7, low, color=PALETTE[k], label=label)
         axes.hlines(white[some], x - 0.42, x + 0.42, color=INK, label="if residuals were white")
         axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
-        axes.set_yscale("log")
-        axes.set_ylim(low, high)
+        axes.set(yscale="log", ylim=(low, high))
         style.plain_logarithmic(axes.yaxis)
         axes.set_xlim(-0.8, each - 0.2)
         axes.set_xticks(x, [found.names[k] for k in some], rotation=90)
@@ -353,8 +340,7 @@ def _draw_search(left: Axes, right: Axes, found: ExcitingTrajectory) -> None:
             right.hlines(np.median(values), k - 0.32, k + 0.32, color=INK)
     right.set_xlim(-0.6, 2.6)
     right.set_xticks(range(3), [word for word, _, _ in groups])
-    right.set_ylabel("condition number" if ratio else "minus log det")
-    right.set_title("line: median")
+    right.set(ylabel="condition number" if ratio else "minus log det", title="line: median")
     for axes in (left, right) if ratio else ():
         axes.set_yscale("log")
         style.plain_logarithmic(axes.yaxis, 8)

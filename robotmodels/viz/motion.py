@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, as_vector
+from .._arrays import Array, as_number, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..trajectories.joint_path import JointPath
 from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
@@ -73,11 +73,11 @@ def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
         raise InvalidValueError(
             f"dt, fps: both give the time between samples: give one of them, got {dt} and {fps}."
         )
-    name, value = ("dt", dt) if dt is not None else ("fps", _FPS if fps is None else fps)
-    value = float(as_vector([value], 1, name)[0])  # type: ignore[list-item]
-    if value <= 0:
-        raise InvalidValueError(f"{name}: expected a positive number, got {value}.")
-    return (value if name == "dt" else 1.0 / value) * np.arange(count, dtype=np.float64)
+    if dt is None:
+        step = 1.0 / as_number(_FPS if fps is None else fps, "fps", above=0.0)
+    else:
+        step = as_number(dt, "dt", above=0.0)
+    return step * np.arange(count, dtype=np.float64)
 
 
 def timed_samples(

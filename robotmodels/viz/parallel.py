@@ -156,7 +156,10 @@ def plot_assembly_modes(
     rows, flat = -(-len(T) // wide), 2 not in robot.columns
     tall = 0.3 + rows * PAGE / wide * (1.0 if flat else 1.1)
     figure, places = style.panels(PAGE, tall, look, rows, wide)
-    base, view = np.broadcast_to(robot.base, (len(T), robot.m, 3)), _view(flat)
+    a, e = np.deg2rad([-60.0, 22.0])
+    above = (-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e))
+    view = np.eye(2, 3) if flat else np.array(((-np.sin(a), np.cos(a), 0.0), above))
+    base = np.broadcast_to(robot.base, (len(T), robot.m, 3))
     anchors = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
     paths = np.stack((base, _knees(robot, T), anchors), axis=2) @ view.T
     low, high = paths.min(axis=(0, 1, 2)), paths.max(axis=(0, 1, 2))
@@ -276,13 +279,3 @@ def _knees(robot: ParallelRobot, T: Array) -> Array:
         away = np.abs(np.exp(1j * every[0][:, None]) - np.exp(1j * every[-1])).max(axis=-1)
         q = every[0, [np.nanargmin(np.nanmin(away, axis=1))]]
     return np.broadcast_to(knees(robot, q), (len(T), robot.m, 3))
-
-
-def _view(flat: bool) -> Array:
-    """Projection on the picture, shape (2, 3)."""
-    if flat:
-        return np.eye(2, 3)
-    a, e = np.deg2rad([-60.0, 22.0])
-    return np.array(
-        ((-np.sin(a), np.cos(a), 0.0), (-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)))
-    )

@@ -35,6 +35,7 @@ from base64 import b64encode
 from collections.abc import Callable, Iterable
 from functools import partial
 from html import escape
+from inspect import cleandoc
 from io import BytesIO
 from pathlib import Path
 from string import Template
@@ -54,43 +55,19 @@ from .processing import plot_processing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_RESIDUALS = (
-    "Residuals (predicted minus measured) of each row over the number of the configuration, before "
-    "(nominal table, base and tool fitted) and after; the scales of both sides differ."
-)
-_IN_SPACE = "Errors of position where they were made, magnified as stated; crosses are outliers."
-_NORMALITY = "Residuals in standard deviations: Gaussian ones follow the curve and the line."
-_TORQUES = (
-    "Measured and predicted torques and their difference, with its size relative to the measured "
-    "torque; grey: the joint is in its dead band."
-)
-_EQUATIONS = (
-    "Residuals of the equations, with two standard deviations, and their autocorrelation, with the "
-    "95 % band of white residuals"
-)
-_PARAMETERS = "Parameters with 95 % intervals, as their contributions to the torques of the log."
-_ERRORS = (
-    "Relative standard errors; above the dashed line (30 %) the log does not determine the "
-    "parameter."
-)
-_PROCESSING = (
-    "Spectra of positions and torques, kept and cut off as noise (grey); below, the criteria: the "
-    "bias that noise of the positions causes, and the number of equations."
-)
-
-Drawing = tuple[Callable[..., "Figure"], str]
-"""A function that draws a figure of a result, and the caption of the figure."""
+Drawing = Callable[..., "Figure"]
+"""A function that draws a figure of a result; its summary is the caption."""
 
 
 def html_report(result: CalibrationResult, path: str | Path) -> None:
     """Write the report on a calibration with its figures into one offline file."""
     found = calibration.as_result(result)
     figures: list[Drawing] = [
-        (calibration.plot_calibration_residuals, _RESIDUALS),
-        (calibration.plot_calibration_in_space, _IN_SPACE),
-        (calibration.plot_calibration_parameters, "Corrections with their intervals."),
-        (calibration.plot_calibration_correlations, "Correlations of the estimates."),
-        (calibration.plot_calibration_normality, _NORMALITY),
+        calibration.plot_calibration_residuals,
+        calibration.plot_calibration_in_space,
+        calibration.plot_calibration_parameters,
+        calibration.plot_calibration_correlations,
+        calibration.plot_calibration_normality,
     ]
     title = f"Geometric calibration of {found.nominal.name}"
     _write(path, title, calibration_sections(found), figures, found)
@@ -105,17 +82,14 @@ def identification_html(
     """Write the report on an identification with its figures into one offline file."""
     found = identification.as_result(result, test)
     own = identification
-    held_out: list[Drawing] = [
-        (partial(own.plot_identification_residuals, test=test), f"{_EQUATIONS}, held-out log.")
-    ]
     figures: list[Drawing] = [
-        (partial(own.plot_identification_torques, test=test), _TORQUES),
-        (own.plot_identification_residuals, f"{_EQUATIONS}."),
-        *(held_out if test is not None else ()),
-        (own.plot_identification_parameters, _PARAMETERS),
-        (own.plot_identification_standard_errors, _ERRORS),
-        (own.plot_identification_correlations, "Correlations of the estimates."),
-        (plot_processing, _PROCESSING),
+        partial(own.plot_identification_torques, test=test),
+        own.plot_identification_residuals,
+        *([] if test is None else [partial(own.plot_identification_residuals, test=test)]),
+        own.plot_identification_parameters,
+        own.plot_identification_standard_errors,
+        own.plot_identification_correlations,
+        plot_processing,
     ]
     title = f"Dynamic identification of {found.model.name}"
     _write(path, title, identification_sections(found, robot), figures, found)
@@ -133,23 +107,23 @@ def _write(
     text = template.substitute(
         title=escape(title),
         sections="\n".join(map(_section, sections)),
-        figures="\n".join(_figure(draw, caption, result) for draw, caption in figures),
+        figures="\n".join(_figure(draw, result) for draw in figures),
     )
     Path(path).write_text(text, encoding="utf-8")
 
 
-def _figure(draw: Callable[..., Figure], caption: str, result: object) -> str:
-    """A figure of a result as an embedded image with its caption."""
-    buffer = BytesIO()
+def _figure(draw: Drawing, result: object) -> str:
+    """A figure of a result as an embedded image; its caption is the summary of the function."""
+    function, buffer = getattr(draw, "func", draw), BytesIO()
+    caption = escape(cleandoc(function.__doc__ or "").split("\n\n")[0])
+    if function is not draw and "residuals" in function.__name__:
+        caption = f"Held-out log: {caption}"
     try:
         draw(result).savefig(buffer, format="svg", metadata={"Date": None})
     except InvalidValueError as reason:  # such as arrows in space where no position is measured
         return f"<p>{escape(str(reason).removeprefix('result: '))}</p>"
     image = "data:image/svg+xml;base64," + b64encode(buffer.getvalue()).decode("ascii")
-    return (
-        f'<figure><img alt="{escape(caption)}" src="{image}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+    return f'<figure><img alt="{caption}" src="{image}"><figcaption>{caption}</figcaption></figure>'
 
 
 def _section(section: ReportSection) -> str:

@@ -252,12 +252,17 @@ def draw_ellipsoids(
         own = [(k, e) for k, e in enumerate(ellipsoids, 1) if e.quantity is quantity]
         if not own:
             continue
-        s = scale or _scale(quantity, np.array([e.radii for _, e in own]), size)
+        every = np.array([e.radii for _, e in own])
+        every = every[np.isfinite(every) & (every > 0)]
+        longest = float(every.max(initial=0.0)) or 1.0
+        if quantity in _FORCES and every.size:  # near singular positions they grow without bound
+            longest = min(longest, _LONGEST * float(every.min()))
+        s = scale or (rounded_down(_REACH * size / longest) if every.size else 1.0)
         beyond = ""
         for k, ellipsoid in own:
             radii = ellipsoid.radii * s
             finite = float(np.max(radii, where=np.isfinite(radii), initial=0.0))
-            longest = _CUT * size if scale is None else max(_CUT * size, 1.3 * finite)
+            longest = max(_CUT * size, 0.0 if scale is None else 1.3 * finite)
             cut = radii > longest * (1.0 + 1e-9)
             beyond = ", continues along its axes" if cut.any() else beyond
             ends = np.where(cut, longest * _BEYOND / _CUT, radii)
@@ -269,17 +274,6 @@ def draw_ellipsoids(
         text = f"{quantity.value}: {s:g} m drawn per {quantity.unit}{beyond}"
         legend.append((text, (*color[:3], 1.0)))
     return nodes, np.concatenate(points), tuple(legend)
-
-
-def _scale(quantity: EllipsoidQuantity, radii: Array, size: float) -> float:
-    """Metres per unit, a round number, with which the longest radius suits the robot."""
-    finite = radii[np.isfinite(radii) & (radii > 0)]
-    if not finite.size:
-        return 1.0
-    longest = float(finite.max())
-    if quantity in _FORCES:  # near singular positions they grow without bound
-        longest = min(longest, _LONGEST * float(finite.min()))
-    return rounded_down(_REACH * size / longest)
 
 
 def _ellipsoid_nodes(

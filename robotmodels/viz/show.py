@@ -262,13 +262,11 @@ def _as_models(model: object) -> tuple[RobotModel, ...]:
     """One model or several, as a tuple."""
     models = (model,) if isinstance(model, RobotModel) else model
     if not isinstance(models, (tuple, list)) or not models:
-        raise InvalidValueError(
-            f"model: expected a RobotModel or a list of them, got {type(model).__name__}."
-        )
+        models = (models,)
     for item in models:
         if not isinstance(item, RobotModel):
             raise InvalidValueError(
-                f"model: expected a RobotModel, got {type(item).__name__} in the list."
+                f"model: expected a RobotModel or a list of them, got {type(item).__name__}."
             )
     return tuple(models)
 

@@ -155,13 +155,9 @@ def _joint(
 
 
 def _limits(lower: float, upper: float, ends: tuple[float, float], prismatic: bool) -> str:
-    """The limits in words; where one is missing, the range of the slider."""
+    """The range of a slider, and which limits of the joint it is not."""
     unit, factor = ("m", 1.0) if prismatic else ("deg", 180.0 / np.pi)
     low, high = (f"{end * factor:.5g}" for end in ends)
-    if np.isfinite(lower) and np.isfinite(upper):
-        return f"{low} to {high} {unit}"
-    if np.isfinite(lower):
-        return f"from {low} {unit}, no upper limit, slider to {high} {unit}"
-    if np.isfinite(upper):
-        return f"up to {high} {unit}, no lower limit, slider from {low} {unit}"
-    return f"no limits, slider {low} to {high} {unit}"
+    missing = [w for w, x in (("lower", lower), ("upper", upper)) if not np.isfinite(x)]
+    none = {0: "", 1: f", no {missing[0]} limit" if missing else "", 2: ", no limits"}
+    return f"{low} to {high} {unit}{none[len(missing)]}"

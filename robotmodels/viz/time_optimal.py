@@ -31,12 +31,12 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_reals
+from .._arrays import as_floats, as_reals
 from ..dynamics import idm
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
@@ -76,8 +76,7 @@ def plot_phase_plane(
         curve = np.where(most <= top, most, np.nan)
         above.plot(s, curve, color=PALE, label="maximum velocity curve", **DASHED)
     above.plot(s, rate, color=INK, label="quickest motion")
-    above.set_ylim(0.0, top)
-    above.set_ylabel("rate s′ (1/s)")
+    above.set(ylim=(0.0, top), ylabel="rate s′ (1/s)")
     names = sorted(set(timed.active.tolist()) - {""}, key=lambda name: (len(name), name))
     for k, name in enumerate(names):
         here = (timed.active == name)[:-1]
@@ -86,8 +85,7 @@ def plot_phase_plane(
     below.set_ylim(0.0, 1.0)
     below.set_yticks([])
     below.grid(False)
-    below.set_xlabel("path parameter s")
-    below.set_xlim(s[0], s[-1])
+    below.set(xlabel="path parameter s", xlim=(s[0], s[-1]))
     return style.finished(figure, look, ["quickest motion", "maximum velocity curve", *names])
 
 
@@ -116,7 +114,15 @@ def plot_plan(
     symbols = dict.fromkeys(kind.value for kind in kinds)
     left[0].set_ylabel(f"position ({' or '.join(symbols)})")
     if model is not None:
-        bound = _torque_limits(model, torque)
+        bound = model.table.effort if torque is None else as_reals(torque, "torque")
+        if bound.shape not in ((), (n,)):
+            raise ShapeError(f"torque: expected shape () or ({n},), got {bound.shape}.")
+        if not (bound > 0.0).all() or np.isinf(bound).all():
+            raise InvalidValueError(
+                f"torque: expected positive limits, some of them finite, got {bound}; give torque= "
+                "where the model has none."
+            )
+        bound = np.broadcast_to(bound, (n,))
         some = np.flatnonzero(np.isfinite(bound)).tolist()
         share = idm(model, seen.q, seen.v, seen.a)[:, some] / bound[some]
         over_time.lines_over_time(left[1], t, share, [names[j] for j in some], some)
@@ -133,22 +139,8 @@ def plot_plan(
     right.plot(count[shown], cost[shown], ".", color=PALE, markersize=1.5, label="candidates")
     right.plot(count, best, color=INK, label="least cost")
     right.axhline(plan.cost, color=ALERT, label="checked motion", **DASHED)
-    right.set_xlabel("evaluations")
-    right.set_ylabel("cost")
+    right.set(xlabel="evaluations", ylabel="cost")
     return style.finished(figure, look, names)
-
-
-def _torque_limits(model: RobotModel, torque: ArrayLike | None) -> Array:
-    """Limits of torque, at least one of them finite. Shapes: -> (n,)."""
-    bound = model.table.effort if torque is None else as_reals(torque, "torque")
-    if bound.shape not in ((), (model.n,)):
-        raise ShapeError(f"torque: expected shape () or ({model.n},), got {bound.shape}.")
-    if not (bound > 0.0).all() or np.isinf(bound).all():
-        raise InvalidValueError(
-            f"torque: expected positive limits, some of them finite, got {bound}; give torque= "
-            "where the model has none."
-        )
-    return np.broadcast_to(bound, (model.n,))
 
 
 @style.plot
@@ -168,13 +160,21 @@ def plot_joint_motion(
     margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
     at a limit.
     """
-    style.as_instance(model, RobotModel, "model", "")
+    names = over_time.joint_names(None, style.as_instance(model, RobotModel, "model", "").n, model)
     times = as_floats(t, "t")
     if times.ndim != 1 or not times.size:
         raise ShapeError(f"t: expected shape (N,) with N at least 1, got {times.shape}.")
-    motions = _motions(q, times.size, model.n)
+    motions, shape = {}, (times.size, model.n)
+    given = style.as_named(q if isinstance(q, Mapping) else [q], None, "q", "motion")
+    for name, values in given.items():
+        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
+        motions[name] = as_reals(values, where)
+        if motions[name].shape != shape or np.isinf(motions[name]).any():
+            raise ShapeError(
+                f"{where}: expected positions of shape {shape}, finite or NaN for a gap, got "
+                f"shape {motions[name].shape}."
+            )
     labels = list(motions) if len(motions) > 1 else ["_motion"]
-    names = over_time.joint_names(None, model.n, model)
     units = over_time.joint_units(None, model.n, model, degrees)
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
     count = model.n + bool(bounded.any())
@@ -182,9 +182,8 @@ def plot_joint_motion(
     figure, order = style.panel_list(count, wide, 0.95, look)
     for j, (axes, unit) in enumerate(zip(order, units, strict=False)):
         k = unit.factor
-        over_time.lines_over_time(
-            axes, times, k * np.stack([v[:, j] for v in motions.values()], 1), labels
-        )
+        lines = k * np.stack([values[:, j] for values in motions.values()], axis=1)
+        over_time.lines_over_time(axes, times, lines, labels)
         _draw_range(axes, k * float(model.lower[j]), k * float(model.upper[j]))
         axes.set_title(f"{names[j]} ({unit.value})", loc="left")
     if bounded.any():
@@ -225,22 +224,3 @@ def _shade_beyond(axes: Axes, lower: float, upper: float) -> None:
             axes.axhspan(*ends, facecolor=ALERT, alpha=0.16, linewidth=0.0, label=BEYOND)
             axes.axhline(limit, color=INK, zorder=1.5, label=LIMIT, **DASHED)
     axes.set_ylim(low, high)
-
-
-def _motions(q: Any, N: int, n: int) -> dict[str, Array]:
-    """Positions of each motion, NaN where they are missing. Shapes: -> (N, n) each."""
-    motions = {}
-    for name, values in style.as_named(
-        q if isinstance(q, Mapping) else [q], None, "q", "motion"
-    ).items():
-        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
-        array = as_reals(values, where)
-        if array.shape != (N, n):
-            raise ShapeError(
-                f"{where}: expected positions of shape ({N}, {n}) for {N} times and {n} joints, "
-                f"got {array.shape}."
-            )
-        if np.isinf(array).any():
-            raise InvalidValueError(f"{where}: expected finite positions, or NaN for a gap.")
-        motions[name] = array
-    return motions

@@ -100,21 +100,19 @@ def plot_trajectory(
     """
     motion = over_time.sampled(trajectory)
     n = motion.n
-    labels, kinds = over_time.joint_names(names, n, model), over_time.joint_units(units, n, model)
+    labels = over_time.joint_names(names, n, model)
+    columns = over_time.joints_by_unit(over_time.joint_units(units, n, model))
     bounds, shown = over_time.as_limits(limits, n), over_time.as_orders(orders)
-    columns = over_time.joints_by_unit(kinds)
     if n == 1 and names is None and model is None:
         labels = ["_joint"]  # one line needs no legend
     width, height = COLUMN if len(columns) == 1 else PAGE, 0.55 + 1.05 * len(shown) + 0.02 * n
     figure, grid = style.panels(width, height, look, len(shown), len(columns), sharex=True)
-    for column, (unit, joints) in enumerate(columns.items()):
-        for row, order in enumerate(shown):
-            over_time.quantity_over_time(
-                grid[row, column], motion, order, joints, unit, labels, bounds
-            )
+    for column, (unit, joints) in zip(grid.T, columns.items(), strict=True):
+        for axes, order in zip(column, shown, strict=True):
+            over_time.quantity_over_time(axes, motion, order, joints, unit, labels, bounds)
             if breakpoints:
-                over_time.mark_breaks(grid[row, column], motion, order, joints, unit)
-        grid[-1, column].set_xlabel("time (s)")
+                over_time.mark_breaks(axes, motion, order, joints, unit)
+        column[-1].set_xlabel("time (s)")
     return style.finished(figure, look, labels)
 
 
@@ -140,16 +138,14 @@ def plot_profiles(
     width, height = COLUMN if columns == 1 else PAGE, 0.75 + 1.05 * len(shown)
     figure, grid = style.panels(width, height, look, len(shown), columns, sharex=True, sharey="row")
     for k, (name, motion) in enumerate(motions.items()):
-        column = k if side_by_side else 0
+        column = grid[:, k if side_by_side else 0]
         bounds, duration = over_time.as_limits(limits, motion.n), f"{motion.duration:.4g} s"
         label = {j: f"{'_' * side_by_side}{name}, {duration}"}
-        for row, order in enumerate(shown):
-            over_time.quantity_over_time(
-                grid[row, column], motion, order, [j], kind, label, bounds, [k]
-            )
+        for axes, order in zip(column, shown, strict=True):
+            over_time.quantity_over_time(axes, motion, order, [j], kind, label, bounds, [k])
         if side_by_side:
-            grid[0, column].set_title(style.wrapped(f"{name}\n{duration}", width / columns))
-        grid[-1, column].set_xlabel("time (s)")
+            column[0].set_title(style.wrapped(f"{name}\n{duration}", width / columns))
+        column[-1].set_xlabel("time (s)")
     for axes in grid.flat:
         axes.label_outer()
     return style.finished(figure, look)
@@ -191,7 +187,14 @@ def plot_joint_path(
     *above, lowest = grid[:, 0]
     for axes, (order, unit, joints) in zip(above, rows, strict=False):
         over_time.quantity_over_time(axes, motion, order, joints, unit, labels, bounds)
-    _draw_conditioning(above[-1], x, path.conditioning)
+    least = float(np.nanmin(np.append(path.conditioning, 1.0)))
+    shown = np.maximum(path.conditioning, _LEAST)
+    above[-1].plot(x, shown, color=INK, linewidth=1.0, label="_conditioning")
+    above[-1].set_ylabel("conditioning\n(1)")
+    if least < 0.02:
+        above[-1].set(yscale="log", ylim=(max(0.5 * least, _LEAST), 1.5))
+    else:
+        above[-1].set_ylim(0.0, None)
     lowest.set_yticks(range(len(happens)), [_EVENTS[kind][0] for kind in happens])
     lowest.set_ylim(max(len(happens), 1) - 0.4, -0.6)
     lowest.grid(False, axis="y")
@@ -203,17 +206,6 @@ def plot_joint_path(
         style.note(lowest, "no events on the path")
     lowest.set_xlabel("time (s)" if timed else "number of the pose")
     return style.finished(figure, look, labels)
-
-
-def _draw_conditioning(axes: Axes, x: Array, conditioning: Array) -> None:
-    """The conditioning, on a logarithmic scale where it comes near zero."""
-    axes.plot(x, np.maximum(conditioning, _LEAST), color=INK, linewidth=1.0, label="_conditioning")
-    axes.set_ylabel("conditioning\n(1)")
-    least = float(np.nanmin(np.append(conditioning, 1.0)))
-    if least < 0.02:
-        axes.set(yscale="log", ylim=(max(0.5 * least, _LEAST), 1.5))
-    else:
-        axes.set_ylim(0.0, None)
 
 
 def _draw_event(

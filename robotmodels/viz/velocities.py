@@ -226,7 +226,11 @@ def plot_ellipsoids(
     figure, grid = style.panels(PAGE, 0.35 + 2.35 * len(rows), look, len(rows), len(_PLANES))
     for row, own in zip(grid, rows, strict=True):
         quantity = own[0].quantity
-        half = _shown(np.array([e.radii for e in own]))
+        radii = np.array([e.radii for e in own])
+        finite = radii[np.isfinite(radii) & (radii > 0)]
+        half = 1.15 * float(finite.max(initial=0.0)) or 1.0
+        if not np.isfinite(radii).all() and finite.size:
+            half = min(half, 1.15 * _LONGEST * float(finite.min()))
         for axes, plane in zip(row, _PLANES, strict=True):
             for k, ellipsoid in enumerate(own):
                 _draw_projection(axes, ellipsoid, plane, half, k, names[k])
@@ -234,13 +238,6 @@ def plot_ellipsoids(
             axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel=x, ylabel=y)
             axes.locator_params(nbins=5)
     return style.finished(figure, look)
-
-
-def _shown(radii: Array) -> float:
-    """Half the width of a picture that holds the bounded radii."""
-    finite = radii[np.isfinite(radii) & (radii > 0)]
-    longest, least = (finite.max(), finite.min()) if finite.size else (1.0, 1.0)
-    return 1.15 * float(longest if np.isfinite(radii).all() else min(longest, _LONGEST * least))
 
 
 def _draw_projection(

@@ -85,7 +85,7 @@ def plot_servo(run: ServoMotion, **look: Unpack[Look]) -> Figure:
         line = {"color": PALETTE[k % 3], "linestyle": "-" if k < 3 else "--", "linewidth": 1.1}
         speeds.plot(run.t, run.velocity[:, k], label=name, **line)
     speeds.set(xlabel="time (s)", ylabel="camera velocity")
-    places, track = object_points(run), run.cameras[:, :3, 3]
+    places, track = apply(run.cameras[0] @ run.T[0], _corners(run)), run.cameras[:, :3, 3]
     points = np.concatenate((track, places))
     axes = space(figure, (2, 2, 4), points, Unit.METRE, across(points))
     axes.plot(*track.T, color=INK, linewidth=1.2)
@@ -105,7 +105,7 @@ def show_servo(
 ) -> Scene:
     """Scene with the object, the camera's view and path, the robot, and the image beside."""
     style.as_instance(run, ServoMotion, "run", "servo")
-    places, track = object_points(run), run.cameras[:, :3, 3]
+    places, track = apply(run.cameras[0] @ run.T[0], _corners(run)), run.cameras[:, :3, 3]
     points = np.concatenate((places, track))
     nodes, motion, path, first = list[Node](), None, "camera", run.cameras[0]
     if model is not None and run.q is not None:
@@ -144,11 +144,6 @@ def frustum(camera: Sensor | None, depth: float) -> Array:
     far = depth * np.c_[corners, np.ones(4)]
     sides = np.stack((np.zeros((4, 3)), far), axis=1)
     return np.concatenate((sides, np.stack((far, np.roll(far, -1, axis=0)), axis=1))).reshape(-1, 3)
-
-
-def object_points(run: ServoMotion) -> Array:
-    """Points of the object in the world at the start. Shapes: -> (m, 3)."""
-    return apply(run.cameras[0] @ run.T[0], _corners(run))
 
 
 def image_paths(run: ServoMotion) -> tuple[Array, Array | None]:

@@ -1317,7 +1317,7 @@ MUTATIONS = [
         "values = np.full(len(found.names), np.nan)", "return values - moved", "return values",
         f"{FITS} -k known_truth"),
     Mutation("viz: fits", "envelopes of long signals lose their upper peaks", "def _envelope(",
-        "groups.argmax(axis=1)", "groups.argmin(axis=1)", f"{FITS} -k torques_are_those"),
+        "nan=-np.inf).argmax", "nan=-np.inf).argmin", f"{FITS} -k torques_are_those"),
     Mutation("viz: fits", "effects are weighted by the standard deviation once",
         "def _effects(", "w * w * (R**2)", "w * (R**2)", f"{FITS} -k effects"),
     Mutation("viz: scenes", "frames stand at the pose of the first one", "def _frames(",
