@@ -2,6 +2,15 @@
 
 A law is a frozen value with ``command(t, q, v, x) -> tau``, its state ``state0``, and ``rate(t, q,
 v, x)``, the derivative of the state; laws that use forces take the measured ``wrench`` last.
+
+Throughout, ``model`` is the robot of n joints as the controller believes it to be. ``reference``
+are positions (n,), or in task space a world pose (4, 4): a motion (`Trajectory`, `PoseTrajectory`),
+a constant, or a function of t that returns (q, v, a) or (T, twist, acceleration). Gains are one
+number, or one for each joint or component of the task (six are those of all components). Errors are
+``e = q_d - q`` of the joints, or ``e = [p_d - p; log(R_d R^T)]`` of the tool in world axes;
+wrenches ``[f; m]`` are those that the tool exerts on the environment, at the tool, in world axes.
+Gains that are not positive, references for another number of joints and arguments of the wrong
+shape raise InvalidValueError or ShapeError.
 """
 
 from .force import ConstrainedDecoupling, ExternalForceLoop, ForceTracking, ParallelHybrid
@@ -19,26 +28,8 @@ from .sliding import SlidingMode, SuperTwisting, first_order
 from .task_laws import Admittance, ComputedTorque, Impedance
 from .walls import SpringWall
 
-__all__ = [
-    "AdaptiveSlotineLi",
-    "Admittance",
-    "ComputedTorque",
-    "ConstrainedDecoupling",
-    "ControlStatus",
-    "ControlledMotion",
-    "DecentralizedPID",
-    "ExternalForceLoop",
-    "ForceTracking",
-    "Impedance",
-    "PDGravity",
-    "PIDGains",
-    "ParallelHybrid",
-    "Passivity",
-    "SlidingMode",
-    "SpringWall",
-    "SuperTwisting",
-    "first_order",
-    "pid_gains",
-    "run",
-    "slotine_li_regressor",
-]
+__all__ = ["AdaptiveSlotineLi", "Admittance", "ComputedTorque", "ConstrainedDecoupling"]
+__all__ += ["ControlStatus", "ControlledMotion", "DecentralizedPID", "ExternalForceLoop"]
+__all__ += ["ForceTracking", "Impedance", "PDGravity", "PIDGains", "ParallelHybrid", "Passivity"]
+__all__ += ["SlidingMode", "SpringWall", "SuperTwisting", "first_order", "pid_gains", "run"]
+__all__ += ["slotine_li_regressor"]

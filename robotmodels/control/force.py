@@ -1,8 +1,5 @@
 """Control of forces: on a mass and a spring, beside positions (hybrid), around a position loop.
 
-Wrenches ``[f; m]`` are those that the tool exerts on the environment, at the tool, in world axes.
-A position error is ``[p_d - p; log(R_d R^T)]``.
-
 Parameters
 ----------
 kp, kv, ke : float or array_like
@@ -30,11 +27,6 @@ inverse : {"consistent", "jacobian"}
 stiffness, gain : float or array_like
     Of the environment as the controller believes it to be, N/m (N m/rad); bandwidth of the external
     loop, 1/s.
-
-Raises
-------
-ShapeError, InvalidValueError
-    As the laws in task space; a selection that is not of zeros and ones.
 
 References
 ----------

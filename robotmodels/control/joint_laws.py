@@ -1,33 +1,34 @@
 """Laws of the joints with constant or adapted gains: PID, PD with gravity, passivity, adaptation.
 
-The error is ``e = q_d - q``; gains are one number or one for each joint. Passivity-based laws have
-``s = e' + slope e = q_r' - q'`` with the reference velocity ``q_r' = q_d' + slope e``.
+Passivity-based laws have ``s = e' + slope e = q_r' - q'`` with the reference velocity
+``q_r' = q_d' + slope e``.
 
 Parameters
 ----------
-reference : Trajectory, array_like (n,) or callable
-    Positions: a motion, a constant, or a function of t that returns (q, v, a).
-model : RobotModel
-    The robot as the controller believes it to be, n joints; adaptive control ignores its inertia.
+reference, model
+    See `robotmodels.control`; adaptive control ignores the inertia of the model.
 kp, ki, kd : float or array_like
     Gains of the error, of its integral and of its rate; ki may be 0.
 slope, gain : float or array_like
     Rate at which the error vanishes where s is 0, 1/s; torque by s, N m s/rad.
 feedforward : RobotModel or array_like (n,), optional
     Constant torques, or a model whose torques of the reference motion are added.
-adaptation : float or array_like, shape (p,)
-    Gains of the estimates.
+adaptation, start : array_like, shape (p,)
+    Gains of the estimates; estimates at the start, default zero.
 parameters : {"base", "standard"}
     Estimated parameters. Standard ones drift along combinations that have no effect.
-start : array_like, shape (p,), optional
-    Estimates at the start; default zero.
 drive : bool or collection of DriveKind or str
     Drive parameters that are estimated, too, as in `torque_regressor`.
+inertia, viscous, omega : float
+    Of a joint, kg m^2 and N m s/rad (kg and N s/m); bandwidth, rad/s, above
+    ``viscous / (3 inertia)``.
+q, v, v_r, a_r : array_like, shape (..., n)
+    Joint variables, rad or m, their velocities, reference velocities and accelerations.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Gains that are not positive; a reference for another number of joints; no model.
+Returns
+-------
+PIDGains or ndarray, shape (..., n, p)
+    Of `slotine_li_regressor` with columns as `parameter_names`.
 
 References
 ----------
@@ -39,6 +40,9 @@ Examples
 --------
 >>> DecentralizedPID([0.5, 0.2], kp=100.0, ki=50.0, kd=20.0).command(0, [0, 0], [0, 0], [0, 0])
 array([50., 20.])
+>>> gains = pid_gains(inertia=2.0, viscous=1.0, omega=5.0)
+>>> gains.kp, gains.kd, gains.ki, gains.margin
+(150.0, 29.0, 250.0, 9.0)
 >>> from robotmodels.robots import load
 >>> AdaptiveSlotineLi([0, 0], 5.0, 10.0, 1.0, model=load("planar_2r"), drive=False).names
 ('ZZ1', 'ZZ2', 'MX2', 'MY2')
@@ -80,10 +84,7 @@ class PIDGains(Value):
 
     @property
     def poles(self) -> NDArray[Any]:
-        """Poles of the controlled joint, 1/s, shape (3,): unstable with a positive real part.
-
-        They are the roots of ``inertia s^3 + (kd + viscous) s^2 + kp s + ki``.
-        """
+        """Poles of the controlled joint, 1/s, shape (3,): unstable with a positive real part."""
         return np.roots([self.inertia, self.kd + self.viscous, self.kp, self.ki])
 
     @property
@@ -102,22 +103,6 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     """Gains of a PID controller that give a joint a triple pole at -omega.
 
     ``kp = 3 inertia omega^2``, ``kd = 3 inertia omega - viscous``, ``ki = inertia omega^3``.
-
-    Parameters
-    ----------
-    inertia, viscous, omega : float
-        Inertia and viscous friction of the joint, kg m^2 and N m s/rad (kg and N s/m); bandwidth,
-        rad/s, above ``viscous / (3 inertia)``.
-
-    Returns
-    -------
-    PIDGains
-
-    Examples
-    --------
-    >>> gains = pid_gains(inertia=2.0, viscous=1.0, omega=5.0)
-    >>> gains.kp, gains.kd, gains.ki, gains.margin
-    (150.0, 29.0, 250.0, 9.0)
     """
     a, w = as_number(inertia, "inertia", above=0.0), as_number(omega, "omega", above=0.0)
     f = as_number(viscous, "viscous", least=0.0)
@@ -202,8 +187,7 @@ class PDGravity(JointLaw):
     """PD control with gravity compensation (Takegaki and Arimoto), PD+ for motions (Paden, Panja).
 
     ``tau = A(q) q_d'' + C(q, q') q_d' + Q(q) + kp e + kd e'``. Friction of the drives is not
-    compensated: at a set point it dissipates as kd does. Without a model nothing is compensated,
-    and there is no Lyapunov function.
+    compensated. Without a model nothing is, and there is no Lyapunov function.
     """
 
     reference: Any
@@ -260,29 +244,7 @@ def slotine_li_regressor(
     a_r: ArrayLike,
     drive: Drives = True,
 ) -> Array:
-    """Regressor of ``A a_r + C(q, v) v_r + Q``, with the friction of the drives at v.
-
-    Parameters
-    ----------
-    model, drive
-        The robot, whose inertia is not used, and its drive parameters with columns.
-    q, v, v_r, a_r : array_like, shape (..., n)
-        Joint variables (rad or m), their velocities, reference velocities and accelerations; the
-        leading axes broadcast.
-
-    Returns
-    -------
-    ndarray, shape (..., n, p)
-        Columns as `parameter_names`.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> Y = slotine_li_regressor(one, [0.0], [3.0], [1.0], [2.0])
-    >>> dict(zip(parameter_names(one), Y[0].tolist(), strict=True))["ZZ1"]
-    2.0
-    """
+    """Regressor of ``A a_r + C(q, v) v_r + Q``, with the friction of the drives at v."""
     check_model(model)
     given = {"q": q, "v": v, "v_r": v_r, "a_r": a_r}
     vectors = tuple(as_vector(x, model.n, name) for name, x in given.items())

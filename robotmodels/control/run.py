@@ -45,20 +45,16 @@ class ControlledMotion(Frozen, Value):
 
     Parameters
     ----------
-    law : object
-        The control law.
-    simulation : Simulation
-        The motion of the plant, N samples, n joints.
+    law, simulation : object and Simulation
+        The control law; the motion of the plant, N samples, n joints.
     error : ndarray, shape (N, k)
         Error of the law: desired less actual joints, components of the task, or forces.
     wrench : ndarray, shape (N, 6)
         Wrench ``[f; m]`` of the tool on the environment, world axes.
     lyapunov : ndarray, shape (N,), or None
         Lyapunov function of the law, None if it has none.
-    status : ControlStatus
-        Outcome.
-    notes : tuple of str
-        Sentences that explain it.
+    status, notes : ControlStatus and tuple of str
+        Outcome, and sentences that explain it.
     """
 
     law: Any
@@ -146,12 +142,11 @@ def run(
     disturbance : callable or array_like (n,), optional
         Torques that act on the joints, a function of (t, q, v) or constant.
     period, delay : float, optional
-        Sampling period of the law, default continuous; time from a sample to its torque, s.
-    noise : float or array_like, optional
+        Sampling period of the law, default continuous, which laws that switch need; time from a
+        sample to its torque, s.
+    noise, rng : float or array_like; int or Generator, optional
         Standard deviation of what is measured at samples: one number for positions and velocities,
-        or two, or three with that of wrenches.
-    rng : int or Generator, optional
-        Seed of the noise.
+        or two, or three with that of wrenches; seed.
     **options
         ``method`` (``"Radau"`` for stiff walls), ``max_evaluations``, ``progress`` of `simulate`.
 
@@ -159,12 +154,6 @@ def run(
     -------
     ControlledMotion
         Motion, errors, torques, wrenches and the status.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong shape; a law for another number of joints, or one that switches, in
-        continuous time; a delay as long as the run; noise without rng or period.
 
     References
     ----------

@@ -6,24 +6,28 @@ acceleration ``q_d'' + slope e' + u``, so that ``s' = -u`` up to disturbances, w
 
 Parameters
 ----------
-reference : Trajectory, array_like (n,) or callable
-    Positions: a motion, a constant, or a function of t that returns (q, v, a); None for the
-    scalar law alone, see `first_order`.
+reference, model
+    See `robotmodels.control`; reference None is the scalar law alone, for `first_order`.
 slope : float or array_like
     Rate at which the error vanishes on the surface, 1/s.
-gain : float or array_like
-    Of the first order: larger than every disturbance, in the unit of u.
-layer : float or array_like
-    Half width of the boundary layer, rad/s (m/s); 0 switches, and needs a sampling period.
+gain, layer : float or array_like
+    Of the first order: larger than every disturbance, in the unit of u; half width of the boundary
+    layer, rad/s (m/s), of which 0 switches, and needs a sampling period.
 k1, k2 : float or array_like
     Gains of the root and of the integral of super-twisting.
-model : RobotModel, optional
-    The robot as the controller believes it to be.
+law : SlidingMode, SuperTwisting or callable
+    Of `first_order`: a law, whose integral starts at zero, or a function of s.
+s0 : array_like, shape (...)
+    Start, of any shape: all entries are independent.
+disturbance : callable or array_like, optional
+    Function of t, or constant; its answers broadcast with s0, as the gains do.
+t, step : float
+    Duration and step, s.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Gains that are not positive; a reference for another number of joints.
+Returns
+-------
+ndarray, shape (N + 1, ...)
+    s at the multiples of the step, N = t / step.
 
 References
 ----------
@@ -33,8 +37,8 @@ Examples
 --------
 >>> SlidingMode([0.0], slope=5.0, gain=2.0, layer=0.1).command(0.0, [0.01], [0.0])
 array([-1.])
->>> SuperTwisting([0.0], slope=5.0, k1=2.0, k2=1.0).rate(0.0, [0.0], [-0.25], [0.5])
-array([1.])
+>>> first_order(SlidingMode(None, slope=1.0, gain=2.0), 1.0, 0.5, t=1.0, step=0.25)
+array([ 1.   ,  0.625,  0.25 , -0.125,  0.5  ])
 """
 
 from __future__ import annotations
@@ -139,29 +143,7 @@ def first_order(
     t: float,
     step: float,
 ) -> Array:
-    """Scalar sliding mode ``s' = law(s) + disturbance(t)`` by explicit Euler steps.
-
-    Parameters
-    ----------
-    law : SlidingMode, SuperTwisting or callable
-        A law, whose integral starts at zero, or a function of s.
-    s0 : array_like, shape (...)
-        Start, of any shape: all entries are independent.
-    disturbance : callable or array_like, optional
-        Function of t, or constant; its answers broadcast with s0, as the gains do.
-    t, step : float
-        Duration and step, s.
-
-    Returns
-    -------
-    ndarray, shape (N + 1, ...)
-        s at the multiples of the step, N = t / step.
-
-    Examples
-    --------
-    >>> first_order(SlidingMode(None, slope=1.0, gain=2.0), 1.0, 0.5, t=1.0, step=0.25)
-    array([ 1.   ,  0.625,  0.25 , -0.125,  0.5  ])
-    """
+    """Scalar sliding mode ``s' = law(s) + disturbance(t)`` by explicit Euler steps."""
     h, end = as_number(step, "step", above=0.0), as_number(t, "t", least=0.0)
     if end / h > _MOST_STEPS:
         raise InvalidValueError(f"step: {h:.3g} s would take more than {_MOST_STEPS} steps.")

@@ -1,16 +1,9 @@
 """Laws that linearise the robot: computed torque, impedance and admittance.
 
-Errors are ``e = q_d - q`` of the joints, or ``e = [p_d - p; log(R_d R^T)]`` of the tool in world
-axes; f is the wrench that the tool exerts on the environment. Gains are one number, or one for each
-joint or component (six are those of all components).
-
 Parameters
 ----------
-reference : Trajectory, PoseTrajectory, array_like or callable
-    Positions (n,), or in task space a world pose (4, 4): a motion, a constant, or a function of t
-    that returns (q, v, a) or (T, twist, acceleration), evaluated at t = 0 when the law is made.
-model : RobotModel
-    The robot as the controller believes it to be, n joints; friction of its drives is compensated.
+reference, model
+    See `robotmodels.control`; friction of the model's drives is compensated.
 mask : array_like, shape (6,), optional
     Components of the task, m <= n; default the first that the robot moves independently. Joint
     motions of no effect on them are damped.
@@ -18,12 +11,6 @@ M, B, K : float or array_like
     Mass (kg, kg m^2), damping (N s/m, N m s/rad) and stiffness (N/m, N m/rad) of the tool.
 frame : str or int, optional
     The frame that is moved; default the tool.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Gains that are not positive; a reference for another number of joints; more components than
-    joints; no model.
 
 References
 ----------

@@ -109,14 +109,10 @@ def program(
 
     Raises
     ------
-    InvalidValueError
-        An unknown model or choice; an argument that the model does not have; an arm without a plan
-        for ``"igm"``.
-    FrameNotFoundError
-        No such frame.
-    SingularMassMatrixError, InertiaError
-        `ddm` with numbers of a robot whose mass matrix is singular in every configuration. Code
-        divides by its pivots and does not check them.
+    InvalidValueError, FrameNotFoundError, SingularMassMatrixError
+        Unknown choices, arguments that the model does not have, arms without a plan for ``"igm"``;
+        `ddm` of a robot whose mass matrix is singular in every configuration: code divides by its
+        pivots and does not check them.
 
     Notes
     -----

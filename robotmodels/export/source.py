@@ -27,22 +27,10 @@ _SIGN = {"add": " + ", "sub": " - ", "mul": "*", "div": "/"}
 class Program:
     """A model as straight-line code, made by `program`. Read-only, picklable, equal by value.
 
-    Parameters
-    ----------
-    name : str
-        Name of the function in generated code.
-    kind : str
-        The model, such as ``"idm"``.
-    inputs : tuple of (name, shape)
-        In the order of the arguments.
-    elements, values : tuple of tuple
-        Names of the elements of inputs that are parameters, and their values in the model.
-    outputs : tuple of (name, shape)
-        In the order of the results.
-    notes : tuple of str
-        The header: conventions, units, identifiers that differ from the names given.
-    operations : Operations
-        The tape.
+    ``name`` is that of the function in generated code, ``kind`` the model; ``inputs`` and
+    ``outputs`` are (name, shape) in the order of arguments and results; ``elements`` and ``values``
+    name the elements of inputs that are parameters, with their values in the model; ``notes`` are
+    the header, ``operations`` the tape.
 
     Examples
     --------
@@ -75,18 +63,7 @@ class Program:
         return tuple(_lines(self, LANGUAGES["python"])[0])
 
     def __call__(self, *inputs: ArrayLike) -> Array | tuple[Array, ...]:
-        """Run the tape, for checks; leading axes of the inputs are batch axes.
-
-        Parameters
-        ----------
-        *inputs : array_like
-            In the order of `inputs`.
-
-        Returns
-        -------
-        ndarray or tuple of ndarray
-            The output, or the outputs in their order.
-        """
+        """Outputs of the tape, for checks; leading axes of the inputs are batch axes."""
         if len(inputs) != len(self.inputs):
             names = ", ".join(f"{p.name} {p.shape}" for p in self.inputs)
             raise InvalidValueError(
@@ -118,15 +95,8 @@ class Program:
     def code(self, language: str = "c") -> str:
         """Source text of one file.
 
-        Parameters
-        ----------
-        language : {"c", "python", "numpy", "casadi", "matlab"}
-            C99; plain Python; NumPy with batch axes; CasADi; MATLAB.
-
-        Returns
-        -------
-        str
-            One function, self-contained, the same text every time.
+        ``"c"`` (C99), ``"python"`` (plain), ``"numpy"`` (batch axes), ``"casadi"`` or ``"matlab"``:
+        one function, self-contained, the same text every time.
         """
         return _file(self, check_choice(str(language).lower(), LANGUAGES, "language"))
 
@@ -147,11 +117,6 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
         The file; ``.c``, ``.py`` and ``.m`` are C, plain Python and MATLAB.
     language : str, optional
         One of those of `Program.code`; needed for NumPy, CasADi and other suffixes.
-
-    Raises
-    ------
-    InvalidValueError
-        Neither a known suffix nor a language; a file that cannot be written.
 
     Examples
     --------

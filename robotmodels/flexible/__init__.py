@@ -1,7 +1,24 @@
-"""Flexible robots (chapter 7): elastic links and joints, their dynamics and control."""
+"""Flexible robots (chapter 7): elastic links and joints, their dynamics and control.
+
+Throughout, ``arm`` is a `FlexibleRobot` of n joints and m elastic coordinates; ``q, v, a`` (..., n)
+are positions, velocities and accelerations of its motors, rad or m, ``e, e_v`` (..., m) elastic
+coordinates and their velocities, default zero, ``tau`` (..., n) torques of the motors, N m or N;
+``wrench`` (..., 6) is the force and moment of the tool on the environment at the tool point in
+world axes. Leading axes are batch axes. Arguments of the wrong shape, with NaN or out of range
+raise ShapeError or InvalidValueError; a coordinate that moves no inertia, such as a flexible joint
+without rotor inertia, SingularMassMatrixError.
+"""
 
 from .beams import beam
-from .control import RestStatus, RestToRest, joint_tracking, regulator, rest_to_rest
+from .control import (
+    RestStatus,
+    RestToRest,
+    Shaper,
+    input_shaper,
+    joint_tracking,
+    regulator,
+    rest_to_rest,
+)
 from .linear import (
     Deflection,
     DeflectionStatus,
@@ -25,7 +42,6 @@ from .models import (
 from .modes import ReducedModel, craig_bampton, from_modes
 from .references import Elastica, elastica, lumped
 from .robot import FlexibleRobot
-from .shaper import Shaper, input_shaper
 from .simulate import FlexibleMotion, FlexibleMotionStatus, FreeBodyMotion, free_body, simulate
 from .tip import TipStatus, TipTracking, tip_tracking
 

@@ -57,14 +57,12 @@ def beam(
 
     Parameters
     ----------
-    length : float
-        From the root to the tip, m.
+    length, density : float
+        From the root to the tip, m; mass per length, kg/m.
     EI : array_like, shape (2,) or ()
         Bending stiffness about y and z, or both, N m^2; infinite where the beam is rigid.
     GJ : float, optional
         Torsional stiffness, N m^2; default rigid.
-    density : float
-        Mass per length, kg/m.
     tip : float, (mass, inertia) or (mass, com, inertia), optional
         Body fixed to the tip: kg; centre of mass (3,) from the tip, m; inertia about it, kg m^2, a
         number, shape (3,) or (3, 3).
@@ -89,13 +87,7 @@ def beam(
     Returns
     -------
     FlexibleLink
-        The link.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError, InertiaError
-        Stiffness, length or density that is not positive; an unknown kind of ends; a negative
-        number of modes; a tip that is no physical body.
+        The link. A tip that is no physical body raises InertiaError.
 
     References
     ----------

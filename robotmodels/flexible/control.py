@@ -4,8 +4,8 @@ A law is a function of (t, q, v, e, e_v) that `simulate` takes as its ``control`
 
 Parameters
 ----------
-arm : FlexibleRobot
-    The robot, n joints and m elastic coordinates.
+arm
+    See `robotmodels.flexible`.
 kp, kd : array_like, shape () or (n,)
     Positive gains: N m/rad and N m s/rad of `regulator`, 1/s^2 and 1/s of `joint_tracking`, whose
     errors decay with ``s^2 + kd s + kp``.
@@ -13,37 +13,48 @@ q_goal, q0, q1 : array_like, shape (n,)
     Goal (default zero), start and end of the motors, rad or m.
 reference : Trajectory, RestToRest, or callable
     Motion of the motors, or a function of t that returns (q, v, a).
-duration : float
-    Time, s.
+duration, frequency, damping : float
+    Time, s; undamped natural frequency of a vibration, rad/s, and its ratio from 0, below 1.
+kind : str
+    ``"ZV"``: no vibration at the frequency; ``"ZVD"``: nor a derivative by it.
 
 Returns
 -------
-callable or RestToRest
-    The law; the motion with its torques and its status.
-
-Raises
-------
-InvalidValueError, ShapeError
-    Gains or durations that are not positive; goals without equilibrium; a reference of another
-    kind; vectors of another length.
+callable, RestToRest or Shaper
+    The law; the motion with its torques and its status; impulses half a period after each other.
 
 References
 ----------
 Seed book section 7.3.3; A. De Luca and B. Siciliano, "Regulation of flexible arms under gravity",
-IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, ICRA 2002.
+IEEE Trans. Robotics and Automation 9 (1993); M. Benosman and G. Le Vey, ICRA 2002; N. Singer and W.
+Seering, "Preshaping command inputs to reduce system vibration", J. Dyn. Syst. Meas. Control 112
+(1990).
+
+Examples
+--------
+>>> from robotmodels import RobotModel, DHTable, flexible
+>>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+>>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
+>>> motion = flexible.simulate(arm, [0.0], control=regulator(arm, 1.0, 1.0, [0.2]), t=10.0)
+>>> plan = rest_to_rest(arm, [0.0], [1.0], 2.0)
+>>> bool(abs(motion.q[-1] - 0.2) < 1e-3), plan.status, plan.trajectory.q(2.0)
+(True, <RestStatus.AT_REST: 0>, array([1.]))
+>>> input_shaper(2.0, kind="ZVD").amplitudes
+array([0.25, 0.5 , 0.25])
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import factorial
+from math import comb, factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats, as_number
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from ..trajectories import Trajectory
@@ -70,17 +81,7 @@ class RestStatus(Outcome):
 def regulator(
     arm: FlexibleRobot, kp: ArrayLike, kd: ArrayLike, q_goal: ArrayLike | None = None
 ) -> Law:
-    """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
-    >>> motion = flexible.simulate(arm, [0.0], control=regulator(arm, 1.0, 1.0, [0.2]), t=10.0)
-    >>> bool(abs(motion.q[-1] - 0.2) < 1e-3)
-    True
-    """
+    """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal."""
     n = check_arm(arm).n
     goal = np.zeros(n) if q_goal is None else as_exact(q_goal, (n,), "q_goal").copy()
     P, D, found = _gains(kp, n, "kp"), _gains(kd, n, "kd"), static_deflection(arm, goal)
@@ -91,17 +92,7 @@ def regulator(
 
 
 def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
-    """Tracking of joint motions: the inverse model with the errors of the motors.
-
-    Examples
-    --------
-    >>> from robotmodels import load, flexible, trajectories
-    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
-    >>> motion = trajectories.quintic(np.zeros(6), np.ones(6), duration=1.0)
-    >>> law = joint_tracking(arm, motion, 100.0, 20.0)
-    >>> law(0.5, motion.q(0.5), motion.v(0.5), np.zeros(2), np.zeros(2)).shape
-    (6,)
-    """
+    """Tracking of joint motions: the inverse model with the errors of the motors."""
     n = check_arm(arm).n
     P, D, at = _gains(kp, n, "kp"), _gains(kd, n, "kd"), motion_of(reference, n)
 
@@ -144,19 +135,10 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestToRest(Result):
-    """Motion from rest to rest in a fixed time.
+    """Motion of the motors from rest to rest in a fixed time, ``trajectory``.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot.
-    trajectory : Trajectory
-        Motion of the motors.
-    end : ndarray, shape (2 m,)
-        What is left of the elastic coordinates and their velocities at the end, relative to their
-        largest values on the way, and at least to 1e-4 of the length.
-    status : RestStatus
-        Whether the arm ends at rest.
+    ``end`` (2 m,) is the rest of elastic coordinates and velocities at the end, relative to their
+    largest values on the way, and at least to 1e-4 of the length.
     """
 
     arm: FlexibleRobot
@@ -192,15 +174,6 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
 
     The motion of the motors is a spline with free coefficients, of least change, with which the
     elastic coordinates, integrated by the inverse model, begin and end at rest.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
-    >>> plan = rest_to_rest(arm, [0.0], [1.0], 2.0)
-    >>> plan.status, plan.trajectory.q(2.0)
-    (<RestStatus.AT_REST: 0>, array([1.]))
     """
     from scipy.integrate import solve_ivp
 
@@ -277,3 +250,47 @@ def _splines(K: int) -> Array:
     spline = BSpline(np.clip(np.arange(-7.0, K + 9.0), 0.0, K + 1.0), np.eye(K + 8), 7)
     starts = np.arange(K + 1.0)
     return np.stack([spline(starts, nu=d) / factorial(d) for d in range(8)], axis=1)
+
+
+# --- input shaping --------------------------------------------------------------------------------
+
+
+_IMPULSES = {"ZV": 2, "ZVD": 3}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shaper(Frozen, Value):
+    """Impulses that a reference is convolved with: ``times`` (k,), s, and ``amplitudes`` (k,).
+
+    The sum of the amplitudes is 1; ``frequency``, rad/s, and ``damping`` are those of the
+    vibration.
+    """
+
+    times: Array
+    amplitudes: Array
+    frequency: float
+    damping: float
+
+    def residual(self, relative_frequency_error: ArrayLike = 0.0) -> Array:
+        """Vibration that is left, relative to one impulse: ``|sum A_i exp(s t_i)|`` at the end."""
+        w = self.frequency * (1.0 + as_floats(relative_frequency_error, "relative_frequency_error"))
+        w, damping = w[..., None], self.damping
+        s = w * (damping + 1j * np.sqrt(1.0 - damping**2))
+        left = np.abs((self.amplitudes * np.exp(s * self.times)).sum(axis=-1))
+        return left * np.exp(-damping * w[..., 0] * self.times[-1])
+
+    def shaped(self, reference: Callable[[Array], Array]) -> Callable[[ArrayLike], Array]:
+        """Convolution of a function of time, such as ``trajectory.q``, with the impulses."""
+        pairs = list(zip(self.times.tolist(), self.amplitudes.tolist(), strict=True))
+        return lambda t: sum(a * reference(np.asarray(t) - delay) for delay, a in pairs)  # type: ignore[return-value]
+
+
+def input_shaper(frequency: float, damping: float = 0.0, kind: str = "ZV") -> Shaper:
+    """Input shaper for one vibration (section 7.3.3.2)."""
+    w = as_number(frequency, "frequency", above=0.0)
+    damping = as_number(damping, "damping", least=0.0, below=1.0)
+    count, root = _IMPULSES[one_of(kind, tuple(_IMPULSES), "kind")], np.sqrt(1.0 - damping**2)
+    ratio = np.exp(-damping * np.pi / root)
+    amplitudes = np.array([comb(count - 1, i) * ratio**i for i in range(count)])
+    times = np.arange(count) * np.pi / (w * root)
+    return Shaper(times, amplitudes / amplitudes.sum(), w, damping)

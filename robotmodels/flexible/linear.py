@@ -2,12 +2,8 @@
 
 Parameters
 ----------
-arm : FlexibleRobot
-    The robot, n joints and m elastic coordinates.
-q : array_like, shape (..., n)
-    Angles of the motors; of `linearize` shape (n,).
-wrench : array_like, shape (..., 6), optional
-    Of the tool on the environment, in world axes.
+arm, q, wrench
+    See `robotmodels.flexible`; q of `linearize` has shape (n,).
 joints : str
     ``"locked"``: motors held; ``"free"``: motors without torque.
 output : str
@@ -16,19 +12,24 @@ output : str
 Returns
 -------
 Deflection, ndarray or LinearModel
-    Equilibrium; frequencies, rad/s; matrices, poles and zeros.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Arguments of the wrong length, or with NaN or infinity; unknown words; `linearize`: no
-    equilibrium at q, a singular posture for the tip.
-SingularMassMatrixError
-    A motor that moves no inertia.
+    Equilibrium; frequencies, rad/s; matrices, poles and zeros. Postures without equilibrium, and
+    singular ones for the tip, are not linearised.
 
 References
 ----------
 Seed book sections 7.2.5, at rest, 7.3.3.3 and 7.3.3.4.
+
+Examples
+--------
+>>> from robotmodels import RobotModel, DHTable, flexible
+>>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), gravity=(0, 0, 0))
+>>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
+>>> bool(abs(static_deflection(arm, [0.0], [0, -0.03, 0, 0, 0, 0]).deflection - 0.01) < 1e-4)
+True
+>>> linearize(arm, [0.0]).zeros.imag.round(3)                # the clamped frequencies
+array([-22.034,  -3.516,   3.516,  22.034])
+>>> bool(linearize(arm, [0.0], "tip").zeros.real.max() > 1.0)
+True
 """
 
 from __future__ import annotations
@@ -73,14 +74,9 @@ class DeflectionStatus(Outcome):
 class Deflection(Result):
     """Elastic equilibrium of an arm whose joints are held.
 
-    Parameters
-    ----------
-    e, tau : ndarray, shape (..., m) and (..., n)
-        Elastic coordinates, and torques that hold the joints; NaN where none was found.
-    deflection : ndarray, shape (...)
-        Largest displacement of a link's tip, relative to its length.
-    status : ndarray of int8, shape (...)
-        Codes of `DeflectionStatus`.
+    ``e`` (..., m) and the torques ``tau`` (..., n) that hold the joints, NaN where none was found;
+    ``deflection`` (...), the largest displacement of a link's tip relative to its length;
+    ``status``.
     """
 
     e: Array
@@ -96,17 +92,7 @@ class Deflection(Result):
 def static_deflection(
     arm: FlexibleRobot, q: ArrayLike, wrench: ArrayLike | None = None
 ) -> Deflection:
-    """Deflection of an arm at rest under gravity and a wrench, joints held.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), gravity=(0, 0, 0))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 10.0), modes=3)})
-    >>> found = static_deflection(arm, [0.0], [0, -0.3, 0, 0, 0, 0])       # F L^3 / (3 EI)
-    >>> bool(abs(found.deflection - 0.01) < 2e-5), found.reason()[:20]
-    (True, 'The deflection of ev')
-    """
+    """Deflection of an arm at rest under gravity and a wrench, joints held."""
     batch, (x, wrench) = checked_rows(arm, (q, None), wrench=wrench)
     n, m, size = arm.n, arm.m, scales(arm)[arm.n :]
     status = np.full(len(x), DeflectionStatus.NOT_FOUND, np.int8)
@@ -148,14 +134,6 @@ def natural_frequencies(arm: FlexibleRobot, q: ArrayLike, joints: str = "locked"
     """Natural frequencies (..., m) of the undeformed arm at rest, without gravity, ascending.
 
     With free joints (..., n + m): those of the n motions without vibration are zero.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), modes=2)})
-    >>> natural_frequencies(arm, [0.0], joints="free").shape
-    (3,)
     """
     one_of(joints, ("locked", "free"), "joints")
     batch, (x,) = checked_rows(arm, (q, None))
@@ -178,16 +156,9 @@ def scales(arm: FlexibleRobot) -> Array:
 class LinearModel(Frozen, Value):
     """Linear model about an equilibrium: ``x' = A x + B u``, ``y = C x + D u``.
 
-    Parameters
-    ----------
-    A, B, C, D : ndarray, shape (2 k, 2 k), (2 k, n), (n, 2 k), (n, n)
-        With k = n + m; the state is the deviation of (q, e, v, e_v), the input that of tau.
-    poles : ndarray of complex, shape (2 k,)
-        Eigenvalues of A, 1/s.
-    zeros : ndarray of complex, shape (up to 2 m,)
-        Finite transmission zeros, 1/s.
-    e : ndarray, shape (m,)
-        Elastic coordinates of the equilibrium.
+    With k = n + m the state (2 k,) is the deviation of (q, e, v, e_v), the input (n,) that of tau;
+    ``poles`` (2 k,) and finite transmission ``zeros`` (up to 2 m,) are complex, 1/s; ``e`` (m,) are
+    the elastic coordinates of the equilibrium.
     """
 
     A: Array
@@ -208,17 +179,6 @@ def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> Linear
     The output ``"joint"`` is q; ``"tip"`` the motion of the joints that would move the tool of the
     rigid arm as the flexible one moves: ``q + J_q^+ J_e e``, of positions where they determine it,
     else of poses. Its zeros on the right side are the reason why a tip is not tracked causally.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> link = flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)
-    >>> arm = flexible.FlexibleRobot(model, {1: link})
-    >>> linearize(arm, [0.0]).zeros.imag.round(3)                # the clamped frequencies
-    array([-22.034,  -3.516,   3.516,  22.034])
-    >>> bool(linearize(arm, [0.0], "tip").zeros.real.max() > 1.0)
-    True
     """
     one_of(output, ("joint", "tip"), "output")
     n, q = check_arm(arm).n, as_exact(q, (arm.n,), "q")

@@ -48,20 +48,16 @@ class Invariants(Frozen, Value):
     ----------
     mass : float
         Integral of dm, kg.
-    first_moment : ndarray, shape (3,)
-        Of X dm.
-    inertia : ndarray, shape (3, 3)
-        About the root.
+    first_moment, inertia : ndarray, shape (3,) and (3, 3)
+        Of X dm; about the root.
     translation, rotation : ndarray, shape (m, 3)
         Of Phi_k dm and of X x Phi_k dm: the modes' linear and angular momentum.
     modal_mass, modal_stiffness : ndarray, shape (m, m)
         Of Phi_k . Phi_l dm, and second derivatives of the elastic energy.
-    gyroscopic : ndarray, shape (m, m, 3)
-        Of (Phi_l x Phi_k + X x Gamma_kl) dm.
+    gyroscopic, foreshortening : ndarray, shape (m, m, 3)
+        Of (Phi_l x Phi_k + X x Gamma_kl) dm; of Gamma_kl dm, zero without stiffening.
     inertia_first, inertia_second : ndarray, shape (m, 3, 3) and (m, m, 3, 3)
         First and second derivatives of the inertia by the elastic coordinates.
-    foreshortening : ndarray, shape (m, m, 3)
-        Of Gamma_kl dm; zero without stiffening.
     """
 
     mass: float
@@ -97,21 +93,12 @@ class FlexibleLink(Frozen, Value):
         Of its modes, rad/s: clamped at the root, or with a free joint for ``"pinned-hub"``.
     tip : Section
         Where what follows is fixed.
-    nodes : ndarray, shape (N, 3)
-        Undeformed points from root to tip, m.
-    shapes : ndarray, shape (N, 3, m)
-        Displacements of the nodes by the modes.
+    nodes, shapes : ndarray, shape (N, 3) and (N, 3, m)
+        Undeformed points from root to tip, m, and their displacements by the modes.
     stiffening : bool
         Whether foreshortening is part of the model.
     source : BeamData or None
         The uniform beam.
-
-    Examples
-    --------
-    >>> from robotmodels.flexible import beam
-    >>> link = beam(1.0, EI=(1.0, 1.0), density=1.0, modes=1)
-    >>> link.m, link.frequencies.round(4)
-    (2, array([3.516, 3.516]))
     """
 
     invariants: Invariants

@@ -1,19 +1,9 @@
 """Geometric, kinematic and dynamic models of flexible robots, by a compiled recursion (7.2).
 
-Vectors may have leading batch axes, which broadcast; an empty batch gives an empty result.
-
 Parameters
 ----------
-arm : FlexibleRobot
-    The robot, n joints and m elastic coordinates.
-q, v, a : array_like, shape (..., n)
-    Positions, velocities and accelerations of the motors, rad or m.
-e, e_v : array_like, shape (..., m)
-    Elastic coordinates and their velocities; None is zero, of v as well.
-tau : array_like, shape (..., n)
-    Torques of the motors, N m or N.
-wrench : array_like, shape (..., 6), optional
-    Force and moment of the tool on the environment at the tool point, in world axes.
+arm, q, e, v, e_v, a, tau, wrench
+    See `robotmodels.flexible`.
 drive : bool
     Whether rotor inertia, friction and offsets of the model's drives take part.
 
@@ -22,17 +12,18 @@ Returns
 ndarray, shape (..., *core)
     Or a pair of them; each function states its core.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Arguments of the wrong length, or with NaN or infinity.
-SingularMassMatrixError
-    A coordinate that moves no inertia, such as a flexible joint without rotor inertia.
-
 References
 ----------
 Seed book sections 7.2.3, 7.2.5, 7.2.7 and 7.2.8; F. Boyer and W. Khalil, "An efficient calculation
 of flexible manipulator inverse dynamics", Int. J. Robotics Research 17 (1998).
+
+Examples
+--------
+>>> from robotmodels import flexible, load
+>>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
+>>> a, e_a = ddm(arm, np.zeros(6), None, np.zeros(6), None, np.zeros(6))
+>>> a.shape, e_a.shape, dgm(arm, np.zeros(6), [0.0, 0.01]).shape
+((6,), (2,), (4, 4))
 """
 
 from __future__ import annotations
@@ -69,15 +60,7 @@ class SpinStatus(Outcome):
 
 
 class Accelerations(Result, tuple[Array, Array]):
-    """Accelerations (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`.
-
-    Parameters
-    ----------
-    pair : tuple of ndarray
-        The accelerations.
-    status : ndarray of int8, shape (...)
-        Codes of `SpinStatus`.
-    """
+    """Accelerations (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`."""
 
     status: NDArray[np.int8]
     outcomes = SpinStatus
@@ -97,15 +80,7 @@ class Accelerations(Result, tuple[Array, Array]):
 
 
 def dgm(arm: FlexibleRobot, q: ArrayLike, e: ArrayLike | None = None) -> Array:
-    """Direct geometric model: world pose (..., 4, 4) of the tool.
-
-    Examples
-    --------
-    >>> from robotmodels import flexible, load
-    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
-    >>> dgm(arm, np.zeros(6), [0.0, 0.01]).shape
-    (4, 4)
-    """
+    """Direct geometric model: world pose (..., 4, 4) of the tool."""
     poses = _poses(arm, q, e)[..., -1, :, :]
     return poses @ np.block([[arm.model.tool[:3, :3], np.zeros((3, 1))], [np.eye(4)[3:]]])
 
@@ -145,10 +120,9 @@ def idm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> tuple[Array, Array]:
-    """Inverse dynamic model: torques of given joint accelerations.
+    """Inverse dynamic model: torques (..., n) of joint accelerations, and elastic ones (..., m).
 
-    They are tau (..., n), N m or N, with the elastic accelerations (..., m), which follow from the
-    state: integrate them along a motion.
+    The latter follow from the state: integrate them along a motion.
     """
     batch, rows = checked_rows(arm, (q, e), (v, e_v), a=a, wrench=wrench)
     found = solved(arm, False, *rows, drive=drive)[0].reshape(*batch, arm.n + arm.m)
@@ -165,18 +139,7 @@ def ddm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> Accelerations:
-    """Direct dynamic model: accelerations under given torques.
-
-    They are the pair (a, e_a), shapes (..., n) and (..., m), with ``.status`` of `SpinStatus`.
-
-    Examples
-    --------
-    >>> from robotmodels import flexible, load
-    >>> arm = flexible.FlexibleRobot(load("rx90"), {3: flexible.beam(0.45, EI=100.0, modes=1)})
-    >>> a, e_a = ddm(arm, np.zeros(6), None, np.zeros(6), None, np.zeros(6))
-    >>> a.shape, e_a.shape
-    ((6,), (2,))
-    """
+    """Direct dynamic model: the pair (a, e_a) of accelerations under given torques."""
     batch, rows = checked_rows(arm, (q, e), (v, e_v), tau=tau, wrench=wrench)
     found, base = solved(arm, True, *rows, drive=drive)
     found, status = found.reshape(*batch, arm.n + arm.m), base[:, 9].astype(np.int8)

@@ -1,4 +1,39 @@
-"""Flexible links from modes, and reduction of finite elements by Craig and Bampton."""
+"""Flexible links from modes, and reduction of finite elements by Craig and Bampton.
+
+Parameters
+----------
+M, K : array_like, shape (c, c)
+    Mass and stiffness of the nodes: for `from_modes` c = 3 N displacements, or 6 N with rotations
+    after the displacements of each node, and M may be the N masses of the nodes.
+shapes : array_like, shape (c, m) or (N, 3, m)
+    Orthogonal modes, zero at the first node, where the link is clamped; at most N.
+nodes : array_like, shape (N, 3)
+    Places in the frame of the joint, m; the last is where the next link is fixed.
+interface, clamped : array_like of int, shape (k,) and optional
+    Displacements, from 0, by which the body is loaded, such as those of the last node; those that
+    are zero, such as those of the first node.
+modes : int
+    Modes with the interface held.
+
+Returns
+-------
+FlexibleLink or ReducedModel
+    The link; the reduction with k + modes shapes, which `from_modes` takes.
+
+References
+----------
+Seed book section 7.2.2.3; R. Craig and M. Bampton, "Coupling of substructures for dynamic
+analyses", AIAA J. 6 (1968).
+
+Examples
+--------
+>>> nodes, K = np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.diag([1.0, 1.0, 1.0, 9.0, 4.0, 4.0])
+>>> from_modes([1.0, 1.0], K, np.eye(6)[:, 4:5], nodes).frequencies
+array([2.])
+>>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+>>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
+array([0.445 , 1.247 , 1.8019])
+"""
 
 from __future__ import annotations
 
@@ -19,39 +54,6 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     """Flexible link from modes of a finite element model, clamped at its first node.
 
     Integrals linear in the shapes are those of M; quadratic ones take the mass of its translations.
-
-    Parameters
-    ----------
-    M, K : array_like, shape (c, c)
-        Mass and stiffness of the nodes: c = 3 N displacements, or 6 N with rotations after the
-        displacements of each node. M may be the N masses of the nodes.
-    shapes : array_like, shape (c, m) or (N, 3, m)
-        Orthogonal modes, zero at the first node; at most N.
-    nodes : array_like, shape (N, 3)
-        Places in the frame of the joint, m; the last is where the next link is fixed.
-
-    Returns
-    -------
-    FlexibleLink
-        The link.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Modes that are not orthogonal, or move the first node; more modes than nodes; matrices of
-        another size, not symmetric, or not positive.
-
-    References
-    ----------
-    Seed book section 7.2.2.3.
-
-    Examples
-    --------
-    >>> nodes = np.array([[0.0, 0, 0], [1.0, 0, 0]])
-    >>> K = np.diag([1.0, 1.0, 1.0, 9.0, 4.0, 4.0])
-    >>> link = from_modes([1.0, 1.0], K, np.eye(6)[:, 4:5], nodes)
-    >>> link.frequencies
-    array([2.])
     """
     X = as_floats(nodes, "nodes")
     if X.ndim != 2 or X.shape[1] != 3 or len(X) < 2:
@@ -119,16 +121,9 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedModel(Frozen, Value):
-    """Reduced finite elements.
+    """Reduced finite elements: diagonal ``M, K`` (r, r), the mass of each mode 1.
 
-    Parameters
-    ----------
-    M, K : ndarray, shape (r, r)
-        Diagonal: the mass of each mode is 1.
-    shapes : ndarray, shape (c, r)
-        Orthogonal shapes of all c displacements.
-    frequencies : ndarray, shape (r,)
-        Ascending, rad/s.
+    ``shapes`` (c, r) are orthogonal, ``frequencies`` (r,) ascending, rad/s.
     """
 
     M: Array
@@ -146,39 +141,7 @@ def craig_bampton(
     """Reduction of finite elements to an interface and modes with the interface held.
 
     Its shapes are the static ones of unit displacements of the interface and the first modes,
-    made orthogonal, so that `from_modes` takes them.
-
-    Parameters
-    ----------
-    M, K : array_like, shape (c, c)
-        Mass and stiffness.
-    interface : array_like of int, shape (k,)
-        Displacements, from 0, by which the body is loaded, such as those of the last node.
-    modes : int
-        Modes with the interface held.
-    clamped : array_like of int, optional
-        Displacements that are zero, such as those of the first node.
-
-    Returns
-    -------
-    ReducedModel
-        With k + modes shapes.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Matrices that are not symmetric, or singular inside; displacements that do not exist, or
-        twice; more modes than displacements inside.
-
-    References
-    ----------
-    R. Craig and M. Bampton, "Coupling of substructures for dynamic analyses", AIAA J. 6 (1968).
-
-    Examples
-    --------
-    >>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
-    >>> craig_bampton(np.eye(3), K, [2], 2).frequencies.round(4)
-    array([0.445 , 1.247 , 1.8019])
+    made orthogonal.
     """
     from scipy.linalg import LinAlgError, eigh
 

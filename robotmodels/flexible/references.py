@@ -1,4 +1,39 @@
-"""References of elastic models: exact large bending of one beam, and lumped rigid segments."""
+"""References of elastic models: exact large bending of one beam, and lumped rigid segments.
+
+Parameters
+----------
+length, EI : float
+    Length, m, and bending stiffness, N m^2.
+force, moment : float
+    On the tip along y, whatever its slope, N, and about z, N m; ``force length^2 / EI`` and
+    ``moment length / EI`` up to 100.
+arm : FlexibleRobot
+    The robot; its flexible links are made by `beam`, its joints are rigid.
+segments : int
+    Hinges of each beam, from 1.
+
+Returns
+-------
+Elastica
+    The shape that is continued from the straight beam.
+model : RobotModel
+    Robot whose last rows are moved behind the segments; the drives keep their joints.
+stiffness : ndarray, shape (N,)
+    Of the springs in its N joints, N m/rad; 0 for the joints of the arm.
+
+References
+----------
+K. Bisshopp and D. Drucker, "Large deflection of cantilever beams", Quart. Appl. Math. 3 (1945).
+
+Examples
+--------
+>>> from robotmodels.flexible import beam
+>>> elastica(1.0, 1.0, force=1.0).tip[:2, 3].round(5)
+array([0.94357, 0.30172])
+>>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+>>> lumped(FlexibleRobot(model, {1: beam(1.0, EI=(np.inf, 1.0))}), 3)[1].tolist()
+[0.0, 3.0, 3.0, 3.0]
+"""
 
 from __future__ import annotations
 
@@ -27,14 +62,8 @@ _LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solutio
 class Elastica(Frozen, Value):
     """Exact shape of a bent cantilever.
 
-    Parameters
-    ----------
-    tip : ndarray, shape (4, 4)
-        Pose of the tip in the frame of the root, x along the beam.
-    points : ndarray, shape (N, 3)
-        The bent axis, m.
-    angle : ndarray, shape (N,)
-        Its slope, rad.
+    ``tip`` (4, 4) is its pose in the frame of the root, x along the beam; ``points`` (N, 3) the
+    bent axis, m, and ``angle`` (N,) its slope, rad.
     """
 
     tip: Array
@@ -47,37 +76,7 @@ class Elastica(Frozen, Value):
 
 
 def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) -> Elastica:
-    """Exact static bending of one beam clamped along x: ``EI theta'' + force cos(theta) = 0``.
-
-    Parameters
-    ----------
-    length, EI : float
-        Length, m, and bending stiffness, N m^2.
-    force : float
-        On the tip along y, whatever its slope, N.
-    moment : float
-        On the tip about z, N m.
-
-    Returns
-    -------
-    Elastica
-        The shape that is continued from the straight beam.
-
-    Raises
-    ------
-    InvalidValueError
-        Length or stiffness that is not positive; ``force length^2 / EI`` or ``moment length / EI``
-        above 100.
-
-    References
-    ----------
-    K. Bisshopp and D. Drucker, "Large deflection of cantilever beams", Quart. Appl. Math. 3 (1945).
-
-    Examples
-    --------
-    >>> elastica(1.0, 1.0, force=1.0).tip[:2, 3].round(5)
-    array([0.94357, 0.30172])
-    """
+    """Exact static bending of one beam clamped along x: ``EI theta'' + force cos(theta) = 0``."""
     from scipy.integrate import solve_ivp
     from scipy.optimize import newton
 
@@ -128,34 +127,6 @@ def lumped(arm: FlexibleRobot, segments: int) -> tuple[RobotModel, Array]:
     Each beam becomes ``segments`` + 1 rigid parts, halves at the ends, with a joint for each
     elastic direction between them. Its frequencies approach those of the beam with 1 / segments^2;
     of slender ones, as the sections of segments have inertia when they bend, those of modes none.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot; its flexible links are made by `beam`.
-    segments : int
-        Hinges of each beam, from 1.
-
-    Returns
-    -------
-    model : RobotModel
-        Robot whose last rows are moved behind the segments; the drives keep their joints.
-    stiffness : ndarray, shape (N,)
-        Of the springs in its N joints, N m/rad; 0 for the joints of the arm.
-
-    Raises
-    ------
-    InvalidValueError
-        Links that are not made by `beam`, flexible joints, a number of segments below 1.
-
-    Examples
-    --------
-    >>> from robotmodels.flexible import beam
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = FlexibleRobot(model, {1: beam(1.0, EI=(np.inf, 1.0))})
-    >>> segmented, stiffness = lumped(arm, 3)
-    >>> segmented.n, stiffness.tolist()
-    (4, [0.0, 3.0, 3.0, 3.0])
     """
     if not isinstance(segments, int | np.integer) or segments < 1:
         raise InvalidValueError(f"segments: expected a number from 1, got {segments!r:.40}.")

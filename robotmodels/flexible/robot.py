@@ -56,7 +56,7 @@ class FlexibleRobot(Value):
     Its coordinates are q (n,), the angles of the motors, and e (m,): the modes of the flexible
     links by row, then the deflections of the flexible joints. The tip section of a flexible link
     carries what follows; where the last link is flexible and the model has no tool, the tool is the
-    end of the beam. Trees are supported.
+    end of the beam. Trees are supported; prismatic flexible links and coupled motors are refused.
 
     Parameters
     ----------
@@ -64,18 +64,11 @@ class FlexibleRobot(Value):
         The rigid robot, n joints, with its drives; independent motors.
     links : mapping of int to FlexibleLink
         By row of the table, from 1. A flexible link's inertia replaces that of the row.
-    joint_stiffness : array_like, shape (n,) or (), optional
-        N m/rad, infinite (default) for rigid joints. The motor side has the rotor inertia Ia.
-    joint_damping : array_like, shape (n,) or (), optional
-        N m s/rad, of the deflections of flexible joints.
+    joint_stiffness, joint_damping : array_like, shape (n,) or (), optional
+        N m/rad, infinite (default) for rigid joints, and N m s/rad of the deflections of flexible
+        ones. The motor side has the rotor inertia Ia.
     modal_damping : array_like, shape () or that of all modes, optional
         Damping ratios of the modes of the clamped links.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Rows that do not exist, or are prismatic; stiffness that is not positive; negative damping;
-        motors coupled by a transmission.
 
     References
     ----------

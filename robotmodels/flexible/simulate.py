@@ -5,41 +5,38 @@ integration. Dry friction is taken with the sign of the velocity, without sticki
 
 Parameters
 ----------
-arm : FlexibleRobot
-    The robot, n joints and m elastic coordinates.
+arm, e0, e_v0
+    See `robotmodels.flexible`: the robot, elastic coordinates and velocities at the start.
 link : FlexibleLink
     A free body. A line without inertia about its axis gets that of a radius of length / 10.
 q0, v0 : array_like, shape (n,)
     Motors at the start; default at rest. Of a free body v0 (6,) is the velocity [v; w] of the root,
     whose axes are those of the world at the start.
-e0, e_v0 : array_like, shape (m,), optional
-    Elastic coordinates and velocities at the start; default zero.
 control : callable or array_like of shape (n,), optional
     Torques: a function of t, of (t, q, v) or of (t, q, v, e, e_v), or constant; default none. A
     simulation under constant torques without a wrench is compiled, ten times as fast.
 wrench : callable or array_like of shape (6,), optional
-    Of the tool on the environment, in world axes, given as ``control``.
+    Given as ``control``.
 t : array_like
     A duration, with samples at the steps of the integrator, or ascending times (N,), s.
-method : Integrator or str
+method, rtol, atol, progress
     As for `robotmodels.simulate`. The highest mode limits the step, at loose tolerances too: take
-    few modes, or ``"Radau"`` for stiff links with modal damping; without damping it is no quicker.
-rtol, atol : float
-    Tolerances of a step.
+    few modes, or ``"Radau"`` for stiff links with modal damping.
 max_evaluations : int, optional
     Default 60 000 for each second and as many more.
-progress : bool or callable, optional
-    A function is called with the fraction done; True writes it to the log of Python.
 
 Returns
 -------
 FlexibleMotion or FreeBodyMotion
     The motion with its energies, momenta and status.
 
-Raises
-------
-ShapeError, InvalidValueError, SingularMassMatrixError
-    Wrong shapes, NaN or infinity, also of ``control`` and ``wrench``; modes that are rigid motions.
+Examples
+--------
+>>> from robotmodels import flexible
+>>> link = flexible.beam(1.0, EI=(5.0, 8.0), density=1.0, gyration=0.02, modes=1)
+>>> motion = free_body(link, [0.01, 0.0], [0, 0, 0, 0.1, 0.2, 1.0], 1.0)
+>>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
+(True, True)
 """
 
 from __future__ import annotations
@@ -86,27 +83,13 @@ class FlexibleMotionStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlexibleMotion(Result):
-    """Simulated motion of a flexible arm.
+    """Simulated motion of a flexible arm at times ``t`` (N,), which may end early.
 
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot.
-    t : ndarray, shape (N,)
-        Times, s; they end early if the simulation did.
-    q, v, tau : ndarray, shape (N, n)
-        Angles, velocities and torques of the motors.
-    e, e_v : ndarray, shape (N, m)
-        Elastic coordinates and their velocities.
-    kinetic, potential, work : ndarray, shape (N,)
-        Energies; work since the start of the torques, less friction, damping and the tool's, J.
-    momentum, impulse : ndarray, shape (N, 6)
-        Linear and angular momentum about the origin of the world, and the impulse since the start
-        of the base, of gravity and of the environment; without rotors.
-    status : FlexibleMotionStatus
-        Why it ended; SOFTENED if a link ever spun too fast for its linear modes.
-    evaluations : int
-        Of the direct model.
+    Motors ``q, v, tau`` (N, n), elastic coordinates ``e, e_v`` (N, m); ``kinetic``, ``potential``
+    and ``work`` (N,) of the torques less friction, damping and the tool's, J; ``momentum`` (N, 6),
+    linear and angular about the origin of the world, and the ``impulse`` (N, 6) of the base, of
+    gravity and of the environment, without rotors; ``status``, SOFTENED if a link ever spun too
+    fast for its linear modes; ``evaluations`` of the direct model.
     """
 
     arm: FlexibleRobot
@@ -163,17 +146,7 @@ def simulate(
     max_evaluations: int | None = None,
     progress: Progress = None,
 ) -> FlexibleMotion:
-    """Simulate a flexible arm under torques.
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
-    >>> motion = simulate(arm, [0.0], control=[0.1], t=0.5)
-    >>> motion.status, motion.energy_drift < 1e-8
-    (<FlexibleMotionStatus.FINISHED: 0>, True)
-    """
+    """Simulate a flexible arm under torques."""
     n, m, model = check_arm(arm).n, arm.m, arm.model
     given = (("q0", q0, n), ("e0", e0, m), ("v0", v0, n), ("e_v0", e_v0, m))
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]
@@ -389,16 +362,7 @@ def free_body(
     atol: float = 1e-13,
     max_evaluations: int | None = None,
 ) -> FreeBodyMotion:
-    """Motion of an elastic body that floats without loads (section 7.2.2).
-
-    Examples
-    --------
-    >>> from robotmodels import flexible
-    >>> link = flexible.beam(1.0, EI=(5.0, 8.0), density=1.0, gyration=0.02, modes=1)
-    >>> motion = free_body(link, [0.01, 0.0], [0, 0, 0, 0.1, 0.2, 1.0], 1.0)
-    >>> motion.energy_drift < 1e-9, motion.momentum_drift < 1e-9
-    (True, True)
-    """
+    """Motion of an elastic body that floats without loads (section 7.2.2)."""
     from scipy.linalg import eigvalsh
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,42 @@
-"""Tracking in the operational space: inversion of the tip's motion (section 7.3.3.4)."""
+"""Tracking in the operational space: inversion of the tip's motion (section 7.3.3.4).
+
+The output is ``y = q + J_q^+ J_e e``, corrected until the tip is on the path in the directions in
+which the joints move it. Its zero dynamics are a boundary value problem, which needs a preview of
+the motion.
+
+Parameters
+----------
+arm : FlexibleRobot
+    The robot, n joints up to six; rigid joints.
+reference : Trajectory or callable
+    Motion of the joints of the rigid arm: its tip is the reference. A function of t returns
+    (q, v, a) and needs ``duration``.
+method : str
+    ``"stable_inversion"``, or ``"causal"``, refused by status where a zero is unstable.
+duration, preview : float, optional
+    Of the reference, s, default that of the trajectory; default 14 time constants of the slowest
+    unstable zero, s.
+
+Returns
+-------
+TipTracking
+    ``t`` (N,), s, from ``-preview`` on, empty if refused; motion ``q, v, e, e_v`` and torques
+    ``tau``; ``zeros`` (2 m,) of the tip at the start, 1/s; status.
+
+References
+----------
+Seed book section 7.3.3.4; E. Bayo, J. Robotic Systems 4 (1987); S. Devasia, D. Chen, B. Paden,
+"Nonlinear inversion-based output tracking", IEEE Trans. Automatic Control 41 (1996).
+
+Examples
+--------
+>>> from robotmodels import RobotModel, DHTable, flexible, trajectories
+>>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+>>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 9.0), hub=0.1)})
+>>> motion = trajectories.quintic([0.0], [0.5], duration=1.0)
+>>> tip_tracking(arm, motion, method="causal").status
+<TipStatus.NON_MINIMUM_PHASE: 1>
+"""
 
 from __future__ import annotations
 
@@ -43,25 +81,7 @@ class TipStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipTracking(Result):
-    """Motion of the joints that moves the tip of a flexible arm along a reference.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot.
-    t : ndarray, shape (N,)
-        Times, s, from ``-preview`` on; empty if refused.
-    q, v, tau : ndarray, shape (N, n)
-        Angles, velocities and torques of the motors.
-    e, e_v : ndarray, shape (N, m)
-        Elastic coordinates and velocities.
-    zeros : ndarray of complex, shape (2 m,)
-        Of the tip at the start, 1/s.
-    preview : float
-        Time before the reference starts to move at which the torques start, s.
-    status : TipStatus
-        Whether it was found.
-    """
+    """Motion of the joints that moves the tip of a flexible arm along a reference."""
 
     arm: FlexibleRobot
     t: Array
@@ -116,50 +136,7 @@ def tip_tracking(
     duration: float | None = None,
     preview: float | None = None,
 ) -> TipTracking:
-    """Torques that move the tip as the rigid arm would be moved by a reference of its joints.
-
-    The output is ``y = q + J_q^+ J_e e``, corrected until the tip is on the path in the directions
-    in which the joints move it. Its zero dynamics are a boundary value problem, which needs a
-    preview of the motion.
-
-    Parameters
-    ----------
-    arm : FlexibleRobot
-        The robot, n joints up to six; rigid joints.
-    reference : Trajectory or callable
-        Motion of the joints of the rigid arm: its tip is the reference. A function of t returns
-        (q, v, a) and needs ``duration``.
-    method : str
-        ``"stable_inversion"``, or ``"causal"``, refused by status where a zero is unstable.
-    duration : float, optional
-        Of the reference, s; default that of the trajectory.
-    preview : float, optional
-        Default 14 time constants of the slowest unstable zero, s.
-
-    Returns
-    -------
-    TipTracking
-        Motion, torques and status.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Flexible joints, another method, a reference of another kind, a singular posture.
-
-    References
-    ----------
-    Seed book section 7.3.3.4; E. Bayo, J. Robotic Systems 4 (1987); S. Devasia, D. Chen, B. Paden,
-    "Nonlinear inversion-based output tracking", IEEE Trans. Automatic Control 41 (1996).
-
-    Examples
-    --------
-    >>> from robotmodels import RobotModel, DHTable, flexible, trajectories
-    >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 9.0), hub=0.1)})
-    >>> motion = trajectories.quintic([0.0], [0.5], duration=1.0)
-    >>> tip_tracking(arm, motion, method="causal").status
-    <TipStatus.NON_MINIMUM_PHASE: 1>
-    """
+    """Torques that move the tip as the rigid arm would be moved by a reference of its joints."""
     causal = one_of(method, _METHODS, "method") == "causal"
     if len(check_arm(arm).joints) or not arm.m:
         raise InvalidValueError(

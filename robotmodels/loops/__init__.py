@@ -1,7 +1,11 @@
 """Robots with kinematic loops: closures, reduced models, dynamics, base parameters.
 
 A robot with loops is the spanning tree that is left when each loop is cut, and the closures of
-the cuts. Joint variables are those of all joints of the tree.
+the cuts. Throughout, ``robot`` is a `LoopedRobot` of n joints, n_a of them actuated, with c
+constraint rows; ``q, v, a`` (..., n) are variables of all joints of the tree, rad or m, which close
+the loops, their velocities and accelerations; ``tau`` (..., n_a) are torques of the actuated
+joints, N m or N. Arguments of the wrong shape or with NaN raise ShapeError or InvalidValueError;
+open loops, and actuated joints that do not determine the others, LoopError.
 """
 
 from ..errors import LoopError
@@ -14,24 +18,7 @@ from .read import read_mjcf, read_par
 from .robot import Closure, LoopedRobot
 from .simulation import simulate
 
-__all__ = [
-    "Closure",
-    "LoopedRobot",
-    "LoopError",
-    "read_par",
-    "read_mjcf",
-    "close",
-    "ClosedPostures",
-    "ClosingStatus",
-    "mobility",
-    "Mobility",
-    "closure_jacobian",
-    "velocity_map",
-    "velocity_map_rate",
-    "idm",
-    "ddm",
-    "closure_forces",
-    "simulate",
-    "torque_regressor",
-    "base_parameters",
-]
+__all__ = ["Closure", "LoopedRobot", "LoopError", "read_par", "read_mjcf", "close"]
+__all__ += ["ClosedPostures", "ClosingStatus", "mobility", "Mobility", "closure_jacobian"]
+__all__ += ["velocity_map", "velocity_map_rate", "idm", "ddm", "closure_forces", "simulate"]
+__all__ += ["torque_regressor", "base_parameters"]

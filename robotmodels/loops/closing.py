@@ -37,10 +37,9 @@ class ClosedPostures(Result):
     ----------
     q : ndarray, shape (..., n)
         Joint variables of all joints, rad or m.
-    residual : ndarray, shape (...)
-        Largest distance (m) or angle (rad) between the frames of a closure.
-    status : ndarray of int8, shape (...)
-        Codes of `ClosingStatus`; loops are open for ``CANNOT_CLOSE`` and ``NOT_CONVERGED``.
+    residual, status : ndarray, shape (...)
+        Largest distance (m) or angle (rad) between the frames of a closure; codes of
+        `ClosingStatus`.
     """
 
     q: Array
@@ -83,11 +82,6 @@ def close(
     -------
     ClosedPostures
         ``.q (..., n)``, ``.residual (...)``, ``.status (...)``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity.
 
     References
     ----------

@@ -2,17 +2,13 @@
 
 Parameters
 ----------
-robot : LoopedRobot
-    The robot: n joints, n_a of them actuated, c constraint rows.
-q, v : array_like, shape (..., n)
-    Joint variables of all joints (rad or m), which close the loops, and their velocities.
+robot, q, v
+    See `robotmodels.loops`.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Arguments of the wrong length, or with NaN or infinity.
-LoopError
-    The actuated joints do not determine the motion of the others (velocity maps).
+Returns
+-------
+ndarray or Mobility
+    Each function states its shape.
 
 References
 ----------
@@ -58,14 +54,8 @@ _CONSISTENT = 1e-5  # largest velocity between the frames of a closure, in the s
 class Mobility(Frozen, Value):
     """Number of independent motions of a looped robot; serves as a number or an array.
 
-    Parameters
-    ----------
-    count : ndarray of int, shape (...)
-        Degrees of freedom: joints less independent constraint rows.
-    is_redundant : ndarray of bool, shape (..., c)
-        Constraint rows that follow from others, earlier ones first kept.
-    rows : tuple of str
-        Names of the c rows.
+    ``count`` (...) are the degrees of freedom, joints less independent constraint rows;
+    ``is_redundant`` (..., c) the ``rows`` that follow from others, earlier ones first kept.
     """
 
     count: NDArray[np.int64]
@@ -95,27 +85,16 @@ class Mobility(Frozen, Value):
 
 
 def closure_jacobian(robot: LoopedRobot, q: ArrayLike) -> Array:
-    """Jacobian of the closures: rows that vanish on every motion, ``J v = 0``.
+    """Jacobian (..., c, n) of the closures: rows that vanish on every motion, ``J v = 0``.
 
     Rows are the velocity and angular velocity of the second frame of each closure relative to the
-    first, in the axes of the first; see ``robot.rows`` for their names.
-
-    Returns
-    -------
-    ndarray, shape (..., c, n)
-        Metres or 1 for each rad/s or m/s.
+    first, in the axes of the first, m or 1; see ``robot.rows`` for their names.
     """
     return closure_rows(robot, *checked(robot, q=q))[1]
 
 
 def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
-    """Mobility: number of independent motions of a posture, with the redundant rows named.
-
-    Returns
-    -------
-    Mobility
-        Serves as the count, shape (...); ``.redundant`` names rows that follow from others.
-    """
+    """Mobility: number of independent motions of a posture, with the redundant rows named."""
     (q,) = checked(robot, q=q)
     J = scaled(robot, closure_rows(robot, q)[1])
     least = _INDEPENDENT * np.linalg.norm(J, axis=-1).max(axis=-1, initial=0.0)
@@ -126,24 +105,12 @@ def mobility(robot: LoopedRobot, q: ArrayLike) -> Mobility:
 
 
 def velocity_map(robot: LoopedRobot, q: ArrayLike) -> Array:
-    """Map G from velocities of the actuated joints to those of all joints, ``v = G v_a``.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n_a)
-        The rows of the actuated joints are the identity.
-    """
+    """Map G (..., n, n_a) from velocities of the actuated joints to those of all, ``v = G v_a``."""
     return maps(robot, *checked(robot, q=q))[0]
 
 
 def velocity_map_rate(robot: LoopedRobot, q: ArrayLike, v: ArrayLike) -> Array:
-    """Time derivative of the velocity map, so that ``a = G a_a + dG/dt v_a``.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n_a)
-        The rows of the actuated joints are zero.
-    """
+    """Time derivative (..., n, n_a) of the velocity map, so that ``a = G a_a + dG/dt v_a``."""
     return maps(robot, *checked(robot, q=q, v=v))[1]
 
 

@@ -1,31 +1,24 @@
 """Dynamic models of looped robots: torques of the actuated joints, accelerations, closure forces.
 
 With ``v = G v_a``, torques of the spanning tree do the work of ``G^T tau_tree`` at the actuated
-joints; drives of passive joints, such as their friction, are among those of the tree.
+joints; drives of passive joints, such as their friction, are among those of the tree. `ddm` and
+`closure_forces` do not check that the loops are closed at q and stay so at the velocities; where no
+accelerations keep them closed they raise LoopError, SingularMassMatrixError where free motions have
+no inertia.
 
 Parameters
 ----------
-robot : LoopedRobot
-    The robot: n joints, n_a of them actuated, c constraint rows.
-q, v, a : array_like, shape (..., n)
-    Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
-tau : array_like, shape (..., n_a)
-    Torques (N m) or forces (N) of the actuated joints.
+robot, q, v, a, tau
+    See `robotmodels.loops`.
 wrench : array_like, shape (..., 6), optional
     Wrench ``[f; m]`` of the tool of the tree on the environment, as for `robotmodels.idm`.
 drive : bool
     Whether the drives of all joints take part.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Arguments of the wrong length, or with NaN or infinity.
-LoopError
-    Loops that are open at q, and actuated joints that do not determine the others (of `idm`); no
-    accelerations that keep the loops closed (of `ddm` and `closure_forces`, which do not check
-    that the loops are closed at q and stay so at the velocities).
-SingularMassMatrixError
-    Free motions without inertia.
+Returns
+-------
+ndarray
+    Each function states its shape.
 
 References
 ----------
@@ -89,13 +82,7 @@ def idm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> Array:
-    """Inverse dynamic model: torques of the actuated joints, ``G^T tau_tree``.
-
-    Returns
-    -------
-    ndarray, shape (..., n_a)
-        Torques (N m) or forces (N).
-    """
+    """Inverse dynamic model: torques (..., n_a) of the actuated joints, ``G^T tau_tree``."""
     q, v, a = checked(robot, q=q, v=v, a=a)
     G = maps(robot, closed(robot, q))[0]
     tau = dynamics.idm(robot.tree, q, v, a, wrench=wrench, drive=drive)
@@ -110,15 +97,7 @@ def ddm(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> Array:
-    """Direct dynamic model: accelerations of all joints, the inverse of `idm`.
-
-    Dead points of the actuated joints are no obstacle.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Accelerations, rad/s^2 or m/s^2.
-    """
+    """Direct dynamic model: accelerations (..., n) of all joints, at dead points too."""
     try:  # one sample given as arrays, of a robot without drives whose engine is made: no calls
         model, data, models, datas, settings, full, places, order, back, n, n_a = (
             robot.scratch.quick
@@ -151,15 +130,10 @@ def closure_forces(
     wrench: ArrayLike | None = None,
     drive: bool = True,
 ) -> Array:
-    """Forces f of the closures: ``tau_tree(q, v, a) = tau + J^T f`` with J of `closure_jacobian`.
+    """Forces f (..., c) of the closures, N and N m: ``tau_tree(q, v, a) = tau + J^T f``.
 
     Force and moment of the first frame of each closure on the second, at the second's origin, in
     the axes of the first. Of redundant rows they are not determined: the shortest vector is given.
-
-    Returns
-    -------
-    ndarray, shape (..., c)
-        In the order of ``robot.rows``, N and N m.
     """
     a = ddm(robot, q, v, tau, wrench, drive)
     q, v = checked(robot, q=q, v=v)

@@ -2,10 +2,8 @@
 
 Parameters
 ----------
-robot : LoopedRobot
-    The robot, n joints, n_a of them actuated.
-q, v, a : array_like, shape (..., n)
-    Joint variables of all joints (rad or m), which close the loops, velocities, accelerations.
+robot, q, v, a
+    See `robotmodels.loops`.
 q_ref : array_like, shape (n,), optional
     Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
     Default: the first posture that closes at random positions of the actuated joints.
@@ -15,10 +13,11 @@ drive, columns
 tolerance : float
     Largest relative torque of a parameter that is not kept, between 0 and 1.
 
-Raises
-------
-ShapeError, InvalidValueError, LoopError
-    As `idm`; columns that do not exist; no closed posture, or no regular ones near ``q_ref``.
+Returns
+-------
+ndarray, shape (..., n_a, p), or BaseParameters
+    ``G^T`` times the regressor of the tree; base parameters of the tree's standard parameters.
+    Given to `robotmodels.identification.fit`, they name the assembly of the log.
 
 References
 ----------
@@ -111,13 +110,7 @@ def torque_regressor(
     drive: Drives = True,
     columns: Columns | None = None,
 ) -> Array:
-    """Matrix W of the inverse dynamic model: ``idm(robot, q, v, a) = W @ parameters``.
-
-    Returns
-    -------
-    ndarray, shape (..., n_a, p)
-        ``G^T`` times the regressor of the tree; columns as ``parameter_names(robot.tree, drive)``.
-    """
+    """Matrix W of the inverse dynamic model: ``idm(robot, q, v, a) = W @ parameters``."""
     batch, rows = batch_rows(tuple(checked(robot, q=q, v=v, a=a)), ("q", "v", "a"))
     G = maps(robot, closed(robot, rows[0]))[0].swapaxes(1, 2)
     pieces = []
@@ -139,12 +132,6 @@ def base_parameters(
 
     Khalil's choice as for the tree: earlier frames before later ones, link parameters before
     ``Ia`` before ``Fv`` and ``Fc``. There are at most as many as base parameters of the tree.
-
-    Returns
-    -------
-    BaseParameters
-        Of the tree's standard parameters; ``.reduce`` and ``columns=`` of `torque_regressor`.
-        Given to `robotmodels.identification.fit`, they name the assembly of the log.
     """
     check_looped(robot)
     tolerance = as_number(tolerance, "tolerance", above=0.0, below=1.0)

@@ -10,15 +10,8 @@ values, gravity
 Returns
 -------
 LoopedRobot
-    Spanning tree, closures and actuated joints.
-
-Raises
-------
-ParFileError, TableError, InvalidValueError
-    As for `robotmodels.read_par`; a ``.par`` file without loops.
-LoopError
-    An MJCF file that cannot be read, or without joints; other joints or equalities than those
-    supported, by name.
+    Spanning tree, closures and actuated joints. ParFileError or LoopError tells what a file has
+    that is not supported, by name.
 
 References
 ----------
@@ -27,12 +20,11 @@ W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robot
 
 Examples
 --------
->>> text = '''<mujoco model="bars"><worldbody>
-... <body name="crank"><joint name="j1" axis="0 0 1"/><inertial pos="0 0 0" mass="1"
-...   diaginertia="1 1 1"/><body name="rod" pos="0.5 0 0"><joint name="j2" axis="0 0 1"/>
-...   <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
-... <body name="rocker" pos="1 0 0"><joint name="j3" axis="0 0 1"/><inertial pos="0 0 0"
-...   mass="1" diaginertia="1 1 1"/></body></worldbody>
+>>> body = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+>>> text = f'''<mujoco model="bars"><worldbody>
+... <body name="crank"><joint name="j1" axis="0 0 1"/>{body}
+...   <body name="rod" pos="0.5 0 0"><joint name="j2" axis="0 0 1"/>{body}</body></body>
+... <body name="rocker" pos="1 0 0"><joint name="j3" axis="0 0 1"/>{body}</body></worldbody>
 ... <equality><connect body1="rod" body2="rocker" anchor="1 0 0"/></equality>
 ... <actuator><motor joint="j1"/></actuator></mujoco>'''
 >>> with TemporaryDirectory() as folder:

@@ -36,11 +36,6 @@ class Closure:
         ``"revolute"``: origins and z axes coincide (rows ``x y z rx ry``); ``"point"``: origins
         coincide, as in a spherical joint; ``"full"``: the frames coincide, as in a cut body.
 
-    Raises
-    ------
-    InvalidValueError
-        An empty name, another kind, or not two frames.
-
     Examples
     --------
     >>> Closure("cut", frames=(4, 7)).rows
@@ -73,6 +68,8 @@ class Closure:
 class LoopedRobot(Value):
     """Robot with kinematic loops: spanning tree, closures and actuated joints. Read-only.
 
+    Closures between frames of one body, and those that no joint can violate, raise LoopError.
+
     Parameters
     ----------
     tree : RobotModel
@@ -90,13 +87,6 @@ class LoopedRobot(Value):
         Natural unit of each joint: 1 rad, or the size of the robot in metres.
     rows : tuple of str
         Names of the c constraint rows, such as ``"cut.x"``.
-
-    Raises
-    ------
-    LoopError
-        A closure between frames of one body, or one that no joint can violate.
-    FrameNotFoundError, InvalidValueError
-        Unknown frames; repeated names; actuated joints that do not exist or are repeated.
 
     References
     ----------

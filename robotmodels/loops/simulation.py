@@ -65,13 +65,6 @@ def simulate(
     Simulation
         Motion of the tree, energies and works, status; ``tau`` is zero for passive joints.
 
-    Raises
-    ------
-    LoopError
-        Loops that are open at the start, or velocities that open them.
-    ShapeError, InvalidValueError
-        Arguments of the wrong shape, with NaN or infinity; dry friction without smoothing.
-
     References
     ----------
     J. Baumgarte, "Stabilization of constraints", CMAME 1, 1972. Seed book section 1.5.

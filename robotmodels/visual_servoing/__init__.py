@@ -1,4 +1,10 @@
-"""Visual servoing (chapter 6): image features, interaction matrices, tasks, pose, simulation."""
+"""Visual servoing (chapter 6): image features, interaction matrices, tasks, pose, simulation.
+
+Throughout, image coordinates are normalised, x = X / Z and y = Y / Z; twists [v; w] are those of
+the camera in its own axes, m/s and rad/s; ``T`` (..., 4, 4) are poses of the object in the camera.
+Arguments of the wrong shape, with NaN or out of range, matrices that are not poses, and objects at
+or behind the plane of the camera raise ShapeError, InvalidValueError or NotARotationError.
+"""
 
 from .camera import Camera
 from .features import Circle, Cylinder, Feature, Lines, Points, Segments, Sphere
@@ -23,51 +29,12 @@ from .tasks import Hybrid, Task, task_2_1_2d, task_3d
 from .tracking import TargetEstimate, TargetMotion
 from .velocity import ServoStatus, ServoStep, VirtualLink, camera_velocity, virtual_link
 
-__all__ = [
-    "Camera",
-    "Circle",
-    "Cylinder",
-    "EyeInHand",
-    "EyeToHand",
-    "Feature",
-    "Hybrid",
-    "Lines",
-    "Moments",
-    "Plane3D",
-    "PlaneMotions",
-    "Point3D",
-    "PointAndRotation",
-    "Points",
-    "PoseError",
-    "PoseSolutions",
-    "PoseStatus",
-    "Segments",
-    "ServoMotion",
-    "ServoStatus",
-    "ServoStep",
-    "Sphere",
-    "TargetEstimate",
-    "TargetMotion",
-    "Task",
-    "VirtualLink",
-    "broyden",
-    "camera_velocity",
-    "decompose_homography",
-    "estimate_interaction",
-    "homography",
-    "interaction_ellipse",
-    "interaction_line",
-    "interaction_moment",
-    "interaction_plane_3d",
-    "interaction_point",
-    "interaction_point_3d",
-    "interaction_segment",
-    "interaction_theta_u",
-    "p3p",
-    "pnp",
-    "refine_pose",
-    "servo",
-    "task_2_1_2d",
-    "task_3d",
-    "virtual_link",
-]
+__all__ = ["Camera", "Circle", "Cylinder", "EyeInHand", "EyeToHand", "Feature", "Hybrid", "Lines"]
+__all__ += ["Moments", "Plane3D", "PlaneMotions", "Point3D", "PointAndRotation", "Points"]
+__all__ += ["PoseError", "PoseSolutions", "PoseStatus", "Segments", "ServoMotion", "ServoStatus"]
+__all__ += ["ServoStep", "Sphere", "TargetEstimate", "TargetMotion", "Task", "VirtualLink"]
+__all__ += ["broyden", "camera_velocity", "decompose_homography", "estimate_interaction"]
+__all__ += ["homography", "interaction_ellipse", "interaction_line", "interaction_moment"]
+__all__ += ["interaction_plane_3d", "interaction_point", "interaction_point_3d"]
+__all__ += ["interaction_segment", "interaction_theta_u", "p3p", "pnp", "refine_pose", "servo"]
+__all__ += ["task_2_1_2d", "task_3d", "virtual_link"]

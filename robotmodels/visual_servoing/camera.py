@@ -24,11 +24,6 @@ class Camera(Value):
         Focal lengths, not zero, or one for both; principal point; width and height of the image,
         above zero. Pixels.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays of another shape, NaN, values out of range, points that are not in front.
-
     Examples
     --------
     >>> camera = Camera(focal=(800, 800), centre=(320, 240), size=(640, 480))

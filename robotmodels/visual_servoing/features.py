@@ -31,8 +31,7 @@ class Sight(NamedTuple):
 class Feature(Value):
     """A feature of an object: its measurement, and its interaction matrix.
 
-    Objects are given in their own frame, metres; image coordinates are normalised. Errors of
-    angles are taken modulo their period.
+    Objects are given in their own frame, metres. Errors of angles are taken modulo their period.
 
     Parameters
     ----------
@@ -42,13 +41,8 @@ class Feature(Value):
     Returns
     -------
     ndarray, shape (..., k) or (..., k, 6)
-        Measurement; interaction matrix for the twist [v; w] of the camera in its own axes.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        An object of another shape or without extent; a matrix that is not a pose; an object at or
-        behind the plane of the camera, or seen so that the feature does not exist.
+        Measurement; interaction matrix for the twist [v; w] of the camera in its own axes. Objects
+        without extent, or seen so that the feature does not exist, are refused.
 
     References
     ----------

@@ -13,11 +13,6 @@ Returns
 ndarray of shape (..., 3, 3), or PlaneMotions
     H scaled to a second singular value of 1 and positive depths; up to 1, 2 or 4 motions.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Fewer than four points, points on a line, a singular matrix.
-
 References
 ----------
 Seed book section 6.2.5.1; O. Faugeras and F. Lustman 1988; Y. Ma, S. Soatto, J. Kosecka and
@@ -25,7 +20,6 @@ S. Sastry, "An invitation to 3-D vision", 5.3.
 
 Examples
 --------
->>> import numpy as np
 >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 >>> H = homography(corners, corners + [0.5, 0.0])
 >>> H.round(6)[0] + 0.0, decompose_homography(H).R.shape
@@ -48,13 +42,9 @@ from .results import Values, as_sized, packed
 class PlaneMotions(Values):
     """Motions that a homography allows, ``H = R + t n^T``; missing rows of a batch are NaN.
 
-    Parameters
-    ----------
-    R, t : ndarray, shapes (..., k, 3, 3) and (..., k, 3)
-        Motions of points from the first camera to the second, ``X_2 = R X_1 + t``, translations
-        divided by the distance of the plane from the first camera.
-    n : ndarray, shape (..., k, 3)
-        Unit normals of the plane in the first camera; NaN without translation, for one motion.
+    ``R, t`` (..., k, 3, 3) and (..., k, 3) move points from the first camera to the second, ``X_2 =
+    R X_1 + t``, translations divided by the distance of the plane from the first camera; ``n``
+    (..., k, 3) are unit normals of the plane in the first camera, NaN without translation.
     """
 
     R: Array

@@ -1,7 +1,6 @@
 """Interaction matrices ``ds/dt = L [v; w]``: closed forms, and estimates from motions.
 
-The twist is that of the camera in its own axes, linear then angular; the object stands still.
-Coordinates are normalised: x = X / Z, y = Y / Z. Arguments broadcast against each other.
+The object stands still. Arguments broadcast against each other.
 
 Parameters
 ----------
@@ -17,30 +16,20 @@ n20, n02, n11 : array_like, shape (...)
 plane : array_like, shape (..., 4) or ()
     Plane (A, B, C, D) of the object, ``A X + B Y + C Z + D = 0`` in the camera, D not 0, so
     ``1 / Z = -(A x + B y + C) / D``; or the depth of a plane parallel to the image.
-theta_u : array_like, shape (..., 3)
-    Rotation vector of the current camera in the axes of the desired one, rad.
-point, normal : array_like, shape (..., 3)
-    Point and unit normal in the camera, m.
+theta_u, point, normal : array_like, shape (..., 3)
+    Rotation vector of the current camera in the axes of the desired one, rad; point, m, and unit
+    normal in the camera.
 moments, i, j : array_like, shape (..., K, K), and int
     Raw moments of a region, [p, q] the integral of ``x^p y^q``; order, K at least i + j + 2.
 dS, dX : array_like, shapes (N, k) and (N, 6)
     Changes of a measurement, and the small displacements [v; w] of the camera that caused them.
-L, ds, dx : array_like, shapes (k, 6), (k,) and (6,)
-    Estimate so far; the last change and its displacement.
-factor : float
-    Part of the correction, in (0, 1].
+L, ds, dx, factor : array_like, shapes (k, 6), (k,), (6,) and float
+    Estimate so far; the last change and its displacement; part of the correction, in (0, 1].
 
 Returns
 -------
 ndarray, shape (..., k, 6)
     Rows in the order of the arguments; of ``m_ij`` one.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Arguments that do not fit each other, NaN; a depth that is not positive; a plane through the
-    centre of the camera; a rotation of a turn or more; a normal of another length than 1;
-    displacements that do not span all six directions.
 
 References
 ----------
@@ -54,8 +43,6 @@ Examples
 >>> interaction_point(0.1, 0.2, 2.0).round(3)
 array([[-0.5 ,  0.  ,  0.05,  0.02, -1.01,  0.2 ],
        [ 0.  , -0.5 ,  0.1 ,  1.04, -0.02, -0.1 ]])
->>> broyden(np.zeros((1, 6)), [0.2], [0.1, 0, 0, 0, 0, 0])
-array([[2., 0., 0., 0., 0., 0.]])
 """
 
 from __future__ import annotations

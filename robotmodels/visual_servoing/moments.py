@@ -40,20 +40,14 @@ class Moments(Feature):
     Parameters
     ----------
     polygon : array_like, shape (k, 3), optional
-        Corners of a planar region in order, in the frame of the object, m.
+        Corners of a planar region in order, in the frame of the object, m; its outline does not
+        touch itself.
     components : sequence of str
-        Which, in this order.
+        Which, in this order. ``alpha`` does not exist without orientation, as of a square.
     points : array_like, shape (k, 3), optional
         Instead of a polygon: moments are sums over points, which need not be coplanar. Their
         ``area`` is mu20 + mu02, ``c`` the root of the sum of the squared distances from their
         mean, and n20, n02, n11 are divided by their number k.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        A polygon with fewer than three corners, without area, not planar or that crosses or
-        touches itself; unknown components; ``alpha`` of an image without orientation, such as a
-        square.
 
     References
     ----------

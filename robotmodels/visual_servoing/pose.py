@@ -18,13 +18,9 @@ T0 : array_like, shape (4, 4)
 Returns
 -------
 PoseSolutions
-    Poses with all points in front of the camera.
-
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Arrays that do not fit each other, points on a line, an image of one point, a first pose with
-    points behind the camera.
+    Poses with all points in front of the camera: ``T`` (..., S, 4, 4) by growing misfit, packed,
+    missing ones NaN; ``valid`` and ``residual`` (..., S), the largest distance of an image point
+    from its measurement; ``status`` (...), codes of `PoseStatus`.
 
 References
 ----------
@@ -35,7 +31,6 @@ pose estimation from a planar target", IEEE Trans. PAMI 28(12), 2006; E. Marchan
 
 Examples
 --------
->>> import numpy as np
 >>> triangle = np.array([[2.0, 0, 0], [-1, 3**0.5, 0], [-1, -(3**0.5), 0]])
 >>> p3p(triangle, triangle[:, :2] / 12**0.5)
 <PoseSolutions: 4 poses. Each pose found is a minimum of the image error.>
@@ -77,17 +72,7 @@ class PoseStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PoseSolutions(Result):
-    """Poses of an object in the camera; rows are packed, missing ones NaN. Read-only.
-
-    Parameters
-    ----------
-    T : ndarray, shape (..., S, 4, 4)
-        Poses ``T_camera_object``, by growing misfit; also ``np.asarray`` of the result.
-    valid, residual : ndarray, shape (..., S)
-        Whether the row is a solution; largest distance of an image point from its measurement.
-    status : ndarray of int8, shape (...)
-        Codes of `PoseStatus`.
-    """
+    """Poses of an object in the camera; ``np.asarray`` of the result is T. Read-only."""
 
     T: Array
     valid: NDArray[np.bool_]

@@ -33,11 +33,6 @@ Returns
 ServoMotion
     Poses, measurements, errors, velocities and the status.
 
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    Arguments of the wrong shape or kind, q0 outside the limits, more than a million steps.
-
 References
 ----------
 Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
@@ -97,21 +92,11 @@ class EyeToHand(Value):
 class ServoMotion(Result):
     """A simulated motion under visual servoing, N samples. Read-only.
 
-    Parameters
-    ----------
-    task, camera : Task or Hybrid, Camera or None
-        Of the call.
-    t : ndarray, shape (N,)
-        Times, s; they end early where the object is behind the camera or out of sight.
-    T, cameras : ndarray, shape (N, 4, 4)
-        Poses of the object in the camera; of the camera in the world, which without a robot is the
-        object at the start.
-    q : ndarray, shape (N, n), or None
-        Joint variables, rad or m.
-    s, error, velocity : ndarray, shapes (N, k), (N, k) and (N, 6)
-        Measurements; ``s - s*``; twists [v; w] of the camera by the law.
-    codes : ndarray of int8, shape (N,)
-        `ServoStatus` of every sample.
+    Times ``t`` (N,), s, which end early where the object is behind the camera or out of sight;
+    ``T`` and ``cameras`` (N, 4, 4), poses of the object in the camera and of the camera in the
+    world, which without a robot is the object at the start; joints ``q`` (N, n) or None;
+    measurements ``s`` and ``error`` (N, k); ``velocity`` (N, 6) asked of the camera; ``codes`` (N,)
+    of `ServoStatus`; ``task`` and ``camera`` of the call.
     """
 
     task: Task | Hybrid

@@ -26,11 +26,6 @@ Task
     Of `task_3d` with `PoseError`, whose two errors decay by themselves; of `task_2_1_2d` with
     `PointAndRotation`, which moves the image of a point straight to its goal.
 
-Raises
-------
-ShapeError, InvalidValueError
-    A desired value of another feature; options that need a desired pose without one.
-
 References
 ----------
 Seed book sections 6.3.1 to 6.3.3; F. Chaumette, "Potential problems of stability and convergence

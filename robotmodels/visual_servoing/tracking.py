@@ -4,12 +4,9 @@ The rate of s by the target is ``(s_k - s_{k-1}) / step - L [v; w]``.
 
 Parameters
 ----------
-kalman : bool
-    Whether a Kalman filter with constant slope filters the differences, or they are used as they
-    are.
-process, noise : float
-    Standard deviations: of the change of the slope in one second, 1/s^2 per root second; of a
-    component of s.
+kalman, process, noise : bool, float, float
+    Whether a Kalman filter with constant slope filters the differences; standard deviations: of
+    the change of the slope in one second, 1/s^2 per root second, and of a component of s.
 s, rate, slope : ndarray, shape (k,)
     Last measurement, its rate by the target per s, and the slope of the rate per s^2.
 covariance : ndarray, shape (2, 2)

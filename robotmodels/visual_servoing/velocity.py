@@ -16,12 +16,6 @@ Returns
 ServoStep or VirtualLink
     Velocity, error, rank and status; or the motions that leave the feature unchanged.
 
-Raises
-------
-ShapeError, InvalidValueError, NotARotationError
-    A measurement of another feature, NaN, a matrix that is not a pose, a pose at which the feature
-    of a virtual link does not exist.
-
 References
 ----------
 Seed book sections 6.3.2 and 6.3.3.
@@ -66,9 +60,8 @@ _REDUCIBLE = 1e-3  # part of the error below which a velocity cannot reduce it
 class ServoStatus(Outcome):
     """Outcome of a visual servoing law; fits int8.
 
-    With the current matrix at true depths the velocity of ``CONVERGES`` reduces the error. With
-    other matrices or depths the error may grow, as with the desired matrix of an object that is
-    turned by more than a quarter.
+    With the current matrix at true depths the velocity of ``CONVERGES`` reduces the error; with
+    other matrices or depths the error may grow.
     """
 
     CONVERGES = 0, "The law gives a velocity, or the error is zero."
@@ -81,15 +74,10 @@ class ServoStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ServoStep(Result):
-    """Velocity of the camera for one measurement, or for a batch. Read-only.
+    """Velocity ``v`` (..., 6) of the camera, zero for an object that is behind it or out of sight.
 
-    Parameters
-    ----------
-    v, error : ndarray, shapes (..., 6) and (..., k)
-        Twist [v; w] of the camera in its own axes, m/s and rad/s, zero for an object that is
-        behind the camera or out of sight; ``s - s*``, NaN behind the camera.
-    rank, status : int and ServoStatus, or ndarrays of int8, shape (...)
-        Rank of the matrix of the law; outcome.
+    ``error`` (..., k) is ``s - s*``, NaN behind the camera; ``rank`` (...) that of the matrix of
+    the law; ``status`` a `ServoStatus` or codes (...).
     """
 
     v: Array
@@ -233,14 +221,9 @@ _LINKS = {
 class VirtualLink(Values):
     """The motions of a camera that leave a feature unchanged at a pose (section 6.3.3.1).
 
-    Parameters
-    ----------
-    link_class, rank : int, or ndarray, shape (...)
-        Dimension of the motions, 6 - rank; rank of the interaction matrix.
-    kernel_twists : ndarray, shape (..., class, 6)
-        Orthonormal twists [v; w] of the camera in its own axes; missing rows of a batch are NaN.
-    name : str, or ndarray, shape (...)
-        Of the mechanical link with as many rotations and translations, "" for others.
+    ``link_class`` (...) is their dimension, 6 - ``rank``; ``kernel_twists`` (..., class, 6)
+    orthonormal twists [v; w], missing rows of a batch NaN; ``name`` (...) that of the mechanical
+    link with as many rotations and translations, "" for others.
     """
 
     link_class: int | NDArray[np.int64]
