@@ -74,9 +74,21 @@ class Value(Rebuilt):
     def __hash__(self) -> int:
         return value_hash(type(self).__name__, *self._values)
 
+    def __repr__(self) -> str:
+        given = ((f.name, getattr(self, f.name)) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        texts = [f"{name}={_shown(value)}" for name, value in given if value is not None]
+        return f"{type(self).__name__}({', '.join(texts)})"
+
     @property
     def _values(self) -> tuple[Any, ...]:
         return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
+
+
+def _shown(value: object) -> str:
+    """A field in one line: arrays of more than seven numbers by their shape."""
+    if isinstance(value, np.ndarray) and value.size > 7:
+        return f"<{value.shape} array>"
+    return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
 
 
 def same_value(a: object, b: object) -> bool:

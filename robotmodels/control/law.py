@@ -121,22 +121,6 @@ class Law(Value):
             NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench"),
         )
 
-    def __repr__(self) -> str:
-        shown = []
-        for f in (f for f in fields(self) if f.init):  # type: ignore[arg-type]
-            value = getattr(self, f.name)
-            if isinstance(value, np.ndarray) and value.ndim < 2 and value.size <= 7:
-                value = value.tolist()
-                if isinstance(value, list) and len(value) > 1 and len(set(value)) == 1:
-                    value = value[0]
-            elif isinstance(value, RobotModel):
-                value = value.name
-            elif value is not None and not isinstance(value, (int, float, str, Law)):
-                value = type(value).__name__
-            if value is not None:
-                shown.append(f"{f.name}={value}")
-        return f"{type(self).__name__}({', '.join(shown)})"
-
 
 def check_single(q: Array, v: Array) -> None:
     """Refuse several postures."""

@@ -46,7 +46,7 @@ array([0.25, 0.5 , 0.25])
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import comb, factorial
 from typing import Any
 
@@ -133,7 +133,7 @@ def _gains(value: ArrayLike, n: int, name: str) -> Array:
 # --- rest to rest --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RestToRest(Result):
     """Motion of the motors from rest to rest in a fixed time, ``trajectory``.
 
@@ -145,7 +145,7 @@ class RestToRest(Result):
     trajectory: Trajectory
     end: Array
     status: RestStatus
-    _elastic: Any = field(repr=False)
+    _elastic: Any
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -164,9 +164,6 @@ class RestToRest(Result):
         path = self.trajectory.motion.derivatives(times.ravel(), (0, 1, 2))
         q, v, a = (x.reshape(*times.shape, self.arm.n) for x in path)
         return idm(self.arm, q, e, v, e_v, a)[0]
-
-    def __repr__(self) -> str:
-        return f"<RestToRest: {self.trajectory.duration:g} s, {self.status.name}>"
 
 
 def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: float) -> RestToRest:

@@ -57,20 +57,12 @@ class DeflectionStatus(Outcome):
     """Outcome of a static deflection; fits int8."""
 
     SMALL = 0, "The deflection of every link is small, so that its linear modes hold."
-    LARGE = (
-        1,
-        "The tip of a link moves by more than a tenth of its length: linear modes are no longer "
-        "within 1 %; `elastica` bends one beam exactly.",
-    )
+    LARGE = 1, "The tip of a link moves by more than a tenth of its length: see elastica."
     NOT_FOUND = 2, "No equilibrium was found: the load is beyond the range of linear modes."
-    UNSTABLE = (
-        3,
-        "The equilibrium is unstable: the load exceeds the one at which the arm buckles, and the "
-        "arm leaves it at the least disturbance.",
-    )
+    UNSTABLE = 3, "The equilibrium is unstable: the load exceeds the one at which the arm buckles."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Deflection(Result):
     """Elastic equilibrium of an arm whose joints are held.
 
@@ -84,9 +76,6 @@ class Deflection(Result):
     deflection: Array
     status: NDArray[np.int8]
     outcomes = DeflectionStatus
-
-    def __repr__(self) -> str:
-        return f"<Deflection: shape {self.e.shape}, up to {np.max(self.deflection, initial=0):.3g}>"
 
 
 def static_deflection(
@@ -152,7 +141,7 @@ def scales(arm: FlexibleRobot) -> Array:
     return np.concatenate([np.ones(arm.n), *sizes, np.ones(len(arm.joints))])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LinearModel(Frozen, Value):
     """Linear model about an equilibrium: ``x' = A x + B u``, ``y = C x + D u``.
 
@@ -168,9 +157,6 @@ class LinearModel(Frozen, Value):
     poles: NDArray[np.complex128]
     zeros: NDArray[np.complex128]
     e: Array
-
-    def __repr__(self) -> str:
-        return f"<LinearModel: {len(self.A)} states, {self.B.shape[1]} inputs>"
 
 
 def linearize(arm: FlexibleRobot, q: ArrayLike, output: str = "joint") -> LinearModel:

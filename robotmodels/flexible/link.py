@@ -40,7 +40,7 @@ class BeamData(Frozen, Value):
     pose: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Invariants(Frozen, Value):
     """Integrals over the mass of an elastic body, r = X + Phi e + Gamma e e / 2 (7.2.2.12).
 
@@ -76,9 +76,6 @@ class Invariants(Frozen, Value):
     def m(self) -> int:
         """Number of modes."""
         return len(self.modal_mass)
-
-    def __repr__(self) -> str:
-        return f"<Invariants: {self.mass:g} kg, {self.m} modes>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

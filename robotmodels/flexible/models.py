@@ -47,16 +47,8 @@ class SpinStatus(Outcome):
     """Whether the elastic stiffness of the spinning links and the mass are positive; fits int8."""
 
     STIFF = 0, "The elastic stiffness of every link is positive at its angular velocity."
-    SOFTENED = (
-        1,
-        "A link spins above its own critical speed: its linear modes have no stiffness left and "
-        "their deflection grows. Make the link with stiffening=True.",
-    )
-    BENT = (
-        2,
-        "The mass matrix is not positive: higher modes are bent beyond the second order of "
-        "stiffening=True. Take fewer modes, or stiffening=False.",
-    )
+    SOFTENED = 1, "A link spins above its own critical speed: make it with stiffening=True."
+    BENT = 2, "Modes are bent beyond the second order of stiffening=True: take fewer modes."
 
 
 class Accelerations(Result, tuple[Array, Array]):
@@ -64,6 +56,7 @@ class Accelerations(Result, tuple[Array, Array]):
 
     status: NDArray[np.int8]
     outcomes = SpinStatus
+    __repr__ = tuple.__repr__
 
     def __new__(cls, pair: tuple[Array, Array], status: NDArray[np.int8]) -> Accelerations:
         """Attach the status to the pair."""

@@ -119,7 +119,7 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     return FlexibleLink(found, np.sqrt(np.diag(stiffness) / np.diag(mass)), section, X, Phi)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ReducedModel(Frozen, Value):
     """Reduced finite elements: diagonal ``M, K`` (r, r), the mass of each mode 1.
 
@@ -130,9 +130,6 @@ class ReducedModel(Frozen, Value):
     K: Array
     shapes: Array
     frequencies: Array
-
-    def __repr__(self) -> str:
-        return f"<ReducedModel: {len(self.M)} of {len(self.shapes)} displacements>"
 
 
 def craig_bampton(

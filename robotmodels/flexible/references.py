@@ -58,7 +58,7 @@ _MOST = 100.0  # greatest load of `elastica`, of the same
 _LOAD_STEP = 0.5  # of force L^2 / EI and moment L / EI, along which the solution is continued
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Elastica(Frozen, Value):
     """Exact shape of a bent cantilever.
 
@@ -69,10 +69,6 @@ class Elastica(Frozen, Value):
     tip: Array
     points: Array
     angle: Array
-
-    def __repr__(self) -> str:
-        x, y, _ = self.tip[:3, 3]
-        return f"<Elastica: tip at ({x:.6g}, {y:.6g}) m, {self.angle[-1]:.6g} rad>"
 
 
 def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) -> Elastica:

@@ -320,7 +320,7 @@ def _relative(error: Array, *sizes: Array) -> float:
 # --- one body in space ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FreeBodyMotion(Result):
     """Motion of an elastic body without loads (section 7.2.2), at times t (N,).
 
@@ -346,9 +346,6 @@ class FreeBodyMotion(Result):
     def momentum_drift(self) -> float:
         """Largest change of the momenta, relative to them."""
         return _relative(self.momentum - self.momentum[0], self.momentum)
-
-    def __repr__(self) -> str:
-        return f"<FreeBodyMotion: {self.t[-1]:.6g} s, energy drift {self.energy_drift:.1g}>"
 
 
 def free_body(

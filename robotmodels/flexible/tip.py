@@ -68,18 +68,13 @@ class TipStatus(Outcome):
     FOUND = 0, "The torques move the tip along its reference."
     NON_MINIMUM_PHASE = (
         1,
-        "Causal inversion is refused: the tip is a non-minimum-phase output, so that its zeros in "
-        "the right half plane make causal torques grow without bound. Take "
-        "method='stable_inversion', which starts before the motion.",
+        "The tip is a non-minimum-phase output: causal torques would grow without bound; take "
+        "method='stable_inversion'.",
     )
-    NOT_FOUND = (
-        2,
-        "No bounded motion of the joints was found: the reference is too fast for this arm, or "
-        "passes postures between which the number of unstable zeros of the tip grows.",
-    )
+    NOT_FOUND = 2, "No bounded motion of the joints was found; take a slower reference."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TipTracking(Result):
     """Motion of the joints that moves the tip of a flexible arm along a reference."""
 
@@ -93,7 +88,7 @@ class TipTracking(Result):
     zeros: NDArray[np.complex128]
     preview: float
     status: TipStatus
-    _spline: Any = field(init=False, repr=False)
+    _spline: Any = field(init=False)
 
     def __post_init__(self) -> None:
         from scipy.interpolate import CubicSpline
@@ -124,9 +119,6 @@ class TipTracking(Result):
             raise InvalidValueError(f"There are no torques. {self.reason()}")
         times = np.clip(as_floats(t, "t"), self.t[0], self.t[-1])
         return np.split(self._spline(times), 3, axis=-1)
-
-    def __repr__(self) -> str:
-        return f"<TipTracking: {self.status.name}, preview {self.preview:.4g} s>"
 
 
 def tip_tracking(

@@ -21,9 +21,7 @@ class ClosingStatus(Outcome):
     CLOSED = 0, "The loops are closed."
     CANNOT_CLOSE = 1, "The loops cannot be closed at these positions of the actuated joints."
     NOT_CONVERGED = 2, "The iterations were used up before the loops were closed."
-    SINGULAR_THERE = (
-        3, "The loops are closed, but the actuated joints do not determine the other joints there.",
-    )  # fmt: skip
+    SINGULAR_THERE = 3, "The loops are closed, but the actuated joints do not determine the others."
 
 
 _OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)

@@ -73,6 +73,8 @@ class LoopedParameters(Value, BaseParameters):
     robot: LoopedRobot = None  # type: ignore[assignment]
     q_ref: Array = None  # type: ignore[assignment]
 
+    __repr__ = BaseParameters.__repr__
+
     def motion(
         self, guess: Array, q: Array, v: Array | None, a: Array | None
     ) -> tuple[Array, Array, Array, Array]:

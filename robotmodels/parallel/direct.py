@@ -60,15 +60,8 @@ class PoseStatus(Outcome):
     """Outcome of an iterative direct model."""
 
     CONVERGED = 0, "The pose is found, on the same side of singular positions as the start."
-    NOT_CONVERGED = (
-        1,
-        "No pose was found near the start; the legs may be too short to meet, see assembly_modes.",
-    )
-    LEFT_THE_MODE = (
-        2,
-        "A pose is found beyond a singular position: the determinant has another sign than at the "
-        "start.",
-    )
+    NOT_CONVERGED = 1, "No pose was found near the start: legs may be too short to meet."
+    LEFT_THE_MODE = 2, "A pose is found beyond a singular position, where the determinant is 0."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -87,11 +80,7 @@ class AssemblyStatus(Outcome):
     """Completeness of the assembly modes."""
 
     ALL = 0, "All assembly modes are listed."
-    DEGENERATE = (
-        1,
-        "The legs do not determine the platform: solutions form a continuum, or the robot is "
-        "singular at every pose.",
-    )
+    DEGENERATE = 1, "The legs do not determine the platform: solutions form a continuum."
     SOME_LOST = 2, "Assembly modes may be missing: not every path or start led to a solution."
 
 

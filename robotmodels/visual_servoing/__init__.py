@@ -25,8 +25,7 @@ from .matrices import (
 from .moments import Moments
 from .pose import PoseSolutions, PoseStatus, p3p, pnp, refine_pose
 from .servo import EyeInHand, EyeToHand, ServoMotion, servo
-from .tasks import Hybrid, Task, task_2_1_2d, task_3d
-from .tracking import TargetEstimate, TargetMotion
+from .tasks import Hybrid, TargetEstimate, TargetMotion, Task, task_2_1_2d, task_3d
 from .velocity import ServoStatus, ServoStep, VirtualLink, camera_velocity, virtual_link
 
 __all__ = ["Camera", "Circle", "Cylinder", "EyeInHand", "EyeToHand", "Feature", "Hybrid", "Lines"]

@@ -14,7 +14,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose
 from .camera import Camera
 from .matrices import interaction_ellipse, interaction_line, interaction_segment, point_rows
-from .results import THIN, Value
+from .results import THIN, Checked
 
 _TURN = 2.0 * np.pi
 
@@ -28,7 +28,7 @@ class Sight(NamedTuple):
     image: Any = None  # points (..., m, 2) that have to be inside the image, None without any
 
 
-class Feature(Value):
+class Feature(Checked):
     """A feature of an object: its measurement, and its interaction matrix.
 
     Objects are given in their own frame, metres. Errors of angles are taken modulo their period.

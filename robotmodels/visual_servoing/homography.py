@@ -33,13 +33,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
+from .._arrays import Array, Frozen, Value
 from ..errors import InvalidValueError, ShapeError
-from .results import Values, as_sized, packed
+from .results import as_sized, packed
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PlaneMotions(Values):
+class PlaneMotions(Frozen, Value):
     """Motions that a homography allows, ``H = R + t n^T``; missing rows of a batch are NaN.
 
     ``R, t`` (..., k, 3, 3) and (..., k, 3) move points from the first camera to the second, ``X_2 =

@@ -48,11 +48,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from .._arrays import Array
-from .._outcomes import Outcome
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
-from .results import Result, as_points, as_sized, packed, taken
+from .results import as_points, as_sized, packed, taken
 
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides

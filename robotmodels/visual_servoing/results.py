@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _arrays, _outcomes
+from .. import _arrays
 from .._arrays import LARGEST, Array, as_bounded, as_core, as_exact, as_number, read_only
 from .._choices import one_of
 from ..errors import InvalidValueError, ShapeError
@@ -17,23 +17,10 @@ from ..se3 import as_single_pose
 THIN = 1e-9  # relative: lengths, areas and angles below are zero
 
 
-def brief(self: Any) -> str:
-    """One line for a value with arrays: those of more than six numbers by their shapes."""
-    given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.init]
-    texts = [
-        f"{name}=<{entry.shape} array>"
-        if isinstance(entry, np.ndarray) and entry.size > 6
-        else f"{name}={' '.join(repr(entry).split())}"
-        for name, entry in given
-    ]
-    return f"{type(self).__name__}({', '.join(texts)})"
-
-
-class Value(_arrays.Value):
+class Checked(_arrays.Value):
     """Base of descriptions, whose fields are checked by their names."""
 
     __slots__ = ()
-    __repr__ = brief
 
     def __post_init__(self) -> None:
         self._check(*(f.name for f in fields(self)))  # type: ignore[arg-type]
@@ -45,20 +32,6 @@ class Value(_arrays.Value):
     def _set(self, name: str, value: Any) -> None:
         value = read_only(value) if isinstance(value, np.ndarray) else value
         object.__setattr__(self, name, value)
-
-
-class Values(_arrays.Frozen, _arrays.Value):
-    """Base of results without a status."""
-
-    __slots__ = ()
-    __repr__ = brief
-
-
-class Result(_outcomes.Result):
-    """Base of results with a status."""
-
-    __slots__ = ()
-    __repr__ = brief
 
 
 def taken(x: Array, order: Any) -> Array:

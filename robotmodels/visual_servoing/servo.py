@@ -58,6 +58,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact, as_number
+from .._outcomes import Result
 from ..errors import InvalidValueError
 from ..kinematics import JointBounds, dgm, ikm
 from ..kinematics.inverse import IKMStatus
@@ -66,23 +67,22 @@ from ..model import RobotModel, check_model
 from ..se3 import as_pose, as_single_pose, inverse
 from .camera import Camera
 from .features import sight_of
-from .results import Result, Value
-from .tasks import Hybrid, Task
-from .tracking import TargetMotion
+from .results import Checked
+from .tasks import Hybrid, TargetMotion, Task
 from .velocity import ServoStatus, check_kinds, law, moved
 
 _MOST = 1_000_000  # steps of a simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeInHand(Value):
+class EyeInHand(Checked):
     """A camera on the tool of a robot (section 6.2.2)."""
 
     T_tool_camera: Array = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class EyeToHand(Value):
+class EyeToHand(Checked):
     """A camera fixed in the world that sees the object on the tool (section 6.2.3)."""
 
     T_world_camera: Array = None  # type: ignore[assignment]

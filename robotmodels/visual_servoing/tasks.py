@@ -1,4 +1,6 @@
-"""Tasks: regulation of a feature with an interaction matrix (section 6.3).
+"""Tasks: regulation of a feature with an interaction matrix, tracking of a target (section 6.3).
+
+The rate of s by a moving target is ``(s_k - s_{k-1}) / step - L [v; w]``.
 
 Parameters
 ----------
@@ -19,10 +21,16 @@ points : array_like, shape (k, 3) or (3,)
 primary, secondary, weight : Task; Task, array_like (6,) or function (4, 4) -> (6,); float
     The task that is kept; another task, a constant twist of the camera in its own axes, or a
     function of the pose of the object, such as minus the gradient of a cost; and its weight.
+kalman, process, noise : bool, float, float
+    Whether a Kalman filter with constant slope filters the differences; standard deviations: of
+    the change of the slope in one second, 1/s^2 per root second, and of a component of s.
+s, rate, slope, covariance : ndarray, shapes (k,) and (2, 2)
+    Last measurement, its rate by the target per s, the slope of the rate per s^2, and covariance
+    of both, the same for all components.
 
 Returns
 -------
-Task
+Task or TargetEstimate
     Of `task_3d` with `PoseError`, whose two errors decay by themselves; of `task_2_1_2d` with
     `PointAndRotation`, which moves the image of a point straight to its goal.
 
@@ -31,7 +39,8 @@ References
 Seed book sections 6.3.1 to 6.3.3; F. Chaumette, "Potential problems of stability and convergence
 in image-based and position-based visual servoing", 1998; E. Malis, "Improving vision-based control
 using efficient second-order minimization techniques", ICRA 2004; C. Samson, M. Le Borgne and
-B. Espiau, "Robot control: the task function approach", 1991.
+B. Espiau, "Robot control: the task function approach", 1991; P. Corke and M. Good, "Dynamic
+effects in visual closed-loop systems", IEEE Trans. Robotics and Automation 12(5), 1996.
 
 Examples
 --------
@@ -52,16 +61,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact
+from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose, as_single_pose
 from .features import Feature, Sight, as_sensed
 from .features_3d import PointAndRotation, PoseError
-from .results import Value, as_points
+from .results import Checked, as_points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Task(Value):
+class Task(Checked):
     """Regulation of a feature: ``[v; w] = -gain L^+ (s - s*)``."""
 
     feature: Feature
@@ -142,7 +151,7 @@ class Task(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Hybrid(Value):
+class Hybrid(Checked):
     """A primary task, and a secondary motion z in the kernel of its matrix.
 
     ``[v; w] = primary + weight (I - L^+ L) z``.
@@ -175,3 +184,49 @@ def task_2_1_2d(points: ArrayLike, desired: ArrayLike, gain: float = 0.5) -> Tas
     """2 1/2-D visual servoing."""
     T = as_pose(desired, "desired")
     return Task(PointAndRotation(as_points(points, "points")[0], T), T, gain)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TargetEstimate(Frozen, Value):
+    """Estimate of the motion of a target."""
+
+    s: Array
+    rate: Array
+    slope: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TargetMotion(Checked):
+    """Estimation of the rate of a measurement by a moving target."""
+
+    kalman: bool = True
+    process: float = 1.0
+    noise: float = 1e-4
+
+    def start(self, s: ArrayLike) -> TargetEstimate:
+        """Estimate before any motion was seen, of a measurement s (k,)."""
+        s = as_floats(s, "s")
+        return TargetEstimate(s, 0.0 * s, 0.0 * s, np.eye(2))
+
+    def update(
+        self, last: TargetEstimate, s: ArrayLike, own: ArrayLike, step: float
+    ) -> TargetEstimate:
+        """Estimate with the next measurement s (k,); ``own`` (k,) is the rate by the camera."""
+        if not isinstance(last, TargetEstimate):
+            raise InvalidValueError(
+                f"last: expected the estimate of start or update, got {type(last).__name__}."
+            )
+        s, own = (as_exact(x, last.s.shape, name) for x, name in ((s, "s"), (own, "own")))
+        h = as_number(step, "step", above=0.0)
+        seen = (s - last.s) / h - own
+        if not self.kalman:
+            return TargetEstimate(s, seen, 0.0 * s, last.covariance)
+        F = np.array(((1.0, h), (0.0, 1.0)))
+        Q = self.process**2 * np.array(((h**3 / 3.0, h**2 / 2.0), (h**2 / 2.0, h)))
+        P = F @ last.covariance @ F.T + Q
+        K = P[:, 0] / (P[0, 0] + 2.0 * (self.noise / h) ** 2)
+        rate = last.rate + h * last.slope
+        missing = seen - rate
+        kept = np.eye(2) - np.outer(K, (1.0, 0.0))
+        return TargetEstimate(s, rate + K[0] * missing, last.slope + K[1] * missing, kept @ P)

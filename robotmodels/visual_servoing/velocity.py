@@ -43,12 +43,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import LARGEST, Array, as_exact, read_only
-from .._outcomes import Outcome
+from .._arrays import LARGEST, Array, Frozen, Value, as_exact, read_only
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from .camera import Camera
 from .features import Feature, as_sensed, sight_of
-from .results import Result, Values, packed
+from .results import packed
 from .tasks import Hybrid, Task
 
 RANK_TOLERANCE = 1e-9
@@ -218,7 +218,7 @@ _LINKS = {
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class VirtualLink(Values):
+class VirtualLink(Frozen, Value):
     """The motions of a camera that leave a feature unchanged at a pose (section 6.3.3.1).
 
     ``link_class`` (...) is their dimension, 6 - ``rank``; ``kernel_twists`` (..., class, 6)
