@@ -27,21 +27,6 @@ theta = {th1,th2,th3,th4,th5,th6,th7,th8,th9,0}
 IA = {IA1,IA2,IA3,IA4,IA5,IA6,IA7,IA8}
 """
 LENGTHS = {"D2": 0.4, "D3": 0.8, "D4": -0.2, "RL4": 1.0, "D8": 1.0}
-TWO_LOOPS = """(* Robotname = 'TwoLoops' *)
-NL = 8
-NJ = 10
-NF = 12
-Type = 2
-ant = {0,1,2,3,4,1,4,3,7,6,8,11}
-sigma = {0,0,0,0,0,0,0,0,0,0,2,2}
-b = {0,0,0,0,0,d12*cos(g12),0,0,0,0,0,0}
-d = {0,0,d3,d4,0,-d12*sin(g12),d7,0,d4,d3,d7,0}
-r = {0,0,0,0,0,0,0,0,0,0,0,0}
-gamma = {0,0,0,0,0,0,g12 + pi/2,0,0,0,g12 + pi/2,0}
-alpha = {0,pi/2,0,0,pi/2,pi/2,0,0,0,0,0,0}
-mu = {1,1,1,0,1,0,0,0,0,0,0,0}
-theta = {th1,th2,th3,th4,th5,th6,th7,th8,th9,th10,0,0}
-"""
 BAR = '<inertial pos="0.2 0 0" mass="1.5" diaginertia="0.1 0.2 0.3"/>'
 FOUR_BAR = f"""<mujoco model="bars"><compiler angle="radian"/>
 <worldbody>
@@ -80,16 +65,6 @@ def test_a_parallelogram_robot_of_symoro(read):
     # as many as an independent rank of G^T W, with rotors and without friction
     assert len(loops.base_parameters(robot, found.q, drive=("Ia",))) == 51
     assert len(rm.base_parameters(robot.tree, drive=("Ia",))) == 55
-
-
-def test_two_loops_of_symoro(read):
-    lengths = {"d3": 0.7, "d4": 0.6, "d7": 0.35, "d12": 0.3, "g12": 0.4}
-    robot = read(TWO_LOOPS, loops.read_par, values=lengths)
-    assert [closure.frames for closure in robot.closures] == [(9, 11), (10, 12)]
-    found = loops.close(robot, [0.87, 0.54, 0.34, 0.31])
-    assert found.status == loops.ClosingStatus.CLOSED
-    assert int(loops.mobility(robot, found.q)) == 4
-    assert len(loops.base_parameters(robot, found.q, drive=("Ia",))) == 48
 
 
 def test_par_files_that_are_no_looped_robots(read):

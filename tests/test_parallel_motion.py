@@ -293,7 +293,7 @@ def test_robots_with_cranks_count_working_modes():
     [
         ({"kind": "round"}, "orientation, dexterous"),
         ({"limits": False}, "unlimited"),
-        ({"resolution": 1.5}, "whole number"),
+        ({"resolution": 1.5}, "resolution: expected"),
         ({"orientation": np.eye(2)}, "orientation"),
     ],
 )

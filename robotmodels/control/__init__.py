@@ -13,7 +13,13 @@ Gains that are not positive, references for another number of joints and argumen
 shape raise InvalidValueError or ShapeError.
 """
 
-from .force import ConstrainedDecoupling, ExternalForceLoop, ForceTracking, ParallelHybrid
+from .force import (
+    ConstrainedDecoupling,
+    ExternalForceLoop,
+    ForceTracking,
+    ParallelHybrid,
+    SpringWall,
+)
 from .joint_laws import (
     AdaptiveSlotineLi,
     DecentralizedPID,
@@ -26,7 +32,6 @@ from .joint_laws import (
 from .run import ControlledMotion, ControlStatus, run
 from .sliding import SlidingMode, SuperTwisting, first_order
 from .task_laws import Admittance, ComputedTorque, Impedance
-from .walls import SpringWall
 
 __all__ = ["AdaptiveSlotineLi", "Admittance", "ComputedTorque", "ConstrainedDecoupling"]
 __all__ += ["ControlStatus", "ControlledMotion", "DecentralizedPID", "ExternalForceLoop"]

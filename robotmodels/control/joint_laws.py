@@ -108,8 +108,7 @@ def pid_gains(inertia: float, viscous: float, omega: float) -> PIDGains:
     f = as_number(viscous, "viscous", least=0.0)
     if (kd := 3.0 * a * w - f) <= 0.0:
         raise InvalidValueError(
-            f"omega: expected more than viscous / (3 inertia) = {f / (3.0 * a):.6g} rad/s, the "
-            f"bandwidth of friction alone, got {w:.6g}."
+            f"omega: expected more than the bandwidth of friction alone, {f / (3.0 * a):.6g} rad/s."
         )
     return PIDGains(3.0 * a * w * w, a * w**3, kd, a, f)
 

@@ -154,8 +154,7 @@ def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> D
             where, answer = f"{name}({t:g})", reference(t)
             if not isinstance(answer, (tuple, list)) or len(answer) != 3:
                 raise InvalidValueError(
-                    f"{where}: expected three arrays, the value with its first and second "
-                    f"derivative, got {type(answer).__name__}."
+                    f"{where}: expected three arrays, got {type(answer).__name__}."
                 )
             values = tuple(as_floats(x, where) for x in answer)
             wanted, found = shapes or ((values[0].size,),) * 3, tuple(x.shape for x in values)

@@ -179,8 +179,7 @@ def run(
         period = as_number(period, "period", above=0.0)
     elif getattr(law, "switches", False):
         raise InvalidValueError(
-            "law: its torque or its state switches, which stalls a continuous simulation; give a "
-            "sampling period, or a boundary layer (layer=)."
+            "law: it switches, which takes time steps: give a sampling period, or a boundary layer."
         )
     for name, instead in (("wrench", "environment="), ("control", "law=")):
         if name in options:
@@ -280,8 +279,7 @@ def _deviations(noise: Any, rng: Any, period: Any) -> tuple[float, ...] | None:
     given = np.atleast_1d(as_floats(noise, "noise"))
     if given.ndim != 1 or not 1 <= given.size <= 3 or (given < 0.0).any():
         raise InvalidValueError(
-            "noise: expected one standard deviation of positions and velocities, two, or three "
-            f"with that of wrenches, none negative, got {noise!r:.60}."
+            f"noise: expected one to three standard deviations, none negative, got {noise!r:.40}."
         )
     for value, name in ((rng, "rng, a seed or a Generator"), (period, "period: it is of samples")):
         if value is None:

@@ -73,8 +73,7 @@ class TaskLaw(Law):
         rows = [] if mask is None else np.flatnonzero(as_mask(mask)).tolist()
         if len(rows) > n:
             raise InvalidValueError(
-                f"mask: {len(rows)} components are more than the {n} joints of "
-                f"{self.model.name!r} control; choose fewer."
+                f"mask: {len(rows)} components are more than the {n} joints; choose fewer."
             )
         postures = np.random.default_rng(0).uniform(-2.0, 2.0, (4, n))
         J = turn @ jacobian(self.model, postures, self.frame)
@@ -137,8 +136,7 @@ class TaskLaw(Law):
         a = np.empty(self.n)
         if _kernels().resolved(J, wanted, order[: len(J)], M, -self._free * v, a) < 0:
             raise SingularMassMatrixError(
-                "model: the mass matrix is singular; a hybrid law needs a model whose joints all "
-                "have inertia."
+                "model: the mass matrix is singular; give all joints inertia."
             )
         return a
 

@@ -134,8 +134,7 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
     suffixes = {kind.suffix: name for name, kind in reversed(LANGUAGES.items())} | {".py": "python"}
     if language is None and path.suffix.lower() not in suffixes:
         raise InvalidValueError(
-            f"path: expected a file named {', '.join(sorted(suffixes))}, or a language, got "
-            f"{path.name!r}."
+            f"path: expected *{', *'.join(sorted(suffixes))}, or a language, got {path.name!r}."
         )
     text = program.code(suffixes[path.suffix.lower()] if language is None else language)
     try:

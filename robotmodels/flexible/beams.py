@@ -106,8 +106,7 @@ def beam(
     stiff = np.broadcast_to(stiff, (2,)) if stiff.ndim == 0 else stiff
     if (stiff.shape, torsion.shape) != ((2,), ()) or not (np.append(stiff, torsion) > 0.0).all():
         raise InvalidValueError(
-            f"EI, GJ: expected positive stiffness, N m^2: EI = (about y, about z) and GJ, got EI = "
-            f"{EI!r:.60}, GJ = {GJ!r:.20}; infinite where the beam is rigid."
+            f"EI, GJ: expected positive stiffness or infinity, got {EI!r:.60} and {GJ!r:.20}."
         )
     one_of(ends, _ENDS, "ends")
     if not isinstance(modes, int | np.integer) or modes < 0:
@@ -201,8 +200,7 @@ def _tip_body(tip: Any) -> tuple[float, Array, Array]:
     given = (0.0,) if tip is None else tuple(tip) if isinstance(tip, list | tuple) else (tip,)
     if not 1 <= len(given) <= 3:
         raise InvalidValueError(
-            "tip: expected a mass, (mass, inertia) or (mass, com, inertia), got "
-            f"{len(given)} entries."
+            f"tip: expected mass, (mass, inertia) or (mass, com, inertia), got {len(given)}."
         )
     mass = as_number(given[0], "tip mass", least=0.0)
     com = as_exact(given[1], (3,), "tip com") if len(given) == 3 else np.zeros(3)
@@ -210,10 +208,7 @@ def _tip_body(tip: Any) -> tuple[float, Array, Array]:
     J = as_exact(J * np.eye(3) if J.shape in ((), (3,)) else J, (3, 3), "tip inertia")
     least = np.linalg.eigvalsh(0.5 * np.trace(J) * np.eye(3) - J)[0]
     if not np.allclose(J, J.T) or least < -1e-9 * abs(np.trace(J)) or (mass == 0.0 and J.any()):
-        raise InertiaError(
-            f"tip: mass {mass:g} and inertia {J.tolist()} belong to no body: expected a positive "
-            "mass, and moments of which none exceeds the sum of the others."
-        )
+        raise InertiaError(f"tip: mass {mass:g} and inertia {J.tolist()} belong to no body.")
     return mass, com, J
 
 
@@ -253,8 +248,7 @@ def _modes(
     values, V = values[::-1][:count], V[:, ::-1]
     if count and values[-1] < _LIGHT * values[0]:
         raise InvalidValueError(
-            "tip, hub, density: not all modes were found, because the beam is too light for its "
-            "loads. Take a greater density or radius of gyration, or fewer modes."
+            "tip, hub, density: the beam is too light for its loads; take fewer modes."
         )
     found = []
     for c, value in enumerate(values):

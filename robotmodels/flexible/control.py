@@ -109,8 +109,7 @@ def motion_of(reference: Any, n: int) -> Callable[[float], list[Array]]:
     trajectory = all(callable(getattr(motion, name, None)) for name in "qva")
     if not trajectory and not callable(motion):
         raise InvalidValueError(
-            "reference: expected a trajectory, or a function of t that returns (q, v, a), got "
-            f"{type(reference).__name__}."
+            f"reference: expected a trajectory or a function of t, got {type(reference).__name__}."
         )
 
     def at(t: float) -> list[Array]:

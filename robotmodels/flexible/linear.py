@@ -196,8 +196,7 @@ def _inverse_factor(arm: FlexibleRobot, M: Array) -> Any:
         return np.linalg.inv(np.linalg.cholesky(M))
     except np.linalg.LinAlgError:
         raise SingularMassMatrixError(
-            f"{arm.model.name!r}: a coordinate moves no inertia. Give inertial parameters with "
-            "model.with_inertia(...) or Ia with model.with_drive(...)."
+            f"{arm.model.name!r}: a coordinate moves no inertia; see model.with_inertia, Ia."
         ) from None
 
 
@@ -209,8 +208,7 @@ def tip_inverse(J: Array, n: int) -> Array:
             inverse: Any = np.linalg.pinv(J[..., :n] * (np.arange(6) < rows)[:, None])
             return inverse
     raise InvalidValueError(
-        "q: the joints do not determine the pose of the tool here: a singular posture, or more "
-        "joints than six. Take output='joint', or another posture."
+        "q: the joints do not determine the pose of the tool; take output='joint' or another q."
     )
 
 

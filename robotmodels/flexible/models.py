@@ -249,8 +249,7 @@ def solved(
         if len(still):
             fault = f"flexible joint {int(still[0]) + 1} has no rotor inertia to accelerate"
         raise SingularMassMatrixError(
-            f"{arm.model.name!r}: {fault}. Give inertial parameters with model.with_inertia(...), "
-            "or rotor inertia with model.with_drive(DriveParameters(Ia=...)) and drive=True."
+            f"{arm.model.name!r}: {fault}; see model.with_inertia and Ia of DriveParameters."
         )
     return found, base
 

@@ -66,8 +66,7 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     c, m = S.shape
     if m > N:
         raise InvalidValueError(
-            f"shapes: expected at most as many modes as nodes, got {m} modes of {N} nodes; take "
-            "fewer modes, or a finer mesh."
+            f"shapes: expected at most as many modes as nodes, got {m} modes of {N} nodes."
         )
     K, M = _symmetric(K, c, "K"), as_floats(M, "M")
     if M.shape == (N,):
@@ -76,16 +75,14 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
     size = np.abs(S).max(axis=0, initial=1e-300)
     if (np.abs(S[:free]) > _MOVES * size).any():
         raise InvalidValueError(
-            "shapes: the first node moves, and a link is clamped there. Take modes with that node "
-            "held, or subtract the rigid motion."
+            "shapes: the first node moves, and a link is clamped there; take modes with it held."
         )
     least = np.linalg.eigvalsh(M)
     if least[0] < -_MIXED * max(least[-1], 0.0):
         raise InvalidValueError("M: expected a mass matrix, which has no negative eigenvalue.")
     if free == 3 and not np.any(X[-1] - X[-2]):
         raise InvalidValueError(
-            "nodes: the last two are the same place, which gives the tip no rotation. Leave one "
-            "out, or give rotations of the nodes."
+            "nodes: the last two are the same place, so that the tip has no rotation."
         )
     mass, stiffness = S.T @ M @ S, S.T @ K @ S
     for name, matrix in (("M", mass), ("K", stiffness)):
@@ -93,9 +90,7 @@ def from_modes(M: ArrayLike, K: ArrayLike, shapes: ArrayLike, nodes: ArrayLike) 
         mixed = np.abs(matrix - np.diag(own)) > _MIXED * np.sqrt(np.abs(np.outer(own, own)))
         if (own <= 0.0).any() or mixed.any():
             raise InvalidValueError(
-                f"shapes: the modes are not orthogonal with respect to {name}, or {name} of one "
-                "is not positive (a shape that is zero, or a rigid motion). Take the eigenvectors "
-                "of K and M, as craig_bampton returns them."
+                f"shapes: expected modes orthogonal with respect to {name}, with positive {name}."
             )
     parts = S.reshape(N, free, m)
     Phi = parts[:, :3]
@@ -148,8 +143,7 @@ def craig_bampton(
     named = np.concatenate([x.ravel() for x in chosen])
     if len(set(named)) != len(named) or not np.isin(named, np.arange(c)).all():
         raise InvalidValueError(
-            f"interface, clamped: expected different numbers from 0 to {c - 1}, got "
-            f"{named.tolist()}."
+            f"interface, clamped: expected different numbers below {c}, got {named.tolist()}."
         )
     k = chosen[0].ravel().astype(np.int64)
     inner = np.setdiff1d(np.arange(c), named.astype(np.int64))
@@ -165,8 +159,7 @@ def craig_bampton(
         values, V = eigh(T.T @ K @ T, T.T @ M @ T)
     except LinAlgError:
         raise InvalidValueError(
-            "M, K: with the interface and the clamped displacements held, expected stiffness that "
-            "is not singular, and positive mass. Clamp the body, or add mass."
+            "M, K: singular mass or stiffness where the interface is held; clamp the body."
         ) from None
     values = np.maximum(values, 0.0)
     return ReducedModel(np.eye(len(values)), np.diag(values), T @ V, np.sqrt(values))

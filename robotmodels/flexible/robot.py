@@ -104,8 +104,7 @@ class FlexibleRobot(Value):
         stiffness = each(self.joint_stiffness, n, "joint_stiffness", np.inf)
         if not (stiffness > 0.0).all():
             raise InvalidValueError(
-                "joint_stiffness: expected positive numbers, N m/rad, infinite for rigid joints, "
-                f"got {stiffness.tolist()}."
+                f"joint_stiffness: expected positive numbers or infinity, got {stiffness.tolist()}."
             )
         joints = np.flatnonzero(np.isfinite(stiffness))
         damping = each(self.joint_damping, n, "joint_damping", 0.0)
@@ -121,8 +120,7 @@ class FlexibleRobot(Value):
         )
         if coupled or (model.transmission is not None and not model.transmission.is_invertible):
             raise InvalidValueError(
-                f"model: {model.name!r} has motors that are coupled by its transmission, which "
-                "flexible robots do not support; take model.with_transmission(None)."
+                "model: its transmission couples motors; take model.with_transmission(None)."
             )
         for name, value in {
             "links": MappingProxyType(links),
@@ -188,17 +186,14 @@ def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
         isinstance(link, FlexibleLink) for link in links.values()
     ):
         raise InvalidValueError(
-            "links: expected a mapping of rows to flexible links, such as {2: beam(...)}, got "
-            f"{links!r:.60}."
+            f"links: expected a mapping such as {{2: beam(...)}}, got {links!r:.40}."
         )
     for row in links:
         if type(row) is bool or row not in range(1, model.f + 1):
             raise InvalidValueError(f"links: expected rows 1 to {model.f}, got {row!r:.20}.")
         if model.table.sigma[row - 1] == 1:
             raise InvalidValueError(
-                f"links: row {row} is prismatic, and a flexible link on a sliding joint is not "
-                "supported. Put the flexible link on a fixed row (sigma 2) behind the joint, or "
-                "leave the link rigid."
+                f"links: row {row} is a sliding joint; put the link on a fixed row behind it."
             )
     return {int(row): links[row] for row in sorted(links)}
 

@@ -132,8 +132,7 @@ def tip_tracking(
     causal = one_of(method, _METHODS, "method") == "causal"
     if len(check_arm(arm).joints) or not arm.m:
         raise InvalidValueError(
-            "arm: tip tracking is for flexible links with rigid joints. Take rest_to_rest or "
-            "joint_tracking for flexible joints, and computed torque for rigid arms."
+            "arm: tip tracking is for flexible links with rigid joints; see joint_tracking."
         )
     at, motion = motion_of(reference, arm.n), getattr(reference, "trajectory", reference)
     given = getattr(motion, "duration", None) if duration is None else duration

@@ -187,8 +187,7 @@ def _motion(
             break
     else:
         raise LoopError(
-            f"{robot.name!r}: the loops hardly close around q = {reference.tolist()}; give another "
-            "posture as q_ref."
+            f"{robot.name!r}: the loops hardly close around the posture; give another as q_ref."
         )
     G = maps(robot, q)[0]  # without the half that is nearest to dead points
     best = np.argsort(np.abs(G / robot.units[:, None]).max(axis=(1, 2)))[:count]

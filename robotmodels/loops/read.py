@@ -116,8 +116,7 @@ def read_mjcf(path: str | Path) -> LoopedRobot:
         raise LoopError(f"{path.name}: expected bodies with joints, got none.")
     if len(constraints) != len(equalities):
         raise LoopError(
-            f"{path.name}: Pinocchio reads {len(constraints)} of {len(equalities)} equalities; "
-            "check the names of their bodies."
+            f"{path.name}: {len(equalities) - len(constraints)} equalities name unknown bodies."
         )
     text = _urdf(model, root.get("model") or path.stem, path.name)
     tree = RobotModel.from_urdf(text, gravity=model.gravity.linear)
@@ -148,8 +147,7 @@ def _check_equality(equality: ET.Element, label: str) -> None:
     shown = ET.tostring(equality, encoding="unicode").strip()
     if equality.tag not in ("connect", "weld") or equality.get("body1") is None:
         raise LoopError(
-            f"{label}: the equality {shown} is not supported; closures are <connect> and <weld> of "
-            "body1 and body2."
+            f"{label}: the equality {shown} is not supported, only <connect> and <weld>."
         )
     for key, count, text in (("anchor", 3, "0 0 0"), ("relpose", 7, "0 0 0 1 0 0 0")):
         text = equality.get(key, "" if (key, equality.tag) == ("anchor", "connect") else text)
@@ -173,8 +171,7 @@ def _urdf(model: Any, name: str, label: str) -> str:
         sort = {"R": "revolute", "P": "prismatic"}.get(kind.removeprefix("JointModel")[0])
         if sort is None or model.joints[k].nq != 1:
             raise LoopError(
-                f"{label}: joint {model.names[k]!r} is a {kind}; only hinge and slide joints with "
-                "one of them in each joint are supported."
+                f"{label}: joint {model.names[k]!r} is a {kind}, neither hinge nor slide."
             )
         twist = pin.getJointJacobian(model, data, k, pin.LOCAL)[:, model.idx_vs[k]]
         axis = twist[3:] if sort == "revolute" else twist[:3]

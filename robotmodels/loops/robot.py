@@ -170,8 +170,7 @@ def check_looped(robot: object) -> None:
     """Raise unless the argument is a looped robot."""
     if not isinstance(robot, LoopedRobot):
         raise InvalidValueError(
-            f"robot: expected a LoopedRobot, got {type(robot).__name__}; build one of a tree and "
-            "its closures: LoopedRobot(tree, closures=[...], actuated=[...])."
+            f"robot: expected a LoopedRobot(tree, closures, actuated), got {type(robot).__name__}."
         )
 
 
@@ -183,8 +182,7 @@ def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:
     known = given.ndim == 1 and np.isin(given, np.arange(tree.n)).all()
     if not known or len({*given.tolist()}) < given.size:
         raise InvalidValueError(
-            f"actuated: expected different columns of q, from 0 to {tree.n - 1}, got "
-            f"{actuated!r:.60}."
+            f"actuated: expected different columns below {tree.n}, got {actuated!r:.60}."
         )
     return read_only(given, np.int64)
 
@@ -225,8 +223,5 @@ def acting_rows(robot: LoopedRobot) -> NDArray[np.bool_]:
                 f"{named} are on the same body; give frames of the two bodies that it joins."
             )
         if not acts[[robot.rows.index(row) for row in closure.rows]].any():
-            raise LoopError(
-                f"{named} add no constraint: no joint moves them against each other in the rows "
-                f"{', '.join(closure.rows)}. Remove the closure, or correct its frames."
-            )
+            raise LoopError(f"{named} add no constraint, as no joint moves them apart.")
     return acts

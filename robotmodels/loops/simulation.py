@@ -93,8 +93,7 @@ def simulate(
     width = None if smoothing is None else np.full(n, as_number(smoothing, "smoothing", above=0.0))
     if width is None and drives is not None and (drives.coulomb.any() or drives.coupling.size):
         raise InvalidValueError(
-            "smoothing: the dry friction of looped robots needs a velocity, such as "
-            "smoothing=1e-3; or leave out the drives: drive=False."
+            "smoothing: dry friction needs a velocity here, such as 1e-3; or take drive=False."
         )
 
     def torques(t: float, q: Array, v: Array, x: Array) -> Array:
@@ -112,8 +111,7 @@ def simulate(
     moved = motion.projected(q, v)
     if np.abs(moved[1] - v).max(initial=0.0) > _MOVING * np.abs(v).max(initial=0.0):
         raise LoopError(
-            f"v0: these velocities open the loops of {robot.name!r}; take "
-            "v0 = velocity_map(robot, q0) @ v_actuated."
+            f"v0: it opens the loops of {robot.name!r}; take velocity_map(robot, q0) @ v_actuated."
         )
     steps = {"rtol": as_number(rtol, "rtol", least=1e-13), "max_step": np.inf}
     steps["atol"] = as_number(atol, "atol", above=0.0)

@@ -197,8 +197,7 @@ def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
     q = as_bounded(as_vector(q, robot.m, "q"), "q", LARGEST)
     if not robot.has_cranks and (least := q.min(initial=0.0)) < 0.0:
         raise InvalidValueError(
-            f"q: expected lengths of legs in metres that are not negative (not strokes), got "
-            f"{least:.6g}."
+            f"q: expected lengths of legs (not strokes) that are not negative, got {least:.6g} m."
         )
     return q
 

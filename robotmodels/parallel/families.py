@@ -181,8 +181,7 @@ def _robot(
     for i, j in combinations(range(m if family is not Family.DELTA else 0), 2):
         if np.abs(a[i] - a[j]).max() + np.abs(b[i] - b[j]).max() <= 1e-12 * size:
             raise InvalidValueError(
-                f"base, platform: legs {i + 1} and {j + 1} have the same anchors on both, they "
-                "coincide; give each leg its own points."
+                f"base, platform: legs {i + 1} and {j + 1} coincide; give each its own anchors."
             )
     crank, rod = (
         np.zeros(m) if arms is None else for_legs(as_floats(value, name), m, name, 1e-300)

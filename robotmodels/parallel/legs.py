@@ -196,13 +196,11 @@ def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
         return False
     if not isinstance(robot, LoopedPlatform):
         raise InvalidValueError(
-            "robot: expected a parallel robot, as made by parallel.gough and others, got "
-            f"{type(robot).__name__}."
+            f"robot: expected one made by parallel.gough and others, got {type(robot).__name__}."
         )
     if mode is not None and np.any(as_reals(mode, "mode") != 0):
         raise InvalidValueError(
-            f"mode: a robot from from_loops has the working mode of its home alone, got "
-            f"{mode!r:.40}; give from_loops another q_home."
+            f"mode: a robot from from_loops has that of its home alone, got {mode!r:.40}."
         )
     return True
 
@@ -213,8 +211,7 @@ def modes_of(robot: ParallelRobot, mode: Mode, batch: tuple[int, ...]) -> NDArra
     most = 2**robot.m if robot.has_cranks else 1
     if not np.isin(given, np.arange(most)).all():
         raise InvalidValueError(
-            f"mode: expected whole numbers from 0 to {most - 1}, as igm(robot, T).mode numbers the "
-            f"working modes, got {mode!r:.60}."
+            f"mode: expected whole numbers from 0 to {most - 1} as of igm, got {mode!r:.40}."
         )
     try:
         return np.broadcast_to(given, batch).reshape(-1).astype(np.int64)

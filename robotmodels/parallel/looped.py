@@ -149,8 +149,7 @@ class LoopedPlatform(Value):
         q, residual, reached = self.postures(T)
         if not reached.all():
             raise InvalidValueError(
-                "T: the platform does not reach this pose near home (residual "
-                f"{residual.max():.2g}); see igm(robot, T).status."
+                f"T: the platform does not reach this pose (residual {residual.max():.2g})."
             )
         return q
 
@@ -278,8 +277,7 @@ def from_loops(
     found = loops.close(looped_robot, start[looped_robot.actuated], start)
     if not found.residual < 1e-8:
         raise InvalidValueError(
-            f"q_home: the loops do not close near this posture (residual {found.residual:.2g}); "
-            "give all joints of an assembled posture."
+            f"q_home: the loops do not close near this posture (residual {found.residual:.2g})."
         )
     P = jacobian(looped_robot.tree, found.q, platform_frame)
     P = P @ loops.velocity_map(looped_robot, found.q)

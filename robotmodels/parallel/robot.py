@@ -194,8 +194,7 @@ class ParallelRobot(Value):
             sizes = ()
         if sizes != (3, 3, 3):
             raise ShapeError(
-                "platform, legs: expected (mass, com, inertia), and for legs two parts, each "
-                "(mass, position, inertia)."
+                "platform, legs: expected (mass, com, inertia), two parts (mass, place, inertia)."
             )
         mass, com = as_number(platform[0], "mass", least=0.0), as_exact(platform[1], (3,), "com")
         inertia = as_exact(platform[2], (3, 3), "inertia")
@@ -203,8 +202,7 @@ class ParallelRobot(Value):
         least = np.linalg.eigvalsh(inertia).min()
         if np.abs(inertia - inertia.T).max() > 1e-9 * size or least < -1e-12 * size:
             raise InvalidValueError(
-                "inertia: expected a symmetric matrix about the centre of mass with positive "
-                f"principal moments, got {inertia.tolist()}."
+                f"inertia: expected a symmetric, positive matrix, got {inertia.tolist()}."
             )
         least = (0.0, -np.inf, 0.0)
         both = [

@@ -164,8 +164,7 @@ def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
     """
     if is_looped(robot, mode):
         raise InvalidValueError(
-            "robot: the legs of kinematic loops are not known; see condition and "
-            "classify_singularity."
+            "robot: the legs of kinematic loops are not known; see classify_singularity."
         )
     poses = robot.checked(T)
     modes = modes_of(robot, mode, poses.shape[:-2])
@@ -206,14 +205,10 @@ def states(
         row = f" of row {n}" if batch else ""
         if not legs.reached[n]:
             raise InvalidValueError(
-                f"T: the pose{row} is out of reach of the legs, so that there is no Jacobian; see "
-                "igm(robot, T).status."
+                f"T: the pose{row} is out of reach of the legs; see igm(robot, T).status."
             )
         why = "is straight (serial singularity)" if robot.has_cranks else "has no length"
-        raise InvalidValueError(
-            f"T: leg {i + 1} {why} at the pose{row}, so that its velocity is not determined; see "
-            "classify_singularity."
-        )
+        raise InvalidValueError(f"T: leg {i + 1} {why} at the pose{row}; see classify_singularity.")
     pairs = zip(vectors, others, strict=True)
     return batch, rows, legs, [x if k == "tau" else only_freedoms(robot, x) for k, x in pairs]
 

@@ -134,15 +134,13 @@ def workspace(
     n = as_number({2: 300, 3: 40}[d] if resolution is None else resolution, "resolution")
     if n != int(n) or n < 2 or n**d > _MOST:
         raise InvalidValueError(
-            f"resolution: expected a whole number from 2 to {_MOST ** (1 / d):.0f}, got "
-            f"{resolution!r:.40}."
+            f"resolution: expected a number to {_MOST ** (1 / d):.0f}, got {resolution!r:.20}."
         )
     # the boxes about spheres of the legs' longest reach
     reach = robot.crank + robot.rod if robot.has_cranks else high
     if not np.isfinite(reach).all():
         raise InvalidValueError(
-            "limits: a leg of unlimited length reaches everywhere; give upper=, or limits=(lower, "
-            "upper)."
+            "limits: legs of unlimited length reach everywhere; give limits=(lower, upper)."
         )
     centre = robot.base - robot.platform @ np.swapaxes(R, 1, 2)
     first, last = (centre - reach[:, None]).max(axis=1), (centre + reach[:, None]).min(axis=1)

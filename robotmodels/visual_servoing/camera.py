@@ -58,8 +58,7 @@ class Camera(Value):
         X = as_core(points, (3,), "points")
         if not (X[..., 2] > 0.0).all():
             raise InvalidValueError(
-                "points: expected points in front of the camera, Z > 0, got Z = "
-                f"{X[..., 2].min():.4g} m; move the camera or leave such points out."
+                f"points: expected points in front of the camera, got Z = {X[..., 2].min():.4g} m."
             )
         return self.pixels(X[..., :2] / X[..., 2:])
 

@@ -229,8 +229,7 @@ class Sphere(Feature):
     def _parallel(self, Z: float) -> float:
         if not self.radius < Z:
             raise InvalidValueError(
-                f"depth: expected the depth of the centre of the sphere, above its radius "
-                f"{self.radius:g} m, got {Z:g} m."
+                f"depth: expected more than the sphere's radius, {self.radius:g} m, got {Z:g} m."
             )
         return Z
 

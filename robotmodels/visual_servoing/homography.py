@@ -57,8 +57,7 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
     p, q = as_sized(image_1, (2,), "image_1"), as_sized(image_2, (2,), "image_2")
     if p.ndim < 2 or p.shape != q.shape or p.shape[-2] < 4:
         raise ShapeError(
-            "image_1, image_2: expected the same shape (..., n, 2), n from 4, got "
-            f"{p.shape}, {q.shape}."
+            f"image_1, image_2: expected one shape (..., n, 2), n from 4, got {p.shape}, {q.shape}."
         )
     (x, N), (y, M) = _scaled(p), _scaled(q)
     in_x = np.concatenate((x, 0.0 * x, -y[..., :1] * x), axis=-1)
@@ -67,8 +66,7 @@ def homography(image_1: ArrayLike, image_2: ArrayLike) -> Array:
     _, sizes, Vt = np.linalg.svd(A)
     if (sizes[..., 7] <= 1e-9 * sizes[..., 0]).any():
         raise InvalidValueError(
-            "image_1, image_2: the points do not determine a homography; expected four of which no "
-            "three are on a line."
+            "image_1, image_2: they do not determine a homography: too many are on a line."
         )
     H = np.linalg.solve(M, Vt[..., 8, :].reshape(N.shape) @ N)
     H = H / np.linalg.svd(H, compute_uv=False)[..., 1, None, None]

@@ -198,8 +198,7 @@ def estimate_interaction(dS: ArrayLike, dX: ArrayLike) -> Array:
     L, _, rank, _ = np.linalg.lstsq(X / np.where(scale > 0.0, scale, 1.0), S, rcond=1e-10)
     if rank < 6:
         raise InvalidValueError(
-            f"dX: the displacements span {rank} of 6 directions; translate along and rotate about "
-            "all three axes of the camera."
+            f"dX: it spans {rank} of 6 directions; translate along and rotate about all three axes."
         )
     return (L / scale[:, None]).T
 
@@ -246,7 +245,6 @@ def _inverse_depth(plane: ArrayLike) -> dict[str, Array]:
     P = as_core(np.array((0.0, 0.0, 1.0, -_in_front(P))) if P.ndim == 0 else P, (4,), "plane")
     if not P[..., 3].all() or not P[..., :3].any(axis=-1).all():
         raise InvalidValueError(
-            "plane: expected (A, B, C, D) with A X + B Y + C Z + D = 0, a normal and D not zero; "
-            "of a plane through the centre of the camera the image has no area."
+            "plane: expected (A, B, C, D), A X + B Y + C Z + D = 0, with a normal and D not zero."
         )
     return dict(zip("ABC", np.moveaxis(-P[..., :3] / P[..., 3:], -1, 0), strict=True))

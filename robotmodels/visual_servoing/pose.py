@@ -108,8 +108,7 @@ def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     flat = _sine(P) <= _THIN
     if flat.any():
         raise InvalidValueError(
-            f"points: expected three points that are not on a line, row {int(flat.argmax())} are; "
-            "no finite number of poses has their image."
+            f"points: row {int(flat.argmax())} has three points on a line, which determine no pose."
         )
     T, s, off = _poses_of_triples(P, m)
     longest = ((P[:, _I] - P[:, _J]) ** 2).sum(axis=-1).max(axis=-1, keepdims=True)

@@ -89,8 +89,7 @@ class Task(Checked):
         feature: Any = self.feature
         if not isinstance(feature, Feature):
             raise InvalidValueError(
-                "feature: expected a feature such as Points(...) or Lines(...), got "
-                f"{type(feature).__name__}."
+                f"feature: expected one such as Points(...), got {type(feature).__name__}."
             )
         if isinstance(self.desired, Feature | Task):
             raise InvalidValueError(
@@ -143,8 +142,7 @@ class Task(Checked):
         if w is None and self.feature.depends_on_depth:
             if sight is None:
                 raise InvalidValueError(
-                    'measurement: depth="true" needs the pose (4, 4) of the object in the camera; '
-                    'give it, or a task with depth="desired" or depth in metres.'
+                    'measurement: depth="true" needs the pose (4, 4); or give the task a depth.'
                 )
             w = sight.depth
         return self.feature._rows(s, w, image)

@@ -181,8 +181,7 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
     if isinstance(task.secondary, Task):
         if T is None and task.secondary.feature != task.primary.feature:
             raise InvalidValueError(
-                "measurement: the secondary task has another feature, so expected the pose (4, 4) "
-                "of the object in the camera; give it instead of s."
+                "measurement: expected the pose (4, 4), as the secondary task has another feature."
             )
         return law(task.secondary, None if T is not None else s, T)[0]
     if not callable(task.secondary):
