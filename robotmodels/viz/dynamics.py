@@ -46,18 +46,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction
 from ..model import RobotModel, check_model
 from ..simulation.dynamics_map import DynamicsMap
 from ..simulation.result import Simulation, SimulationEventKind
-from ..simulation.torque_parts import TorqueParts, simulated_torque_parts, torque_parts
+from ..simulation.torque_parts import simulated_torque_parts, torque_parts
 from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Unit
@@ -97,7 +96,25 @@ def plot_torque_parts(
     A panel for each joint; parts that are zero for all of them have no line.
     """
     check_model(model)
-    times, parts = _split(model, motion, wrench, drive, friction)
+    if isinstance(motion, Simulation):
+        if motion.model != model:
+            raise InvalidValueError(
+                f"model: the simulation is one of {motion.model.name!r} with its parameters, not "
+                f"of this {model.name!r}; pass simulation.model."
+            )
+        if wrench is not None or friction is not None or not drive:
+            raise InvalidValueError(
+                "motion: a simulation has its own wrench, drives and friction; leave them out."
+            )
+        times, parts = motion.t, simulated_torque_parts(motion)
+    else:
+        samples = over_time.sampled(motion, "motion")
+        if samples.n != model.n:
+            raise ShapeError(
+                f"motion: expected one of the {model.n} joints of {model.name!r}, got {samples.n}."
+            )
+        times, qva = samples.t, samples.values[:3]
+        parts = torque_parts(model, *qva, wrench, drive, friction)
     if not model.n:
         raise InvalidValueError("model: there are no joints to draw.")
     every = range(model.n) if joints is None else joints
@@ -117,30 +134,6 @@ def plot_torque_parts(
         axes.plot(times, parts.total[:, j], **total)
         axes.set_title(f"{names[j]} ({efforts[j]})", loc="left")
     return style.finished(figure, look)
-
-
-def _split(
-    model: RobotModel, motion: Any, wrench: ArrayLike | None, drive: bool, friction: Friction | None
-) -> tuple[Array, TorqueParts]:
-    """Times and parts of the torques."""
-    if isinstance(motion, Simulation):
-        if motion.model != model:
-            raise InvalidValueError(
-                f"model: the simulation is one of {motion.model.name!r} with its parameters, not "
-                f"of this {model.name!r}; pass simulation.model."
-            )
-        if wrench is not None or friction is not None or not drive:
-            raise InvalidValueError(
-                "motion: a simulation has its own wrench, drives and friction; leave them out."
-            )
-        return motion.t, simulated_torque_parts(motion)
-    samples = over_time.sampled(motion, "motion")
-    if samples.n != model.n:
-        raise ShapeError(
-            f"motion: expected one of the {model.n} joints of {model.name!r}, got {samples.n}."
-        )
-    q, v, a = samples.values[:3]
-    return samples.t, torque_parts(model, q, v, a, wrench, drive, friction)
 
 
 @style.plot

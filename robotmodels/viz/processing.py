@@ -88,7 +88,23 @@ def plot_processing(
     >>> [axes.get_xlabel() for axes in plot_processing(log, choose_processing(log)).axes]
     ['frequency (Hz)', 'frequency (Hz)']
     """
-    log, chosen, model, system = _given(log, processing, model)
+    system = None
+    if isinstance(log, IdentificationResult):
+        if processing is not None or model is not None:
+            raise InvalidValueError(
+                "processing, model: the result contains them; leave them out, or give its log."
+            )
+        system, model = log.equations, log.model
+        log, processing = system.log, system.processing
+    if not isinstance(log, Log):
+        raise InvalidValueError(
+            f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
+        )
+    chosen = style.as_instance(processing, Processing, "processing", "choose_processing")
+    if len(chosen.dead_band) != log.n:
+        raise ShapeError(
+            f"processing: expected one of {log.n} joints, got {len(chosen.dead_band)}."
+        )
     part = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
     rows = slice(part.start, min(part.stop, part.start + _LONGEST))
     N = rows.stop - rows.start
@@ -144,28 +160,6 @@ def plot_processing(
         style.plain_logarithmic(axes.yaxis, 4)
         style.plain_logarithmic(axes.xaxis)
     return style.finished(figure, look)
-
-
-def _given(
-    log: Log | IdentificationResult, processing: Processing | None, model: RobotModel | None
-) -> tuple[Log, Processing, RobotModel | None, Equations | None]:
-    """Log, choices, robot and, of a result, its equations."""
-    if isinstance(log, IdentificationResult):
-        if processing is not None or model is not None:
-            raise InvalidValueError(
-                "processing, model: the result contains them; leave them out, or give its log."
-            )
-        return log.equations.log, log.equations.processing, log.model, log.equations
-    if not isinstance(log, Log):
-        raise InvalidValueError(
-            f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
-        )
-    chosen = style.as_instance(processing, Processing, "processing", "choose_processing")
-    if len(chosen.dead_band) != log.n:
-        raise ShapeError(
-            f"processing: expected one of {log.n} joints, got {len(chosen.dead_band)}."
-        )
-    return log, chosen, model, None
 
 
 def _draw_frequencies(axes: Axes, processing: Processing) -> None:

@@ -76,10 +76,9 @@ from ..trajectories.resolved_motion import ResolvedMotion
 from ..trajectories.trajectory import Samples, Trajectory
 from ..visual import Color, characteristic_length
 from .camera import framed
-from .loops import with_closures
 from .motion import Motion, Track, keyframes, timed_samples
 from .over_time import is_prismatic
-from .robot import MESH_COLOR, Options, RobotDrawing, draw_robot
+from .robot import MESH_COLOR, Options, RobotDrawing, draw_robot, with_closures
 from .scene import Scene
 from .shapes import (
     Label,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .._json_data import json_data
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .over_time import is_prismatic
@@ -41,18 +42,7 @@ class SliderPanel:
 
     def data(self) -> dict[str, Any]:
         """The panel as data for its script."""
-        return {
-            "joints": list(self.joints),
-            "matrix": self.matrix.tolist(),
-            "offset": self.offset.tolist(),
-            "start": self.start.tolist(),
-            "postures": [[name, x.tolist()] for name, x in self.postures],
-            "targets": [
-                {"name": name, "path": path, "pose": pose.T.ravel().tolist()}
-                for name, path, pose in self.targets
-            ],
-            "struts": list(self.struts),
-        }
+        return {each.name: json_data(getattr(self, each.name)) for each in fields(self)}
 
 
 def slider_panel(
@@ -146,8 +136,8 @@ def _joint(
         "name": names[i],
         "path": path,
         "prismatic": prismatic,
-        "lower": lower,
-        "upper": upper,
+        "lower": max(lower, -1e9),
+        "upper": min(upper, 1e9),
         "ends": list(ends),
         "leads": leads,
         "note": note,

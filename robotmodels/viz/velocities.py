@@ -305,7 +305,22 @@ def plot_singularities(
         )
     postures = None if q is None else np.atleast_2d(as_floats(q, "q"))
     for grid in given:
-        _check(grid, model, postures)
+        shape, least = (grid.first.size, grid.second.size), 1 + int(grid.joints.max())
+        if grid.values.shape != shape or min(shape) < 2 or not np.isfinite(grid.values).any():
+            raise ShapeError(
+                f"maps: {grid.label!r} needs at least two values of each joint and a value for "
+                f"each pair, some finite, got {shape} and {grid.values.shape}."
+            )
+        if model is not None and model.n < least:
+            raise ShapeError(
+                f"model: {grid.label!r} is a map over joints {grid.joints.tolist()} (from 0), "
+                f"which {model.name!r} with its {model.n} joints does not have."
+            )
+        if postures is not None and (postures.ndim > 2 or postures.shape[-1] < least):
+            raise ShapeError(
+                f"q: expected one posture (n,) or several (N, n), n at least {least}, got "
+                f"{postures.shape}."
+            )
     wide = style.as_columns(columns, len(given), 2)
     rows = -(-len(given) // wide)
     width = COLUMN if wide == 1 else PAGE
@@ -364,25 +379,3 @@ def _hatch_outside(axes: Axes, grid: SingularityMap, model: RobotModel, units: l
             if limit != edge:
                 lines[i](limit, color=INK, zorder=2.5, label=f"_limit of {grid.names[i]}", **DASHED)
                 areas[i](*sorted((limit, edge)), **box)
-
-
-def _check(grid: SingularityMap, model: RobotModel | None, q: Array | None) -> None:
-    """Raise unless a map can be drawn, with the limits of a robot and configurations."""
-    shape = (grid.first.size, grid.second.size)
-    if grid.values.shape != shape or min(shape) < 2:
-        raise ShapeError(
-            f"maps: {grid.label!r} needs at least two values of each joint and a value for each "
-            f"pair, got {shape} and {grid.values.shape}."
-        )
-    if not np.isfinite(grid.values).any():
-        raise InvalidValueError(f"maps: {grid.label!r} has no finite value.")
-    least = 1 + int(grid.joints.max())
-    if model is not None and model.n < least:
-        raise ShapeError(
-            f"model: {grid.label!r} is a map over joints {grid.joints.tolist()} (from 0), which "
-            f"{model.name!r} with its {model.n} joints does not have."
-        )
-    if q is not None and (q.ndim > 2 or q.shape[-1] < least):
-        raise ShapeError(
-            f"q: expected one posture (n,) or several (N, n), n at least {least}, got {q.shape}."
-        )
