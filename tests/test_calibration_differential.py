@@ -8,7 +8,6 @@ from test_calibration_measurements import slope
 import robotmodels as rm
 from robotmodels.calibration import (
     GeometricParameters,
-    candidate_parameters,
     combine_arms,
     differential_model,
 )
@@ -67,23 +66,6 @@ def test_psi_is_the_derivative_of_the_pose(structure, corrected):
             column = psi[0, :, k] * unit[k]
             close = 1e-7 * max(1.0, np.abs(column).max())
             np.testing.assert_allclose(np.r_[rate[0, :3, 3], w], column, rtol=0, atol=close)
-
-
-@pytest.mark.parametrize("structure", STRUCTURES)
-def test_without_corrections_poses_are_those_of_the_direct_geometric_model(structure):
-    rng = np.random.default_rng(17)
-    model = random_model(rng, **STRUCTURES[structure])
-    q = random_state(model, rng, 3, 2)[0]
-    frames = (None, *range(model.f + 1))
-    candidates = candidate_parameters(model, frames)
-    for frame in frames:
-        T, psi = differential_model(candidates, q, None, frame)
-        np.testing.assert_allclose(T, rm.dgm(model, q, frame), atol=1e-12)
-        assert psi.shape == (3, 2, 6, len(candidates))
-    T, psi = differential_model(candidates, q[:0, 0])
-    assert T.shape == (0, 4, 4)
-    assert psi.shape == (0, 6, len(candidates))
-    assert differential_model(candidates, q[0, 0]).psi.shape == (6, len(candidates))
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)

@@ -69,10 +69,10 @@ def test_columns_by_argument_and_by_number(tmp_path):
     for file, more, message in (
         (named, {}, r"expected columns x, y, z; the header is q1"),
         (named, {"columns": ["pu", "py", "pz"]}, r"no column 'pu'; near it: p"),
-        (named, {"joints": ["q1"]}, "a column for each of the 6 joints"),
-        (bare, {"columns": [0, 1, 2]}, "no header says which of its 9 columns"),
+        (named, {"joints": ["q1"]}, r"joints: expected 6 columns \(joint_1"),
+        (bare, {"columns": [0, 1, 2]}, "expected columns joint_1.* or q1, .*no header"),
         (bare, {"joints": range(3, 9), "columns": [0, 1, 9]}, "columns 0 to 8, got 9"),
-        (written(tmp_path / "b.csv", ["a", "b"], [[1.0, 2.0]]), {}, "joints of rx90"),
+        (written(tmp_path / "b.csv", ["a", "b"], [[1.0, 2.0]]), {}, "expected columns joint_1"),
     ):
         with pytest.raises(InvalidValueError, match=message):
             read_measurements(file, "position", RX90, **more)

@@ -237,16 +237,6 @@ def test_whitened_rows_have_the_length_that_a_covariance_gives_them(rng):
     np.testing.assert_allclose(np.einsum("bip,bi->bp", slopes, rows), expected)
 
 
-def test_the_same_name_and_label_is_the_same_unknown():
-    arm = candidate_parameters(RX90)
-    touched = PointContact(Q4, [0, 0, 1, 1], name="ball")
-    bar = Distance(Q4, 0.3, pivot=[0, 0, 2, 2], name="ball")
-    problem = problem_of(arm, [touched, bar, KnownDistance("ball:0", "ball:2", 0.2)])
-    assert [f.name for f in problem.fixtures] == [f"ball:{k}.{c}" for k in (0, 1, 2) for c in "xyz"]
-    table = PlaneContact(Q4, name="table")
-    assert problem_of(arm, [table, PlaneContact(Q4 + 1, name="table")]).F == 3
-
-
 # --- scale ----------------------------------------------------------------------------------------
 
 TWO = [0, 0, 1, 1]

@@ -14,7 +14,7 @@ from robotmodels.calibration import (
     select_configurations,
 )
 from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
-from robotmodels.calibration.observability import Criterion, exchanged, greedy, nested
+from robotmodels.calibration.observability import Criterion, exchanged, greedy
 from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacked
 from robotmodels.calibration.selection import group_rows
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -49,21 +49,6 @@ def test_indices_of_a_diagonal_matrix_by_hand():
     assert "O5 1.143" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "options", "match"),
-    [
-        ((np.zeros(3),), {}, "psi"),
-        ((np.zeros((0, 3)),), {}, "psi"),
-        (([[np.nan]],), {}, "finite"),
-        ((np.eye(2), 0), {}, "configurations"),
-        ((np.eye(2),), {"scales": [1.0, 0.0]}, "scales"),
-    ],
-)
-def test_mistakes_about_indices_are_named(arguments, options, match):
-    with pytest.raises((ShapeError, InvalidValueError), match=match):
-        observability(*arguments, **options)
-
-
 # --- exchange ----------------------------------------------------------------------------------
 
 
@@ -79,17 +64,6 @@ def test_exchange_finds_what_exhaustive_search_finds(criterion):
             value(rows, exchanged(rows, s, criterion, Workers()), criterion) for s in starts
         )
         assert found == pytest.approx(best, rel=1e-9)
-
-
-def test_first_members_of_a_nested_order_are_good_sets():
-    rng = np.random.default_rng(7)
-    rows = rng.normal(size=(60, 3, 5)) * rng.uniform(0.1, 2.0, size=(60, 1, 1))
-    chosen = rng.permutation(60)[:20]
-    order = chosen[nested(rows[chosen], Criterion.O1)]
-    assert sorted(order) == sorted(chosen)
-    for c in (4, 8, 12):
-        at_random = [value(rows, rng.permutation(chosen)[:c], Criterion.O1) for _ in range(50)]
-        assert value(rows, order[:c], Criterion.O1) > max(at_random)
 
 
 # --- rows of groups ----------------------------------------------------------------------------

@@ -115,23 +115,15 @@ class GeometricParameters(Rebuilt):
     Parameters
     ----------
     table, entries
-        The extended table, and the parameters of it.
-
-    References
-    ----------
-    Seed book section 1.4.2.
+        The extended table, and the parameters of it (seed book section 1.4.2).
 
     Examples
     --------
     >>> from robotmodels.calibration import candidate_parameters
     >>> from robotmodels.robots import load
     >>> full = candidate_parameters(load("rx90"))
-    >>> full.names[11:15]
-    ('theta0', 'theta1', 'theta2', 'theta3')
     >>> full.subset(["d3", "theta2"]).names, full.preferring(["d3"]).names[0]
     (('theta2', 'd3'), 'd3')
-    >>> len(full) - len(full.without(["r4"]))
-    1
     """
 
     table: ExtendedTable

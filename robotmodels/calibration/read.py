@@ -138,8 +138,21 @@ def read_measurements(
         )
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
 
+    names = model.table.joint_names
+    spellings = [names, [f"q{j + 1}" for j in range(model.n)]]
+
     def readings(given: Sequence[Column] | None, what: str) -> list[Array]:
-        parts = [t.numbers(_joint_columns(t, model, given, what, alone=not needs)) for t in tables]
+        if given is None and what == "other_joints":
+            raise InvalidValueError("other_joints: two ends need two readings.")
+        parts = []
+        for t in tables:
+            alone = not (t.names or needs or given) and t.width == model.n
+            columns = range(model.n) if alone else given
+            try:
+                found = _columns(t, what, spellings, columns)
+            except InvalidValueError as error:
+                raise InvalidValueError(f"{error}{expected_joints_text(model)}") from None
+            parts.append(t.numbers(found))
         units = "joint_angles" if joint_angles else "angles"
         _check_angles(np.concatenate(parts)[:, revolute], turn, files[0], units)
         return [part * np.where(revolute, turn.factor, length.factor) for part in parts]
@@ -150,7 +163,7 @@ def read_measurements(
         _check_contents(tables, parts, model, frame)
     values = np.zeros((len(q), 0))
     if needs:
-        values = np.concatenate([t.numbers(_measured_columns(t, needs, columns)) for t in tables])
+        values = np.concatenate([t.numbers(_columns(t, "columns", needs, columns)) for t in tables])
     given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
     for f in fields(kind):
         content, p = f.metadata.get("content"), None
@@ -229,54 +242,24 @@ def _files(path: str | Path | Iterable[str | Path], pattern: str) -> tuple[list[
     return files, folder
 
 
-def _joint_columns(
-    table: CsvTable, model: RobotModel, given: Sequence[Column] | None, what: str, alone: bool
+def _columns(
+    table: CsvTable, what: str, spellings: Sequence[Sequence[str]], given: Sequence[Column] | None
 ) -> tuple[int, ...]:
-    n, names = model.n, model.table.joint_names
+    """Columns that are given, or those of the first spelling that the header has."""
+    count = len(spellings[0])
     if given is not None:
-        if isinstance(given, str) or len(given) != n:
+        if isinstance(given, str) or len(given) != count:
             raise InvalidValueError(
-                f"{what}: expected a column for each of the {n} joints, got {given!r:.80}."
-                f"{expected_joints_text(model)}"
+                f"{what}: expected {count} columns ({', '.join(spellings[0])}), got {given!r:.80}."
             )
         return tuple(table.number(column, what) for column in given)
-    found = table.find(names) or table.find([f"q{j + 1}" for j in range(n)])
-    if what == "other_joints":
-        error = "other_joints: two ends need two readings."
-    elif table.names and found is not None:
-        return found
-    elif not table.names and alone and table.width == n:
-        return tuple(range(n))
-    elif table.names:
-        error = (
-            f"{table.path}: the header has neither the joints of {model.name} "
-            f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}."
-        )
-    else:
-        error = f"{table.path}: no header says which of its {table.width} columns are the joints."
-    raise InvalidValueError(
-        f"{error} Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
-        f"{expected_joints_text(model)}"
-    )
-
-
-def _measured_columns(
-    table: CsvTable, needs: Sequence[Sequence[str]], given: Sequence[Column] | None
-) -> tuple[int, ...]:
-    if given is not None:
-        if isinstance(given, str) or len(given) != len(needs[0]):
-            raise InvalidValueError(
-                f"columns: expected {len(needs[0])} columns ({', '.join(needs[0])}), got "
-                f"{given!r:.80}."
-            )
-        return tuple(table.number(column, "columns") for column in given)
-    for found in map(table.find, needs):
+    for found in map(table.find, spellings):
         if found is not None:
             return found
-    wanted = " or ".join(", ".join(names) for names in needs)
+    wanted = " or ".join(", ".join(names) for names in spellings)
     has = f"the header is {', '.join(table.names)}" if table.names else "the file has no header"
     raise InvalidValueError(
-        f"{table.path}: expected columns {wanted}; {has}. Give them as columns=[...], a name or "
+        f"{table.path}: expected columns {wanted}; {has}. Give them as {what}=[...], a name or "
         "number (from 0) for each."
     )
 

@@ -216,15 +216,11 @@ def calibrated_model(parameters: GeometricParameters, corrections: ArrayLike) ->
 
     Examples
     --------
-    >>> from robotmodels.calibration import calibrated_pose, candidate_parameters
-    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.calibration import candidate_parameters
     >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("rx90"), gains=True)
-    >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))
-    >>> robot, q_read = calibrated_model(parameters, xi), [0.1, -0.4, 0.8, 0.2, 0.6, -0.3]
-    >>> T = dgm(robot.model, robot.joint_errors.actual(q_read))
-    >>> np.allclose(T, calibrated_pose(robot, q_read), atol=1e-14)
-    True
+    >>> robot = calibrated_model(candidate_parameters(load("lab_rr")), np.full(18, 1e-3))
+    >>> float((robot.model.table.d - robot.nominal.table.d)[1].round(9))
+    0.001
     """
     xi = as_exact(corrections, (len(parameters),), "corrections")
     table, nominal = parameters.table, parameters.model

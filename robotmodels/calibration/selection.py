@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -253,17 +252,24 @@ def select_configurations(
 
     if candidates is None:
         size = kind.postures if postures is None else whole_number(postures, "postures")
-        pool, notes = _drawn(
-            parameters, kind, whole_number(drawn, "drawn"), size, rng, frame, is_clear
-        )
-        numbers = np.arange(len(pool))
+        wanted = whole_number(drawn, "drawn")
+        rounds = (_drawn(parameters, kind, wanted, size, rng, frame) for _ in range(_DRAWS))
     else:
         given = _given(parameters, kind, candidates, frame)
-        within, clear = _within_limits(model, given), is_clear(given)
-        numbers = np.flatnonzero(within & clear)
-        pool = given[numbers]
-        notes = _counted("{} candidates are beyond the limits of the joints.", ~within)
-        notes += _counted("{} candidates touch an obstacle.", ~clear)
+        wanted, rounds = len(given), iter([given])
+    parts, numbers, seen = [], [], 0
+    left_out = {"beyond the limits": 0, "at an obstacle": 0}
+    for groups in rounds:
+        within, clear = _within_limits(model, groups), is_clear(groups)
+        left_out["beyond the limits"] += int((~within).sum())
+        left_out["at an obstacle"] += int((~clear).sum())
+        parts.append(groups[within & clear])
+        numbers.append(seen + np.flatnonzero(within & clear))
+        seen += len(groups)
+        if sum(map(len, parts)) >= wanted:
+            break
+    pool, numbers = np.concatenate(parts)[:wanted], np.concatenate(numbers)[:wanted]
+    notes = tuple(f"{n} candidates are {why}." for why, n in left_out.items() if n)
     if len(pool) < count:
         raise InvalidValueError(
             f"count: expected at most {len(pool)}, the number of usable candidates (within the "
@@ -371,11 +377,6 @@ def _within_limits(model: RobotModel, q: Array) -> NDArray[np.bool_]:
     return np.asarray(within.all(axis=(1, 2)))
 
 
-def _counted(sentence: str, number: Any) -> tuple[str, ...]:
-    """The sentence with a number; none if it is zero."""
-    return (sentence.format(np.sum(number)),) if np.any(number) else ()
-
-
 def _drawn(
     parameters: GeometricParameters,
     kind: Kind,
@@ -383,26 +384,11 @@ def _drawn(
     postures: int,
     rng: np.random.Generator,
     frame: Frame,
-    is_clear: Callable[[Array], NDArray[np.bool_]],
-) -> tuple[Array, tuple[str, ...]]:
-    """Random groups (G, m, n) within limits and clear of obstacles, and notes on the others."""
-    parts: list[Array] = []
-    touching = short = 0
-    for _ in range(_DRAWS):
-        q, label = drawn_groups(parameters, kind, wanted, postures, rng, frame=frame)
-        whole = np.bincount(label, minlength=1)[label] == postures
-        groups = q[whole].reshape(-1, postures, q.shape[1])
-        clear = is_clear(groups)
-        short += wanted - len(groups)
-        touching += int((~clear).sum())
-        parts.append(groups[clear])
-        if sum(map(len, parts)) >= wanted:
-            break
-    notes = _counted(
-        f"{{}} drawn contacts do not have {postures} postures within the limits.", short
-    )
-    notes += _counted("{} drawn ones touch an obstacle.", touching)
-    return np.concatenate(parts)[:wanted], notes
+) -> Array:
+    """Random groups (G, m, n) with all their postures within the limits."""
+    q, label = drawn_groups(parameters, kind, wanted, postures, rng, frame=frame)
+    whole = np.bincount(label, minlength=1)[label] == postures
+    return q[whole].reshape(-1, postures, q.shape[1])
 
 
 def _given(

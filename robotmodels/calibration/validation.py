@@ -105,11 +105,9 @@ class Validation:
     Parameters
     ----------
     given, nominal, in_sample : Errors
-        Of the robot as given, with its base and tool alone fitted (where they may be off), and
-        calibrated.
+        Of the robot as given, with base and tool alone fitted, and calibrated.
     folds, held_out : Errors or None
-        On data held out of the fits (cross-validation; one more fit, or the caller's); their
-        ``nominal`` is before the calibration.
+        On data held out (cross-validation; one more fit, or the caller's), and ``nominal`` before.
     """
 
     given: Errors

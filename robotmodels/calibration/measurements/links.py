@@ -22,9 +22,6 @@ The other arguments are those of `Measurement`.
 
 Examples
 --------
->>> held = LinkedFrames(np.zeros((9, 12)), "left_tool", "right_tool", orientation=False)
->>> [fixture.name for fixture in held.fixtures]
-['link:0.x', 'link:0.y', 'link:0.z']
 >>> KnownDistance("point:0", "point:1", 0.05).fixtures[0].name
 'point:0.x'
 """

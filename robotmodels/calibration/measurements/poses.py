@@ -20,8 +20,6 @@ The other arguments are those of `Measurement`.
 Examples
 --------
 >>> q, T = np.zeros((4, 6)), np.tile(np.eye(4), (4, 1, 1))
->>> Pose(q, T).axes
-('x', 'y', 'z', 'rx', 'ry', 'rz')
 >>> RelativePose.successive(q, T[1:]).blocks
 3
 >>> boards = CameraPose(q, T)

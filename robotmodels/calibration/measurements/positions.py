@@ -30,13 +30,9 @@ The other arguments are those of `Measurement`.
 
 Examples
 --------
->>> q = np.zeros((3, 6))
->>> Position(q, np.zeros((3, 3)), rows=[1, 1, 0]).axes
+>>> Position(np.zeros((3, 6)), np.zeros((3, 3)), rows=[1, 1, 0]).axes
 ('x', 'y')
->>> gauge = AxisPosition(q, [0.0, 1e-3, 2e-3], [0, 0, 1], axis_is_known=False)
->>> [fixture.name for fixture in gauge.fixtures]
-['gauge.turn_1', 'gauge.turn_2', 'gauge.zero']
->>> [fixture.name for fixture in Distance(q, 0.3).fixtures]
+>>> [fixture.name for fixture in Distance(np.zeros((3, 6)), 0.3).fixtures]
 ['pivot:0.x', 'pivot:0.y', 'pivot:0.z']
 """
 
