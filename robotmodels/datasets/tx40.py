@@ -130,22 +130,23 @@ def load_tx40() -> Tx40Log:
     (60, 'ZZ1', 1.242121)
     """
     data = folder("tx40_log")
-    q, tau = (_motors(data / f"{name}.xz", name) for name in (_POSITIONS, _TORQUES))
+    q, q_source = _motors(data / f"{_POSITIONS}.xz", _POSITIONS)
+    tau, tau_source = _motors(data / f"{_TORQUES}.xz", _TORQUES)
     model = load("tx40")
     transmission = model.transmission
     assert transmission is not None  # of the catalogue, which this data set is made with
     log = Log(
         _PERIOD,
-        q=transmission.to_joint(q.values),
-        tau=np.linalg.solve(transmission.matrix.T, tau.values.T).T,
+        q=transmission.to_joint(q),
+        tau=np.linalg.solve(transmission.matrix.T, tau.T).T,
         names=model.table.joint_names,
-        sources=(q.source, tau.source),
+        sources=(q_source, tau_source),
     )
     return Tx40Log(
         log=log,
         model=model,
-        motor_positions=q.values,
-        motor_torques=tau.values,
+        motor_positions=q,
+        motor_torques=tau,
         published=_parameters(data / "TX40_bp_5.csv"),
         essential=_parameters(data / "TX40_ep_5.csv"),
         training=slice(0, 24750),
@@ -155,19 +156,11 @@ def load_tx40() -> Tx40Log:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Motors:
-    values: Array
-    source: LogSource
-
-
-def _motors(file: Traversable, name: str) -> _Motors:
+def _motors(file: Traversable, name: str) -> tuple[Array, LogSource]:
     """Columns of a packed file, and the name and fingerprint of the file that was packed."""
     text = lzma.decompress(file.read_bytes())
-    values = np.loadtxt(text.decode("ascii").splitlines()[1:], delimiter=",")
-    return _Motors(
-        read_only(values), LogSource(name, hashlib.sha256(text).hexdigest(), len(values))
-    )
+    values = read_only(np.loadtxt(text.decode("ascii").splitlines()[1:], delimiter=","))
+    return values, LogSource(name, hashlib.sha256(text).hexdigest(), len(values))
 
 
 def _parameters(file: Traversable) -> tuple[PublishedParameter, ...]:

@@ -223,15 +223,9 @@ def rounding(m: int) -> float:
 def warn_of_negative_mass(model: RobotModel) -> None:
     """Warn the caller of the caller of links with negative masses."""
     if (model.inertia.mass < 0.0).any():
-        links = ", ".join(
-            f"link {j + 1} ({model.table.names[j]}) {mass:g} kg"
-            for j, mass in enumerate(model.inertia.mass)
-            if mass < 0.0
-        )
         warnings.warn(
-            f"negative mass in {model.name!r}: {links}. The mass matrix is positive definite here, "
-            "and the accelerations are those of the equations, but these links are not physical; "
-            "see model.inertia.consistency().",
+            f"not physical in {model.name!r}: {model.inertia.consistency().not_physical}. The mass "
+            "matrix is positive definite here; the accelerations are those of the equations.",
             InertiaWarning,
             stacklevel=3,
         )

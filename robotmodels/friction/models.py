@@ -223,17 +223,14 @@ class StribeckFriction(JointFriction):
         for name in ("vs", "exponent"):
             if ((values := getattr(self, name)) <= 0.0).any():
                 raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")
-        for name in ("Fv", "Fc"):
-            for j in np.flatnonzero(getattr(self, name) < 0.0)[:1]:
+        zero = np.zeros(self.n)
+        for name, least in (("Fv", zero), ("Fc", zero), ("Fs", self.Fc)):
+            values = getattr(self, name)
+            for j in np.flatnonzero(values < least)[:1]:
                 raise InvalidValueError(
-                    f"{name}: friction of joint {j + 1} is negative ({getattr(self, name)[j]:g}) "
-                    "and would drive it; take ViscousFriction or CoulombFriction for any numbers."
+                    f"{name}: friction of joint {j + 1} ({values[j]:g}) is less than its bound "
+                    f"({least[j]:g}); expected Fv >= 0 and Fs >= Fc >= 0."
                 )
-        for j in np.flatnonzero(self.Fs < self.Fc)[:1]:
-            raise InvalidValueError(
-                f"Fs: static friction of joint {j + 1} ({self.Fs[j]:g}) is less than its Coulomb "
-                f"friction Fc ({self.Fc[j]:g}); exchange them if they are in the wrong order."
-            )
 
     def basis(self, v: ArrayLike) -> Array:
         """Velocity, and the sign times the part of Fc and that of Fs, shape (..., 3, n)."""

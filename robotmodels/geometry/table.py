@@ -20,8 +20,7 @@ from ..table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 from .columns import check_structure, checked_limits, whole_numbers
 from .joint_kinds import FIXED, PRISMATIC
 from .names import checked_names, checked_symbols, default_names
-from .rows import columns_of_rows, unknown_name
-from .standard_rows import rows_of_standard
+from .rows import columns_of_rows, rows_of_standard, unknown_name
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)

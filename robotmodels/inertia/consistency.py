@@ -27,10 +27,8 @@ class LinkFinding:
 
     Parameters
     ----------
-    link : int
-        Frame number.
-    problems : tuple of str
-        One sentence each; empty if the parameters are physically consistent.
+    link, problems : int, tuple of str
+        Frame number; one sentence each, none if the parameters are physically consistent.
     """
 
     link: int

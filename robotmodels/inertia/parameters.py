@@ -17,6 +17,7 @@ from .. import se3
 from .._arrays import LARGEST, Array, Value, as_bounded, as_core, read_only
 from ..errors import InertiaError, ShapeError
 from ..geometry import DHTable
+from ..table_text import boxed
 from .consistency import ConsistencyReport, link_finding
 
 PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
@@ -111,19 +112,8 @@ class InertialParameters(Value):
         The classical frame of link j is ``R_j Trans(x, a_j) Rot(x, alpha_j)``, its table ``rows``
         as for `DHTable.from_standard`; masses, centres and tensors as for `from_com`, in it.
         """
-        rows = list(rows)
-        com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")
-        if com.shape != (len(rows), 3) or tensor.shape != (len(rows), 3, 3):
-            raise ShapeError(
-                f"expected com ({len(rows)}, 3) and inertia ({len(rows)}, 3, 3) for {len(rows)} "
-                f"rows, got {com.shape} and {tensor.shape}."
-            )
         X = np.array([DHTable.from_standard([row], degrees)[1] for row in rows])
-        X = X.reshape(-1, 4, 4)
-        R = X[:, :3, :3]
-        return cls.from_com(
-            mass, (R @ com[:, :, None])[:, :, 0] + X[:, :3, 3], R @ tensor @ np.swapaxes(R, 1, 2)
-        )
+        return cls.from_com(mass, com, inertia).moved(X.reshape(-1, 4, 4))
 
     @property
     def f(self) -> int:
@@ -156,19 +146,13 @@ class InertialParameters(Value):
 
     def __str__(self) -> str:
         report = self.consistency()
-        rows = [("link", *PARAMETERS, "physical")]
-        rows += [
-            (str(link.link), *(f"{x:.4g}" for x in row + 0.0), "yes" if link.is_physical else "no")
-            for row, link in zip(self.values, report.links, strict=True)
+        columns = [("link", [str(link.link) for link in report.links])]
+        columns += [
+            (name, [f"{x:.4g}" for x in column + 0.0])
+            for name, column in zip(PARAMETERS, self.values.T, strict=True)
         ]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [
-            "  ".join(word.rjust(width) for word, width in zip(row, widths, strict=True))
-            for row in rows
-        ]
-        lines.insert(1, "-" * len(lines[0]))
-        lines += [str(link) for link in report.links if not link.is_physical]
-        return "\n".join(lines)
+        problems = [str(link) for link in report.links if not link.is_physical]
+        return "\n".join([boxed(columns), *problems])
 
     def moved(self, T: ArrayLike) -> Self:
         """The same bodies in other frames; T (f, 4, 4) are the poses of the present ones in them.

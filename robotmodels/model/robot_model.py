@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,15 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import LARGEST, Array, as_bounded, as_exact, read_only, same_value, value_hash
 from ..drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
+from ..errors import InvalidValueError
 from ..geometry import DHTable, constant_factors
 from ..inertia import InertialParameters
 from ..kernels import Chain
 from ..urdf import NamedFrame, RobotParts, read_urdf
 from ..urdf.parts import UrdfSource
 from ..visual import Visual
-from .changed import Changeable
 from .other_names import no_attribute
-from .part_checks import check_count, check_name, check_table, check_tip, checked_postures
+from .part_checks import (
+    check_count,
+    check_name,
+    check_table,
+    check_tip,
+    checked_postures,
+    placed,
+)
 from .tip_text import tip_text
 from .twin import PinocchioTwin
 
@@ -36,11 +43,12 @@ _NUMERIC_PARTS = _PARTS[:9]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, weakref_slot=True)
-class RobotModel(Changeable):
+class RobotModel:
     """A robot: geometry, inertia, drives, base, tool and gravity. Immutable, picklable.
 
-    Made by `from_table` or `from_urdf`, changed by the ``with_*`` methods, which return a new
-    model. Every computation is a function that takes the model first: ``dgm(model, q)``.
+    Made by `from_table` or `from_urdf`. Every computation is a function that takes the model first:
+    ``dgm(model, q)``. The ``with_*`` methods return a new model with one part changed, checked as
+    in `from_table`; None removes it: no mass, no drives, the identity as base or tool.
 
     Parameters
     ----------
@@ -61,6 +69,8 @@ class RobotModel(Changeable):
     >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
     >>> arm.n, arm.frame_names
     (2, ('base', 'joint_1', 'joint_2', 'tool'))
+    >>> arm.with_drive(DriveParameters(Fv=[0.5, 0.2])).drive.Fv
+    array([0.5, 0.2])
     """
 
     name: str
@@ -240,6 +250,75 @@ class RobotModel(Changeable):
 
         def __getattr__(self, name: str) -> Any:
             raise no_attribute(type(self).__name__, name)
+
+    def with_table(self, table: DHTable) -> Self:
+        """The same robot with other geometric parameters, of as many frames and joints."""
+        return replace(self, table=table)
+
+    def with_inertia(self, inertia: InertialParameters | None) -> Self:
+        """The same robot with other inertial parameters of its f frames."""
+        return replace(
+            self, inertia=InertialParameters.zeros(self.table.f) if inertia is None else inertia
+        )
+
+    def with_drive(self, drive: DriveParameters | None) -> Self:
+        """The same robot with other drive parameters of its n joints."""
+        return replace(self, drive=DriveParameters.zeros(self.table.n) if drive is None else drive)
+
+    def with_base(self, base: ArrayLike | None) -> Self:
+        """The same robot elsewhere: pose of R_0 in the world, shape (4, 4), metres."""
+        return replace(self, base=np.eye(4) if base is None else base)
+
+    def with_tool(self, tool: ArrayLike | None, tip: int | None = None) -> Self:
+        """The same robot with another tool: its pose in the frame ``tip``, shape (4, 4), metres.
+
+        ``tip`` is the number of the frame, the present one by default.
+        """
+        tool = np.eye(4) if tool is None else tool
+        return replace(self, tool=tool, tip=self.tip if tip is None else tip)
+
+    def with_gravity(self, gravity: ArrayLike) -> Self:
+        """The same robot under another gravity: acceleration in world axes, shape (3,), m/s^2."""
+        return replace(self, gravity=gravity)
+
+    def with_transmission(self, transmission: Transmission | None) -> Self:
+        """The same robot with another transmission between motors and its n joints."""
+        return replace(self, transmission=transmission)
+
+    def with_configurations(self, configurations: Mapping[str, ArrayLike]) -> Self:
+        """The same robot with other named configurations, each of shape (n,), rad or m.
+
+        ``"zero"`` is added.
+        """
+        return replace(self, configurations=configurations)
+
+    def with_frames(self, frames: Mapping[str, ArrayLike], frame: str | int | None = None) -> Self:
+        """The same robot with more named frames: markers, targets, further tools.
+
+        ``frames`` gives by name the position, shape (3,), with the axes of ``frame``, or the pose,
+        shape (4, 4), in ``frame`` (default: the tool), metres. They are fixed to its body, and
+        their names serve as frames everywhere, as in ``Position(q, p, frame="marker_1")``.
+        """
+        if not isinstance(frames, Mapping):
+            raise InvalidValueError(
+                "frames: expected a mapping of names to positions or poses, such as "
+                f"{{'marker_1': [0, 0, 0.1]}}, got {type(frames).__name__}."
+            )
+        at, taken = self.twin.frame(frame), self.twin.frame_names()
+        place = np.eye(4)
+        place[:3, :3], place[:3, 3] = at.rotation, at.position
+        for name in frames:
+            check_name(name)
+            if name in taken:
+                raise InvalidValueError(
+                    f"frames: the name {name!r} is taken; the frames are "
+                    f"{', '.join(taken)}. Give another name."
+                )
+        new = tuple(
+            NamedFrame(name, at.parent, place @ placed(value, f"frames[{name!r}]"))
+            for name, value in frames.items()
+        )
+        return replace(self, frames=(*self.frames, *new))
 
     @property
     def n(self) -> int:
