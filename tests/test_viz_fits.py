@@ -278,25 +278,21 @@ def test_effects_and_standard_errors_are_those_of_the_parameters(found):
 def test_processing_shows_cutoffs_and_the_noise_they_cut(found):
     log, chosen = found.equations.log, found.equations.processing
     figure = viz.plot_processing(log, chosen, model=found.model)
-    assert len(figure.axes) == 6
-    assert figure.axes[0].get_ylabel() == "position\n(m/√Hz)"
     for axes, cutoff in zip(figure.axes, (chosen.cutoff, chosen.torque_cutoff), strict=False):
-        for label, frequency in (
-            ("cutoff of the positions", chosen.cutoff),
-            ("cutoff of regressor and torques", chosen.torque_cutoff),
-            ("motion: 99.9 % of the velocity's power", chosen.motion),
-        ):
-            assert lines(axes, label)[0].get_xdata()[0] == frequency
         assert min(patch.get_x() for patch in axes.patches) == cutoff  # grey: cut
         f, before, after = (
             lines(axes, "kept")[0].get_xdata(),
-            data(axes, "as recorded"),
-            data(axes, "kept"),
+            *(data(axes, word) for word in ("as recorded", "kept")),
         )
         assert (after[f > 2.0 * cutoff] < 0.1 * before[f > 2.0 * cutoff]).all()
         np.testing.assert_allclose(after[f < 0.5 * cutoff], before[f < 0.5 * cutoff], rtol=0.15)
     noise = float(re.search(r": (\S+) m", figure.axes[0].get_title(loc="left"))[1])
     assert noise == pytest.approx(1e-5 * np.sqrt(1.0 - 2.0 * DT * chosen.cutoff), rel=0.1)
+    bias, count = viz.plot_processing(found).axes[6:]
+    # one equation of each joint for each sample that is kept
+    expected = len(log) * 3 / chosen.decimation / len(found.base)
+    assert data(count, "choice")[0] == pytest.approx(expected)
+    assert lines(bias, "choice")[0].get_xdata()[0] == min(chosen.cutoff, chosen.torque_cutoff)
 
 
 def test_excitation_shows_its_motion_and_its_search():

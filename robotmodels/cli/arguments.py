@@ -35,6 +35,13 @@ robot [] a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file
 --lengths [m|mm =m] unit of lengths, also of prismatic joints, in the files""",
     "delimiter": r"""
 --delimiter CHARACTER [character] between cells, \t for a tab (default: ; tab or , as found)""",
+    "mask": """
+--mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words
+    position, xyz (the same) and orientation""",
+    "degrees": """
+--degrees [flag] angles in degrees, those given and those printed""",
+    "no_limits": """
+--no-limits [flag] leave the joint limits out""",
     "output": """
 what is handed over:
 --out FOLDER [path] write files into this folder (made if it is not there)

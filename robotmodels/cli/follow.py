@@ -32,9 +32,9 @@ without a jump, and where it breaks for the others."""
 OPTIONS = """\
 @robot
 poses [path] file with one pose in each row
---degrees [flag] angles in degrees, those given and those printed
---no-limits [flag] leave the joint limits out
---mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met
+@degrees
+@no_limits
+@mask
 --through-singular [flag] allow motions through singular positions
 --cost [length|conditioning =length] what the best motion minimises
 --motion FILE [path] write the best joint motion as CSV

@@ -41,12 +41,11 @@ the pose of the tool, in one of three ways:
 --matrix NUMBERS [] 16 numbers of the 4x4 pose, row by row
 --q NUMBERS [] the pose that these joint variables (or a named configuration) lead to
 what is asked for:
---degrees [flag] angles in degrees, those given and those printed
+@degrees
 --limits [flag] only postures inside the joint limits
 --q-ref NUMBERS [] order by the distance to this posture; joints that the pose leaves free take its
     values (default 0)
---mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what has to be met; or one of the words
-    position, xyz (the same) and orientation
+@mask
 --mask-axes [world|tool =world] axes of the mask
 --lock JOINT=VALUE [repeated] a joint, by name or number from 1, that keeps a value; may be repeated
 --arm-angle ANGLE [] seven-joint arms: angle of the elbow about the line from shoulder to wrist

@@ -187,11 +187,11 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
     if isinstance(error, RobotModelsError):
         return in_options(str(error), options), ExitStatus.WRONG_INPUT
     if isinstance(error, OSError):
-        if error.filename is None:
-            give_up_output()  # perhaps a full disk behind standard output
         text = error.strerror or str(error) or type(error).__name__
-        file = f": {error.filename}" if error.filename is not None else "."
-        return text + file, ExitStatus.WRONG_INPUT
+        if error.filename is not None:
+            return f"{text}: {error.filename}", ExitStatus.WRONG_INPUT
+        give_up_output()  # perhaps a full disk behind standard output
+        return f"{text}.", ExitStatus.WRONG_INPUT
     if isinstance(error, MemoryError):
         return "there is not enough memory for this.", ExitStatus.WRONG_INPUT
     said = (

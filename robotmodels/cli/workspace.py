@@ -27,9 +27,9 @@ OPTIONS = """\
     some but not every one
 --section [auto|plane|space =auto] half a plane through the first axis, or space (default: the plane
     where it stands for all)
---no-limits [flag] leave the joint limits out
+@no_limits
 --resolution CELLS [int] cells along each coordinate
---mask NUMBERS [] 1 or 0 for each of x y z rx ry rz: what is asked for
+@mask
 --picture FILE [path] draw the section or two views (.png, .pdf, .svg), or write a page with the
     robot (.html)
 @json"""
