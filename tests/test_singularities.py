@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from identities.random_robots import models, random_model, random_pose, random_state
+from identities.random_robots import models, random_pose, random_state
 from scipy.optimize import minimize_scalar
 
 import robotmodels as rm
@@ -25,7 +25,7 @@ from robotmodels.kinematics import (
 
 PI = np.pi
 SHOULDER, ELBOW, WRIST, OTHER = SingularityKind
-INTERIOR, BOUNDARY = WorkspaceSide.INTERIOR, WorkspaceSide.BOUNDARY
+UNDECIDED, BOUNDARY = WorkspaceSide.UNDECIDED, WorkspaceSide.BOUNDARY
 FINITE, INFINITESIMAL = SelfMotionKind.FINITE, SelfMotionKind.INFINITESIMAL
 # RX-90: S23 RL4 - C2 D3 = 0 with RL4 = D3 where q2 + q3 = pi/2 - q2
 RX90 = {
@@ -45,24 +45,24 @@ def iiwa(**values):
 
 # robot, configuration: order, kinds, side, first words
 KNOWN = {
-    "ur5 wrist": ("ur5", [0.1, -1, 1.2, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "ur5 wrist": ("ur5", [0.1, -1, 1.2, 0.4, 0, 0.6], 1, (WRIST,), UNDECIDED),
     "ur5 elbow": ("ur5", [0.1, -1, 0, 0.4, 0.5, 0.6], 1, (ELBOW,), BOUNDARY),
     "ur5 folded": ("ur5", [0.1, -1, PI, 0.4, 0.5, 0.6], 1, (ELBOW,), BOUNDARY),
-    "puma wrist": ("puma560", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "puma wrist": ("puma560", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), UNDECIDED),
     "puma elbow": (
         "puma560", [0.1, 0.2, -PI / 2 + np.arctan2(0.0203, 0.4318), 0.4, 0.5, 0.6],
         1, (ELBOW,), BOUNDARY,
     ),
-    "stanford wrist": ("stanford_arm", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "stanford wrist": ("stanford_arm", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), UNDECIDED),
     "stanford axis": ("stanford_arm", [0.1, 0, 0.3, 0.4, 0.5, 0.6], 1, (SHOULDER,), BOUNDARY),
     "scara stretched": ("cobra_s600", [0.1, 0, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
     "scara folded": ("cobra_s600", [0.1, PI, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
     "planar stretched": ("planar_3r", [0.1, 0, 0.3], 1, (ELBOW,), BOUNDARY),
-    "gantry wrist": ("gantry", [0.5, 0.5, 0.5, 0.1, 0, 0.3], 1, (WRIST,), INTERIOR),
-    "iiwa elbow": ("iiwa14", iiwa(q4=0), 1, (ELBOW,), BOUNDARY),
-    "iiwa shoulder": ("iiwa14", iiwa(q2=0, q3=PI / 2), 1, (SHOULDER,), INTERIOR),
-    "iiwa wrist": ("iiwa14", iiwa(q6=0, q5=PI / 2), 1, (WRIST,), INTERIOR),
-    "iiwa both ends": ("iiwa14", iiwa(q2=0, q6=0), 1, (SHOULDER, WRIST), INTERIOR),
+    "gantry wrist": ("gantry", [0.5, 0.5, 0.5, 0.1, 0, 0.3], 1, (WRIST,), UNDECIDED),
+    "iiwa elbow": ("iiwa14", iiwa(q4=0), 1, (ELBOW,), UNDECIDED),
+    "iiwa shoulder": ("iiwa14", iiwa(q2=0, q3=PI / 2), 1, (SHOULDER,), WorkspaceSide.INTERIOR),
+    "iiwa wrist": ("iiwa14", iiwa(q6=0, q5=PI / 2), 1, (WRIST,), WorkspaceSide.INTERIOR),
+    "iiwa both ends": ("iiwa14", iiwa(q2=0, q6=0), 1, (SHOULDER, WRIST), UNDECIDED),
 }  # fmt: skip
 
 
@@ -104,7 +104,7 @@ def test_rx90_by_name(name):
     if name == "wrist":
         assert report.words == ("wrist: axes 4 and 6 are aligned",)
         np.testing.assert_allclose(motion.velocity, [0, 0, 0, 1, 0, -1], atol=1e-13)
-        assert (motion.joints, motion.kind, report.side) == ((4, 6), FINITE, INTERIOR)
+        assert (motion.joints, motion.kind, report.side) == ((4, 6), FINITE, UNDECIDED)
         # in R4 the moment is about x4 alone: the turn about x4 is what the wrist has lost
         book = classify_singularity(arm, RX90[name], axes=4, point=4).lost
         assert (book.axes, book.point) == (4, 4)
@@ -127,7 +127,7 @@ def test_rx90_by_name(name):
         assert report.lost.axes in (2, 3)  # along the parallel axes 2 and 3, at the wrist centre
         np.testing.assert_allclose(report.lost.wrenches, [[0, 0, 1, 0, 0, 0]], atol=1e-13)
         assert motion.joints == (1, 4, 5, 6)
-        assert (motion.kind, report.side) == (FINITE, INTERIOR)
+        assert (motion.kind, report.side) == (FINITE, UNDECIDED)
     text = str(report)
     for part in (report.words[0], report.lost.where, motion.kind.sentence, report.side.sentence):
         assert part in text
@@ -168,38 +168,6 @@ def test_lost_directions_have_the_sign_of_the_book():
     assert (reached @ report.open_twist[:3]).min() > 0.0
     whole = classify_singularity(planar, [0.1, 0.0], mask=[1] * 6)
     assert whole.status is SingularityStatus.REGULAR
-
-
-def test_redundant_arm_keeps_its_regular_self_motion():
-    arm = rm.load("iiwa14")
-    regular = classify_singularity(arm, IIWA)
-    assert (regular.order, regular.gained, len(regular.self_motions)) == (0, 0, 1)
-    assert regular.self_motions[0].kind is FINITE
-    assert regular.side is WorkspaceSide.REGULAR
-    assert regular.lost.wrenches.shape == (0, 6)
-    stretched = classify_singularity(arm, iiwa(q4=0))
-    kinds = {m.joints: m.kind for m in stretched.self_motions}
-    assert kinds[(3, 5)] is FINITE
-    assert sorted(kinds.values()) == [FINITE, INFINITESIMAL]
-    assert stretched.words == ("elbow: axes 3 and 5 are aligned: the arm is stretched or folded",)
-
-
-def test_self_motions_as_they_are_called():
-    """Finite ones leave the tool exactly, infinitesimal ones only to the second order."""
-    arm = rm.load("rx90")
-    q = np.array(RX90["wrist"])
-    motion = classify_singularity(arm, q).self_motions[0]
-    T = rm.dgm(arm, q)
-    for s in (0.1, 1.0, -2.0):
-        np.testing.assert_allclose(rm.dgm(arm, q + s * motion.velocity), T, atol=1e-14)
-    q = np.array(RX90["elbow"])
-    report = classify_singularity(arm, q)
-    v, wrench = report.self_motions[0].velocity, report.lost_in_world.wrenches[0]
-    T = rm.dgm(arm, q)
-    along = [wrench[:3] @ (rm.dgm(arm, q + s * v)[:3, 3] - T[:3, 3]) for s in (1e-2, -1e-2, 5e-3)]
-    assert abs(along[0]) > 1e-6
-    assert along[0] * along[1] > 0.0  # to one side only
-    np.testing.assert_allclose(along[0] / along[2], 4.0, rtol=0.05)
 
 
 def test_two_singularities_at_once():
@@ -404,34 +372,6 @@ def test_limits_are_respected():
     assert (outside.q <= upper + 1e-12).all()
 
 
-def test_small_arms_by_dense_sampling():
-    """Random spatial arms of three joints, position alone: no point of a grid is nearer."""
-    rng = np.random.default_rng(8)
-    mask = [1, 1, 1, 0, 0, 0]
-    looked = 0
-    for _ in range(6):
-        arm = random_model(rng, f=3, prismatic=False, limits=False)
-        q = random_state(arm, rng)[0]
-        found = nearest_singularity(arm, q, mask=mask)
-        J = rm.jacobian(arm, rng.uniform(-3, 3, size=(50, 3)))[:, :3]
-        if np.abs(np.linalg.det(J)).max() < 1e-5:
-            continue  # an arm whose point hardly ever has three freedoms
-        looked += 1
-        assert found.count
-        side = np.linspace(-1.0, 1.0, 41)
-        radius = found.distance[0]
-        grid = q + radius * np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
-        grid = grid[np.linalg.norm(grid - q, axis=1) < radius * (1 - 1e-9)]
-        det = np.linalg.det(rm.jacobian(arm, grid)[:, :3])
-        assert det.min() * det.max() > 0.0  # it changes sign nowhere nearer
-        beyond = q + 1.05 * radius * found.direction[0]
-        det_here = np.linalg.det(rm.jacobian(arm, q)[:3])
-        det_there = np.linalg.det(rm.jacobian(arm, beyond)[:3])
-        simple = found.slope[0] > 1e-4 and found.codimension[0] == 1
-        assert not simple or det_here * det_there < 0.0
-    assert looked >= 2
-
-
 def test_other_arms():
     ur5 = nearest_singularity(rm.load("ur5"), [0.1, -1, 1.2, 0.4, 0.5, 0.6])
     for kind, distance in ((WRIST, 0.5), (ELBOW, 1.2)):
@@ -573,24 +513,6 @@ def test_kinds_are_those_of_the_factors_that_vanish(name):
     assert looked
 
 
-@pytest.mark.parametrize("name", ["stanford_arm", "iiwa14", "tx40"])
-@pytest.mark.nightly
-def test_kinds_of_the_nearest_are_those_of_the_factors(name):
-    arm = rm.load(name)
-    explained = rm.explain_singularities(arm)
-    q = np.random.default_rng(8).uniform(-1.2, 1.2, size=(2, arm.n))
-    if name == "stanford_arm":
-        q[0] = [0.3, 0, 0.5, 0.3, 0.5, 0.2]
-        assert nearest_singularity(arm, q[0]).kind[0] == (SHOULDER,)
-    for home in q:
-        found = nearest_singularity(arm, home)
-        assert found.count
-        for there, kinds in zip(found.q, found.kind, strict=True):
-            conditions = [c for c in explained.conditions if c.holds(there, 1e-6)]
-            vanishing = {f.kind for c in conditions for f in c.factors}
-            assert set(kinds) == vanishing
-
-
 def test_near_what():
     """Near a singular configuration the report says near which, and what is weak."""
     arm = rm.load("rx90")
@@ -617,15 +539,3 @@ def test_near_what():
     assert (aside.kinds, aside.near_kinds) == ((), (SHOULDER,))
     planar = classify_singularity(rm.load("planar_2r"), [0.3, 1e-3])
     assert planar.near_kinds == (ELBOW,)
-
-
-@pytest.mark.parametrize("name", ["rx90", "iiwa14", "ur5", "gantry", "planar_2r", "lab_trr"])
-def test_table_fits_a_page(name):
-    arm = rm.load(name)
-    found = nearest_singularity(arm, np.full(arm.n, 0.37))
-    lines = str(found).splitlines()
-    assert max(map(len, lines)) <= 100
-    assert any("distance" in line for line in lines)
-    for text in {text for row in found.words for text in row}:
-        assert " ".join(" ".join(lines).split()).count(text) == 1
-    assert "itself" not in str(classify_singularity(arm, found.q[0]))

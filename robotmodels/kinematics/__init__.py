@@ -37,99 +37,67 @@ from .poses import dgm, link_poses
 from .velocities import dkm, dkm_second_order
 
 if TYPE_CHECKING:
-    from .coordinates import *  # noqa: F403
+    from ..obstacles import Plane, Sphere  # noqa: F401
+    from .coordinates.conversion import *  # noqa: F403
+    from .coordinates.orientations import OrientationKind  # noqa: F401
+    from .coordinates.rates import *  # noqa: F403
     from .dexterity import *  # noqa: F403
     from .ellipsoid import *  # noqa: F403
     from .ellipsoids import *  # noqa: F403
     from .factors import *  # noqa: F403
-    from .inverse import *  # noqa: F403
-    from .singular import *  # noqa: F403
+    from .inverse.bounds import *  # noqa: F403
+    from .inverse.criteria import *  # noqa: F403
+    from .inverse.ikm import *  # noqa: F403
+    from .inverse.methods import *  # noqa: F403
+    from .inverse.solution import *  # noqa: F403
+    from .inverse.tasks import *  # noqa: F403
+    from .singular.frames import *  # noqa: F403
+    from .singular.nearest import *  # noqa: F403
+    from .singular.rank import *  # noqa: F403
+    from .singular.report import *  # noqa: F403
+    from .singular.self_motion import *  # noqa: F403
     from .singularity_kind import *  # noqa: F403
     from .statics import *  # noqa: F403
 
 _ROOMS = {
-    ".coordinates": (
-        "OrientationKind",
-        "continuous_coordinates",
-        "coordinate_jacobian",
-        "coordinate_jacobian_rate",
-        "coordinate_rates",
-        "coordinate_rates_rate",
-        "is_representation_singular",
-        "operational_coordinates",
-        "pose_from_coordinates",
-        "twist_from_rates",
+    "..obstacles": "Plane Sphere",
+    ".coordinates.conversion": (
+        "continuous_coordinates operational_coordinates pose_from_coordinates"
     ),
-    ".dexterity": ("Manipulability", "manipulability"),
-    ".ellipsoid": ("Ellipsoid", "EllipsoidQuantity"),
-    ".ellipsoids": (
-        "OtherPart",
-        "TwistPart",
-        "force_ellipsoid",
-        "velocity_ellipsoid",
+    ".coordinates.orientations": "OrientationKind",
+    ".coordinates.rates": (
+        "coordinate_jacobian coordinate_jacobian_rate coordinate_rates coordinate_rates_rate "
+        "is_representation_singular twist_from_rates"
     ),
-    ".factors": (
-        "JacobianFactors",
-        "jacobian_factors",
+    ".dexterity": "Manipulability manipulability",
+    ".ellipsoid": "Ellipsoid EllipsoidQuantity",
+    ".ellipsoids": "OtherPart TwistPart force_ellipsoid velocity_ellipsoid",
+    ".factors": "JacobianFactors jacobian_factors",
+    ".inverse.bounds": "JointBounds",
+    ".inverse.criteria": (
+        "Criterion JointLimitCriterion ManipulabilityCriterion NearLimitCriterion "
+        "ObstacleCriterion PostureCriterion"
     ),
-    ".inverse": (
-        "Criterion",
-        "DampedInverse",
-        "Damping",
-        "DistanceTask",
-        "FilteredInverse",
-        "FunctionTask",
-        "IKMSolution",
-        "IKMStatus",
-        "InverseMethod",
-        "JointBounds",
-        "JointLimitCriterion",
-        "JointTask",
-        "LinearTask",
-        "ManipulabilityCriterion",
-        "NearLimitCriterion",
-        "ObstacleCriterion",
-        "Plane",
-        "PositionTask",
-        "PostureCriterion",
-        "PseudoInverse",
-        "Sphere",
-        "Task",
-        "TwistTask",
-        "ikm",
-        "ikm_second_order",
+    ".inverse.ikm": "ikm ikm_second_order",
+    ".inverse.methods": "DampedInverse Damping FilteredInverse InverseMethod PseudoInverse",
+    ".inverse.solution": "IKMSolution IKMStatus",
+    ".inverse.tasks": (
+        "DistanceTask FunctionTask JointTask LinearTask PositionTask Task TwistTask"
     ),
-    ".singular": (
-        "JacobianRank",
-        "LostDirections",
-        "NearestSingularities",
-        "NearestStatus",
-        "OperationalDimension",
-        "SearchOutcome",
-        "SelfMotion",
-        "SelfMotionKind",
-        "SingularityFlags",
-        "SingularityReport",
-        "SingularityStatus",
-        "WorkspaceSide",
-        "classify_singularity",
-        "jacobian_rank",
-        "nearest_singularity",
-        "operational_dimension",
-        "singularity_flags",
+    ".singular.frames": "LostDirections",
+    ".singular.nearest": "NearestSingularities NearestStatus SearchOutcome nearest_singularity",
+    ".singular.rank": "JacobianRank OperationalDimension jacobian_rank operational_dimension",
+    ".singular.report": (
+        "SingularityFlags SingularityReport SingularityStatus classify_singularity "
+        "singularity_flags"
     ),
-    ".singularity_kind": ("SingularityKind",),
-    ".statics": (
-        "StaticStatus",
-        "StaticWrench",
-        "static_wrench",
-        "static_torque",
-        "transported_wrench",
-    ),
+    ".singular.self_motion": "SelfMotion SelfMotionKind WorkspaceSide",
+    ".singularity_kind": "SingularityKind",
+    ".statics": "StaticStatus StaticWrench static_torque static_wrench transported_wrench",
 }
 """Imported when one of their names is first used: together they take 0.15 s."""
 
-_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
 __all__ = [
     "Reference",

@@ -2,6 +2,15 @@
 
 The six-dimensional ellipsoids as numbers; `velocity_ellipsoid` and `force_ellipsoid` are their
 three-dimensional halves, which can be drawn.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -37,13 +46,6 @@ class Manipulability(Rebuilt):
     weights : ndarray, shape (m,)
         What the rows were multiplied by to be comparable: 1 / length for linear ones next to
         angular ones, else 1.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> found = manipulability(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    >>> found.rank, found.measure.round(4)
-    (array(6), np.float64(0.0209))
     """
 
     singular_values: Array
@@ -140,10 +142,11 @@ def manipulability(
 ) -> Manipulability:
     """Singular values, Yoshikawa's measure and condition of the Jacobian.
 
+    Khalil and Dombre, sections 5.8.1 and 5.8.2; T. Yoshikawa, "Manipulability of robotic
+    mechanisms", International Journal of Robotics Research 4(2), 1985.
+
     Parameters
     ----------
-    model, q, frame, reference, mask
-        See `robotmodels.kinematics`.
     joint_velocity : array_like, shape (n,), optional
         Half axes of the ball of joint velocities (rad/s, m/s), as in `velocity_ellipsoid`.
     length : float
@@ -151,17 +154,6 @@ def manipulability(
         of 1 m is the measure of most books; the size of the robot makes a fairer condition.
     tolerance : float
         Singular values below this part of the size of the whole Jacobian are zero.
-
-    Returns
-    -------
-    Manipulability
-        Its measure, condition, and ratios along twists and wrenches. For fewer joints than
-        components, measure and condition are those of ``J^T J``.
-
-    References
-    ----------
-    Khalil and Dombre, sections 5.8.1 and 5.8.2; T. Yoshikawa, "Manipulability of robotic
-    mechanisms", International Journal of Robotics Research 4(2), 1985.
 
     Examples
     --------

@@ -17,13 +17,7 @@ _ON = 1e-12
 
 
 class EllipsoidQuantity(Enum):
-    """Quantity that an ellipsoid shows: the value names it, ``unit`` is that of the radii.
-
-    Examples
-    --------
-    >>> EllipsoidQuantity.FORCE.unit
-    'N'
-    """
+    """Quantity that an ellipsoid shows: the value names it, ``unit`` is that of the radii."""
 
     unit: str
 
@@ -60,11 +54,6 @@ class Ellipsoid(Rebuilt):
         any force, so that the force radius there is infinite.
     rank : ndarray of int64, shape (...)
         Number of directions that move: of velocity radii above 0, of force radii that are finite.
-
-    Raises
-    ------
-    ShapeError
-        Fields that do not fit each other.
 
     Examples
     --------

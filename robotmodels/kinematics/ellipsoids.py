@@ -3,6 +3,10 @@
 With the joints in the ball ``sum_i (v_i / s_i)^2 <= 1`` the velocities ``J v`` fill an ellipsoid
 whose axes are the left singular vectors of ``J S`` and whose radii are its singular values. The
 forces that torques of a ball balance fill the dual one: same axes, reciprocal radii.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -23,26 +27,14 @@ from .poses import dgm
 
 
 class TwistPart(Enum):
-    """Half of a twist or a wrench.
-
-    Examples
-    --------
-    >>> TwistPart.ANGULAR.value
-    'angular velocity or moment'
-    """
+    """Half of a twist or a wrench."""
 
     LINEAR = "linear velocity or force"
     ANGULAR = "angular velocity or moment"
 
 
 class OtherPart(Enum):
-    """Condition on the half of the twist or wrench that an ellipsoid does not show.
-
-    Examples
-    --------
-    >>> OtherPart.ZERO.value
-    'is zero'
-    """
+    """Condition on the half of the twist or wrench that an ellipsoid does not show."""
 
     FREE = "may be anything"
     ZERO = "is zero"
@@ -70,6 +62,9 @@ def velocity_ellipsoid(
 ) -> Ellipsoid:
     """Velocities of a frame that joint velocities of one size give; also manipulability ellipsoid.
 
+    Khalil and Dombre, section 5.8.2; T. Yoshikawa, "Manipulability of robotic mechanisms",
+    International Journal of Robotics Research 4(2), 1985.
+
     Parameters
     ----------
     model, q, frame
@@ -86,22 +81,6 @@ def velocity_ellipsoid(
     length, tolerance : float, optional
         Radii below ``tolerance`` of the size of the Jacobian, ``[J_v; length J_w] S`` for the
         linear part, are zero.
-
-    Returns
-    -------
-    Ellipsoid
-        In m/s or rad/s, in world axes at the frame's origin.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `jacobian`; ``joint_velocity`` of the wrong length, negative, or infinite as that of a
-        joint without a limit; no member of the enums.
-
-    References
-    ----------
-    Khalil and Dombre, section 5.8.2; T. Yoshikawa, "Manipulability of robotic mechanisms",
-    International Journal of Robotics Research 4(2), 1985.
 
     Examples
     --------
@@ -137,6 +116,8 @@ def force_ellipsoid(
     moment, of that without angular velocity for forces with the moment that costs least torque.
     Weight and friction are left out.
 
+    Khalil and Dombre, sections 5.8.2 and 5.9.3; Yoshikawa 1985.
+
     Parameters
     ----------
     model, q, frame, length, tolerance
@@ -148,16 +129,6 @@ def force_ellipsoid(
         Default 1 N m and 1 N; ``model.table.effort`` are the limits.
     other : OtherPart
         Whether the other half of the wrench is zero or may be anything.
-
-    Returns
-    -------
-    Ellipsoid
-        In N or N m, in world axes at the frame's origin. The radius is infinite along forces that
-        the structure carries without torque.
-
-    References
-    ----------
-    Khalil and Dombre, sections 5.8.2 and 5.9.3; Yoshikawa 1985.
 
     Examples
     --------

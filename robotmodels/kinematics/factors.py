@@ -2,6 +2,15 @@
 
 Seed book section 1.3.1.3, after M. Renaud, "Contribution à la modélisation et à la commande
 dynamique des robots manipulateurs", 1980.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -38,13 +47,6 @@ class JacobianFactors(Rebuilt):
         zero if the joint does not move the frame.
     projection, intermediate : str
         Names of the frames i and j.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> factors = jacobian_factors(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], 3, 4)
-    >>> factors.reduced[:3, 3:].any(), factors.intermediate
-    (np.False_, 'joint_4')
     """
 
     rotation: Array
@@ -71,14 +73,6 @@ class JacobianFactors(Rebuilt):
 
         The inverses of the first two matrices are written down; only the third is solved. Singular
         values below 1e-12 of its largest count as zero, nothing is damped.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> factors = jacobian_factors(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-        >>> twist = np.array([0.1, 0.0, 0.2, 0.0, 0.3, 0.0])
-        >>> np.allclose(factors.jacobian @ factors.inverse_times(twist), twist)
-        True
         """
         twist = as_vector(twist, 6, "twist")
         seen = np.einsum("...ji,...j->...i", self.rotation, twist)
@@ -101,21 +95,10 @@ def jacobian_factors(
 
     Parameters
     ----------
-    model, q, frame
-        See `robotmodels.kinematics`.
     projection, intermediate : str or int, optional
         Frames i, in whose axes the third matrix is, and j, at whose origin; 0 is R_0. Defaults as
         the book advises, halfway along the k frames that carry ``frame``: i is number k/2 of them
         (R_3 of six) and j the next (R_4).
-
-    Returns
-    -------
-    JacobianFactors
-        Their product is ``jacobian(model, q, frame)``.
-
-    References
-    ----------
-    Seed book section 1.3.1.3.
 
     Examples
     --------

@@ -2,6 +2,11 @@
 
 Seed book section 1.3.1.2. One configuration goes through Pinocchio, a batch through the compiled
 recursions in table order; tests hold both equal.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
 """
 
 from __future__ import annotations
@@ -35,10 +40,10 @@ def jacobian(
 ) -> Array:
     """Kinematic (basic, geometric) Jacobian: joint velocities to the twist of a frame.
 
+    Seed book sections 1.3.1.1 and 1.3.1.2.
+
     Parameters
     ----------
-    model, q, frame
-        See `robotmodels.kinematics`.
     reference : {"world_aligned", "local", "world"}
         ``"world_aligned"``: velocity of the frame's origin and angular velocity in world axes;
         ``"local"``: the same in the frame's own axes; ``"world"``: the spatial Jacobian, velocity
@@ -48,15 +53,6 @@ def jacobian(
     -------
     ndarray, shape (..., 6, n)
         Rows ``[v; w]``, m/s and rad/s per joint velocity, columns in table order.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` of the wrong length, or with NaN or infinity; an unknown reference or frame.
-
-    References
-    ----------
-    Seed book sections 1.3.1.1 and 1.3.1.2.
 
     Examples
     --------
@@ -93,19 +89,10 @@ def jacobian_rate(
 ) -> Array:
     """Time derivative of the Jacobian along a motion, entry by entry.
 
-    Parameters
-    ----------
-    model, q, v, frame, reference
-        See `robotmodels.kinematics`.
-
     Returns
     -------
     ndarray, shape (..., 6, n)
         ``dJ/dt``; the acceleration of the frame is ``J a + dJ/dt v`` for ``"world_aligned"``.
-
-    References
-    ----------
-    Seed book section 1.3.1.2 (differentiated).
 
     Examples
     --------

@@ -2,6 +2,11 @@
 
 Seed book section 1.2.2. One configuration goes through Pinocchio, a batch through the compiled
 recursions in table order; tests hold both equal.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
 """
 
 from __future__ import annotations
@@ -19,24 +24,12 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     Also called forward kinematics, ``fkine``, forward geometry.
 
-    Parameters
-    ----------
-    model, q, frame
-        See `robotmodels.kinematics`.
+    Seed book eq. [1.4] and [1.10].
 
     Returns
     -------
     ndarray, shape (..., 4, 4)
         World pose, ``Z T(0, tip) E`` for the tool; position in metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` of the wrong length, or with NaN or infinity; no such frame.
-
-    References
-    ----------
-    Seed book eq. [1.4] and [1.10].
 
     Examples
     --------
@@ -67,19 +60,12 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     """World poses of all frames of the table, R_1 to R_f; the pose of the tool is `dgm`.
 
-    Parameters
-    ----------
-    model, q
-        See `robotmodels.kinematics`.
+    Seed book eq. [1.4].
 
     Returns
     -------
     ndarray, shape (..., f, 4, 4)
         Poses, positions in metres.
-
-    References
-    ----------
-    Seed book eq. [1.4].
 
     Examples
     --------

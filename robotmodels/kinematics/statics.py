@@ -3,6 +3,10 @@
 A wrench ``[f; m]`` is exerted by the tool on the environment, as in `idm`; by the principle of
 virtual work ``tau = J^T w`` (Khalil and Dombre, Modeling, identification and control of robots,
 section 5.9).
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -25,13 +29,7 @@ _EPS = float(np.finfo(np.float64).eps)
 
 
 class StaticStatus(Outcome):
-    """Solvability of ``J^T w = tau``; fits int8. Each member has a ``sentence``.
-
-    Examples
-    --------
-    >>> StaticStatus(2).sentence
-    'No wrench balances the torques: the residual would move joints while the tool rests.'
-    """
+    """Solvability of ``J^T w = tau``; fits int8. Each member has a ``sentence``."""
 
     DETERMINED = 0, "One wrench balances the torques."
     UNDETERMINED = (
@@ -64,14 +62,6 @@ class StaticWrench(Rebuilt):
         be added to the wrench. They are orthonormal once moments are divided by the length.
     residual : ndarray, shape (..., n)
         Part of the torques that no wrench balances (N m, N).
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> found = static_wrench(pendulum, [0.0], [2.0])
-    >>> found.wrench[5], int(found.undetermined)
-    (np.float64(2.0), 5)
     """
 
     wrench: Array
@@ -95,6 +85,8 @@ def static_torque(
 ) -> Array:
     """Joint torques that balance a wrench on a frame, ``J^T w``; also called the static model.
 
+    Khalil and Dombre, section 5.9.2.
+
     Parameters
     ----------
     model, q, frame, reference
@@ -110,10 +102,6 @@ def static_torque(
     -------
     ndarray, shape (..., n)
         Torques (N m) or forces (N) in table order.
-
-    References
-    ----------
-    Khalil and Dombre, section 5.9.2.
 
     Examples
     --------
@@ -132,6 +120,8 @@ def static_torque(
 def transported_wrench(wrench: ArrayLike, T: Any) -> Array:
     """The same wrench at another point and in other axes: ``f' = R f``, ``m' = R m + P x R f``.
 
+    Khalil and Dombre, section 5.9.1.
+
     Parameters
     ----------
     wrench : array_like, shape (..., 6)
@@ -143,10 +133,6 @@ def transported_wrench(wrench: ArrayLike, T: Any) -> Array:
     -------
     ndarray, shape (..., 6)
         Force and moment about the origin of the other frame, in its axes.
-
-    References
-    ----------
-    Khalil and Dombre, section 5.9.1.
 
     Examples
     --------
@@ -178,6 +164,8 @@ def static_wrench(
     torque, because the structure carries them; where the robot can move while the frame rests,
     some torques are balanced by no wrench. Both are reported row by row.
 
+    Khalil and Dombre, sections 5.8.1 (singular value decomposition) and 5.9.
+
     Parameters
     ----------
     model, q, frame, reference
@@ -192,15 +180,6 @@ def static_wrench(
     tolerance : float
         Singular values of the dimensionless Jacobian below this part of the largest count as
         zero; a residual below this part of the torques, or of the size of rounding, as balanced.
-
-    Returns
-    -------
-    StaticWrench
-        The wrench, its status, the wrenches without torque and the torques without wrench.
-
-    References
-    ----------
-    Khalil and Dombre, sections 5.8.1 (singular value decomposition) and 5.9.
 
     Examples
     --------

@@ -1,6 +1,11 @@
 """Direct kinematic model: the twist that joint velocities give, and its time derivative.
 
 Seed book section 1.3.1.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
 """
 
 from __future__ import annotations
@@ -25,19 +30,12 @@ def dkm(
 
     Also called forward velocity kinematics.
 
-    Parameters
-    ----------
-    model, q, v, frame, reference
-        See `robotmodels.kinematics`.
+    Seed book eq. [1.18].
 
     Returns
     -------
     ndarray, shape (..., 6)
         Twist ``[v; w]`` in m/s and rad/s.
-
-    References
-    ----------
-    Seed book eq. [1.18].
 
     Examples
     --------
@@ -69,19 +67,12 @@ def dkm_second_order(
     of the frame's origin and the angular acceleration; for the other references the derivatives of
     the twist's entries, as in `jacobian_rate`.
 
-    Parameters
-    ----------
-    model, q, v, a, frame, reference
-        See `robotmodels.kinematics`.
+    Seed book eq. [1.18], differentiated.
 
     Returns
     -------
     ndarray, shape (..., 6)
         Linear then angular part, m/s^2 and rad/s^2, without gravity.
-
-    References
-    ----------
-    Seed book eq. [1.18], differentiated.
 
     Examples
     --------

@@ -107,7 +107,7 @@ def skew(p: Array) -> Array:
     >>> skew(np.array([1.0, 0.0, 0.0]))[2, 1]
     np.float64(1.0)
     """
-    S = np.zeros((*p.shape[:-1], 3, 3))
+    S = np.zeros((*p.shape[:-1], 3, 3), np.result_type(p, float))
     S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -p[..., 2], p[..., 1], -p[..., 0]
     S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = p[..., 2], -p[..., 1], p[..., 0]
     return S

@@ -60,8 +60,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_exact, as_number
 from .._outcomes import Result
 from ..errors import InvalidValueError
-from ..kinematics import JointBounds, dgm, ikm
-from ..kinematics.inverse import IKMStatus
+from ..kinematics import IKMStatus, JointBounds, dgm, ikm
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..se3 import as_pose, as_single_pose, inverse

@@ -57,17 +57,6 @@ def operational_coordinates(
         comes back to rounding, also at and near gimbal lock (where, without ``near``, the first
         angle is 0) and near half a turn.
 
-    Raises
-    ------
-    InvalidValueError, ShapeError, NotARotationError
-        An unknown kind; NaN or infinity; as `robotmodels.se3.as_pose`; ``near`` of the wrong
-        length.
-
-    References
-    ----------
-    Seed book eq. [1.5] to [1.9]. W. Khalil, E. Dombre, *Modeling, Identification and Control of
-    Robots*, chapter 3.
-
     Examples
     --------
     >>> from robotmodels.se3 import rotation, translation
@@ -85,6 +74,8 @@ def operational_coordinates(
 def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     """Poses of operational coordinates, the inverse of `operational_coordinates`.
 
+    Seed book eq. [1.8] and [1.9].
+
     Parameters
     ----------
     x : array_like, shape (..., m)
@@ -97,16 +88,6 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     ndarray, shape (..., 4, 4)
         Poses. A quaternion, direction cosines or two axes that are off by no more than 1e-6 are
         brought onto the nearest rotation.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError, NotARotationError
-        An unknown kind; NaN or infinity; ``x`` of the wrong length; a quaternion that is not of
-        unit length, or axes that are not of unit length, square and right-handed.
-
-    References
-    ----------
-    Seed book eq. [1.8] and [1.9].
 
     Examples
     --------

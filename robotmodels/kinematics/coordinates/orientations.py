@@ -34,6 +34,8 @@ class OrientationKind(StrEnum):
     and `robotmodels.se3.from_rpy` take roll about x and yaw about z: `ROLL_PITCH_YAW_URDF`, the
     same three numbers listed backwards.
 
+    W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, chapter 3.
+
     Attributes
     ----------
     EULER
@@ -56,10 +58,6 @@ class OrientationKind(StrEnum):
         ``"two_axes"``: n and a only, eq. [1.9]; s = n x a.
     ANGLE_AXIS
         ``"angle_axis"``: rotation vector, unit axis times angle, length in [0, pi].
-
-    References
-    ----------
-    W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, chapter 3.
 
     Examples
     --------

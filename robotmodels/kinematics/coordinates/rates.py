@@ -55,6 +55,7 @@ Rates grow with its inverse, and so does the effect of rounding errors in the po
 held exact to 4e-15, so that at this distance a rate has two correct digits left.
 """
 _SERIES_BELOW = 4.0
+_STEP = 1e-100
 
 
 def coordinate_rates(T: Any, kind: str | OrientationKind, near: ArrayLike | None = None) -> Array:
@@ -160,10 +161,10 @@ def coordinate_jacobian(
 ) -> Array:
     """Jacobian of the operational coordinates, ``dX/dt = J(q) dq/dt``; the analytic Jacobian.
 
+    Seed book eq. [1.5] and section 1.3.1.1.
+
     Parameters
     ----------
-    model, q, frame
-        See `robotmodels.kinematics`.
     kind : OrientationKind or str
         Form of the orientation.
     near : array_like, shape (..., m), optional
@@ -174,10 +175,6 @@ def coordinate_jacobian(
     ndarray, shape (..., m, n)
         Derivatives of the m coordinates (m and rad) with respect to the joints, in table order.
         NaN rows as in `coordinate_rates`, whatever the robot.
-
-    References
-    ----------
-    Seed book eq. [1.5] and section 1.3.1.1.
 
     Examples
     --------
@@ -289,18 +286,14 @@ def orientation_rates(y: Array, kind: OrientationKind) -> Array:
 
 
 def orientation_rates_rate(y: Array, w: Array, kind: OrientationKind) -> Array:
-    """Time derivatives of `orientation_rates` along a motion.
+    """Time derivatives of `orientation_rates` along a motion, by a complex step: to rounding.
 
     Shapes: y (..., k), w (..., 3) -> (..., k, 3).
     """
-    if kind in ANGLE_SEQUENCES:
-        return _reordered(kind, _angle_rates_rate(ANGLE_SEQUENCES[kind], in_order(kind, y), w))
-    dy = (orientation_rates(y, kind) @ w[..., None])[..., 0]
-    if kind is OrientationKind.QUATERNION:
-        return _quaternion_rates(dy)
-    if kind is OrientationKind.ANGLE_AXIS:
-        return _vector_rates_rate(y, dy)
-    return _column_rates(dy)
+    E = orientation_rates(y, kind)
+    with np.errstate(invalid="ignore"):  # NaN where rates do not exist
+        ahead = orientation_rates(y + _STEP * 1j * (E @ w[..., None])[..., 0], kind)
+    return np.where(np.isnan(E), np.nan, ahead.imag / _STEP)
 
 
 def angular_velocity(y: Array, kind: OrientationKind) -> Array:
@@ -340,21 +333,11 @@ def _angle_rates(sequence: AngleSequence, angles: Array) -> Array:
     s, c = inclination(sequence, angles[..., 1])
     lost = np.abs(s) <= SINGULAR
     s = np.where(lost, np.nan, s)
-    E = np.zeros((*px.shape, 3, 3))
+    E = np.zeros((*px.shape, 3, 3), px.dtype)
     E[..., 0, 0], E[..., 0, 1], E[..., 0, 2] = -c * px / s, -c * py / s, 1.0
     E[..., 1, 0], E[..., 1, 1] = -py, px
     E[..., 2, 0], E[..., 2, 1] = px / s, py / s
     return np.where(lost[..., None, None], np.nan, E)
-
-
-def _angle_rates_rate(sequence: AngleSequence, angles: Array, w: Array) -> Array:
-    """``-E (dB/dt) E`` with the axes B: z is constant, ``de = dphi z x e``, ``dg = w x g``."""
-    E, B = _angle_rates(sequence, angles), _angle_axes(sequence, angles)
-    dphi = (E[..., 0, :] * w).sum(axis=-1)
-    dB = np.zeros(np.broadcast_shapes(B.shape, (*w.shape, 3)))
-    dB[..., 0, 1], dB[..., 1, 1] = -dphi * B[..., 1, 1], dphi * B[..., 0, 1]
-    dB[..., 2] = np.cross(w, B[..., 2])
-    return -E @ dB @ E
 
 
 def _reordered(kind: OrientationKind, E: Array) -> Array:
@@ -365,7 +348,7 @@ def _reordered(kind: OrientationKind, E: Array) -> Array:
 
 def _quaternion_rates(Q: Array) -> Array:
     """``dQ = (0, w) Q / 2``; linear in Q."""
-    E = np.empty((*Q.shape[:-1], 4, 3))
+    E = np.empty((*Q.shape[:-1], 4, 3), Q.dtype)
     half = 0.5 * Q
     E[..., 0, :] = -half[..., 1:]
     E[..., 1:, :] = -skew(half[..., 1:])
@@ -380,19 +363,6 @@ def _column_rates(columns: Array) -> Array:
     return -skew(vectors).reshape(*columns.shape, 3)
 
 
-def _vector_rates_rate(vector: Array, rate: Array) -> Array:
-    """Of ``1 - [v] / 2 + gamma(v.v) [v]^2``."""
-    t = (vector**2).sum(axis=-1)
-    gamma = inverse_left_factor(t)
-    gamma_rate = 2.0 * inverse_left_factor_slope(t) * (vector * rate).sum(axis=-1)
-    S, dS = skew(vector), skew(rate)
-    return (
-        -0.5 * dS
-        + gamma_rate[..., None, None] * (S @ S)
-        + gamma[..., None, None] * (dS @ S + S @ dS)
-    )
-
-
 def _gamma_coefficients(count: int) -> list[float]:
     """Coefficients ``|B_2k| / (2k)!`` of gamma, by the recurrence ``(2k + 1) c_k = sum c_j c_k-j``.
 
@@ -405,7 +375,6 @@ def _gamma_coefficients(count: int) -> list[float]:
 
 
 _GAMMA = _gamma_coefficients(20)
-_GAMMA_SLOPE = [k * c for k, c in enumerate(_GAMMA)][1:]
 _SECOND = [(-1) ** k / factorial(2 * k + 3) for k in range(13)]
 
 
@@ -427,17 +396,9 @@ def inverse_left_factor(t: Array) -> Array:
     return np.where(small, _sum(_GAMMA, t), far)
 
 
-def inverse_left_factor_slope(t: Array) -> Array:
-    """Derivative of `inverse_left_factor` with respect to t, by Riccati's equation."""
-    small, safe = _split(t)
-    gamma = inverse_left_factor(safe)
-    far = (0.125 - 1.5 * gamma + 0.5 * safe * gamma**2) / safe
-    return np.where(small, _sum(_GAMMA_SLOPE, t), far)
-
-
 def _split(t: Array) -> tuple[NDArray[np.bool_], Array]:
     """Where the series serves, and values that are safe to divide by."""
-    small = t < _SERIES_BELOW
+    small = t.real < _SERIES_BELOW
     return small, np.where(small, _SERIES_BELOW, t)
 
 

@@ -34,6 +34,9 @@ _ROUNDING = 1e-6
 class JointBounds(Rebuilt):
     """Velocity, position and acceleration limits of the joints.
 
+    F. Flacco, A. De Luca and O. Khatib 2015 (bounds of velocities from all limits); A. Del Prete
+    2018 (bounds of accelerations that can be kept ever after).
+
     Parameters
     ----------
     velocity : array_like, shape (n,) or (), optional
@@ -47,16 +50,6 @@ class JointBounds(Rebuilt):
         Time for which a command is held, s: positions after it are inside the limits. Default
         none: a joint may move towards its limit until it is there (with ``acceleration``: as fast
         as it can brake in time). Bounds of accelerations need a step.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Limits that are no vectors, negative speeds, accelerations or a step that are not positive.
-
-    References
-    ----------
-    F. Flacco, A. De Luca and O. Khatib 2015 (bounds of velocities from all limits); A. Del Prete
-    2018 (bounds of accelerations that can be kept ever after).
 
     Examples
     --------
@@ -96,15 +89,6 @@ class JointBounds(Rebuilt):
         limit in one step, or at its largest speed. A present velocity ``v (..., n)`` adds what
         ``acceleration`` allows in one step. Speeds take precedence over positions, accelerations
         over both: see `conflicts`.
-
-        Examples
-        --------
-        A joint 0.02 rad outside has to come back:
-
-        >>> from robotmodels.robots import load
-        >>> bounds = JointBounds(velocity=1.0, lower=-2.0, upper=2.0, step=0.1)
-        >>> bounds.velocity_bounds(load("planar_2r"), [2.02, 0.0])
-        (array([-1., -1.]), array([-0.2,  1. ]))
         """
         return self._velocities(model, q, v)[:2]
 
@@ -116,25 +100,11 @@ class JointBounds(Rebuilt):
         They leave the joint inside its limits at the end of the step, slow enough to stop before
         its position limits with the same bounds ever after. Accelerations take precedence over all
         others: see `conflicts`.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> bounds = JointBounds(velocity=1.0, acceleration=5.0, step=0.1)
-        >>> bounds.acceleration_bounds(load("planar_2r"), [0.0, 0.0], [0.8, -1.0])
-        (array([-5., 0.]), array([2., 5.]))
         """
         return self._accelerations(model, q, v)[:2]
 
     def outside(self, model: RobotModel, q: ArrayLike) -> NDArray[np.bool_]:
-        """Joints outside their position limits (..., n).
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> JointBounds(upper=[1.0, 2.0]).outside(load("planar_2r"), [1.5, 1.5])
-        array([ True, False])
-        """
+        """Joints outside their position limits (..., n)."""
         _, lower, upper, _ = self._limits(model)
         q = as_vector(q, model.n, "q")
         return (q < lower) | (q > upper)
@@ -147,17 +117,7 @@ class JointBounds(Rebuilt):
         *,
         accelerations: bool = False,
     ) -> NDArray[np.bool_]:
-        """Joints (..., n) whose limits cannot all be kept, of velocities or of accelerations.
-
-        Examples
-        --------
-        Nothing stops a joint from 1 rad/s within 0.01 rad at 5 rad/s^2:
-
-        >>> from robotmodels.robots import load
-        >>> bounds = JointBounds(upper=1.0, lower=-1.0, acceleration=5.0, step=0.01)
-        >>> bounds.conflicts(load("planar_2r"), [0.99, 0.0], [1.0, 1.0])
-        array([ True, False])
-        """
+        """Joints (..., n) whose limits cannot all be kept, of velocities or of accelerations."""
         if not accelerations:
             return self._velocities(model, q, v)[2]
         if v is None:

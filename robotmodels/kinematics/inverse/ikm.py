@@ -2,6 +2,10 @@
 
 Seed book section 1.3.2. Everything about one row happens in one compiled pass: Jacobian from the
 chain, its singular values, the inverse by them, and the part of the twist that is missing.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -42,6 +46,9 @@ def ikm(
     components along nearly lost directions are reduced. The missing part of the twist is
     ``error``.
 
+    Seed book sections 1.3.2.1 (regular case), 1.3.2.2 and 1.3.2.3 (near singular positions),
+    1.3.2.4 (redundant robots).
+
     Parameters
     ----------
     model, frame, reference, mask, length
@@ -68,22 +75,6 @@ def ikm(
     limits : JointBounds or bool, optional
         Bounds that ``v`` must respect; True takes ``JointBounds()``, the model's own limits. A
         twist that they do not allow is kept in its direction and made slower: see ``scale``.
-
-    Returns
-    -------
-    IKMSolution
-        ``v (..., n)``, ``status``, ``achieved``, ``error``, ``reachable``, ``singular_values`` ...
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        Arguments of the wrong shape, with NaN or infinity; an unknown reference or frame; a mask
-        without a 1; weights or a length that are not positive.
-
-    References
-    ----------
-    Seed book sections 1.3.2.1 (regular case), 1.3.2.2 and 1.3.2.3 (near singular positions),
-    1.3.2.4 (redundant robots).
 
     Examples
     --------
@@ -143,6 +134,8 @@ def ikm_second_order(
     null space is left to the least acceleration keeps the self-motion it has: give
     ``secondary=-k * v`` to bring it to rest.
 
+    Seed book section 1.3.2 (differentiated); J. Luh, M. Walker and R. Paul 1980.
+
     Parameters
     ----------
     model, frame, reference, mask, method, joint_weights, length, augmented, tasks, limits
@@ -154,21 +147,6 @@ def ikm_second_order(
         `dkm_second_order` gives it.
     secondary : array_like, shape (..., n), criterion, or sequence of them, optional
         Joint accelerations for the null space; gradients are used as accelerations.
-
-    Returns
-    -------
-    IKMSolution
-        With ``a (..., n)``, the joint accelerations; ``v`` as given. ``achieved``, ``error`` and
-        ``reachable`` are accelerations of the frame, the first and last with ``dJ/dt v``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `ikm`.
-
-    References
-    ----------
-    Seed book section 1.3.2 (differentiated); J. Luh, M. Walker and R. Paul 1980.
 
     Examples
     --------

@@ -26,13 +26,7 @@ LARGEST_DAMPING = 0.0021
 
 
 class Damping(Enum):
-    """Which directions are damped, and when.
-
-    Examples
-    --------
-    >>> Damping.WEAK_DIRECTIONS.value
-    'each direction whose singular value is below the threshold, by its own'
-    """
+    """Which directions are damped, and when."""
 
     WEAK_DIRECTIONS = "each direction whose singular value is below the threshold, by its own"
     SMALLEST_SINGULAR_VALUE = "all directions, by the smallest singular value"
@@ -49,20 +43,13 @@ _FIRST_KIND = 2
 class PseudoInverse:
     """The regular solution: exact, of least weighted norm, unbounded near singular positions.
 
+    Seed book sections 1.3.2.1 and 1.3.2.4.
+
     Parameters
     ----------
     tolerance : float
         Singular values up to this, relative to the largest, count as zero: their directions are
         left out.
-
-    Raises
-    ------
-    InvalidValueError
-        A tolerance outside [0, 1).
-
-    References
-    ----------
-    Seed book sections 1.3.2.1 and 1.3.2.4.
 
     Examples
     --------
@@ -93,20 +80,13 @@ class FilteredInverse:
     ``1 / sigma`` above the threshold e, ``s (3 - 2 s) / e`` with ``s = sigma / e`` below: the same
     value and slope at the threshold, 0 at a singular position. Directions above it are exact.
 
+    Seed book section 1.3.2.2; A. A. Maciejewski and C. A. Klein, Numerical filtering for the
+    operation of robotic manipulators through kinematically singular configurations, 1988.
+
     Parameters
     ----------
     threshold : float
         Singular value below which a direction is filtered.
-
-    Raises
-    ------
-    InvalidValueError
-        A threshold that is not positive.
-
-    References
-    ----------
-    Seed book section 1.3.2.2; A. A. Maciejewski and C. A. Klein, Numerical filtering for the
-    operation of robotic manipulators through kinematically singular configurations, 1988.
 
     Examples
     --------
@@ -134,6 +114,10 @@ class FilteredInverse:
 class DampedInverse:
     """Damped least squares: ``sigma / (sigma^2 + lambda^2)`` in place of ``1 / sigma``.
 
+    Seed book section 1.3.2.2; Y. Nakamura and H. Hanafusa 1986 (manipulability), A. A. Maciejewski
+    and C. A. Klein 1988 (weak directions), S. Chiaverini 1997 (smallest singular value), A. S. Deo
+    and I. D. Walker 1993 (bounded speed).
+
     Parameters
     ----------
     threshold : float
@@ -151,18 +135,6 @@ class DampedInverse:
         ``v`` [rad/s], ``sqrt(sum(joint_weights v^2))``. Where more would be needed, one more
         damping, the least that suffices, is added: the error is then the least possible within
         the bound (for what is not damped otherwise).
-
-    Raises
-    ------
-    InvalidValueError
-        Numbers that are negative or not finite, a largest speed of zero, or a ``damping`` that is
-        none.
-
-    References
-    ----------
-    Seed book section 1.3.2.2; Y. Nakamura and H. Hanafusa 1986 (manipulability), A. A. Maciejewski
-    and C. A. Klein 1988 (weak directions), S. Chiaverini 1997 (smallest singular value), A. S. Deo
-    and I. D. Walker 1993 (bounded speed).
 
     Examples
     --------

@@ -24,13 +24,6 @@ class IKMStatus(Outcome):
     ----------
     sentence : str
         The meaning of the code.
-
-    Examples
-    --------
-    >>> IKMStatus.MET.sentence
-    'The motion is met.'
-    >>> IKMStatus(4)
-    <IKMStatus.LIMITED: 4>
     """
 
     MET = 0, "The motion is met."
@@ -81,15 +74,6 @@ class IKMSolution(Rebuilt):
         Part of the rates of ``tasks`` that is kept under limits.
     a : ndarray, shape (..., n), optional
         Joint accelerations, rad/s^2 or m/s^2, from `ikm_second_order`.
-
-    Examples
-    --------
-    >>> from robotmodels import ikm, load
-    >>> found = ikm(load("rx90"), [0.1, 0.2, 1.3, 0.4, 0.0, 0.6], [0.0, 0.0, 0.0, 0.1, 0.2, 0.3])
-    >>> found.rank, found.status
-    (array(5, dtype=int8), array(2, dtype=int8))
-    >>> found.reason()
-    'The motion has a part that cannot be produced at this singular position. ...'
     """
 
     v: Array

@@ -43,13 +43,6 @@ class LostDirections(Rebuilt):
         its twist has the same numbers whatever that length is.
     frame : str
         Name of the frame of the task, such as ``"the tool"``.
-
-    Examples
-    --------
-    >>> along_z = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
-    >>> lost = LostDirections(4, 4, along_z, along_z)
-    >>> lost.where, lost.combinations
-    ('axes of R4, at the origin of R4', ('vz',))
     """
 
     axes: int | None

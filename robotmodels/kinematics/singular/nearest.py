@@ -1,6 +1,15 @@
 """Search of singular configurations near a given one.
 
 Seed book section 1.3.2.3: the solution near singular positions needs to know where they are.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -42,13 +51,7 @@ _ALREADY, _ASIDE, _FLAT = 1e-9, 1e-4, 3e-6
 
 
 class NearestStatus(Outcome):
-    """Status of one found configuration; fits int8. Each member has a ``sentence``.
-
-    Examples
-    --------
-    >>> NearestStatus.NEAREST.sentence
-    'Singular, and none of the same kind in its neighbourhood is nearer.'
-    """
+    """Status of one found configuration; fits int8. Each member has a ``sentence``."""
 
     NEAREST = 0, "Singular, and none of the same kind in its neighbourhood is nearer."
     AT_LIMIT = 1, "Singular, and none that respects the joint limits is nearer there."
@@ -59,13 +62,7 @@ class NearestStatus(Outcome):
 
 
 class SearchOutcome(Outcome):
-    """Outcome of a search; each member has a ``sentence``.
-
-    Examples
-    --------
-    >>> SearchOutcome.NONE_FOUND.name
-    'NONE_FOUND'
-    """
+    """Outcome of a search; each member has a ``sentence``."""
 
     FOUND = 0, "Singular configurations were found."
     ALREADY_SINGULAR = 1, "The given configuration is singular itself."
@@ -116,13 +113,6 @@ class NearestSingularities(Rebuilt):
         Components that count.
     frame : str
         What the frame is called, such as ``"the tool"``.
-
-    Examples
-    --------
-    >>> from robotmodels import load, nearest_singularity
-    >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    >>> found.distance[:2], [kinds[0].name for kinds in found.kind[:2]]
-    (array([0.3894, 0.5   ]), ['SHOULDER', 'WRIST'])
     """
 
     home: Array
@@ -213,8 +203,6 @@ def nearest_singularity(
 
     Parameters
     ----------
-    model, frame, length
-        See `robotmodels.kinematics`.
     q : array_like, shape (n,)
         The given configuration, rad or m.
     limits : bool
@@ -228,15 +216,6 @@ def nearest_singularity(
         Number of starts, the given configuration included, and of configurations to keep.
     rng : numpy.random.Generator or int, optional
         Generator or seed of the other starts; default a fixed seed.
-
-    Returns
-    -------
-    NearestSingularities
-        Configurations, distances, directions, kinds; no row where none was found.
-
-    References
-    ----------
-    Seed book section 1.3.2.3.
 
     Examples
     --------

@@ -2,6 +2,15 @@
 
 Seed book section 1.3.1.4. The number of degrees of freedom of the tool is the rank of its
 Jacobian: the local one at a configuration, the global one M at almost all of them.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -49,12 +58,6 @@ class JacobianRank(Rebuilt):
         Characteristic length, metres.
     tolerance : float
         Fraction of the largest singular value below which one is zero.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> jacobian_rank(load("rx90"), np.zeros(6)).rank
-    array(5)
     """
 
     rank: NDArray[np.int64]
@@ -92,13 +95,6 @@ class OperationalDimension(Rebuilt):
         Characteristic length, metres.
     local : JacobianRank or None
         At the configurations that were given.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> found = operational_dimension(load("cobra_s600"))
-    >>> found.dimension, found.never_in_world
-    (4, 'wx, wy')
     """
 
     dimension: int
@@ -164,19 +160,8 @@ def jacobian_rank(
 
     Parameters
     ----------
-    model, q, frame, length, tolerance, mask
-        See `robotmodels.kinematics`.
     mask_axes : {"world", "tool"}
         Axes of the components: the world's, or the frame's own.
-
-    Returns
-    -------
-    JacobianRank
-        Rank, singular values and gap of each.
-
-    References
-    ----------
-    Seed book section 1.3.1.4.
 
     Examples
     --------
@@ -215,15 +200,6 @@ def operational_dimension(
         Number of random configurations.
     rng : numpy.random.Generator or int, optional
         Generator or seed; default a fixed seed.
-
-    Returns
-    -------
-    OperationalDimension
-        Dimension, order of redundancy, combinations that are never produced.
-
-    References
-    ----------
-    Seed book section 1.3.1.4.
 
     Examples
     --------

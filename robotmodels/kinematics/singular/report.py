@@ -3,6 +3,15 @@
 Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
 surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators, ASME J.
 Mechanisms 110, 1988, for the second-order test of a boundary.
+
+Parameters
+----------
+model, q, v, a, frame, reference, mask, length
+    See `robotmodels.kinematics`.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
@@ -36,13 +45,7 @@ SMALL = 0.02
 
 
 class SingularityStatus(Outcome):
-    """Status of a configuration; fits int8. Each member has a ``sentence``.
-
-    Examples
-    --------
-    >>> SingularityStatus.SINGULAR.sentence
-    'Singular: the robot has lost degrees of freedom.'
-    """
+    """Status of a configuration; fits int8. Each member has a ``sentence``."""
 
     REGULAR = 0, "Regular: no degree of freedom is lost."
     NEAR_SINGULAR = (
@@ -70,12 +73,6 @@ class SingularityFlags(Rebuilt):
         Components that count.
     frame : str
         Name of the frame in sentences, such as ``"the tool"``.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> singularity_flags(load("rx90"), np.zeros((2, 6))).order
-    array([1, 1])
     """
 
     status: NDArray[np.int8]
@@ -220,15 +217,6 @@ def singularity_flags(
     model, q, frame, length, tolerance, near, mask, mask_axes
         As in `classify_singularity`, with ``q (..., n)``.
 
-    Returns
-    -------
-    SingularityFlags
-        Status, rank, order and measure of each.
-
-    References
-    ----------
-    Seed book section 1.3.1.4.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -275,10 +263,10 @@ def classify_singularity(
 ) -> SingularityReport:
     """Degrees of freedom lost and gained at a configuration, in numbers and in words.
 
+    Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3; Oblak and Kohli 1988.
+
     Parameters
     ----------
-    model, frame, length
-        See `robotmodels.kinematics`.
     q : array_like, shape (n,)
         One configuration, rad or m.
     tolerance : float
@@ -296,20 +284,6 @@ def classify_singularity(
         Numbers of the frames in whose axes and at whose origin the lost directions are
         given, the projection and the intermediate frame of the book; 0 is R_0. Default: where
         they have the most zeros.
-
-    Returns
-    -------
-    SingularityReport
-        Lost directions, self-motions, kind, side of the workspace.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` of the wrong length; a length, tolerance or mask that cannot be; no such frame.
-
-    References
-    ----------
-    Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3; Oblak and Kohli 1988.
 
     Examples
     --------
@@ -345,7 +319,7 @@ def classify_singularity(
     )
     null = outside(Vt[r:].T, np.eye(model.n)[:, ~task.moving])
     motions = self_motions(task, q, lost, null, zero)
-    side, opening = workspace_side(task, q, lost, null, motions, missing)
+    side, opening = workspace_side(task, q, lost, null)
     sets = singular_sets(task, q, M, arm_geometry(task)) if min(r, strong) < M else ()
     named = names_at(sets, tolerance) if r < M else ()
     nearby = names_near(sets, named, tolerance, near) if strong < r else ()

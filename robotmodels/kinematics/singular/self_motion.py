@@ -8,7 +8,6 @@ The same form tells on which side of a singular pose the tool can move along u.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import tau
 
 import numpy as np
 
@@ -16,21 +15,15 @@ from ..._arrays import Array, Rebuilt, read_only
 from ..._outcomes import Outcome
 from ..poses import dgm
 from .rank import sparse_basis
-from .task import SingularTask, outside, task_derivatives, task_jacobians
+from .task import SingularTask, task_derivatives, task_jacobians
 
 _ZERO_FORM = 1e-6
-_SHORT, _STEP = 0.01, 0.15
+_STEP = 0.01
 _MET = 1e-11
 
 
 class SelfMotionKind(Outcome):
-    """Extent of a self-motion; each member has a ``sentence``.
-
-    Examples
-    --------
-    >>> SelfMotionKind.INFINITESIMAL.sentence
-    'The joints can only begin to move: at the second order the tool leaves its place.'
-    """
+    """Extent of a self-motion; each member has a ``sentence``."""
 
     FINITE = 0, "The joints can move on while the tool stays."
     INFINITESIMAL = (
@@ -43,17 +36,12 @@ class WorkspaceSide(Outcome):
     """Place of a singular pose among the poses reached near that configuration.
 
     Each member has a ``sentence``. UNDECIDED also where several directions are lost.
-
-    Examples
-    --------
-    >>> WorkspaceSide.INTERIOR.name
-    'INTERIOR'
     """
 
     REGULAR = 0, "No direction is lost."
-    INTERIOR = 1, "Inside the workspace: the lost direction is open after a self-motion or a turn."
+    INTERIOR = 1, "Inside the workspace: the lost direction is open to both sides."
     BOUNDARY = 2, "On a boundary: along the lost direction the tool can move to one side only."
-    UNDECIDED = 3, "The second order and the self-motions do not tell boundary from interior."
+    UNDECIDED = 3, "The second order does not decide between boundary and interior."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,11 +59,6 @@ class SelfMotion(Rebuilt):
     obstruction : float
         Largest ``|u^T (dJ/dt) v|`` over the unit vectors u of the lost directions, no unit;
         0 for a finite self-motion.
-
-    Examples
-    --------
-    >>> SelfMotion(np.array([1.0, -1.0]), (4, 6), SelfMotionKind.FINITE, 0.0).joints
-    (4, 6)
     """
 
     velocity: Array
@@ -102,7 +85,7 @@ def self_motions(
         kind = SelfMotionKind.UNDECIDED
         if obstruction > max(_ZERO_FORM, 10.0 * zero):
             kind = SelfMotionKind.INFINITESIMAL
-        elif all(_next(task, q, q, s * unit, _SHORT, rank) is not None for s in (1.0, -1.0)):
+        elif all(_continues(task, q, s * unit, rank) for s in (1.0, -1.0)):
             kind, obstruction = SelfMotionKind.FINITE, 0.0
         joints = tuple(int(j) for j in numbers[np.abs(row) > zero])
         found.append(SelfMotion(read_only(row * task.joint_scale), joints, kind, obstruction))
@@ -110,16 +93,11 @@ def self_motions(
 
 
 def workspace_side(
-    task: SingularTask,
-    q: Array,
-    lost: Array,
-    null: Array,
-    motions: tuple[SelfMotion, ...],
-    missing: Array,
+    task: SingularTask, q: Array, lost: Array, null: Array
 ) -> tuple[WorkspaceSide, Array | None]:
-    """Boundary or interior, and the open side of a boundary.
+    """Boundary or interior by the second order, and the open side of a boundary.
 
-    Shapes: q (n,), lost (m, p), null (n, k), missing (m, s) -> open side (m,).
+    Shapes: q (n,), lost (m, p), null (n, k) -> open side (m,).
     """
     if lost.shape[1] != 1:
         return WorkspaceSide.UNDECIDED if lost.shape[1] else WorkspaceSide.REGULAR, None
@@ -127,13 +105,7 @@ def workspace_side(
     up, down = int((values > _ZERO_FORM).sum()), int((values < -_ZERO_FORM).sum())
     if up and down:
         return WorkspaceSide.INTERIOR, None
-    finite = [m.velocity / task.joint_scale for m in motions if m.kind is SelfMotionKind.FINITE]
-    turns = [_least_cosine(task, q, along, lost[:, 0], missing) for along in finite]
-    if any(cosine < 1e-6 for cosine in turns):
-        return WorkspaceSide.INTERIOR, None
-    # the rest of the null space are self-motions that keep the lost direction
-    kept = sum(cosine > 1.0 - 1e-9 for cosine in turns)
-    if (up or down) and up + down + kept >= len(values):
+    if (up or down) and up + down == len(values):
         return WorkspaceSide.BOUNDARY, (1.0 if up else -1.0) * lost[:, 0]
     return WorkspaceSide.UNDECIDED, None
 
@@ -144,52 +116,25 @@ def _forms(task: SingularTask, q: Array, lost: Array, null: Array) -> Array:
     return 0.5 * (forms + forms.transpose(0, 2, 1))
 
 
-def _least_cosine(
-    task: SingularTask, q: Array, along: Array, direction: Array, missing: Array
-) -> float:
-    """Least cosine of a lost direction to its place at q, along a self-motion; -1 where free."""
-    least = 1.0
-    for sign in (1.0, -1.0):
-        here, way, before = q, sign * along / np.linalg.norm(along), direction
-        for _ in range(int(tau / _STEP) + 1):
-            there = _next(task, q, here, way, _STEP)
-            if there is None:
-                break
-            way = (there - here) / task.joint_scale
-            here, way = there, way / np.linalg.norm(way)
-            U, sigma, _ = np.linalg.svd(task_jacobians(task, here))
-            space = outside(U[:, int((sigma > 1e-6).sum()) :], missing)
-            if space.shape[1] != 1:
-                least = min(least, 1.0 if space.shape[1] else -1.0)
-                break
-            before = space[:, 0] if space[:, 0] @ before > 0.0 else -space[:, 0]
-            least = min(least, float(before @ direction))
-    return least
-
-
-def _next(
-    task: SingularTask, start: Array, q: Array, unit: Array, step: float, rank: int | None = None
-) -> Array | None:
-    """Configuration a step from q along a direction with the pose of start; None: none near."""
+def _continues(task: SingularTask, start: Array, unit: Array, rank: int) -> bool:
+    """Whether a configuration a short step along a direction has the pose of the start."""
     goal = dgm(task.model, start, task.frame)
-    there = q + step * unit * task.joint_scale
+    there = start + _STEP * unit * task.joint_scale
     for _ in range(20):
-        moved = (there - q) / task.joint_scale
-        wrong = np.append(_pose_error(task, goal, there), unit @ moved - step)
+        moved = (there - start) / task.joint_scale
+        wrong = np.append(_pose_error(task, goal, there), unit @ moved - _STEP)
         if np.abs(wrong).max() < _MET:
-            off = float(np.linalg.norm(moved - step * unit))
-            return there if off < (0.25 if rank is not None else 0.5) * step else None
+            return bool(np.linalg.norm(moved - _STEP * unit) < 0.25 * _STEP)
         U, sigma, Vt = np.linalg.svd(
             np.vstack([task_jacobians(task, there), unit]), full_matrices=False
         )
         keep = sigma > 1e-3 * sigma[0]
-        if rank is not None:
-            keep[: rank + 1] = sigma[: rank + 1] > 1e-9 * sigma[0]
+        keep[: rank + 1] = sigma[: rank + 1] > 1e-9 * sigma[0]
         correction = Vt[keep].T @ ((U[:, keep].T @ wrong) / sigma[keep])
         if np.linalg.norm(correction) > 1.0:
-            return None
+            return False
         there = there - correction * task.joint_scale
-    return None
+    return False
 
 
 def _pose_error(task: SingularTask, goal: Array, q: Array) -> Array:
