@@ -1,4 +1,10 @@
-"""An ellipsoid of velocities or forces as data: axes, radii, and what follows from them."""
+"""An ellipsoid of velocities or forces as data: axes, radii, and what follows from them.
+
+Examples
+--------
+>>> EllipsoidQuantity.FORCE.unit
+'N'
+"""
 
 from __future__ import annotations
 

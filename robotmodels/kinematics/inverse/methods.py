@@ -4,6 +4,18 @@ All of them solve ``A y = b`` with the Jacobian ``A`` and the twist ``b`` made c
 rows divided by a characteristic length, columns by the square roots of the joints' weights. The
 singular values of ``A`` are then numbers of order one: ``1 / sigma`` is the speed of the joints
 [rad/s] that a turn of 1 rad/s, or a motion of one length per second, takes in that direction.
+
+Attributes
+----------
+gain : float
+    Largest joint speed per speed of the twist, both comparable.
+
+Examples
+--------
+>>> PseudoInverse().gain, FilteredInverse(0.05).gain
+(inf, 22.5)
+>>> DampedInverse(damping=Damping.CONSTANT, largest=0.05).gain
+10.0
 """
 
 from __future__ import annotations
@@ -43,18 +55,8 @@ _FIRST_KIND = 2
 class PseudoInverse:
     """The regular solution: exact, of least weighted norm, unbounded near singular positions.
 
-    Seed book sections 1.3.2.1 and 1.3.2.4.
-
-    Parameters
-    ----------
-    tolerance : float
-        Singular values up to this, relative to the largest, count as zero: their directions are
-        left out.
-
-    Examples
-    --------
-    >>> PseudoInverse().gain
-    inf
+    Singular values up to ``tolerance``, relative to the largest, in [0, 1), count as zero: their
+    directions are left out. Seed book sections 1.3.2.1 and 1.3.2.4.
     """
 
     tolerance: float = 1e-10
@@ -64,7 +66,7 @@ class PseudoInverse:
 
     @property
     def gain(self) -> float:
-        """Largest joint speed per speed of the twist, both comparable: without bound."""
+        """Without bound."""
         return inf
 
     @property
@@ -78,20 +80,8 @@ class FilteredInverse:
     """Singular value filtering: the inverse of a small singular value fades out.
 
     ``1 / sigma`` above the threshold e, ``s (3 - 2 s) / e`` with ``s = sigma / e`` below: the same
-    value and slope at the threshold, 0 at a singular position. Directions above it are exact.
-
-    Seed book section 1.3.2.2; A. A. Maciejewski and C. A. Klein, Numerical filtering for the
-    operation of robotic manipulators through kinematically singular configurations, 1988.
-
-    Parameters
-    ----------
-    threshold : float
-        Singular value below which a direction is filtered.
-
-    Examples
-    --------
-    >>> FilteredInverse(0.05).gain
-    22.5
+    value and slope at the threshold, 0 at a singular position. Seed book section 1.3.2.2;
+    A. A. Maciejewski and C. A. Klein 1988.
     """
 
     threshold: float = THRESHOLD
@@ -101,7 +91,7 @@ class FilteredInverse:
 
     @property
     def gain(self) -> float:
-        """Largest joint speed per speed of the twist, both comparable: 9 / (8 threshold)."""
+        """``9 / (8 threshold)``."""
         return 1.125 / self.threshold
 
     @property
@@ -121,27 +111,16 @@ class DampedInverse:
     Parameters
     ----------
     threshold : float
-        Singular value below which damping sets in (for `Damping.MANIPULABILITY` the product of
-        them); not used by `Damping.CONSTANT`.
+        Singular value e below which damping sets in (for MANIPULABILITY the product w of them);
+        not used by CONSTANT.
     largest : float
-        Damping ``lambda`` at a singular position. With e the threshold,
-        ``lambda^2 = largest^2 (1 - (sigma / e)^2)`` below it, where sigma is that of the direction
-        (`Damping.WEAK_DIRECTIONS`) or the smallest one; for `Damping.MANIPULABILITY`
-        ``lambda = largest (1 - w / e)`` with their product w.
+        Damping ``lambda`` at a singular position; ``lambda^2 = largest^2 (1 - (sigma / e)^2)``
+        below the threshold, ``lambda = largest (1 - w / e)`` for MANIPULABILITY.
     damping : Damping
-        Which directions are damped. The default leaves all directions above the threshold exact.
+        Which directions are damped. The default leaves all above the threshold exact.
     largest_speed : float, optional
-        Bound on the speed of the joints that the task takes: the weighted norm of its part of
-        ``v`` [rad/s], ``sqrt(sum(joint_weights v^2))``. Where more would be needed, one more
-        damping, the least that suffices, is added: the error is then the least possible within
-        the bound (for what is not damped otherwise).
-
-    Examples
-    --------
-    >>> round(DampedInverse(threshold=0.01, largest=0.007).gain, 2)
-    100.02
-    >>> DampedInverse(damping=Damping.CONSTANT, largest=0.05).gain
-    10.0
+        Bound on the weighted norm of the task's part of ``v`` [rad/s],
+        ``sqrt(sum(joint_weights v^2))``: where needed the least further damping is added.
     """
 
     threshold: float = THRESHOLD
@@ -159,11 +138,7 @@ class DampedInverse:
 
     @property
     def gain(self) -> float:
-        """Largest joint speed per speed of the twist, both comparable, by the damping alone.
-
-        ``1 / (2 largest)`` for a constant damping; infinite where the damping may vanish beside a
-        singular position (`Damping.MANIPULABILITY`, a threshold of zero).
-        """
+        """By the damping alone; infinite where that may vanish beside a singular position."""
         if self.damping is Damping.MANIPULABILITY or self.largest == 0.0:
             return inf
         if self.damping is Damping.CONSTANT:
