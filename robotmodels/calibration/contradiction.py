@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +61,8 @@ def contradictions(
     firsts = np.cumsum([0, *(m.blocks for m in measurements)])
     source = "the other measurements"
     source += " and the prior" if np.isfinite(solution.fit.prior.sigma).any() else ""
-    known, found = [measurements[k] for k in numbers], []
-    lengths = [m.length for m in known]  # type: ignore[attr-defined]
+    known: list[Any] = [measurements[k] for k in numbers]
+    lengths, found = [m.length for m in known], []
     for group, mean, deviation in _wrong_groups(shift, covariance + np.diag(sigma**2), lengths):
         length, many = lengths[group[0]], len(group)
         size = float(np.linalg.norm(sigma[group])) / many
@@ -156,7 +156,7 @@ def _unbiased(solution: Solution) -> Array:
     return fit.x - fit.basis @ (fit.basis.T @ (change.T @ fit.residuals))
 
 
-def _named(m: KnownDistance) -> str:
+def _named(m: Any) -> str:
     return f"{m.name} {m.point} to {m.other}"
 
 

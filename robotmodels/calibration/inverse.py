@@ -105,7 +105,7 @@ def corrected_igm(
     q = np.where(found.valid[..., None], found.q, 0.0)
     low, high = (model.lower, model.upper) if limits else (np.full(n, -pi), np.full(n, pi))
     bounded = np.isfinite(low) & np.isfinite(high)
-    middle = sum(np.where(bounded, 0.5 * x, 0.0) for x in (low, high))
+    middle = np.where(bounded, 0.5 * low, 0.0) + np.where(bounded, 0.5 * high, 0.0)
     goal = references[:, None] if given and limits else middle
     reading = errors.reading(q)
     whole = np.nan_to_num(np.round((turned_inside(reading, low, high, goal) - reading) / (2 * pi)))

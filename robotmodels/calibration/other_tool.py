@@ -83,7 +83,8 @@ def other_tool_error(
     angle = squares[:, 3:, :-1].sum(axis=(1, 2))
     nominal = squares[:, :3, -1].sum(axis=1)
     means = (position.mean(), position.max(), angle.mean(), nominal.mean())
-    return PredictedError(*(float(np.sqrt(x)) for x in means), float(length))
+    rms, largest, turned, before = (float(np.sqrt(x)) for x in means)
+    return PredictedError(rms, largest, turned, before, float(length))
 
 
 def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:

@@ -62,14 +62,14 @@ class JointErrors(Frozen):
         q = wanted.copy()
         if self.is_zero or not q.size:
             return q
-        size = 1.0 + np.abs(wanted).max(axis=-1)
+        size = 1.0 + np.abs(wanted).max(axis=-1, keepdims=True)
         for _ in range(_STEPS):
             missing = wanted - self.actual(q)
-            off = np.abs(missing).max(axis=-1) / size
+            off = np.abs(missing).max(axis=-1, keepdims=True) / size
             if (off <= _ROUNDING).all():
                 break
             q += missing
-        return np.where((off <= _WRONG)[..., None], q, np.nan)
+        return np.where(off <= _WRONG, q, np.nan)
 
     def _errors(self, q: Array) -> Array:
         """Differences of joint variables and readings, (..., n)."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt, read_only
 from ..estimation import FitStatus, Loss, NonlinearFit, fit_nonlinear
@@ -177,7 +178,7 @@ def _estimated_scales(
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit, shrunk to the common value of its kind."""
     leverage = (fit.orthonormal_rows**2).sum(axis=1)
-    estimates: dict[tuple[type, str], list[tuple[int, Array, float, float]]] = {}
+    estimates: dict[tuple[type, str], list[tuple[int, NDArray[np.bool_], float, float]]] = {}
     parts = zip(problem.measurements, scales, problem.row_slices, strict=True)
     for k, (m, scale, rows) in enumerate(parts):
         if states_noise(m):

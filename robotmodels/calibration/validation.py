@@ -306,11 +306,11 @@ def _postures(seen: Sequence[Measurement]) -> Numbers:
     return np.array(numbers, dtype=np.int64)
 
 
-def _labels(m: Measurement) -> list[str | None]:
-    """Touched or observed object of each block; None where there is none."""
+def _labels(m: Measurement) -> list[str]:
+    """Touched or observed object of each block; empty where there is none."""
     if isinstance(m, Labelled):
         return [f"{m.name}:{label}" for label in m.label]
-    return [m.name if m.fixtures else None] * m.blocks
+    return [m.name if m.fixtures else ""] * m.blocks
 
 
 def _places(p: Array, posture: Numbers, label: Numbers, near: float) -> Numbers:

@@ -113,7 +113,8 @@ def drawn_groups(
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
     if isinstance(met, Contact):
         bounded = np.isfinite(model.lower) & np.isfinite(model.upper)
-        middle = sum(np.where(bounded, 0.5 * x, 0.0) for x in (model.lower, model.upper))
+        lower, upper = (np.where(bounded, x, 0.0) for x in (model.lower, model.upper))
+        middle = 0.5 * (lower + upper)
         turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
         q = met.q - 2.0 * np.pi * np.round((met.q - middle) / (2.0 * np.pi)) * turns
         allowed = np.all((q >= model.lower - 1e-9) & (q <= model.upper + 1e-9), axis=1)
