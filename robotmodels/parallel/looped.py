@@ -44,16 +44,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from .. import loops, se3
 from .._arrays import Array, Value, as_core, as_exact, batch_shape, read_only
 from ..errors import InvalidValueError, LoopError
-from ..geometry import PRISMATIC
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..kinematics.lengths import characteristic_length
 from ..se3.orientation import rotation_vectors_of
 
-_STEPS, _STARTS = 60, 64
+_STARTS = 64
 _LONGEST = 0.2  # step of the platform, rad or characteristic lengths
 _CLOSED = 1e-10
 _RANK = 1e-9
@@ -98,51 +98,38 @@ class LoopedPlatform(Value):
         return np.asarray(full[..., list(self.columns)])
 
     def postures(self, T: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """All joints (..., n) at poses near home, residuals, and whether the poses are reached."""
-        poses = se3.as_pose(T)
-        rows = poses.reshape(-1, 4, 4)
-        q = np.tile(self.q_home, (len(rows), 1))
-        rest = np.full(len(rows), np.inf)
-        for i, target in enumerate(rows):
-            q[i], rest[i] = self._newton(target)
+        """All joints (..., n) at poses near home, residuals, and whether the poses are reached.
+
+        The pose is one more closure of the loops, moved from home in short steps.
+        """
+        from ..loops.kernels import closed_postures
+
+        poses, n, tree = se3.as_pose(T), self.robot.n, self.robot.tree
+        rows = se3.inverse(tree.base) @ poses.reshape(-1, 4, 4)
+        home, q = se3.inverse(tree.base) @ self.home, np.tile(self.q_home, (len(rows), 1))
+        place, sort = tree.with_frames({"_pose": home}, 0), "point" if self._follows() else "full"
+        held = [*self.robot.closures, loops.Closure("_pose", ("_pose", self.frame), sort)]
+        cuts = loops.LoopedRobot(place, held, []).cuts
+        turns = Rotation.from_matrix(rows[:, :3, :3] @ home[:3, :3].T).as_rotvec()
+        rest, code, none = np.zeros(len(rows)), np.zeros(1), np.zeros((1, 0))
+        for i, (target, turn) in enumerate(zip(rows, turns, strict=True)):
+            by = target[:3, 3] - home[:3, 3]
+            count = np.ceil(max(*np.abs(by) / self.length, *np.abs(turn), _LONGEST) / _LONGEST)
+            for share in np.arange(1.0, count + 1.0) / count:
+                R, at = cuts.rotation.copy(), cuts.position.copy()
+                R[-2] = Rotation.from_rotvec(share * turn).as_matrix() @ home[:3, :3]
+                at[-2] = home[:3, 3] + share * by
+                moved = cuts._replace(rotation=read_only(R), position=read_only(at))
+                closed_postures(
+                    none, moved, np.arange(0), np.arange(n), 0, q[i : i + 1], rest[i : i + 1], code
+                )
         shape = poses.shape[:-2]
-        return q.reshape(*shape, self.robot.n), rest.reshape(shape), rest.reshape(shape) <= _CLOSED
+        return q.reshape(*shape, n), rest.reshape(shape), rest.reshape(shape) <= _CLOSED
 
-    def _newton(self, target: Array) -> tuple[Array, float]:
-        """Newton's method on the actuated joints in short steps, the loops closed after each."""
-        q, best = self.q_home, np.inf
-        columns, unit = list(self.columns), np.repeat([1.0, self.length], 3)
-        table = self.robot.tree.table
-        slides = table.sigma[table.joint_rows] == PRISMATIC
-        for _ in range(_STEPS):
-            error = self._error(q, target)
-            away = np.abs(error[columns]).max()
-            if away <= 1e-15 or (away < 1e-12 and away >= best):
-                break
-            best = min(best, away)
-            try:
-                J = self._inverse(self._twists(q))
-            except LoopError:
-                break
-            step = error * np.isin(np.arange(6), columns)
-            step = step / max(1.0, np.abs(step * unit).max() / (_LONGEST * self.length))
-            found = loops.close(self.robot, q[self.actuated] + J @ step, q)
-            if not found.residual < _CLOSED:
-                break
-            turns = np.round((found.q - self.q_home) / (2.0 * np.pi))
-            q = np.where(slides, found.q, found.q - 2.0 * np.pi * turns)
-        return q, float(np.abs(self._error(q, target) * self._counts()).max())
-
-    def _error(self, q: Array, target: Array) -> Array:
-        """Small twist (6,) from the pose at q to another."""
-        T = dgm(self.robot.tree, q, self.frame)
-        turn = rotation_vectors_of(target[:3, :3] @ T[:3, :3].T)
-        return np.concatenate((target[:3, 3] - T[:3, 3], turn))
-
-    def _counts(self) -> NDArray[np.bool_]:
-        """Components (6,) that a pose must have; turns that follow from the position are free."""
-        turns = max(self.columns) < 3 and np.abs(self._twists(self.q_home)[3:]).max() > _RANK
-        return np.repeat([True, not turns], 3)
+    def _follows(self) -> bool:
+        """Whether turns of the platform follow from its position, so that they do not count."""
+        moves = np.abs(self._twists(self.q_home)[3:]).max() > _RANK
+        return bool(max(self.columns) < 3 and moves)
 
     def _reached(self, T: ArrayLike) -> Array:
         """Joints at poses; raises where one is not reached."""
