@@ -57,9 +57,7 @@ from .robot import Closure, LoopedRobot
 
 
 def read_par(
-    path: str | Path,
-    values: Mapping[str, float] | None = None,
-    gravity: ArrayLike | None = None,
+    path: str | Path, values: Mapping[str, float] | None = None, gravity: ArrayLike | None = None
 ) -> LoopedRobot:
     """Read a SYMORO ``.par`` file with loops.
 

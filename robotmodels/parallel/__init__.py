@@ -8,14 +8,7 @@ wrenches act on the environment. Arrays of the wrong shape, NaN, and poses that 
 have or the legs do not reach raise ShapeError, InvalidValueError or NotARotationError.
 """
 
-from .direct import (
-    AssemblyModes,
-    AssemblyStatus,
-    PlatformPoses,
-    PoseStatus,
-    assembly_modes,
-    dgm,
-)
+from .direct import AssemblyModes, AssemblyStatus, PlatformPoses, PoseStatus, assembly_modes, dgm
 from .dynamics import MotionStatus, ParallelMotion, ddm, energies, idm, simulate
 from .families import delta, five_bar, gough, gough_symmetric, planar_3rpr, planar_3rrr
 from .legs import LegSolutions, LegStatus, igm

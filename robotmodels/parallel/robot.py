@@ -10,16 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import (
-    Array,
-    Value,
-    as_core,
-    as_exact,
-    as_floats,
-    as_number,
-    as_reals,
-    read_only,
-)
+from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, as_reals, read_only
 from .._outcomes import Result
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of

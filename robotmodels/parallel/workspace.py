@@ -278,10 +278,7 @@ def _annulus(robot: ParallelRobot, d: Array) -> Array:
 def _bend(robot: ParallelRobot, T: Array, legs: LegStates) -> Array:
     """Angles of legs from their directions at home, at the base and the platform: the larger."""
     home = leg_states(robot, robot.home[None]).direction
-    pairs = (
-        (legs.direction, home),
-        (legs.direction @ T[:, :3, :3], home @ robot.home[:3, :3]),
-    )
+    pairs = ((legs.direction, home), (legs.direction @ T[:, :3, :3], home @ robot.home[:3, :3]))
     cosine = np.minimum(*((a * b).sum(axis=-1) for a, b in pairs))
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 

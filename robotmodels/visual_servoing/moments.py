@@ -14,10 +14,7 @@ from .features import Feature, Sight, inner, norm, placed, projected
 from .matrices import point_rows
 from .results import THIN, as_points
 
-_COMPONENTS = (
-    *("area", "x", "y", "n20", "n02", "n11"),
-    *("alpha", "xn", "yn", "an", "c_x", "c_y"),
-)
+_COMPONENTS = (*("area", "x", "y", "n20", "n02", "n11"), *("alpha", "xn", "yn", "an", "c_x", "c_y"))
 _FLAT = 1e-6  # of the size: heights above the plane of a polygon, and areas
 _STEP = 1e-30  # of the complex step, so small that its square vanishes
 _NODES = np.array(((1.0, 1.0, 1.0), (1.8, 0.6, 0.6), (0.6, 1.8, 0.6), (0.6, 0.6, 1.8))) / 3.0
