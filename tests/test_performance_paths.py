@@ -274,18 +274,6 @@ def test_means_over_joints_and_workspace():
     assert over == pytest.approx(0.6 * np.pi / 4, rel=3e-3)
 
 
-@pytest.mark.nightly
-def test_maps_of_other_arms():
-    arm = rm.load("puma560")
-    w = pf.workspace(arm, limits=False, resolution=20)
-    found = pf.dexterity_map(arm, w)
-    assert (np.isfinite(found.best) <= (w.count > 0)).all()
-    assert np.nanmax(found.best - found.mean) > 0.0
-    R = np.eye(3)
-    w = pf.workspace(arm, "orientation", orientation=R, resolution=6, limits=False)
-    assert np.isfinite(pf.dexterity_map(arm, w).best).sum() == (w.count > 0).sum()
-
-
 # --- figures and commands ------------------------------------------------------------------------
 
 

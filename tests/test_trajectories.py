@@ -66,10 +66,10 @@ def named(error, words):
 @pytest.mark.parametrize("law", LAWS)
 def test_limits_hold_and_ends_are_met_on_random_motions(law, rng):
     """Not one bit above a limit, anywhere on the motion; some limit is used in full."""
-    for _ in range(100):
-        n = int(rng.integers(1, 5))
+    for k in range(100):
+        n, size = int(rng.integers(1, 5)), 10.0 ** rng.uniform(-5.0, 2.0)
         limits = random_limits(rng, law, n)
-        q0, q1 = rng.normal(size=(2, n)) * 10.0 ** rng.uniform(-5.0, 2.0)
+        q0, q1 = rng.normal(size=(2, n)) * (size if k > 3 else (1e-40, 1e-9, 1e9, 1e40)[k])
         q1 = np.where(rng.random(n) < 0.2, q0, q1)
         move, used = along_line(law, q0, q1, None, limits), 0.0
         for k, name in enumerate(("velocity", "acceleration", "jerk"), 1):
@@ -81,7 +81,9 @@ def test_limits_hold_and_ends_are_met_on_random_motions(law, rng):
                 used = max(used, np.maximum(high / most, low / least).max())
         assert used > 1.0 - 1e-12 if (q0 != q1).any() else move.duration == 0.0
         ends = move.at([0.0, move.duration])
-        assert np.abs(ends.q - [q0, q1]).max() < 1e-12 * max(1.0, np.abs([q0, q1]).max())
+        assert np.abs(ends.q - [q0, q1]).max() < 1e-12 * np.abs([q0, q1]).max()
+        if AT_REST[law] and used:
+            assert np.abs(ends.v).max() < 1e-12 * np.abs(move.motion.extremes(1)).max()
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -211,19 +213,6 @@ def test_joints_may_share_only_the_time_or_nothing():
     assert slow.check(limits).kept
 
 
-def test_a_law_that_ends_with_a_jump_is_refused_where_a_joint_waits():
-    independent = Synchronisation.INDEPENDENT
-    limits = MotionLimits(velocity=1.0, acceleration=1.0, jerk=1.0)
-    with pytest.raises(InvalidValueError, match=r"CUBIC ends .* waits.*joint 1: jerk"):
-        along_line(TimeLaw.CUBIC, [0, 0.0], [1, 3.0], None, limits, independent)
-    with pytest.raises(InvalidValueError, match=r"LINEAR ends .* joint 2: acceleration"):
-        linear([0, 0.0], [3, 1.0], None, limits.without_jerk(), independent)
-    # no joint waits after a motion; no limit is broken by the jump
-    along_line(TimeLaw.CUBIC, [0, 0.0, 0.0], [3, 3.0, 0.0], None, limits, independent)
-    along_line(TimeLaw.CUBIC, [0, 0.0], [1, 3.0], 9.0, limits, independent)
-    linear([0, 0.0], [3, 1.0], None, MotionLimits(velocity=1.0), independent)
-
-
 def test_motions_that_stay_or_hardly_move():
     limits = MotionLimits(1.0, 1.0, 1.0)
     for make in (linear, cubic, quintic, smoothed_trapezoidal, jerk_limited):
@@ -238,31 +227,6 @@ def test_motions_that_stay_or_hardly_move():
     # zero limits of joints that stay do not matter
     move = trapezoidal([0.0, 1.0], [1.0, 1.0], limits=MotionLimits([1.0, 0.0], [1.0, 0.0]))
     assert move.duration == pytest.approx(2.0, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_end_states_and_breaks_of_motions_of_any_size_are_exact(law, rng):
-    for i in range(60):
-        scale = 10.0 ** rng.uniform(-3.0, 3.0) if i > 4 else (1e-40, 1e-9, 1e9, 1e40, 1.0)[i]
-        q0, q1 = rng.normal(size=(2, 3)) * scale
-        v, a, j = 10.0 ** rng.uniform([-2.0, -2.0, -1.0], [2.0, 4.0, 6.0])
-        limits = MotionLimits(v, a) if jumping(law) else MotionLimits(v, a, j)
-        move = along_line(law, q0, q1, None, limits, (Synchronisation.COORDINATED, SAME)[i % 2])
-        ends = move.at([0.0, move.duration])
-        peak = [np.abs(np.stack(move.motion.extremes(order))).max() for order in range(3)]
-        assert np.abs(ends.q - [q0, q1]).max() < 1e-12 * peak[0]
-        if law is not TimeLaw.LINEAR:
-            assert np.abs(ends.v).max() < 1e-12 * peak[1]
-            # no jump where one piece follows another, nor where the times of breaks are rounded
-            inner = move.motion.breaks.ravel()
-            inner = inner[inner > 0.0]
-            gap = np.abs(np.diff(move.v(np.stack((np.nextafter(inner, 0.0), inner))), axis=0)).max()
-            assert gap <= 4.0 * np.spacing(move.duration) * peak[2] + 1e-12 * peak[1]
-        if not jumping(law) and law not in (TimeLaw.LINEAR, TimeLaw.CUBIC):
-            assert np.abs(ends.a).max() < 1e-12 * peak[2]
-    move = trapezoidal([0.0], [1000.0], limits=MotionLimits(velocity=1.0, acceleration=1e4))
-    assert np.array_equal(move.v(move.duration), [0.0])
-    assert np.array_equal(move.q(move.duration), [1000.0])
 
 
 # --- polynomials between states ------------------------------------------------------------------
@@ -381,16 +345,6 @@ def test_coordinated_states_stay_on_their_line(rng):
         assert np.abs(s.v[[0, -1]] - np.outer([v0, v1], u)).max() < 1e-12
         assert np.abs(s.q[-1] - q0 - L * u).max() < 1e-12
         assert move.check(limits, 1e-8).kept
-
-
-def test_independent_joints_start_moving_and_wait():
-    limits = MotionLimits(1.0, 2.0, 5.0)
-    move = jerk_limited([0.0, 0.0, 3.0], [1.0, 4.0, 3.0], limits=limits, v0=[0.5, 0.0, 0.0],
-                        synchronisation=Synchronisation.INDEPENDENT)  # fmt: skip
-    alone = jerk_limited(0.0, 1.0, limits=limits, v0=0.5)
-    assert move.duration > alone.duration + 1.0
-    assert abs(move.q(alone.duration + 0.1)[0] - 1.0) < 1e-12
-    assert np.abs(move.q(move.duration) - [1.0, 4.0, 3.0]).max() < 1e-12
 
 
 def test_jerk_that_is_limited_one_way_only():
@@ -707,6 +661,10 @@ SLOW = MotionLimits(1.0, 2.0, 5.0)
     ("call", "message"),
     [
         (lambda: trapezoidal(0.0, 1.0), "duration, limits or both"),
+        (
+            lambda: along_line("cubic", [0, 0.0], [1, 3.0], None, UNIT, "independent"),
+            r"CUBIC ends .* waits.*joint 1: jerk",
+        ),
         (lambda: trapezoidal(0.0, 1.0, limits=MotionLimits(1.0, 0.0)), "is 0"),
         (lambda: trapezoidal(0.0, 1.0, limits=UNIT), "without_jerk"),
         (lambda: linear(0.0, 1.0, limits=MotionLimits(acceleration=1.0)), "velocity"),
