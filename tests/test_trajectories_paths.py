@@ -331,6 +331,10 @@ def test_joint_velocities_on_a_straight_line():
     assert np.abs(numeric - path.v[1:-1]).max() < 1e-3 * np.abs(path.v).max()
     twist = np.einsum("kij,kj->ki", jacobian(arm, path.q), path.v)
     assert np.abs(twist - move.twist(path.t)).max() < 1e-12
+    J = jacobian(arm, path.q)
+    J[:, :3] /= np.linalg.norm(J[:, :3], axis=1).max()
+    both = np.linalg.norm(J, axis=(1, 2)) * np.linalg.norm(np.linalg.inv(J), axis=(1, 2))
+    np.testing.assert_allclose(path.conditioning, 6.0 / both, rtol=1e-9)
     same = joint_path(arm, move.resample(401).T, q, t=path.t)
     assert np.abs(same.q - path.q).max() < 1e-12
     assert np.abs(same.v[1:-1] - path.v[1:-1]).max() < 1e-3 * np.abs(path.v).max()
@@ -380,7 +384,8 @@ def test_passing_a_singular_wrist_changes_the_posture():
     arm = load("rx90")
     qa, qb = np.array([0.1, 0.3, 1.2, 0.0, 0.4, 0.2]), np.array([0.1, 0.3, 1.2, 0.0, -0.4, 0.2])
     for samples in (40, 201):  # with and without a sample on the singular position
-        path = joint_path(arm, straight_line(dgm(arm, qa), dgm(arm, qb), 2.0), qa, samples=samples)
+        line = straight_line(dgm(arm, qa), dgm(arm, qb), 2.0)
+        path = joint_path(arm, line, qa, samples=samples, singular_below=1e-9)
         assert path.complete
         assert np.abs(path.q[-1] - qb).max() < 1e-9
         middle = samples / 2
