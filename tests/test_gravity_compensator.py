@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from identification_logs import swinging
 from identities.random_robots import random_bodies, random_drive, random_table
 
 import robotmodels as rm
 from robotmodels.dynamics import idm_from_base
 from robotmodels.friction import AsymmetricFriction, GravityCompensator
-from robotmodels.identification import Log, choose_processing, fit, predicted_torque
 from robotmodels.regressors import (
     energy_difference_regressor,
     parameter_names,
@@ -28,17 +26,6 @@ def random_arm(rng, f=4):
     table = table.replace(beta=np.where(abs(table.beta) < 1e-2, 0.0, table.beta))
     model = rm.RobotModel.from_table(table, gravity=rng.normal(size=3) * 6)
     return model.with_inertia(random_bodies(rng, f)).with_drive(random_drive(rng, f))
-
-
-def log_of(model, friction, rng):
-    q, v, a = swinging(model, rng)
-    return Log(2e-3, q, rm.idm(model, q, v, a, friction=friction), v, a)
-
-
-def fitted(model, log, friction, **options):
-    choices = choose_processing(log, decimation=20, dead_band=1e-3, filtered=False)
-    base = rm.base_parameters(model, drive=True, friction=friction)
-    return fit(model, log, base=base, processing=choices, **options)
 
 
 def test_the_torque_is_the_slope_of_the_energy():
@@ -122,22 +109,6 @@ def test_its_work_between_samples_is_the_change_of_its_energy():
     np.testing.assert_allclose(rows, np.diff(energies, axis=0), rtol=0, atol=2e-8)
 
 
-@pytest.mark.parametrize(("options", "form"), [(SPRING, "energy"), (SERIES, "torque")])
-def test_it_is_identified_exactly_without_noise(options, form):
-    rng = np.random.default_rng(1)
-    model = random_arm(rng)
-    true = GravityCompensator(model.n, 2, **options)
-    start = GravityCompensator(model.n, 2, **({} if options is SERIES else GEOMETRY))
-    found = fitted(model, log_of(model, true, rng), start, form=form)
-    truth = rm.base_parameters(model, drive=True, friction=true).values(model)
-    assert np.abs(found.values - truth).max() < 1e-8 * np.abs(truth).max()
-    q, v, a = swinging(model, rng, samples=500)
-    torque = rm.idm(model, q, v, a, friction=true)
-    quick = (np.abs(v) > 1e-3).all(axis=1)  # beyond the dead band
-    off = np.abs(predicted_torque(found, q, v, a) - torque)[quick].max()
-    assert off < 1e-8 * np.abs(torque).max()
-
-
 def test_what_gravity_does_alike_is_regrouped():
     """About a horizontal axis first moments turn with sin q and cos q, as a spring does."""
     pendulum = [{"sigma": 0}, {"sigma": 0, "d": 0.4}]
@@ -166,9 +137,3 @@ def test_what_gravity_does_alike_is_regrouped():
             model.with_gravity(np.zeros(3)), method, drive=True, friction=series
         )
         assert {"Gs1", "Gc1", "Gs2", "Gc2"} <= {*free.names}
-    log = log_of(model, spring, rng)
-    found = fitted(model, log, GravityCompensator(2, 1, **GEOMETRY))
-    assert (
-        np.abs(found.values - found.base.matrix @ parameter_vector(model, True, spring)).max()
-        < 1e-6
-    )

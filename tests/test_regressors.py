@@ -168,32 +168,6 @@ def test_torques_through_a_filter_are_the_means_of_neighbours_through_it(order):
 
 
 @pytest.mark.parametrize(
-    "sections",
-    [
-        signal.butter(4, 12.0, fs=1000.0, output="sos"),
-        signal.cheby1(5, 0.5, 15.0, fs=1000.0, output="sos"),
-        signal.tf2sos(np.ones(8) / 8, [1.0]),
-    ],
-    ids=["Butterworth", "Chebyshev", "moving average"],
-)
-def test_the_filtered_regressor_gives_the_filtered_torques(model, sections):
-    """Along a smooth motion sampled at 1 kHz, drives without dry friction included."""
-    rng = np.random.default_rng(1)
-    dt, n = 1e-3, model.n
-    model = model.with_drive(rm.DriveParameters(Ia=rng.uniform(size=n), Fv=rng.uniform(size=n)))
-    t = np.arange(2500)[:, None] * dt
-    rate, size = rng.uniform(1.0, 6.0, n), rng.uniform(0.2, 0.6, n)
-    q = size * np.sin(rate * t)
-    v, a = size * rate * np.cos(rate * t), -size * rate**2 * np.sin(rate * t)
-    tau = rm.idm(model, q, v, a)
-    base = base_parameters(model)
-    W = filtered_regressor(model, dt, q, v, sections, columns=base, drive=("Ia", "Fv", "Fc"))
-    atol = 2e-5 * np.abs(tau).max()
-    np.testing.assert_allclose(W @ base.values(model), filtered_torque(tau, sections), atol=atol)
-    assert not filtered_regressor(model, dt, q[:1], v[:1], sections).any()
-
-
-@pytest.mark.parametrize(
     ("call", "error", "words"),
     [
         (lambda m, q: energy_difference_regressor(m, [0, 1, 1], q, q), InvalidValueError, "ascend"),

@@ -143,17 +143,6 @@ def test_values_that_are_rounding_weigh_as_zeros(rng):
     assert nearest[0] < 0.01
 
 
-def test_the_nearest_of_no_robot_stays_near_the_prior(rng):
-    """Parameters without effect are the prior's also where the base parameters are not met."""
-    model = rm.load("rx90")
-    base = base_parameters(model)
-    values = base.values(model) * (1 + 0.05 * rng.normal(size=len(base)))
-    found = standard_parameters(base, values)
-    again = standard_parameters(base, base.values(found.of(model)))
-    assert found.inertia.mass[0] == pytest.approx(30.0, rel=1e-3)  # M1 has no effect
-    assert found.distance <= again.distance * 1.01 + 1e-6
-
-
 @pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
 def test_the_size_of_the_robot_does_not_matter(size):
     table = rm.load("rx90").table

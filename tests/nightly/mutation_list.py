@@ -1285,7 +1285,7 @@ MUTATIONS = [
         "tests/test_identification_report.py -k gaps_and_recordings_are_no_neighbours", True),
     Mutation("regressors: filter", "momentum form: forces of one end of each period count alone",
         "def filtered_regressor(", "0.5 * (S[1:] + S[:-1])", "S[1:]",
-        "tests/test_regressors.py -k (gives_the_filtered and moving)"),
+        f"{FORMS} -k filtered_form_is_the_filtered"),
     Mutation("regressors: filter", "torques are those at the end of each period",
         "def filtered_torque(", "0.5 * (signal[1:] + signal[:-1])", "signal[1:]",
         "tests/test_regressors.py -k means_of_neighbours"),
