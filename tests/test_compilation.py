@@ -145,13 +145,6 @@ def test_without_a_home_no_folder_is_made(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_tilde_is_the_home(tmp_path, monkeypatch, folder):
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.setenv("USERPROFILE", str(tmp_path))
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "~/kept")
-    assert _cache.cache_folder().parent == tmp_path / "kept"
-
-
 def test_a_full_disk_costs_one_warning(folder, monkeypatch):
     def full(path, data):
         raise OSError(28, "No space left on device")

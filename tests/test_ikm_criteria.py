@@ -183,21 +183,6 @@ def test_an_arm_stays_inside_its_limits_along_a_line(line):
     assert error < TRACKED
 
 
-def test_an_arm_avoids_an_obstacle_along_a_line():
-    """A ball in the way of the elbow, which moves around it while the tool goes on."""
-    model = rm.load("panda")
-    q, way = np.array([0.0, 0.3, 0.0, -1.8, 0.0, 2.1, 0.7]), np.array([0.1, 0.3, -0.1])
-    plain, _ = follow(model, q, way)
-    elbow = rm.dgm(model, plain[100], 4)[:3, 3]
-    ball = Sphere(elbow + np.array([0.0, 0.03, -0.06]), 0.05)
-    criterion = ObstacleCriterion([ball], influence=0.2, gain=2.0, radius=0.04)
-    assert criterion.clearance(model, plain).min() < -0.08
-    around, error = follow(model, q, way, criterion=criterion)
-    assert criterion.clearance(model, around).min() > 0.02
-    assert error < TRACKED
-    np.testing.assert_allclose(rm.dgm(model, around[-1]), rm.dgm(model, plain[-1]), atol=TRACKED)
-
-
 def test_wrong_criteria_are_named():
     model = rm.load("panda")
     q, ball = np.zeros(7), Sphere([0, 0, 0], 0.1)

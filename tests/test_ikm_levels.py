@@ -26,7 +26,6 @@ from robotmodels.kinematics import (
 )
 from robotmodels.kinematics.inverse.solver import by_levels
 from robotmodels.kinematics.inverse.tasks import Level
-from robotmodels.kinematics.lengths import characteristic_length
 
 EXACT = PseudoInverse()
 METHODS = [
@@ -383,29 +382,6 @@ def test_twist_tasks_are_rows_of_the_jacobian(model, seed, reference):
     drift = np.einsum("abij,abj->abi", rate, v)[..., rows].reshape(6, -1)
     np.testing.assert_allclose(above.drift, drift, atol=1e-12)
     assert not level.drift.any()
-
-
-def test_lengths_make_prismatic_joints_and_positions_comparable():
-    model = rm.load("stanford_arm")
-    length = characteristic_length(model)
-    level = JointTask([0.0, 0.0], joints=[1, 2]).level(model, np.zeros(6))
-    np.testing.assert_array_equal(level.weights, [1.0, 1.0 / length])
-    named = JointTask([0.0], joints=[model.table.joint_names[2]], length=2.0)
-    np.testing.assert_array_equal(named.level(model, np.zeros(6)).weights, [0.5])
-    np.testing.assert_array_equal(named.level(model, np.zeros(6)).J[0, 0], np.eye(6)[2])
-
-
-def test_a_matrix_is_a_task_of_its_own(rng):
-    model = rm.load("panda")
-    q, v = rng.normal(size=(2, 4, 7))
-    J = rng.normal(size=(2, 7))
-    task = LinearTask(J, [1.0, 2.0], drift=[3.0, 4.0], weights=[1.0, 5.0])
-    level, above = task.level(model, q), task.level(model, q, v)
-    np.testing.assert_array_equal(level.J, np.tile(J, (4, 1, 1)))
-    np.testing.assert_array_equal(above.drift, [[3.0, 4.0]] * 4)
-    assert not level.drift.any()
-    J = rng.normal(size=(4, 2, 7))
-    np.testing.assert_array_equal(LinearTask(J, np.zeros(2)).level(model, q).J, J)
 
 
 def test_a_rate_of_the_gradient_may_be_given(rng):

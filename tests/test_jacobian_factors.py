@@ -1,12 +1,10 @@
 """The Jacobian as a product of three matrices."""
 
 import numpy as np
-import pytest
 from hypothesis import given
-from identities.random_robots import models, random_model, random_state, robot_size
+from identities.random_robots import models, random_state, robot_size
 
 import robotmodels as rm
-from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.kinematics import jacobian_factors
 
 
@@ -77,21 +75,6 @@ def test_rx90_is_the_books():
     np.testing.assert_allclose(np.abs(np.linalg.det(J)), np.abs(det), atol=1e-15)
 
 
-@pytest.mark.parametrize("batch", [(), (3,), (2, 3), (0,), (2, 0)], ids=str)
-def test_leading_axes_are_the_batch(batch):
-    model = random_model(np.random.default_rng(4), f=7, tree=True, fixed=True)
-    q, *_ = random_state(model, np.random.default_rng(5), *batch)
-    factors = jacobian_factors(model, q, 2, 5)
-    assert factors.rotation.shape == factors.transport.shape == (*batch, 6, 6)
-    assert factors.reduced.shape == factors.jacobian.shape == (*batch, 6, model.n)
-    assert not factors.reduced.flags.writeable
-    for index in np.ndindex(*batch):
-        single = jacobian_factors(model, q[index], 2, 5)
-        np.testing.assert_allclose(factors.reduced[index], single.reduced, rtol=0, atol=1e-13)
-    twist = np.random.default_rng(6).normal(size=(*batch, 6))
-    assert factors.inverse_times(twist).shape == (*batch, model.n)
-
-
 def test_joint_velocities_matrix_by_matrix(rng):
     model = rm.load("tx40")
     q = rng.uniform(-2, 2, size=(50, 6))
@@ -112,18 +95,3 @@ def test_joint_velocities_matrix_by_matrix(rng):
     found = jacobian_factors(model, q).inverse_times(twist)
     np.testing.assert_allclose(rm.dkm(model, q, found), twist, atol=1e-12)
     assert np.linalg.norm(found) <= np.linalg.norm(v)
-
-
-def test_mistakes_are_refused():
-    model = rm.load("rx90")
-    q = np.zeros(6)
-    with pytest.raises(ShapeError):
-        jacobian_factors(model, q[:5])
-    with pytest.raises(InvalidValueError):
-        jacobian_factors(model, [np.nan] * 6)
-    with pytest.raises(FrameNotFoundError):
-        jacobian_factors(model, q, projection=7)
-    with pytest.raises(FrameNotFoundError):
-        jacobian_factors(model, q, intermediate="elbow")
-    with pytest.raises(ShapeError):
-        jacobian_factors(model, q).inverse_times([1, 2, 3])

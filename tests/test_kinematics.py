@@ -7,8 +7,6 @@ from identities.random_robots import random_model, random_state, table_poses
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, RobotModelsError, ShapeError
 
-REFERENCES = ("world_aligned", "local", "world")
-
 # name: function of the model and its joint vectors, how many of these, shape of the result
 FUNCTIONS = {
     "dgm": (rm.dgm, 1, (4, 4)),
@@ -57,75 +55,6 @@ def test_leading_axes_are_the_batch(case, model, batch):
         np.testing.assert_allclose(result[index], single, rtol=0, atol=1e-12)
 
 
-def test_batches_broadcast(model):
-    for function, core in ((rm.jacobian_rate, (6, model.n)), (rm.dkm, (6,))):
-        q, v = states(model, 2, 3)
-        for batch, x, y in (
-            ((3,), q[0], v),
-            ((3,), q, v[0]),
-            ((3,), q[:1], v),
-            ((3, 2), q[:, None], v[:2]),
-            ((0,), q[0], v[:0]),
-        ):
-            result = function(model, x, y)
-            assert result.shape == (*batch, *core)
-            assert result.flags.c_contiguous
-            pairs = np.broadcast_arrays(x, y) if x.ndim == y.ndim else (
-                np.broadcast_to(x, (*batch, model.n)), np.broadcast_to(y, (*batch, model.n))
-            )  # fmt: skip
-            for index in np.ndindex(*batch):
-                expected = function(model, pairs[0][index], pairs[1][index])
-                np.testing.assert_allclose(result[index], expected, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
-def test_results_are_fresh_and_inputs_stay(case, model, batch):
-    function, count, _ = case
-    vectors = [np.array(x) for x in states(model, count, *batch)]
-    copies = [x.copy() for x in vectors]
-    first = function(model, *vectors)
-    kept = first.copy()
-    second = function(model, *vectors)
-    assert not np.shares_memory(first, second)
-    assert not any(np.shares_memory(first, x) for x in vectors)
-    first[...] = np.nan
-    np.testing.assert_array_equal(function(model, *vectors), kept)
-    np.testing.assert_array_equal(second, kept)
-    for x, copy in zip(vectors, copies, strict=True):
-        np.testing.assert_array_equal(x, copy)
-
-
-@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
-def test_anything_like_an_array_is_taken(case, model, batch):
-    function, count, _ = case
-    n = model.n
-    whole = [np.arange(np.prod(batch, dtype=int) * n).reshape(*batch, n) % 3 - k
-             for k in range(count)]  # fmt: skip
-    expected = function(model, *(x.astype(float) for x in whole))
-
-    def frozen(x):
-        x = x.astype(float)
-        x.flags.writeable = False
-        return x
-
-    def strided(x):
-        wide = np.repeat(x.astype(float), 2, axis=-1)
-        return wide[..., ::2]
-
-    for kind in (
-        lambda x: x,
-        lambda x: x.tolist(),
-        lambda x: tuple(x.tolist()),
-        lambda x: x.astype(np.float32),
-        lambda x: x.astype(np.int8),
-        lambda x: np.asfortranarray(x.astype(float)),
-        lambda x: x.astype(">f8"),
-        frozen,
-        strided,
-    ):
-        np.testing.assert_array_equal(function(model, *map(kind, whole)), expected)
-
-
 def bad_vectors(n):
     good = np.zeros(n)
     nan, infinite = np.zeros(n), np.zeros((3, n))
@@ -163,25 +92,6 @@ def test_a_bad_vector_is_named(case, model, fault):
         assert str(caught.value).startswith("qv"[position])
 
 
-def test_batches_that_do_not_fit_are_named(model):
-    q, v = states(model, 2, 3)
-    for function in (rm.jacobian_rate, rm.dkm):
-        with pytest.raises(ShapeError, match=r"broadcast.*q \(3, .*v \(2, "):
-            function(model, q, v[:2])
-
-
-@pytest.mark.filterwarnings("ignore:q. joint")
-def test_large_angles_are_angles(model):
-    """Turning many times changes nothing but the digits that the sum itself loses."""
-    q = np.full(model.n, 0.5)
-    revolute = model.table.sigma[model.table.joint_rows] == 0
-    turns = 2 * np.pi * 1000 * revolute
-    np.testing.assert_allclose(rm.dgm(model, q + turns), rm.dgm(model, q), atol=1e-10)
-    q = np.where(revolute, 1e100, 0.5)
-    assert np.isfinite(rm.dgm(model, q)).all()
-    assert np.isfinite(rm.jacobian(model, [q])).all()
-
-
 def test_frames_by_name_by_number_and_the_tool(model):
     q = states(model, 1)[0]
     poses = np.concatenate([[model.base], table_poses(model, q)])
@@ -206,12 +116,6 @@ def test_an_unknown_frame_is_refused_whatever_was_asked_before(model, frame):
     ):
         with pytest.raises(FrameNotFoundError, match="Known"):
             call()
-
-
-def test_near_names_are_offered(model):
-    name = model.table.names[0]
-    with pytest.raises(FrameNotFoundError, match=f"Did you mean .*'{name}'"):
-        rm.dgm(model, np.zeros(model.n), name.lower())
 
 
 @pytest.mark.parametrize("reference", ["LOCAL", "", None, 0, ["local"]], ids=repr)

@@ -10,7 +10,7 @@ from identities.random_robots import models, random_state, seeds
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.obstacles import Box, Capsule, Plane, Sphere, clearance
-from robotmodels.obstacles.clearance import link_distances, links, origins
+from robotmodels.obstacles.clearance import link_distances, origins
 
 
 def bodies_of(rng):
@@ -134,21 +134,6 @@ def test_what_no_joint_moves_does_not_count():
     assert clearance(arm, [0.0, 0.0], beside) == pytest.approx(0.1)
     assert clearance(arm, np.zeros((4, 2)), beside, segments=[(0, 1)]).tolist() == [np.inf] * 4
     assert clearance(arm, [0.0, 0.0], beside, segments=[(None, None)]) == pytest.approx(2.1)
-
-
-def test_leading_axes_are_the_batch_and_sizes_may_differ():
-    arm, ball = rm.load("rx90"), Sphere([0.5, 0.2, 0.6], 0.1)
-    q = np.random.default_rng(0).uniform(-2, 2, (2, 3, 6))
-    values = clearance(arm, q, [ball], 0.1)
-    assert values.shape == (2, 3)
-    assert values[1, 2] == clearance(arm, q[1, 2], [ball], 0.1)
-    assert clearance(arm, q[:0], [ball]).shape == (0, 3)
-    assert clearance(arm, q, []).tolist() == [[np.inf] * 3] * 2
-    many = clearance(arm, np.tile(q[0], (1500, 1)), ball, 0.1)  # more than one piece
-    assert np.array_equal(many[-3:], values[0])
-    each = [clearance(arm, q, ball, segments=[ab]) - 0.01 * k for k, ab in enumerate(links(arm))]
-    sizes = 0.01 * np.arange(arm.f + 1)
-    assert np.allclose(clearance(arm, q, ball, sizes), np.min(each, axis=0))
 
 
 def test_mistakes_are_named_and_values_stay_read_only():

@@ -14,9 +14,7 @@ from scipy.spatial.transform import Rotation
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import (
-    FrameNotFoundError,
     InvalidValueError,
-    NotARotationError,
     ShapeError,
 )
 from robotmodels.kinematics import (
@@ -31,7 +29,6 @@ from robotmodels.kinematics import (
     pose_from_coordinates,
     twist_from_rates,
 )
-from robotmodels.kinematics.coordinates.orientations import orientation_kind
 from robotmodels.kinematics.coordinates.rates import SINGULAR
 
 EPS = np.finfo(float).eps
@@ -58,23 +55,6 @@ def random_poses(rng, *batch):
     count = int(np.prod(batch))
     R = Rotation.random(count, rng=rng).as_matrix() if count else np.zeros((0, 3, 3))
     return se3.as_pose(poses(R, rng)).reshape(*batch, 4, 4)
-
-
-def special_rotations():
-    """All quarter turns, and rotations by nearly nothing and nearly half a turn about any axis."""
-    rng = np.random.default_rng(7)
-    signed = [
-        np.eye(3)[list(p)] * np.array(s)[:, None]
-        for p in itertools.permutations(range(3))
-        for s in itertools.product((1.0, -1.0), repeat=3)
-    ]
-    yield from (R for R in signed if np.linalg.det(R) > 0)
-    axes = [*np.eye(3), *-np.eye(3), *rng.normal(size=(6, 3)), [1, 1, 0], [0, 1e-9, 1]]
-    for axis in axes:
-        u = np.asarray(axis) / np.linalg.norm(axis)
-        for gap in (0.0, 1e-300, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8, 1e-5, 1e-2):
-            for angle in (gap, np.pi - gap):
-                yield rotation_by(u * angle)
 
 
 def rotation_by(v):
@@ -109,32 +89,6 @@ def same(x, y, tolerance):
 
 
 # --- kinds -------------------------------------------------------------------------------------
-
-
-@every_kind
-def test_words_of_a_kind(kind):
-    word = kind.value
-    for spelt in (kind, word, word.replace("_", "-"), f" {word.replace('_', '  ').upper()} "):
-        assert orientation_kind(spelt) is kind
-    assert kind.dimension == len(kind.labels) == operational_coordinates(np.eye(4), kind).size
-    assert len(set(kind.labels)) == kind.dimension
-
-
-@pytest.mark.parametrize("word", ["eule", "", "quaternions", "eulerzyz", 3, None, b"rpy", ["rpy"]])
-def test_unknown_words_are_refused_with_the_known_ones(word):
-    for call in (
-        lambda: operational_coordinates(np.eye(4), word),
-        lambda: pose_from_coordinates(np.zeros(6), word),
-        lambda: continuous_coordinates([np.eye(4)], word),
-        lambda: coordinate_rates(np.eye(4), word),
-        lambda: twist_from_rates(np.eye(4), word),
-        lambda: coordinate_rates_rate(np.eye(4), np.zeros(6), word),
-        lambda: is_representation_singular(np.eye(4), word),
-        lambda: coordinate_jacobian(rm.load("rx90"), np.zeros(6), word),
-        lambda: coordinate_jacobian_rate(rm.load("rx90"), np.zeros(6), np.zeros(6), word),
-    ):
-        with pytest.raises(InvalidValueError, match=r"'euler'.*'direction_cosines'.*'rpy'"):
-            call()
 
 
 # --- there and back ----------------------------------------------------------------------------
@@ -187,51 +141,12 @@ def test_quaternion_and_vector_are_those_of_scipy(rng):
     same(operational_coordinates(T, "angle axis")[:, 3:], R.as_rotvec(), 1e-13)
 
 
-def test_columns_are_those_of_the_book(rng):
-    T = random_poses(rng, 5)
-    s, n, a, P = (T[:, :3, k] for k in range(4))
-    assert np.array_equal(
-        operational_coordinates(T, "direction cosines"), np.concatenate([P, s, n, a], axis=1)
-    )
-    assert np.array_equal(operational_coordinates(T, "two axes"), np.concatenate([P, n, a], axis=1))
-
-
 def test_khalils_roll_is_about_z_and_urdfs_about_x(rng):
     for T in random_poses(rng, 50):
         khalil = operational_coordinates(T, "roll_pitch_yaw")[3:]
         same(khalil[::-1], se3.to_rpy(T[:3, :3]), 8 * EPS)
         same(operational_coordinates(T, "roll_pitch_yaw_urdf")[3:], se3.to_rpy(T[:3, :3]), 8 * EPS)
     assert operational_coordinates(se3.rotation("z", 0.5), "rpy")[3] == pytest.approx(0.5)
-
-
-@every_kind
-def test_ranges(kind, rng):
-    R = np.concatenate([list(special_rotations()), random_poses(rng, 2000)[:, :3, :3]])
-    y = operational_coordinates(poses(R, rng), kind)[:, 3:]
-    if kind in ANGLES:
-        assert not np.signbit(y[y == 0.0]).any()
-        outer = y[:, [0, 2]]
-        assert ((outer > -np.pi) & (outer <= np.pi)).all()
-        low, high = (0.0, np.pi) if kind in EULER else (-np.pi / 2, np.pi / 2)
-        assert ((y[:, 1] >= low) & (y[:, 1] <= high)).all()
-    if kind is OrientationKind.QUATERNION:
-        first = y[np.arange(len(y)), (y != 0).argmax(axis=1)]
-        assert (y[:, 0] >= 0).all()
-        assert (first > 0).all()
-    if kind is OrientationKind.ANGLE_AXIS:
-        assert np.linalg.norm(y, axis=1).max() <= np.pi * (1 + 2 * EPS)
-
-
-def test_half_turns_have_one_sign():
-    for R, axis in (
-        (np.diag([1.0, -1, -1]), [1, 0, 0]),
-        (np.diag([-1.0, 1, -1]), [0, 1, 0]),
-        (np.diag([-1.0, -1, 1]), [0, 0, 1]),
-    ):
-        T = np.eye(4)
-        T[:3, :3] = R
-        assert operational_coordinates(T, "quaternion")[3:].tolist() == [0, *axis]
-        same(operational_coordinates(T, "angle_axis")[3:], np.pi * np.array(axis), 0)
 
 
 # --- the border --------------------------------------------------------------------------------
@@ -282,25 +197,6 @@ def test_wrong_coordinates_are_refused(kind):
             call(0.0)
         with pytest.raises(InvalidValueError, match="nan"):
             call(np.where(np.arange(m) == 4, np.nan, good))
-
-
-@pytest.mark.parametrize("kind", ["quaternion", "direction_cosines", "two_axes"])
-def test_orientations_that_are_nearly_or_not_at_all_rotations(kind, rng):
-    x = operational_coordinates(random_poses(rng, 4), kind)
-    noise = rng.uniform(-1, 1, size=x.shape)
-    noise[:, :3] = 0.0
-    T = pose_from_coordinates(x + 2e-7 * noise, kind)
-    R = T[:, :3, :3]
-    # what `as_pose` takes as a rotation without a change: rounding of products of 3 x 3 matrices
-    assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 18 * EPS
-    assert np.abs(operational_coordinates(T, kind, near=x) - x).max() < 1e-6
-    off = x.copy()
-    off[2, 3:] *= 1.001
-    with pytest.raises(NotARotationError, match=r"x.*row 2"):
-        pose_from_coordinates(off, kind)
-    off[2, 3:] = 0.0
-    with pytest.raises(NotARotationError):
-        pose_from_coordinates(off, kind)
 
 
 # --- near --------------------------------------------------------------------------------------
@@ -374,17 +270,6 @@ def test_a_sequence_is_each_sample_near_the_one_before(kind, with_near, rng):
 
 
 @every_angle
-def test_a_motion_straight_through_gimbal_lock_keeps_its_outer_angles(kind):
-    theta = np.linspace(-0.5, 0.5, 11)
-    x = np.zeros((11, 6))
-    x[:, 3], x[:, 4], x[:, 5] = 0.7, theta + (0.0 if kind in EULER else np.pi / 2), -1.2
-    T = pose_from_coordinates(x, kind)
-    same(continuous_coordinates(T, kind, near=x[0]), x, 1e-14)
-    y = continuous_coordinates(T, kind)
-    same(np.diff(y[:, [3, 5]], axis=0), np.zeros((10, 2)), 1e-14)
-
-
-@every_angle
 def test_a_sequence_that_begins_at_gimbal_lock_begins_with_the_angle_it_leaves_with(kind):
     x = np.zeros((5, 6))
     first = 5 if kind is ROLL[1] else 3
@@ -454,32 +339,6 @@ def test_twist_from_rates_is_a_left_inverse(kind, rng):
         same(E @ B, np.broadcast_to(np.eye(6), (len(T), 6, 6)), 1e-13)
 
 
-@pytest.mark.parametrize(
-    "angle", [0.0, 1e-160, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 1.0, 1.99, 2.0, 2.01, 3.0, np.pi - 1e-9,
-              np.pi, np.pi + 1e-9, 4.0, 6.0, TURN - 1e-3, TURN + 1e-3, 10.0]
-)  # fmt: skip
-def test_rates_of_rotation_vectors_of_every_length(angle, rng):
-    v = rng.normal(size=(20, 3))
-    x = np.concatenate([np.zeros((20, 3)), angle * v / np.linalg.norm(v, axis=1)[:, None]], axis=1)
-    T = se3.as_pose(pose_from_coordinates(x, "angle_axis"))
-    E, B = coordinate_rates(T, "angle_axis", x), twist_from_rates(T, "angle_axis", x)
-    scale = np.abs(E).max()
-    assert np.isfinite(E).all()
-    same(B @ E, np.broadcast_to(np.eye(6), (20, 6, 6)), 1e-14 * scale * (1 + angle))
-    # the twist of a rotation vector that changes, by differences of the rotations themselves
-    rate, h = rng.normal(size=3), 1e-3
-    step = np.r_[0, 0, 0, rate]
-    dR = five_point(lambda t: pose_from_coordinates(x + t * step, "angle_axis")[:, :3, :3], h)
-    W = dR @ T[:, :3, :3].swapaxes(1, 2)
-    w = np.stack([W[:, 2, 1], W[:, 0, 2], W[:, 1, 0]], axis=1)
-    same(B[:, 3:, 3:] @ rate, w, 1e-10)
-    if scale < 20:
-        twist = rng.normal(size=6)
-        difference = five_point(lambda t: coordinate_rates(moved(T, twist, t), "angle_axis", x), h)
-        dE = coordinate_rates_rate(T, twist, "angle_axis", x)
-        same(dE, difference, 1e-9 if scale < 3 else 1e-4)
-
-
 @every_angle
 @pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-13, 2e-12, 1e-9])
 def test_rates_do_not_exist_at_gimbal_lock(kind, gap, rng):
@@ -543,33 +402,6 @@ def test_coordinate_jacobian_is_the_difference_of_coordinates(kind, rng):
             lambda t, q=q, v=v, a=a: coordinates(q + t * v + t * t / 2 * a), 2e-3 / speed
         )
         same(J @ a + dJ @ v, second, 1e-4 * size * speed**2)
-
-
-@every_kind
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
-def test_batches_of_coordinate_jacobians(kind, batch):
-    model = random_model(np.random.default_rng(3), f=7, tree=True, fixed=True)
-    q, v, _ = random_state(model, np.random.default_rng(5), *batch)
-    shape = (*batch, kind.dimension, model.n)
-    J, dJ = coordinate_jacobian(model, q, kind), coordinate_jacobian_rate(model, q, v, kind)
-    assert J.shape == dJ.shape == shape
-    assert J.flags.c_contiguous
-    assert dJ.flags.c_contiguous
-    for i in np.ndindex(*batch):
-        same(J[i], coordinate_jacobian(model, q[i], kind), 1e-13)
-        same(dJ[i], coordinate_jacobian_rate(model, q[i], v[i], kind), 1e-12)
-
-
-def test_mistakes_of_coordinate_jacobians():
-    model = rm.load("rx90")
-    with pytest.raises(ShapeError):
-        coordinate_jacobian(model, np.zeros(5), "euler")
-    with pytest.raises(InvalidValueError):
-        coordinate_jacobian_rate(model, np.zeros(6), np.full(6, np.nan), "euler")
-    with pytest.raises(FrameNotFoundError):
-        coordinate_jacobian(model, np.zeros(6), "euler", frame="nope")
-    with pytest.raises(InvalidValueError, match="model"):
-        coordinate_jacobian("rx90", np.zeros(6), "euler")
 
 
 def test_a_singular_representation_is_not_a_singular_robot():

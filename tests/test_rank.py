@@ -6,7 +6,6 @@ from hypothesis import given
 from identities.random_robots import models, random_pose, random_state
 
 import robotmodels as rm
-from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.kinematics import jacobian_rank, operational_dimension
 from robotmodels.kinematics.lengths import characteristic_length
@@ -43,26 +42,6 @@ def test_dimension_of_known_robots(name):
     q = np.random.default_rng(1).uniform(-2, 2, size=(20, arm.n))
     for row in found.missing_in_world:
         assert np.abs(row @ rm.jacobian(arm, q)).max() < 1e-12
-
-
-def test_two_joints_have_constraints_in_the_tool_axes():
-    arm = rm.load("lab_rr")
-    found = operational_dimension(arm)
-    assert found.never_in_frame == "vx, vy - 0.2 wz, vz + 0.2 wy"
-    q = np.random.default_rng(1).uniform(-3, 3, size=(20, 2))
-    assert np.abs(found.missing_in_frame @ rm.jacobian(arm, q, reference="local")).max() < 1e-14
-
-
-def test_local_dimension_and_order():
-    arm = rm.load("iiwa14")
-    q = np.zeros((2, 7))
-    q[1] = 0.1, 0.4, 0.3, 0.0, 0.5, 0.9, 0.7
-    found = operational_dimension(arm, q=q)
-    np.testing.assert_array_equal(found.local_dimension, [3, 5])
-    np.testing.assert_array_equal(found.singularity_order, [3, 1])
-    assert "3 to 5" in str(found)
-    assert operational_dimension(arm).local_dimension is None
-    assert operational_dimension(arm).singularity_order is None
 
 
 @given(case=models(max_frames=8))
@@ -128,30 +107,6 @@ def test_derivatives_by_finite_differences(case):
             ]
             limit = (4 * steps[1] - steps[0]) / 3
             np.testing.assert_allclose(found[i], limit, rtol=0, atol=1e-9 * scale)
-
-
-def test_robot_without_a_moving_joint_before_the_frame():
-    table = rm.DHTable(antecedent=[0, 1], sigma=[2, 0], d=[0.4, 0.3])
-    arm = rm.RobotModel.from_table(table)
-    assert operational_dimension(arm, frame=1).dimension == 0
-    assert jacobian_rank(arm, [0.3], frame=1).rank == 0
-    # a point on its axis: position does not move at all, whatever rounding says
-    assert operational_dimension(arm).position_dimension == 0
-    assert operational_dimension(arm).orientation_dimension == 1
-
-
-def test_nearly_parallel_joints_show_in_the_gap():
-    rows = [{"sigma": 0}, {"sigma": 0, "d": 0.4}, {"sigma": 0, "d": 0.3, "alpha": 1e-7}]
-    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=se3.translation(0.2, 0, 0))
-    found = operational_dimension(arm)
-    assert found.dimension == 3
-    four = rm.DHTable.from_rows([*rows, {"sigma": 0, "d": 0.2}])
-    near = operational_dimension(rm.RobotModel.from_table(four))
-    assert near.dimension == 4
-    assert 1e-10 < near.singular_values[3] < 1e-6
-    coarse = operational_dimension(rm.RobotModel.from_table(four), tolerance=1e-5)
-    assert coarse.dimension == 3
-    assert 1e4 < coarse.gap < np.inf
 
 
 def test_characteristic_length():

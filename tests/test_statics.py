@@ -6,8 +6,6 @@ import pytest
 from hypothesis import given
 from identities.random_robots import (
     any_models,
-    random_bodies,
-    random_model,
     random_pose,
     random_state,
     robot_size,
@@ -113,29 +111,6 @@ def test_a_lever_by_hand():
     close(static_torque(slide, [0.7], [0, 10.0, 0, 1, 2, 3]), [10.0], 1e-14)
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,), (2, 0)], ids=str)
-def test_leading_axes_are_the_batch(batch, rng):
-    model = random_model(rng, f=7, tree=True, fixed=True)
-    q, v, _ = random_state(model, rng, *batch)
-    w = rng.normal(size=(*batch, 6))
-    for gravity in (False, True):
-        tau = static_torque(model, q, w, gravity=gravity)
-        assert tau.shape == (*batch, model.n)
-        assert tau.flags.c_contiguous
-        found = static_wrench(model, q, v, gravity=gravity)
-        assert found.wrench.shape == (*batch, 6)
-        assert found.residual.shape == (*batch, model.n)
-        for i in np.ndindex(*batch):
-            close(tau[i], static_torque(model, q[i], w[i], gravity=gravity), 1e-11)
-            single = static_wrench(model, q[i], v[i], gravity=gravity)
-            close(found.wrench[i], single.wrench, 1e-9 * max(1, np.abs(single.wrench).max()))
-            assert found.reason(i) == single.reason()
-    # one configuration, many wrenches, and the other way round
-    assert static_torque(model, q, w[..., None, :, :] if batch else w).shape[-1] == model.n
-    assert static_wrench(model, np.zeros(model.n), v).wrench.shape == (*batch, 6)
-    assert static_wrench(model, q, np.zeros(model.n)).wrench.shape == (*batch, 6)
-
-
 # ---------------------------------------------------------------- the inverse
 
 
@@ -187,46 +162,6 @@ def test_equilibrium_and_what_is_left_open(model, seed):
             assert not found.status & 2
         if rank == 6:
             close(found.wrench, w, noise * 10 * max(1.0, length, 1 / length))
-
-
-@pytest.mark.parametrize("name", ["rx90", "iiwa14", "stanford_arm", "planar_3r", "gantry"])
-def test_torques_that_hold_the_weight_hold_no_wrench(name, rng):
-    """What is left of the weight is rounding, not an unbalanced torque."""
-    model = rm.load(name)
-    model = model.with_inertia(random_bodies(rng, model.f)).with_base(random_pose(rng))
-    q, _, _ = random_state(model, rng, 20)
-    weight = rm.gravity_torque(model, q)
-    assert np.abs(weight).max() > 1.0
-    found = static_wrench(model, q, weight, gravity=True)
-    assert not (found.status & 2).any()
-    close(found.wrench, np.zeros((20, 6)), 1e-9)
-    w = np.array([3.0, -2.0, 1.0, 0.1, 0.2, 0.3])
-    tau = static_torque(model, q, w, gravity=True)
-    found = static_wrench(model, q, tau, gravity=True)
-    assert not (found.status & 2).any()
-    close(static_torque(model, q, found.wrench, gravity=True), tau, 1e-11)
-    if model.n >= 6:
-        assert not found.undetermined.any()
-        close(found.wrench, np.tile(w, (20, 1)), 1e-9)
-
-
-def test_length_weighs_moments_against_forces(rng):
-    """One revolute joint: a force at the tool or a moment; a short length prefers the force."""
-    arm = planar(0.5)
-    for length in (0.01, 0.5, 100.0):
-        found = static_wrench(arm, [0.0], [2.0], length=length)
-        lever = np.array([0, 0.5, 0, 0, 0, 1.0])  # J^T
-        weights = np.repeat((1.0, length**2), 3)
-        close(found.wrench, 2.0 * weights * lever / (lever @ (weights * lever)), 1e-12)
-    assert static_wrench(arm, [0.0], [2.0]).wrench.tolist() == (
-        static_wrench(arm, [0.0], [2.0], length=0.5).wrench.tolist())  # fmt: skip
-
-
-def test_result_is_read_only():
-    found = static_wrench(planar(0.3, 0.2), [0.1, 0.2], [1.0, 2.0])
-    for name in ("wrench", "status", "undetermined", "directions", "residual"):
-        assert not getattr(found, name).flags.writeable
-    assert found.status.dtype == np.int8
 
 
 def test_mistakes_are_named():

@@ -61,11 +61,6 @@ def clearance(
     ndarray, shape (...)
         Metres, negative inside; infinite without pairs.
 
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        ``q`` of the wrong length, an object that is not an obstacle, a negative radius.
-
     Examples
     --------
     >>> from robotmodels.obstacles import Plane, Sphere

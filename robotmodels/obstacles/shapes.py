@@ -45,11 +45,6 @@ class Sphere(Value):
         In the world, m.
     radius : float
         Radius, m, not negative; 0 is a point.
-
-    Examples
-    --------
-    >>> Sphere([0.5, 0.0, 0.3], 0.1).radius
-    0.1
     """
 
     center: Array
@@ -74,11 +69,6 @@ class Capsule(Value):
         Ends of the axis in the world, m.
     radius : float
         Radius, m, not negative.
-
-    Examples
-    --------
-    >>> Capsule([0.0, 0.0, 0.0], [0.0, 0.0, 2.0], 0.1).end
-    array([0., 0., 2.])
     """
 
     start: Array
@@ -105,11 +95,6 @@ class Plane(Value):
         On the plane, in the world, m.
     normal : array_like, shape (3,)
         Towards the free side; made a unit vector.
-
-    Examples
-    --------
-    >>> Plane([0.0, 0.0, 0.1], [0.0, 0.0, 2.0]).normal
-    array([0., 0., 1.])
     """
 
     point: Array
@@ -138,11 +123,6 @@ class Box(Value):
     ----------
     lower, upper : array_like, shape (3,)
         Opposite corners in the world, m; infinite where there is no face.
-
-    Examples
-    --------
-    >>> Box([-1, -1, -1], [1, 1, np.inf]).upper
-    array([ 1.,  1., inf])
     """
 
     lower: Array

@@ -1,4 +1,9 @@
-"""The direct geometric model as formulas, derived step by step as in the book."""
+"""The direct geometric model as formulas, derived step by step as in the book.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +32,6 @@ class SymbolicTransform:
         The product that it is, such as ``"Trans(x, D3) Rot(z, θ3)"`` or ``"2T3 3T6"``.
     matrix : sympy.ImmutableDenseMatrix, shape (4, 4)
         Its entries, lengths in metres.
-
-    Examples
-    --------
-    >>> from robotmodels import DHTable, RobotModel
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> step = explain_dgm(arm).factors[1]
-    >>> step.name, step.motion, step.matrix[0, 3]
-    ('1T2', 'Trans(x, D2) Rot(z, θ2)', D2)
     """
 
     name: str
@@ -73,16 +70,6 @@ class DirectModelExplanation(Explanation):
     text, latex : str
         The derivation for people; the LaTeX has the same content, as paragraphs and amsmath
         environments.
-
-    Examples
-    --------
-    >>> from robotmodels import DHTable, RobotModel
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> model = explain_dgm(arm)
-    >>> model.P.T
-    Matrix([[C1*D2, D2*S1, 0]])
-    >>> float(model.evaluate([1.0, 0.0])[2, 2])
-    1.0
     """
 
     robot: str
@@ -160,6 +147,8 @@ def explain_dgm(
     Rot(z, AZ0) Rot(y, AY0) Rot(x, AX0)``, the tool the same with E instead of 0. Partial results
     of more than 100 symbols (arms with many oblique axes) are named ``U1``, ``U2``, ...
 
+    Seed book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
+
     Parameters
     ----------
     model : RobotModel
@@ -169,27 +158,10 @@ def explain_dgm(
     symbols : mapping of str to str, optional
         Other names for some of the symbols, such as ``{"RL1": "l1", "C1": "c1"}``.
 
-    Returns
-    -------
-    DirectModelExplanation
-        Prints as the derivation; has the matrices, ``.latex`` and ``.evaluate(q)``.
-
-    Raises
-    ------
-    FrameNotFoundError
-        No such frame.
-    InvalidValueError
-        ``symbols`` renames a symbol that does not occur, gives a name that is not an identifier,
-        or gives a name twice.
-
     Notes
     -----
     Angles within 1e-13 rad of a multiple of 30 or 45 degrees are taken as exact, lengths below
     1e-13 m as zero.
-
-    References
-    ----------
-    Seed book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
 
     Examples
     --------

@@ -45,17 +45,6 @@ class SingularityFactor:
         The zeros, as formulas for that joint.
     never_zero : bool
         Whether the constants of this robot keep it from vanishing.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.symbolic import explain_singularities
-    >>> elbow = explain_singularities(load("rx90")).factor(SingularityKind.ELBOW)
-    >>> elbow.text, elbow.solution, elbow.meaning
-    ('C3', 'θ3 = -π/2 or π/2',
-     'the wrist centre is in the plane of axes 2 and 3: the arm is stretched or folded')
-    >>> elbow.zeros(np.zeros(6)).round(3)
-    array([-1.571,  1.571])
     """
 
     kind: SingularityKind

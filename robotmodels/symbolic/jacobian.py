@@ -1,4 +1,9 @@
-"""The Jacobian as formulas: three matrices, the third as simple as frames can make it."""
+"""The Jacobian as formulas: three matrices, the third as simple as frames can make it.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
+"""
 
 from __future__ import annotations
 
@@ -47,17 +52,6 @@ class JacobianExplanation(Explanation):
         Variables, abbreviations and the constants of this robot.
     text, latex : str
         All of it for people.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics import jacobian
-    >>> from robotmodels.robots import load
-    >>> J = explain_jacobian(load("rx90"), 3, 4)
-    >>> J.reduced[2, 0], J.reduced[3:, 4].T
-    (-C2*D3 + RL4*S23, Matrix([[S4, 0, C4]]))
-    >>> q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
-    >>> np.allclose(J.evaluate(q).jacobian, jacobian(load("rx90"), q), atol=1e-14)
-    True
     """
 
     robot: str
@@ -124,6 +118,8 @@ def explain_jacobian(
     axes of R_i, with ``L_{k,j}`` from O_k to O_j. Notation as of `explain_dgm`: ``C23`` is
     ``cos(θ2 + θ3)``, ``D3`` and ``RL4`` are constants of the table.
 
+    Seed book section 1.3.1.3.
+
     Parameters
     ----------
     model : RobotModel
@@ -135,23 +131,6 @@ def explain_jacobian(
         Frame whose Jacobian it is; default the tool.
     symbols : mapping of str to str, optional
         Other names of symbols, as for `explain_dgm`.
-
-    Returns
-    -------
-    JacobianExplanation
-        Prints as the matrices; has the expressions, ``.latex`` and ``.evaluate(q)``.
-
-    Raises
-    ------
-    FrameNotFoundError
-        No such frame.
-    InvalidValueError
-        ``projection`` or ``intermediate`` is fixed to a frame of the table without being it, or
-        ``symbols`` does not fit.
-
-    References
-    ----------
-    Seed book section 1.3.1.3.
 
     Examples
     --------

@@ -1,4 +1,9 @@
-"""The singular positions of a robot in closed form: factors of the determinant of its Jacobian."""
+"""The singular positions of a robot in closed form: factors of the determinant of its Jacobian.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
+"""
 
 from __future__ import annotations
 
@@ -53,6 +58,8 @@ def explain_singularities(
     matrix loses rank where every minor has a factor that vanishes, and ``conditions`` are the
     smallest sets of such factors.
 
+    Seed book section 1.3.1.3.
+
     Parameters
     ----------
     model : RobotModel
@@ -63,28 +70,11 @@ def explain_singularities(
     symbols : mapping of str to str, optional
         Other names of symbols, as for `explain_dgm`.
 
-    Returns
-    -------
-    SingularityExplanation
-        Prints as the derivation; has the factors, ``.latex``, ``.values(q)`` and
-        ``.determinant(q)``. Where no factors in closed form exist its status says so.
-
-    Raises
-    ------
-    FrameNotFoundError
-        No such frame.
-    InvalidValueError
-        ``symbols`` does not fit.
-
     Notes
     -----
     Constants are kept as symbols while factoring. Entries below 1e-11 in random configurations
     count as zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to
     1e-12 of their size are dropped. The last sixteen results are kept.
-
-    References
-    ----------
-    Seed book section 1.3.1.3.
 
     Examples
     --------

@@ -63,16 +63,6 @@ class SingularityCondition:
         That of all its factors, else OTHER.
     text : str
         Such as ``"S2 = 0 and C3 = 0"``.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.symbolic import explain_singularities
-    >>> iiwa = explain_singularities(load("iiwa14"))
-    >>> [c.text for c in iiwa.conditions]
-    ['S4 = 0', 'S2 = 0 and C3 = 0', 'S2 = 0 and S6 = 0', 'C5 = 0 and S6 = 0']
-    >>> iiwa.conditions[0].holds(np.zeros(7))
-    np.True_
     """
 
     factors: tuple[SingularityFactor, ...]
@@ -117,16 +107,6 @@ class SingularityExplanation(Explanation):
         Which those are, 0 to 5 for ``[v; w]``; empty where each minor has its own.
     text, latex : str
         All of it for people.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.symbolic import explain_singularities
-    >>> rx90 = explain_singularities(load("rx90"))
-    >>> [(f.kind.value, f.text) for f in rx90.factors]
-    [('shoulder', 'S23*RL4 - C2*D3'), ('elbow', 'C3'), ('wrist', 'S5')]
-    >>> rx90.values(np.zeros((4, 6))).shape
-    (4, 3)
     """
 
     robot: str

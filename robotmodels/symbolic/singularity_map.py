@@ -1,4 +1,9 @@
-"""A singular factor, or the determinant, over two joint ranges: data for a picture."""
+"""A singular factor, or the determinant, over two joint ranges: data for a picture.
+
+Returns
+-------
+The result that the signature names; its fields are described with its class.
+"""
 
 from __future__ import annotations
 
@@ -41,13 +46,6 @@ class SingularityMap(Rebuilt):
     units : tuple of str, length 3
         Units of ``first``, ``second`` and ``values``, such as ``("rad", "rad", "m^2")``; ``"1"``
         where there is none.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> grid = singularity_map(load("rx90"), joints=(1, 2), samples=(5, 7))
-    >>> grid.values.shape, grid.units
-    ((5, 7), ('rad', 'rad', 'm^3'))
     """
 
     model_name: str
@@ -81,6 +79,8 @@ def singularity_map(
 ) -> SingularityMap:
     """Values of a singular factor, or of the determinant, over the ranges of two joints.
 
+    Seed book section 1.3.1.3.
+
     Parameters
     ----------
     model : RobotModel
@@ -97,22 +97,6 @@ def singularity_map(
     ranges : array_like, shape (2, 2), optional
         Lower and upper value of each of the two joints, rad or m; default their limits, and
         from -pi to pi for a revolute joint without.
-
-    Returns
-    -------
-    SingularityMap
-        The two axes and the values.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``joints`` are not two different joints, ``at``, ``samples`` or ``ranges`` do not fit,
-        a prismatic joint has no limits, several or no factors are of the kind, or the robot has
-        no determinant (it is redundant, for instance): choose a factor.
-
-    References
-    ----------
-    Seed book section 1.3.1.3.
 
     Examples
     --------
