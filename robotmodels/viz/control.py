@@ -139,10 +139,9 @@ def _figure(t: Array, panels: Sequence[tuple[str, Array, list[str]]], look: Look
         axes.set_ylabel(label)
         if names not in ([label], shown):  # the same names have the legend of the panel above
             shown, lines = names, axes.get_lines()[-len(names) :]
-            columns = int(_LETTERS / (max(map(len, names)) + 9.0))
-            columns = ceil(len(names) / ceil(len(names) / columns))
-            place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1)}
-            axes.legend(lines, names, ncols=columns, **place)
+            most = int(_LETTERS / (max(map(len, names)) + 9.0))
+            columns = ceil(len(names) / ceil(len(names) / most))
+            axes.legend(lines, names, ncols=columns, loc="lower right", bbox_to_anchor=(1, 1))
     return style.finished(figure, look)
 
 

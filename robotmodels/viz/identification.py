@@ -287,8 +287,7 @@ def plot_excitation(found: ExcitingTrajectory, **look: Unpack[Look]) -> Figure:
     drive, n = model.drive, model.n
     parameters = (model.inertia.values, drive.Ia, drive.Fv, drive.Fc, drive.offset)
     rows = 3 + any(values.any() for values in parameters)  # torques of a robot that has some
-    names, efforts = over_time.joint_names(None, n, model), over_time.effort_units(model)
-    columns = over_time.joints_by_unit(over_time.joint_units(None, n, model))
+    (names, columns), efforts = over_time.joints_of(n, model), over_time.effort_units(model)
     figure, _ = style.panels(PAGE, 2.9 + 1.1 * rows + 0.02 * n, look, rows=0)
     parts: Any = figure.subfigures(2, 1, height_ratios=[1.1 * rows, 1.9])
     grid = parts[0].subplots(rows, len(columns), squeeze=False, sharex=True)

@@ -95,9 +95,14 @@ def joint_units(
     return kinds
 
 
-def joints_by_unit(kinds: Sequence[Unit]) -> dict[Unit, list[int]]:
-    """Numbers of the joints of each unit."""
-    return {u: [j for j, kind in enumerate(kinds) if kind is u] for u in dict.fromkeys(kinds)}
+def joints_of(
+    n: int, model: RobotModel | None, names: Any = None, units: Any = None, degrees: bool = False
+) -> tuple[list[str], dict[Unit, list[int]]]:
+    """Names of joints, and their numbers by units."""
+    kinds = joint_units(units, n, model, degrees)
+    return joint_names(names, n, model), {
+        unit: [j for j, kind in enumerate(kinds) if kind is unit] for unit in dict.fromkeys(kinds)
+    }
 
 
 def effort_units(model: RobotModel) -> list[str]:

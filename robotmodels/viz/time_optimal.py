@@ -104,15 +104,14 @@ def plot_plan(
     t = np.linspace(0.0, plan.duration, _SAMPLES)
     seen = plan.trajectory.at(t)
     n = seen.q.shape[1]
-    names, kinds = over_time.joint_names(None, n, model), over_time.joint_units(None, n, model)
+    names, kinds = over_time.joints_of(n, model)
     figure, grid = style.panels(PAGE, 2.9, look, 2 if model is not None else 1, 2)
     left, right = grid[:, 0], grid[0, 1]
     over_time.lines_over_time(left[0], t, seen.q, names)
     for time in plan.via_times:
         q = plan.trajectory.q(time)
         left[0].plot([time] * n, q, "o", color=INK, markersize=3.0, label="via point")
-    symbols = dict.fromkeys(kind.value for kind in kinds)
-    left[0].set_ylabel(f"position ({' or '.join(symbols)})")
+    left[0].set_ylabel(f"position ({' or '.join(kind.value for kind in kinds)})")
     if model is not None:
         bound = model.table.effort if torque is None else as_reals(torque, "torque")
         if bound.shape not in ((), (n,)):
@@ -202,15 +201,12 @@ def plot_joint_motion(
 def _draw_range(axes: Axes, lower: float, upper: float) -> None:
     """The range of a joint from one limit to the other, with shades beyond."""
     low, high = axes.get_ylim()
-    if np.isfinite(lower) and np.isfinite(upper) and upper > lower:
+    if np.isfinite(upper - lower) and upper > lower:
         margin = _MARGIN * (upper - lower)
         low = min(lower - margin, axes.dataLim.y0 - 0.3 * margin)
         high = max(upper + margin, axes.dataLim.y1 + 0.3 * margin)
         axes.set_yticks([lower, 0.5 * (lower + upper), upper])
         axes.yaxis.set_major_formatter(lambda x, _: f"{x:.3g}".replace("-", "\N{MINUS SIGN}"))
-    else:  # a limit that is far away, or none, is no reason to make the line flat
-        low = lower if np.isfinite(lower) and lower > low else low
-        high = upper if np.isfinite(upper) and upper < high else high
     axes.set_ylim(low, high)
     _shade_beyond(axes, lower, upper)
 

@@ -100,8 +100,7 @@ def plot_trajectory(
     """
     motion = over_time.sampled(trajectory)
     n = motion.n
-    labels = over_time.joint_names(names, n, model)
-    columns = over_time.joints_by_unit(over_time.joint_units(units, n, model))
+    labels, columns = over_time.joints_of(n, model, names, units)
     bounds, shown = over_time.as_limits(limits, n), over_time.as_orders(orders)
     if n == 1 and names is None and model is None:
         labels = ["_joint"]  # one line needs no legend
@@ -170,15 +169,14 @@ def plot_joint_path(
     if not len(style.as_instance(path, JointPath, "path", "joint_path").q):
         raise InvalidValueError("path: there are no poses to draw.")
     n = path.q.shape[1]
-    labels, kinds = over_time.joint_names(names, n, model), over_time.joint_units(units, n, model)
+    labels, columns = over_time.joints_of(n, model, names, units)
     if limits is None and model is not None:
         limits = MotionLimits.of_model(model)
     bounds = over_time.as_limits(limits, n)
     timed = not np.isnan(path.t).any()
     x = path.t if timed else np.arange(len(path.q), dtype=float)
     motion = Sampled(x, np.stack((path.q, path.v)))
-    columns = over_time.joints_by_unit(kinds).items()
-    rows = [(order, *column) for order in range(1 + timed) for column in columns]
+    rows = [(order, *column) for order in range(1 + timed) for column in columns.items()]
     happens = [kind for kind in PathEventKind if path.of_kind(kind)]
     heights = [1.1] * len(rows) + [0.8, 0.16 + 0.17 * max(len(happens), 1)]
     width = COLUMN if n < 5 else 0.5 * (COLUMN + PAGE)

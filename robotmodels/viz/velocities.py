@@ -115,8 +115,7 @@ def plot_inverse_velocities(
     if len(counts) > 1:
         raise ShapeError(f"solutions: expected one robot, got {counts} joints.")
     n = counts[0]
-    joints, kinds = over_time.joint_names(None, n, model), over_time.joint_units(units, n, model)
-    speeds = over_time.joints_by_unit(kinds)
+    joints, speeds = over_time.joints_of(n, model, None, units)
     bounds, unit = over_time.as_limits(limits, n), over_time.as_unit(distance_unit)
     x = unit.factor * x
     below = [k for k in _BELOW if any(method[k] is not None for method in methods.values())]
@@ -244,41 +243,22 @@ def _draw_projection(
     axes: Axes, ellipsoid: Ellipsoid, plane: tuple[int, int], half: float, k: int, label: str
 ) -> None:
     """Border, area and principal axes of the projection on a plane."""
-    U, r = ellipsoid.axes[list(plane)], ellipsoid.radii
-    unbounded = ~np.isfinite(r)
-    points = _border(U, r, unbounded, half)
+    U, r = ellipsoid.axes[list(plane)], np.minimum(ellipsoid.radii, _FAR * half)
+    squares, V = np.linalg.eigh((U * r**2) @ U.T)
+    t = np.linspace(0.0, 2.0 * np.pi, 361)
+    circle = np.stack((np.cos(t), np.sin(t)))
+    points = V @ (np.sqrt(np.maximum(squares, 0.0))[:, None] * circle)
     color = style.line(k)["color"]
-    axes.plot(*points.T, zorder=3, linewidth=1.2, label=label, **style.line(k))
-    axes.fill(*points.T, facecolor=color, alpha=0.10, linewidth=0.0, zorder=2)
-    for u, radius, endless in zip(U.T, r, unbounded, strict=True):
+    axes.plot(*points, zorder=3, linewidth=1.2, label=label, **style.line(k))
+    axes.fill(*points, facecolor=color, alpha=0.10, linewidth=0.0, zorder=2)
+    for u, radius, endless in zip(U.T, r, ~np.isfinite(ellipsoid.radii), strict=True):
         if np.linalg.norm(u) > 1e-6 and radius > 0.0:
-            x, y = np.outer(u, (-1.0, 1.0)) * (_FAR * half if endless else radius)
+            x, y = np.outer(u, (-radius, radius))
             dashes, name = ((0, (6.0, 3.0)), "_unbounded axis") if endless else ("-", "_axis")
             line: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 0.8}
             axes.plot(x, y, alpha=0.8, label=name, **line)
     if not (r > 0).any():
         axes.plot(0.0, 0.0, "o", color=INK, label="_no motion")
-
-
-def _border(U: Array, r: Array, unbounded: Array, half: float) -> Array:
-    """Border of the projection (k, 2): an ellipse, or the strip or plane of unbounded axes.
-
-    Its point with the normal n is ``Q n / sqrt(n^T Q n)``, Q the sum of ``r_i^2 u_i u_i^T``.
-    """
-    t = np.linspace(0.0, 2.0 * np.pi, 181)
-    n = np.stack((np.cos(t), np.sin(t)), axis=-1)
-    Q = (U * np.where(unbounded, 0.0, r) ** 2) @ U.T
-    lengths = np.linalg.norm(U, axis=0)
-    long = [U[:, i] / lengths[i] for i in np.flatnonzero(unbounded & (lengths > 1e-6))]
-    if not long:
-        width = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", n, Q, n), 0.0))
-        return (n @ Q) / np.maximum(width, 1e-9 * half)[:, None]
-    side = np.array((-long[0][1], long[0][0]))
-    far = _FAR * half
-    crossed = max((abs(float(side @ u)) for u in long[1:]), default=0.0) > 1e-6
-    wide = far if crossed else float(np.sqrt(max(side @ Q @ side, 0.0)))
-    corners = np.array(((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)), float)
-    return corners * (far, wide) @ np.array((long[0], side))
 
 
 @style.plot

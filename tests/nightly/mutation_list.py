@@ -1305,7 +1305,7 @@ MUTATIONS = [
         "(slice(0, 3), slice(3, 6))", "(slice(3, 6), slice(0, 3))",
         f"{FIGURES} -k inverse_velocities_are_drawn"),
     Mutation("viz: figures", "an ellipse of a projection has the roots of its radii",
-        "def _border(", "np.where(unbounded, 0.0, r) ** 2", "np.where(unbounded, 0.0, r)",
+        "def _draw_projection(", "(U * r**2)", "(U * r)",
         f"{FIGURES} -k projections"),
     Mutation("viz: figures", "the total torque is its inertial part", "def plot_torque_parts(",
         "parts.total[:, j]", "parts.inertia[:, j]",
