@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -173,34 +173,9 @@ def fit(
     if prior is not None:
         prior = sized(prior, candidates.table.size)
     given_prior = prior
-    identify = partial(identifiable_on, dependent=_DEPENDENT, known_lengths=known_lengths)
-    identifiable = identify(candidates, measured, known=known)
-    _check_enough(identifiable, measured)
-    for attempt in range(1, _TRIES + 1):
-        estimated = identifiable.kept
-        if prior is not None:
-            estimated = estimated_with(prior, identifiable, measured)
-        problem = problem_of(estimated, measured)
-        zero = np.zeros(problem.P)
-        start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-        used = settled_prior(prior, problem, loss, rng)
-        solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
-        insignificant = [] if truncation else _insignificant_parameters(solution, start)
-        identify_there = partial(
-            identify,
-            measurements=measured,
-            known=(*known, *identifiable.of_reason(Reason.NOISE)),
-            corrections=dict(zip(estimated.names, solution.corrections, strict=True)),
-            fixtures=solution.fixtures,
-        )
-        preferred = candidates.preferring(estimated.names)
-        after = identify_there(preferred)
-        wider = None if prior is None else widened(prior, problem, solution.fit)
-        # columns that depend on others at the nominal robot may not at the solution
-        gained = set(after.names) - set(estimated.names) if prior is not None else set()
-        if attempt == _TRIES or not (insignificant or gained or wider is not prior):
-            break
-        prior, identifiable = wider, _adjusted(identifiable, insignificant, gained)
+    solution, identifiable, after, prior, identify = _estimated(
+        candidates, measured, known, known_lengths, prior, loss, truncation, rng
+    )
     expected = given_prior and replace(given_prior, strength=solution.fit.prior.strength)
     contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
     solution = with_outliers(solution, contradicted, expected)
@@ -237,7 +212,7 @@ def fit(
         trials = []
         if in_folds is not None:
             trials = trials_of(
-                structure, solution, preferred, identify_there, parts, in_folds, nominal, step
+                structure, solution, after.candidates, identify, parts, in_folds, nominal, step
             )
         notes.append(note_of_structure(structure, trials, in_folds))
     in_sample = errors_of(solution.problem, solution.corrections, solution.fixture_values)
@@ -259,6 +234,56 @@ def fit(
             *notes_after(solution, identifiable, after),
         ),
     )
+
+
+def _estimated(
+    candidates: GeometricParameters,
+    measured: tuple[Measurement, ...],
+    known: tuple[str, ...],
+    known_lengths: tuple[str, ...],
+    prior: ParameterPrior | None,
+    loss: Loss,
+    truncation: float | None,
+    rng: np.random.Generator,
+) -> tuple[
+    Solution,
+    IdentifiableParameters,
+    IdentifiableParameters,
+    ParameterPrior | None,
+    Callable[[GeometricParameters], IdentifiableParameters],
+]:
+    """Fit of the identifiable and significant parameters, with a prior that suits them.
+
+    Also the identifiable ones at the solution, and the function that gives those of candidates.
+    """
+    identify = partial(identifiable_on, dependent=_DEPENDENT, known_lengths=known_lengths)
+    identifiable = identify(candidates, measured, known=known)
+    _check_enough(identifiable, measured)
+    for attempt in range(1, _TRIES + 1):
+        estimated = identifiable.kept
+        if prior is not None:
+            estimated = estimated_with(prior, identifiable, measured)
+        problem = problem_of(estimated, measured)
+        zero = np.zeros(problem.P)
+        start = np.concatenate([zero, guessed_fixtures(problem, zero)])
+        used = settled_prior(prior, problem, loss, rng)
+        solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
+        insignificant = [] if truncation else _insignificant_parameters(solution, start)
+        identify_there = partial(
+            identify,
+            measurements=measured,
+            known=(*known, *identifiable.of_reason(Reason.NOISE)),
+            corrections=dict(zip(estimated.names, solution.corrections, strict=True)),
+            fixtures=solution.fixtures,
+        )
+        after = identify_there(candidates.preferring(estimated.names))
+        wider = None if prior is None else widened(prior, problem, solution.fit)
+        # columns that depend on others at the nominal robot may not at the solution
+        gained = set(after.names) - set(estimated.names) if prior is not None else set()
+        if attempt == _TRIES or not (insignificant or gained or wider is not prior):
+            break
+        prior, identifiable = wider, _adjusted(identifiable, insignificant, gained)
+    return solution, identifiable, after, prior, identify_there
 
 
 def _held_out(
