@@ -58,12 +58,12 @@ def theirs(model: rm.RobotModel) -> Solve | None:
     def solve(T: Array, _: Array) -> tuple[Array, Flags, Flags]:
         answers = batch(T)
         most = max(len(a.Q) for a in answers)
-        q = np.full((len(answers), most, model.n), np.nan)
+        q: Array = np.full((len(answers), most, model.n), np.nan)
         claimed = np.zeros((len(answers), most), np.bool_)
         for i, a in enumerate(answers):
             q[i, : len(a.Q)] = np.reshape(a.Q, (-1, model.n))
             claimed[i, : len(a.Q)] = ~np.asarray(a.is_LS, np.bool_)
-        there = np.isfinite(q).all(axis=2)
+        there: Flags = np.asarray(np.isfinite(q).all(axis=2), np.bool_)
         return q, there, claimed & there
 
     return solve

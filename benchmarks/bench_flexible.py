@@ -40,7 +40,7 @@ def direct(settings: Settings) -> Iterator[Work]:
         ways = [Contestant(OURS, lambda r=arm, x=(q, e, v, ev, tau): flexible.ddm(r, *x))]
         goals = [at_most(60.0, "us")] if n == 6 else []
         yield Work(f"direct model, {n} links with two modes", "us", ways, goals)
-        many = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]
+        many: Any = [np.tile(x, (100, 1)) for x in (q, e, v, ev, tau)]
         batch = [Contestant(OURS, lambda r=arm, x=many: flexible.ddm(r, *x), 100)]
         yield Work(f"direct model, {n} links with two modes, batch", "us", batch)
 

@@ -153,7 +153,7 @@ def numeric(settings: Settings) -> Iterator[Work]:
     poses = rm.dgm(model, rng.uniform(model.lower, model.upper, (count, model.n)))
 
     def said(found: rm.IGMSolutions) -> str:
-        q, claims = found.closest, found.valid[:, 0]
+        q, claims = np.asarray(found.closest), found.valid[:, 0]
         met = residual(model, poses, q) <= 1.1 * TOLERANCE
         reached, false = (100.0 * float(x.mean()) for x in (claims & met, claims & ~met))
         return f"{reached:.2f} % reached, {false:.2f} % false"

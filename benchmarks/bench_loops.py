@@ -25,7 +25,7 @@ def planar(rows: list[dict], frames: tuple[int, int], actuated: list[int]) -> lo
         np.ones(table.f), np.full((table.f, 3), 0.1), [0.1 * np.eye(3)] * table.f
     )
     tree = rm.RobotModel.from_table(table, bars, gravity=(0.0, -9.81, 0.0))
-    return loops.LoopedRobot(tree, [loops.Closure("pin", frames)], actuated)
+    return loops.LoopedRobot(tree, [loops.Closure("pin", frames)], np.array(actuated))
 
 
 def robots() -> dict[str, tuple[loops.LoopedRobot, Array]]:

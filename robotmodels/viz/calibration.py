@@ -389,5 +389,5 @@ def plot_selection(
         axes.xaxis.get_major_locator().set_params(integer=True, nbins=6)
         if enough is not None:
             axes.axvline(enough, color=INK, zorder=1.5, label=f"enough: {enough}", **DASHED)
-    look["title"] = sentence if look.get("title") is None else look["title"]
+    look["title"] = look.get("title") or sentence
     return style.finished(figure, look, ("each parameter", "largest", "median"))

@@ -113,8 +113,8 @@ def plot_torque_parts(
             raise ShapeError(
                 f"motion: expected one of the {model.n} joints of {model.name!r}, got {samples.n}."
             )
-        times, qva = samples.t, samples.values[:3]
-        parts = torque_parts(model, *qva, wrench, drive, friction)
+        times, (q, v, a) = samples.t, samples.values[:3]
+        parts = torque_parts(model, q, v, a, wrench, drive, friction)
     if not model.n:
         raise InvalidValueError("model: there are no joints to draw.")
     every = range(model.n) if joints is None else joints
@@ -203,13 +203,9 @@ def plot_inertia_map(
     """
     style.as_instance(grid, DynamicsMap, "grid", "dynamics_map")
     n, joints = grid.model.n, grid.joints
-    names, kinds = [
-        [every[j] for j in joints]
-        for every in (
-            over_time.joint_names(None, n, grid.model),
-            over_time.joint_units(None, n, grid.model, degrees),
-        )
-    ]
+    every = over_time.joint_units(None, n, grid.model, degrees)
+    names = [over_time.joint_names(None, n, grid.model)[j] for j in joints]
+    kinds = [every[j] for j in joints]
     if len(joints) > 1:
         (joint,) = style.as_choice([joints[0] if of is None else of], n, "of", "a joint")
         two = np.atleast_1d(list(joints) if pair is None else pair)

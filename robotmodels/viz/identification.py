@@ -114,7 +114,7 @@ def _torques(result: IdentificationResult, log: Log) -> tuple[Array, Array, Arra
     step = max(1, len(log) // _POINTS)
     gap, begin = np.full((2, 1, 3 * log.n), np.nan), None
     parts: list[Any] = []
-    slow: list[tuple[Array, Array]] = []
+    slow: list[Any] = []
     for piece in pieces(log, chosen):
         s = piece_signals(log, chosen, piece, 0)
         tau = predicted_torque(result, s.q, s.v, s.a)
@@ -301,7 +301,8 @@ def plot_excitation(found: ExcitingTrajectory, **look: Unpack[Look]) -> Figure:
             effort = efforts[joints[0]]
             column[3].set_ylabel(f"{'force' if effort == 'N' else 'torque'}\n({effort})")
         column[-1].set_xlabel("time (s)")
-    _draw_search(*parts[1].subplots(1, 2), found)
+    left, right = parts[1].subplots(1, 2)
+    _draw_search(left, right, found)
     look["title"] = look.get("title") or (
         f"{model.name}: condition number {found.condition:.4g}, {found.scaled_condition:.3g} "
         "with scaled columns"

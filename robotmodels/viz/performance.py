@@ -84,8 +84,8 @@ def plot_workspace(w: Workspace, *, curves: bool = True, **look: Unpack[Look]) -
     views = ((0, 2, (1,)), (0, 1, (2,))) if in_space else ((0, 1, ()),)
     for panel, (across, up, along) in zip(grid[0], views, strict=True):
         counts = w.count.reshape(w.shape).max(axis=along).T
-        kind: dict[str, Any] = {"cmap": tints, "norm": norm, "shading": "nearest"}
-        image = panel.pcolormesh(axes[across], axes[up], counts, rasterized=True, **kind)
+        colors: dict[str, Any] = {"cmap": tints, "norm": norm, "shading": "nearest"}
+        image = panel.pcolormesh(axes[across], axes[up], counts, rasterized=True, **colors)
         panel.grid(False)
         panel.set(xlabel=names[across], ylabel=names[up], aspect="equal")
         middles = 0.5 * (norm.boundaries[1:] + norm.boundaries[:-1])

@@ -192,7 +192,8 @@ def jog(model: RobotModel, q: ArrayLike | str | None = None, **options: Any) -> 
     units of the sliders; the page keeps it there, so that a link shows a posture.
     """
     check_model(model)
-    given, first = Options(**({"height": 640} | options)), _named(q, model)
+    options.setdefault("height", 640)
+    given, first = Options(**options), _named(q, model)
     start = coupled_posture(model, None if first is None else as_exact(first, (model.n,), "q"))
     (label,) = _unique_names((model,))
     colors, seen = _colors(given.color, [1])[0], _neighbourhood(model, start)
@@ -257,17 +258,16 @@ def _neighbourhood(model: RobotModel, start: Array) -> Array:
     return np.stack(moved)
 
 
-def _as_models(model: object) -> tuple[RobotModel, ...]:
+def _as_models(model: Any) -> tuple[RobotModel, ...]:
     """One model or several, as a tuple."""
-    models = (model,) if isinstance(model, RobotModel) else model
-    if not isinstance(models, (tuple, list)) or not models:
-        models = (models,)
+    is_list = isinstance(model, (tuple, list)) and len(model) > 0
+    models: tuple[Any, ...] = tuple(model) if is_list else (model,)
     for item in models:
         if not isinstance(item, RobotModel):
             raise InvalidValueError(
                 f"model: expected a RobotModel or a list of them, got {type(item).__name__}."
             )
-    return tuple(models)
+    return models
 
 
 def _as_many(value: Any, model: object, count: int) -> tuple[Any, ...]:
