@@ -223,44 +223,6 @@ def test_solutions_within_limits_are_all_solutions_turned_and_sorted(name, given
     assert (found.count < every.count).any()
 
 
-def test_limits_shift_by_whole_turns_and_drop():
-    rows = rm.load("puma560").table
-    lower, upper = np.array([-3.0, -7, -7, 0.5, -1.5, 7.0]), np.array([3.0, 7, 7, 7.5, 1.5, 13.0])
-    model = rm.RobotModel.from_table(
-        rm.DHTable(
-            antecedent=rows.antecedent, sigma=rows.sigma, alpha=rows.alpha, d=rows.d,
-            theta=rows.theta, r=rows.r, lower=lower, upper=upper,
-        )
-    )  # fmt: skip
-    q = np.random.default_rng(3).uniform(lower, upper, (200, 6))
-    T = rm.dgm(model, q)
-    inside = rm.igm(model, T, q, limits=True)
-    assert np.abs(inside.q[:, 0] - q).max() < 1e-9
-    assert np.all(inside.within_limits == inside.valid)
-    kept = inside.q[inside.valid]
-    assert np.all((kept >= lower - 1e-9) & (kept <= upper + 1e-9))
-    free = rm.igm(model, T)
-    assert np.all(inside.count <= free.count)
-    assert not inside.periodic.any()
-    # nearest to mid-range without a reference
-    middle = rm.igm(model, T, limits=True)
-    way = np.abs(middle.q - 0.5 * (lower + upper))[middle.valid]
-    assert np.all(way[:, 1:3] <= np.pi + 1e-9)
-    # what is within the limits as it stands
-    stands = (free.q >= lower - 1e-9) & (free.q <= upper + 1e-9)
-    np.testing.assert_array_equal(free.within_limits, stands.all(axis=-1) & free.valid)
-    # every posture outside
-    narrow = model.with_table(
-        rm.DHTable(
-            antecedent=rows.antecedent, sigma=rows.sigma, alpha=rows.alpha, d=rows.d,
-            theta=rows.theta, r=rows.r, lower=np.full(6, 0.1), upper=np.full(6, 0.2),
-        )
-    )  # fmt: skip
-    away = rm.igm(narrow, T[:3], limits=True)
-    assert np.all(away.status == rm.IGMStatus.OUTSIDE_LIMITS)
-    assert "limits" in away.reason(1)
-
-
 def test_why_a_pose_has_no_posture():
     model = rm.load("rx90")
     T = rm.dgm(model, [0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
@@ -303,46 +265,6 @@ def test_other_bases_tools_and_signs():
         T = rm.dgm(model, q)
         found = checked(model, T, rm.igm(model, T, q), residual=2e-12)
         assert distance(model, found.q[:, 0], q).max() < 1e-6
-
-
-def test_reversed_arms_agree():
-    """The chain walked from the tool to the base: the same postures, signs and order reversed."""
-    for name in ("rx90", "stanford_arm", "ur5", "crx10ia"):
-        model = rm.load(name)
-        urdf = reversed_arm(model)
-        q = random_q(model, 30, 2)
-        T = rm.dgm(model, q)
-        back = rm.se3.inverse(T)
-        np.testing.assert_allclose(rm.dgm(urdf, -q[:, ::-1]), back, atol=1e-12)
-        a, b = rm.igm(model, T), checked(urdf, back, rm.igm(urdf, back))
-        np.testing.assert_array_equal(a.count, b.count)
-        for i in range(30):
-            for row in a.q[i][a.valid[i]]:
-                assert np.nanmin(distance(urdf, b.q[i], -row[::-1])) < 1e-7
-
-
-def reversed_arm(model):
-    """The arm that leads from the tool to the base, through URDF text."""
-    T = np.array(rm.link_transforms(model.table, np.zeros(model.n)))
-    # from joint frame j + 1 back to joint frame j
-    steps = [rm.se3.inverse(model.tool), *(rm.se3.inverse(t) for t in T[::-1])]
-    sigma = model.table.sigma
-    links = ["<link name='l0'/>"]
-    for j in range(model.n):
-        xyz = steps[j][:3, 3]
-        roll, pitch, yaw = pin.rpy.matrixToRpy(steps[j][:3, :3])
-        kind = "prismatic" if sigma[model.n - 1 - j] else "revolute"
-        numbers = " ".join(f"{v:.17g}" for v in xyz)
-        links.append(
-            f"<link name='l{j + 1}'/><joint name='j{j}' type='{kind}'>"
-            f"<origin xyz='{numbers}' rpy='{roll:.17g} {pitch:.17g} {yaw:.17g}'/>"
-            f"<parent link='l{j}'/><child link='l{j + 1}'/><axis xyz='0 0 1'/>"
-            "<limit lower='-9' upper='9' effort='1' velocity='1'/></joint>"
-        )
-    end = steps[-1] @ rm.se3.inverse(model.base)
-    text = f"<robot name='back'>{''.join(links)}</robot>"
-    urdf = rm.RobotModel.from_urdf(text)
-    return urdf.with_tool(urdf.tool @ end)
 
 
 @pytest.mark.parametrize(
@@ -502,27 +424,6 @@ def test_a_path_through_the_solutions_is_continuous():
         rm.igm(model, T).path(q[0])
     with pytest.raises(ShapeError, match="poses of shape"):
         rm.igm(model, T[0]).path(q[0])
-
-
-@pytest.mark.parametrize(
-    ("word", "mask"),
-    [
-        ("position", (1, 1, 1, 0, 0, 0)),
-        ("xyz", (1, 1, 1, 0, 0, 0)),
-        ("orientation", (0, 0, 0, 1, 1, 1)),
-    ],
-)
-def test_masks_in_words(word, mask):
-    model = rm.load("lab_trr")
-    T = rm.dgm(model, [0.1, 0.2, 0.3])
-    if word == "orientation":
-        with pytest.raises(InvalidValueError, match="position"):
-            rm.igm(model, T, mask="positions")
-        found, same = (rm.igm_numeric(model, T, mask=m, rng=1) for m in (word, mask))
-    else:
-        found, same = (rm.igm(model, T, mask=m) for m in (word, mask))
-    assert found.mask.tolist() == list(map(bool, mask))
-    np.testing.assert_array_equal(found.q, same.q)
 
 
 def test_a_typed_rotation_is_refused_with_the_function_that_mends_it():

@@ -114,21 +114,6 @@ def test_rounded_urdf_numbers(name, digits):
     assert lost(model, found, q)[:100].sum() <= 1
 
 
-@pytest.mark.parametrize("name", ["rx90", "ur5e"])
-def test_one_pose_is_solved_as_many_are(name):
-    model = changed(name, 2)
-    q = configurations(model, 60, seed=3)
-    q[:10, 4] = 0.0
-    T = rm.dgm(model, q)
-    whole = rm.igm(model, T)
-    for n in range(0, 60, 3):
-        one = rm.igm(model, T[n])
-        np.testing.assert_array_equal(one.q, whole.q[n][whole.valid[n]])
-    assert not whole.free_joints.any()
-    assert rm.igm(model, T[:0]).q.shape[::2] == (0, 6)
-    assert not rm.igm(model, rm.se3.translation(30.0, 0.0, 0.0) @ T).count.any()
-
-
 @pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ["rx90", "kr6_r900", "ur5e"])
 @pytest.mark.parametrize("share", [1.0, 0.1, 1e-3])

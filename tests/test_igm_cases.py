@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.igm.closed_form import closed_form_postures, plan_loop
+from robotmodels.igm.constraints import Components
 from robotmodels.igm.kernels.elimination import eigenproblems
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.pose_search import SearchTask, pose_search, search_space
@@ -100,7 +101,7 @@ def test_rotation_vectors_of_the_iteration_keep_their_sign_up_to_half_a_turn(rng
 
     one = JointChain(np.zeros(0, int), np.zeros(0, int), np.eye(4)[None], np.eye(4))
     space = search_space(one, np.zeros(0), np.zeros(0), False, 0, 0)
-    task = SearchTask(np.ones(6, bool), False, Tolerances(), 0, 0)
+    task = SearchTask(Components(), Tolerances(), 0, 0)
     axes = np.vstack((np.eye(3), -np.eye(3), rng.normal(size=(60, 3))))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     for axis in axes:

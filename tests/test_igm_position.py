@@ -116,10 +116,3 @@ def test_first_joint_is_free_where_the_point_is_on_its_axis():
     assert found.free_joints[found.valid].tolist() == [[True, False, False]] * int(found.count)
     assert difference(model, found.nearest(q), q) < 1e-9
     np.testing.assert_allclose(found.q[:, 0], 0.7)
-
-
-def test_out_of_reach():
-    model = arm((0, 0, 0), np.random.default_rng(0))
-    found = rm.igm(model, se3.translation(9.0, 0.0, 0.0), mask=POSITION)
-    assert found.status == rm.IGMStatus.TOO_FAR
-    assert found.count == 0

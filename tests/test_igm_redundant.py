@@ -73,35 +73,6 @@ def test_the_first_joints_that_move_the_tool_take_the_reference(name):
     assert nearest(model, rm.igm(model, T[:1], q[:1]), locked.q[0][None]).max() < 1e-8
 
 
-@pytest.mark.parametrize("name", ["panda", "erd:talos_left_arm", "7R"])
-@pytest.mark.nightly
-def test_where_the_reference_has_no_solution_the_nearest_value_is_taken(name):
-    model = random_arm(7, 3) if name == "7R" else rm.load(name)
-    q = drawn(model, 16, seed=2)
-    T = rm.dgm(model, q)
-    found = met(model, rm.igm(model, T), T)
-    assert np.all(found.count > 0)
-    away = np.flatnonzero(np.nanmin(np.abs(found.q[..., 0]), axis=1) > 1e-9)
-    assert away.size >= 1
-    assert np.all(found.status[away] == rm.IGMStatus.INCOMPLETE)
-    assert "may be missing" in found.reason(int(away[0]))
-    assert np.all(found.free_joints[found.valid][:, 0])
-    for n in away[:2]:
-        value = found.q[n, 0, 0]
-        assert np.ptp(found.q[n, found.valid[n], 0]) < 1e-6
-
-        def exists(at, n=n):
-            return rm.igm(model, T[n], lock={0: at}).status == rm.IGMStatus.REACHED
-
-        # no solution at nearer values on either side, and one as near as rounding allows
-        for share in (0.02, 0.3, 0.6, 0.9, 0.999, 1.0 - 1e-6):
-            assert not exists(share * value)
-            assert not exists(-share * value)
-        assert exists(value + np.sign(value) * 1e-7)
-        alone = rm.igm(model, T[n])
-        np.testing.assert_allclose(alone.q, found.q[n, found.valid[n]], atol=1e-9)
-
-
 def test_a_planar_arm_of_four_joints():
     """Joint 1 takes its reference, or the nearest value at which joints 2 and 3 reach the wrist."""
     l1, l2, l3, l4 = 1.0, 0.4, 0.3, 0.2
@@ -299,16 +270,6 @@ def test_a_rail_out_of_reach_of_its_reference_is_brought_as_near_as_it_gets():
     assert rm.igm(model, T, lock={0: rail + 1e-3}).count > 0
 
 
-def test_a_posture_that_violates_the_relations_is_no_solution():
-    model, values = rm.load("iiwa14"), np.full(7, 0.4)
-    T, one = rm.dgm(model, values), np.eye(7)[3:4]
-    none = rm.igm(model, T, relations=(one, [2.0]))
-    assert none.count == 0
-    assert none.status == rm.IGMStatus.NOT_CONVERGED
-    assert none.reason() == rm.IGMStatus.NOT_CONVERGED.sentence
-    assert rm.igm(model, T, relations=(one, [0.4])).count > 0
-
-
 def test_arms_without_a_moving_joint():
     model, values = rm.load("iiwa14"), np.full(7, 0.4)
     T = rm.dgm(model, values)
@@ -321,42 +282,11 @@ def test_arms_without_a_moving_joint():
     assert rm.igm(still, rm.se3.translation(5, 0, 0)).status == rm.IGMStatus.TOO_FAR
 
 
-def test_no_claim_about_limits_where_a_posture_lies_within():
-    model = rm.load("erd:panda")
-    q = np.random.default_rng(1).uniform(model.lower, model.upper, (200, model.n))
-    found = rm.igm(model, rm.dgm(model, q), limits=True)
-    assert not np.any(found.status == rm.IGMStatus.OUTSIDE_LIMITS)
-    assert np.all(found.count > 0)
-    np.testing.assert_array_equal(found.within_limits, found.valid)
-
-
 @pytest.mark.parametrize("values", [[0.1, 0.2, 1.3, 0.4, 0, 0.6], np.zeros(6)])
 @pytest.mark.filterwarnings("error")
 def test_limits_that_are_infinite(values):
     model = rm.load("rx90")
     assert rm.igm(model, rm.dgm(model, values), limits=True).count > 0
-
-
-@pytest.mark.parametrize("mask", [None, [1, 1, 1, 1, 1, 0]])
-@pytest.mark.parametrize("axes", ["world", "tool"])
-def test_unreachable_poses_of_an_arm_with_parallel_slides(mask, axes):
-    rows = [{"sigma": 1}, {"sigma": 0}, {"sigma": 0, "d": 0.05}, {"sigma": 1, "d": 0.05}]
-    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        T = rm.se3.from_rpy(rng.uniform(-2, 2, 3))
-        T[:3, 3] = rng.uniform(-1, 1, 3)
-        assert rm.igm(model, T, mask=mask, mask_axes=axes).count == 0
-
-
-@pytest.mark.nightly
-def test_a_free_coordinate_may_have_any_value():
-    model = rm.load("rx90")
-    T = np.tile(rm.dgm(model, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]), (2, 1, 1))
-    T[1, 2, 3] += 100.0
-    found = rm.igm(model, T, mask=[0, 1, 0, 1, 1, 1])
-    assert found.count[0] == found.count[1] > 0
-    assert found.status[0] == found.status[1]
 
 
 def test_solutions_by_search_are_incomplete_behind_a_mask():

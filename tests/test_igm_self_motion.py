@@ -8,8 +8,10 @@ import pytest
 
 from robotmodels.igm.families import prepare
 from robotmodels.igm.loop import JointChain, joint_chain
+from robotmodels.igm.motion import jacobians
+from robotmodels.igm.motion import tool_poses as poses
 from robotmodels.igm.postures import no_postures
-from robotmodels.igm.singular import complete, singular_postures
+from robotmodels.igm.singular import complete
 from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.robots import load
 from robotmodels.se3 import inverse
@@ -28,32 +30,6 @@ def arm(name, backwards=False):
             chain.base,
         )
     return chain, prepare(chain)
-
-
-def poses_and_jacobians(chain, q):
-    M = np.zeros((*q.shape, 4, 4))
-    turning = chain.sigma == 0
-    c, s = np.where(turning, np.cos(q), 1.0), np.where(turning, np.sin(q), 0.0)
-    M[..., 0, 0], M[..., 0, 1], M[..., 1, 0], M[..., 1, 1] = c, -s, s, c
-    M[..., 2, 2] = M[..., 3, 3] = 1.0
-    M[..., 2, 3] = np.where(turning, 0.0, q)
-    T = np.broadcast_to(chain.D[0], (*q.shape[:-1], 4, 4))
-    axes, origins = [], []
-    for j in range(chain.k):
-        axes.append(T[..., :3, 2])
-        origins.append(T[..., :3, 3])
-        T = T @ M[..., j, :, :] @ chain.D[j + 1]
-    J = np.zeros((*q.shape[:-1], 6, chain.k))
-    for j in range(chain.k):
-        J[..., :3, j] = axes[j]
-        if turning[j]:
-            J[..., :3, j] = np.cross(axes[j], T[..., :3, 3] - origins[j])
-            J[..., 3:, j] = axes[j]
-    return T, J
-
-
-def poses(chain, q):
-    return poses_and_jacobians(chain, q)[0]
 
 
 def missing(U, T):
@@ -82,7 +58,7 @@ def searched(chain, U, free, values, rng, starts=400):
     q, rest = draw(chain, starts, rng), ~free
     q[:, free] = values
     for _ in range(50):
-        T, J = poses_and_jacobians(chain, q)
+        T, J = poses(chain, q), jacobians(chain, q)
         step = (np.linalg.pinv(J[:, :, rest], rcond=1e-9) @ missing(U, T)[..., None])[..., 0]
         largest = np.abs(step).max(axis=1)[:, None]
         q[:, rest] += step * np.minimum(1.0, 0.5 / np.maximum(largest, 1e-9))
@@ -101,7 +77,6 @@ def settled(chain, solver, q, reference):
     U = poses(chain, q)
     references = np.full(q.shape, reference)
     found = postures(solver, U, references, TOLERANCES)
-    found.family[...] |= singular_postures(chain, found)[1]
     out = complete(chain, U, found, references, TOLERANCES)
     assert np.all(np.diff(out.valid.astype(int), axis=1) <= 0)
     n, r = np.nonzero(out.valid)
@@ -188,15 +163,6 @@ def shoulder_singular(chain, N, rng):
     return q
 
 
-def test_joint_one_is_free_on_a_singular_shoulder(rng):
-    chain, solver = arm("rx90")
-    q = shoulder_singular(chain, 4, rng)
-    _, found, out = settled(chain, solver, q, 0.3)
-    np.testing.assert_array_equal(found.q, out.q)
-    assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
-    assert np.all(out.moving[out.family] == [1, 0, 0, 1, 1, 1])
-
-
 @pytest.mark.parametrize("wrist", [0.0, 0.7])
 def test_a_singular_shoulder_from_the_other_end(wrist, rng):
     chain, solver = arm("rx90", backwards=True)
@@ -255,7 +221,7 @@ def test_the_nearest_value_where_the_reference_is_out_of_reach(rng):
     assert len(short) > 1
     for n, r in short:
         # at a turning point the Jacobian of the other joints is singular
-        J = poses_and_jacobians(chain, out.q[n, r])[1]
+        J = jacobians(chain, out.q[n, r][None])[0]
         assert np.linalg.svd(J[:, 1:])[1][-1] < 1e-6
         closer = out.q[n, r, 0] + 1e-3 * np.sign(
             np.remainder(2.5 - out.q[n, r, 0] + np.pi, 2 * np.pi) - np.pi
@@ -288,37 +254,9 @@ def test_double_roots(rng):
     q = draw(chain, 3, rng)
     q[1, 2] = -np.pi / 2  # stretched
     q[2, 2], q[2, 4] = -np.pi / 2, 0.0  # and a wrist aligned: half of them are a family
-    U = poses(chain, q)
-    found = postures(solver, U, np.zeros((3, 6)), TOLERANCES)
-    double = singular_postures(chain, found)[0]
-    assert not double[~found.valid].any()
-    assert not double[0].any()
-    np.testing.assert_array_equal(double[1], found.valid[1])
-    np.testing.assert_array_equal(double[2], found.valid[2] & ~found.family[2])
+    out = settled(chain, solver, q, 0.0)[2]
+    assert not out.double[~out.valid].any()
+    assert not out.double[0].any()
+    np.testing.assert_array_equal(out.double[1], out.valid[1])
     # a singular shoulder is a family, no double root
-    q = shoulder_singular(chain, 2, rng)
-    found = postures(solver, poses(chain, q), np.zeros((2, 6)), TOLERANCES)
-    assert not singular_postures(chain, found)[0].any()
-
-
-def test_no_family_costs_nothing(rng):
-    chain, solver = arm("rx90")
-    q = draw(chain, 4, rng)
-    U = poses(chain, q)
-    found = postures(solver, U, np.zeros((4, 6)), TOLERANCES)
-    out = complete(chain, U, found, np.zeros((4, 6)), TOLERANCES)
-    assert out.q is found.q
-    assert not out.moving.any()
-    empty = complete(chain, U[:0], no_postures(0, 8, 6), np.zeros((0, 6)), TOLERANCES)
-    assert empty.moving.shape == (0, 8, 6)
-
-
-def test_a_wrong_mark_is_taken_back(rng):
-    chain, solver = arm("rx90")
-    q = draw(chain, 1, rng)
-    U = poses(chain, q)
-    found = postures(solver, U, np.zeros((1, 6)), TOLERANCES)
-    found.family[...] = found.valid
-    out = complete(chain, U, found, np.zeros((1, 6)), TOLERANCES)
-    assert not out.family.any()
-    np.testing.assert_allclose(np.sort(out.q[0], axis=0), np.sort(found.q[0], axis=0), atol=1e-12)
+    assert not settled(chain, solver, shoulder_singular(chain, 2, rng), 0.0)[2].double.any()

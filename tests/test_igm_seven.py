@@ -10,7 +10,8 @@ from robotmodels import se3
 from robotmodels.igm import igm
 from robotmodels.igm.arm_angle import arm_angle_of, arm_angle_postures, prepare_arm_angle
 from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.solver import Tolerances, postures
+from robotmodels.igm.motion import tool_poses
+from robotmodels.igm.solver import Tolerances
 from robotmodels.kinematics import dgm
 from robotmodels.robots import load
 
@@ -21,17 +22,8 @@ ARMS = (
 
 
 def poses(chain, q):
-    """Tool in R_0 at ``q (..., k)``, straight from the constants."""
-    M = np.zeros((*q.shape, 4, 4))
-    turning = chain.sigma == 0
-    c, s = np.where(turning, np.cos(q), 1.0), np.where(turning, np.sin(q), 0.0)
-    M[..., 0, 0], M[..., 0, 1], M[..., 1, 0], M[..., 1, 1] = c, -s, s, c
-    M[..., 2, 2] = M[..., 3, 3] = 1.0
-    M[..., 2, 3] = np.where(turning, 0.0, q)
-    T = np.broadcast_to(chain.D[0], (*q.shape[:-1], 4, 4))
-    for k in range(chain.k):
-        T = T @ M[..., k, :, :] @ chain.D[k + 1]
-    return T
+    """Tool in R_0 at ``q (..., k)``."""
+    return tool_poses(chain, q.reshape(-1, chain.k)).reshape(*q.shape[:-1], 4, 4)
 
 
 def random_rotation(rng):
@@ -144,24 +136,6 @@ def test_all_postures_at_the_arm_angle_of_a_posture(name):
     assert np.abs(wrong).max() < (1e-7 if "icub" in name else 1e-11)
 
 
-@pytest.mark.parametrize("name", ["iiwa14", "erd:icub_left_arm", "random", "random skew"])
-def test_arrays_of_arm_angles_and_batches_are_what_their_parts_are(name):
-    chain, solver = arm(name)
-    q = random_postures(20, seed=2)
-    psi = np.random.default_rng(3).uniform(-np.pi, np.pi, (20, 7))
-    found = solved(name, q, psi=psi)
-    for n in (0, 7, 19):
-        for a in (0, 6):
-            alone = at_angles(solver, poses(chain, q[n : n + 1]), [psi[n, a]])
-            np.testing.assert_array_equal(alone.q[0, 0], found.q[n, a])
-            np.testing.assert_array_equal(alone.valid[0, 0], found.valid[n, a])
-    shared = at_angles(solver, poses(chain, q), psi[3])
-    np.testing.assert_array_equal(shared.q[3], found.q[3])
-    # as a family: the reference says which arm angle
-    family = postures(solver, poses(chain, q), q, Tolerances())
-    np.testing.assert_array_equal(family.q, solved(name, q, references=q).q[:, 0])
-
-
 @pytest.mark.parametrize("name", ["iiwa14", "random", "random level"])
 def test_the_arm_angle_is_where_the_elbow_is(name):
     """Measured on the chain itself: the foot of the shoulder on axis 4, about the line."""
@@ -185,17 +159,6 @@ def test_the_arm_angle_is_where_the_elbow_is(name):
     plane, elbow = across(np.broadcast_to([0.0, 0.0, 1.0], line.shape)), across(E - S)
     measured = np.arctan2(np.sum(np.cross(plane, elbow) * line, axis=-1), np.sum(plane * elbow, -1))
     assert np.abs(turn(measured - psi)).max() < 1e-9
-
-
-def test_the_arm_angle_goes_round_without_a_jump():
-    chain, solver = arm("iiwa14")
-    q = random_postures(30, seed=5)
-    psi = np.linspace(-np.pi, np.pi, 721)
-    found = at_angles(solver, poses(chain, q), psi)
-    # the same branch at the next angle is never far; at the end the circle closes
-    step = gaps(found.q[:, 1:, :, None].swapaxes(2, 3), found.q[:, :-1]).min(axis=-1)
-    assert np.median(step) < 0.02
-    assert np.max(np.abs(turn(found.q[:, 0] - found.q[:, -1]))) < 1e-9
 
 
 # --- singular postures ---------------------------------------------------------------------------
@@ -270,21 +233,6 @@ def test_both_branches_beside_an_aligned_joint(joint, tiny):
         assert there.any(axis=1).all()
 
 
-@pytest.mark.parametrize("tiny", [1e-12, 1e-10, 1e-9, 3e-8, 2e-6, 1e-5, 1e-4, 1e-3])
-def test_both_branches_beside_the_stretched_elbow(tiny):
-    q = random_postures(60, seed=8)
-    q[:, 5] = 1.0
-    q[:, 3] = np.where(np.arange(60) % 2, tiny, -tiny)
-    found = solved("iiwa14", q, references=q)
-    rows = found.q[:, 0]
-    assert np.nanmin(gaps(rows, q), axis=1).max() < max(3e-16 / tiny, 2e-7) * 4
-    for sign in (1, -1):
-        # the pose says the square of the angle
-        gap = np.abs(rows[..., 3] ** 2 - tiny**2)
-        on_side = (sign * rows[..., 3] > 0) | (tiny < 1e-7)
-        assert np.nanmin(np.where(on_side, gap, np.nan), axis=1).max() < 2e-14
-
-
 def test_a_wrist_in_the_shoulder_keeps_the_upper_arm_at_the_reference():
     chain, solver = arm("iiwa14")
     D = np.array(chain.D)
@@ -302,38 +250,6 @@ def test_a_wrist_in_the_shoulder_keeps_the_upper_arm_at_the_reference():
 
 
 # --- out of reach, unusual -----------------------------------------------------------------------
-
-
-def test_out_of_reach_and_not_finite():
-    chain, solver = arm("iiwa14")
-    q = random_postures(20, seed=9)
-    U = poses(chain, q)
-    far = U.copy()
-    far[:, :3, 3] += 5.0
-    assert not at_angles(solver, far, [0.0]).valid.any()
-    U[3, 0, 3], U[5, 1, 1] = np.nan, np.inf
-    found = at_angles(solver, U, [0.3])
-    assert not found.valid[[3, 5]].any()
-    assert found.valid[np.setdiff1d(np.arange(20), [3, 5])].all()
-    assert at_angles(solver, U[:0], np.zeros((0, 4))).q.shape == (0, 4, 8, 7)
-
-
-def test_stretched_within_the_tolerance_is_reached_and_beyond_is_not():
-    chain, solver = arm("iiwa14")
-    q = random_postures(50, seed=10)
-    q[:, 3] = 0.0
-    U = poses(chain, q)
-    line = (U @ np.append(solver.wrist, 1.0))[:, :3] - solver.shoulder
-    line /= np.linalg.norm(line, axis=1, keepdims=True)
-    for overshoot, tolerance, reached in (
-        (1e-15, 1e-9, True), (5e-10, 1e-9, True), (1e-8, 1e-9, False), (5e-5, 1e-4, True),
-        (2e-4, 1e-4, False),
-    ):  # fmt: skip
-        V = U.copy()
-        V[:, :3, 3] += overshoot * line
-        found = at_angles(solver, V, [0.4], q, Tolerances(tolerance, 1e-9))
-        assert found.valid.any(axis=-1).all() == reached
-        assert found.valid.any() == reached
 
 
 def test_other_arms_have_no_arm_angle():

@@ -7,7 +7,6 @@ import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.igm import IGMSolutions, IGMStatus
-from robotmodels.igm.solutions import posture_distance
 
 NAN = np.nan
 
@@ -33,25 +32,6 @@ def solutions(**changes):
     return IGMSolutions(**{**fields, **changes})
 
 
-def empty_batch(S):
-    return IGMSolutions(
-        q=np.empty((0, S, 2)), valid=np.empty((0, S)), residual=np.empty((0, S)),
-        within_limits=np.empty((0, S)), code=np.empty((0, S)), labels=("front",),
-        status=np.empty(0),
-        double=np.empty((0, S)), free_joints=np.empty((0, S, 2)),
-        family_joints=np.empty((0, S, 2)), method="by hand", periodic=[True, True],
-    )  # fmt: skip
-
-
-def test_statuses():
-    """Small numbers with sentences that differ; zero and one are successes."""
-    assert len({status.sentence for status in IGMStatus}) == len(IGMStatus)
-    assert all(status.sentence.endswith(".") for status in IGMStatus)
-    assert all(np.int8(status) == status for status in IGMStatus)
-    assert IGMStatus(3) is IGMStatus.TOO_FAR
-    assert pickle.loads(pickle.dumps(IGMStatus.TOO_FAR)) is IGMStatus.TOO_FAR
-
-
 def test_fields_are_typed_and_frozen():
     found = solutions()
     assert found.status.dtype == np.int8
@@ -62,13 +42,6 @@ def test_fields_are_typed_and_frozen():
             getattr(found, name)[...] = 0
     with pytest.raises(AttributeError):
         found.q = None
-
-
-def test_fields_must_fit():
-    with pytest.raises(ShapeError, match="valid: expected shape"):
-        solutions(valid=np.ones((3, 3), bool))
-    with pytest.raises(ShapeError, match="error"):
-        solutions(error=np.zeros((3, 6)))
 
 
 def test_reasons():
@@ -117,42 +90,6 @@ def test_nearest():
             found.nearest(wrong)
 
 
-@pytest.mark.parametrize("S", [0, 1, 2])
-def test_empty_batches(S):
-    found = empty_batch(S)
-    assert found.count.shape == (0,)
-    assert found.nearest([0, 0]).shape == (0, 2)
-    assert "0 postures for 0 poses" in repr(found)
-
-
-def test_no_solution_at_all():
-    """S may be 0: then nearest is NaN."""
-    found = IGMSolutions(
-        q=np.empty((0, 2)), valid=np.empty(0), residual=np.empty(0), within_limits=np.empty(0),
-        code=np.empty(0), labels=("front",), status=IGMStatus.TOO_NEAR, double=np.empty(0),
-        free_joints=np.empty((0, 2)), family_joints=np.empty((0, 2)), method="by hand",
-        periodic=[True, True],
-    )  # fmt: skip
-    assert found.count == 0
-    assert np.isnan(found.nearest([0, 0])).all()
-    assert found.reason() == IGMStatus.TOO_NEAR.sentence
-
-
-def test_repr_is_for_people():
-    text = repr(solutions())
-    assert text.splitlines()[0] == "<IGMSolutions: 3 postures for 3 poses, method 'by hand'>"
-    assert "pose 0: The pose is reached." in text
-    assert "front  residual 1.0e-14" in text
-    assert "back  residual 1.0e-14, outside the limits" in text
-    many = solutions(
-        **{name: np.concatenate([getattr(solutions(), name)] * 4) for name in (
-            "q", "valid", "residual", "within_limits", "code", "status", "double", "free_joints",
-            "family_joints")}
-    )  # fmt: skip
-    assert len(repr(many).splitlines()) == 4
-    assert "4 x The position is out of reach: too far." in repr(many)
-
-
 def test_pickles_stay_read_only():
     found = solutions(error=np.zeros((3, 2, 6)), closest=np.zeros((3, 2)))
     again = pickle.loads(pickle.dumps(found))
@@ -164,10 +101,3 @@ def test_pickles_stay_read_only():
             assert not b.flags.writeable
         else:
             assert a == b
-
-
-def test_distance_between_postures():
-    a, b = np.array([[3.0, 1.0], [0.0, 0.0]]), np.array([-3.0, 1.0])
-    np.testing.assert_allclose(posture_distance(a, b, np.array([True, True])),
-                               [2 * np.pi - 6, np.hypot(3, 1)])  # fmt: skip
-    assert posture_distance(a, b, np.array([False, True]))[0] == 6

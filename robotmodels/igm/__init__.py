@@ -15,9 +15,4 @@ from .numeric import igm_numeric
 from .solutions import IGMSolutions
 from .status import IGMStatus
 
-__all__ = [
-    "IGMSolutions",
-    "IGMStatus",
-    "igm",
-    "igm_numeric",
-]
+__all__ = ["IGMSolutions", "IGMStatus", "igm", "igm_numeric"]

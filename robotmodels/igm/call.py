@@ -16,11 +16,10 @@ from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
 from .chain import far_along_rails
 from .check import checked
-from .constraints import Components, asked_jacobians, constraints
+from .constraints import Components, constraints
 from .families import may_miss_solutions
 from .known import KnownArm, known_arm, solver_for
 from .loop import JointChain
-from .motion import lever
 from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
 from .postures import Postures, no_postures
 from .redundant import Redundant
@@ -86,18 +85,19 @@ def solved(
         above_zero(position_tolerance, "position_tolerance"),
         above_zero(orientation_tolerance, "orientation_tolerance"),
     )
-    task = Task(
-        mask=tuple(as_mask(mask).tolist()),
-        in_tool_axes=mask_axes == "tool",
-        locks=locks_of(model, lock),
-        by_arm_angle=arm_angle is not None,
-        relations=relations_of(model, relations),
-    )
     if relations is not None and not mask is lock is arm_angle is None:
         raise InvalidValueError(
             "relations: not together with mask, lock or arm_angle; a locked joint is a "
             "relation too, with a single 1 in its row."
         )
+    locks, related = relations_of(model, relations)
+    task = Task(
+        mask=tuple(as_mask(mask).tolist()),
+        in_tool_axes=mask_axes == "tool",
+        locks=locks or locks_of(model, lock),
+        by_arm_angle=arm_angle is not None,
+        relations=related,
+    )
     if quick is None or quick.most == NEEDS_CHECK:
         batch, poses, references = _checked(model, T, q_ref, bool(limits))
     else:  # the kernel has found them proper
@@ -331,9 +331,8 @@ def moving_joints(chain: JointChain, task: Task, U: Array, found: Postures) -> N
     n, s = np.nonzero(found.family & found.valid)
     if n.size == 0:
         return moving
-    components = Components(task.mask, task.in_tool_axes)
-    J = asked_jacobians(chain, U[n], found.q[n, s], components)
-    J[:, : sum(task.mask[:3])] /= lever(chain)
+    wanted = constraints(chain, Components(task.mask, task.in_tool_axes))
+    J = wanted.jacobians(U[n], found.q[n, s])
     _, sizes, rows = np.linalg.svd(J)
     rank = np.sum(sizes > 1e-6 * sizes[:, :1], axis=1)
     null = np.where((np.arange(chain.k) >= rank[:, None])[..., None], rows, 0.0)

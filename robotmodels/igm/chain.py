@@ -15,8 +15,6 @@ from .loop import JointChain
 
 NO_COLUMN = -1
 """`JointChain.columns` of a virtual joint."""
-
-
 BESIDE = 4.0
 """Distance along rails, in lengths of the arm, up to which a pose is solved where it is."""
 

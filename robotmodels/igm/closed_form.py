@@ -15,7 +15,7 @@ from .._arrays import Array
 from .check import CHUNK, checked
 from .loop import JointChain
 from .postures import Postures
-from .solver import Tolerances, postures
+from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
 from .structure import Family, LoopPlan, plan_loop
 
 __all__ = ["MOST", "ClosedForm", "closed_form_postures", "plan_loop"]
@@ -44,23 +44,24 @@ def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
     return None if plan is None else ClosedForm(chain, plan)
 
 
+@prepare_alike.register
+def _(known: ClosedForm, chain: JointChain, prepare: Prepare) -> Solver | None:
+    return prepare_closed_form(chain) or prepare(chain)
+
+
 @postures.register
 def _(solver: ClosedForm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     return closed_form_postures(solver.plan, solver.chain, U, references, tolerances)
 
 
 def closed_form_postures(
-    plan: LoopPlan,
-    chain: JointChain,
-    U: Array,
-    references: Array,
-    tolerances: Tolerances = DEFAULT,
+    plan: LoopPlan, chain: JointChain, U: Array, references: Array, tolerances: Tolerances = DEFAULT
 ) -> Postures:
     """All real postures of a six-joint arm that has a closed form.
 
     Shapes: U (N, 4, 4), references (N, 6).
     """
-    from ._parallel import parallel_postures
+    from .kernels.parallel import parallel_postures
     from .kernels.pieper import concurrent_postures, scratch
 
     N = len(U)
@@ -72,22 +73,19 @@ def closed_form_postures(
     wanted = np.ascontiguousarray(wanted[:, plan.order])
     found, counts = np.zeros((N, MOST, 6)), np.zeros(N, np.int64)
     marks, work = np.zeros((N, MOST), np.int64), scratch()
-    if plan.family is Family.CONCURRENT:
-        pose = se3.inverse(poses) if plan.inverted else poses
+    pose = se3.inverse(poses) if plan.inverted else poses
+    for start in range(0, N, CHUNK):
+        rows = slice(start, start + CHUNK)
+        links = np.tile(plan.constants, (len(pose[rows]), 1, 1, 1))
+        links[:, plan.slot] = plan.left @ pose[rows] @ plan.right
+        out = wanted[rows], work, found[rows], marks[rows], counts[rows]
+        if plan.family is Family.PARALLEL:
+            parallel_postures(links, plan.size, slack, *out)
+            continue
         pair, kinds = se3.inverse(plan.constants[1::-1]), np.ascontiguousarray(plan.sigma[:3])
-        for start in range(0, N, CHUNK):
-            rows = slice(start, start + CHUNK)
-            links = np.tile(plan.constants, (len(pose[rows]), 1, 1, 1))
-            links[:, plan.slot] = plan.left @ pose[rows] @ plan.right
-            concurrent_postures(
-                links, pair, int(plan.backwards), kinds, plan.meeting, plan.size, slack,
-                wanted[rows], work, found[rows], marks[rows], counts[rows],
-            )  # fmt: skip
-    else:
-        parallel_postures(
-            poses, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted),
-            plan.size, slack, wanted, work, found, marks, counts,
-        )  # fmt: skip
+        concurrent_postures(
+            links, pair, int(plan.backwards), kinds, plan.meeting, plan.size, slack, *out
+        )
     there = (np.arange(MOST) < counts[:, None]) & finite[:, None]
     q, free = np.empty(found.shape), np.empty(found.shape, np.bool_)
     q[..., plan.order] = plan.sense * found

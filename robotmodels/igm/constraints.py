@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import reduce
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, reduce
 from math import gcd
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
-from ..se3.orientation import quaternions_of, rotation_vectors_of
+from .._arrays import Array, read_only
 from .loop import JointChain
-from .motion import cross, jacobians, lever, poses_and_jacobians, tool_poses
+from .motion import lever
+
+if TYPE_CHECKING:
+    from .kernels.damped import Problem
+
+PATH = (1e-10, 1e-10)
+"""Errors of configurations on a self-motion [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,80 +50,75 @@ def mask_axes(chain: JointChain, U: Array, components: Components) -> Array:
     return np.broadcast_to(chain.base[:3, :3].T, (len(U), 3, 3))
 
 
-def asked_errors(
-    chain: JointChain, U: Array, q: Array, components: Components
-) -> tuple[Array, Array]:
-    """Lengths of the errors of the asked translations [m] and rotations [rad], each (N,)."""
-    P, asked = tool_poses(chain, q), np.array(components.asked)
-    rows = np.swapaxes(mask_axes(chain, U, components), 1, 2)
-    rotation = rotation_vectors_of(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
-    errors = [
-        (rows[:, wanted] @ vector[..., None])[..., 0]
-        for wanted, vector in ((asked[:3], U[:, :3, 3] - P[:, :3, 3]), (asked[3:], rotation))
-    ]
-    return np.linalg.norm(errors[0], axis=1), np.linalg.norm(errors[1], axis=1)
-
-
-def asked_jacobians(chain: JointChain, U: Array, q: Array, components: Components) -> Array:
-    """Jacobians of the asked components, at configurations that meet them, shape (N, a, k)."""
-    J = jacobians(chain, q)
-    axes = np.swapaxes(mask_axes(chain, U, components), 1, 2)
-    return np.concatenate([axes @ J[:, :3], axes @ J[:, 3:]], axis=1)[:, np.array(components.asked)]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Constraints:
-    """Asked components of a pose and relations ``A q = b``. Shapes: A (m, k), b, period (m,)."""
+    """Asked components of a pose and relations ``A q = b``. Shapes: A (m, k), b (m,).
+
+    ``length`` is the unit of lengths in which errors are compared [m].
+    """
 
     chain: JointChain
     components: Components
     A: Array
     b: Array
-    length: float = field(default=1.0)
+    length: float
 
     @property
-    def period(self) -> Array:
-        """Periods of the relations: with whole coefficients of angles they hold modulo a turn."""
-        period = np.zeros(len(self.A))
-        for i, row in enumerate(self.A[:, self.chain.sigma == 0]):
-            used = row[row != 0.0]
-            if used.size and np.array_equal(used, np.round(used)) and np.abs(used).max() < 1e6:
-                period[i] = 2.0 * np.pi * reduce(gcd, (int(abs(a)) for a in used))
-        return period
+    def weight(self) -> Array:
+        """Weights (6 + m,) of the errors: of the asked components, 0 for the others; relations."""
+        pose = np.where(self.components.asked, [1.0 / self.length] * 3 + [1.0] * 3, 0.0)
+        return np.concatenate([pose, np.ones(len(self.b))])
 
-    def relation_errors(self, q: Array) -> Array:
-        """``b - A q`` modulo the periods, shape (N, m)."""
-        r, period = self.b - q @ self.A.T, self.period
-        turn = np.where(period > 0.0, period, 1.0)
-        return np.where(period > 0.0, r - turn * np.round(r / turn), r)
+    def descents(
+        self,
+        U: Array,
+        starts: Array,
+        steps: int,
+        patience: float,
+        held: Sequence[int] = (),
+        weight: Array | None = None,
+        bounds: Array | None = None,
+        tolerances: tuple[float, float] = PATH,
+    ) -> tuple[Array, Array, Array]:
+        """Configurations by Levenberg-Marquardt, their errors and minus the derivative of these.
 
-    def linearised(self, U: Array, q: Array) -> tuple[Array, Array]:
-        """Errors (N, r) and their Jacobians (N, r, k): lengths in units of the arm.
-
-        An error of rotation is twice a component of the quaternion of ``R_desired R^T``: where
-        rotations are freed it vanishes exactly where that component of the rotation vector does.
+        Shapes: U (N, 4, 4), starts (N, R, k), which are tried until one meets the constraints;
+        bounds (2, k) -> (N, k), (N, 6 + m), (N, 6 + m, k).
         """
-        P, J = poses_and_jacobians(self.chain, q)
-        axes = np.swapaxes(mask_axes(self.chain, U, self.components), 1, 2)
-        translations, rotations = (np.array(part) for part in _halves(self.components.asked))
-        across, about = axes[:, translations], axes[:, rotations]
-        away = (across @ (U[:, :3, 3] - P[:, :3, 3])[..., None])[..., 0] / self.length
-        Q = quaternions_of(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
-        turned = 2.0 * (about @ Q[:, 1:, None])[..., 0]
-        # (c, v) becomes (c, v) (1, -w/2) where the tool turns by w
-        rows = Q[:, :1, None] * about + cross(about, Q[:, None, 1:])
-        linear = np.broadcast_to(self.A, (len(q), *self.A.shape))
-        return (
-            np.concatenate([away, turned, self.relation_errors(q)], axis=1),
-            np.concatenate([across @ J[:, :3] / self.length, rows @ J[:, 3:], linear], axis=1),
-        )
+        from .kernels.damped import damped_searches
+
+        N, _, k = starts.shape
+        rows = 6 + len(self.b)
+        problem = _problem(self)._replace(tolerance=read_only(tolerances))
+        if len(held):
+            problem = problem._replace(held=read_only(np.isin(np.arange(k), held), np.int64))
+        if weight is not None:
+            problem = problem._replace(weight=read_only(weight))
+        if bounds is not None:
+            problem = problem._replace(bounds=read_only(bounds))
+        q, e, J = np.empty((N, k)), np.empty((N, rows)), np.empty((N, rows, k))
+        axes = np.ascontiguousarray(mask_axes(self.chain, U, self.components))
+        goals, starts = np.ascontiguousarray(U), np.ascontiguousarray(starts)
+        damped_searches(problem, goals, axes, starts, steps, patience, q, e, J)
+        return q, e, J
+
+    def jacobians(self, U: Array, q: Array) -> Array:
+        """Minus the derivative of the asked errors, lengths in units of the arm, (N, r, k)."""
+        J, weight = self.descents(U, q[:, None], 0, 1.0)[2], self.weight
+        return (weight[:, None] * J)[:, weight > 0.0]
+
+    def sizes(self, e: Array) -> tuple[Array, Array]:
+        """Position [m] and angle [rad] that are missing, of errors (N, 6 + m), each (N,)."""
+        x, y, z, a, b, c = (e[:, :6] * self.components.asked).T
+        return np.hypot(np.hypot(x, y), z), np.hypot(np.hypot(a, b), c)
 
     def met(
         self, U: Array, q: Array, tolerances: tuple[float, float]
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Residuals [m or rad] and whether configurations meet the constraints, each (N,)."""
-        away, turned = asked_errors(self.chain, U, q, self.components)
-        related = np.abs(self.relation_errors(q)).max(axis=1, initial=0.0) <= 1e-9
+        e = self.descents(U, q[:, None], 0, 1.0)[1]
+        away, turned = self.sizes(e)
+        related = np.abs(e[:, 6:]).max(axis=1, initial=0.0) <= 1e-9
         residual = np.maximum(away, turned)
         return residual, (away <= tolerances[0]) & (turned <= tolerances[1]) & related
 
@@ -126,8 +128,23 @@ def constraints(chain: JointChain, components: Components = WHOLE) -> Constraint
     return Constraints(chain, components, np.zeros((0, chain.k)), np.zeros(0), lever(chain))
 
 
-def _halves(asked: tuple[bool, ...]) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
-    return asked[:3], asked[3:]
+@lru_cache(maxsize=64)
+def _problem(wanted: Constraints) -> Problem:
+    """The constraints as the kernel takes them."""
+    from .kernels.damped import Problem
+
+    chain, period = wanted.chain, np.zeros(len(wanted.b))
+    # a relation with whole coefficients of angles holds modulo a turn
+    for i, row in enumerate(wanted.A[:, chain.sigma == 0]):
+        used = row[row != 0.0]
+        if used.size and np.array_equal(used, np.round(used)) and np.abs(used).max() < 1e6:
+            period[i] = 2.0 * np.pi * reduce(gcd, (int(abs(a)) for a in used))
+    anywhere = np.repeat([[-np.inf], [np.inf]], chain.k, axis=1)
+    unit = np.where(chain.sigma == 0, 1.0, 1.0 / wanted.length)
+    numbers = [wanted.weight, wanted.A, wanted.b, period, PATH, anywhere, unit]
+    held = read_only(np.zeros(chain.k), np.int64)
+    sigma = read_only(chain.sigma, np.int64)
+    return Problem(sigma, read_only(chain.D), *map(read_only, numbers), held)
 
 
 def in_half_open_turn(sigma: NDArray[np.int64], q: Array) -> Array:

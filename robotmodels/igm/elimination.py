@@ -2,7 +2,7 @@
 
 The method needs no special axes, and is the worse the more special they are: with a spherical
 wrist or three parallel axes its equations become dependent. Pieper's and Paul's methods serve
-those arms; `EliminationArm.well_conditioned` tests whether this one may. Near singular poses
+those arms; a self-test tells whether this one may. Near singular poses
 solutions may be missing: the partner of a fold is predicted, self-motions are not followed.
 
 References
@@ -23,12 +23,12 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, read_only
 from .chain import canonical_frames
 from .check import checked
+from .closed_form import prepare_closed_form
 from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
 from .postures import Postures
-from .singular import singular_postures
-from .solver import Tolerances, postures
+from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
 
 MOST = 16  # solutions a six-joint arm can have at one pose
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
@@ -37,7 +37,7 @@ TESTS = 48  # random poses of the self-test
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EliminationArm:
-    """Six-joint arm solved by elimination, with the results of its self-test.
+    """Six-joint arm solved by elimination, and how many postures its self-test missed.
 
     ``scaled`` is the chain with frames slid together, in units of ``unit`` metres.
     """
@@ -46,8 +46,6 @@ class EliminationArm:
     scaled: JointChain
     unit: float
     forms: tuple[Form, ...]
-    conditioning: float = np.inf
-    doubtful: int = 0
     missed: int = 0
 
     @property
@@ -56,11 +54,6 @@ class EliminationArm:
         return (
             "six joints, at most one prismatic: elimination, up to 16 solutions (Raghavan and Roth)"
         )
-
-    @property
-    def well_conditioned(self) -> bool:
-        """Whether the self-test missed nothing, seldom needed other forms, and moved little."""
-        return self.missed == 0 and 4 * self.doubtful <= TESTS and self.conditioning < 1e-6
 
 
 def prepare_elimination(chain: JointChain) -> EliminationArm | None:
@@ -74,18 +67,12 @@ def prepare_elimination(chain: JointChain) -> EliminationArm | None:
     if not forms:
         return None
     arm, poses = replace(arm, forms=forms), tool_poses(arm.scaled, many)
-    doubtful, moved = solve_form(arm.scaled, arm.unit, forms[0], poses, Roots(TESTS))
     found = _solved(arm, poses)
     away = found.q - many[:, None]
     away -= 2.0 * np.pi * np.where(chain.sigma == 0, np.rint(away / (2.0 * np.pi)), 0.0)
     nearest = np.min(np.where(found.present, np.abs(away).max(axis=2), np.inf), axis=1)
     odd = (found.count + np.sum(found.double, axis=1)) % 2 == 1
-    return replace(
-        arm,
-        conditioning=float(np.sort(moved)[(9 * TESTS) // 10]),
-        doubtful=int(np.sum(doubtful)),
-        missed=int(np.sum((nearest > 1e-5) | odd)),
-    )
+    return replace(arm, missed=int(np.sum((nearest > 1e-5) | odd)))
 
 
 def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
@@ -119,12 +106,15 @@ def elimination_solutions(
     return q, valid, double
 
 
+@prepare_alike.register
+def _(known: EliminationArm, chain: JointChain, prepare: Prepare) -> Solver | None:
+    return prepare_closed_form(chain) or with_forms_of(known.forms, chain)
+
+
 @postures.register
 def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     q, valid, double = elimination_solutions(solver, U)
-    found = checked(solver.chain, U, q, valid, tolerances, double=double)
-    found.family[...] = singular_postures(solver.chain, found)[1]
-    return found
+    return checked(solver.chain, U, q, valid, tolerances, double=double)
 
 
 def _solved(arm: EliminationArm, poses: Array) -> Roots:

@@ -8,17 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..errors import InvalidValueError
 from .arm_angle import prepare_arm_angle
 from .chain import locked_chain
 from .closed_form import prepare_closed_form
-from .constraints import WHOLE, Components, constraints
+from .constraints import WHOLE, Components, Constraints, constraints
 from .elimination import prepare_elimination
 from .loop import JointChain
+from .motion import lever
 from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
 from .redundant import Redundant, prepare_redundant, redundant_joint
-from .relations import Related, prepare_related
 from .request import Task
 from .search import ManyStarts, prepare_many_starts
 from .solver import Solver
@@ -31,19 +30,9 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     if locks:
         chain = locked_chain(chain, locks)
     if task.relations:
-        if chain.k <= 6:
-            raise InvalidValueError(
-                f"relations: the tool is moved by {chain.k} joints; only more than six leave "
-                "something to relate."
-            )
-        A = np.array([row for row, _ in task.relations])
-        still = np.setdiff1d(np.arange(A.shape[1]), chain.columns)
-        if A[:, still].any():
-            raise InvalidValueError(
-                "relations: a joint that does not move the tool cannot be part of one."
-            )
-        b = np.array([b for _, b in task.relations])
-        return prepare_related(chain, A[:, chain.columns], b, prepare)
+        A = np.array([row for row, _ in task.relations])[:, chain.columns]
+        b = np.array([right for _, right in task.relations])
+        return prepare_many_starts(Constraints(chain, WHOLE, A, b, lever(chain)))
     return prepare(chain, Components(task.mask, task.in_tool_axes))
 
 
@@ -102,4 +91,4 @@ def _searches(solver: Solver) -> bool:
         return _searches(solver.inner)
     if isinstance(solver, FewerJoints):
         return any(_searches(way.solver) for way in solver.ways)
-    return isinstance(solver, (ManyStarts, Related, OneAxis, Redundant))
+    return isinstance(solver, (ManyStarts, OneAxis, Redundant))

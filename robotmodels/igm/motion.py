@@ -21,15 +21,10 @@ def tool_poses(chain: JointChain, q: Array) -> Array:
 
 def jacobians(chain: JointChain, q: Array) -> Array:
     """Jacobians at the tool in the axes of R_0, rows ``[v; w]``. Shapes: q (N, k) -> (N, 6, k)."""
-    return poses_and_jacobians(chain, q)[1]
-
-
-def poses_and_jacobians(chain: JointChain, q: Array) -> tuple[Array, Array]:
-    """Poses of the tool (N, 4, 4) and Jacobians (N, 6, k), axes of R_0."""
     U, axes, origins = _joint_frames(chain, q)
     turning = (chain.sigma == 0)[:, None, None]
     columns = np.where(turning, cross(axes, U[:, :3, 3] - origins), axes), axes * turning
-    return U, np.ascontiguousarray(np.concatenate(columns, axis=2).transpose(1, 2, 0))
+    return np.ascontiguousarray(np.concatenate(columns, axis=2).transpose(1, 2, 0))
 
 
 def axes_of(chain: JointChain, q: Array) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from .._arrays import as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
+from .constraints import Components
 from .loop import joint_chain
 from .pose_search import SearchSpace, SearchTask, pose_search, search_space
 from .request import above_zero
@@ -148,7 +149,8 @@ def igm_numeric(
     batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
     closest = np.clip(first, model.lower, model.upper) if limits else np.array(first)
     U = se3.inverse(model.base) @ targets.reshape(-1, 4, 4)
-    task = SearchTask(asked, mask_axes == "tool", tolerances, restarts, iterations)
+    components = Components(tuple(asked.tolist()), mask_axes == "tool")
+    task = SearchTask(components, tolerances, restarts, iterations)
     found = pose_search(space, task, U, closest[:, columns], q0 is not None)
     closest[:, columns] = found.q
     family = np.zeros(closest.shape, np.bool_)

@@ -8,12 +8,14 @@ joint limits, for the position alone, and for the orientation at that position g
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi
+from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
+from .constraints import Components, Constraints, mask_axes
 from .loop import JointChain
 from .motion import cross, jacobians, tool_poses
 from .solver import Tolerances
@@ -24,44 +26,39 @@ RANK_STARTS = 8  # random configurations whose Jacobians give the rank of a task
 GIVE_UP = 0.7  # share of the cost left after five steps above which another start is better
 STIFF = (1e3, 1e5)  # weights of the position while the least orientation error is looked for
 SIDE_STARTS = 16  # spread starts for the reason why a pose is not met
+SIDE_STEPS = 200  # steps to the configuration closest to a position
 SPREAD = 0.5  # weight of the orientation in the choice of the next start
 MOVES = 1e-10  # squared component of a null-space motion from which a joint moves
-ANYWHERE = np.array([[-inf], [inf]])
+ANYWHERE = np.array([[-np.inf], [np.inf]])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchSpace:
+class SearchSpace(NamedTuple):
     """Starts of the search and the lengths of a chain.
 
-    Shapes: limits, bounds (2, k); middle, unit (k,); starts (S, k); poses (S, 4, 4).
+    Shapes: limits, bounds (2, k); middle (k,); starts (S, k); poses (S, 4, 4). Descents stay
+    within ``bounds``: joints with a whole turn are shifted inside their limits afterwards.
     """
 
     chain: JointChain
     limits: Array
-    """Where configurations must lie; infinite without limits."""
     bounds: Array
-    """The same for descents: joints with a whole turn are shifted inside afterwards."""
     middle: Array
-    unit: Array
     length: float
     reach: float
     starts: Array
     poses: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchTask:
+class SearchTask(NamedTuple):
     """Components and tolerances asked for, and the effort."""
 
-    mask: NDArray[np.bool_]
-    in_tool_axes: bool
+    components: Components
     tolerances: Tolerances
     restarts: int
     iterations: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class Outcome(NamedTuple):
     """Configurations that meet their poses, or come closest.
 
     Shapes: q, family (N, k); error (N, 6); residual, valid, status (N,).
@@ -99,7 +96,6 @@ def search_space(
         limits=read_only(limits),
         bounds=read_only(bounds),
         middle=read_only(0.5 * (low + high)),
-        unit=read_only(np.where(revolute, 1.0, 1.0 / length)),
         length=length,
         reach=(reach + strokes) * (1.0 + 1e-12),
         starts=read_only(starts),
@@ -111,138 +107,111 @@ def pose_search(
     space: SearchSpace, task: SearchTask, U: Array, first: Array, given: bool
 ) -> Outcome:
     """Search for one configuration per pose. Shapes: U (N, 4, 4) in R_0, first (N, k)."""
-    parts = [
-        _Search(space, task, U[rows], first[rows], given).outcome()
-        for rows in (slice(n, n + CHUNK) for n in range(0, max(len(U), 1), CHUNK))
-    ]
-    return Outcome(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in Outcome.__slots__)
-    )
+    k = space.chain.k
+    wanted = Constraints(space.chain, task.components, np.zeros((0, k)), np.zeros(0), space.length)
+    chunks = [slice(n, n + CHUNK) for n in range(0, max(len(U), 1), CHUNK)]
+    parts = [_Search(space, task, wanted, U[rows], first[rows]).outcome(given) for rows in chunks]
+    return Outcome(*map(np.concatenate, zip(*parts, strict=True)))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """Search for the poses of one chunk."""
+    """Search for the poses of one chunk. Shapes: U (N, 4, 4), first (N, k)."""
 
-    def __init__(
-        self, space: SearchSpace, task: SearchTask, U: Array, first: Array, given: bool
-    ) -> None:
-        self.space, self.task, self.U = space, task, np.ascontiguousarray(U)
-        self.first, self.given = np.ascontiguousarray(first), given
-        # components along the axes of the world or of the tool at its desired pose
-        turn = U[:, :3, :3] if task.in_tool_axes else space.chain.base[:3, :3].T
-        self.axes = np.ascontiguousarray(np.broadcast_to(turn, (len(U), 3, 3)))
-        self.whole = np.where(task.mask, [1.0 / space.length] * 3 + [1.0] * 3, 0.0)
-        self.place = np.where(np.arange(6) < 3, self.whole, 0.0)
+    space: SearchSpace
+    task: SearchTask
+    wanted: Constraints
+    U: Array
+    first: Array
 
-    def outcome(self) -> Outcome:
+    def outcome(self, given: bool) -> Outcome:
         """Solve what can be solved, and give the reason for the rest."""
-        space, task = self.space, self.task
+        space, task, whole = self.space, self.task, self.wanted.weight
+        asked = task.components.asked
         away = self.U[:, :3, 3] - space.chain.D[0, :3, 3]
         distance = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
-        beyond = (distance > space.reach + task.tolerances.position) & task.mask[:3].all()
+        beyond = (distance > space.reach + task.tolerances.position) & all(asked[:3])
         status = np.full(len(self.U), IGMStatus.NOT_CONVERGED, np.int8)
-        q = self.first.copy()
-        limited = np.isfinite(space.limits).any()
+        q, limited = self.first.copy(), np.isfinite(space.limits).any()
+        anywhere = np.broadcast_to(ANYWHERE, space.limits.shape)
         for limits, bounds, found in (
             (space.limits, space.bounds, IGMStatus.REACHED),
-            (ANYWHERE, ANYWHERE, IGMStatus.OUTSIDE_LIMITS),
+            (anywhere, anywhere, IGMStatus.OUTSIDE_LIMITS),
         ):
             rows = np.flatnonzero((status == IGMStatus.NOT_CONVERGED) & ~beyond)
             if rows.size == 0 or (found is IGMStatus.OUTSIDE_LIMITS and not limited):
                 continue
-            order = self._order(rows, self.whole)[:, : task.restarts]
-            if self.given:
-                order = np.concatenate([np.full((rows.size, 1), -1), order], axis=1)
-            x = self._descents(rows, self.first[rows], order, self.whole, GIVE_UP, bounds)[0]
+            starts = self._starts(rows, whole, task.restarts)
+            if given:
+                starts = np.concatenate([self.first[rows, None], starts], axis=1)
+            x = self._descents(rows, starts, whole, GIVE_UP, bounds)[0]
             x = self._in_range(rows, x, limits)
-            met = self._sizes(self._errors(rows, x)[0])[2]
+            met = self._met(self._errors(rows, x)[0])[2]
             status[rows[met]] = found
             # what comes closest within the limits, unless the pose is met outside
             kept = met | (found is IGMStatus.REACHED)
             q[rows[kept]] = x[kept]
         rest = np.flatnonzero(status == IGMStatus.NOT_CONVERGED)
-        if rest.size and self.place.any():
+        if rest.size and any(asked[:3]):
             q[rest], status[rest] = self._closest_position(rest, q[rest])
             status[beyond] = IGMStatus.TOO_FAR
-        return self._checked(q, status)
-
-    def _checked(self, q: Array, status: NDArray[np.int8]) -> Outcome:
-        """Errors of the configurations, and the joints that move along self-motions."""
-        k = self.space.chain.k
         error, J = self._errors(np.arange(len(q)), q)
-        position, angle, _ = self._sizes(error)
-        valid = status == IGMStatus.REACHED
-        family = np.zeros((len(q), k), np.bool_)
-        if valid.any() and k:
+        position, angle, _ = self._met(error)
+        valid, family = status == IGMStatus.REACHED, np.zeros(q.shape, np.bool_)
+        if valid.any() and q.shape[1]:
+            # joints that move along self-motions
             samples = np.zeros(RANK_STARTS, np.int64)
-            rank = self._row_space(self._errors(samples, self.space.starts[:RANK_STARTS])[1])[0]
-            if rank.max() < k:
+            rank = self._row_space(self._errors(samples, space.starts[:RANK_STARTS])[1])[0].max()
+            if rank < q.shape[1]:
                 own, moves = self._row_space(J[valid])
-                family[valid] = (moves > MOVES) & (own == rank.max())[:, None]
+                family[valid] = (moves > MOVES) & (own == rank)[:, None]
                 status[family.any(axis=1)] = IGMStatus.REACHED_FAMILY
         return Outcome(q, error, np.maximum(position, angle), valid, family, status)
 
     def _row_space(self, J: Array) -> tuple[NDArray[np.int64], Array]:
         """Rank of the task, and squared components of each joint in its null space."""
-        _, s, rows = np.linalg.svd(self.whole[:, None] * J / self.space.unit, full_matrices=False)
+        unit = np.where(self.space.chain.sigma == 0, 1.0, 1.0 / self.space.length)
+        _, s, rows = np.linalg.svd(self.wanted.weight[:, None] * J / unit, full_matrices=False)
         used = s > 1e-7 * np.maximum(s[:, :1], 1e-300)
         return used.sum(axis=1), 1.0 - np.sum((rows * used[..., None]) ** 2, axis=1)
 
-    def _order(self, rows: NDArray[np.int64], weight: Array) -> NDArray[np.int64]:
-        """Starts ordered by the distance of their poses, shape (m, S)."""
+    def _axes(self, rows: NDArray[np.int64]) -> Array:
+        return mask_axes(self.space.chain, self.U[rows], self.task.components)
+
+    def _starts(self, rows: NDArray[np.int64], weight: Array, count: int) -> Array:
+        """The starts whose poses are nearest, in this order, shape (m, count, k)."""
         poses, U = self.space.poses, self.U[rows]
-        away = (U[:, None, :3, 3] - poses[:, :3, 3]) @ self.axes[rows]
+        away = (U[:, None, :3, 3] - poses[:, :3, 3]) @ self._axes(rows)
         with np.errstate(over="ignore"):
             score = np.sum((away * weight[:3]) ** 2, axis=-1)
         angular = weight[3:].max()
         if angular > 0.0:
             trace = U[:, :3, :3].reshape(-1, 9) @ poses[:, :3, :3].reshape(-1, 9).T
             score += SPREAD * angular**2 * (3.0 - trace)
-        return np.argsort(score, axis=1, kind="stable")
+        return self.space.starts[np.argsort(score, axis=1, kind="stable")[:, :count]]
 
     def _descents(
         self,
         rows: NDArray[np.int64],
-        first: Array,
-        order: NDArray[np.int64] | None,
+        starts: Array,
         weight: Array,
         patience: float,
         bounds: Array,
-        iterations: int | None = None,
+        steps: int | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Configurations after descents, their errors and the derivatives of these."""
-        from .kernels.damped import damped_searches
-
-        chain, m = self.space.chain, len(rows)
-        q, error, J = np.empty((m, chain.k)), np.empty((m, 6)), np.empty((m, 6, chain.k))
-        damped_searches(
-            chain.sigma,
-            chain.D,
-            self.U[rows],
-            self.axes[rows],
-            weight,
-            np.array(self.task.tolerances),
-            np.ascontiguousarray(np.broadcast_to(bounds, (2, chain.k))),
-            self.space.unit,
-            np.ascontiguousarray(first),
-            self.space.starts,
-            np.full((m, 1), -1) if order is None else np.ascontiguousarray(order),
-            self.task.iterations if iterations is None else iterations,
-            patience,
-            q,
-            error,
-            J,
+        """Configurations after descents, their errors and minus the derivative of these."""
+        steps = self.task.iterations if steps is None else steps
+        return self.wanted.descents(
+            self.U[rows], starts, steps, patience, (), weight, bounds, self.task.tolerances
         )
-        return q, error, J
 
     def _errors(self, rows: NDArray[np.int64], q: Array) -> tuple[Array, Array]:
-        """Errors (m, 6) of configurations and their derivatives (m, 6, k)."""
-        return self._descents(rows, q, None, self.whole, GIVE_UP, ANYWHERE, 0)[1:]
+        """Errors (m, 6) of configurations and minus their derivatives (m, 6, k)."""
+        return self.wanted.descents(self.U[rows], q[:, None], 0, 1.0)[1:]
 
-    def _sizes(self, error: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _met(self, error: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Position and angle missing of what is asked for, and whether both are met."""
-        e = error * self.task.mask
-        position, angle = (np.hypot(np.hypot(a, b), c) for a, b, c in (e[:, :3].T, e[:, 3:].T))
+        position, angle = self.wanted.sizes(error)
         limits = self.task.tolerances
         return position, angle, (position <= limits.position) & (angle <= limits.orientation)
 
@@ -263,29 +232,27 @@ class _Search:
         self, rows: NDArray[np.int64], q: Array
     ) -> tuple[Array, NDArray[np.int8]]:
         """Configurations at the position with the least angle missing, else closest to it."""
-        space, m = self.space, len(rows)
-        tolerance = self.task.tolerances.position
-        starts = space.starts[
-            self._order(rows, self.place)[:, : min(SIDE_STARTS, self.task.restarts)]
-        ]
+        space, m, tolerance = self.space, len(rows), self.task.tolerances.position
+        whole, only = self.wanted.weight, np.arange(6) < 3
+        place = np.where(only, whole, 0.0)
+        starts = self._starts(rows, place, min(SIDE_STARTS, self.task.restarts))
         x = np.concatenate([q[:, None], self.first[rows, None], starts], axis=1)
         S = x.shape[1]
         x, tried = x.reshape(m * S, -1), np.repeat(rows, S)
         active = np.arange(m * S)
         # the position; the orientation with it, twice; again the position
-        stiff = [self.whole * np.where(np.arange(6) < 3, factor, 1.0) for factor in STIFF]
-        for weight in (self.place, *stiff, self.place):
-            patience = GIVE_UP if weight is self.place else 0.999
+        stiff = [whole * np.where(only, factor, 1.0) for factor in STIFF]
+        for weight in (place, *stiff, place):
+            patience = GIVE_UP if weight is place else 0.999
             x[active], error, _ = self._descents(
-                tried[active], x[active], None, weight, patience, space.bounds
+                tried[active], x[active, None], weight, patience, space.bounds
             )
-            position, _, met = self._sizes(error)
-            keep = ~met & ((position <= tolerance) | (weight is not self.place))
-            active = active[keep]
+            position, _, met = self._met(error)
+            active = active[~met & ((position <= tolerance) | (weight is not place))]
             if active.size == 0:
                 break
         x = self._in_range(tried, x, space.limits)
-        position, angle, met = self._sizes(self._errors(tried, x)[0])
+        position, angle, met = self._met(self._errors(tried, x)[0])
         # any configuration at the position comes before all that are not
         rank = np.where(position <= tolerance, angle, 10.0 + position).reshape(m, S)
         best = np.arange(m) * S + np.argmin(rank, axis=1)
@@ -294,53 +261,40 @@ class _Search:
         status[met[best]] = IGMStatus.REACHED
         short = np.flatnonzero(position[best] > tolerance)
         if short.size:
-            q[short], status[short] = self._side(rows[short], q[short])
+            q[short], status[short] = self._side(rows[short], q[short], place)
         return q, status
 
-    def _side(self, rows: NDArray[np.int64], q: Array) -> tuple[Array, NDArray[np.int8]]:
-        """Configurations closest to the position, and whether it is too far or too near."""
-        bounds = self.space.bounds
-        status = np.full(len(rows), IGMStatus.NOT_CONVERGED, np.int8)
-        active = np.arange(len(rows))
-        for _ in range(20):
-            q[active], error, J = self._descents(
-                rows[active], q[active], None, self.place, GIVE_UP, bounds
-            )
-            with np.errstate(over="ignore", invalid="ignore"):
-                slope = np.einsum("c,nci,nc->ni", self.place**2, J, error)
-                held = (q[active] <= bounds[0]) & (slope <= 0.0)
-                held |= (q[active] >= bounds[1]) & (slope >= 0.0)
-                size = np.linalg.norm(np.where(held, 0.0, slope / self.space.unit), axis=1)
-                cost = np.linalg.norm(self.place * error, axis=1)
-            least = size <= 1e-3 * cost
-            at = active[least]
-            status[at] = self._side_of(rows[at], q[at], error[least], held[least])
-            active = active[~least]
-            if active.size == 0:
-                break
-        q = self._in_range(rows, q, self.space.limits)
-        position, _, met = self._sizes(self._errors(rows, q)[0])
-        status[position <= self.task.tolerances.position] = IGMStatus.NOT_CONVERGED
-        status[met] = IGMStatus.REACHED
-        return q, status
-
-    def _side_of(
-        self, rows: NDArray[np.int64], q: Array, error: Array, held: NDArray[np.bool_]
-    ) -> NDArray[np.int8]:
-        """Whether positions are too far or too near for the configurations closest to them.
+    def _side(
+        self, rows: NDArray[np.int64], q: Array, place: Array
+    ) -> tuple[Array, NDArray[np.int8]]:
+        """Configurations closest to the position, and whether it is too far or too near.
 
         There the line from the tool to the position meets every axis that turns the tool. It is
         too near if one of them lies at the position or beyond: the tool comes no closer to it.
         """
-        e = np.where(self.task.mask[:3], error[:, :3], 0.0)
-        ahead = np.einsum("nij,nj->ni", self.axes[rows], e)
+        space, chain = self.space, self.space.chain
+        q, error, J = self._descents(rows, q[:, None], place, 1.0, space.bounds, SIDE_STEPS)
+        unit = np.where(chain.sigma == 0, 1.0, 1.0 / space.length)
+        with np.errstate(over="ignore", invalid="ignore"):
+            slope = np.einsum("c,nci,nc->ni", place**2, J, error)
+            held = (q <= space.bounds[0]) & (slope <= 0.0)
+            held |= (q >= space.bounds[1]) & (slope >= 0.0)
+            size = np.linalg.norm(np.where(held, 0.0, slope / unit), axis=1)
+            least = size <= 1e-3 * np.linalg.norm(place * error, axis=1)
+        ahead = np.einsum("nij,nj->ni", self._axes(rows), error[:, :3] * (place[:3] > 0.0))
         distance = np.hypot(np.hypot(ahead[:, 0], ahead[:, 1]), ahead[:, 2])
         ahead /= np.maximum(distance, 1e-300)[:, None]
-        J = np.swapaxes(jacobians(self.space.chain, q), 1, 2)
-        velocity, axis = J[..., :3], J[..., 3:]
+        columns = np.swapaxes(jacobians(chain, q), 1, 2)
+        velocity, axis = columns[..., :3], columns[..., 3:]
         # the axis passes the line at z x (z x (P - O)) from the tool; a parallel axis is left out
-        slope = 1.0 - np.einsum("nki,ni->nk", axis, ahead) ** 2
+        across = 1.0 - np.einsum("nki,ni->nk", axis, ahead) ** 2
         along = np.einsum("nki,ni->nk", cross(axis, velocity), ahead)
-        turning = (self.space.chain.sigma == 0) & ~held & (slope > 0.01)
-        near = turning & (along > 0.5 * slope * distance[:, None])
-        return np.where(near.any(axis=1), IGMStatus.TOO_NEAR, IGMStatus.TOO_FAR).astype(np.int8)
+        turning = (chain.sigma == 0) & ~held & (across > 0.01)
+        near = turning & (along > 0.5 * across * distance[:, None])
+        status = np.where(near.any(axis=1), IGMStatus.TOO_NEAR, IGMStatus.TOO_FAR)
+        status[~least] = IGMStatus.NOT_CONVERGED
+        q = self._in_range(rows, q, space.limits)
+        position, _, met = self._met(self._errors(rows, q)[0])
+        status[position <= self.task.tolerances.position] = IGMStatus.NOT_CONVERGED
+        status[met] = IGMStatus.REACHED
+        return q, status.astype(np.int8)

@@ -23,7 +23,6 @@ from scipy.spatial.transform import Rotation
 from .. import se3
 from .._arrays import Array
 from ..se3.orientation import quaternions_of
-from .alike import prepare_alike
 from .chain import VirtualJoint, with_virtual_joints
 from .check import checked
 from .constraints import WHOLE, Components, constraints, mask_axes
@@ -32,7 +31,7 @@ from .motion import jacobians, lever, random_postures, scaled, singular_rows, to
 from .position import prepare_position
 from .postures import MERGE, Postures, assembled, difference, no_postures, side_by_side
 from .search import classified, prepare_many_starts
-from .solver import Prepare, Solver, Tolerances, postures
+from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
 from .virtual_joints import Placement, loose_placements, placements, virtual_joints
 
 KEPT = 3  # extensions kept
@@ -318,7 +317,7 @@ def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) 
         order = np.argsort(found.residual, axis=1)
         found = found.take((np.arange(N)[:, None], order))
         found = found.merge(chain.sigma, SAME * max(tolerances))
-    return _marked(solver, U, found)
+    return found
 
 
 @prepare_alike.register
@@ -352,29 +351,11 @@ def _of_extension(
     kept = found.valid & (near <= _rough(tolerances) * max(1.0, solver.length))
     part = no_postures(len(U), found.q.shape[1], way.places.size)
     part.q[...], part.valid[...] = found.q[..., way.places], kept
-    singular = found.valid & (found.family | found.double | found.free.any(axis=-1))
-    return part, ~kept.any(axis=1) | singular.any(axis=1)
-
-
-def _marked(solver: FewerJoints, U: Array, found: Postures) -> Postures:
-    """Mark double roots and members of self-motions."""
-    chain = solver.chain
     n, s = np.nonzero(found.valid)
-    J = scaled(jacobians(chain, found.q[n, s]), solver.length)
-    singular, null = singular_rows(J, SINGULAR)
-    if singular.size == 0:
-        return found
-    n, s = n[singular], s[singular]
-    step, q = 1e-3, found.q[n, s]
-    # a fold leaves the second-order part of the step, 1e-6 of the arm's length, a family nothing
-    beside = checked(
-        chain, U[n], (q + step * null)[:, None], np.ones((len(q), 1), np.bool_),
-        Tolerances(1e-10, 1e-10),
-    )  # fmt: skip
-    gone = np.abs(beside.q[:, 0] - q).max(axis=1) > 0.1 * step
-    found.family[n, s] = beside.valid[:, 0] & gone
-    found.double[n, s] = ~found.family[n, s]
-    return found
+    J = scaled(jacobians(way.solver.chain, found.q[n, s]), solver.length)
+    unsure = ~kept.any(axis=1)
+    unsure[n[singular_rows(J, SINGULAR)[0]]] = True
+    return part, unsure
 
 
 def _chosen(

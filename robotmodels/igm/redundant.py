@@ -13,14 +13,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .._arrays import Array
-from .alike import prepare_alike
 from .chain import locked_chain, without_end
-from .constraints import WHOLE, Components, constraints
+from .constraints import PATH, WHOLE, Components, constraints
 from .loop import JointChain
-from .motion import poses_and_jacobians, random_postures
+from .motion import random_postures, tool_poses
 from .postures import Postures, assembled, difference, side_by_side
-from .search import PATH, collected, nearest_value, refined
-from .solver import Prepare, Solver, Tolerances, postures
+from .search import collected, nearest_value, refined
+from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
 
 DEPENDENT = 1e-9  # singular values beside the largest that count as zero at any configuration
 SHARE = 1e-6  # part of a joint in a null direction that counts
@@ -34,31 +33,30 @@ SAME = 1e-7  # values of the joint closer than this are one [rad, m]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Redundant:
-    """Arm with a joint whose motion the others can always undo, or with a locked joint."""
+    """Arm with a joint whose motion the others can always undo."""
 
     chain: JointChain
     components: Components
     joint: int
     inner: Solver
     prepare: Prepare
-    locked: float | None = None
     _known: dict[float | None, Solver | None] = field(default_factory=dict)
 
     @property
     def method(self) -> str:
         """The method in words."""
-        at = "at its reference" if self.locked is None else "locked"
-        return f"joint {self.chain.columns[self.joint] + 1} {at}; {self.inner.method}"
+        number = self.chain.columns[self.joint] + 1
+        return f"joint {number} at its reference; {self.inner.method}"
 
 
 def redundant_joint(chain: JointChain, components: Components) -> int | None:
     """First joint whose column of the Jacobian depends on the others everywhere, or None."""
     q = random_postures(chain, 16, np.random.default_rng(3))
     wanted = constraints(chain, components)
-    U = poses_and_jacobians(chain, q)[0]
+    U = tool_poses(chain, q)
     # two freed rotations leave an orientation error: pair each configuration with another pose
     U = U[::-1] if len(components.freed_rotations) == 2 else U
-    _, sizes, rows = np.linalg.svd(wanted.linearised(U, q)[1])
+    _, sizes, rows = np.linalg.svd(wanted.jacobians(U, q))
     padded = np.zeros((len(q), chain.k))
     padded[:, : sizes.shape[1]] = sizes
     null = padded <= DEPENDENT * np.maximum(padded[:, :1], 1e-3)
@@ -73,29 +71,22 @@ def redundant_joint(chain: JointChain, components: Components) -> int | None:
 
 
 def prepare_redundant(
-    chain: JointChain,
-    components: Components,
-    joint: int,
-    prepare: Prepare,
-    locked: float | None = None,
+    chain: JointChain, components: Components, joint: int, prepare: Prepare
 ) -> Redundant | None:
-    """Prepare the arm without a joint, which takes its reference or a locked value."""
-    rest, value = _typical_rest(chain, components, joint, locked)
+    """Prepare the arm without a joint, which takes its reference."""
+    rest, value = _typical_rest(chain, components, joint)
     inner = prepare(rest)
-    if inner is None:
-        return None
-    return Redundant(chain, components, joint, inner, prepare, locked, {value: inner})
+    return inner and Redundant(chain, components, joint, inner, prepare, {value: inner})
 
 
 def _typical_rest(
-    chain: JointChain, components: Components, joint: int, locked: float | None
+    chain: JointChain, components: Components, joint: int
 ) -> tuple[JointChain, float | None]:
     """The chain with the joint locked, and that value (None: valid for all values)."""
     if _at_an_end(chain, components, joint):
         return without_end(chain, joint, np.zeros(1), np.eye(4)[None])[0], None
     # 0.5, because axes are often aligned at 0
-    value = 0.5 if locked is None else locked
-    return locked_chain(chain, {joint: value}), value
+    return locked_chain(chain, {joint: 0.5}), 0.5
 
 
 def _at_an_end(chain: JointChain, components: Components, joint: int) -> bool:
@@ -105,7 +96,7 @@ def _at_an_end(chain: JointChain, components: Components, joint: int) -> bool:
 
 @prepare_alike.register
 def _(known: Redundant, chain: JointChain, prepare: Prepare) -> Solver | None:
-    rest, value = _typical_rest(chain, known.components, known.joint, known.locked)
+    rest, value = _typical_rest(chain, known.components, known.joint)
     inner = prepare_alike(known.inner, rest, known.prepare)
     return inner and replace(known, chain=chain, inner=inner, _known={value: inner})
 
@@ -119,9 +110,6 @@ def _solutions(
     solver: Redundant, U: Array, references: Array, tolerances: Tolerances, searched: bool
 ) -> Postures:
     """Solutions with the joints at their references, else at the nearest values if searched."""
-    if solver.locked is not None:
-        values = np.full(len(U), solver.locked)
-        return at_values(solver, values, U, references, tolerances)
     found = at_values(solver, references[:, solver.joint], U, references, tolerances, searched)
     parts = [(np.arange(len(U)), found)]
     if searched:

@@ -16,6 +16,7 @@ from .. import se3
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError, nearest_names
 from ..model import RobotModel
+from .loop import joint_chain
 
 WHOLE_POSE = (True,) * 6
 FARTHEST = 1e6
@@ -102,10 +103,10 @@ def locks_of(
 
 def relations_of(
     model: RobotModel, relations: tuple[ArrayLike, ArrayLike] | None
-) -> tuple[tuple[tuple[float, ...], float], ...]:
-    """Rows of added relations between joints."""
+) -> tuple[tuple[tuple[int, float], ...], tuple[tuple[tuple[float, ...], float], ...]]:
+    """Added relations between joints: those of one joint as locks, and rows of the others."""
     if relations is None:
-        return ()
+        return (), ()
     if not isinstance(relations, tuple) or len(relations) != 2:
         raise InvalidValueError(
             "relations: expected a pair (A, b) of A q = b, A of shape (m, n) and b of shape (m,)."
@@ -116,4 +117,28 @@ def relations_of(
             f"relations: expected A of shape (m, {model.n}) and b of shape (m,), got {A.shape} "
             f"and {b.shape}."
         )
-    return tuple((tuple(row), right) for row, right in zip(A.tolist(), b.tolist(), strict=True))
+    columns = joint_chain(model).columns
+    m = columns.size - 6
+    if m < 1:
+        raise InvalidValueError(
+            f"relations: the tool is moved by {columns.size} joints; only more than six leave "
+            "something to relate."
+        )
+    if np.delete(A, columns, axis=1).any():
+        raise InvalidValueError(
+            "relations: a joint that does not move the tool cannot be part of one."
+        )
+    if len(A) != m or np.linalg.matrix_rank(A) < m:
+        raise InvalidValueError(
+            f"relations: an arm of {columns.size} joints takes {m} independent "
+            f"relation{'s' * (m > 1)}; A has {len(A)} rows, of rank {np.linalg.matrix_rank(A)}."
+        )
+    locks: dict[int, float] = {}
+    while (single := np.flatnonzero(np.count_nonzero(A, axis=1) == 1)).size:
+        joint = int(A[single[0]].nonzero()[0][0])
+        locks[joint] = float(b[single[0]] / A[single[0], joint])
+        b = np.delete(b - A[:, joint] * locks[joint], single[0])
+        A = np.delete(A, single[0], axis=0)
+        A[:, joint] = 0.0
+    rows = tuple((tuple(row), right) for row, right in zip(A.tolist(), b.tolist(), strict=True))
+    return tuple(sorted(locks.items())), rows

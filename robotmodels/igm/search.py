@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .constraints import Constraints, in_half_open_turn
+from .constraints import PATH, Constraints, in_half_open_turn
 from .loop import JointChain
 from .motion import random_postures, singular_rows
 from .postures import Postures, assembled, difference, no_postures, side_by_side
@@ -27,12 +27,10 @@ STEPS = 50
 SLIDES = 60
 """Steps along a self-motion to the nearest value of a joint."""
 ROWS = 4096  # configurations worked on at a time
-LEAST_DAMPING = 1e-14  # damping beside the sum of the squared singular values
-EXACT = 1e-15  # error at which nothing is left to improve
+PATIENCE = 0.9  # share of the cost left after five steps above which a start is given up
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
 CLOSE = 0.05  # the same below which a second root may be close
 BESIDE = (0.01, 0.03, 0.1, 0.3)  # distances along the null direction at which it is looked for
-PATH = (1e-10, 1e-10)  # errors of configurations on a self-motion [m, rad]
 FOLD = 1e-3  # singular configurations closer than this may come from one root
 
 
@@ -78,41 +76,7 @@ def _(solver: ManyStarts, U: Array, references: Array, tolerances: Tolerances) -
 
 def refined(wanted: Constraints, U: Array, q: Array, held: Sequence[int] = ()) -> Array:
     """Levenberg-Marquardt iterations. Shapes: U (B, 4, 4), q (B, k) -> (B, k)."""
-    q, active = q.copy(), np.arange(len(q))
-    damping, at = np.full(len(q), 1e-4), np.array(held, np.int64)
-    e, J = wanted.linearised(U, q)
-    for _ in range(STEPS):
-        if active.size == 0:
-            break
-        J[:, :, at] = 0.0
-        step = _damped_step(J, e, damping)
-        angles = np.abs(step) * (wanted.chain.sigma == 0)
-        trial = q[active] + step / angles.max(axis=1, initial=1.0)[:, None]
-        next_e, next_J = wanted.linearised(U[active], trial)
-        size, next_size = np.abs(e).max(axis=1), np.abs(next_e).max(axis=1)
-        better = np.sum(next_e**2, axis=1) < np.sum(e**2, axis=1)
-        q[active[better]] = trial[better]
-        e, J = np.where(better[:, None], next_e, e), np.where(better[:, None, None], next_J, J)
-        damping = np.clip(np.where(better, 0.05 * damping, 20.0 * damping), 1e-15, 1e6)
-        # a start in a local minimum improves no more
-        slow = better & (next_size > 0.999 * size) & (size > 1e-3)
-        stuck = slow | ~better & (damping >= 1e4)
-        size = np.where(better, next_size, size)
-        going = (size > EXACT) & ~stuck
-        active, e, J, damping = active[going], e[going], J[going], damping[going]
-    return q
-
-
-def _damped_step(J: Array, e: Array, damping: Array) -> Array:
-    """Damped steps of least length, (B, k)."""
-    Jt, (_, r, k) = np.swapaxes(J, 1, 2), J.shape
-    A = J @ Jt if r < k else Jt @ J
-    # less than this is lost to rounding where A is singular
-    least = LEAST_DAMPING * np.trace(A, axis1=1, axis2=2)
-    A += np.maximum(damping, least)[:, None, None] * np.eye(min(r, k))
-    e = e[..., None]
-    step = Jt @ np.linalg.solve(A, e) if r < k else np.linalg.solve(A, Jt @ e)
-    return np.asarray(step[..., 0], np.float64)
+    return wanted.descents(U, q[:, None], STEPS, PATIENCE, held)[0]
 
 
 def nearest_value(
@@ -166,7 +130,7 @@ def _gradient(
 
 def _null_projectors(wanted: Constraints, U: Array, q: Array, held: Sequence[int]) -> Array:
     """Projectors on the joint motions that keep the constraints to first order, (B, k, k)."""
-    J = wanted.linearised(U, q)[1]
+    J = wanted.jacobians(U, q)
     at = list(held)
     fixed = np.zeros((len(J), len(at), J.shape[2]))
     fixed[:, range(len(at)), at] = 1.0
@@ -209,7 +173,7 @@ def solutions_from(
     found = collected(wanted, U, refined(wanted, U[pose], q), pose, tolerances)
     n, s = np.nonzero(found.valid)
     q = found.q[n, s]
-    _, sizes, rows = np.linalg.svd(wanted.linearised(U[n], q)[1])
+    _, sizes, rows = np.linalg.svd(wanted.jacobians(U[n], q))
     if sizes.shape[1] == wanted.chain.k:
         close = np.flatnonzero(sizes[:, -1] < CLOSE * sizes[:, 0])
         distances = np.array(BESIDE + tuple(-d for d in BESIDE))
@@ -229,7 +193,7 @@ def classified(
     n, s = np.nonzero(found.valid)
     if n.size == 0:
         return found
-    J = wanted.linearised(U[n], found.q[n, s])[1]
+    J = wanted.jacobians(U[n], found.q[n, s])
     # fewer constraints than joints: a self-motion everywhere
     flat = singular_rows(J, FOLD)[0] if J.shape[1] >= chain.k else np.arange(n.size)
     if flat.size == 0:

@@ -18,7 +18,7 @@ from .._arrays import Array
 from .chain import canonical_frames
 from .check import bits_of, checked
 from .loop import JointChain
-from .motion import jacobians, lever, tool_poses
+from .motion import jacobians, lever
 from .postures import Postures
 from .self_motions import SelfMotions
 from .solver import Tolerances
@@ -39,11 +39,7 @@ Candidates = Callable[[Array, Array], tuple[Array, NDArray[np.bool_], NDArray[np
 
 
 def solve_singular(
-    chain: JointChain,
-    candidates: Candidates,
-    U: Array,
-    references: Array,
-    tolerances: Tolerances,
+    chain: JointChain, candidates: Candidates, U: Array, references: Array, tolerances: Tolerances
 ) -> Postures:
     """All postures of poses that are singular or nearly so, from a solver's candidates.
 
@@ -52,7 +48,8 @@ def solve_singular(
     q, there, free = candidates(U, references)
     first = checked(chain, U, _filled(q, there), there, tolerances, free=free, rough=np.inf)
     met = np.where(first.valid, first.residual, 0.0).max(axis=1, initial=0.0) <= MET
-    rest = np.flatnonzero(doubly_singular(chain, first) | ~met)
+    # without a candidate the pose is out of reach by more than what rounding explains
+    rest = np.flatnonzero((doubly_singular(chain, first) | ~met) & there.any(axis=1))
     if rest.size == 0:
         return first
     from scipy.spatial.transform import Rotation
@@ -91,12 +88,7 @@ def doubly_singular(chain: JointChain, found: Postures) -> NDArray[np.bool_]:
 
 
 def complete(
-    chain: JointChain,
-    U: Array,
-    found: Postures,
-    references: Array,
-    tolerances: Tolerances,
-    at_reference: bool = True,
+    chain: JointChain, U: Array, found: Postures, references: Array, tolerances: Tolerances
 ) -> Postures:
     """Mark double roots; bring every self-motion to the reference.
 
@@ -120,7 +112,7 @@ def complete(
             double[n, s] |= len(rows) == 0 < null and motion.is_double(q[n, s], null)
     out = replace(found, double=double, family=member, moving=_flags(moving, k))
     rows = np.flatnonzero(np.any(member & (moving == 0), axis=1))
-    if rows.size == 0 or not at_reference:
+    if rows.size == 0:
         return out
     for n in rows:
         kept.append([])
@@ -140,18 +132,6 @@ def complete(
         moving=_flags(marks[1], k), double=marks[2] == 1, singular=True,
     )  # fmt: skip
     return out.put(rows, part)
-
-
-def singular_postures(
-    chain: JointChain, found: Postures
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Flags (N, S) of double roots and of members of self-motions, from the Jacobians."""
-    U = np.zeros((len(found.q), 4, 4))
-    n, s = np.nonzero(found.valid)
-    U[n] = tool_poses(chain, found.q[n, s])
-    bare = replace(found, free=np.zeros_like(found.free), family=np.zeros_like(found.family))
-    out = complete(chain, U, bare, np.zeros(found.q[:, 0].shape), Tolerances(), at_reference=False)
-    return out.double, out.family
 
 
 def _in_units(

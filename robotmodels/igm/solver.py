@@ -47,6 +47,15 @@ Prepare = Callable[[JointChain], "Solver | None"]
 
 
 @singledispatch
+def prepare_alike(known: Solver, chain: JointChain, prepare: Prepare) -> Solver | None:
+    """Solver of a chain that differs from a prepared one in its numbers only.
+
+    What was chosen and tested for the other is taken over where a solver registers how.
+    """
+    return prepare(chain)
+
+
+@singledispatch
 def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances) -> Postures:
     """All postures of poses by a prepared solver. Shapes: U (N, 4, 4), references (N, k)."""
     raise TypeError(f"no solver is registered for {type(solver).__name__}")

@@ -11,6 +11,7 @@ from .. import se3
 from .._arrays import Array
 from ..model import RobotModel
 from .chain import locked_chain
+from .constraints import Components
 from .loop import joint_chain
 from .pose_search import SearchTask, pose_search, search_space
 from .request import Task
@@ -80,7 +81,7 @@ def diagnose(
             continue
         at = np.ix_(rows[chosen], columns)
         space = search_space(chain, lower, upper, limits, effort[0], SEED)
-        search = SearchTask(np.array(task.mask), task.in_tool_axes, tolerances, *effort)
+        search = SearchTask(Components(task.mask, task.in_tool_axes), tolerances, *effort)
         found = pose_search(space, search, U[chosen], closest[at], True)
         closest[at], missing[rows[chosen]] = found.q, found.error
         reason[chosen], met[chosen], residual[chosen] = found.status, found.valid, found.residual

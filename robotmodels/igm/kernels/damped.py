@@ -1,21 +1,23 @@
-"""Compiled: Levenberg-Marquardt on the pose error of a chain.
+"""Compiled: Levenberg-Marquardt on constraints of a chain: components of a pose, linear relations.
 
 The error of a configuration has six components in given axes: the translation ``P_d - P`` and the
 rotation vector ``phi = log(R_d R^T)``. A rotation of the tool by ``w dt`` turns ``R_d R^T`` into
 ``R_d R^T exp(-[w] dt)``, hence ``d phi = -Jr^-1(phi) w dt`` with the inverse right Jacobian of the
-rotation group. It is regular below a whole turn, so the derivative is exact for every mask.
+rotation group. It is regular below a whole turn, so the derivative is exact for every mask. The
+errors ``b - A q`` of relations stand behind them.
 
-Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e``. lambda is proportional to the squared error
-(T. Sugihara, IEEE T-RO 27(5), 2011), to the error itself where that is large.
+Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e`` with lambda proportional to the size of the error:
+convergence stays fast and flat directions of J are left alone (J. Fan and Y. Yuan, Computing 74,
+2005).
 """
 
 from __future__ import annotations
 
-from math import atan2, inf, sqrt, tan
+from math import atan2, floor, inf, sqrt, tan
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from ...kernels._compile import (
     INT,
@@ -32,9 +34,28 @@ from ...kernels._compile import (
 )
 from .chain import forward
 
-ORDER = types.Array(types.int64, 2, "C")
 START_DAMPING = 0.1  # of the first step, in units of the cost
-EXACT = 1e-28  # cost below which only rounding is left
+EXACT = 1e-30  # cost below which only rounding is left
+
+
+class Problem(NamedTuple):
+    """Constraints on the joints of a chain, and how they are searched."""
+
+    sigma: Ints  # (k,)
+    D: Floats  # (k + 1, 4, 4)
+    weight: Floats  # (6 + m,): of the components of the pose, 0 where free, and of the relations
+    A: Floats  # (m, k): relations A q = b
+    b: Floats  # (m,)
+    period: Floats  # (m,): 0 for relations without one
+    tolerance: Floats  # (2,): position and orientation
+    bounds: Floats  # (2, k)
+    unit: Floats  # (k,)
+    held: Ints  # (k,): 1 for joints that keep their value
+
+
+PROBLEM = types.NamedTuple(
+    (INTS, STACK, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, INTS), Problem
+)
 
 
 @compiled()
@@ -66,24 +87,34 @@ def rotation_vector(E: Floats, phi: Floats) -> None:
 
 
 @compiled()
-def pose_error(U: Floats, axes: Floats, T: Floats, E: Floats, phi: Floats, e: Floats) -> None:
-    """Error e (6,) of the pose T towards U in the axes; ``phi`` is its rotation in base axes."""
+def errors(
+    p: Problem, U: Floats, axes: Floats, q: Floats, T: Floats, lines: Floats, W: Floats, e: Floats
+) -> None:
+    """Errors e (6 + m,) of a configuration; its pose T, the axes of its joints, phi in W (4, 3)."""
+    forward(p.sigma, p.D, q, T, lines)
     for i in range(3):
         for j in range(3):
-            E[i, j] = U[i, 0] * T[j, 0] + U[i, 1] * T[j, 1] + U[i, 2] * T[j, 2]
-    rotation_vector(E, phi)
+            W[i, j] = U[i, 0] * T[j, 0] + U[i, 1] * T[j, 1] + U[i, 2] * T[j, 2]
+    rotation_vector(W, W[3])
     for c in range(3):
         e[c], e[3 + c] = 0.0, 0.0
         for i in range(3):
             e[c] += axes[i, c] * (U[i, 3] - T[i, 3])
-            e[3 + c] += axes[i, c] * phi[i]
+            e[3 + c] += axes[i, c] * W[3, i]
+    for r in range(p.b.size):
+        off = p.b[r]
+        for i in range(q.size):
+            off -= p.A[r, i] * q[i]
+        e[6 + r] = off
+        if p.period[r] > 0.0:
+            e[6 + r] -= p.period[r] * floor(off / p.period[r] + 0.5)
 
 
 @compiled()
 def error_jacobian(
-    sigma: Ints, T: Floats, lines: Floats, axes: Floats, phi: Floats, J: Floats
+    p: Problem, T: Floats, lines: Floats, axes: Floats, phi: Floats, J: Floats
 ) -> None:
-    """Minus the derivative of the error, J (6, k); ``lines (k, 6)``: axes and origins of joints.
+    """Minus the derivative of the errors, J (6 + m, k).
 
     ``Jr^-1(phi) w = w + phi x w / 2 + c phi x (phi x w)``, c = (1 - (t / 2) cot(t / 2)) / t^2.
     """
@@ -93,49 +124,57 @@ def error_jacobian(
     else:
         half = 0.5 * sqrt(tt)
         c = (1.0 - half / tan(half)) / tt
-    for k in range(sigma.shape[0]):
+    for k in range(p.sigma.shape[0]):
         x, y, z = lines[k, 0], lines[k, 1], lines[k, 2]
         vx, vy, vz, wx, wy, wz = x, y, z, 0.0, 0.0, 0.0
-        if sigma[k] == 0:
+        if p.sigma[k] == 0:
             px, py, pz = T[0, 3] - lines[k, 3], T[1, 3] - lines[k, 4], T[2, 3] - lines[k, 5]
             vx, vy, vz = y * pz - z * py, z * px - x * pz, x * py - y * px
             wx, wy, wz = phi[1] * z - phi[2] * y, phi[2] * x - phi[0] * z, phi[0] * y - phi[1] * x
-            ux, uy, uz = (
-                phi[1] * wz - phi[2] * wy,
-                phi[2] * wx - phi[0] * wz,
-                phi[0] * wy - phi[1] * wx,
-            )
+            ux, uy = phi[1] * wz - phi[2] * wy, phi[2] * wx - phi[0] * wz
+            uz = phi[0] * wy - phi[1] * wx
             wx, wy, wz = x + 0.5 * wx + c * ux, y + 0.5 * wy + c * uy, z + 0.5 * wz + c * uz
         for i in range(3):
             J[i, k] = axes[0, i] * vx + axes[1, i] * vy + axes[2, i] * vz
             J[3 + i, k] = axes[0, i] * wx + axes[1, i] * wy + axes[2, i] * wz
+        for r in range(p.b.size):
+            J[6 + r, k] = p.A[r, k]
 
 
 @compiled()
-def cost_of(e: Floats, weight: Floats) -> float:
+def cost_of(p: Problem, e: Floats) -> float:
     """Squared weighted error."""
     total = 0.0
-    for c in range(6):
-        total += (weight[c] * e[c]) ** 2
+    for c in range(e.size):
+        total += (p.weight[c] * e[c]) ** 2
     return total
 
 
 @compiled()
-def is_met(e: Floats, weight: Floats, tolerance: Floats) -> bool:
+def is_met(p: Problem, e: Floats) -> bool:
     """Whether translation and rotation, without components of weight 0, are within tolerance."""
     for part in range(2):
         total = 0.0
         for c in range(3 * part, 3 * part + 3):
-            if weight[c] > 0.0:
+            if p.weight[c] > 0.0:
                 total += e[c] * e[c]
-        if sqrt(total) > tolerance[part]:
+        if sqrt(total) > p.tolerance[part]:
             return False
     return True
 
 
 @compiled()
+def slope_of(p: Problem, J: Floats, e: Floats, i: int) -> float:
+    """Half of the rate at which the cost falls with joint i."""
+    total = 0.0
+    for c in range(e.size):
+        total += p.weight[c] * p.weight[c] * J[c, i] * e[c]
+    return total
+
+
+@compiled()
 def damped_step(
-    J: Floats, e: Floats, weight: Floats, held: Ints, damping: Floats, H: Floats, x: Floats
+    p: Problem, J: Floats, e: Floats, held: Ints, damping: Floats, H: Floats, x: Floats
 ) -> bool:
     """Solve ``(J^T W^2 J + diag(damping)) x = J^T W^2 e`` by Cholesky's method; False if singular.
 
@@ -148,8 +187,8 @@ def damped_step(
             if held[i] + held[j] > 0:
                 total = 1.0 if i == j else 0.0
             else:
-                for c in range(6):
-                    total += weight[c] * weight[c] * J[c, i] * J[c, j]
+                for c in range(e.size):
+                    total += p.weight[c] * p.weight[c] * J[c, i] * J[c, j]
             for m in range(j):
                 total -= H[i, m] * H[j, m]
             if i > j:
@@ -158,10 +197,7 @@ def damped_step(
                 H[i, i] = sqrt(total)
             else:
                 return False
-        x[i] = 0.0
-        if held[i] == 0:
-            for c in range(6):
-                x[i] += weight[c] * weight[c] * J[c, i] * e[c]
+        x[i] = slope_of(p, J, e, i) if held[i] == 0 else 0.0
         for m in range(i):
             x[i] -= H[i, m] * x[m]
         x[i] /= H[i, i]
@@ -174,33 +210,21 @@ def damped_step(
 
 @compiled()
 def descend(
-    sigma: Ints,
-    D: Floats,
-    U: Floats,
-    axes: Floats,
-    weight: Floats,
-    tolerance: Floats,
-    bounds: Floats,
-    unit: Floats,
-    iterations: int,
-    patience: float,
-    q: Floats,
-    e: Floats,
+    p: Problem, U: Floats, axes: Floats, iterations: int, patience: float, q: Floats, e: Floats,
     J: Floats,
-) -> None:
-    """Levenberg-Marquardt from q (k,), in place; its error e (6,) and derivative J (6, k).
+) -> None:  # fmt: skip
+    """Levenberg-Marquardt from q (k,), in place; its errors e and their derivative J.
 
     Ends when a step no longer reduces the error, or when more than ``patience`` of the cost is
     left after five steps.
     """
     k = q.shape[0]
-    T, lines, E, phi = np.empty((3, 4)), np.empty((k, 6)), np.empty((3, 3)), np.empty(3)
+    T, lines, W, after = np.empty((3, 4)), np.empty((k, 6)), np.empty((4, 3)), np.empty(e.size)
     H, step, trial, damping = np.empty((k, k)), np.empty(k), np.empty(k), np.empty(k)
-    after, held = np.empty(6), np.zeros(k, np.int64)
-    forward(sigma, D, q, T, lines)
-    pose_error(U, axes, T, E, phi, e)
-    error_jacobian(sigma, T, lines, axes, phi, J)
-    cost, factor = cost_of(e, weight), START_DAMPING
+    held = np.empty(k, np.int64)
+    errors(p, U, axes, q, T, lines, W, e)
+    error_jacobian(p, T, lines, axes, W[3], J)
+    cost, factor = cost_of(p, e), START_DAMPING
     due, before = 0, inf
     for count in range(iterations):
         if cost < EXACT:
@@ -211,23 +235,20 @@ def descend(
             due, before = count + 5, cost
         # a joint at a bound that would leave it stays
         for i in range(k):
-            total = 0.0
-            for c in range(6):
-                total += weight[c] * weight[c] * J[c, i] * e[c]
-            leaves = (q[i] <= bounds[0, i] and total <= 0.0) or (
-                q[i] >= bounds[1, i] and total >= 0.0
+            slope = slope_of(p, J, e, i)
+            leaves = (q[i] <= p.bounds[0, i] and slope <= 0.0) or (
+                q[i] >= p.bounds[1, i] and slope >= 0.0
             )
-            held[i] = 1 if leaves else 0
+            held[i] = 1 if leaves or p.held[i] == 1 else 0
         new = inf
         for _ in range(8):
             for i in range(k):
-                damping[i] = (factor * min(cost, sqrt(cost)) + 1e-14) * unit[i] * unit[i]
-            if damped_step(J, e, weight, held, damping, H, step):
+                damping[i] = (factor * sqrt(cost) + 1e-14) * p.unit[i] * p.unit[i]
+            if damped_step(p, J, e, held, damping, H, step):
                 for i in range(k):
-                    trial[i] = min(max(q[i] + step[i], bounds[0, i]), bounds[1, i])
-                forward(sigma, D, trial, T, lines)
-                pose_error(U, axes, T, E, phi, after)
-                new = cost_of(after, weight)
+                    trial[i] = min(max(q[i] + step[i], p.bounds[0, i]), p.bounds[1, i])
+                errors(p, U, axes, trial, T, lines, W, after)
+                new = cost_of(p, after)
                 if new < cost:
                     break
             factor *= 8.0
@@ -235,48 +256,22 @@ def descend(
             break
         for i in range(k):
             q[i] = trial[i]
-        for c in range(6):
+        for c in range(e.size):
             e[c] = after[c]
-        error_jacobian(sigma, T, lines, axes, phi, J)
+        error_jacobian(p, T, lines, axes, W[3], J)
         factor = max(factor / 3.0, 1e-3)
         pays = new < 0.1 * cost
         cost = new
-        if not pays and is_met(e, weight, tolerance):
+        if not pays and is_met(p, e):
             break
 
 
-@compiled(
-    NOTHING(
-        INTS,
-        STACK,
-        STACK,
-        STACK,
-        VECTOR,
-        VECTOR,
-        MATRIX,
-        VECTOR,
-        MATRIX,
-        MATRIX,
-        ORDER,
-        INT,
-        types.float64,
-        OUT2,
-        OUT2,
-        OUT3,
-    )
-)
+@compiled(NOTHING(PROBLEM, STACK, STACK, STACK, INT, types.float64, OUT2, OUT2, OUT3))
 def damped_searches(
-    sigma: Ints,
-    D: Floats,
+    p: Problem,
     poses: Floats,
     axes: Floats,
-    weight: Floats,
-    tolerance: Floats,
-    bounds: Floats,
-    unit: Floats,
-    first: Floats,
     starts: Floats,
-    order: NDArray[np.int64],
     iterations: int,
     patience: float,
     q: Floats,
@@ -285,37 +280,21 @@ def damped_searches(
 ) -> None:
     """Best configuration of each pose, from its starts in order until one meets it.
 
-    Shapes: poses (N, 4, 4), axes (N, 3, 3), first (N, k), starts (S, k), order (N, R) of rows of
-    starts, -1 for ``first`` -> q (N, k), error (N, 6), J (N, 6, k).
+    Shapes: poses (N, 4, 4), axes (N, 3, 3), starts (N, R, k) -> q (N, k), error (N, 6 + m),
+    J (N, 6 + m, k).
     """
-    k = sigma.shape[0]
-    x, e, Jx = np.empty(k), np.empty(6), np.empty((6, k))
+    k, rows = starts.shape[2], error.shape[1]
+    x, e, Jx = np.empty(k), np.empty(rows), np.empty((rows, k))
     for n in range(poses.shape[0]):
         least = inf
-        for r in range(order.shape[1]):
-            s = order[n, r]
+        for r in range(starts.shape[1]):
             for i in range(k):
-                value = first[n, i] if s < 0 else starts[s, i]
-                x[i] = min(max(value, bounds[0, i]), bounds[1, i])
-            descend(
-                sigma,
-                D,
-                poses[n],
-                axes[n],
-                weight,
-                tolerance,
-                bounds,
-                unit,
-                iterations,
-                patience,
-                x,
-                e,
-                Jx,
-            )
-            cost, met = cost_of(e, weight), is_met(e, weight, tolerance)
+                x[i] = min(max(starts[n, r, i], p.bounds[0, i]), p.bounds[1, i])
+            descend(p, poses[n], axes[n], iterations, patience, x, e, Jx)
+            cost, met = cost_of(p, e), is_met(p, e)
             if met or cost < least or r == 0:
                 least = cost
-                for c in range(6):
+                for c in range(rows):
                     error[n, c] = e[c]
                     for i in range(k):
                         J[n, c, i] = Jx[c, i]

@@ -28,16 +28,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from numba import types
 
-from ...kernels._compile import (
-    INT,
-    INTS,
-    NOTHING,
-    OUT1,
-    OUT3,
-    Floats,
-    Ints,
-    compiled,
-)
+from ...kernels._compile import INT, INTS, NOTHING, OUT1, OUT3, Floats, Ints, compiled
 
 LINKS = types.Array(types.float64, 4, "C", readonly=True)
 ORDERS = types.Array(types.int64, 2, "C")

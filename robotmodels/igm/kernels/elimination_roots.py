@@ -226,12 +226,7 @@ def fold_at(sigma: Ints, D: Floats, root: Floats, v: Floats) -> tuple[float, flo
 
 @compiled()
 def mark_double_roots(
-    sigma: Ints,
-    D: Floats,
-    tolerance: Floats,
-    found: Floats,
-    count: int,
-    double: NDArray[np.bool_],
+    sigma: Ints, D: Floats, tolerance: Floats, found: Floats, count: int, double: NDArray[np.bool_]
 ) -> None:
     """Mark roots whose partner is not told apart from them, or not found beside them.
 

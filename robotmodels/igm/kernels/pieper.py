@@ -31,13 +31,7 @@ from ...kernels._compile import (
     compiled,
 )
 from .chain import wrapped
-from .equations import (
-    ANY,
-    polynomial_roots,
-    quadratic_roots,
-    trigonometric_roots,
-    type_2,
-)
+from .equations import ANY, polynomial_roots, quadratic_roots, trigonometric_roots, type_2
 
 LINKS = types.Array(types.float64, 4, "C", readonly=True)
 COUNTS, MARKS = types.Array(types.int64, 1, "C"), types.Array(types.int64, 2, "C")
@@ -292,13 +286,7 @@ def turning_pair(
 
 @compiled(counted=False)
 def sliding_pair(
-    lam: float,
-    last: bool,
-    size: float,
-    slack: float,
-    zero: float,
-    reference: Floats,
-    work: Scratch,
+    lam: float, last: bool, size: float, slack: float, zero: float, reference: Floats, work: Scratch
 ) -> int:
     """The same with a sliding joint x_b: ``row_i z x_b + lam_i (2 f_z x_b + x_b^2) = b_i``.
 

@@ -6,10 +6,4 @@
 from .explain import ExplainedStep, InverseModelExplanation, explain_igm
 from .plan import PaulPlan, derive_plan
 
-__all__ = [
-    "ExplainedStep",
-    "InverseModelExplanation",
-    "PaulPlan",
-    "derive_plan",
-    "explain_igm",
-]
+__all__ = ["ExplainedStep", "InverseModelExplanation", "PaulPlan", "derive_plan", "explain_igm"]
