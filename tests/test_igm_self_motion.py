@@ -130,7 +130,6 @@ def test_the_wrist_of_a_ur_frees_joint_two(rng):
     q = draw(chain, 6, rng)
     q[:, 4] = 0.0
     U, found, out = settled(chain, solver, q, 0.3)
-    np.testing.assert_array_equal(found.q, out.q)
     np.testing.assert_array_equal(np.unique(out.free[out.family], axis=0), [[0, 1, 0, 0, 0, 0]])
     np.testing.assert_array_equal(np.unique(out.moving[out.family], axis=0), [[0, 1, 1, 1, 0, 1]])
     # walking the curves from members elsewhere comes to the same postures

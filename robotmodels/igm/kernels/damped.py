@@ -6,8 +6,8 @@ rotation vector ``phi = log(R_d R^T)``. A rotation of the tool by ``w dt`` turns
 rotation group. It is regular below a whole turn, so the derivative is exact for every mask. The
 errors ``b - A q`` of relations stand behind them.
 
-Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e`` with lambda proportional to the size of the error:
-convergence stays fast and flat directions of J are left alone (J. Fan and Y. Yuan, Computing 74,
+Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e``, lambda proportional to the size of the error:
+convergence stays fast, and flat directions of J are left alone (J. Fan and Y. Yuan, Computing 74,
 2005).
 """
 
@@ -260,7 +260,7 @@ def descend(
             e[c] = after[c]
         error_jacobian(p, T, lines, axes, W[3], J)
         factor = max(factor / 3.0, 1e-3)
-        pays = new < 0.1 * cost
+        pays = new < 0.25 * cost
         cost = new
         if not pays and is_met(p, e):
             break

@@ -7,7 +7,7 @@ their axes and the height along them) gives joints 0 and 4, then 5; a planar tri
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 from numba import types
@@ -170,25 +170,28 @@ def parallel_postures(
                     beta[j] = u * E[4, 0, j] + v * E[4, 1, j] + E[3, 2, 2] * E[4, 2, j]
                 sense = E[1, 2, 2] * E[2, 2, 2]
                 x5 = atan2(sense * beta[1], sense * beta[0]) - atan2(alpha[1], alpha[0])
-            # E_3 M_4 E_4 M_5 E_5 M_0 E_0, whose inverse T is what joints 1 to 3 must do
-            advance(unit, True, 0.0, E[3], P)
-            advance(P, True, x4, E[4], Q)
-            advance(Q, True, x5, E[5], P)
-            advance(P, True, x0, E[0], Q)
-            for r in range(3):
-                T[r, 3] = 0.0
-                for s in range(3):
-                    T[r, s] = Q[s, r]
-                    T[r, 3] -= Q[s, r] * Q[s, 3]
-            planar = references[n, 1:4]
-            for j in range(triangle(T, E[1], E[2], reaching, zero, planar, x, planar_marks)):
-                if count == 8:
+            # an aligned axis 5 takes its reference, or another angle at which the triangle closes
+            for turn in range(8 if aligned else 1):
+                last = x5 + 0.25 * pi * turn
+                # E_3 M_4 E_4 M_5 E_5 M_0 E_0, whose inverse T is what joints 1 to 3 must do
+                advance(unit, True, 0.0, E[3], P)
+                advance(P, True, x4, E[4], Q)
+                advance(Q, True, last, E[5], P)
+                advance(P, True, x0, E[0], Q)
+                for r in range(3):
+                    T[r, 3] = 0.0
+                    for s in range(3):
+                        T[r, s] = Q[s, r]
+                        T[r, 3] -= Q[s, r] * Q[s, 3]
+                planar, kept = references[n, 1:4], aligned and turn == 0
+                closed = triangle(T, E[1], E[2], reaching, zero, planar, x, planar_marks)
+                for j in range(min(closed, 8 - count)):
+                    q[n, count, 0], q[n, count, 4], q[n, count, 5] = x0, x4, last
+                    for m in range(3):
+                        q[n, count, 1 + m] = x[j, m]
+                    free[n, count] = (marks[i] & 4) >> 2 | planar_marks[j] << 1 | kept << 5
+                    free[n, count] |= (marks[i] & 2) << 3
+                    count += 1
+                if closed > 0:
                     break
-                q[n, count, 0], q[n, count, 4], q[n, count, 5] = x0, x4, x5
-                for m in range(3):
-                    q[n, count, 1 + m] = x[j, m]
-                free[n, count] = (
-                    (marks[i] & 4) >> 2 | planar_marks[j] << 1 | (marks[i] & 2) << 3 | aligned << 5
-                )
-                count += 1
         counts[n] = count
