@@ -83,19 +83,6 @@ def ikm(
     >>> found = ikm(arm, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6], [0.1, 0.0, -0.2, 0.0, 0.0, 0.3])
     >>> found.reason(), bool(abs(found.error).max() < 1e-12)
     ('The motion is met.', True)
-
-    A straight line in 1 s by integrating joint velocities. The position error added to the twist
-    keeps the integration from drifting:
-
-    >>> import numpy as np
-    >>> from robotmodels.kinematics import dgm
-    >>> q, step = np.array([0.1, 0.2, 0.8, 0.4, 0.5, 0.6]), 0.01
-    >>> start, velocity = dgm(arm, q)[:3, 3], np.array([-0.1, 0.2, -0.1])
-    >>> for k in range(100):
-    ...     behind = start + velocity * k * step - dgm(arm, q)[:3, 3]
-    ...     q = q + step * ikm(arm, q, [*(velocity + 50.0 * behind), 0.0, 0.0, 0.0]).v
-    >>> bool(abs(dgm(arm, q)[:3, 3] - start - velocity).max() < 1e-4)
-    True
     """
     check_model(model)
     q, twist = as_positions(model, q), as_vector(twist, 6, "twist")
@@ -130,23 +117,19 @@ def ikm_second_order(
 ) -> IKMSolution:
     """Second order inverse kinematic model: joint accelerations for the rate of a twist.
 
-    Solves ``J a = acceleration - dJ/dt v`` as `ikm` solves ``J v = twist``. A redundant robot whose
-    null space is left to the least acceleration keeps the self-motion it has: give
-    ``secondary=-k * v`` to bring it to rest.
-
-    Seed book section 1.3.2 (differentiated); J. Luh, M. Walker and R. Paul 1980.
+    Solves ``J a = acceleration - dJ/dt v`` as `ikm` solves ``J v = twist`` (J. Luh, M. Walker and
+    R. Paul 1980). A redundant robot whose null space is left to the least acceleration keeps the
+    self-motion it has: give ``secondary=-k * v`` to bring it to rest.
 
     Parameters
     ----------
     model, frame, reference, mask, method, joint_weights, length, augmented, tasks, limits
-        As in `ikm`, for accelerations.
+        As in `ikm`, for accelerations; ``secondary`` too, gradients are used as accelerations.
     q, v : array_like, shape (..., n)
         Joint variables (rad or m) and velocities; leading axes broadcast with ``acceleration``.
     acceleration : array_like, shape (..., 6)
         Time derivative of the frame's twist, entry by entry [m/s^2, rad/s^2], as
         `dkm_second_order` gives it.
-    secondary : array_like, shape (..., n), criterion, or sequence of them, optional
-        Joint accelerations for the null space; gradients are used as accelerations.
 
     Examples
     --------

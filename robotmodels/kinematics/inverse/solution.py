@@ -44,26 +44,21 @@ class IKMSolution(Rebuilt):
 
     Parameters
     ----------
-    v : ndarray, shape (..., n)
-        Joint velocities, rad/s or m/s; from `ikm_second_order` those that were given.
+    v, a : ndarray, shape (..., n)
+        Joint velocities, rad/s or m/s; accelerations, rad/s^2 or m/s^2, of the second order only,
+        where ``v`` are the velocities that were given.
     status : ndarray of int8, shape (...)
         Codes of `IKMStatus`.
-    achieved : ndarray, shape (..., 6)
-        ``J v``, the part that was requested [m/s, rad/s].
-    error : ndarray, shape (..., 6)
-        The twist minus ``achieved``.
+    achieved, error : ndarray, shape (..., 6)
+        ``J v``, the part that was requested [m/s, rad/s], and the twist minus it.
     reachable : ndarray, shape (..., 6)
-        The part of the twist that some joint velocities produce: its projection onto the range of
-        J (metres and radians compared by the length).
-    singular_values : ndarray, shape (..., k)
-        Of the scaled Jacobian, rows of ``augmented`` included, descending; k is the smaller of its
-        numbers of rows and columns.
-    rank : ndarray of int8, shape (...)
-        Number of singular values above 1e-10 of the Jacobian's norm.
-    damping : ndarray, shape (...)
-        Largest damping of any direction; 0 where nothing is damped.
-    scale : ndarray, shape (...)
-        Part of the twist that is kept under limits, 1 without.
+        The projection of the twist onto the range of J (metres and radians compared by the
+        length): what some joint velocities produce.
+    singular_values, rank : ndarray, shapes (..., k) and (...)
+        Of the scaled Jacobian, rows of ``augmented`` included, descending, and the number of them
+        above 1e-10 of its norm.
+    damping, scale : ndarray, shape (...)
+        Largest damping of any direction, and the part of the twist that is kept under limits.
     limited : ndarray of bool, shape (..., n)
         Joints that are at a limit of their velocity or acceleration.
     mask : ndarray of bool, shape (6,)
@@ -72,8 +67,6 @@ class IKMSolution(Rebuilt):
         The rates of the tasks minus those achieved: ``augmented`` in their order, then ``tasks``.
     task_scales : ndarray, shape (..., t)
         Part of the rates of ``tasks`` that is kept under limits.
-    a : ndarray, shape (..., n), optional
-        Joint accelerations, rad/s^2 or m/s^2, from `ikm_second_order`.
     """
 
     v: Array

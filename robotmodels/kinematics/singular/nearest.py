@@ -78,41 +78,31 @@ class NearestSingularities(Rebuilt):
 
     Parameters
     ----------
-    home : ndarray, shape (n,)
-        The given configuration, rad or m.
-    q : ndarray, shape (S, n)
-        Singular configurations, rad or m.
+    home, q : ndarray, shapes (n,) and (S, n)
+        The given configuration, and singular ones, rad or m.
     distance : ndarray, shape (S,)
         From ``home``, weighted: ``sqrt(sum of w (dq)^2)``, strokes in units of ``length``.
     direction : ndarray, shape (S, n)
         ``(q - home) / distance``, rad or m per unit of distance; zero where the distance is.
-    escape : ndarray, shape (S, n)
-        Joint direction, rad or m per unit of distance, normal to the singular set there: the
-        weakest singular value rises along it. Towards ``home``.
-    slope : ndarray, shape (S,)
-        Of the weakest singular value along ``escape``, per unit of distance: nearly 0 where the
-        singular set is touched twice, or where two sets cross.
+    escape, slope : ndarray, shapes (S, n) and (S,)
+        Joint direction normal to the singular set there, rad or m per unit of distance, towards
+        ``home``, and the slope of the weakest singular value along it: nearly 0 where the set is
+        touched twice, or where two sets cross.
     codimension : ndarray of int, shape (S,)
         Number of conditions on the joints that the set makes there: 1 is a surface.
-    kind : tuple of tuple of SingularityKind
-        Names of each.
-    words : tuple of tuple of str
-        Sentences of each.
-    residual : ndarray, shape (S,)
-        Weakest singular value over the largest: 0 is exactly singular.
-    stationarity : ndarray, shape (S,)
-        Part of the difference to ``home`` that lies along the set, in units of distance: 0 is
-        nearest; infinite where sets cross.
+    kind, words : tuples, one for each row, of tuples of SingularityKind and of str
+        Names and sentences.
+    residual, stationarity : ndarray, shape (S,)
+        Weakest singular value over the largest, and the part of the difference to ``home`` that
+        lies along the set, in units of distance (infinite where sets cross): 0 is exact.
     status : ndarray of int8, shape (S,)
         Codes of `NearestStatus`.
     outcome : SearchOutcome
         Of the whole search.
     length : float
         Characteristic length, metres.
-    mask : ndarray of bool, shape (6,)
-        Components that count.
-    frame : str
-        What the frame is called, such as ``"the tool"``.
+    mask, frame : ndarray of bool, shape (6,), and str
+        Components that count, and what the frame is called.
     """
 
     home: Array
@@ -172,13 +162,12 @@ def _short(x: float) -> str:
 
 def _tables(fixed: list[tuple[str, list[str]]], joints: list[tuple[str, list[str]]]) -> list[str]:
     """One table, or several one below the other where the joints do not fit abreast."""
-    count = len(joints)
-    while count > 1:
-        tables = [boxed([*fixed, *joints[k : k + count]]) for k in range(0, len(joints), count)]
-        if max(len(line) for table in tables for line in table.splitlines()) <= _WIDTH:
+    for count in range(max(len(joints), 1), 0, -1):
+        parts = [joints[k : k + count] for k in range(0, max(len(joints), 1), count)]
+        tables = [boxed([*fixed, *part]) for part in parts]
+        if count == 1 or max(map(len, "\n".join(tables).splitlines())) <= _WIDTH:
             return tables
-        count -= 1
-    return [boxed([*fixed, *joints[k : k + 1]]) for k in range(len(joints))] or [boxed(fixed)]
+    return []
 
 
 def nearest_singularity(

@@ -110,44 +110,30 @@ class SingularityReport(Rebuilt):
         M, local rank r, and M - r.
     singular_values : ndarray, shape (k,)
         Descending, no unit.
-    weakest : float
-        The M-th of them over the first: the measure of the distance to a singularity.
-    gap : float
-        Smallest singular value that counts over the largest that does not.
-    kinds : tuple of SingularityKind
-        Shoulder, elbow, wrist or other.
-    words : tuple of str
-        The same as sentences.
+    weakest, gap : float
+        The M-th of them over the first, the distance from singular; and the smallest that counts
+        over the largest that does not.
+    kinds, words : tuples of SingularityKind and str
+        Shoulder, elbow, wrist or other, and the same as sentences.
     near_kinds, near_words : tuples of SingularityKind and str
         Nearby singular sets that explain the nearly lost directions.
     weak : LostDirections
-        Combinations that are nearly lost, in the frame in which most of their components are small:
-        those of singular values between ``tolerance`` and ``near``.
+        Combinations that are nearly lost, of singular values between ``tolerance`` and ``near``.
     side : WorkspaceSide
         Boundary or interior, of the poses reached near this configuration.
-    lost : LostDirections
-        Combinations that cannot be produced, where they have the most zeros.
-    lost_in_world : LostDirections
-        The same in the axes of the task (world axes unless the mask's are the tool's) at the
-        frame's origin.
+    lost, lost_in_world : LostDirections
+        Combinations that cannot be produced, where they have the most zeros, and in the axes of
+        the task (world axes unless the mask's are the tool's) at the frame's origin.
     open_twist : ndarray, shape (6,), or None
         At a boundary: the lost direction towards the side that is open, ``[v; w]`` in the axes of
         ``lost_in_world``, unit length when metres are divided by ``length``.
     self_motions : tuple of SelfMotion
-        Joint motions without velocity of the frame.
-    gained : int
-        How many more of them than at regular configurations.
+        Joint motions without velocity of the frame; ``gained`` is how many more of them than at
+        regular configurations.
     mask : ndarray of bool, shape (6,)
         Components that count.
     length, tolerance : float
         Characteristic length in metres, and the relative size of zero.
-
-    Examples
-    --------
-    >>> from robotmodels import classify_singularity, load
-    >>> report = classify_singularity(load("rx90"), [0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6])
-    >>> report.kinds[0].name, report.side.name, report.lost.combinations
-    ('ELBOW', 'BOUNDARY', ('vz',))
     """
 
     status: SingularityStatus
