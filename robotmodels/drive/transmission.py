@@ -74,20 +74,13 @@ class Transmission(Value):
         for name, value in given.items():
             array = np.zeros(n) if value is None else as_exact(value, (n,), name)
             object.__setattr__(self, name, read_only(array))
-        terms = any(getattr(self, name).any() for name in ("Iam", "Fvm", "Fcm"))
-        if terms and not self.is_invertible:
+        terms = (self.Iam != 0.0) | (self.Fvm != 0.0) | (self.Fcm != 0.0)
+        for m in set(np.flatnonzero(terms) + 1) - set(self.coupled_motors if terms.any() else ()):
+            known = f"turns one joint only, or K has rank {self.rank} of {n} and does not tell"
             raise InertiaError(
-                f"matrix: it has rank {self.rank} of {n}, so that the joints do not determine the "
-                "motors: inertia and friction of coupled motors (Iam, Fvm, Fcm) need a matrix "
-                "that can be inverted."
+                f"Motor {m} {known}; its inertia and friction belong to DriveParameters (Ia, Fv, "
+                f"Fc). Coupling terms are for the motors {list(self.coupled_motors)}."
             )
-        for m in set(range(1, n + 1)) - set(self.coupled_motors) if terms else ():
-            if self.Iam[m - 1] or self.Fvm[m - 1] or self.Fcm[m - 1]:
-                raise InertiaError(
-                    f"Motor {m} turns one joint only, so its inertia and friction belong to "
-                    "DriveParameters (Ia, Fv, Fc); coupling terms are for the motors "
-                    f"{list(self.coupled_motors)}."
-                )
 
     @classmethod
     def from_motor(

@@ -14,6 +14,11 @@ values : array_like, shape (b,)
 q, v, a, wrench, friction
     As for `idm`; friction acts besides that whose parameters are among the base ones.
 
+Returns
+-------
+RobotModel or ndarray
+    A new model, or torques (..., n) as of `idm`.
+
 Raises
 ------
 InvalidValueError
@@ -70,11 +75,6 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     those of the robot. Its links are not physical (first moments without mass) and partly contain
     the rotors, so that single links and ``drive=False`` have no meaning.
 
-    Returns
-    -------
-    RobotModel
-        A new model.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -104,11 +104,6 @@ def idm_from_base(
     friction: Friction | None = None,
 ) -> Array:
     """Inverse dynamic model from base parameters alone: the torques of `idm`, drives included.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Torques (N m) or forces (N) in table order, of motions q, v, a (..., n).
 
     Examples
     --------
