@@ -46,24 +46,6 @@ def lost(model, found, q):
     return gaps(model, found.q, q).min(axis=1) > 1e-6
 
 
-def multi_start(model, T, starts, seed=1):
-    """Solutions of one pose by Newton's method from random starts, apart from the inverse model."""
-    q = configurations(model, starts, seed)
-    for _ in range(40):
-        U, J = rm.dgm(model, q), rm.jacobian(model, q)
-        R = T[:3, :3] @ np.swapaxes(U[:, :3, :3], 1, 2)
-        turn = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0],
-                               R[:, 1, 0] - R[:, 0, 1]], axis=1)  # fmt: skip
-        e = np.concatenate([T[:3, 3] - U[:, :3, 3], turn], axis=1)
-        step = np.linalg.solve(J + 1e-14 * np.eye(6), e[..., None])[..., 0]
-        q = q + step / np.maximum(1.0, 2.0 * np.abs(step).max(axis=1))[:, None]
-    roots = np.empty((0, 6))
-    for x in q[(np.abs(e).max(axis=1) < 1e-11) & (np.trace(R, axis1=1, axis2=2) > 2.9)]:
-        if not len(roots) or gaps(model, roots[None], x[None]).min() > 1e-5:
-            roots = np.vstack([roots, x])
-    return roots
-
-
 @pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_solutions_are_found_again_and_nothing_else_is_returned(name):
@@ -80,21 +62,6 @@ def test_solutions_are_found_again_and_nothing_else_is_returned(name):
         assert not lost(model, found, q).any()
         # real solutions of six equations come in pairs
         assert np.all((found.valid.sum(axis=1) + found.double.sum(axis=1)) % 2 == 0)
-
-
-@pytest.mark.sampled(2)
-@pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
-def test_as_many_solutions_as_from_two_hundred_starts(name):
-    model = changed(name, 1)
-    T = rm.dgm(model, configurations(model, 6, seed=7))
-    found, missing = rm.igm(model, T), 0
-    for n in range(len(T)):
-        wanted = multi_start(model, T[n], 200)
-        for q in wanted:
-            assert gaps(model, found.q[n][None], q[None]).min() < 1e-5
-        missing += found.count[n] - len(wanted)
-    # random starts may miss a narrow solution, not many
-    assert 0 <= missing <= 4
 
 
 @pytest.mark.sampled(3)

@@ -305,31 +305,6 @@ def test_beside_a_self_motion(eps, share):
 # --- symmetry, borders ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sigma", [REVOLUTE, (0, 0, 1, 0, 0, 0)])
-def test_reversed_and_mirrored_arms_agree(sigma):
-    chain = random_arm(5, sigma)
-    U = poses(chain, draw(chain, 40, np.random.default_rng(1)))
-    q, valid, _ = elimination_solutions(solver_of(chain), U)
-
-    backwards = JointChain(
-        chain.columns, chain.sigma[::-1].copy(), np.linalg.inv(chain.D[::-1]), chain.base
-    )
-    r, there, _ = elimination_solutions(prepare_elimination(backwards), np.linalg.inv(U))
-    assert np.array_equal(there.sum(axis=1), valid.sum(axis=1))
-    r = -r[..., ::-1]
-
-    S = np.diag([1.0, -1.0, 1.0, 1.0])
-    mirror = JointChain(chain.columns, chain.sigma, S @ chain.D @ S, chain.base)
-    m, seen, _ = elimination_solutions(prepare_elimination(mirror), S @ U @ S)
-    assert np.array_equal(seen.sum(axis=1), valid.sum(axis=1))
-    m = np.where(chain.sigma == 0, -m, m)
-
-    for n in range(40):
-        for row in q[n][valid[n]]:
-            assert apart(chain.sigma, row, r[n][there[n]]).min() < 1e-8
-            assert apart(chain.sigma, row, m[n][seen[n]]).min() < 1e-8
-
-
 def test_other_arms_are_declined():
     assert prepare_elimination(arm("planar_3r")) is None
     assert prepare_elimination(random_arm(0, (1, 0, 1, 0, 0, 0))) is None

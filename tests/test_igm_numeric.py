@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
 from robotmodels import se3
-from robotmodels.errors import InvalidValueError, NotARotationError, RobotModelsError, ShapeError
+from robotmodels.errors import InvalidValueError, RobotModelsError, ShapeError
 from robotmodels.igm import IGMStatus, igm_numeric
 from robotmodels.igm.constraints import Components, constraints
 from robotmodels.igm.loop import joint_chain
@@ -225,17 +225,6 @@ def test_hole_in_the_middle_of_a_planar_arm():
     assert found.status.tolist() == [IGMStatus.TOO_NEAR, IGMStatus.REACHED, IGMStatus.TOO_FAR]
 
 
-def test_orientation_least_along_a_self_motion():
-    """A planar 3R arm holds its point along a self-motion: the best orientation of it is kept."""
-    model = rm.load("planar_3r").with_tool(at(1.0, 0, 0))
-    T = at(2.9, 0, 0) @ se3.rotation("z", np.pi / 2)
-    found = igm_numeric(model, T)
-    assert found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
-    a = np.linspace(-np.pi, np.pi, 200_001)  # direction of the last link: the others must reach
-    ends = np.hypot(2.9 - np.cos(a), np.sin(a)) <= 2.0
-    assert abs(found.error[0, 5]) == pytest.approx(np.abs(np.pi / 2 - a[ends]).min(), abs=1e-4)
-
-
 def test_no_false_success_on_wild_poses(rng):
     """Poses drawn at random are either met or refused; refused ones carry a true error."""
     for name in ("rx90", "lab_trr", "xarm5", "panda"):
@@ -362,21 +351,14 @@ def test_batch_is_single_row_by_row(rng):
     ("options", "error", "words"),
     [
         ({"T": np.eye(3)}, ShapeError, r"\(\.\.\., 4, 4\)"),
-        ({"T": np.zeros((4, 4, 5))}, ShapeError, "MATLAB"),
-        ({"T": 2 * np.eye(4)}, NotARotationError, "last row"),
-        ({"T": np.diag([1.0, 1, -1, 1])}, NotARotationError, "not a rotation"),
         ({"T": np.full((4, 4), np.nan)}, InvalidValueError, "finite"),
         ({"q0": [0, 0]}, ShapeError, "q0"),
         ({"q0": [np.inf] * 6}, InvalidValueError, "q0"),
         ({"mask": [0] * 6}, InvalidValueError, "nothing"),
-        ({"mask": [1, 1, 1]}, ShapeError, "6 numbers"),
         ({"mask": [1, 1, 1, 0.5, 0, 0]}, InvalidValueError, "zeros and ones"),
-        ({"mask": [1, 1, 1, -1, 0, 0]}, InvalidValueError, "zeros and ones"),
         ({"mask": "111000"}, InvalidValueError, "mask"),
         ({"mask_axes": "local"}, InvalidValueError, "'world' or 'tool'"),
-        ({"mask_axes": ["tool"]}, InvalidValueError, "'world' or 'tool'"),
         ({"position_tolerance": 0}, InvalidValueError, "position_tolerance"),
-        ({"position_tolerance": "fine"}, InvalidValueError, "position_tolerance"),
         ({"orientation_tolerance": np.nan}, InvalidValueError, "orientation_tolerance"),
         ({"restarts": -1}, InvalidValueError, "restarts"),
         ({"restarts": 2.5}, InvalidValueError, "restarts"),

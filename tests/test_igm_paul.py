@@ -583,30 +583,6 @@ def test_formulas_of_the_types_are_typeset(type_):
         assert r"\pm (W_{1} \, S_{j} - W_{2} \, C_{j}) = X \, S_{i}" in formula.latex
 
 
-def test_latex_says_what_the_text_says():
-    latex = told_of("lab_rrt").latex
-    assert r"2 & 0 & -\pi/2 & 0 & \theta_{2} + \pi/2 & 0" in latex
-    assert r"$\mathbf{U}_0 = \mathbf{T}$: the desired pose" in latex
-    assert r"$\mathbf{E}$ the tool" in latex
-    assert r"RL_{1} &= 0.5 \quad (r_{1})" in latex
-    assert r"$q_{2} = \theta_{2} - \frac{\pi}{2}$" in latex
-    assert r"$\theta_{1}$ is free where $P_{x} = 0$ and $P_{y} = 0$ ($O_{3}$ is on" in latex
-    assert latex.count(r"r_{3} &=") == 1
-    latex = told_of("rx90").latex
-    assert r"$\theta_{4}$ has $S_{5} > 0$ and $\theta_{4}'$ has $S_{5} < 0$." in latex
-    assert "fall together where $X^{2} + Y^{2} = Z^{2}$ (stretched or folded)" in latex
-    assert r"D_{3} &= 0.45 \quad (d_{3})" in latex
-    assert r"with $X_{1} = Y_{2}, \; Y_{1} = X_{2} = 0$: $X_{1} \, S = Z_{1}" in latex
-    assert r"\text{(squared and added)}" in latex
-    ur5, cobra = told_of("ur5").latex, told_of("cobra_s600").latex
-    assert r"\mathbf{U}_0 = \mathbf{Z}^{-1} \, \mathbf{T} \, \mathbf{E}^{-1}" in ur5
-    assert r"\theta_{3} &= \left(\theta_{2} + \theta_{3}\right) - \theta_{2}" in ur5
-    assert cobra.count("r_{3} &=") == 1
-    assert "S_{1+2-4}" in cobra
-    assert "12-4" not in cobra
-    assert r"$S_{1+2-4}$ of $\theta_{1} + \theta_{2} - \theta_{4}$" in cobra
-
-
 def test_offsets_are_multiples_of_pi_where_they_are():
     assert "offset: q2 = θ2 - π/2." in told_of("lab_rrt").text
     assert "offset: q2 = θ2 + π/2, q3 = θ3 - π/2, q6 = θ6 - π." in told_of("tx40").text
