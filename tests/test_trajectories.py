@@ -702,7 +702,7 @@ SLOW = MotionLimits(1.0, 2.0, 5.0)
         (lambda: blended_lines([0.0, 1.0]), "Give limits"),
         (lambda: fourier(np.ones((5, 3)), np.ones((4, 3))), "H, n"),
         (lambda: quintic(0.0, 1.0, 1.0).resample(), "either"),
-        (lambda: quintic(0.0, 1.0, 1.0).resample(0.1), r"whole number from 1 to 1e9.*period="),
+        (lambda: quintic(0.0, 1.0, 1.0).resample(0.1), "samples: expected a whole number"),
         (lambda: quintic(0.0, 1.0, 1.0).check(None), "MotionLimits"),
         (lambda: cubic_spline(np.zeros((3, 0)), [0.0, 1.0, 2.0]), "at least one joint, got none"),
         (lambda: linear(0.0, 1e300, limits=MotionLimits(1e-9)), r"1e-50 to 1e\+50"),

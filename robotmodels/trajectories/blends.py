@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, least_shown, slowed
+from .checks import ROUNDING, checked_limits, least_shown, limits_along, slowed
 from .limits import MotionLimits
 from .motions import PiecewisePolynomial
 from .splines import as_points
@@ -77,7 +77,7 @@ def blended_lines(
     if segment_times is None:
         if bounds is None or blend_times is not None:
             raise InvalidValueError("Give limits, or segment_times (and then blend_times).")
-        T = _full_speed(step, bounds)
+        T = full_speed(step, bounds)
         T, tb = schedule(T, lambda T: _least_blends(step, T, bounds, smooth))
     else:
         T = _spread(segment_times, m - 1, "segment_times")
@@ -129,23 +129,12 @@ def rates_of(step: Array, T: Array) -> Array:
     return np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
 
 
-def _full_speed(step: Array, limits: MotionLimits) -> Array:
-    """Times of lines at the greatest velocity, shape (m - 1,)."""
-    V = np.where(step > 0.0, limits.velocity, -limits.velocity_lower)
-    moves = step != 0.0
-    A = np.minimum(limits.acceleration, -limits.acceleration_lower)
-    for bound, name in ((V, "velocity"), (np.broadcast_to(A, V.shape), "acceleration")):
-        if (moves & (bound == 0.0)).any():
-            j = int(np.argwhere(moves & (bound == 0.0))[0][-1])
-            raise InvalidValueError(
-                f"limits: the limit of {name} of joint {j + 1} is 0, but it has to move; any "
-                "other will do."
-            )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        T = np.where(moves, np.abs(step) / V, 0.0).max(axis=-1, initial=0.0)
-    if ((T == 0.0) & moves.any(axis=-1)).any():
+def full_speed(step: Array, limits: MotionLimits, names: tuple[str, ...] = ()) -> Array:
+    """Times (m - 1,) of lines at the greatest velocity, zero of those that stay."""
+    along = [limits_along(limits, row, names) if row.any() else None for row in step]
+    if any(one is not None and np.isinf(one.velocity) for one in along):
         raise InvalidValueError("limits: lines with blends need a limit of velocity.")
-    return T
+    return np.array([0.0 if one is None else 1.0 / one.velocity for one in along])
 
 
 def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> Array:

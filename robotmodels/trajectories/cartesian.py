@@ -34,7 +34,7 @@ from .._arrays import Array, as_exact, as_number
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
-from .blends import PARABOLA, QUARTIC, rates_of, schedule
+from .blends import PARABOLA, QUARTIC, full_speed, rates_of, schedule
 from .checks import limits_along, sample_count, slowed
 from .laws import LineLimits, TimeLaw, law_of_limits
 from .limits import MotionLimits, ranges_of
@@ -230,13 +230,9 @@ def blended_poses(
     step[:, 3:] = rotation_vectors_of(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
     step[np.linalg.norm(step[:, 3:], axis=-1) <= _NO_TURN, 3:] = 0.0
     size = np.stack((np.linalg.norm(step[:, :3], axis=-1), np.linalg.norm(step[:, 3:], axis=-1)))
-    for name, bound in (("velocity", bounds.velocity), ("acceleration", bounds.acceleration)):
-        wrong = size.any(axis=-1) & ((bound == 0.0) | np.isinf(bound))
-        if wrong.any():
-            what = _MOVES[int(wrong.argmax())]
-            raise InvalidValueError(f"limits: expected a positive {name} of {what}.")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least_T = np.where(size > 0.0, size / bounds.velocity[:, None], 0.0).max(axis=0)
+    least_T = full_speed(size.T, bounds, _MOVES)
+    if (size.any(axis=1) & np.isinf(bounds.acceleration)).any():
+        raise InvalidValueError("limits: blends need limits of acceleration.")
     times, tb = schedule(least_T, lambda t: _pose_blends(step, t, bounds, smooth))
     times, tb = slowed(times, tb, duration, True)
     twists = rates_of(step, times)

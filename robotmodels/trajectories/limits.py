@@ -102,12 +102,7 @@ class MotionLimits(Value):
             )
         if self.velocity.shape == (n,):
             return self
-        result = object.__new__(type(self))  # valid as it is: no check again
-        for field in fields(self):
-            value = np.full(n, getattr(self, field.name))
-            value.setflags(write=False)
-            object.__setattr__(result, field.name, value)
-        return result
+        return replace(self, **{f.name: np.full(n, getattr(self, f.name)) for f in fields(self)})
 
     def without_jerk(self) -> Self:
         """The same limits but none of jerk, for laws whose acceleration jumps."""

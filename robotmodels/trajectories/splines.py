@@ -40,6 +40,7 @@ from .checks import (
     checked_limits,
     checked_request,
     least_shown,
+    limits_along,
     refuse_jointless,
     refuse_short,
 )
@@ -203,11 +204,8 @@ def _chosen_times(knots: _Knots) -> Array:
     if knots.moving:
         raise InvalidValueError("times: velocities or accelerations at the ends need given times.")
     step = np.diff(knots.points, axis=0)
-    forward = np.where(step > 0.0, knots.limits.velocity, -knots.limits.velocity_lower)
-    if ((step != 0.0) & (forward == 0.0)).any():
-        raise InvalidValueError("limits: a limit of velocity of a joint that has to move is 0.")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        needs = np.where(step != 0.0, np.abs(step) / forward, 0.0).max(axis=-1)
+    along = [limits_along(knots.limits, row).velocity if row.any() else np.inf for row in step]
+    needs = 1.0 / np.array(along)
     if not needs.any():  # no limit of velocity
         needs = np.linalg.norm(step, axis=-1)
     if (needs == 0.0).any():

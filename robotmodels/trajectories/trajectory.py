@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .checks import checked_limits, counted, greatest_shown, seconds_shown
+from .checks import checked_limits, counted, greatest_shown, sample_count, seconds_shown
 from .limits import RATES, LimitsReport, MotionLimits
 from .motions import FunctionMotion, Motion
 
@@ -165,7 +165,7 @@ class Trajectory(Value):
         """
         T = self.duration
         if samples is not None and period is None:
-            return np.linspace(0.0, T, _count(samples))
+            return np.linspace(0.0, T, sample_count(samples, "samples", 1))
         if samples is not None or period is None:
             raise InvalidValueError("resample: give either samples or period.")
         step = as_number(period, "period", above=0.0)
@@ -242,17 +242,3 @@ class TimingResult(Frozen, Value):
     def reason(self) -> str:
         """The status as a sentence, with the place and the joint."""
         return self.explanation or self.status.sentence
-
-
-def _count(samples: Any) -> int:
-    """A number of samples; seconds in its place are told from it by their fraction."""
-    try:
-        count = int(samples)
-    except (TypeError, ValueError, OverflowError):
-        count = 0
-    if not 1 <= count <= 10**9 or count != samples:
-        raise InvalidValueError(
-            f"samples: expected a whole number from 1 to 1e9, got {samples!r:.40}; the "
-            "seconds between samples are given as period=."
-        )
-    return count
