@@ -550,7 +550,7 @@ MUTATIONS = [
     Mutation("igm: singular", "a fold is never a double root",
         "Mark double roots; bring every self-motion to the reference",
         "double[n, s] |= len(rows) == 0 < null", "double[n, s] |= len(rows) > 0 < null",
-        SELF + "double_roots"),
+        "tests/test_igm_counts.py -k rx90", True),
     Mutation("igm: self-motion", "a curve is continued to one side only",
         "def continue_curve(", "for sense in (1.0, -1.0):", "for sense in (-1.0,):",
         SELF + "prismatic"),
