@@ -104,8 +104,8 @@ def isotropy_index(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> isotropy_index(load("planar_2r"), [[0.3, 0.0], [0.3, 1.57]]).round(3)
-    array([0.   , 0.667])
+    >>> isotropy_index(load("planar_2r"), [[0.3, 0.0], [0.3, 1.57]]).round(2)
+    array([0.  , 0.67])
     """
     check_model(arm)
     q = as_vector(q, arm.n, "q")

@@ -85,8 +85,7 @@ def root_between(c: Floats, degree: int, a: float, b: float, rises: bool) -> flo
 def real_roots(c: Floats, degree: int, slack: float, roots: Floats, work: Floats) -> int:
     """Real roots of ``c[0] + ... + c[degree] x^degree``; double roots once. Returns their number.
 
-    Between the roots of its derivative a polynomial has one root at most. An extremum of the other
-    sign that reaches zero but for ``slack (1 + x^2)^(degree / 2)`` is a double root.
+    An extremum that misses zero by ``slack (1 + x^2)^(degree / 2)`` at most is a double root.
     Shapes: roots (4,), and work (3, 6), which holds derivatives and the ends of intervals.
     """
     bound, size = 0.0, 0.0

@@ -338,9 +338,8 @@ def wrist_postures(
 ) -> int:
     """The (at most two) ``x (m, 3)`` with ``Rz(x_0) A Rz(x_1) B Rz(x_2) = M``. Returns how many.
 
-    The first angle comes from the last axis, the others by substitution, so that any first angle is
-    exact where it is free (``free[i] = 1``): first and last axis aligned.
-    It is ``first`` then. Shapes: M, R (3, 3); R is room to work in.
+    Where first and last axis are aligned, the first angle is free (``free[i] = 1``) and ``first``.
+    Shapes: M, R (3, 3); R is room to work in.
     """
     m0, m1, m2 = M[0, 2], M[1, 2], M[2, 2]
     n0, n1, n2 = B[0, 2], B[1, 2], B[2, 2]
