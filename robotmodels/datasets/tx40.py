@@ -138,7 +138,7 @@ def load_tx40() -> Tx40Log:
     log = Log(
         _PERIOD,
         q=transmission.to_joint(q),
-        tau=np.linalg.solve(transmission.matrix.T, tau.T).T,
+        tau=np.asarray(np.linalg.solve(transmission.matrix.T, tau.T).T, np.float64),
         names=model.table.joint_names,
         sources=(q_source, tau_source),
     )

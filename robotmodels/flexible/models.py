@@ -56,7 +56,7 @@ class Accelerations(Result, tuple[Array, Array]):
 
     status: NDArray[np.int8]
     outcomes = SpinStatus
-    __repr__ = tuple.__repr__
+    __repr__ = tuple.__repr__  # type: ignore[assignment]
 
     def __new__(cls, pair: tuple[Array, Array], status: NDArray[np.int8]) -> Accelerations:
         """Attach the status to the pair."""

@@ -69,7 +69,8 @@ def follow(
                 z[c] = y[c] + h * moved
             for c in range(k):
                 q[0, c], v[0, c] = z[c], z[k + c]
-            recursion(place, (arm, q, v, tau, room[3:4], free, work, a, base, poses))
+            given = arm, q, v, tau, room[3:4], free, work, a, base, poses
+            recursion(place, given)  # type: ignore[call-arg]
             power = 0.0
             for c in range(k):
                 slopes[s, c], slopes[s, k + c] = v[0, c], a[0, c]

@@ -144,7 +144,8 @@ def _problem(wanted: Constraints) -> Problem:
     numbers = [wanted.weight, wanted.A, wanted.b, period, PATH, anywhere, unit]
     held = read_only(np.zeros(chain.k), np.int64)
     sigma = read_only(chain.sigma, np.int64)
-    return Problem(sigma, read_only(chain.D), *map(read_only, numbers), held)
+    D, *others = map(read_only, [chain.D, *numbers])
+    return Problem(sigma, D, *others, held)  # type: ignore[call-arg]
 
 
 def in_half_open_turn(sigma: NDArray[np.int64], q: Array) -> Array:

@@ -76,7 +76,9 @@ def prepare_redundant(
     """Prepare the arm without a joint, which takes its reference."""
     rest, value = _typical_rest(chain, components, joint)
     inner = prepare(rest)
-    return inner and Redundant(chain, components, joint, inner, prepare, {value: inner})
+    if inner is None:
+        return None
+    return Redundant(chain, components, joint, inner, prepare, {value: inner})
 
 
 def _typical_rest(

@@ -123,7 +123,7 @@ def _operations_remembered() -> Iterator[None]:
             known[key] = find(function, context, args, kws)
         return known[key]
 
-    types.Function.get_call_type = remembered
+    types.Function.get_call_type = remembered  # type: ignore[method-assign]
     try:
         yield
     finally:

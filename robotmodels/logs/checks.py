@@ -289,8 +289,10 @@ def _rates(log: Log) -> Iterator[LogFinding]:
     """Findings where velocities or accelerations are not the derivatives of the positions."""
     part = stretches(log, _STRETCH)
     for order, word, rate in ((1, "velocities", part.v), (2, "accelerations", part.a)):
+        if rate is None:
+            continue
         wrong: dict[str, list[str]] = {}
-        for j in range(0 if rate is None else log.n):
+        for j in range(log.n):
             factor, correlation = _compared(part, part.q[:, j], rate[:, j], order)
             if correlation < _CORRELATION:
                 words = f"do not follow from the positions (correlation {correlation:.1g})"

@@ -73,7 +73,7 @@ class LoopedParameters(Value, BaseParameters):
     robot: LoopedRobot = None  # type: ignore[assignment]
     q_ref: Array = None  # type: ignore[assignment]
 
-    __repr__ = BaseParameters.__repr__
+    __repr__ = BaseParameters.__repr__  # type: ignore[assignment]
 
     def motion(
         self, guess: Array, q: Array, v: Array | None, a: Array | None

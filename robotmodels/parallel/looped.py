@@ -109,7 +109,7 @@ class LoopedPlatform(Value):
         home, q = se3.inverse(tree.base) @ self.home, np.tile(self.q_home, (len(rows), 1))
         place, sort = tree.with_frames({"_pose": home}, 0), "point" if self._follows() else "full"
         held = [*self.robot.closures, loops.Closure("_pose", ("_pose", self.frame), sort)]
-        cuts = loops.LoopedRobot(place, held, []).cuts
+        cuts = loops.LoopedRobot(place, held, np.zeros(0, np.int64)).cuts
         turns = Rotation.from_matrix(rows[:, :3, :3] @ home[:3, :3].T).as_rotvec()
         rest, code, none = np.zeros(len(rows)), np.zeros(1), np.zeros((1, 0))
         for i, (target, turn) in enumerate(zip(rows, turns, strict=True)):

@@ -257,7 +257,7 @@ def _timed(
         if path.radius > 0.0 and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any():
             along = _on_circle(law, path, bounds, along)
         V, A, B, J, K, _ = along
-        along = MotionLimits(V, A, J, velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K)
+        along = MotionLimits(*np.array([V, A, J, -V, -B, -K]))
     return PoseTrajectory(path, along_line(law, 0.0, float(size.any()), duration, along))
 
 
@@ -280,7 +280,8 @@ def _on_circle(
             if pull > 0.0 and jolt > 0.0:
                 up = [min(x, pull / L) for x in along[1:3]]
                 up += [min(x, jolt / L) for x in along[3:5]]
-                bounds = LineLimits(min(along.velocity, speed / L), *up, along.back)
+                up = [min(along.velocity, speed / L), *up]
+                bounds = LineLimits(*up, along.back)  # type: ignore[call-arg]
                 T = float(law_of_limits(law, 1.0, bounds).durations.sum())
                 best, least = (bounds, T) if least > T else (best, least)
     return best

@@ -70,7 +70,8 @@ def scratch() -> Scratch:
     shapes = (3, 3), 5, (2, 3), 2, (2, 3), (3, 3), 5, 8, 4, (3, 6), (8, 2)
     marks = np.zeros((2, 8), np.int64)
     last = np.zeros((4, 3, 4)), np.zeros(3), np.zeros(3)
-    return Scratch(*map(np.zeros, shapes), marks[0], np.zeros((8, 3)), marks[1], *last)
+    rooms = *map(np.zeros, shapes), marks[0], np.zeros((8, 3)), marks[1], *last
+    return Scratch(*rooms)  # type: ignore[call-arg]
 
 
 SCRATCH = types.NamedTuple(

@@ -292,7 +292,8 @@ def orientation_rates_rate(y: Array, w: Array, kind: OrientationKind) -> Array:
     """
     E = orientation_rates(y, kind)
     with np.errstate(invalid="ignore"):  # NaN where rates do not exist
-        ahead = orientation_rates(y + _STEP * 1j * (E @ w[..., None])[..., 0], kind)
+        beside: Any = y + _STEP * 1j * (E @ w[..., None])[..., 0]  # complex, unlike all else
+        ahead = orientation_rates(beside, kind)
     return np.where(np.isnan(E), np.nan, ahead.imag / _STEP)
 
 
