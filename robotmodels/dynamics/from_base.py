@@ -105,6 +105,8 @@ def idm_from_base(
 ) -> Array:
     """Inverse dynamic model from base parameters alone: the torques of `idm`, drives included.
 
+    ``values`` are (b,), ``q, v, a`` (..., n) and the torques (..., n).
+
     Examples
     --------
     >>> from robotmodels.robots import load
