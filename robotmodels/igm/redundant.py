@@ -14,9 +14,9 @@ import numpy as np
 
 from .._arrays import Array
 from .chain import locked_chain, without_end
-from .constraints import PATH, WHOLE, Components, constraints
+from .constraints import PATH, WHOLE, Components, constraints, mask_axes
 from .loop import JointChain
-from .motion import random_postures, tool_poses
+from .motion import jacobians, random_postures, scaled, tool_poses
 from .postures import Postures, assembled, difference, side_by_side
 from .search import collected, nearest_value, refined
 from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
@@ -54,9 +54,15 @@ def redundant_joint(chain: JointChain, components: Components) -> int | None:
     q = random_postures(chain, 16, np.random.default_rng(3))
     wanted = constraints(chain, components)
     U = tool_poses(chain, q)
-    # two freed rotations leave an orientation error: pair each configuration with another pose
-    U = U[::-1] if len(components.freed_rotations) == 2 else U
-    _, sizes, rows = np.linalg.svd(wanted.jacobians(U, q))
+    if len(components.freed_rotations) == 2:
+        # they leave an orientation error: pair each configuration with another pose
+        J = wanted.jacobians(U[::-1], q)
+    else:  # rows of the Jacobian: a first call has no search to compile
+        axes = np.swapaxes(mask_axes(chain, U, components), 1, 2)
+        J = scaled(jacobians(chain, q), wanted.length)
+        J = np.concatenate([axes @ J[:, :3], axes @ J[:, 3:]], axis=1)
+        J = J[:, np.array(components.asked)]
+    _, sizes, rows = np.linalg.svd(J)
     padded = np.zeros((len(q), chain.k))
     padded[:, : sizes.shape[1]] = sizes
     null = padded <= DEPENDENT * np.maximum(padded[:, :1], 1e-3)
