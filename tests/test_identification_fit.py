@@ -93,7 +93,7 @@ def test_covariance_of_correlated_residuals():
     clean = clean_log(model, rng, samples=3000)
     choices = choose_processing(clean, decimation=1, dead_band=0.0, filtered=False)
     z, white, segments = [], [], 0
-    for _ in range(40):
+    for _ in range(60):
         e = rng.normal(size=(3004, 2))
         e = sum(e[k : k + 3000] for k in range(5)) / 5.0
         log = Log(clean.dt, clean.q, clean.tau + e, clean.v, clean.a)
