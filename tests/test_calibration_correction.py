@@ -213,7 +213,7 @@ def test_a_batch_is_its_poses_one_by_one_also_at_singular_wrists(rng):
         alone = corrected_igm(robot, T.reshape(2, 6, 4, 4)[i])
         assert_reached(robot, alone, T.reshape(2, 6, 4, 4)[i][None])
         there = together.q[i][together.valid[i]]
-        np.testing.assert_allclose(alone.q, there, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(alone.q, there, rtol=0, atol=1e-10)
     empty = corrected_igm(robot, np.empty((0, 4, 4)))
     assert empty.q.shape[0] == empty.status.size == 0
     with pytest.raises(InvalidValueError, match="CalibratedRobot"):
