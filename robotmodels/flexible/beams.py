@@ -63,9 +63,10 @@ def beam(
         Bending stiffness about y and z, or both, N m^2; infinite where the beam is rigid.
     GJ : float, optional
         Torsional stiffness, N m^2; default rigid.
-    tip : float, (mass, inertia) or (mass, com, inertia), optional
+    tip, carried : float, (mass, inertia) or (mass, com, inertia), optional
         Body fixed to the tip: kg; centre of mass (3,) from the tip, m; inertia about it, kg m^2, a
-        number, shape (3,) or (3, 3).
+        number, shape (3,) or (3, 3). What the next links and their load are there, for the shapes
+        of the modes alone: fewer modes suffice.
     hub : float, optional
         Rotary inertia about z at the root, kg m^2; default 0.
     modes : int
@@ -78,9 +79,6 @@ def beam(
         Whether foreshortening is included, which keeps a spinning beam stiff.
     gyration : float, optional
         Polar radius of gyration of the section, m; default ``length / 50`` with torsion, else 0.
-    carried : float, (mass, inertia) or (mass, com, inertia), optional
-        What the next links and their load are at the tip, for the shapes of the modes alone: fewer
-        modes suffice. It is no part of this link's mass.
     pose : array_like, shape (4, 4), optional
         Pose of the beam's root in the frame of its joint; default identity.
 
@@ -91,8 +89,7 @@ def beam(
 
     References
     ----------
-    Seed book sections 7.2.2.3 and 7.2.2.12; T. Kane, R. Ryan, A. Banerjee, "Dynamics of a
-    cantilever beam attached to a moving base", J. Guidance 10 (1987), for the stiffening.
+    Sections 7.2.2.3 and 7.2.2.12; for the stiffening T. Kane et al., J. Guidance 10 (1987).
 
     Examples
     --------

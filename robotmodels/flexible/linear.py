@@ -1,13 +1,11 @@
-"""Static deflection, natural frequencies and linear models about an equilibrium.
+"""Static deflection, natural frequencies and linear models about an equilibrium (7.3.3.3, 7.3.3.4).
 
 Parameters
 ----------
 arm, q, wrench
     See `robotmodels.flexible`; q of `linearize` has shape (n,).
-joints : str
-    ``"locked"``: motors held; ``"free"``: motors without torque.
-output : str
-    ``"joint"`` or ``"tip"``.
+joints, output : str
+    ``"locked"`` or ``"free"``: motors held or without torque; ``"joint"`` or ``"tip"``.
 
 Returns
 -------
@@ -15,21 +13,13 @@ Deflection, ndarray or LinearModel
     Equilibrium; frequencies, rad/s; matrices, poles and zeros. Postures without equilibrium, and
     singular ones for the tip, are not linearised.
 
-References
-----------
-Seed book sections 7.2.5, at rest, 7.3.3.3 and 7.3.3.4.
-
 Examples
 --------
 >>> from robotmodels import RobotModel, DHTable, flexible
 >>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), gravity=(0, 0, 0))
 >>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 1.0), hub=0.1)})
->>> bool(abs(static_deflection(arm, [0.0], [0, -0.03, 0, 0, 0, 0]).deflection - 0.01) < 1e-4)
-True
 >>> linearize(arm, [0.0]).zeros.imag.round(3)                # the clamped frequencies
 array([-22.034,  -3.516,   3.516,  22.034])
->>> bool(linearize(arm, [0.0], "tip").zeros.real.max() > 1.0)
-True
 """
 
 from __future__ import annotations

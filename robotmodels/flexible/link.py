@@ -2,6 +2,21 @@
 
 A point X of the link is displaced by ``Phi_k(X) e_k``, in the axes of the frame at the root, which
 the link is clamped to. With foreshortening ``Gamma_kl(X) e_k e_l / 2`` is added (stiffening).
+
+Parameters
+----------
+invariants : Invariants
+    The integrals of section 7.2.2.
+frequencies : ndarray, shape (m,)
+    Of the modes, rad/s: clamped at the root, or with a free joint for ``"pinned-hub"``.
+tip : Section
+    Where what follows is fixed.
+nodes, shapes : ndarray, shape (N, 3) and (N, 3, m)
+    Undeformed points from root to tip, m, and their displacements by the modes.
+stiffening : bool
+    Whether foreshortening is part of the model.
+source : BeamData or None
+    The uniform beam.
 """
 
 from __future__ import annotations
@@ -44,20 +59,10 @@ class BeamData(Frozen, Value):
 class Invariants(Frozen, Value):
     """Integrals over the mass of an elastic body, r = X + Phi e + Gamma e e / 2 (7.2.2.12).
 
-    Parameters
-    ----------
-    mass : float
-        Integral of dm, kg.
-    first_moment, inertia : ndarray, shape (3,) and (3, 3)
-        Of X dm; about the root.
-    translation, rotation : ndarray, shape (m, 3)
-        Of Phi_k dm and of X x Phi_k dm: the modes' linear and angular momentum.
-    modal_mass, modal_stiffness : ndarray, shape (m, m)
-        Of Phi_k . Phi_l dm, and second derivatives of the elastic energy.
-    gyroscopic, foreshortening : ndarray, shape (m, m, 3)
-        Of (Phi_l x Phi_k + X x Gamma_kl) dm; of Gamma_kl dm, zero without stiffening.
-    inertia_first, inertia_second : ndarray, shape (m, 3, 3) and (m, m, 3, 3)
-        First and second derivatives of the inertia by the elastic coordinates.
+    ``mass``; ``first_moment`` (3,) and ``inertia`` (3, 3) about the root; ``translation, rotation``
+    (m, 3), of Phi_k dm and X x Phi_k dm; ``modal_mass, modal_stiffness`` (m, m); ``gyroscopic``
+    (m, m, 3), of (Phi_l x Phi_k + X x Gamma_kl) dm; ``inertia_first`` (m, 3, 3), ``inertia_second``
+    (m, m, 3, 3), derivatives by e; ``foreshortening`` (m, m, 3), of Gamma_kl dm. SI units.
     """
 
     mass: float
@@ -80,23 +85,7 @@ class Invariants(Frozen, Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlexibleLink(Frozen, Value):
-    """An elastic body clamped to the frame at its root (7.2.2.12), made by `beam` or `from_modes`.
-
-    Parameters
-    ----------
-    invariants : Invariants
-        The integrals of section 7.2.2.
-    frequencies : ndarray, shape (m,)
-        Of its modes, rad/s: clamped at the root, or with a free joint for ``"pinned-hub"``.
-    tip : Section
-        Where what follows is fixed.
-    nodes, shapes : ndarray, shape (N, 3) and (N, 3, m)
-        Undeformed points from root to tip, m, and their displacements by the modes.
-    stiffening : bool
-        Whether foreshortening is part of the model.
-    source : BeamData or None
-        The uniform beam.
-    """
+    """An elastic body clamped to the frame at its root, made by `beam` or `from_modes`."""
 
     invariants: Invariants
     frequencies: Array

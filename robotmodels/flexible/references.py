@@ -16,23 +16,14 @@ Returns
 -------
 Elastica
     The shape that is continued from the straight beam.
-model : RobotModel
-    Robot whose last rows are moved behind the segments; the drives keep their joints.
-stiffness : ndarray, shape (N,)
-    Of the springs in its N joints, N m/rad; 0 for the joints of the arm.
-
-References
-----------
-K. Bisshopp and D. Drucker, "Large deflection of cantilever beams", Quart. Appl. Math. 3 (1945).
+model, stiffness : RobotModel and ndarray, shape (N,)
+    Robot whose last rows are moved behind the segments; the drives keep their joints. Springs of
+    its N joints, N m/rad; 0 for the joints of the arm.
 
 Examples
 --------
->>> from robotmodels.flexible import beam
->>> elastica(1.0, 1.0, force=1.0).tip[:2, 3].round(5)
+>>> elastica(1.0, 1.0, force=1.0).tip[:2, 3].round(5)  # Bisshopp and Drucker (1945)
 array([0.94357, 0.30172])
->>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
->>> lumped(FlexibleRobot(model, {1: beam(1.0, EI=(np.inf, 1.0))}), 3)[1].tolist()
-[0.0, 3.0, 3.0, 3.0]
 """
 
 from __future__ import annotations

@@ -70,19 +70,13 @@ class FlexibleRobot(Value):
     modal_damping : array_like, shape () or that of all modes, optional
         Damping ratios of the modes of the clamped links.
 
-    References
-    ----------
-    Seed book sections 7.2.3, 7.2.5 and 7.2.7.
-
     Examples
     --------
     >>> from robotmodels.flexible import beam
     >>> from robotmodels.geometry import DHTable
     >>> model = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]))
-    >>> link = beam(0.5, EI=(np.inf, 1.0), density=0.2)
-    >>> arm = FlexibleRobot(model, {1: link, 2: link}, modal_damping=0.01)
-    >>> arm.n, arm.m
-    (2, 4)
+    >>> FlexibleRobot(model, {1: beam(0.5, EI=(np.inf, 1.0)), 2: beam(0.5, EI=1.0)}).m
+    6
     """
 
     model: RobotModel

@@ -25,17 +25,7 @@ TipTracking
 
 References
 ----------
-Seed book section 7.3.3.4; E. Bayo, J. Robotic Systems 4 (1987); S. Devasia, D. Chen, B. Paden,
-"Nonlinear inversion-based output tracking", IEEE Trans. Automatic Control 41 (1996).
-
-Examples
---------
->>> from robotmodels import RobotModel, DHTable, flexible, trajectories
->>> model = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
->>> arm = flexible.FlexibleRobot(model, {1: flexible.beam(1.0, EI=(np.inf, 9.0), hub=0.1)})
->>> motion = trajectories.quintic([0.0], [0.5], duration=1.0)
->>> tip_tracking(arm, motion, method="causal").status
-<TipStatus.NON_MINIMUM_PHASE: 1>
+S. Devasia, D. Chen, B. Paden, IEEE Trans. Automatic Control 41 (1996).
 """
 
 from __future__ import annotations

@@ -1,4 +1,32 @@
-"""Accessibility of positions and poses: section 3.2 of the book."""
+"""Accessibility of positions and poses (sections 3.2.1 and 3.2.2): reached or not, and why.
+
+Parameters
+----------
+arm, limits, free, mask, executor, progress
+    See the head of the room; of one component of the orientation 180 angles about its axis,
+    from the orientation of zero joints, stand for every one.
+T : array_like, shape (..., 4, 4)
+    World poses of the tool.
+level : {"position", "pose", "every_orientation"}
+    What is asked: the position in any orientation, the pose, or the position in every
+    orientation, of which 96 stand for all (180 angles for an arm that moves in a plane).
+
+Returns
+-------
+Accessibility
+    Of each pose ``status`` (...), codes of `AccessStatus`, and ``count`` (...), the postures within
+    the limits and free of collisions; of several orientations the least, of an infinite family
+    the members that were found. ``level`` as asked.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> from robotmodels.se3 import translation
+>>> found = accessibility(load("planar_2r"), [translation(1, 1, 0), translation(3, 0, 0)],
+...                       level="position")
+>>> found.count, found.reason(1)
+(array([2, 0]), 'No posture reaches the position.')
+"""
 
 from __future__ import annotations
 
@@ -41,18 +69,7 @@ class AccessStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Accessibility(Result):
-    """Accessibility of poses.
-
-    Parameters
-    ----------
-    status : ndarray of int8, shape (...)
-        Codes of `AccessStatus`.
-    count : ndarray of int64, shape (...)
-        Postures within the limits and free of collisions; of several orientations the least.
-        Of an infinite family the members that were found.
-    level : str
-        What was asked: position, pose, or every orientation.
-    """
+    """Accessibility of poses, see the head of the file."""
 
     outcomes: ClassVar = AccessStatus
     status: NDArray[np.int8]
@@ -73,37 +90,7 @@ def accessibility(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Accessibility:
-    """Accessibility of poses: can the tool be brought there, and if not, why.
-
-    Parameters
-    ----------
-    arm, limits, free, mask, executor, progress
-        See the head of the room; of one component of the orientation 180 angles about its axis,
-        from the orientation of zero joints, stand for every one.
-    T : array_like, shape (..., 4, 4)
-        World poses of the tool.
-    level : {"position", "pose", "every_orientation"}
-        What is asked: the position in any orientation, the pose, or the position in every
-        orientation, of which 96 stand for all (180 angles for an arm that moves in a plane).
-
-    Returns
-    -------
-    Accessibility
-        Status and number of postures of each pose.
-
-    References
-    ----------
-    Seed book sections 3.2.1 and 3.2.2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.se3 import translation
-    >>> found = accessibility(load("planar_2r"), [translation(1, 1, 0), translation(3, 0, 0)],
-    ...                       level="position")
-    >>> found.count, found.reason(1)
-    (array([2, 0]), 'No posture reaches the position.')
-    """
+    """Accessibility of poses: can the tool be brought there, and if not, why."""
     space, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
     one_of(level, LEVELS, "level")
     poses = poses_of(T)

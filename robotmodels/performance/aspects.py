@@ -1,4 +1,32 @@
-"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.3 of the book."""
+"""Aspects and components of the free joint space: sections 3.4.1 to 3.4.4 of the book.
+
+Of an arm whose position three joints determine (or two in a plane) the position counts, of others
+the pose. The joint space is cut by every factor of the determinant on a grid that closes in itself
+where no limit cuts it. Joints that no factor shares are apart: aspects are products of parts.
+
+Parameters
+----------
+arm, limits, free, executor, progress
+    See the head of the room; limits and obstacles cut the joint space.
+resolution : int, optional
+    Cells along each joint.
+
+Returns
+-------
+Aspects
+    The parts with ``volume`` (k,), rad^n (and m for slides) of the joints that move the tool,
+    largest first, and ``signs`` (k, factors) of the factors ``names`` of the determinant; none,
+    with a status, for redundant arms. Of components of the free space ``signs`` is empty.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> found = aspects(load("planar_2r"), limits=False)
+>>> found.count, found.signs.ravel(), found.of([[0.3, 1.0], [0.3, -1.0]])
+(2, array([-1,  1], dtype=int8), array([1, 0]))
+>>> free_components(load("planar_2r"), lambda q: abs(q[:, 1]) > 0.5, limits=False).count
+1
+"""
 
 from __future__ import annotations
 
@@ -74,24 +102,9 @@ class Group(Frozen, Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Aspects(Result):
-    """Parts of the joint space: aspects, or components of the free space.
+    """Parts of the joint space, see the head of the file.
 
-    Parameters
-    ----------
-    model, limits, free
-        The robot, whether its limits count, and the predicate or obstacles, or None.
-    names : tuple of str
-        The factors of the determinant; none for components of the free space.
-    signs : ndarray of int8, shape (k, factors)
-        Signs of the factors in each aspect.
-    volume : ndarray, shape (k,)
-        Volume of each, rad^n (and m for slides), largest first, of the joints that move the tool.
-    groups : tuple
-        The grids: joints that no factor shares are apart, and aspects are products of parts.
-    order : ndarray of int64, shape (k, groups)
-        The part of each group that makes the aspect.
-    status : AspectStatus
-        Whether all were found.
+    ``groups`` are the grids, ``order`` (k, groups) the part of each that makes the aspect.
     """
 
     model: RobotModel
@@ -154,35 +167,7 @@ def aspects(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Aspects:
-    """Aspects: the largest connected parts of the joint space without singular positions.
-
-    Of an arm whose position three joints determine (or two in a plane) the position counts, of
-    others the pose. The joint space is cut by every factor of the determinant on a grid that
-    closes in itself where no limit cuts it.
-
-    Parameters
-    ----------
-    arm, limits, free, executor, progress
-        See the head of the room; limits and obstacles cut the joint space.
-    resolution : int, optional
-        Cells along each joint.
-
-    Returns
-    -------
-    Aspects
-        The parts with their volumes and signs; none, with a status, for redundant arms.
-
-    References
-    ----------
-    Seed book sections 3.4.1 to 3.4.4.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> found = aspects(load("planar_2r"), limits=False)
-    >>> found.count, found.signs.ravel(), found.of([[0.3, 1.0], [0.3, -1.0]])
-    (2, array([-1,  1], dtype=int8), array([1, 0]))
-    """
+    """Aspects: the largest connected parts of the joint space without singular positions."""
     joints, work = joint_space(arm, limits, free), Workers(executor, progress)
     factors = sign_factors(arm)
     if factors is None:
@@ -198,24 +183,7 @@ def free_components(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Aspects:
-    """Connected components of the free joint space, singular positions included.
-
-    Parameters
-    ----------
-    arm, free, limits, resolution, executor, progress
-        As for `aspects`.
-
-    Returns
-    -------
-    Aspects
-        The components; ``signs`` is empty.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> free_components(load("planar_2r"), lambda q: abs(q[:, 1]) > 0.5, limits=False).count
-    1
-    """
+    """Connected components of the free joint space, singular positions included."""
     joints, work = joint_space(arm, limits, free), Workers(executor, progress)
     return _divided(joints, Factors(arm, (), (), (), np.zeros(6, np.bool_)), resolution, work)
 

@@ -1,4 +1,36 @@
-"""Singular curves of three-joint arms, their cusps and nodes: sections 3.3.6, 3.4.2 and 3.4.4."""
+"""Singular curves of three-joint arms, their cusps and nodes: sections 3.3.6, 3.4.2 and 3.4.4.
+
+The position of the arm is determined by three joints, or two in a plane. What is found is the same
+for all values of the first joint: the section is half a plane through its axis, or a plane across
+it if it slides; for a planar arm of two joints its plane. At a cusp three postures meet: the
+singular curve in joint space is tangent to the direction in which the arm moves without moving its
+tool. An arm with cusps can change posture without being singular. At a node singular curves cross.
+
+Parameters
+----------
+arm, limits
+    The robot; whether limits of its last two joints cut the curves and add their own. Limits of
+    revolute joints do not count for cusps and nodes.
+
+Returns
+-------
+SingularCurves or SpecialPoints
+    Curves, or points: none, with a status, for other arms. The first joint is at zero.
+
+References
+----------
+M. Baili, P. Wenger and D. Chablat, "A classification of 3R orthogonal manipulators by the topology
+of their workspace", ICRA 2004.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> curves = singular_curves(load("planar_2r"), limits=False)
+>>> [kind.value for kind in curves.kind], curves.joint[0].shape[1]
+(['boundary', 'internal'], 2)
+>>> cusps(load("planar_2r"))
+<SpecialPoints: 0 in the section; All curves were found.>
+"""
 
 from __future__ import annotations
 
@@ -33,13 +65,7 @@ class SectionStatus(Outcome):
 
 
 class CurveKind(Enum):
-    """Kinds of curves by the regions that they separate.
-
-    Examples
-    --------
-    >>> CurveKind("limit")
-    <CurveKind.LIMIT: 'limit'>
-    """
+    """Kinds of curves by the regions that they separate."""
 
     BOUNDARY = "boundary"
     INTERNAL = "internal"
@@ -48,19 +74,11 @@ class CurveKind(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SingularCurves(Result):
-    """Singular curves of an arm in joint space and in its section.
+    """Singular curves of an arm, each broken where its kind changes.
 
-    Parameters
-    ----------
-    joint : tuple of ndarray, shape (K, n)
-        Points of each curve, rad or m; the first joint is zero, angles run on beyond pi.
-    section : tuple of ndarray, shape (K, 2)
-        The same points in the section, m.
-    kind : tuple of CurveKind
-        ``BOUNDARY`` has no posture on one side, ``INTERNAL`` has postures on both; on ``LIMIT`` a
-        joint is at its limit. A curve is broken where its kind changes.
-    status : SectionStatus
-        Whether all of them were found.
+    ``joint`` and ``section`` are tuples of points (K, n), rad or m, angles beyond pi, and (K, 2), m.
+    Of ``kind`` BOUNDARY has no posture on one side, INTERNAL has postures on both; on LIMIT a joint
+    is at its limit.
     """
 
     joint: tuple[Array, ...]
@@ -76,18 +94,10 @@ class SingularCurves(Result):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SpecialPoints(Result):
-    """Cusps or nodes of the singular curves in the section of an arm.
+    """Cusps or nodes in the ``section`` (k, 2), m, of an arm.
 
-    Parameters
-    ----------
-    q : ndarray, shape (k, n) or (k, 2, n)
-        Configurations, rad or m, the first joint at zero; of a node the two that meet.
-    section : ndarray, shape (k, 2)
-        Where they are in the section, m.
-    residual : ndarray, shape (k,)
-        What is left of the equations, in units of the arm.
-    status : SectionStatus
-        Whether all of them were found.
+    ``q`` are configurations (k, n), rad or m, of a node the two that meet, (k, 2, n); ``residual``
+    (k,) is what is left of the equations, in units of the arm.
     """
 
     q: Array
@@ -103,32 +113,7 @@ class SpecialPoints(Result):
 
 
 def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
-    """Singular curves of an arm whose position three joints determine, or two in a plane.
-
-    They are the same for all values of the first joint: the section is half a plane through its
-    axis, or a plane across it if it slides; for a planar arm of two joints its plane.
-
-    Parameters
-    ----------
-    arm, limits
-        The robot; whether limits of its last two joints cut the curves and add their own.
-
-    Returns
-    -------
-    SingularCurves
-        Curves in joint space and in the section; none, with a status, for other arms.
-
-    References
-    ----------
-    Seed book sections 3.3.6 and 3.4.2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> curves = singular_curves(load("planar_2r"), limits=False)
-    >>> [kind.value for kind in curves.kind], curves.joint[0].shape[1]
-    (['boundary', 'internal'], 2)
-    """
+    """Singular curves of an arm whose position three joints determine, or two in a plane."""
     bounded, section = joint_space(arm, limits).limits, section_arm(arm)
     if section is None:
         return SingularCurves((), (), (), SectionStatus.NOT_DEFINED)
@@ -148,33 +133,7 @@ def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:
 
 
 def cusps(arm: RobotModel) -> SpecialPoints:
-    """Cusps: points of the section where three postures of an arm meet.
-
-    There the singular curve in joint space is tangent to the direction in which the arm moves
-    without moving its tool. An arm with cusps can change posture without being singular. Limits
-    of revolute joints do not count.
-
-    Parameters
-    ----------
-    arm
-        The robot, as for `singular_curves`.
-
-    Returns
-    -------
-    SpecialPoints
-        One configuration for each cusp.
-
-    References
-    ----------
-    Seed book section 3.4.4; M. Baili, P. Wenger and D. Chablat, "A classification of 3R orthogonal
-    manipulators by the topology of their workspace", ICRA 2004.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> cusps(load("planar_2r"))
-    <SpecialPoints: 0 in the section; All curves were found.>
-    """
+    """Cusps: points of the section where three postures of an arm meet."""
     section = section_arm(joint_space(arm).model)
     if section is None:
         none = np.zeros((0, 2))
@@ -186,24 +145,7 @@ def cusps(arm: RobotModel) -> SpecialPoints:
 
 
 def nodes(arm: RobotModel) -> SpecialPoints:
-    """Nodes: points of the section where singular curves cross.
-
-    Parameters
-    ----------
-    arm
-        As for `cusps`.
-
-    Returns
-    -------
-    SpecialPoints
-        Two configurations for each node.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> nodes(load("planar_2r")).q.shape
-    (0, 2, 2)
-    """
+    """Nodes: points of the section where singular curves cross."""
     section = section_arm(joint_space(arm).model)
     if section is None:
         none = np.zeros((0, 2))

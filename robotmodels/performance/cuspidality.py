@@ -1,4 +1,38 @@
-"""Cuspidality: can an arm change posture without meeting a singular position (section 3.4.4)."""
+"""Cuspidality: can an arm change posture without meeting a singular position (section 3.4.4).
+
+Limits of revolute joints do not count, those of slides do. Of an arm whose position three joints
+determine (or two in a plane) the position counts, of others the pose. Straight lines, and lines
+over a third configuration, are tried between postures with equal signs of all factors; with three
+joints level curves of the determinant too, which near a cusp meet two postures of one position.
+
+Parameters
+----------
+arm, executor, progress
+    See the head of the room.
+rng : int or numpy.random.Generator, optional
+    Chooses the poses; default the seed 0.
+poses : int
+    Random poses that are tried, at least 1.
+
+Returns
+-------
+Cuspidality
+    CUSPIDAL with a path on which the least singular value is proved to stay above ``margin``
+    between samples too; NOT_CUSPIDAL if the signs of the factors of the determinant are the
+    labels of the postures (of 50 or more), or, in a section, if all postures of every region
+    lie in different aspects; NONE_FOUND after a search without success.
+
+References
+----------
+P. Wenger, Robotica 25 (2007); D. Salunkhe et al., arXiv 2202.08686; A. Elias and J. Wen, arXiv
+2501.18505.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> cuspidality(load("puma560")).status.name
+'NOT_CUSPIDAL'
+"""
 
 from __future__ import annotations
 
@@ -55,22 +89,10 @@ _NONE = CuspidalityStatus.NONE_FOUND
 class Cuspidality(Result):
     """Outcome of a search for a change of posture that meets no singular position.
 
-    Parameters
-    ----------
-    status : CuspidalityStatus
-        Outcome.
-    path : ndarray, shape (N, n)
-        Joint path, a polyline, rad or m; empty without one.
-    ends : ndarray, shape (2, n)
-        Its ends, two postures of one pose; NaN without a path.
-    pose : ndarray, shape (4, 4)
-        World pose of the tool at the first end; for a task of positions the orientation differs
-        at the other.
-    margin : float
-        Proved lower bound of the least singular value along the path, linear rows over the reach
-        of the arm; 0 without a path.
-    tried : int
-        Pairs of postures that were looked at.
+    ``path`` (N, n) is a polyline of joints, rad or m, ``ends`` (2, n) are two postures of one pose,
+    ``pose`` (4, 4) that of the first; for a task of positions the orientation differs at the other.
+    ``margin`` is the proved lower bound of the least singular value along the path, linear rows
+    over the reach of the arm. Empty, NaN and 0 without a path; ``tried`` counts pairs of postures.
     """
 
     status: CuspidalityStatus
@@ -96,45 +118,7 @@ def cuspidality(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Cuspidality:
-    """Cuspidality: whether an arm can change its posture without meeting a singular position.
-
-    Limits of revolute joints do not count, those of slides do. Of an arm whose position three
-    joints determine (or two in a plane) the position counts, of others the pose.
-
-    Parameters
-    ----------
-    arm, executor, progress
-        See the head of the room.
-    rng : int or numpy.random.Generator, optional
-        Chooses the poses; default the seed 0.
-    poses : int
-        Random poses that are tried, at least 1.
-
-    Returns
-    -------
-    Cuspidality
-        CUSPIDAL with a path on which the least singular value is proved to stay above ``margin``
-        between samples too; NOT_CUSPIDAL if the signs of the factors of the determinant are the
-        labels of the postures (of 50 or more), or, in a section, if all postures of every region
-        lie in different aspects; NONE_FOUND after a search without success.
-
-    Notes
-    -----
-    Straight lines, and lines over a third configuration, between postures with equal signs of all
-    factors. Three joints: along level curves of the determinant too, which near a cusp meet two
-    postures of one position.
-
-    References
-    ----------
-    Seed book section 3.4.4; P. Wenger, "Cuspidal and noncuspidal robot manipulators", Robotica 25
-    (2007); D. Salunkhe et al., arXiv 2202.08686; A. Elias and J. Wen, arXiv 2501.18505.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> cuspidality(load("puma560")).status.name
-    'NOT_CUSPIDAL'
-    """
+    """Cuspidality: whether an arm can change its posture without meeting a singular position."""
     check_model(arm)
     if isinstance(poses, bool) or not isinstance(poses, (int, np.integer)) or poses < 1:
         raise InvalidValueError(f"poses: expected a number of poses of at least 1, got {poses!r}.")

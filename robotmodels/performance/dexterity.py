@@ -1,4 +1,46 @@
-"""Dexterity over configurations and over a workspace: sections 3.6.1 to 3.6.4 of the book."""
+"""Dexterity over configurations and over a workspace: sections 3.6.1 to 3.6.4 of the book.
+
+Parameters
+----------
+arm, mask, executor, progress
+    See the head of the room; by default the components are those of the task of the arm.
+q : array_like, shape (..., n)
+    Configurations, rad or m.
+length : float, optional
+    Metres that count as much as a radian; default the reach of the arm. Linear rows beside angular
+    ones are divided by it.
+over : Workspace, optional
+    Of the same arm; default its positions. Its limits and obstacles count.
+index : {"inverse_condition", "manipulability", "least_singular_value", "isotropy"}
+    Least over largest singular value; product of the singular values; the least one;
+    `isotropy_index`.
+measure : {"workspace", "joints"}
+    Mean over the area or volume that is reached, of the best posture; or over the joints. The two
+    differ: configurations in which the tool moves far fill more of the workspace.
+
+Returns
+-------
+ndarray, DexterityMap or GlobalIndex
+    Index (...); its ``best`` and ``mean`` (N,) over the postures of each cell, aligned with
+    ``over.points``, NaN outside (where infinitely many postures reach a cell over samples of the
+    joints); its mean, a float, with the standard deviation ``spread``.
+
+References
+----------
+C. Gosselin, J. Angeles, Journal of Mechanical Design 113 (1991).
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> arm = load("planar_2r")
+>>> isotropy_index(arm, [[0.3, 0.0], [0.3, 1.57]]).round(2)
+array([0.  , 0.67])
+>>> w = workspace(arm, limits=False, resolution=20)
+>>> dexterity_map(arm, w, "manipulability").best.shape
+(400,)
+>>> round(global_index(arm, "manipulability", "joints", w), 3)       # the mean of |sin q2|
+0.637
+"""
 
 from __future__ import annotations
 
@@ -30,13 +72,7 @@ _SAMPLES = 200000
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class DexterityMap(Frozen, Value):
-    """Index of dexterity at the cells of a workspace.
-
-    Parameters
-    ----------
-    best, mean : ndarray, shape (N,)
-        Of the best posture, and the mean over the postures; NaN outside.
-    """
+    """Index of dexterity at the cells of a workspace: ``best`` and ``mean`` (N,)."""
 
     best: Array
     mean: Array
@@ -52,13 +88,7 @@ class DexterityMap(Frozen, Value):
 
 
 class GlobalIndex(float):
-    """Mean of an index.
-
-    Attributes
-    ----------
-    spread : float
-        Standard deviation over the same measure.
-    """
+    """Mean of an index, a float with its ``spread``."""
 
     __slots__ = ("_spread",)
     _spread: float
@@ -81,31 +111,9 @@ class GlobalIndex(float):
 def isotropy_index(
     arm: RobotModel, q: ArrayLike, mask: ArrayLike | str | None = None, length: float | None = None
 ) -> Array:
-    """Isotropy index: geometric over arithmetic mean of the eigenvalues of ``J J^T``.
+    """Isotropy index (section 3.6.3): geometric over arithmetic mean of the eigenvalues of ``J J^T``.
 
-    Parameters
-    ----------
-    arm, mask
-        See the head of the room; by default the components are those of the task of the arm.
-    q : array_like, shape (..., n)
-        Configurations, rad or m.
-    length : float, optional
-        Metres that count as much as a radian; default the reach of the arm.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        1 where the tool moves equally well in all directions, 0 in singular positions.
-
-    References
-    ----------
-    Seed book section 3.6.3.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> isotropy_index(load("planar_2r"), [[0.3, 0.0], [0.3, 1.57]]).round(2)
-    array([0.  , 0.67])
+    1 where the tool moves equally well in all directions, 0 in singular positions.
     """
     check_model(arm)
     q = as_vector(q, arm.n, "q")
@@ -122,38 +130,7 @@ def dexterity_map(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> DexterityMap:
-    """Index of dexterity at the cells of a workspace.
-
-    Parameters
-    ----------
-    arm, executor, progress
-        See the head of the room.
-    over : Workspace, optional
-        Of the same arm; default its positions. Its limits and obstacles count.
-    index : {"inverse_condition", "manipulability", "least_singular_value", "isotropy"}
-        Least over largest singular value; product of the singular values; the least one;
-        `isotropy_index`.
-    mask, length
-        As for `isotropy_index`; linear rows beside angular ones are divided by the length.
-
-    Returns
-    -------
-    DexterityMap
-        ``best`` and ``mean`` over the postures of each cell, aligned with ``over.points``. Where
-        infinitely many postures reach a cell, over 200 000 samples of the joints.
-
-    References
-    ----------
-    Seed book sections 3.6.1 to 3.6.4.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> w = workspace(arm, limits=False, resolution=20)
-    >>> dexterity_map(arm, w, "manipulability").best.shape
-    (400,)
-    """
+    """Index of dexterity at the cells of a workspace."""
     check_model(arm)
     one_of(index, INDICES, "index")
     w, work = workspace_of(arm, over), Workers(executor, progress)
@@ -185,37 +162,7 @@ def global_index(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> GlobalIndex:
-    """Mean of an index of dexterity over the workspace or over the joint ranges.
-
-    The two differ: configurations in which the tool moves far fill more of the workspace.
-
-    Parameters
-    ----------
-    arm, index, over, mask, length, executor, progress
-        As for `dexterity_map`.
-    measure : {"workspace", "joints"}
-        Mean over the area or volume that is reached, of the best posture; or over the joints.
-
-    Returns
-    -------
-    GlobalIndex
-        The mean, a float, with its ``spread``.
-
-    References
-    ----------
-    Seed book section 3.6.1; C. Gosselin, J. Angeles, "A global performance index for the kinematic
-    optimization of robotic manipulators", Journal of Mechanical Design 113 (1991).
-
-    Examples
-    --------
-    The mean of ``|sin q2|`` over the joints is 2 / pi.
-
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> mean = global_index(arm, "manipulability", "joints", workspace(arm, limits=False))
-    >>> round(mean, 3), round(mean.spread, 3)
-    (0.637, 0.308)
-    """
+    """Mean of an index of dexterity over the workspace or over the joint ranges."""
     check_model(arm)
     one_of(index, INDICES, "index")
     one_of(measure, ("workspace", "joints"), "measure")

@@ -1,4 +1,39 @@
-"""Feasibility of paths of poses: section 3.5.3 of the book."""
+"""Feasibility of paths of poses: section 3.5.3 of the book.
+
+A posture is continued to the next pose by Newton steps along the straight motion between the two,
+not by nearness, so that it never changes to another one unnoticed.
+
+Parameters
+----------
+arm, limits, mask
+    See the head of the room; whole turns are added so that as much as possible of the path
+    lies within the limits, and three joints are asked for the position by default.
+poses : array_like, shape (N, 4, 4)
+    World poses of the tool.
+through_singular : bool
+    Whether a motion may pass singular positions, to the posture that goes on most smoothly.
+cost : {"length", "conditioning"}
+    The best motion is the shortest, or has the least mean of one over the least singular value.
+
+Returns
+-------
+FeasiblePath
+    The best motion, and for every starting posture where it breaks.
+
+References
+----------
+A. Elias and J. Wen, arXiv 2501.18505.
+
+Examples
+--------
+>>> from robotmodels.kinematics import dgm
+>>> from robotmodels.robots import load
+>>> arm, t = load("rx90"), np.linspace(0.0, 1.0, 50)[:, None]
+>>> q = [0.1, 0.2, 1.3, 0.4, 0.5, 0.6] + t * [0.5, 0.2, 0.1, 0.3, 0.4, 1.0]
+>>> found = feasible_path(arm, dgm(arm, q), limits=False)
+>>> found.status.name, len(found.reached)
+('FOLLOWED', 8)
+"""
 
 from __future__ import annotations
 
@@ -38,23 +73,12 @@ class PathStatus(Outcome):
 class FeasiblePath(Result):
     """Joint motions that follow a path of poses, from every starting posture.
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        The best motion, rad or m; NaN from where it breaks.
-    reached : ndarray of bool, shape (S,)
-        Whether the path is followed to its end from each posture of the first pose.
-    breaks : ndarray of int64, shape (S,)
-        First pose that is not reached from it: N if none, 0 if it starts outside the limits.
-    aspect : ndarray of int64, shape (N,)
-        Signs of the factors of the determinant along ``q`` as one number: bit i is set where
-        factor i is positive; -1 where there is no motion.
-    postures : ndarray, shape (N, S, n)
-        All postures of all poses, NaN where there are fewer.
-    following : ndarray of int64, shape (N - 1, S)
-        Number of the posture of the next pose that continues each posture; -1 for none.
-    status : PathStatus
-        Outcome.
+    ``q`` (N, n) is the best motion, rad or m, NaN from where it breaks. Of each posture of the first
+    pose ``reached`` (S,) says whether the path is followed to its end, ``breaks`` (S,) the first pose
+    that is not reached: N if none, 0 if it starts outside the limits. ``aspect`` (N,) has bit i set
+    where factor i of the determinant is positive along ``q``; -1 where there is no motion.
+    ``postures`` (N, S, n) are all of all poses, NaN where there are fewer, and ``following``
+    (N - 1, S) the number of the posture of the next pose that continues each; -1 for none.
     """
 
     q: Array
@@ -96,43 +120,7 @@ def feasible_path(
     through_singular: bool = False,
     cost: str = "length",
 ) -> FeasiblePath:
-    """Follow a path of poses from every posture of its first pose.
-
-    A posture is continued to the next pose by Newton steps along the straight motion between the
-    two, not by nearness, so that it never changes to another one unnoticed.
-
-    Parameters
-    ----------
-    arm, limits, mask
-        See the head of the room; whole turns are added so that as much as possible of the path
-        lies within the limits, and three joints are asked for the position by default.
-    poses : array_like, shape (N, 4, 4)
-        World poses of the tool.
-    through_singular : bool
-        Whether a motion may pass singular positions, to the posture that goes on most smoothly.
-    cost : {"length", "conditioning"}
-        The best motion is the shortest, or has the least mean of one over the least singular
-        value.
-
-    Returns
-    -------
-    FeasiblePath
-        The best motion, and for every starting posture where it breaks.
-
-    References
-    ----------
-    Seed book section 3.5.3; A. Elias and J. Wen, arXiv 2501.18505.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm, t = load("rx90"), np.linspace(0.0, 1.0, 50)[:, None]
-    >>> q = [0.1, 0.2, 1.3, 0.4, 0.5, 0.6] + t * [0.5, 0.2, 0.1, 0.3, 0.4, 1.0]
-    >>> found = feasible_path(arm, dgm(arm, q), limits=False)
-    >>> found.status.name, len(found.reached)
-    ('FOLLOWED', 8)
-    """
+    """Follow a path of poses from every posture of its first pose."""
     joints = joint_space(arm, limits)
     one_of(cost, COSTS, "cost")
     if not isinstance(through_singular, (bool, np.bool_)):

@@ -1,4 +1,34 @@
-"""Polytopes of velocities, forces and accelerations: what limits of joints leave of a task."""
+"""Polytopes of velocities, forces and accelerations (section 3.6.2): what limits of joints leave.
+
+Velocities are the images of the box of joint velocities, a zonotope; accelerations, at rest and
+without gravity, those of the box of torques; forces are all that torques in their box balance, an
+intersection of strips.
+
+Parameters
+----------
+arm
+    The robot; velocity and effort limits are those of its table.
+q : array_like, shape (n,)
+    Configuration, rad or m.
+kind : {"velocity", "force", "acceleration"}
+    Which one.
+mask : array_like, shape (6,), optional
+    Components that count, world axes; of a force the others are zero. Default all.
+frame : str or int, optional
+    Name or number of the frame; default the tool.
+
+Returns
+-------
+Polytope
+    Vertices, faces, and the largest ball inside.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> found = polytope(load("ur5e"), [0, 0.5, 0.5, 0, 0.5, 0], mask="position")
+>>> found.vertices.shape[1], found.radius > 0.0
+(3, True)
+"""
 
 from __future__ import annotations
 
@@ -33,18 +63,10 @@ class PolytopeStatus(Outcome):
 class Polytope(Result):
     """A convex polytope about the origin, symmetric to it.
 
-    Parameters
-    ----------
-    vertices : ndarray, shape (V, m)
-        Extreme points, in the units of the task: m/s and rad/s, N and N m, m/s^2 and rad/s^2.
-        Of an unbounded polytope those of the part that the joints feel.
-    faces : ndarray of int64, shape (F, c), or tuple of ndarray of int64
-        Numbers of the vertices of each face, simplices: triangles for m = 3, edges for m = 2; a
-        tuple where faces have different numbers of vertices.
-    radius : float
-        Radius of the largest ball about the origin inside.
-    status : PolytopeStatus
-        Whether it is bounded and has an inside.
+    ``vertices`` (V, m) in the units of the task: m/s and rad/s, N and N m, m/s^2 and rad/s^2; of an
+    unbounded one those of the part that the joints feel. ``faces`` (F, c) are numbers of the
+    vertices of each face, simplices: triangles for m = 3, edges for m = 2; ``radius`` is that of the
+    largest ball about the origin inside.
     """
 
     vertices: Array
@@ -67,41 +89,7 @@ def polytope(
     mask: ArrayLike | str | None = None,
     frame: str | int | None = None,
 ) -> Polytope:
-    """Polytope of velocities, forces or accelerations of the tool within the limits of the joints.
-
-    Velocities are the images of the box of joint velocities, a zonotope; accelerations, at rest
-    and without gravity, those of the box of torques; forces are all that torques in their box
-    balance, an intersection of strips.
-
-    Parameters
-    ----------
-    arm
-        The robot; velocity and effort limits are those of its table.
-    q : array_like, shape (n,)
-        Configuration, rad or m.
-    kind : {"velocity", "force", "acceleration"}
-        Which one.
-    mask : array_like, shape (6,), optional
-        Components that count, world axes; of a force the others are zero. Default all.
-    frame : str or int, optional
-        Name or number of the frame; default the tool.
-
-    Returns
-    -------
-    Polytope
-        Vertices, faces, and the largest ball inside.
-
-    References
-    ----------
-    Seed book section 3.6.2; A. Skuric et al., "Pycapacity", JOSS 8(89), 2023, for the words.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> found = polytope(load("ur5e"), [0, 0.5, 0.5, 0, 0.5, 0], mask="position")
-    >>> found.vertices.shape[1], found.radius > 0.0
-    (3, True)
-    """
+    """Polytope of velocities, forces or accelerations of the tool within the limits of the joints."""
     check_model(arm)
     one_of(kind, KINDS, "kind")
     rows, q = as_mask(mask), as_vector(q, arm.n, "q")

@@ -1,4 +1,38 @@
-"""Connectivity of workspaces: sections 3.5.2 and 3.5.3 of the book."""
+"""Connectivity of workspaces: sections 3.5.2 and 3.5.3 of the book.
+
+n-connected: images of the components of the free joint space. t-connected: postures of neighbouring
+cells are joined by Newton steps; where a cuspidal arm has several postures of a cell in one aspect,
+sheets are put together so that each cell has one. The cells at the border are left out, as a
+singular position may pass through them.
+
+Parameters
+----------
+arm, limits, free, executor, progress
+    See the head of the room; limits and obstacles of ``over`` count where it is given.
+connectivity : {"n", "t"}
+    Whether any two points of a region are joined by some motion, or every path in it can be
+    followed without a change of posture at a singular position.
+over : Workspace, optional
+    Positions or an orientation, of the same arm; its limits and obstacles count.
+
+Returns
+-------
+Regions
+    ``cells`` (k, N) of each region, which may overlap, the largest first, and ``measure`` (k,),
+    area (in a plane) or volume, m^2 or m^3.
+
+References
+----------
+P. Wenger and P. Chedmail, IJRR 10(3), 1991.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> arm = load("planar_2r")
+>>> w = workspace(arm, limits=False, resolution=30)
+>>> regions(arm, "n", w).count, regions(arm, "t", w).count
+(1, 1)
+"""
 
 from __future__ import annotations
 
@@ -45,22 +79,7 @@ class RegionStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Regions(Result):
-    """Connected regions of a workspace, which may overlap.
-
-    Parameters
-    ----------
-    connectivity : str
-        ``"n"``: any two points of a region are joined by some motion; ``"t"``: every path inside
-        can be followed.
-    over : Workspace
-        The cells.
-    cells : ndarray of bool, shape (k, N)
-        Which cells belong to each region, the largest first.
-    measure : ndarray, shape (k,)
-        Area (in a plane) or volume of each, m^2 or m^3.
-    status : RegionStatus
-        Outcome.
-    """
+    """Connected regions of the workspace ``over``, see the head of the file."""
 
     connectivity: str
     over: Workspace
@@ -88,43 +107,7 @@ def regions(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Regions:
-    """Regions of a workspace in which points are joined, or in which every path can be followed.
-
-    Parameters
-    ----------
-    arm, limits, free, executor, progress
-        See the head of the room; limits and obstacles of ``over`` count where it is given.
-    connectivity : {"n", "t"}
-        Whether any two points of a region are joined by some motion, or every path in it can be
-        followed without a change of posture at a singular position.
-    over : Workspace, optional
-        Positions or an orientation, of the same arm; its limits and obstacles count.
-
-    Returns
-    -------
-    Regions
-        Cells of each region. Of t-connected ones the cells at the border are left out, as a
-        singular position may pass through them.
-
-    Notes
-    -----
-    n: images of the components of the free joint space. t: postures of neighbouring cells are
-    joined by Newton steps; where a cuspidal arm has several postures of a cell in one aspect,
-    sheets are put together so that each cell has one.
-
-    References
-    ----------
-    Seed book sections 3.5.2 and 3.5.3; P. Wenger and P. Chedmail, "Ability of a robot to travel
-    through its free work space in an environment with obstacles", IJRR 10(3), 1991.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> w = workspace(arm, limits=False, resolution=30)
-    >>> regions(arm, "n", w).count, regions(arm, "t", w).count
-    (1, 1)
-    """
+    """Regions of a workspace in which points are joined, or in which every path can be followed."""
     joints, work = joint_space(arm, limits, free), Workers(executor, progress)
     one_of(connectivity, ("n", "t"), "connectivity")
     if over is None:

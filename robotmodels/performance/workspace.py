@@ -1,4 +1,37 @@
-"""Workspaces: sections 3.3.1 to 3.3.6 of the book."""
+"""Workspaces: sections 3.3.1 to 3.3.6 of the book.
+
+Three joints are solved by the quartic of Pieper, cell by cell. The positions of other arms are
+found by samples of the joints, and by Newton steps in the cells at the border.
+
+Parameters
+----------
+arm, limits, free, executor, progress
+    See the head of the room.
+kind : {"positions", "primary", "secondary", "orientation", "free"}
+    Positions in any orientation; those in every orientation; those in some but not every
+    one; those in the given orientation; those free of collisions with ``free``.
+section : {"auto", "plane", "space"}
+    Half a plane through the first axis where that joint turns freely, the plane of a planar
+    arm, which has no other, or space.
+resolution : int, optional
+    Cells along each coordinate.
+orientation : array_like, shape (3, 3), optional
+    Rotation of the tool, for kind ``orientation``.
+mask : array_like, shape (6,), optional
+    Components that are asked; two positions make a planar workspace.
+
+Returns
+-------
+Workspace
+    Cells with numbers of postures; areas and volumes.
+
+Examples
+--------
+>>> from robotmodels.robots import load
+>>> w = workspace(load("planar_2r"), limits=False, resolution=100)
+>>> round(w.area, 6), w.count.max(), w.contains([[1.0, 0.5], [2.0, 0.5]])
+(12.566371, np.int64(2), array([ True, False]))
+"""
 
 from __future__ import annotations
 
@@ -46,27 +79,11 @@ class WorkspaceStatus(Outcome):
 class Workspace(Result):
     """Workspace of an arm on a grid of cells, with numbers of postures.
 
-    Parameters
-    ----------
-    model, kind, limits, free, mask
-        As asked; ``free`` is the predicate or obstacles, ``mask`` (6,) of bool, or None.
-    rotation : ndarray, shape (3, 3), or None
-        The orientation of kind ``orientation``.
-    points : ndarray, shape (N, 2) or (N, 3)
-        Centres of all cells, m: distance from the first axis and height, x and y in a plane, or
-        world positions.
-    count : ndarray of int64, shape (N,)
-        Postures at the centre of each cell, 0 outside.
-    size : ndarray, shape (2,) or (3,)
-        Sides of a cell, m.
-    shape : tuple of int
-        Cells along each coordinate; ``points`` run over the last one first.
-    coordinates : str
-        ``"half plane"``, ``"plane"`` or ``"space"``.
-    frame : ndarray, shape (4, 4)
-        Maps the coordinates, completed by zero, to the world.
-    status : WorkspaceStatus
-        What the counts mean.
+    ``points`` (N, 2 or 3) are the centres of all cells, m: distance from the first axis and height
+    (``coordinates`` "half plane"), x and y in a "plane", or world positions in "space", the last
+    coordinate the fastest; ``count`` (N,) the postures there, 0 outside; ``size`` (2 or 3,) the
+    sides of a cell, ``shape`` the cells along each coordinate; ``frame`` (4, 4) maps the coordinates,
+    completed by zero, to the world. ``rotation`` (3, 3) is that of kind ``orientation``.
     """
 
     model: RobotModel
@@ -223,46 +240,7 @@ def workspace(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Workspace:
-    """Workspace of an arm: which positions it reaches, and in how many postures.
-
-    Parameters
-    ----------
-    arm, limits, free, executor, progress
-        See the head of the room.
-    kind : {"positions", "primary", "secondary", "orientation", "free"}
-        Positions in any orientation; those in every orientation; those in some but not every
-        one; those in the given orientation; those free of collisions with ``free``.
-    section : {"auto", "plane", "space"}
-        Half a plane through the first axis where that joint turns freely, the plane of a planar
-        arm, which has no other, or space.
-    resolution : int, optional
-        Cells along each coordinate.
-    orientation : array_like, shape (3, 3), optional
-        Rotation of the tool, for kind ``orientation``.
-    mask : array_like, shape (6,), optional
-        Components that are asked; two positions make a planar workspace.
-
-    Returns
-    -------
-    Workspace
-        Cells with numbers of postures; areas and volumes.
-
-    Notes
-    -----
-    Three joints are solved by the quartic of Pieper, cell by cell. The positions of other arms
-    are found by samples of the joints, and by Newton steps in the cells at the border.
-
-    References
-    ----------
-    Seed book sections 3.3.1 to 3.3.6.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> w = workspace(load("planar_2r"), limits=False, resolution=100)
-    >>> round(w.area, 6), w.count.max(), w.contains([[1.0, 0.5], [2.0, 0.5]])
-    (12.566371, np.int64(2), array([ True, False]))
-    """
+    """Workspace of an arm: which positions it reaches, and in how many postures."""
     joints, work = arms.joint_space(arm, limits, free), Workers(executor, progress)
     one_of(kind, KINDS, "kind")
     one_of(section, SECTIONS, "section")
