@@ -1,7 +1,6 @@
 """Direct geometric models (forward kinematics): the pose near a given one, all assembly modes.
 
-`dgm` iterates Newton's method from a pose nearby; where it leaves the assembly mode, the lengths
-are continued from those at the start in small pieces. `assembly_modes` continues the 40 complex
+`dgm` iterates Newton's method from a pose nearby. `assembly_modes` continues the 40 complex
 solutions of a stored robot (Gough platforms), solves the sextic (planar robots), or intersects
 spheres and circles (Delta and five-bar). Kinematic loops are searched from random postures, which
 is no proof (``SOME_LOST``).
@@ -25,9 +24,8 @@ PlatformPoses or AssemblyModes
 
 References
 ----------
-Seed book section 2.4; C. Wampler, "Forward displacement analysis of general six-in-parallel SPS
-(Stewart) platform manipulators using soma coordinates", Mechanism and Machine Theory 31 (1996)
-331-337; J.-P. Merlet, "Parallel Robots", 2nd ed., chapter 4.
+Seed book section 2.4; C. Wampler, Mechanism and Machine Theory 31 (1996) 331-337; J.-P. Merlet,
+"Parallel Robots", 2nd ed., chapter 4.
 
 Examples
 --------

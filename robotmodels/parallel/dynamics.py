@@ -31,8 +31,7 @@ ndarray or ParallelMotion
 
 References
 ----------
-W. Khalil and O. Ibrahim, "General solution for the dynamic modeling of parallel robots", J. of
-Intelligent and Robotic Systems 49 (2007) 19-37; seed book section 2.3.3.5 (singular positions).
+W. Khalil and O. Ibrahim, J. of Intelligent and Robotic Systems 49 (2007) 19-37.
 
 Examples
 --------
@@ -40,8 +39,6 @@ Examples
 >>> robot = gough_symmetric(1.0).with_masses(platform=(6.0, [0, 0, 0], 0.1 * np.eye(3)))
 >>> idm(robot, robot.home, np.zeros(6), np.zeros(6)).round(3)
 array([11.772, 11.772, 11.772, 11.772, 11.772, 11.772])
->>> simulate(robot, robot.home, t=0.1).status.name
-'FINISHED'
 """
 
 from __future__ import annotations

@@ -19,8 +19,6 @@ compiled = _compile.compiled
 CONVERGED, NOT_CONVERGED, LEFT_THE_MODE = 0, 1, 2
 _ITERATIONS = 50
 _LAST = 1e-8  # a Newton step this small, relative, is the last one
-_PIECES = 400
-_FINEST = 1e-5
 _FAR = 0.02  # largest change of a rotation by polishing
 _REAL = 1e-6  # distance of a root of the sextic from the unit circle
 
@@ -148,46 +146,21 @@ def room_for(m: int) -> Room:
 def direct(
     c: Floats, b: Floats, rods: Floats, T0: Floats, columns: Ints, T: Floats, out: Floats
 ) -> None:
-    """Poses near T0 by Newton's method, else by continuation of the lengths.
+    """Poses near T0 by Newton's method.
 
     Shapes: c (N, m, 3), b (m, 3), rods (N, m), T0 (N, 4, 4) -> T (N, 4, 4), out (N, 4): code,
     iterations, residual, determinant.
     """
-    m = b.shape[0]
-    room = room_for(m)
-    first, target, last, piece = np.zeros(m), np.zeros(m), np.zeros((4, 4)), np.zeros((4, 4))
+    room = room_for(b.shape[0])
     for s in range(c.shape[0]):
         put(T[s], T0[s])
         _, side = measured(T[s], c[s], b, rods[s], columns, room)
-        for i in range(m):
-            first[i] = room[1][i]
         done = newton(T[s], c[s], b, rods[s], columns, room)
-        total = abs(done)
         worst, det = measured(T[s], c[s], b, rods[s], columns, room)
         code = CONVERGED if done > 0 else NOT_CONVERGED
         if done > 0 and det * side < 0.0:
             code = LEFT_THE_MODE
-        if code != CONVERGED:
-            put(last, T0[s])
-            now, h, pieces = 0.0, 0.125, 0
-            while now < 1.0 and h > _FINEST and pieces < _PIECES:
-                pieces += 1
-                after = min(1.0, now + h)
-                for i in range(m):
-                    target[i] = first[i] + after * (rods[s, i] - first[i])
-                put(piece, last)
-                done = newton(piece, c[s], b, target, columns, room)
-                total += abs(done)
-                error, here = measured(piece, c[s], b, target, columns, room)
-                if 0 < done <= 6 and here * side > 0.0:
-                    now, h = after, 2.0 * h
-                    put(last, piece)
-                    if now == 1.0:
-                        code, worst, det = CONVERGED, error, here
-                        put(T[s], piece)
-                else:
-                    h *= 0.25
-        out[s, 0], out[s, 1], out[s, 2], out[s, 3] = code, total, worst, det
+        out[s, 0], out[s, 1], out[s, 2], out[s, 3] = code, abs(done), worst, det
 
 
 @compiled(NOTHING(STACK, MATRIX, MATRIX, INTS, OUT4, OUT2, OUT2))

@@ -14,10 +14,6 @@ LegSolutions
     turns) and ``residual``, the largest error of a rod's length, m, are (..., S). Packed: after the
     solutions NaN, mode -1. ``status`` (...) are codes of `LegStatus`.
 
-References
-----------
-Seed book section 2.3.1.
-
 Examples
 --------
 >>> from robotmodels.parallel import five_bar

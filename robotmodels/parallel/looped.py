@@ -17,13 +17,8 @@ Returns
 -------
 LoopedPlatform
     Taken by the functions of this package in place of a `ParallelRobot`. Its ``columns`` are the
-    independent components of the platform's twist, from 0.
-
-Raises
-------
-InvalidValueError, LoopError, FrameNotFoundError
-    Loops that cannot be closed near home, actuated joints that do not determine the platform, or
-    more of them than it has freedoms.
+    independent components of the platform's twist, from 0. Loops that cannot be closed near home
+    and actuated joints that do not determine the platform are refused.
 
 Examples
 --------

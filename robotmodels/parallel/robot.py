@@ -20,13 +20,7 @@ _AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 class Family(Enum):
-    """Families of parallel robots: name, and components of the platform's twist.
-
-    Examples
-    --------
-    >>> Family.DELTA.value
-    ('Delta robot', (0, 1, 2))
-    """
+    """Families of parallel robots: name, and components of the platform's twist."""
 
     GOUGH = "Gough-Stewart platform", (0, 1, 2, 3, 4, 5)
     PLANAR_3RPR = "planar 3-RPR robot", (0, 1, 5)
@@ -170,8 +164,7 @@ class ParallelRobot(Value):
         Parameters
         ----------
         platform : tuple (mass, com, inertia)
-            kg; centre of mass in the platform's frame, shape (3,), m; inertia about it in the same
-            axes, shape (3, 3), kg m^2.
+            kg; centre of mass (3,) in the platform's frame, m; inertia (3, 3) about it, kg m^2.
         legs : tuple of two, each (mass, position, inertia), optional
             kg; distance of the centre of mass from the part's start, m; inertia about it across the
             part, kg m^2; numbers or one for each leg. Default massless.

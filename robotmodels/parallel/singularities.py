@@ -19,8 +19,7 @@ Singularity
 
 References
 ----------
-Seed book sections 2.3.3, 2.3.3.3 (geometric method); J.-P. Merlet, "Singular configurations of
-parallel manipulators and Grassmann geometry", Int. J. of Robotics Research 8(5), 1989.
+Seed book section 2.3.3.3; J.-P. Merlet, Int. J. of Robotics Research 8(5), 1989.
 
 Examples
 --------

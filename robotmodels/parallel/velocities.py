@@ -6,10 +6,8 @@ Parameters
 ----------
 robot, T, mode, twist, wrench
     See `robotmodels.parallel`.
-acceleration : array_like, shape (..., 6)
-    Time derivative of the twist, m/s^2 and rad/s^2.
-q_rate, q_acceleration : array_like, shape (..., m)
-    Velocities and accelerations of the actuators, m/s or rad/s and per s.
+acceleration, q_rate, q_acceleration : array_like, shape (..., 6) or (..., m)
+    Time derivative of the twist; velocities and accelerations of the actuators. SI, rad.
 k : array_like, scalar or shape (m,)
     Stiffness of the actuators, N/m or N m/rad, not negative.
 length : float, optional
@@ -30,11 +28,8 @@ Examples
 --------
 >>> from robotmodels.parallel import gough_symmetric
 >>> robot, V = gough_symmetric(1.0), [0.1, 0.2, 0.3, 0.1, 0.0, 0.2]
->>> rates = ikm(robot, robot.home, V)
->>> inverse_jacobian(robot, robot.home).shape, dkm(robot, robot.home, rates).round(6).tolist()
-((6, 6), [0.1, 0.2, 0.3, 0.1, 0.0, 0.2])
->>> leg_forces(robot, robot.pose([0, 0, 1, 0, 0, np.pi / 2]), np.ones(6)).reason()
-'The pose is singular: no bounded forces of the legs balance every wrench.'
+>>> dkm(robot, robot.home, ikm(robot, robot.home, V)).round(6).tolist()
+[0.1, 0.2, 0.3, 0.1, 0.0, 0.2]
 """
 
 from __future__ import annotations

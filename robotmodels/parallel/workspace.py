@@ -26,18 +26,12 @@ PlatformWorkspace
     joints and legs from theirs, m or rad, negative outside. Areas and volumes are interpolated from
     it. ``rotations`` (K, 3, 3), ``lower`` and ``upper`` (m,) are those that count.
 
-References
-----------
-Seed book section 2.3.3.5; C. Gosselin, "Determination of the workspace of 6-DOF parallel
-manipulators", J. of Mechanical Design 112 (1990).
-
 Examples
 --------
 >>> from robotmodels.parallel import planar_3rpr
 >>> robot = planar_3rpr([[0, 0], [2, 0], [1, 2]], [[0, 0], [0.5, 0], [0.2, 0.5]], 0.3, 1.5)
->>> found = workspace(robot, orientation=0.1, resolution=100)
->>> round(found.area, 2), found.contains([[1.0, 0.5], [3.0, 0.0]])
-(1.2, array([ True, False]))
+>>> round(workspace(robot, orientation=0.1, resolution=100).area, 2)
+1.2
 """
 
 from __future__ import annotations

@@ -7,10 +7,9 @@ middle of a trapezoid are those of all of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,7 @@ from .level_curves import Line, section_lines
 _CHUNK = 65536
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cut:
+class Cut(NamedTuple):
     """Trapezoids: area (m,), middle (m, 2), strip (m,), sides (m, 4) in y; ends of strips (k + 1,).
 
     Sides are the lower left and right end, then the upper ones. Crossings (k, 2, 2): line, place.
@@ -41,10 +39,8 @@ class Cut:
 def cut(lines: tuple[Line, ...]) -> Cut:
     """Trapezoids between the lines, and where lines cross."""
     if not lines:
-        none = np.zeros(0)
-        return Cut(
-            none, np.zeros((0, 2)), none.astype(int), np.zeros((0, 4)), none, np.zeros((0, 2, 2))
-        )
+        x, two, four = np.zeros(0), np.zeros((0, 2)), np.zeros((0, 4))
+        return Cut(x, two, np.zeros(0, np.int64), four, x, four.reshape(0, 2, 2))
     first = np.concatenate([line.section[:-1] for line in lines])
     last = np.concatenate([line.section[1:] for line in lines])
     sizes = [len(line.x) - 1 for line in lines]

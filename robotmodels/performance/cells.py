@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi, tau
 from typing import Any
@@ -14,12 +14,12 @@ from .._arrays import Array, as_mask
 from .._arrays.tasks import Workers
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
+from ..igm import igm_numeric
 from ..igm.loop import joint_chain
-from ..kinematics import dgm, jacobian
+from ..kinematics import dgm
 from ..model import RobotModel
 from . import arms
 from .arms import Flags, Ints, JointSpace, SectionArm
-from .arrangement import closed_loops
 
 SECTIONS = ("auto", "plane", "space")
 SAMPLES = 400000
@@ -29,7 +29,6 @@ _MARGIN = 0.02
 _CHUNK = 50000
 _MOST_BYTES = 1e9
 _CELL_BYTES = 170
-_STEPS = 25
 _ROUNDS = 60
 
 
@@ -207,22 +206,6 @@ def neighbours(flags: Flags) -> Flags:
     return np.asarray(ndimage.binary_dilation(flags, np.ones((3,) * flags.ndim)))
 
 
-def outlines(cells: Cells, reached: Flags) -> list[Array]:
-    """Outlines of the cells that are reached, which lie on their left."""
-    flags = np.pad(reached.reshape(cells.shape), 1).astype(int)
-    starts, ends = [], []
-    for axis, along in enumerate(np.eye(2, dtype=int)[::-1]):
-        change = np.diff(flags, axis=axis)
-        for side in (-1, 1):
-            low = np.argwhere(change == side) + 1 - along
-            forward = side == (-1, 1)[axis]
-            starts.append(low if forward else low + along)
-            ends.append(low + along if forward else low)
-    start, end = np.concatenate(starts), np.concatenate(ends)
-    low = cells.points[0] - 1.5 * cells.size
-    return closed_loops(low + cells.size * start, low + cells.size * end, start, end)
-
-
 def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
     """Which centres of cells (N,) some posture reaches: samples, then Newton at the border."""
     shape = cells.shape
@@ -235,13 +218,13 @@ def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
     # a sample in a cell says nothing of its centre where the border passes
     inner = ~neighbours(~hit.reshape(shape)).ravel()
     reached, tried = inner.copy(), inner.copy()
+    move = partial(_moved_to, _bounded(joints), cells)
     for k in range(_ROUNDS):
         rows = np.flatnonzero(neighbours((hit | reached).reshape(shape)).ravel() & ~tried)
         if not rows.size:
             break
         part = work.part(1.0 - 0.5 * 0.7**k, 1.0 - 0.5 * 0.7 ** (k + 1))
-        move, start = partial(_moved_to, joints, cells), _starts(q_of, rows, shape)
-        found, good = part.rows(move, _CHUNK, cells.points[rows], start)
+        found, good = part.rows(move, _CHUNK, cells.points[rows], _starts(q_of, rows, shape))
         tried[rows] = True
         reached[rows[good]] = True
         q_of[rows[good]] = found[good]
@@ -267,39 +250,30 @@ def _starts(q_of: Array, rows: Ints, shape: tuple[int, ...]) -> Array:
     return np.nan_to_num(start)
 
 
+def _bounded(joints: JointSpace) -> JointSpace:
+    """The joint space with the ranges that count as limits of its model."""
+    ranges, circle = joints.ranges()
+    low, high = np.where(circle, -np.inf, ranges[:, 0]), np.where(circle, np.inf, ranges[:, 1])
+    table = replace(joints.model.table, lower=low, upper=high)
+    return replace(joints, model=joints.model.with_table(table))
+
+
 def _moved_to(joints: JointSpace, space: Space, goals: Array, q: Array) -> tuple[Array, Flags]:
-    """Free postures (N, n) whose tool is at points of the space, by damped Newton steps."""
-    model, (ranges, circle) = joints.model, joints.ranges()
-    low = np.where(circle, -np.inf, ranges[:, 0])
-    high = np.where(circle, np.inf, ranges[:, 1])
+    """Free postures (N, n) near q whose tool is at points of the space."""
+    model, mask, goal = joints.model, "position", space.world(goals)
+    if space.kind == "plane":
+        mask = (1, 1, 0, 0, 0, 0)
+    if space.kind == "half plane":  # the one through the tool
+        local = (dgm(model, q)[:, :3, 3] - space.frame[:3, 3]) @ space.frame[:3, :3]
+        away = np.maximum(np.hypot(local[:, 0], local[:, 2]), 1e-12)[:, None]
+        turned = goals[:, :1] * local / away
+        turned[:, 1] = goals[:, 1]
+        goal = space.world(turned)
+    T = np.tile(space.frame, (len(goals), 1, 1))
+    T[:, :3, 3] = goal
     reach = max(float(np.abs(goals).max(initial=0.0)), 1e-9)
-    q = np.array(q)
-    e = np.full(len(q), np.inf)
-    for _ in range(_STEPS):
-        p = dgm(model, q)[:, :3, 3]
-        error = goals - space.of_world(p)
-        e = np.linalg.norm(error, axis=1)
-        if (e < 1e-9 * reach).all():
-            break
-        local = (p - space.frame[:3, 3]) @ space.frame[:3, :3]
-        J = np.swapaxes(space.frame[:3, :3], 0, 1) @ jacobian(model, q)[:, :3]
-        if space.kind == "half plane":
-            u = local[:, [0, 2]] / np.maximum(np.hypot(local[:, 0], local[:, 2]), 1e-12)[:, None]
-            radial = u[:, :1] * J[:, 0] + u[:, 1:] * J[:, 2]
-            J = np.stack((radial, J[:, 1]), axis=1)
-        else:
-            J = J[:, : space.dimensions]
-        # joints at a limit that would go on are left out
-        gradient = np.einsum("nij,ni->nj", J, error)
-        stuck = ((q <= low) & (gradient < 0.0)) | ((q >= high) & (gradient > 0.0))
-        J = np.where(stuck[:, None], 0.0, J)
-        G = J @ np.swapaxes(J, 1, 2)
-        damping = 1e-9 * reach**2 + 1e-3 * e**2
-        G = G + damping[:, None, None] * np.eye(G.shape[1])
-        step = np.einsum("nij,ni->nj", J, np.linalg.solve(G, error[..., None])[..., 0])
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
-        q = np.clip(q + step, low, high)
-    good = e < 1e-7 * reach
+    found = igm_numeric(model, T, q, mask, "tool", 1e-7 * reach, limits=True, restarts=0)
+    q, good = np.nan_to_num(found.q[:, 0]), found.valid[:, 0].copy()
     if joints.free is not None and good.any():
         good[good] = joints.is_free(q[good])
     return q, good

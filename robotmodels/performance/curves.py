@@ -76,9 +76,9 @@ class CurveKind(Enum):
 class SingularCurves(Result):
     """Singular curves of an arm, each broken where its kind changes.
 
-    ``joint`` and ``section`` are tuples of points (K, n), rad or m, angles beyond pi, and (K, 2), m.
-    Of ``kind`` BOUNDARY has no posture on one side, INTERNAL has postures on both; on LIMIT a joint
-    is at its limit.
+    ``joint`` and ``section`` are tuples of points (K, n), rad or m, and (K, 2), m; angles run on
+    beyond pi. Of ``kind`` BOUNDARY has no posture on one side, INTERNAL has some on both; on LIMIT
+    a joint is at its limit.
     """
 
     joint: tuple[Array, ...]
@@ -136,8 +136,7 @@ def cusps(arm: RobotModel) -> SpecialPoints:
     """Cusps: points of the section where three postures of an arm meet."""
     section = section_arm(joint_space(arm).model)
     if section is None:
-        none = np.zeros((0, 2))
-        return SpecialPoints(np.zeros((0, arm.n)), none, none[:, 0], SectionStatus.NOT_DEFINED)
+        return _nowhere(np.zeros((0, arm.n)))
     lines, touch = lines_of(arm, False)
     x, residual = cusps_of(section, lines)
     points, status = section.values(x)[:, :2], SectionStatus(int(touch))
@@ -148,8 +147,7 @@ def nodes(arm: RobotModel) -> SpecialPoints:
     """Nodes: points of the section where singular curves cross."""
     section = section_arm(joint_space(arm).model)
     if section is None:
-        none = np.zeros((0, 2))
-        return SpecialPoints(np.zeros((0, 2, arm.n)), none, none[:, 0], SectionStatus.NOT_DEFINED)
+        return _nowhere(np.zeros((0, 2, arm.n)))
     lines, touch = lines_of(arm, False)
     lines = tuple(line for line in lines if not line.of_limit)
     pairs = [
@@ -162,6 +160,10 @@ def nodes(arm: RobotModel) -> SpecialPoints:
     x, residual = _distinct(section, x[good], residual[good])
     points, status = section.values(x[:, :2])[:, :2], SectionStatus(int(touch))
     return SpecialPoints(_postures(arm, section, x.reshape(-1, 2, 2)), points, residual, status)
+
+
+def _nowhere(q: Array) -> SpecialPoints:
+    return SpecialPoints(q, np.zeros((0, 2)), np.zeros(0), SectionStatus.NOT_DEFINED)
 
 
 def cusps_of(arm: SectionArm, lines: tuple[Line, ...]) -> tuple[Array, Array]:

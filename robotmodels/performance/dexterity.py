@@ -58,16 +58,15 @@ from .._arrays import Array, Frozen, Value, as_mask, as_vector
 from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from ..errors import InvalidValueError
-from ..kinematics import dgm, jacobian
+from ..kinematics import jacobian
 from ..kinematics.lengths import length_of
 from ..model import RobotModel, check_model
-from .accessibility import allowed_postures
-from .arms import Flags, JointSpace, section_arm, task_rows
-from .workspace import Workspace, workspace
+from .arms import Flags, JointSpace, task_rows
+from .cells import SAMPLES
+from .workspace import Workspace, postures_in, workspace
 
 INDICES = ("inverse_condition", "manipulability", "least_singular_value", "isotropy")
 _AT_A_TIME = 16384
-_SAMPLES = 200000
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -90,19 +89,14 @@ class DexterityMap(Frozen, Value):
 class GlobalIndex(float):
     """Mean of an index, a float with its ``spread``."""
 
-    __slots__ = ("_spread",)
-    _spread: float
+    __slots__ = ("spread",)
+    spread: float
 
     def __new__(cls, value: float, spread: float = 0.0) -> GlobalIndex:
         """Keep the spread beside the mean."""
         self = super().__new__(cls, value)
-        self._spread = float(spread)
+        self.spread = float(spread)
         return self
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation over the same measure."""
-        return self._spread
 
     def __repr__(self) -> str:
         return f"{float(self):.6g} (spread {self.spread:.3g})"
@@ -111,7 +105,7 @@ class GlobalIndex(float):
 def isotropy_index(
     arm: RobotModel, q: ArrayLike, mask: ArrayLike | str | None = None, length: float | None = None
 ) -> Array:
-    """Isotropy index (section 3.6.3): geometric over arithmetic mean of the eigenvalues of ``J J^T``.
+    """Isotropy index (section 3.6.3): geometric over arithmetic mean of eigenvalues of ``J J^T``.
 
     1 where the tool moves equally well in all directions, 0 in singular positions.
     """
@@ -135,20 +129,13 @@ def dexterity_map(
     one_of(index, INDICES, "index")
     w, work = workspace_of(arm, over), Workers(executor, progress)
     best, mean = np.full(len(w.points), np.nan), np.full(len(w.points), np.nan)
-    index_of, inner = _index_of(arm, index, mask, length), np.flatnonzero(w.count > 0)
-    if not inner.size:
-        return DexterityMap(best, mean)
-    if w.kind == "orientation" or section_arm(arm) is not None:
-        at_poses = partial(_of_postures, w.joints, w.place, index_of)
-        best[inner], mean[inner] = work.rows(at_poses, _AT_A_TIME, w.poses[inner])
-        return DexterityMap(best, mean)
-    q = w.joints.samples(_SAMPLES)
-    at, inside = w.cells.numbers(w.cells.of_world(dgm(arm, q)[:, :3, 3]))
-    (values,) = work.rows(index_of, _AT_A_TIME, q[inside])
-    count, top = np.bincount(at, minlength=len(best)), np.full(len(best), -np.inf)
-    np.maximum.at(top, at, values)
-    hit = (count > 0) & (w.count > 0)
-    best[hit], mean[hit] = top[hit], (np.bincount(at, values, len(best))[hit] / count[hit])
+    index_of = _index_of(arm, index, mask, length)
+    if (w.count > 0).any():
+        cells, q = postures_in(w, work.part(0.0, 0.5))
+        (values,) = work.part(0.5, 1.0).rows(index_of, _AT_A_TIME, q)
+        total, count = (np.bincount(cells, x, len(best)) for x in (values, None))
+        np.fmax.at(best, cells, values)
+        mean[count > 0] = total[count > 0] / count[count > 0]
     return DexterityMap(best, mean)
 
 
@@ -168,7 +155,7 @@ def global_index(
     one_of(measure, ("workspace", "joints"), "measure")
     if measure == "joints":
         joints = JointSpace(arm, True) if over is None else workspace_of(arm, over).joints
-        q, index_of = joints.samples(_SAMPLES), _index_of(arm, index, mask, length)
+        q, index_of = joints.samples(SAMPLES), _index_of(arm, index, mask, length)
         (values,) = Workers(executor, progress).rows(index_of, _AT_A_TIME, q)
         weights = np.ones(len(values))
     else:
@@ -216,20 +203,6 @@ def _index_values(
             top = s[:, 0] if index == "inverse_condition" else np.ones(len(s))
             out[part] = np.divide(s[:, -1], top, out=np.zeros(len(s)), where=top > 0.0)
     return (out,)
-
-
-def _of_postures(
-    joints: JointSpace, place: Flags | None, index_of: Callable[[Array], tuple[Array]], T: Array
-) -> tuple[Array, Array]:
-    """Best and mean over the postures of poses (N, 4, 4); NaN without any."""
-    q, valid = allowed_postures(joints, T, place)
-    values = np.full(valid.shape, np.nan)
-    values[valid] = index_of(q[valid])[0]
-    best = np.where(valid, values, -np.inf).max(axis=1, initial=-np.inf)
-    count = valid.sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(valid, values, 0.0).sum(axis=1) / count
-    return np.where(count > 0, best, np.nan), mean
 
 
 def workspace_of(arm: RobotModel, over: Any) -> Workspace:

@@ -73,10 +73,10 @@ class PathStatus(Outcome):
 class FeasiblePath(Result):
     """Joint motions that follow a path of poses, from every starting posture.
 
-    ``q`` (N, n) is the best motion, rad or m, NaN from where it breaks. Of each posture of the first
-    pose ``reached`` (S,) says whether the path is followed to its end, ``breaks`` (S,) the first pose
-    that is not reached: N if none, 0 if it starts outside the limits. ``aspect`` (N,) has bit i set
-    where factor i of the determinant is positive along ``q``; -1 where there is no motion.
+    ``q`` (N, n) is the best motion, rad or m, NaN from where it breaks. Of each posture of the
+    first pose ``reached`` (S,) says whether the path is followed to its end, ``breaks`` (S,) the
+    first pose that is not reached: N if none, 0 if it starts outside the limits. ``aspect`` (N,)
+    has bit i set where factor i of the determinant is positive along ``q``; -1 without motion.
     ``postures`` (N, S, n) are all of all poses, NaN where there are fewer, and ``following``
     (N - 1, S) the number of the posture of the next pose that continues each; -1 for none.
     """

@@ -65,8 +65,8 @@ class Polytope(Result):
 
     ``vertices`` (V, m) in the units of the task: m/s and rad/s, N and N m, m/s^2 and rad/s^2; of an
     unbounded one those of the part that the joints feel. ``faces`` (F, c) are numbers of the
-    vertices of each face, simplices: triangles for m = 3, edges for m = 2; ``radius`` is that of the
-    largest ball about the origin inside.
+    vertices of each face, simplices: triangles for m = 3, edges for m = 2; ``radius`` is that of
+    the largest ball about the origin inside.
     """
 
     vertices: Array
@@ -89,7 +89,7 @@ def polytope(
     mask: ArrayLike | str | None = None,
     frame: str | int | None = None,
 ) -> Polytope:
-    """Polytope of velocities, forces or accelerations of the tool within the limits of the joints."""
+    """Polytope of velocities, forces or accelerations of the tool within the limits of joints."""
     check_model(arm)
     one_of(kind, KINDS, "kind")
     rows, q = as_mask(mask), as_vector(q, arm.n, "q")

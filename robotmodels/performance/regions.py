@@ -50,15 +50,14 @@ from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
-from ..kinematics import dgm
 from ..model import RobotModel
 from .accessibility import allowed_postures
 from .arms import Flags, Ints, JointSpace, joint_space, section_arm, task_rows
 from .aspects import Aspects, free_components, linked
-from .cells import SAMPLES, neighbours
+from .cells import neighbours
 from .continuation import Continuation
 from .dexterity import workspace_of
-from .workspace import Workspace, WorkspaceStatus, workspace
+from .workspace import Workspace, WorkspaceStatus, postures_in, workspace
 
 _RESOLUTION = {2: 100, 3: 20}
 _AT_A_TIME = 4096
@@ -130,7 +129,7 @@ def regions(
         status = RegionStatus.NOT_DEFINED
     elif connectivity == "n":
         parts = free_components(arm, w.free, w.limits, None, executor, work.part(0.0, 0.5).done)
-        found = _images(w, parts, counted)
+        found = _images(w, parts, work.part(0.5, 1.0))
     else:
         found = _followed(w, work)
     work.done()
@@ -144,22 +143,15 @@ def regions(
     return Regions(connectivity, w, cells, measure, status)
 
 
-def _images(w: Workspace, parts: Aspects, counted: bool) -> list[Flags]:
+def _images(w: Workspace, parts: Aspects, work: Workers) -> list[Flags]:
     """Cells that each component of the free joint space reaches."""
     if parts.count == 1:
         return [np.asarray(w.count > 0)]
-    if counted:
-        q, valid = allowed_postures(w.joints, w.poses, w.place)
-        rows, label = np.nonzero(valid)[0], parts.of(q[valid])
-    else:
-        q = w.joints.samples(SAMPLES)
-        rows, inside = w.cells.numbers(w.cells.of_world(dgm(w.model, q)[:, :3, 3]))
-        label = parts.of(q[inside])
-    found = []
+    rows, q = postures_in(w, work)
+    label, found = parts.of(q), []
     for k in range(parts.count):
         cells = np.zeros(len(w.points), np.bool_)
         cells[rows[label == k]] = True
-        cells &= w.count > 0
         if cells.sum() >= _LEAST:
             found.append(cells)
     return found

@@ -37,6 +37,7 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -51,11 +52,12 @@ from ..igm.request import poses_of
 from ..kinematics import dgm
 from ..model import RobotModel
 from . import arms
-from .accessibility import in_every_orientation, posture_counts
+from .accessibility import allowed_postures, in_every_orientation, posture_counts
 from .arms import Flags, Ints, JointSpace
 from .arrangement import boundary, measures
-from .cells import SECTIONS, Cells, Space, cells_of, outlines, reached_cells, space_of
+from .cells import SAMPLES, SECTIONS, Cells, Space, cells_of, reached_cells, space_of
 
+_AT_A_TIME = 16384
 KINDS = ("positions", "primary", "secondary", "orientation", "free")
 _RESOLUTION = {"counted": 400, "reached": 150, "oriented": 60, "turned": 240, "space": 28}
 
@@ -82,7 +84,7 @@ class Workspace(Result):
     ``points`` (N, 2 or 3) are the centres of all cells, m: distance from the first axis and height
     (``coordinates`` "half plane"), x and y in a "plane", or world positions in "space", the last
     coordinate the fastest; ``count`` (N,) the postures there, 0 outside; ``size`` (2 or 3,) the
-    sides of a cell, ``shape`` the cells along each coordinate; ``frame`` (4, 4) maps the coordinates,
+    sides of a cell, ``shape`` the cells along each coordinate; ``frame`` (4, 4) maps coordinates,
     completed by zero, to the world. ``rotation`` (3, 3) is that of kind ``orientation``.
     """
 
@@ -187,14 +189,15 @@ class Workspace(Result):
     def boundary(self) -> list[Array]:
         """Closed polylines (K, 2) around what is reached, which lies on their left.
 
-        From the singular curves and those of the limits where they bound it (see `area_of`), else
-        the outlines of the cells.
+        From the singular curves and those of the limits; where these do not bound what is reached
+        (see `area_of`) InvalidValueError is raised.
         """
-        if self._by_curves:
-            return boundary(self.model, self.limits)
-        if self.coordinates == "space":
-            raise InvalidValueError("boundary: expected a workspace in a plane, got one in space.")
-        return outlines(self.cells, self.count > 0)
+        if not self._by_curves:
+            raise InvalidValueError(
+                "boundary: expected positions of three joints in a section, or of two in a plane, "
+                "without obstacles; other workspaces have cells only, see `count`."
+            )
+        return boundary(self.model, self.limits)
 
     @property
     def _by_curves(self) -> bool:
@@ -249,11 +252,8 @@ def workspace(
     space = space_of(joints, section, free is None and kind != "orientation", mask)
     asked = arm, kind, joints.limits, joints.free, rows, rotation
     if space is None:
-        empty, count = (
-            Cells("space", np.eye(4), np.zeros((0, 3)), np.ones(3), (0, 0, 0)),
-            np.zeros(0),
-        )
-        return _workspace(asked, empty, count, WorkspaceStatus.NOT_DEFINED)
+        empty = Cells("space", np.eye(4), np.zeros((0, 3)), np.ones(3), (0, 0, 0))
+        return _workspace(asked, empty, np.zeros(0), WorkspaceStatus.NOT_DEFINED)
     # a planar question to an arm in space leaves a coordinate open
     counted = _is_counted(space, arm)
     default = "space" if space.kind == "space" else "counted" if counted else "reached"
@@ -331,3 +331,21 @@ def _count_positions(joints: JointSpace, world: Array, work: Workers) -> Ints:
     T = np.tile(np.eye(4), (len(world), 1, 1))
     T[:, :3, 3] = world
     return posture_counts(joints, T, arms.PLACE, work)[1]
+
+
+def postures_in(w: Workspace, work: Workers) -> tuple[Ints, Array]:
+    """Cells (M,) and configurations (M, n): all postures of the cells, or samples of them."""
+    inner = np.flatnonzero(w.count > 0)
+    if w.kind == "orientation" or arms.section_arm(w.model) is not None:
+        solve = partial(_solved, w.joints, w.place)
+        cells, q = work.rows(solve, _AT_A_TIME, inner, w.poses[inner])
+        return cells, q
+    q = w.joints.samples(SAMPLES)
+    cells, inside = w.cells.numbers(w.cells.of_world(dgm(w.model, q)[:, :3, 3]))
+    known = w.count[cells] > 0
+    return cells[known], q[inside][known]
+
+
+def _solved(joints: JointSpace, place: Flags | None, cells: Ints, T: Array) -> tuple[Ints, Array]:
+    q, valid = allowed_postures(joints, T, place)
+    return cells[np.nonzero(valid)[0]], q[valid]
