@@ -20,7 +20,13 @@ _AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 class Family(Enum):
-    """Families of parallel robots: name, and components of the platform's twist."""
+    """Families of parallel robots: name, and components of the platform's twist.
+
+    Examples
+    --------
+    >>> Family.DELTA.value
+    ('Delta robot', (0, 1, 2))
+    """
 
     GOUGH = "Gough-Stewart platform", (0, 1, 2, 3, 4, 5)
     PLANAR_3RPR = "planar 3-RPR robot", (0, 1, 5)
