@@ -1,4 +1,4 @@
-"""Members of enums at the border: given as they are, or by their names in words."""
+"""Members of enums and instances of types at the border."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from .errors import InvalidValueError
 
 E = TypeVar("E", bound=Enum)
+R = TypeVar("R")
 
 
 def chosen(kind: type[E], value: Any, name: str) -> E:
@@ -29,4 +30,14 @@ def one_of(value: Any, words: tuple[str, ...], name: str) -> str:
     if not isinstance(value, str) or value not in words:
         listed = ", ".join(map(repr, words))
         raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.")
+    return value
+
+
+def as_instance(value: Any, kind: type[R], name: str, advice: str = "") -> R:
+    """The value if it is of the expected type."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise InvalidValueError(
+            f"{name}: expected {article} {kind.__name__}{advice}, got {type(value).__name__}."
+        )
     return value

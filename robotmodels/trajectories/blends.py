@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .checks import ROUNDING, checked_limits, least_shown, limits_along, slowed
-from .limits import MotionLimits
+from .limits import ROUNDING, MotionLimits, checked_limits, least_shown, limits_along, slowed
 from .motions import PiecewisePolynomial
 from .splines import as_points
 from .trajectory import Trajectory
@@ -97,7 +96,7 @@ def blended_lines(
                 f"{least_shown(0.5 * (tb[k] + tb[k + 1]), 9)} s, and has {T[k]:.9g} s."
             )
     T, tb = slowed(T, tb, duration, bounds is not None)
-    trajectory = Trajectory(_joined(q, step, T, tb, smooth), scalar)
+    trajectory = Trajectory(joined(q, step, T, tb, smooth), scalar)
     if bounds is not None and not (report := trajectory.check(bounds, 1e-9)).kept:
         raise InvalidValueError(
             f"The limits are not kept: {'; '.join(report.violations())}. The least factor on the "
@@ -156,7 +155,7 @@ def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> 
     return tb.max(axis=-1)
 
 
-def _joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> PiecewisePolynomial:
+def joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> PiecewisePolynomial:
     """Blend, line, blend, and so on to the last blend."""
     m, n = q.shape
     v = rates_of(step, T)

@@ -21,8 +21,7 @@ from ..kinematics.singular.task import generator_of, whole_number
 from ..obstacles.clearance import link_distances
 from ..obstacles.shapes import Obstacle
 from .blends import blended_lines
-from .checks import joint_vectors
-from .limits import ranges_of
+from .limits import joint_vectors, ranges_of
 from .path_limits import PathLimits
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .time_scaling import windows_of

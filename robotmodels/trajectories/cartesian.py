@@ -24,6 +24,7 @@ Seed book section 4.3.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -31,13 +32,12 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_exact, as_number
-from .._choices import chosen
+from .._choices import as_instance, chosen
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
-from .blends import PARABOLA, QUARTIC, full_speed, rates_of, schedule
-from .checks import limits_along, sample_count, slowed
+from .blends import PARABOLA, QUARTIC, full_speed, joined, rates_of, schedule
 from .laws import LineLimits, TimeLaw, law_of_limits
-from .limits import MotionLimits, ranges_of
+from .limits import MotionLimits, limits_along, ranges_of, sample_count, slowed
 from .motions import PiecewisePolynomial
 from .point_to_point import along_line
 from .pose_trajectory import (
@@ -45,7 +45,6 @@ from .pose_trajectory import (
     FixedAxisPath,
     PoseTrajectory,
     arc,
-    axis_and_angle,
     rotation_about,
 )
 from .trajectory import Trajectory
@@ -89,18 +88,13 @@ def cartesian_trajectory(
         raise ShapeError(
             f"The leading (batch) axes do not broadcast: T0 {first.shape}, T1 {last.shape}."
         ) from None
-    first, last = (np.broadcast_to(T, (*batch, 4, 4))[..., None, :, :] for T in (first, last))
     s = along_line(law, 0.0, 1.0, 1.0, None).q(np.linspace(0.0, 1.0, N))  # part of the way
-    R0 = first[..., :3, :3]
-    # the turn seen in the world's axes
-    axis, angle = axis_and_angle(rotation_vectors_of(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
-    T = np.zeros((*batch, N, 4, 4))
-    T[..., :3, :3] = rotation_about(axis, angle * s) @ R0
-    T[..., :3, 3] = first[..., :3, 3] + s[:, None] * (last[..., :3, 3] - first[..., :3, 3])
-    T[..., 3, 3] = 1.0
-    if N:
-        T[..., -1:, :, :] = last
-        T[..., :1, :, :] = first
+    rows = (np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4) for T in (first, last))
+    T = np.empty((*batch, N, 4, 4))
+    for row, ends in zip(
+        T.reshape(math.prod(batch), N, 4, 4), zip(*rows, strict=True), strict=True
+    ):
+        row[:] = arc(*ends).poses(s)
     return T
 
 
@@ -235,9 +229,9 @@ def blended_poses(
         raise InvalidValueError("limits: blends need limits of acceleration.")
     times, tb = schedule(least_T, lambda t: _pose_blends(step, t, bounds, smooth))
     times, tb = slowed(times, tb, duration, True)
-    twists = rates_of(step, times)
-    corners = 0.5 * tb[0] + np.concatenate(((0.0,), np.cumsum(times)))
-    path = BlendedPoses(T, twists, corners, tb, smooth)
+    each = np.eye(len(step))  # a coordinate for each line
+    progress = joined(np.tri(len(T), len(step), -1), each, times, tb, smooth)
+    path = BlendedPoses(T[0], T[-1], step, progress)
     end = path.end
     clock = PiecewisePolynomial(np.array([[0.0, end]]), np.array([[[0.0], [end]]]))
     # the path's parameter is the time itself, and the tool rests outside of it
@@ -291,11 +285,7 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
     """Limits of translation and rotation, the same forth and back."""
     if limits is None:
         return None
-    if not isinstance(limits, MotionLimits):
-        raise InvalidValueError(
-            f"limits: expected MotionLimits, got {type(limits).__name__}; write for instance "
-            "MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])."
-        )
+    as_instance(limits, MotionLimits, "limits")
     if limits.velocity.shape not in ((), (1,), (2,)):
         raise ShapeError(
             "limits: expected limits of two quantities, translation (m) and rotation (rad), or one "

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .checks import counted
 from .motions import Motion
 from .trajectory import Trajectory
 
@@ -61,12 +60,6 @@ class FourierSeries(Motion):
             object.__setattr__(self, name, as_number(getattr(self, name), name, above=0.0))
         for name, value in (("a", a), ("b", b), ("mean", mean)):
             object.__setattr__(self, name, read_only(value))
-
-    def __repr__(self) -> str:
-        return (
-            f"<FourierSeries: {counted(self.n, 'joint')}, {counted(len(self.a), 'harmonic')}, "
-            f"{self.periods:g} x {self.period:.6g} s>"
-        )
 
     @property
     def n(self) -> int:

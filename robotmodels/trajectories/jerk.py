@@ -13,9 +13,15 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .checks import ROUNDING, checked_request, joint_vectors, least_shown, limits_along
 from .laws import TimeLaw
-from .limits import MotionLimits
+from .limits import (
+    ROUNDING,
+    MotionLimits,
+    checked_request,
+    joint_vectors,
+    least_shown,
+    limits_along,
+)
 from .motions import PiecewisePolynomial
 from .point_to_point import Synchronisation, law_motion
 from .trajectory import Trajectory

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .. import se3
 from .._arrays import Array, Value, as_exact, as_number, read_only
 from .._arrays.tasks import Progress
-from .._choices import chosen
+from .._choices import as_instance, chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
@@ -30,8 +30,7 @@ from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, shares, spread
-from .checks import checked_limits, sample_count
-from .limits import MotionLimits
+from .limits import MotionLimits, checked_limits, sample_count
 from .path_limits import PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import TimingResult, Trajectory
@@ -118,17 +117,6 @@ class Plan(TimingResult):
             return np.inf
         return float(np.ptp(self.restarts) / self.restarts.min())
 
-    def __repr__(self) -> str:
-        lines = [f"<Plan: {self.status.name}, {self.duration:.6g} s, cost {self.cost:.6g}"]
-        if self.trajectory is None:
-            lines.append(self.reason())
-        else:
-            use = ", ".join(f"{x:.0%}" for x in self.torque_use)
-            lines.append(f"greatest torques {use} of their limits")
-        spread = f", spread {self.spread:.2%}" if np.isfinite(self.spread) else ""
-        lines.append(f"{self.evaluations} evaluations, {self.restarts.size} restarts{spread}>")
-        return "\n  ".join(lines)
-
 
 def kinodynamic(
     model: RobotModel,
@@ -199,8 +187,7 @@ def kinodynamic(
     """
     check_model(model)
     timing, method = chosen(Timing, timing, "timing"), chosen(PlanMethod, method, "method")
-    if not isinstance(cost, Cost):
-        raise InvalidValueError(f"cost: expected a Cost, got {type(cost).__name__}.")
+    as_instance(cost, Cost, "cost")
     wanted = as_number(clearance, "clearance", least=0.0)
     count, bodies = sample_count(nodes, "nodes", 0, _MOST), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .._arrays import Array, as_reals
+from .._choices import as_instance
 from ..dynamics.inverse import rigid_torques, warn_without_masses
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
-from .checks import checked_limits
 from .joint_path import joint_path
-from .limits import MotionLimits
+from .limits import MotionLimits, checked_limits
 from .motions import FunctionMotion, Motion
 from .point_to_point import linear
 from .pose_trajectory import PoseTrajectory
@@ -299,11 +299,8 @@ def path_of(path: object, model: RobotModel | None, points: int) -> tuple[Motion
         path = _through_poses(path, model, points)
         if isinstance(path, str):
             return path, False
-    if not isinstance(path, Trajectory):
-        raise InvalidValueError(
-            f"path: expected a Trajectory or a PoseTrajectory, got {type(path).__name__}; a path "
-            "through points is cubic_spline(points, times, ends='not_a_knot')."
-        )
+    advice = " (of points: cubic_spline(points, times, ends='not_a_knot'))"
+    path = as_instance(path, Trajectory, "path", advice)
     motion = path.motion
     if not (end := motion.duration) > 0.0:
         raise InvalidValueError("path: it has no length; its ends are the same.")

@@ -41,7 +41,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .checks import (
+from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
+from .limits import (
+    MotionLimits,
     checked_request,
     joint_vectors,
     limits_along,
@@ -49,8 +51,6 @@ from .checks import (
     refuse_short,
     sample_count,
 )
-from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
-from .limits import MotionLimits
 from .motions import PiecewisePolynomial
 from .splines import between_states, motion_between
 from .trajectory import Samples, Trajectory

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_floats
 from ..errors import ShapeError
 from ..se3 import skew
 from ..se3.orientation import rotation_vectors_of
-from .checks import seconds_shown
+from .motions import PiecewisePolynomial
 from .trajectory import Sampled, Trajectory
 
 
@@ -34,9 +34,6 @@ class PoseSamples(Sampled):
     T: Array
     twist: Array
     acceleration: Array
-
-    def __repr__(self) -> str:
-        return f"<PoseSamples: {seconds_shown(self.t)}\n  {_speeds(self.twist)}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,18 +92,7 @@ class PoseTrajectory(Value):
         return self.at(self.law.grid(samples, period))
 
     def __repr__(self) -> str:
-        # a path has no extremes of its own: they are looked for at samples
-        seen = self.at(np.linspace(0.0, self.duration, 501))
-        metres = float(np.linalg.norm(np.diff(seen.T[:, :3, 3], axis=0), axis=-1).sum())
-        return (
-            f"<PoseTrajectory: {self.duration:.6g} s, a way of {metres:.4g} m"
-            f"\n  {_speeds(seen.twist)}>"
-        )
-
-
-def _speeds(twist: Array) -> str:
-    v, w = (np.linalg.norm(part, axis=-1).max(initial=0.0) for part in (twist[:, :3], twist[:, 3:]))
-    return f"greatest speeds {v:.4g} m/s and {w:.4g} rad/s"
+        return f"<PoseTrajectory: {self.duration:.6g} s; {self.resample(501)!r}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,74 +156,44 @@ class FixedAxisPath(Value):
 class BlendedPoses(Value):
     """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
 
-    Shapes: poses_at (m, 4, 4); twists (m - 1, 6); times, blends (m,).
+    ``progress`` has a coordinate for each line, from 0 to 1 over time; neighbours overlap in the
+    blends. Shapes: start, last (4, 4); steps (m - 1, 6), translations and rotation vectors.
     """
 
-    poses_at: Array
-    twists: Array
-    times: Array
-    blends: Array
-    smooth: bool
+    start: Array
+    last: Array
+    steps: Array
+    progress: PiecewisePolynomial
 
     @property
     def end(self) -> float:
         """Seconds from the start of the first blend to the end of the last."""
-        return float(self.times[-1] + 0.5 * self.blends[-1])
+        return self.progress.duration
 
     def poses(self, s: Array) -> Array:
         """World poses. Shapes: s (N,) -> (N, 4, 4)."""
-        corner, before, after, f1, f2 = self._fades(s)
-        w1, a1 = axis_and_angle(before[:, 3:])
-        w2, a2 = axis_and_angle(after[:, 3:])
-        T = np.zeros((s.size, 4, 4))
-        R = rotation_about(w2, a2 * f2[0]) @ rotation_about(w1, a1 * f1[0])
-        T[:, :3, :3] = R @ self.poses_at[corner, :3, :3]
-        T[:, :3, 3] = self.poses_at[corner, :3, 3]
-        T[:, :3, 3] += before[:, :3] * f1[0][:, None] + after[:, :3] * f2[0][:, None]
-        T[:, 3, 3] = 1.0
-        T[s <= 0.0], T[s >= self.end] = self.poses_at[0], self.poses_at[-1]
+        (g,) = self.progress.derivatives(s, (0,))
+        T = np.tile(self.start, (s.size, 1, 1))
+        T[:, :3, 3] += g @ self.steps[:, :3]
+        for along, axis, angle in zip(g.T, *axis_and_angle(self.steps[:, 3:]), strict=True):
+            T[:, :3, :3] = rotation_about(axis, angle * along) @ T[:, :3, :3]
+        T[s <= 0.0], T[s >= self.end] = self.start, self.last
         return T
 
     def rates(self, s: Array) -> tuple[Array, Array]:
         """Twist and its derivative with respect to s. Shapes: s (N,) -> twist, change (N, 6)."""
-        _, before, after, f1, f2 = self._fades(s)
-        w2, a2 = axis_and_angle(after[:, 3:])
-        carried = before.copy()
-        turned = rotation_about(w2, a2 * f2[0]) @ before[:, 3:, None]
-        carried[:, 3:] = turned[..., 0]
-        twist = carried * f1[1][:, None] + after * f2[1][:, None]
-        change = carried * f1[2][:, None] + after * f2[2][:, None]
-        change[:, 3:] += np.cross(after[:, 3:], carried[:, 3:]) * (f1[1] * f2[1])[:, None]
+        g, v, a = self.progress.derivatives(s, (0, 1, 2))
+        twist, change = v @ self.steps, a @ self.steps
+        w, alpha = np.zeros((2, s.size, 3))
+        for k, (axis, angle) in enumerate(zip(*axis_and_angle(self.steps[:, 3:]), strict=True)):
+            # a later line turns what the lines before it do
+            R = rotation_about(axis, angle * g[:, k])
+            w, alpha = (R @ np.stack((w, alpha), axis=-1)).transpose(2, 0, 1)
+            own = angle * axis
+            alpha = alpha + a[:, k, None] * own + np.cross(v[:, k, None] * own, w)
+            w = w + v[:, k, None] * own
+        twist[:, 3:], change[:, 3:] = w, alpha
         return twist, change
-
-    def _fades(self, s: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
-        """Corner of the nearest blend, the twists of its lines, and how far they have gone from it.
-
-        The last two are arrays (3, N): times along the line before and the line after, and their
-        first two derivatives.
-        """
-        # in the middle of what is straight, not of the line: one blend may be much the longer
-        reach = self.times + 0.5 * self.blends, self.times - 0.5 * self.blends
-        corner = np.searchsorted(0.5 * (reach[0][:-1] + reach[1][1:]), s, side="right")
-        none = np.zeros((1, 6))
-        before = np.concatenate((none, self.twists))[corner]
-        after = np.concatenate((self.twists, none))[corner]
-        t, b = s - self.times[corner], self.blends[corner]
-        width = np.where(b > 0.0, b, 1.0)
-        x = np.clip(np.where(b > 0.0, t / width + 0.5, t >= 0.0), 0.0, 1.0)
-        if self.smooth:
-            gone = x**3 * (1.0 - 0.5 * x) * b
-            rate, rise = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / width
-        else:
-            gone, rate, rise = 0.5 * x * x * b, x, 1.0 / width
-        inside = (x > 0.0) & (x < 1.0)
-        rise = np.where(inside, rise, 0.0)
-        # outside the blend one of the two runs at its full rate
-        beyond = np.maximum(t - 0.5 * b, 0.0)
-        f2 = np.stack((gone + beyond, rate, rise))
-        # the two times add up to the time since the corner
-        f1 = np.stack((t - f2[0], 1.0 - rate, -rise))
-        return corner, before, after, f1, f2
 
 
 PosePath = FixedAxisPath | BlendedPoses

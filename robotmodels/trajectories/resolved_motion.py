@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact
+from .._choices import as_instance
 from ..errors import InvalidValueError
 from ..kinematics.inverse.bounds import JointBounds
 from ..kinematics.inverse.ikm import ikm
 from ..kinematics.inverse.methods import InverseMethod
-from ..kinematics.inverse.solution import IKMSolution, IKMStatus
+from ..kinematics.inverse.solution import IKMSolution
 from ..kinematics.inverse.solver import Secondary
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from ..se3.orientation import rotation_vectors_of
-from .checks import ROUNDING, counted, greatest_shown, least_shown, seconds_shown
+from .limits import ROUNDING, least_shown
 from .pose_trajectory import PoseTrajectory
 from .trajectory import Sampled
 
@@ -50,19 +51,6 @@ class ResolvedMotion(Sampled):
     status: NDArray[np.int8]
     position_error: Array
     orientation_error: Array
-
-    def __repr__(self) -> str:
-        unmet = int(np.count_nonzero(self.status != IKMStatus.MET))
-        met = f"{counted(unmet, 'motion')} not met" if unmet else "all met"
-        metres, angle = (
-            self.position_error.max(initial=0.0),
-            self.orientation_error.max(initial=0.0),
-        )
-        return (
-            f"<ResolvedMotion: {seconds_shown(self.t)}, {counted(self.q.shape[-1], 'joint')}, {met}"
-            f"\n  {greatest_shown([('velocity', self.v)])}; behind by at most {metres:.2g} m and "
-            f"{angle:.2g} rad>"
-        )
 
 
 def resolved_motion(
@@ -124,11 +112,7 @@ def resolved_motion(
     True
     """
     check_model(model)
-    if not isinstance(poses, PoseTrajectory):
-        raise InvalidValueError(
-            "poses: expected a PoseTrajectory (straight_line, circle, blended_poses), which knows "
-            f"its velocity, got {type(poses).__name__}; joint_path follows plain arrays of poses."
-        )
+    as_instance(poses, PoseTrajectory, "poses", " (joint_path follows arrays of poses)")
     q = np.array(as_exact(q_start, (model.n,), "q_start"))
     if samples < 2:
         raise InvalidValueError(f"samples: expected at least 2, got {samples}.")
@@ -171,9 +155,7 @@ def _bounds_of_steps(limits: JointBounds | bool | None, step: float) -> JointBou
     """The bounds for joints that keep a velocity for one step of the motion."""
     if limits is None or limits is False:
         return None
-    bounds = JointBounds() if limits is True else limits
-    if not isinstance(bounds, JointBounds):
-        raise InvalidValueError(f"limits: expected JointBounds, True or None, got {limits!r:.80}.")
+    bounds = JointBounds() if limits is True else as_instance(limits, JointBounds, "limits")
     if bounds.step is not None and bounds.step < step * (1.0 - 1e-9):
         raise InvalidValueError(
             f"limits: their step of {bounds.step:.4g} s is shorter than that of the motion, "

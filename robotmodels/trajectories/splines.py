@@ -35,16 +35,17 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from .checks import (
+from .limits import (
     ROUNDING,
+    MotionLimits,
     checked_limits,
     checked_request,
     least_shown,
     limits_along,
+    ranges_of,
     refuse_jointless,
     refuse_short,
 )
-from .limits import MotionLimits, ranges_of
 from .motions import PiecewisePolynomial, ranges_of_pieces
 from .trajectory import Trajectory
 

@@ -12,8 +12,7 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..friction import Friction
 from ..model import RobotModel
-from .checks import checked_limits, sample_count
-from .limits import MotionLimits
+from .limits import MotionLimits, checked_limits, sample_count
 from .motions import Motion, PiecewisePolynomial, TimedMotion
 from .path_limits import Passes, PathLimits, Rows, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
@@ -72,17 +71,6 @@ class TimedPath(TimingResult):
     active: NDArray[np.str_]
     grid_gap: float = np.inf
     explanation: str = field(default="")
-
-    def __repr__(self) -> str:
-        lines = [f"<TimedPath: {self.status.name}"]
-        if self.trajectory is None:
-            return f"{lines[0]}\n  {self.reason()}>"
-        lines[0] += f", {self.duration:.6g} s on {self.rate.size - 1} intervals"
-        lines.append(f"grid gap {self.grid_gap:.2g}")
-        names, counts = np.unique(self.active[:-1], return_counts=True)
-        order = np.argsort(-counts, kind="stable")[:4]
-        shares = [f"{names[k] or 'none'} {counts[k] / counts.sum():.0%}" for k in order]
-        return "\n  ".join([*lines, f"active: {', '.join(shares)}>"])
 
 
 def time_optimal(

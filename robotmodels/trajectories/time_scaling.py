@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
+from .._choices import as_instance
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
-from .checks import checked_limits
-from .limits import MotionLimits
+from .limits import MotionLimits, checked_limits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
 from .path_limits import PathLimits, at_rest
 from .trajectory import TimingResult, Trajectory
@@ -63,13 +63,6 @@ class ScaledTrajectory(TimingResult):
     windows: Array
     explanation: str = ""
 
-    def __repr__(self) -> str:
-        most = self.windows[:, 0].max(initial=0.0)
-        return (
-            f"<ScaledTrajectory: {self.status.name}, {self.duration:.6g} s\n"
-            f"  windows of {len(self.windows)} samples begin at {most:.6g} s at the latest>"
-        )
-
 
 def time_scaled(
     trajectory: Trajectory,
@@ -108,12 +101,9 @@ def time_scaled(
     >>> scaled.duration < 1.0, scaled.windows.shape
     (True, (501, 2))
     """
-    if not isinstance(trajectory, Trajectory):
-        raise InvalidValueError(
-            f"trajectory: expected a Trajectory, got {type(trajectory).__name__}."
-        )
     check_model(model)
-    end, motion = trajectory.duration, trajectory.motion
+    motion = as_instance(trajectory, Trajectory, "trajectory").motion
+    end = trajectory.duration
     if not end > 0.0:
         raise InvalidValueError("trajectory: it has no duration.")
     problem = PathLimits(trajectory.n, model, limits, torque, True, both_ends=True)

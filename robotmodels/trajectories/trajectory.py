@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .checks import checked_limits, counted, greatest_shown, sample_count, seconds_shown
-from .limits import RATES, LimitsReport, MotionLimits
+from .limits import RATES, LimitsReport, MotionLimits, checked_limits, greatest, sample_count
 from .motions import FunctionMotion, Motion
 
 
@@ -27,6 +26,11 @@ class Sampled(Frozen, Value):
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(getattr(self, fields(self)[1].name), dtype=dtype, copy=copy)  # type: ignore[arg-type]
+
+    def __repr__(self) -> str:
+        values = {f.name: getattr(self, f.name) for f in fields(self)[1:]}  # type: ignore[arg-type]
+        ends = " to ".join(f"{end:.4g}" for end in self.t[[0, -1]]) if self.t.size else "none"
+        return f"<{type(self).__name__}: times {ends} s, {len(self)} samples; {greatest(values)}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +57,6 @@ class Samples(Sampled):
             value = getattr(self, field.name)
             if not isinstance(value, np.ndarray) or value.flags.writeable:
                 object.__setattr__(self, field.name, read_only(value))
-
-    def __repr__(self) -> str:
-        n = self.q.shape[-1] if self.q.shape != self.t.shape else 1
-        rows = [x.reshape(-1, n) for x in (self.v, self.a, self.jerk)]
-        return (
-            f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}\n"
-            f"  {greatest_shown(zip(RATES, rows, strict=True))}>"
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -219,10 +215,8 @@ class Trajectory(Value):
 
     def __repr__(self) -> str:
         peaks = [np.stack(self.motion.extremes(order)) for order in (1, 2, 3)]
-        return (
-            f"<Trajectory: {counted(self.n, 'joint')}, {self.duration:.6g} s"
-            f"{', periodic' * self.repeats}\n  {greatest_shown(zip(RATES, peaks, strict=True))}>"
-        )
+        text = greatest(dict(zip(RATES, peaks, strict=True)))
+        return f"<Trajectory: n = {self.n}, {self.duration:.6g} s; {text}>"
 
 
 class TimingResult(Frozen, Value):
@@ -242,3 +236,9 @@ class TimingResult(Frozen, Value):
     def reason(self) -> str:
         """The status as a sentence, with the place and the joint."""
         return self.explanation or self.status.sentence
+
+    def __repr__(self) -> str:
+        values = ((f.name, getattr(self, f.name)) for f in fields(self))  # type: ignore[arg-type]
+        more = [f", {name} {x:.4g}" for name, x in values if isinstance(x, float)]
+        text = f"{self.duration:.6g} s{''.join(more)}" if self.trajectory else self.reason()
+        return f"<{type(self).__name__}: {self.status.name}, {text}>"

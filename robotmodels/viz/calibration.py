@@ -9,10 +9,9 @@ view, **look
 level : float
     Probability of the intervals.
 truth : array_like, shape (P,), or mapping of str to float, optional
-    Known corrections, such as those of a simulation: drawn as crosses. Of the P parameters of
-    the result in their order, NaN where unknown; or by names of candidates (m, rad, ...). Of
-    these the regrouped ones are added to the parameters that stand for them, to first order,
-    and those that are not named count as zero. They count from the robot as it was given.
+    Known corrections, drawn as crosses: of the P parameters of the result, NaN where unknown; or
+    by names of candidates (m, rad, ...), of which the regrouped ones are added to the parameters
+    that stand for them, to first order. They count from the robot as it was given.
 magnification : float, optional
     Of the arrows in all panels; default for each panel so that they can be seen.
 gain : float
@@ -40,12 +39,13 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number, as_reals
+from .._choices import as_instance
 from ..calibration.extended_table import extend_table
 from ..calibration.parameters import GeometricParameters
 from ..calibration.report import MeasuredResiduals, measured_residuals
@@ -57,10 +57,7 @@ from . import style
 from .over_time import Unit
 from .shapes import rounded_down
 from .space import across, fill_cells, space
-from .style import ALERT, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import ALERT, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Figure, Look
 
 _SIDES = (
     ("before", PALETTE[1], "D", "before: base and tool fitted"),
@@ -83,7 +80,7 @@ _LONGEST = 0.22  # longest arrow beside the longest edge of the box
 
 def as_result(result: Any) -> CalibrationResult:
     """The result, checked."""
-    return style.as_instance(result, CalibrationResult, "result", "calibration.fit")
+    return as_instance(result, CalibrationResult, "result", " of calibration.fit")
 
 
 def _parts(result: Any) -> list[MeasuredResiduals]:
@@ -351,8 +348,7 @@ def plot_selection(
     expected standard errors, the largest of them, and a thin line for each one. A dashed line
     marks the number from which on further configurations bring little.
     """
-    source = "calibration.select_configurations"
-    style.as_instance(selected, SelectedConfigurations, "selected", source)
+    as_instance(selected, SelectedConfigurations, "selected", " of select_configurations")
     counts = selected.counts
     if not len(counts):
         raise InvalidValueError(

@@ -39,12 +39,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from .. import se3
 from .._arrays import Array, as_number
+from .._choices import as_instance
 from ..control import ControlledMotion, SpringWall
 from ..errors import InvalidValueError
 from ..kinematics import dgm
@@ -55,10 +56,7 @@ from .motion import Track, keyframes
 from .scene import Scene
 from .shapes import Node, Triangles, along_bars, moving_chain
 from .show import animate
-from .style import Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import Figure, Look
 
 _COMPONENTS = np.array(["x", "y", "z", "rx", "ry", "rz"])
 _FORCES = np.array(["fx", "fy", "fz", "mx", "my", "mz"])
@@ -70,7 +68,7 @@ _WALL = (0.45, 0.55, 0.7, 0.45)
 
 def _as_run(run: Any) -> ControlledMotion:
     """The run, checked."""
-    return style.as_instance(run, ControlledMotion, "run", "control.run")
+    return as_instance(run, ControlledMotion, "run", " of control.run")
 
 
 @style.plot
@@ -123,7 +121,7 @@ def animate_control(
     size = size if length is None else as_number(length, "length", above=0.0)
     nodes, tracks = _arrow(run.t - run.t[0], tips, run.wrench[:, :3], size)
     given = tuple(walls) if isinstance(walls, (list, tuple)) else (walls,)
-    given = [style.as_instance(wall, SpringWall, "walls", "control") for wall in given]
+    given = [as_instance(wall, SpringWall, "walls", " of control") for wall in given]
     nodes += [_wall(wall, tips, size, f"walls/{k}") for k, wall in enumerate(given, 1)]
     motion = replace(moving.motion, tracks=(*moving.motion.tracks, *tracks))
     return replace(moving, nodes=(*moving.nodes, *nodes), motion=motion)

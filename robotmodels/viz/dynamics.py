@@ -6,18 +6,13 @@ model, degrees, columns, **look
     See `robotmodels.viz`; the model of a simulation is its own.
 motion : Trajectory, Samples or Simulation
     One motion of n joints. A simulation brings its own friction, wrench and drives.
-wrench : array_like, shape (6,), optional
-    Constant wrench that the tool exerts on the environment, see `idm`.
-drive : bool
-    Whether rotor inertia, friction and offsets of the model's drives are included.
-friction : Friction, optional
-    A friction model that acts besides them.
+wrench, drive, friction
+    Constant wrench that the tool exerts (6,), whether the model's drives count, and a friction
+    model besides them, as of `idm`.
 joints : sequence of int, optional
     Which joints, columns of q from 0; default all.
-simulation : Simulation
-    As `simulate` gives it. Many samples make smooth lines: give it times.
-events : bool
-    Whether thin lines mark where joints stick and break away.
+simulation, events : Simulation, and bool
+    As `simulate` gives it; whether thin lines mark where joints stick and break away.
 grid : DynamicsMap
     As `dynamics_map` gives it.
 of, pair : int and array_like of int, shape (2,), optional
@@ -46,11 +41,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction
 from ..model import RobotModel, check_model
@@ -60,10 +56,7 @@ from ..simulation.torque_parts import simulated_torque_parts, torque_parts
 from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Unit
-from .style import COLUMN, DASHED, INK, PAGE, PALE, ZERO, Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import COLUMN, DASHED, INK, PAGE, PALE, ZERO, Figure, Look
 
 _PARTS = (
     ("inertia", "inertia"),
@@ -97,26 +90,18 @@ def plot_torque_parts(
     """
     check_model(model)
     if isinstance(motion, Simulation):
-        if motion.model != model:
+        if motion.model != model or wrench is not None or friction is not None or not drive:
             raise InvalidValueError(
-                f"model: the simulation is one of {motion.model.name!r} with its parameters, not "
-                f"of this {model.name!r}; pass simulation.model."
-            )
-        if wrench is not None or friction is not None or not drive:
-            raise InvalidValueError(
-                "motion: a simulation has its own wrench, drives and friction; leave them out."
+                "motion: a simulation has its own model, wrench, drives and friction; pass "
+                "simulation.model and leave the others out."
             )
         times, parts = motion.t, simulated_torque_parts(motion)
     else:
         samples = over_time.sampled(motion, "motion")
         if samples.n != model.n:
-            raise ShapeError(
-                f"motion: expected one of the {model.n} joints of {model.name!r}, got {samples.n}."
-            )
+            raise ShapeError(f"motion: expected one of {model.n} joints, got {samples.n}.")
         times, (q, v, a) = samples.t, samples.values[:3]
         parts = torque_parts(model, q, v, a, wrench, drive, friction)
-    if not model.n:
-        raise InvalidValueError("model: there are no joints to draw.")
     every = range(model.n) if joints is None else joints
     shown = style.as_choice(every, model.n, "joints", "joints")
     names, efforts = over_time.joint_names(None, model.n, model), over_time.effort_units(model)
@@ -149,7 +134,7 @@ def plot_energy(
     the environment, less the work of the control, is constant; the lower panel has its drift, which
     is the error of the integration. Terms that are zero all the time have no line.
     """
-    sim = style.as_instance(simulation, Simulation, "simulation", "simulate")
+    sim = as_instance(simulation, Simulation, "simulation", " of simulate")
     figure, grid = style.panels(COLUMN, 3.4, look, 2, sharex=True, height_ratios=[2.6, 1.0])
     upper, lower = grid[:, 0]
     unit, factor = _unit(sim.energy_turnover)
@@ -201,7 +186,7 @@ def plot_inertia_map(
     joints: three maps, of one joint and one pair. Coupling is ``M_ij / sqrt(M_ii M_jj)``, without
     unit: 0 where neither joint feels the other's acceleration, 1 where they move one body.
     """
-    style.as_instance(grid, DynamicsMap, "grid", "dynamics_map")
+    as_instance(grid, DynamicsMap, "grid", " of dynamics_map")
     n, joints = grid.model.n, grid.joints
     every = over_time.joint_units(None, n, grid.model, degrees)
     names = [over_time.joint_names(None, n, grid.model)[j] for j in joints]
@@ -214,10 +199,7 @@ def plot_inertia_map(
             raise InvalidValueError(f"pair: expected two different joints, got {pair!r:.60}.")
         return _maps(grid, names, kinds, joint, two, look)
     if of is not None or pair is not None:
-        raise InvalidValueError(
-            "of, pair: these choose what is on a map over two joints; over one joint all lines are "
-            "drawn."
-        )
+        raise InvalidValueError("of, pair: of one joint all lines are drawn; leave them out.")
     return _lines(grid, f"{names[0]} ({kinds[0].value})", kinds[0].factor, look)
 
 

@@ -2,24 +2,18 @@
 
 Parameters
 ----------
-arm : FlexibleRobot
-    The robot, n joints and m elastic coordinates.
-link : FlexibleLink
-    A link, m modes.
+arm, link : FlexibleRobot and FlexibleLink
+    The robot, n joints and m elastic coordinates; or a link, m modes.
 q, e : array_like, shape (..., n) and (..., m), optional
     Configurations, drawn over each other; default zero. Of `plot_frequencies` the other joints.
 scale : float
     Factor by which deflections are exaggerated.
-grid, height : bool and int
-    Whether the floor and the axes of the world are drawn; pixels in a notebook.
-joint : int
-    Which joint moves, from 0.
-span : array_like, shape (2,)
-    Its range, rad or m.
+grid, height, **look
+    Whether the floor and the axes of the world are drawn; see `robotmodels.viz`.
+joint, span : int and array_like, shape (2,)
+    Which joint moves, from 0, and its range, rad or m.
 joints : str
     ``"locked"`` or ``"free"``, see `robotmodels.flexible.natural_frequencies`.
-**look
-    ``title`` and ``size``, see `robotmodels.viz`.
 
 Returns
 -------
@@ -35,12 +29,13 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number, as_vector
+from .._choices import as_instance
 from ..errors import InvalidValueError
 from ..flexible import FlexibleLink, FlexibleRobot, dgm, link_poses, natural_frequencies
 from ..visual import Color, characteristic_length
@@ -48,10 +43,7 @@ from . import over_time, style
 from .camera import framed
 from .scene import Scene
 from .shapes import Node, apply, floor_grid, path_tube
-from .style import COLUMN, PALETTE, ZERO, Look, as_instance
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import COLUMN, PALETTE, ZERO, Figure, Look
 
 _RIGID: Color = (0.45, 0.47, 0.50, 1.0)
 _THICK = 0.018  # radius of links, relative to the size of the robot
@@ -67,7 +59,7 @@ def show_flexible(
     height: int = 480,
 ) -> Scene:
     """Draw a flexible robot: bent links as swept tubes in colour, rigid ones grey."""
-    as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
+    as_instance(arm, FlexibleRobot, "arm", " of robotmodels.flexible")
     q = as_vector(np.zeros(arm.n) if q is None else q, arm.n, "q")
     e = as_vector(np.zeros(arm.m) if e is None else e, arm.m, "e")
     e = as_number(scale, "scale", above=0.0) * e
@@ -102,7 +94,7 @@ def show_flexible(
 @style.plot
 def plot_modes(link: FlexibleLink, **look: Unpack[Look]) -> Figure:
     """Mode shapes of a link: displacements along its axis, with their frequencies."""
-    as_instance(link, FlexibleLink, "link", "robotmodels.flexible")
+    as_instance(link, FlexibleLink, "link", " of robotmodels.flexible")
     along = np.linalg.norm(link.nodes - link.nodes[0], axis=1)
     moved = [c for c in range(link.m) if np.abs(link.shapes[..., c]).max() > 0.0]
     if not moved:
@@ -128,7 +120,7 @@ def plot_frequencies(
     **look: Unpack[Look],
 ) -> Figure:
     """Natural frequencies of an arm over the range of a joint."""
-    as_instance(arm, FlexibleRobot, "arm", "robotmodels.flexible")
+    as_instance(arm, FlexibleRobot, "arm", " of robotmodels.flexible")
     (column,) = style.as_choice([joint], arm.n, "joint", "a number")
     low, high = as_exact(span, (2,), "span")
     places = np.linspace(low, high, 61)

@@ -29,11 +29,12 @@ Examples
 from __future__ import annotations
 
 from math import ceil
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from .._arrays import Array
+from .._choices import as_instance
 from ..dynamics import idm
 from ..errors import ShapeError
 from ..identification.excitation import ExcitingTrajectory
@@ -44,11 +45,7 @@ from ..identification.result import IdentificationResult, check_result, predicte
 from ..identification.signals import piece_signals, pieces
 from ..logs import Log
 from . import over_time, style
-from .style import BAND, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import BAND, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Axes, Figure, Look
 
 _WORDS = ("measured", "predicted", "measured less predicted")
 _BAND: dict[str, Any] = {"color": BAND, "linewidth": 0.0, "zorder": 0.5}
@@ -63,7 +60,7 @@ _MOST = 14.0  # logarithm of the largest condition number that is drawn
 def as_result(result: Any, test: Any = None) -> IdentificationResult:
     """The result, and whether the test is a log of the robot, checked."""
     check_result(result)
-    if test is not None and style.as_instance(test, Log, "test", "").n != result.model.n:
+    if test is not None and as_instance(test, Log, "test").n != result.model.n:
         raise ShapeError(f"test: expected a log of {result.model.n} joints, got {test.n}.")
     return result
 
@@ -281,7 +278,7 @@ def plot_excitation(found: ExcitingTrajectory, **look: Unpack[Look]) -> Figure:
     units in columns of their own, limits dashed; below them the criterion over the iterations of
     every start, and that of random motions beside those of the starts, before and after.
     """
-    style.as_instance(found, ExcitingTrajectory, "found", "exciting_trajectory")
+    as_instance(found, ExcitingTrajectory, "found", " of exciting_trajectory")
     model, limits = found.model, found.limits.motion.limits
     motion = over_time.sampled(found.trajectory)
     drive, n = model.drive, model.n

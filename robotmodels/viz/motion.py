@@ -70,14 +70,10 @@ def keyframes(times: Array, q: Array) -> tuple[Array, Array]:
 def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
     """Times of the samples of a motion. Shapes: -> (count,)."""
     if dt is not None and fps is not None:
-        raise InvalidValueError(
-            f"dt, fps: both give the time between samples: give one of them, got {dt} and {fps}."
-        )
+        raise InvalidValueError("dt, fps: give one of them.")
     if dt is None:
-        step = 1.0 / as_number(_FPS if fps is None else fps, "fps", above=0.0)
-    else:
-        step = as_number(dt, "dt", above=0.0)
-    return step * np.arange(count, dtype=np.float64)
+        dt = 1.0 / as_number(_FPS if fps is None else fps, "fps", above=0.0)
+    return as_number(dt, "dt", above=0.0) * np.arange(count, dtype=np.float64)
 
 
 def timed_samples(
@@ -86,22 +82,17 @@ def timed_samples(
     """The configurations of an animation and their times. Shapes: -> times (N,), q (N, n)."""
     if isinstance(value, Trajectory):
         return _sampled(value, n, float(sample_times(2, dt, fps)[1]), name)
-    if isinstance(value, (PoseTrajectory, PoseSamples)):
+    timed = isinstance(value, (Samples, JointPath, ResolvedMotion))
+    array = isinstance(value, Sequence) or hasattr(value, "__array__")
+    if isinstance(value, (PoseTrajectory, PoseSamples)) or not (timed or array):
         raise InvalidValueError(
             f"{name}: expected a motion of joints, got {type(value).__name__}; joint_path and "
             "resolved_motion find the joints that follow poses."
         )
-    timed = isinstance(value, (Samples, JointPath, ResolvedMotion))
-    if not (timed or isinstance(value, Sequence) or hasattr(value, "__array__")):
-        raise InvalidValueError(
-            f"{name}: expected a Trajectory, Samples, JointPath, ResolvedMotion or an array of "
-            f"shape (N, {n}), got {type(value).__name__}."
-        )
     if isinstance(value, JointPath) and (missing := np.isnan(value.q).any(axis=-1)).any():
-        first, count = int(missing.argmax()), int(missing.sum())
         raise InvalidValueError(
-            f"{name}: {count} of the {missing.size} poses of the path have no posture, the first "
-            f"is pose {first}; animate a part that is reached, such as path.q[:{first}]."
+            f"{name}: poses of the path have no posture, the first is pose {missing.argmax()}; "
+            f"animate a part that is reached, such as path.q[:{missing.argmax()}]."
         )
     given: Any = value.q if timed else value
     q = as_vector(given[:, None] if timed and given.ndim == 1 == n else given, n, name)

@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .._arrays import Array
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel
-from ..trajectories.limits import MotionLimits
+from ..trajectories.limits import MotionLimits, ranges_of
 from ..trajectories.motions import PiecewisePolynomial
-from ..trajectories.pose_trajectory import PoseTrajectory
 from ..trajectories.trajectory import Samples, Trajectory
 from . import style
-from .style import ALERT, BEYOND, DASHED, INK, LIMIT, PALE, ZERO
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from .style import ALERT, BEYOND, DASHED, INK, LIMIT, PALE, ZERO, Axes
 
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 _SAMPLES = 601
@@ -86,13 +83,7 @@ def joint_units(
     given = [units] * n if isinstance(units, (Unit, str)) else list(units)
     if len(given) != n:
         raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
-    kinds = [as_unit(unit) for unit in given]
-    wrong = {True: (Unit.RADIAN, Unit.DEGREE), False: (Unit.METRE, Unit.MILLIMETRE), None: ()}
-    for j, (unit, long) in enumerate(zip(kinds, lengths, strict=True)):
-        if unit in wrong[long]:
-            kind = "prismatic" if long else "revolute"
-            raise InvalidValueError(f"units: joint {j + 1} is {kind}, got {unit.value!r}.")
-    return kinds
+    return [as_unit(unit) for unit in given]
 
 
 def joints_of(
@@ -123,7 +114,7 @@ def as_limits(limits: MotionLimits | None, n: int) -> MotionLimits | None:
     """Limits of n joints, checked."""
     if limits is None:
         return None
-    return style.as_instance(limits, MotionLimits, "limits", "").for_joints(n)
+    return as_instance(limits, MotionLimits, "limits").for_joints(n)
 
 
 def as_orders(orders: Sequence[int]) -> list[int]:
@@ -133,7 +124,7 @@ def as_orders(orders: Sequence[int]) -> list[int]:
 
 
 def _check_model(model: Any, n: int) -> None:
-    if model is not None and style.as_instance(model, RobotModel, "model", "").n != n:
+    if model is not None and as_instance(model, RobotModel, "model").n != n:
         raise ShapeError(f"model: expected a robot of {n} joints, got {model.name!r} of {model.n}.")
 
 
@@ -158,33 +149,25 @@ class Sampled:
 def sampled(trajectory: Any, name: str = "trajectory") -> Sampled:
     """Dense samples of a trajectory, with both sides of every jump."""
     breaks: tuple[Array, ...] = ()
-    if isinstance(trajectory, PoseTrajectory):
-        raise InvalidValueError(
-            f"{name}: this is a motion of the tool. Draw its law of time with `.law`, its path "
-            "with plot_pose_path, or the joints that joint_path finds."
-        )
     if isinstance(trajectory, Samples):
         samples, T = trajectory, float(np.ptp(trajectory.t)) if trajectory.t.size else 0.0
     else:
-        motion = style.as_instance(trajectory, Trajectory, name, "joints").motion
+        advice = " of joints (of a PoseTrajectory its .law, or plot_pose_path)"
+        motion = as_instance(trajectory, Trajectory, name, advice).motion
         T = float(motion.duration)
         if isinstance(motion, PiecewisePolynomial):
             breaks = tuple(np.unique(row) for row in motion.breaks)
         both = [np.append(row, row - _BEFORE * T) for row in breaks]
         times = np.unique(np.concatenate((np.linspace(0.0, T, _SAMPLES), *both)))
         samples = trajectory.at(times[(times >= 0.0) & (times <= T)])
-    t = samples.t.reshape(-1)
-    if not t.size:
-        raise InvalidValueError(f"{name}: there are no samples to draw.")
-    rows = [samples.q, samples.v, samples.a, samples.jerk]
+    t, rows = samples.t.reshape(-1), np.stack((samples.q, samples.v, samples.a, samples.jerk))
     if samples.q.shape == samples.t.shape:  # a scalar trajectory
-        rows = [row[..., None] for row in rows]
-    if any(row.ndim != 2 or len(row) != t.size for row in rows):
+        rows = rows[..., None]
+    if not t.size or rows.shape[1:-1] != t.shape:
         raise ShapeError(
-            f"{name}: expected samples of one motion, q of shape ({t.size}, n), got "
-            f"{samples.q.shape}."
+            f"{name}: expected samples of one motion, at least one, got {samples.q.shape}."
         )
-    return Sampled(t, np.stack(rows), breaks, T)
+    return Sampled(t, rows, breaks, T)
 
 
 def lines_over_time(
@@ -244,13 +227,7 @@ def quantity_over_time(
     """Position, velocity, acceleration or jerk of some joints, with their limits."""
     lower = upper = None
     if limits is not None:
-        lower, upper = (
-            (limits.lower, limits.upper),
-            (limits.velocity_lower, limits.velocity),
-            (limits.acceleration_lower, limits.acceleration),
-            (limits.jerk_lower, limits.jerk),
-        )[order]
-        lower, upper = unit.factor * lower[joints], unit.factor * upper[joints]
+        lower, upper = (unit.factor * x[joints] for x in ranges_of(limits)[order][1:])
     values = unit.factor * motion.values[order][:, joints]
     some = [names[j] for j in joints]
     lines_over_time(axes, motion.t, values, some, numbers or joints, lower, upper)

@@ -36,7 +36,7 @@ Examples
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,10 +54,7 @@ from .motion import Motion, Track
 from .scene import Scene
 from .shapes import Node, Triangles, along_bars, chain, floor_grid, moving_chain
 from .sliders import SliderPanel
-from .style import INK, PAGE, PALETTE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import INK, PAGE, PALETTE, Figure, Look
 
 _BASE: Color = (0.45, 0.48, 0.52, 1.0)
 _GHOST: Color = (0.5, 0.6, 0.7, 0.22)

@@ -7,12 +7,9 @@ w : Workspace
 curves : bool
     Whether singular curves and cusps are drawn, where they are defined.
 a : Aspects
-    From `aspects` or `free_components`; of three and more joints that share a factor the first
-    two are drawn, the others in the middle of their ranges.
-path : FeasiblePath
-    From `feasible_path`.
-joint : int, optional
-    Column of q; default the one whose postures differ most.
+    From `aspects` or `free_components`; of more than two joints that share a factor the first two.
+path, joint : FeasiblePath, and int, optional
+    From `feasible_path`; column of q, default the one whose postures differ most.
 q : array_like, shape (n,), optional
     Configuration of the robot, default zero.
 **look, **options
@@ -24,23 +21,21 @@ matplotlib.figure.Figure or Scene
 
 Examples
 --------
->>> from robotmodels.performance import aspects, workspace
+>>> from robotmodels.performance import workspace
 >>> from robotmodels.robots import load
->>> w = workspace(load("planar_2r"), limits=False, resolution=20)
->>> plot_workspace(w).axes[0].get_xlabel()
+>>> plot_workspace(workspace(load("planar_2r"), limits=False, resolution=20)).axes[0].get_xlabel()
 'x (m)'
->>> show_workspace(w, [0.3, 0.8]).paths[-1]
-'workspace/2'
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._choices import as_instance
 from ..errors import InvalidValueError
 from ..performance import Aspects, FeasiblePath, Workspace, cusps, singular_curves
 from ..performance.arms import section_arm
@@ -49,10 +44,7 @@ from .camera import framed
 from .scene import Scene
 from .shapes import Node, Triangles
 from .show import show
-from .style import ALERT, COLUMN, INK, PAGE, PALE, PALETTE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import ALERT, COLUMN, INK, PAGE, PALE, PALETTE, Figure, Look
 
 _LINES = {"boundary": (INK, 1.1), "internal": (ALERT, 0.9), "limit": (PALE, 0.9)}
 _TINTS = ("#f4f4f4", "#cfe3f5", "#9cc4e6", "#6aa2d3", "#3f7fbb", "#235c99")
@@ -69,7 +61,7 @@ def plot_workspace(w: Workspace, *, curves: bool = True, **look: Unpack[Look]) -
 
     Of a workspace in space the greatest numbers seen along two axes of the world.
     """
-    style.as_instance(w, Workspace, "w", "workspace")
+    as_instance(w, Workspace, "w", " of workspace")
     if not len(w.points):
         raise InvalidValueError(f"w: there are no cells to draw. {w.reason()}")
     from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -107,7 +99,7 @@ def plot_workspace(w: Workspace, *, curves: bool = True, **look: Unpack[Look]) -
 @style.plot
 def plot_aspects(a: Aspects, **look: Unpack[Look]) -> Figure:
     """Aspects in the joints that share a factor, and beside it where the tool is in each."""
-    style.as_instance(a, Aspects, "a", "aspects")
+    as_instance(a, Aspects, "a", " of aspects")
     if not a.count:
         raise InvalidValueError(f"a: there are no aspects to draw. {a.reason()}")
     from matplotlib.colors import ListedColormap
@@ -153,7 +145,7 @@ def plot_feasible_path(
     """All postures along a path as a graph over one joint: which go on, and where they break."""
     from matplotlib.collections import LineCollection
 
-    style.as_instance(path, FeasiblePath, "path", "feasible_path")
+    as_instance(path, FeasiblePath, "path", " of feasible_path")
     q = path.postures
     if not q.size or np.isnan(q).all():
         raise InvalidValueError(f"path: there are no postures to draw. {path.reason()}")
@@ -184,7 +176,7 @@ def plot_feasible_path(
 
 def show_workspace(w: Workspace, q: ArrayLike | None = None, **options: Any) -> Scene:
     """Scene of a robot and its workspace: cells as blocks, a colour for each number of postures."""
-    style.as_instance(w, Workspace, "w", "workspace")
+    as_instance(w, Workspace, "w", " of workspace")
     flags = (w.count > 0).reshape(w.shape)
     if w.coordinates == "space" and flags.size:
         inner = np.pad(flags, 1)

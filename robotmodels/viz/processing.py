@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from .._arrays import Array
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..identification.equations import Equations
 from ..identification.position_noise import predicted_bias
@@ -22,11 +23,7 @@ from ..logs import Log
 from ..model import RobotModel
 from . import style
 from .over_time import joint_names, joint_units
-from .style import ALERT, BAND, DASHED, INK, PAGE, PALETTE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import ALERT, BAND, DASHED, INK, PAGE, PALETTE, Axes, Figure, Look
 
 _KEPT = (0, (5.0, 1.0))
 _POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
@@ -50,30 +47,24 @@ def plot_processing(
 ) -> Figure:
     """Spectra of positions and torques before and after processing, and the criteria of its choice.
 
+    A row for each joint has densities of position and torque, with the frequency of the motion, the
+    cutoffs of the positions (their filter) and of regressor and torques (the decimation), and the
+    noise of the positions. The grey part is removed; the title gives its root mean square. For a
+    result a last row has the criteria: the largest bias of a parameter that noise of the positions
+    is predicted to cause, and the equations for each parameter. Dots mark the choice.
+
     Parameters
     ----------
     log : Log or IdentificationResult
         The log; or a result of `identification.fit`, which contains its log, processing and robot.
     processing : Processing, optional
         The choices for a log, of `identification.choose_processing`.
-    model : RobotModel, optional
-        The robot of a log, for units and names of its joints.
-    **look
-        ``title`` and ``size``, see `robotmodels.viz`.
+    model, **look
+        The robot of a log, for units and names of its joints; see `robotmodels.viz`.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A row for each joint: densities of position and torque, with the frequency of the motion,
-        the cutoff of the positions (of their filter), that of regressor and torques (of the
-        decimation) and the noise of the positions. The grey part above the cutoff is removed; the
-        title gives its root mean square, for torques also relative.
-
-        For a result, a last row shows the criteria: the largest bias of a parameter that noise of
-        the positions is predicted to cause, in standard errors of the parameter, against the lower
-        of both cutoffs; and the equations for each parameter (edges and dead bands not subtracted)
-        against that of regressor and torques. Dots mark the choice, dashed lines its bounds. A bias
-        below 1e-6 is drawn at the lower edge.
 
     References
     ----------
@@ -96,11 +87,8 @@ def plot_processing(
             )
         system, model = log.equations, log.model
         log, processing = system.log, system.processing
-    if not isinstance(log, Log):
-        raise InvalidValueError(
-            f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
-        )
-    chosen = style.as_instance(processing, Processing, "processing", "choose_processing")
+    as_instance(log, Log, "log", " or an IdentificationResult")
+    chosen = as_instance(processing, Processing, "processing", " of choose_processing")
     if len(chosen.dead_band) != log.n:
         raise ShapeError(
             f"processing: expected one of {log.n} joints, got {len(chosen.dead_band)}."
@@ -124,14 +112,7 @@ def plot_processing(
     decimated = _decimated(tau, chosen.decimation)
     for column, what, whole, kept, cutoff, of in (
         (grid[:, 0], "position", q, filtered, chosen.cutoff, kinds),
-        (
-            grid[:, 1],
-            "torque",
-            tau,
-            decimated,
-            chosen.torque_cutoff,
-            efforts,
-        ),
+        (grid[:, 1], "torque", tau, decimated, chosen.torque_cutoff, efforts),
     ):
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)

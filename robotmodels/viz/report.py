@@ -14,19 +14,6 @@ robot : StandardParameters, optional
 References
 ----------
 Seed book sections 1.4 and 1.6.5.
-
-Examples
---------
->>> from tempfile import TemporaryDirectory
->>> import numpy as np
->>> import robotmodels as rm
->>> from robotmodels.calibration import Pose, fit
->>> arm, q = rm.load("rx90"), np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
->>> result = fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
->>> with TemporaryDirectory() as folder:
-...     html_report(result, Path(folder) / "report.html")
-...     (Path(folder) / "report.html").read_text(encoding="utf-8").count("<img ")
-5
 """
 
 from __future__ import annotations
@@ -39,7 +26,6 @@ from inspect import cleandoc
 from io import BytesIO
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING
 
 from ..calibration.report import report_sections as calibration_sections
 from ..calibration.result import CalibrationResult
@@ -51,9 +37,7 @@ from ..minimal_parameters import StandardParameters
 from ..table_text import ReportSection, ReportTable
 from . import calibration, identification
 from .processing import plot_processing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import Figure
 
 Drawing = Callable[..., "Figure"]
 """A function that draws a figure of a result; its summary is the caption."""

@@ -6,36 +6,28 @@ model : RobotModel, LoopedRobot or sequence of these
     The robot, or R robots that stand where their bases are; `jog` takes one RobotModel.
 q : array_like or str
     Joint variables in radians or metres, default zero. `show`: (n,) or (N, n) or the name of one of
-    ``model.configurations``; with N > 1 the postures are drawn together, each in a colour of its
-    own. `animate`: (N, n) or (N, 1, n), N >= 2, or a Trajectory (sampled at the frame rate),
-    Samples, JointPath or ResolvedMotion with its own times. For several robots a list with an entry
-    for each. `jog`: the first posture, and that of Reset.
+    ``model.configurations``; N > 1 postures are drawn together, each in a colour of its own.
+    `animate`: (N, n) or (N, 1, n), N >= 2, or a Trajectory, Samples, JointPath or ResolvedMotion
+    with its own times. For several robots a list with an entry for each. `jog`: the first posture.
 columns : int, optional
-    Postures of one robot beside each other, so many in a row, numbered from 1; without it they
-    stand over each other, where those that differ only by the turn of a link hide one another.
+    Postures of one robot beside each other, so many in a row, numbered from 1.
 legend : sequence of str, optional
-    A text for each posture drawn (those of the first robot first), listed in a corner of the
-    picture with its colour.
+    A text for each posture drawn, listed in a corner of the picture with its colour.
 ellipsoids : Ellipsoid or sequence of Ellipsoid, optional
-    Of velocities or forces, drawn at the tools they belong to; a batch gives one for each posture.
-    Flat ones are discs or bars; unbounded ones are cut, their axes go on beyond.
+    Of velocities or forces, drawn at the tools they belong to; flat ones are discs or bars,
+    unbounded ones are cut, their axes go on beyond.
 ellipsoid_scale : float, optional
-    Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m. By default a round number for each quantity that
-    fits the robot. The legend gives it.
-dt : float, optional
-    Seconds from one sample to the next; they replace the times of samples that have some.
-fps : float, optional
-    Samples a second, instead of ``dt``; default 30. Motions with more are resampled at 30.
-path : bool
-    Whether the path of the tool is drawn.
-loop : bool
-    Whether the motion starts again at its end.
+    Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m; default a round number, given in the legend.
+dt, fps : float, optional
+    Seconds from one sample to the next, or samples a second (default 30), in place of the times of
+    samples that have some. Motions with more than 30 a second are resampled.
+path, loop : bool
+    Whether the path of the tool is drawn, and whether the motion starts again at its end.
 **options
     Of every scene: frames, names, tool (bool): whether the axes of all frames, their names, the
     axes of the tool are drawn (x red, y green, z blue); meshes (bool): whether the shapes of the
-    source URDF are used, with a skeleton and a warning for mesh files that are missing, otherwise
-    a skeleton sized from the table, as for robots without shapes; color (array_like, shape (3,) or
-    (4,)): of the links, red, green, blue and opacity in [0, 1], in `show` also one for each
+    source URDF are used, otherwise a skeleton sized from the table; color (array_like, shape (3,)
+    or (4,)): of the links, red, green, blue and opacity in [0, 1], in `show` also one for each
     posture or robot; opacity (float): of the links, in [0, 1]; box (array_like, shape (6,)):
     workspace to draw, ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, m; grid (bool): whether
     the floor z = 0 and the axes of the world are drawn; view; height (int); dark (bool).
@@ -66,6 +58,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_exact, as_floats, as_vector
+from .._choices import as_instance, one_of
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import link_poses
 from ..kinematics.ellipsoid import Ellipsoid
@@ -125,11 +118,7 @@ def show(
     drawn, extra = list(models), list[Node]()
     if columns is not None:
         if len(drawn) > 1 or ellipsoids is not None:
-            raise InvalidValueError(
-                "columns: the postures of one robot stand beside each other; several robots stand "
-                "where their bases are (see RobotModel.with_base), and ellipsoids where the robot "
-                "is."
-            )
+            raise InvalidValueError("columns: expected one robot, without ellipsoids.")
         drawn, extra = _side_by_side(drawn[0], postures[0], as_whole(columns, "columns"))
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
@@ -187,9 +176,6 @@ def jog(model: RobotModel, q: ArrayLike | str | None = None, **options: Any) -> 
     another frame. A joint without limits has a slider from -180 to 180 degrees or -1 to 1 m, and
     the panel says so. Numbers outside the limits may be typed; they are marked. Joints that a
     transmission couples (mimic joints) have no slider and follow the others.
-
-    The address of the page may hold a posture, ``arm.html#q=10,-20,0.3``, in the order and the
-    units of the sliders; the page keeps it there, so that a link shows a posture.
     """
     check_model(model)
     options.setdefault("height", 640)
@@ -260,14 +246,8 @@ def _neighbourhood(model: RobotModel, start: Array) -> Array:
 
 def _as_models(model: Any) -> tuple[RobotModel, ...]:
     """One model or several, as a tuple."""
-    is_list = isinstance(model, (tuple, list)) and len(model) > 0
-    models: tuple[Any, ...] = tuple(model) if is_list else (model,)
-    for item in models:
-        if not isinstance(item, RobotModel):
-            raise InvalidValueError(
-                f"model: expected a RobotModel or a list of them, got {type(item).__name__}."
-            )
-    return models
+    models = model if isinstance(model, (tuple, list)) and model else (model,)
+    return tuple(as_instance(item, RobotModel, "model", " or a list of them") for item in models)
 
 
 def _as_many(value: Any, model: object, count: int) -> tuple[Any, ...]:
@@ -285,13 +265,8 @@ def _named(q: ArrayLike | str | None, model: RobotModel) -> ArrayLike | None:
     """The configuration of this name; anything but a text as it is."""
     if not isinstance(q, str):
         return q
-    if q not in model.configurations:
-        names = ", ".join(map(repr, model.configurations))
-        raise InvalidValueError(
-            f"q: expected joint variables or the name of a configuration of {model.name} "
-            f"({names}), got {q!r:.80}."
-        )
-    return model.configurations[q]
+    name = one_of(q, tuple(model.configurations), "q")
+    return model.configurations[name]
 
 
 def _as_postures(value: ArrayLike | str | None, model: RobotModel) -> Array:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .._arrays import Array
 from .over_time import Unit
-from .style import PALE
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import PALE, Figure
 
 _ELEVATION, _OBLIQUE = np.radians((24.0, 60.0))
 _OFF_AXIS = np.radians((22.0, 68.0))
@@ -57,7 +54,7 @@ def space(
     return axes
 
 
-def fill_cells(figure: Figure, cells: list[tuple[Any, tuple[float, ...], str]]) -> None:
+def fill_cells(figure: Figure, cells: list[tuple[Any, tuple[float, ...], str]]) -> Figure:
     """Zoom and shift axes in space until each fills its cell, below its heading.
 
     Cells are (axes, (left, bottom, width, height) in parts of the figure, heading).
@@ -85,6 +82,7 @@ def fill_cells(figure: Figure, cells: list[tuple[Any, tuple[float, ...], str]]) 
         figure.text(*at, heading, size=8.5, ha="center", va="top")
         for artist in axes.get_children():
             artist.set_clip_on(False)  # the box may stand a little outside of its rectangle
+    return figure
 
 
 def _taken(axes: Any) -> Array:

@@ -20,6 +20,8 @@ from ..visual import Color
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # Matplotlib is imported when the first figure is drawn
+    Axes = Figure = Any
 
 COLUMN, PAGE = 3.5, 7.1
 """Widths of one column and of two in print, inches; texts of 8 to 9.5 points suit them."""
@@ -318,12 +320,3 @@ def as_choice(values: Any, count: int, name: str, what: str) -> list[int]:
             f"{name}: expected {what} from 0 to {count - 1}, each once, got {values!r:.60}."
         )
     return chosen
-
-
-def as_instance(value: Any, kind: type[R], name: str, source: str) -> R:
-    """The value if it is of the expected type."""
-    if not isinstance(value, kind):
-        wanted = f"{kind.__name__}{source and f' of {source}'}"
-        article = "an" if wanted[0] in "AEIOU" else "a"
-        raise InvalidValueError(f"{name}: expected {article} {wanted}, got {type(value).__name__}.")
-    return value

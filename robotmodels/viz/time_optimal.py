@@ -2,19 +2,14 @@
 
 Parameters
 ----------
-timed : TimedPath
-    From `robotmodels.trajectories.time_optimal`, with a motion.
-plan : Plan
-    From `robotmodels.trajectories.kinodynamic`, with a motion.
+timed, plan : TimedPath and Plan
+    From `robotmodels.trajectories.time_optimal` and `kinodynamic`, with a motion.
 model, degrees, columns, **look
     See `robotmodels.viz`; of a plan the torques of its model are drawn.
 torque : array_like, shape () or (n,), optional
-    Limits of torque, N m or N: torques are drawn as shares of them, but for joints without a
-    limit; default those of the model's table.
-t : array_like, shape (N,)
-    Times, s.
-q : array_like, shape (N, n), or mapping of str to such arrays
-    Positions, rad or m; several motions by their names, at the same times. NaN leaves a gap.
+    Limits of torque, N m or N: torques are drawn as shares of them; default those of the table.
+t, q : array_like, shape (N,) and (N, n), or q a mapping of str to such arrays
+    Times, s, and positions, rad or m; several motions by their names. NaN leaves a gap.
 
 Returns
 -------
@@ -31,23 +26,34 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import as_floats, as_reals
+from .._choices import as_instance
 from ..dynamics import idm
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.kinodynamic import Plan
+from ..trajectories.path_limits import checked_torque
 from ..trajectories.time_optimal import TimedPath
 from . import over_time, style
-from .style import ALERT, BEYOND, COLUMN, DASHED, INK, LIMIT, PAGE, PALE, PALETTE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import (
+    ALERT,
+    BEYOND,
+    COLUMN,
+    DASHED,
+    INK,
+    LIMIT,
+    PAGE,
+    PALE,
+    PALETTE,
+    Axes,
+    Figure,
+    Look,
+)
 
 _HIGHEST = 2.5  # of the greatest rate: the maximum velocity curve is drawn below this
 _SAMPLES = 501
@@ -55,15 +61,12 @@ _MARGIN = 0.12  # of the range of a joint, shown beyond either limit
 
 
 @style.plot
-def plot_phase_plane(
-    timed: TimedPath,
-    **look: Unpack[Look],
-) -> Figure:
+def plot_phase_plane(timed: TimedPath, **look: Unpack[Look]) -> Figure:
     """Rate over the path parameter, below the maximum velocity curve, and the limit that binds.
 
     The ribbon below has the colour of the limit that binds at each point; white where none does.
     """
-    style.as_instance(timed, TimedPath, "timed", "time_optimal")
+    as_instance(timed, TimedPath, "timed", " of time_optimal")
     if timed.trajectory is None:
         raise InvalidValueError(f"timed: it has no motion to draw. {timed.reason()}")
     s, rate, most = timed.parameter, timed.rate, timed.maximum_rate
@@ -98,7 +101,7 @@ def plot_plan(
     **look: Unpack[Look],
 ) -> Figure:
     """Joints of a planned motion over time, its torques, and the costs of the search."""
-    style.as_instance(plan, Plan, "plan", "kinodynamic")
+    as_instance(plan, Plan, "plan", " of kinodynamic")
     if plan.trajectory is None:
         raise InvalidValueError(f"plan: it has no motion to draw. {plan.reason()}")
     t = np.linspace(0.0, plan.duration, _SAMPLES)
@@ -113,16 +116,10 @@ def plot_plan(
         left[0].plot([time] * n, q, "o", color=INK, markersize=3.0, label="via point")
     left[0].set_ylabel(f"position ({' or '.join(kind.value for kind in kinds)})")
     if model is not None:
-        bound = model.table.effort if torque is None else as_reals(torque, "torque")
-        if bound.shape not in ((), (n,)):
-            raise ShapeError(f"torque: expected shape () or ({n},), got {bound.shape}.")
-        if not (bound > 0.0).all() or np.isinf(bound).all():
-            raise InvalidValueError(
-                f"torque: expected positive limits, some of them finite, got {bound}; give torque= "
-                "where the model has none."
-            )
-        bound = np.broadcast_to(bound, (n,))
-        some = np.flatnonzero(np.isfinite(bound)).tolist()
+        bound = checked_torque(torque, model, n)
+        some = np.flatnonzero(np.isfinite(bound) & (bound > 0.0)).tolist()
+        if not some:
+            raise InvalidValueError("torque: the model has no positive limits; give some.")
         share = idm(model, seen.q, seen.v, seen.a)[:, some] / bound[some]
         over_time.lines_over_time(left[1], t, share, [names[j] for j in some], some)
         for side in (-1.0, 1.0):
@@ -159,20 +156,16 @@ def plot_joint_motion(
     margin of all joints: 100 % where all of them are in the middle of their ranges, 0 where one is
     at a limit.
     """
-    names = over_time.joint_names(None, style.as_instance(model, RobotModel, "model", "").n, model)
+    names = over_time.joint_names(None, as_instance(model, RobotModel, "model").n, model)
     times = as_floats(t, "t")
     if times.ndim != 1 or not times.size:
         raise ShapeError(f"t: expected shape (N,) with N at least 1, got {times.shape}.")
-    motions, shape = {}, (times.size, model.n)
     given = style.as_named(q if isinstance(q, Mapping) else [q], None, "q", "motion")
-    for name, values in given.items():
-        where = f"q of {name!r}" if isinstance(q, Mapping) else "q"
-        motions[name] = as_reals(values, where)
-        if motions[name].shape != shape or np.isinf(motions[name]).any():
-            raise ShapeError(
-                f"{where}: expected positions of shape {shape}, finite or NaN for a gap, got "
-                f"shape {motions[name].shape}."
-            )
+    motions = {name: as_reals(values, f"q of {name!r}") for name, values in given.items()}
+    for name, values in motions.items():
+        if values.shape != (times.size, model.n):
+            shape = f"({times.size}, {model.n})"
+            raise ShapeError(f"q of {name!r}: expected shape {shape}, got {values.shape}.")
     labels = list(motions) if len(motions) > 1 else ["_motion"]
     units = over_time.joint_units(None, model.n, model, degrees)
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)

@@ -5,28 +5,25 @@ Parameters
 model, names, units, limits, view, **look
     See `robotmodels.viz`. Names of `plot_profiles` are those of a sequence of motions; the limits
     of `plot_joint_path` are by default those of its model.
-trajectory : Trajectory or Samples
-    One motion of n joints; rad or m, and per s.
+trajectory, profiles : Trajectory or Samples, and mapping of str to these, or sequence
+    One motion of n joints, rad or m, and per s; several of them by their names.
 orders : sequence of int
     Which panels: 0 position, 1 velocity, 2 acceleration, 3 jerk.
 breakpoints : bool
     Whether the times at which pieces meet are marked: by thin lines where all joints change
     pieces together, else by dots on the lines of the joints.
-profiles : mapping of str to Trajectory, or sequence of Trajectory
-    Motions by their names; `Samples` may stand for a trajectory. The legend gives the durations.
 joint, unit : int, and Unit or str
     Which joint, from 0, and its unit; of `plot_pose_path` ``m`` or ``mm``.
 side_by_side : bool
-    Whether each motion stands in a column of its own, with common scales, instead of all
-    motions over each other.
+    Whether each motion stands in a column of its own, with common scales.
 path : JointPath
     From `joint_path`, drawn over time, or over the number of the pose if it has no times; of
     `plot_pose_path` optional, for its events.
 poses : PoseTrajectory, PoseSamples or array_like, shape (N, 4, 4)
     World poses of the tool, m.
 frames, frame_size : int and float, optional
-    At how many poses, evenly spaced in time, the axes of the tool are drawn, both ends included,
-    and their length, m; default a tenth of the extent of the path.
+    At how many poses the axes of the tool are drawn, and their length, m; default a tenth of the
+    extent of the path.
 
 Returns
 -------
@@ -34,9 +31,8 @@ matplotlib.figure.Figure
 
 Examples
 --------
->>> from robotmodels.trajectories import MotionLimits, trapezoidal
->>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
->>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], limits=limits), limits, units="rad")
+>>> from robotmodels.trajectories import trapezoidal
+>>> figure = plot_trajectory(trapezoidal([0, 0], [1, 2], 2.0), units="rad")
 >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes[:2]]
 ['position (rad)', 'velocity (rad/s)']
 """
@@ -44,13 +40,14 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_exact, as_number
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
@@ -61,11 +58,7 @@ from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Sampled, Unit
 from .space import across, fill_cells, space
-from .style import COLUMN, INK, PAGE, PALETTE, Look, as_whole
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import COLUMN, INK, PAGE, PALETTE, Axes, Figure, Look, as_whole
 
 _EVENTS: dict[PathEventKind, tuple[str, Any, str]] = {
     PathEventKind.OUT_OF_REACH: ("out of reach", PALETTE[4], "o"),
@@ -166,7 +159,7 @@ def plot_joint_path(
     are shaded where the path leaves the reach or stays singular, and have a thin line where it is
     singular at one pose, where the posture changes and where it jumps.
     """
-    if not len(style.as_instance(path, JointPath, "path", "joint_path").q):
+    if not len(as_instance(path, JointPath, "path", " of joint_path").q):
         raise InvalidValueError("path: there are no poses to draw.")
     n = path.q.shape[1]
     labels, columns = over_time.joints_of(n, model, names, units)
@@ -235,7 +228,7 @@ def plot_pose_path(
 ) -> Figure:
     """Path of the tool in space, with its frame at some poses, equal scales and events."""
     if path is not None:
-        style.as_instance(path, JointPath, "path", "joint_path")
+        as_instance(path, JointPath, "path", " of joint_path")
     T = _poses(poses, path)
     length = over_time.as_unit(unit)
     if length not in (Unit.METRE, Unit.MILLIMETRE):
@@ -269,9 +262,8 @@ def plot_pose_path(
         axes.plot(*run[[0, -1]].T, marker, color=color, markersize=4.5, label=text)
     style.finished(figure, look)
     figure.draw_without_rendering()
-    tops = [legend.get_window_extent().y0 for legend in figure.legends]
-    fill_cells(figure, [(axes, (0.0, 0.0, 1.0, min(tops) / figure.bbox.height), "")])
-    return figure
+    top = min(legend.get_window_extent().y0 for legend in figure.legends)
+    return fill_cells(figure, [(axes, (0.0, 0.0, 1.0, top / figure.bbox.height), "")])
 
 
 def _poses(poses: Any, path: JointPath | None) -> Array:

@@ -8,24 +8,20 @@ solutions : mapping of str to IKMSolution, or sequence
     Result of each method at these distances, by its name: an `IKMSolution` of N rows, or a pair of
     arrays, the joint velocities (N, n) and the error of the twist (N, 6) or None, linear then
     angular. NaN rows leave a gap.
-names : sequence of str, optional
-    Of the methods of a sequence; default ``method 1`` and so on.
-model, units, limits, degrees, columns, **look
-    See `robotmodels.viz`. Of the limits the velocities are drawn, the greater of both directions;
-    in maps, areas outside the joint limits of the model are hatched.
+names, model, units, limits, degrees, columns, **look
+    See `robotmodels.viz`; names of the methods of a sequence. Of the limits the velocities are
+    drawn, the greater of both directions; in maps, areas outside the joint limits are hatched.
 each_joint : bool
     Whether each method has a column with the speeds of all joints, instead of lines for the
     greatest speed of each method.
 distance_unit, distance_name : Unit or str, and str
-    ``deg``, ``rad``, ``m`` or ``mm``, and the name of the axis.
+    Of the axis: ``deg``, ``rad``, ``m`` or ``mm``, and its name.
 logarithmic : bool, optional
-    Whether the distance is on a scale of powers, linear around zero where it has a sign;
-    default where most of the samples are near zero.
+    Whether the distance is on a scale of powers; default where most samples are near zero.
 ellipsoids : Ellipsoid or sequence of Ellipsoid
     One, several, or batches, which are taken apart.
 labels : sequence of str, optional
-    Texts of the legend: the first is for the first ellipsoid of every quantity, and so on.
-    Default numbers, if a quantity has several.
+    Texts of the legend for the ellipsoids of every quantity, in their order; default numbers.
 maps : SingularityMap or sequence of them
     From `singularity_map`; several stand beside each other.
 q : array_like, shape (n,) or (N, n), optional
@@ -43,21 +39,21 @@ Examples
 --------
 >>> d = np.linspace(-0.1, 0.1, 11)
 >>> bounded = d[:, None] / (d[:, None] ** 2 + 1e-3)
->>> missing = np.c_[np.zeros((11, 5)), 1e-3 / (d**2 + 1e-3)]
->>> figure = plot_inverse_velocities(d, {"damped": (bounded, missing)}, units="rad")
->>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes][::2]
-['greatest joint speed (rad/s)', 'missing angular velocity (rad/s)']
+>>> figure = plot_inverse_velocities(d, {"damped": (bounded, None)}, units="rad")
+>>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
+['greatest joint speed (rad/s)']
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, as_reals
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
 from ..kinematics.inverse.solution import IKMSolution
@@ -67,11 +63,7 @@ from ..trajectories.limits import MotionLimits
 from . import over_time, style
 from .over_time import Unit
 from .shapes import as_ellipsoids
-from .style import COLUMN, DASHED, INK, LIMIT, PAGE, PALE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import COLUMN, DASHED, INK, LIMIT, PAGE, PALE, Axes, Figure, Look
 
 _DECADES = 30.0  # ratio from which on a scale of powers shows more
 _LEAST = 1e-6  # beside the greatest: smaller values are drawn as zero
@@ -162,18 +154,12 @@ def _method(solution: Any, name: str, N: int) -> tuple[Array, Any, Any, Any]:
     elif isinstance(solution, tuple) and len(solution) == 2:
         v, error = solution
     else:
-        raise InvalidValueError(
-            f"{name!r}: expected an IKMSolution or a pair (velocities, error), got "
-            f"{type(solution).__name__}."
-        )
-    v = as_reals(v, f"velocities of {name!r}")
-    if v.ndim != 2 or len(v) != N or not v.shape[1]:
-        raise ShapeError(f"{name!r}: expected velocities of shape ({N}, n), got {v.shape}.")
+        raise InvalidValueError(f"{name!r}: expected an IKMSolution or a pair of arrays.")
+    v, error = as_reals(v, name), None if error is None else as_reals(error, name)
+    if v.ndim != 2 or len(v) != N or (error is not None and error.shape != (N, 6)):
+        raise ShapeError(f"{name!r}: expected shapes ({N}, n) and ({N}, 6), got {v.shape}.")
     if error is None:
         return v, None, None, least
-    error = as_reals(error, f"error of {name!r}")
-    if error.shape != (N, 6):
-        raise ShapeError(f"{name!r}: expected errors of shape ({N}, 6), got {error.shape}.")
     linear, angular = (
         np.linalg.norm(error[:, rows], axis=1) if mask[rows].any() else None
         for rows in (slice(0, 3), slice(3, 6))
@@ -277,30 +263,17 @@ def plot_singularities(
     and where they are zero on the grid itself (dots). A zero between grid points at which the sign
     does not change is not found.
     """
-    given = [maps] if isinstance(maps, SingularityMap) else maps
-    kinds = isinstance(given, Sequence) and all(isinstance(m, SingularityMap) for m in given)
-    if not kinds or not given:
-        raise InvalidValueError(
-            f"maps: expected one or several SingularityMap of singularity_map, got {maps!r:.60}."
-        )
+    given = [maps] if isinstance(maps, SingularityMap) else list(maps)
+    if not given:
+        raise InvalidValueError("maps: expected at least one SingularityMap, got none.")
     postures = None if q is None else np.atleast_2d(as_floats(q, "q"))
     for grid in given:
-        shape, least = (grid.first.size, grid.second.size), 1 + int(grid.joints.max())
-        if grid.values.shape != shape or min(shape) < 2 or not np.isfinite(grid.values).any():
-            raise ShapeError(
-                f"maps: {grid.label!r} needs at least two values of each joint and a value for "
-                f"each pair, some finite, got {shape} and {grid.values.shape}."
-            )
-        if model is not None and model.n < least:
-            raise ShapeError(
-                f"model: {grid.label!r} is a map over joints {grid.joints.tolist()} (from 0), "
-                f"which {model.name!r} with its {model.n} joints does not have."
-            )
-        if postures is not None and (postures.ndim > 2 or postures.shape[-1] < least):
-            raise ShapeError(
-                f"q: expected one posture (n,) or several (N, n), n at least {least}, got "
-                f"{postures.shape}."
-            )
+        least = 1 + int(as_instance(grid, SingularityMap, "maps").joints.max())
+        counts = {"model": None if model is None else model.n}
+        counts["q"] = None if postures is None else postures.shape[-1]
+        for name, n in counts.items():
+            if n is not None and n < least:
+                raise ShapeError(f"{name}: {grid.label!r} needs {least} joints, got {n}.")
     wide = style.as_columns(columns, len(given), 2)
     rows = -(-len(given) // wide)
     width = COLUMN if wide == 1 else PAGE

@@ -26,12 +26,13 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from .. import se3
 from .._arrays import Array
+from .._choices import as_instance
 from ..kinematics import link_poses
 from ..model import RobotModel
 from ..visual import Box, Color
@@ -45,10 +46,7 @@ from .robot import Options, draw_robot
 from .scene import Scene
 from .shapes import Node, Segments, apply, floor_grid, path_node
 from .space import across, fill_cells, space
-from .style import INK, PAGE, PALE, PALETTE, Look
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import INK, PAGE, PALE, PALETTE, Figure, Look
 
 _DARK: Color = (0.10, 0.10, 0.10, 1.0)
 _LAST: Color = (0.80, 0.10, 0.45, 1.0)
@@ -64,7 +62,7 @@ def plot_servo(run: ServoMotion, **look: Unpack[Look]) -> Figure:
     Circles are the start, crosses the goal. Pixels with the camera of the run, otherwise
     normalised coordinates; features without points show their centre.
     """
-    style.as_instance(run, ServoMotion, "run", "servo")
+    as_instance(run, ServoMotion, "run", " of servo")
     figure, ((image, errors), (speeds, free)) = style.panels(PAGE, 5.4, look, 2, 2)
     free.remove()
     paths, goal = image_paths(run)
@@ -96,15 +94,14 @@ def plot_servo(run: ServoMotion, **look: Unpack[Look]) -> Figure:
             axes.plot(*edge.T, color=PALETTE[0], linewidth=0.8)
     style.finished(figure, look)
     figure.draw_without_rendering()  # places the other panels
-    fill_cells(figure, [(axes, (0.5, 0.0, 0.5, 0.46), "")])
-    return figure
+    return fill_cells(figure, [(axes, (0.5, 0.0, 0.5, 0.46), "")])
 
 
 def show_servo(
     run: ServoMotion, model: RobotModel | None = None, *, height: int = 480, dark: bool = False
 ) -> Scene:
     """Scene with the object, the camera's view and path, the robot, and the image beside."""
-    style.as_instance(run, ServoMotion, "run", "servo")
+    as_instance(run, ServoMotion, "run", " of servo")
     places, track = apply(run.cameras[0] @ run.T[0], _corners(run)), run.cameras[:, :3, 3]
     points = np.concatenate((places, track))
     nodes, motion, path, first = list[Node](), None, "camera", run.cameras[0]
