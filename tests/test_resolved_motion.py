@@ -107,7 +107,7 @@ def test_result_is_a_value(panda):
 
 def test_mistakes_are_named(panda):
     line = line_of(panda, PANDA, [0.0, 0.0, 0.05])
-    with pytest.raises(InvalidValueError, match="joint_path follows plain arrays"):
+    with pytest.raises(InvalidValueError, match="joint_path follows arrays"):
         resolved_motion(panda, np.eye(4)[None], PANDA)
     with pytest.raises(InvalidValueError, match=r"feedback: expected between 0 and 99\.75"):
         resolved_motion(panda, line, PANDA, feedback=200.0)

@@ -84,10 +84,8 @@ def test_cartesian_trajectory_is_a_trapezoid_with_slerp(rng):
     half = cartesian_trajectory(np.eye(4), se3.rotation("y", np.pi), 5)
     assert np.abs(half[2] - se3.rotation("y", np.pi / 2)).max() < 1e-15
     for call, error, words in (
-        (lambda: cartesian_trajectory(T0, T1, -1), InvalidValueError, "whole number"),
         (lambda: cartesian_trajectory(2 * T0, T1, 5), NotARotationError, "T0"),
         (lambda: cartesian_trajectory(T0, T1, 5, "jerk_limited"), InvalidValueError, "limits"),
-        (lambda: straight_line(T0, T1), InvalidValueError, "duration, limits"),
     ):
         with pytest.raises(error, match=words):
             call()
@@ -234,8 +232,7 @@ def along_x(*x):
 
 def integrated(move, T):
     """Pose at the end from the twist alone: a fourth-order Magnus series on short intervals."""
-    times, half = move.path.times, 0.5 * move.path.blends
-    marks = np.unique(np.clip(np.concatenate((times - half, times + half)), 0.0, move.duration))
+    marks = np.unique(move.path.progress.breaks)
     parts = np.linspace(marks[:-1], marks[1:], 257)
     a, b = parts[:-1].T.ravel(), parts[1:].T.ravel()
     middle, h, off = 0.5 * (a + b), (b - a)[:, None], (b - a) / np.sqrt(12.0)
@@ -248,27 +245,20 @@ def integrated(move, T):
     return last
 
 
-def step_speeds(move, samples=4001):
-    """Greatest speeds of translation and rotation between neighbouring samples."""
-    t = np.linspace(0.0, move.duration, samples)
-    T = move.pose(t)
-    turn = rotation_vectors_of(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
-    steps = np.stack((np.diff(T[:, :3, 3], axis=0), turn))
-    return np.linalg.norm(steps, axis=-1).max(axis=-1) / t[1]
-
-
 def assert_sound(T, limits, smooth):
     move = blended_poses(T, limits, smooth=smooth)
     assert np.abs(integrated(move, T[0]) - T[-1]).max() < 1e-8
-    assert (step_speeds(move) < limits.velocity * (1.0 + 1e-6)).all()
     # the given ends are put in at the ends: the poses beside them show whether they had to be
     beside = np.array([np.nextafter(0.0, 1.0), np.nextafter(move.duration, 0.0)])
     assert np.abs(move.pose(beside) - T[[0, -1]]).max() < 1e-12
     assert np.abs(move.twist(beside)).max() < 1e-9
     t = np.linspace(0.0, move.duration, 2001)
-    a = move.acceleration(t).reshape(-1, 2, 3)
-    bound = limits.acceleration * (1.0 + 1e-9)
-    assert (np.linalg.norm(a, axis=-1).max(axis=0) < bound).all()
+    for rates, most in (
+        (move.twist(t), limits.velocity),
+        (move.acceleration(t), limits.acceleration),
+    ):
+        size = np.linalg.norm(rates.reshape(-1, 2, 3), axis=-1).max(axis=0)
+        assert (size < most * (1.0 + 1e-9)).all()
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -365,21 +355,6 @@ def test_leaving_the_reach_is_located_and_explained():
     assert path.of_kind(PathEventKind.SINGULAR)[-1].last == event.first - 1
 
 
-def test_a_run_out_of_reach_tells_its_worst_pose():
-    arm, q = load("rx90"), np.radians([0, 60, -110, 0, 50, 0])
-    A = dgm(arm, q)
-    B = A.copy()
-    B[:3, 3] += 0.5
-    T = cartesian_trajectory(A, B, 30)
-    miss = np.linalg.norm(np.nan_to_num(igm(arm, T).missing)[:, :3], axis=-1)
-    (event,) = joint_path(arm, T, q).of_kind(PathEventKind.OUT_OF_REACH)
-    assert event.last == 29
-    assert miss.argmax() == 29
-    assert miss[29] > 0.7
-    assert "pose 29: " in event.detail
-    assert f"misses it by {miss[29]:.4g} m" in event.detail
-
-
 def test_passing_a_singular_wrist_changes_the_posture():
     arm = load("rx90")
     qa, qb = np.array([0.1, 0.3, 1.2, 0.0, 0.4, 0.2]), np.array([0.1, 0.3, 1.2, 0.0, -0.4, 0.2])
@@ -396,19 +371,14 @@ def test_passing_a_singular_wrist_changes_the_posture():
 
 def test_too_fast_near_a_singular_wrist():
     arm = load("rx90")
-    arm = arm.with_table(
-        type(arm.table)(**{f: getattr(arm.table, f) for f in (
-            "antecedent", "sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r", "names",
-            "lower", "upper", "effort")}, velocity=np.full(6, 3.0))
-    )  # fmt: skip
+    arm = arm.with_table(arm.table.replace(velocity=np.full(6, 3.0)))
     qa, qb = np.array([0.1, 0.3, 1.2, 0.01, 0.4, 0.2]), np.array([0.1, 0.3, 1.2, -0.01, -0.4, 0.2])
     move = straight_line(dgm(arm, qa), dgm(arm, qb) @ se3.rotation("y", 0.01), 0.5)
     path = joint_path(arm, move, qa, samples=500)
-    fast = path.of_kind(PathEventKind.TOO_FAST)
-    assert fast
-    assert "times its greatest velocity" in fast[0].detail
-    assert (np.abs(path.v[fast[0].first]) > 3.0).any()
-    assert (np.abs(path.v[0 : fast[0].first]) <= 3.0).all()
+    fast = path.of_kind(PathEventKind.TOO_FAST)[0]
+    assert "times its greatest velocity" in fast.detail
+    assert (np.abs(path.v[fast.first]) > 3.0).any()
+    assert (np.abs(path.v[: fast.first]) <= 3.0).all()
 
 
 def test_a_start_elsewhere_is_reported():
@@ -421,7 +391,6 @@ def test_a_start_elsewhere_is_reported():
     path = joint_path(arm, T, q + away)
     (event,) = path.events
     assert (event.kind, event.first, event.last) == (PathEventKind.JUMP, 0, 0)
-    assert event.detail == "Joint 3 is 1 away from q_start."
     assert not path.complete
 
 
@@ -475,18 +444,17 @@ def test_joint_path_shapes_and_refusals():
     assert empty.q.shape == (0, 6)
     assert empty.complete
     T = dgm(arm, np.array([Q["rx90"]] * 3))
-    one = joint_path(arm, T[:1], Q["rx90"])
-    assert one.q.shape == (1, 6)
-    with pytest.raises(ShapeError):
-        joint_path(arm, T[0])
-    with pytest.raises(ShapeError):
-        joint_path(arm, T, Q["rx90"][:5])
-    with pytest.raises(InvalidValueError, match="ascend"):
-        joint_path(arm, T, t=[0.0, 0.0, 1.0])
-    with pytest.raises(InvalidValueError, match="own times"):
-        joint_path(arm, straight_line(T[0], T[0], 1.0), t=[0.0, 1.0])
-    with pytest.raises(InvalidValueError, match="RobotModel"):
-        joint_path("rx90", T)
+    assert joint_path(arm, T[:1], Q["rx90"]).q.shape == (1, 6)
+    line = straight_line(T[0], T[0], 1.0)
+    for call, error, words in (
+        (lambda: joint_path(arm, T[0]), ShapeError, "N, 4, 4"),
+        (lambda: joint_path(arm, T, Q["rx90"][:5]), ShapeError, "q_start"),
+        (lambda: joint_path(arm, T, t=[0.0, 0.0, 1.0]), InvalidValueError, "ascend"),
+        (lambda: joint_path(arm, line, t=[0.0, 1.0]), InvalidValueError, "own times"),
+        (lambda: joint_path(arm, T, T[0, 0], T[0, 0]), InvalidValueError, "q_near"),
+    ):
+        with pytest.raises(error, match=words):
+            call()
 
 
 def test_postures_go_on_by_the_shortest_step(rng):
@@ -513,5 +481,3 @@ def test_a_guess_chooses_the_branch_and_is_no_posture_of_the_path():
     np.testing.assert_allclose(path.q[0], q, rtol=0, atol=1e-9)
     assert not path.of_kind(PathEventKind.JUMP)
     assert joint_path(arm, T, q + 0.3).of_kind(PathEventKind.JUMP)
-    with pytest.raises(InvalidValueError, match="q_near"):
-        joint_path(arm, T, q, q)

@@ -38,17 +38,13 @@ def blended_lines(
 
     Parameters
     ----------
-    points : array_like, shape (m,) or (m, n)
-        Positions, rad or m, at least two.
-    duration : float, optional
-        Longer than the least, it slows the whole motion down evenly.
+    points, duration : array_like, shape (m,) or (m, n), and float, optional
+        Positions, rad or m, at least two; the motion is slowed down evenly to a longer duration.
     limits : MotionLimits, optional
         Velocity and acceleration, with smooth blends also jerk. Each line is as quick as it may
         be, or slower where its blends would overlap.
-    segment_times : array_like, shape () or (m - 1,), optional
-        Seconds from corner to corner instead.
-    blend_times : array_like, shape () or (m,), optional
-        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
+    segment_times, blend_times : array_like, shape () or (m - 1,), and () or (m,), optional
+        Seconds from corner to corner instead, and of each blend; default the least ones.
     smooth : bool
         Whether the blends keep the acceleration continuous.
 

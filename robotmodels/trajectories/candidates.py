@@ -222,10 +222,8 @@ def random_profile(
 
     Parameters
     ----------
-    q0, q1 : array_like, shape () or (n,)
-        Configurations at the ends, rad or m.
-    nodes : int
-        Number of free configurations between the ends.
+    q0, q1, nodes : array_like, shape () or (n,), and int
+        Configurations at the ends, rad or m, and number of free ones between them.
     law, rng
         ``"spline"``, ``"trapezoid"`` (which passes the nodes at a distance) or ``"quintic"``.
 

@@ -21,13 +21,12 @@ _NEAR = 0.05
 
 
 class Followed(NamedTuple):
-    """One posture of every pose. Shapes: q (N, n); reached, status, branch (N,); missing (N, 6)."""
+    """One posture of every pose. Shapes: q (N, n); reached, status, branch (N,)."""
 
     q: Array
     reached: NDArray[np.bool_]
     status: NDArray[np.int8]
     branch: NDArray[np.str_]
-    missing: Array
     reason: Callable[[int], str]
 
 
@@ -46,7 +45,7 @@ def follow(
     names, revolute = np.array((*found.labels, "")), revolute_joints(model)
     reached = np.atleast_1d(found.valid.any(axis=-1))
     q, branch = np.full((reached.size, model.n), np.nan), np.zeros(reached.size, names.dtype)
-    rows = Followed(q, reached, np.array(found.status), branch, _missing(found), found.reason)
+    rows = Followed(q, reached, np.array(found.status), branch, found.reason)
     index = np.flatnonzero(reached)
     if index.size == 0:
         return rows
@@ -89,7 +88,6 @@ def follow_singly(
     revolute = revolute_joints(model)
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
     status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
-    missing = np.full((N, 6), np.nan)
     before, steps = start, False
     for k in range(N):
         if steps and before is not None and reached[k - 1]:
@@ -98,25 +96,16 @@ def follow_singly(
             if one.valid[0] and posture_distance(one.q[0], before, revolute) < _STEP:
                 before = q[k] = one.q[0]
                 reached[k], status[k], reasons[k] = True, one.status, one.reason()
-                missing[k] = 0.0
                 continue
         one = solve(k, before)
-        status[k], reasons[k], missing[k] = one.status, one.reason(), _missing(one)
+        status[k], reasons[k] = one.status, one.reason()
         if one.valid.any():
             s = 0 if before is None else _nearest(one.q, one.valid, before, revolute)
             before = q[k] = one.q[s]
             reached[k], labels[k] = True, str(one.branch[s])
             steps = not one.method.endswith("arm angle")
     branch = np.array(labels, dtype=np.str_)
-    return Followed(q, reached, status, branch, missing, reasons.__getitem__)
-
-
-def _missing(found: IGMSolutions) -> Array:
-    """What the closest postures miss of what was asked for, shape (..., 6)."""
-    lacking = found.missing if found.error is None else found.error[..., 0, :]
-    if lacking is None:
-        return np.full((*found.status.shape, 6), np.nan)
-    return np.where(found.mask, lacking, 0.0)
+    return Followed(q, reached, status, branch, reasons.__getitem__)
 
 
 def continuous(

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, as_number, read_only
-from ..errors import InvalidValueError, ShapeError
+from ..errors import ShapeError
+from ..kinematics.singular.task import whole_number
 from .motions import Motion
 from .trajectory import Trajectory
 
@@ -32,14 +33,10 @@ class FourierSeries(Motion):
 
     Parameters
     ----------
-    period : float
-        Seconds.
-    a, b : array_like, shape (H, n)
-        Amplitudes of the velocity, rad/s or m/s.
-    mean : array_like, shape (n,)
-        Middle of the motion, rad or m.
-    periods : float
-        How many the motion lasts.
+    a, b, mean : array_like, shape (H, n), (H, n), (n,)
+        Amplitudes of the velocity, rad/s or m/s, and middle of the motion, rad or m.
+    period, periods : float
+        Seconds, and how many of them the motion lasts.
     """
 
     period: float
@@ -142,12 +139,8 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
 
     Parameters
     ----------
-    t : array_like, shape (N,)
-        Times, s.
-    harmonics : int
-        Their number H.
-    period : float
-        Seconds.
+    t, harmonics, period : array_like, shape (N,), int, float
+        Times, s, number H of harmonics, and period, s.
     order : int
         Derivative: 0 position, 1 velocity, and so on.
 
@@ -164,16 +157,10 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
     t = as_floats(t, "t")
     if t.ndim != 1:
         raise ShapeError(f"t: expected shape (N,), got {t.shape}.")
-    if int(harmonics) != harmonics or harmonics < 1 or not 0.0 < period < np.inf:
-        raise InvalidValueError(
-            f"Expected at least one harmonic and a positive period, got {harmonics}, {period}."
-        )
-    if int(order) != order or order < 0:
-        raise InvalidValueError(f"order: expected a whole number from 0, got {order!r}.")
-    H = int(harmonics)
+    H, order = whole_number(harmonics, "harmonics", 1), whole_number(order, "order", 0)
     one = np.eye(2 * H + 1)  # a series for each parameter
     series = FourierSeries(period, one[1 : H + 1], one[H + 1 :], one[0])
-    return series.derivatives(t, (int(order),))[0]
+    return series.derivatives(t, (order,))[0]
 
 
 def _waves(t: Array, period: float, H: int) -> tuple[Array, Array]:

@@ -28,14 +28,11 @@ class JointPath(Sampled):
 
     Parameters
     ----------
-    t : ndarray, shape (N,)
-        Times, s; NaN where the poses have none.
-    q : ndarray, shape (N, n)
-        Postures, rad or m, continuous (angles may leave (-pi, pi]); NaN where there is none.
-    v : ndarray, shape (N, n)
-        Velocities, rad/s or m/s; NaN where there is none, or no time.
-    status : ndarray of int8, shape (N,)
-        Codes of `IGMStatus`.
+    t, status : ndarray, shape (N,)
+        Times, s, NaN where the poses have none; codes of `IGMStatus`.
+    q, v : ndarray, shape (N, n)
+        Postures, rad or m, continuous (angles may leave (-pi, pi]), and velocities; NaN where
+        there is none.
     conditioning : ndarray, shape (N,)
         Of the Jacobian, from 1 to 0 where it is singular: the inverse of its condition number in
         the Frobenius norm, positions in units of the arm's lever.
@@ -97,15 +94,13 @@ def joint_path(
     ----------
     model
         The robot, n joints.
-    poses : PoseTrajectory or array_like, shape (N, 4, 4)
-        World poses of the tool, m.
+    poses, t : PoseTrajectory or array_like, shape (N, 4, 4); array_like, shape (N,), optional
+        World poses of the tool, m; times of an array, s, for its velocities.
     q_start : array_like, shape (n,), optional
         Posture from which the robot comes, rad or m; a first posture more than 0.1 away from it is
         reported as a jump. Joints that do not move the tool keep its value.
     q_near : array_like, shape (n,), optional
         A guess instead: the path begins with the solution of the first pose that is nearest to it.
-    t : array_like, shape (N,), optional
-        Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
         Into how many poses a `PoseTrajectory` is divided.
     mask, mask_axes, position_tolerance, orientation_tolerance

@@ -78,22 +78,16 @@ class Plan(TimingResult):
 
     Parameters
     ----------
-    trajectory : Trajectory or None
-        The motion; None without one.
-    status : PlanStatus
-        Outcome.
+    trajectory, status, explanation : Trajectory or None, PlanStatus, str
+        The motion; outcome and its details.
     cost : float
         Its cost, see `Cost`; infinite without one.
     history : ndarray, shape (N, 3)
         Number of the evaluation, cost of the candidate with penalties, least cost so far.
     torque_use : ndarray, shape (n,)
         Greatest torque of each joint over its limit; 0 where it has none.
-    restarts : ndarray, shape (R,)
-        Least cost of each restart of the search.
-    via_times : ndarray, shape (k,)
-        Times at which the via points are met, s.
-    explanation : str
-        Details of the status.
+    restarts, via_times : ndarray, shape (R,) and (k,)
+        Least cost of each restart of the search; times at which the via points are met, s.
     """
 
     trajectory: Trajectory | None
@@ -144,27 +138,20 @@ def kinodynamic(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints, with its drives.
-    q0, q1 : array_like, shape (n,), or Pose
-        The ends, rad or m. Of a pose the planner chooses the posture.
-    limits, torque, rng
-        See the head of the room, and `MotionLimits.of_model` for the limits of the table.
-    via : sequence of array_like, shape (n,), or Pose
-        Configurations on the way, in this order.
-    obstacles : Sphere, Box, Plane, Capsule, or iterable of these
-        Bodies that the links avoid.
-    clearance : float
-        Least distance from them, m.
+    model, limits, torque, rng
+        The robot, n joints, with its drives; see the head of the room for the others.
+    q0, q1, via : array_like, shape (n,), or Pose; via a sequence of these
+        The ends, rad or m, and configurations on the way, in this order. Of a pose the planner
+        chooses the posture.
+    obstacles, clearance : Sphere, Box, Plane, Capsule, or iterable of these, and float
+        Bodies that the links avoid, and the least distance from them, m.
     cost : Cost
         Weights of the duration and of the squared torques.
     nodes : int
         Free configurations of a path in the search.
-    method : PlanMethod or str
-        ``"anneal"`` or ``"descent"``.
-    timing : Timing or str
-        ``"optimal"`` times every path exactly; ``"profile"`` stretches a profile over time, as
-        `time_scaled`.
+    method, timing : PlanMethod and Timing, or str
+        ``"anneal"`` or ``"descent"``; ``"optimal"`` times every path exactly, ``"profile"``
+        stretches a profile over time, as `time_scaled`.
     seconds : float
         Greatest duration of the search, of up to 500 evaluations for each second; results with one
         seed differ only where the clock ends it.

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value
-from ..igm import IGMStatus
 from ..kinematics import jacobian
 from ..model import RobotModel
 from ..se3.orientation import rotation_vectors_of
@@ -171,7 +170,8 @@ def path_events(
     low[:-1] |= flips
     low[1:] |= flips
     for i, j in _runs(~reached):
-        add(PathEventKind.OUT_OF_REACH, i, j, _missed(rows, i, j))
+        k = (i + j) // 2
+        add(PathEventKind.OUT_OF_REACH, i, j, f"Pose {k}: {rows.reason(k)}")
     for i, j in _runs(np.any(outside, axis=-1)):
         add(PathEventKind.OUTSIDE_LIMITS, i, j, _worst(over[i : j + 1], "is outside by {:.4g}."))
     for i, j in _runs(low):
@@ -200,21 +200,6 @@ def path_events(
             text = f"From {before} to {after}." if named else ""
             add(PathEventKind.CHANGES_POSTURE, i, i + 1, text)
     return sorted(events, key=lambda event: (event.first, event.last))
-
-
-def _missed(rows: Followed, first: int, last: int) -> str:
-    """Why a run of poses is not reached: of every reason the pose that is missed by most."""
-    if first == last:
-        return rows.reason(first)
-    metres, angle = (np.linalg.norm(rows.missing[:, part], axis=-1) for part in np.s_[:3, 3:])
-    texts, status = [], rows.status[first : last + 1]
-    for code in dict.fromkeys(status.tolist()):
-        run = first + np.flatnonzero(status == code)
-        turned = code == IGMStatus.ORIENTATION_NOT_AVAILABLE or not (metres[run] > 0.0).any()
-        size = np.nan_to_num((angle if turned else metres)[run], nan=-1.0)
-        k = int(run[size.argmax()])
-        texts.append(f"At worst, pose {k}: {rows.reason(k)}")
-    return " ".join(texts)
 
 
 def _jumps(

@@ -35,10 +35,8 @@ class ResolvedMotion(Sampled):
     ----------
     t : ndarray, shape (N,)
         Times, s.
-    q : ndarray, shape (N, n)
-        Postures, rad or m.
-    v : ndarray, shape (N, n)
-        Velocities from each time to the next, rad/s or m/s; the last row repeats the one before.
+    q, v : ndarray, shape (N, n)
+        Postures, rad or m, and velocities from each time to the next, per s.
     status : ndarray of int8, shape (N,)
         Codes of `IKMStatus`.
     position_error, orientation_error : ndarray, shape (N,)
@@ -76,10 +74,8 @@ def resolved_motion(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    poses : PoseTrajectory
-        Of the tool: `straight_line`, `circle`, `blended_poses` ...
+    model, poses
+        The robot, n joints, and a motion of its tool: `straight_line`, `circle` ...
     q_start : array_like, shape (n,)
         Posture to begin with, rad or m; it need not be on the trajectory.
     samples : int
@@ -87,8 +83,7 @@ def resolved_motion(
     feedback : float
         Rate at which errors die out, 1/s; at most one over the time of a step.
     mask, method, joint_weights, secondary, augmented, tasks, limits
-        As in `ikm`, world axes; the step of the limits is that of the motion, so that no sample
-        passes one.
+        As in `ikm`, world axes; the step of the limits is that of the motion.
 
     Returns
     -------

@@ -43,15 +43,11 @@ class TimedPath(TimingResult):
 
     Parameters
     ----------
-    trajectory : Trajectory or None
-        The motion, whose parameter has a constant acceleration in each interval; or None.
-    status : TimingStatus
-        Outcome.
-    parameter : ndarray, shape (N,)
-        Path parameter s on the grid: the path's own, or its length in joint space where its own
-        timing rests or jumps, or comes from functions.
-    rate : ndarray, shape (N,)
-        Rate of the parameter there, 1/s (of its unit).
+    trajectory, status : Trajectory or None, TimingStatus
+        The motion, whose parameter has a constant acceleration in each interval; outcome.
+    parameter, rate : ndarray, shape (N,)
+        Path parameter s on the grid, and its rate, per s: the path's own, or its length in joint
+        space where its own timing rests or jumps, or comes from functions.
     maximum_rate : ndarray, shape (N,)
         Greatest rate that the limits allow at each point alone: the maximum velocity curve.
     active : ndarray of str, shape (N,)
@@ -135,8 +131,6 @@ def time_optimal(
         as_number(r, k, least=0.0, below=1e150)
         for r, k in ((start_rate, "start_rate"), (end_rate, "end_rate"))
     )
-    if not isinstance(both_ends, bool | np.bool_):
-        raise InvalidValueError(f"both_ends: expected True or False, got {both_ends!r:.40}.")
     motion, scalar = path_of(path, model, points)
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
@@ -255,23 +249,15 @@ def _without(status: TimingStatus, why: str) -> TimedPath:
 
 def _where(passes: Passes, s: Array, ends: tuple[float, float]) -> str:
     """Why the end is not reached, as a sentence."""
-    i = passes.failed
+    i, rate = passes.failed, passes.found[:, 0]
     if i < 0:
-        rate = passes.found[:, 0]
         i = int(((rate[1:] <= 0.0) & (rate[:-1] <= 0.0)).argmax())
-        if not passes.rows.top[i : i + 2].all():
-            return f"The limits of velocity are zero at s = {s[i]:.6g}, for a joint that moves."
-        return f"The limits leave no acceleration at s = {s[i]:.6g}, where the motion stops."
+        return f"The limits let the motion stop at s = {s[i]:.6g}, with no way on."
     if i == len(s) - 1:
-        most = np.sqrt(passes.rows.top[-1])
-        return f"end_rate {ends[1]:.6g} exceeds the limits of velocity, which allow {most:.6g}."
-    low, high = np.sqrt(np.maximum(passes.found[i, 2:4], 0.0))
-    if i == 0 and low <= high:
-        return (
-            f"start_rate {ends[0]:.6g} is not controllable at s = {s[0]:.6g}: the end is reached "
-            f"from rates between {low:.6g} and {high:.6g}."
-        )
-    return (
-        f"No rate at s = {s[i]:.6g} lets the rest of the path be followed within the limits "
-        "(the path is not controllable there)."
-    )
+        low, high = 0.0, float(np.sqrt(passes.rows.top[-1]))
+    else:
+        low, high = np.sqrt(np.maximum(passes.found[i, 2:4], 0.0))
+    name, given = ("end_rate", ends[1]) if i else ("start_rate", ends[0])
+    if i in (0, len(s) - 1) and low <= high:
+        return f"{name} {given:.6g} at s = {s[i]:.6g}: the limits allow {low:.6g} to {high:.6g}."
+    return f"No rate at s = {s[i]:.6g} lets the rest of the path be followed within the limits."

@@ -44,17 +44,13 @@ class ScaledTrajectory(TimingResult):
 
     Parameters
     ----------
-    trajectory : Trajectory or None
-        The motion; None without one.
-    status : ScalingStatus
-        Outcome.
+    trajectory, status, explanation : Trajectory or None, ScalingStatus, str
+        The motion; outcome and its details.
     fraction : ndarray, shape (N,)
         Samples, as fractions of the duration.
     windows : ndarray, shape (N, 2)
         Least and greatest duration with which each sample keeps the limits, s: of several windows
         that of the shortest, both infinite if there is none.
-    explanation : str
-        Details of the status.
     """
 
     trajectory: Trajectory | None

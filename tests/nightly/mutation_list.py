@@ -1299,7 +1299,7 @@ MUTATIONS = [
     Mutation("viz: figures", "lower limits are left out", "def lines_over_time(",
         "limit_lines(axes, lower, names, numbers)", "pass", f"{FIGURES} -k limits_are_dashed"),
     Mutation("viz: figures", "limits are drawn in radians where the axis is in degrees",
-        "def quantity_over_time(", "unit.factor * lower[joints]", "lower[joints]",
+        "def quantity_over_time(", "(unit.factor * x[joints] for x", "(x[joints] for x",
         f"{FIGURES} -k limits_are_dashed"),
     Mutation("viz: figures", "upper joint limits of a map are its lower ones",
         "def _hatch_outside(", "k * model.upper[j]", "k * model.lower[j]",
