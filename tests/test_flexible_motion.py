@@ -102,23 +102,6 @@ def test_segments_approach_the_beam_with_the_square_of_their_number():
     np.testing.assert_allclose(np.log2(errors[0][:3] / errors[1][:3]), 2.0, atol=0.3)
 
 
-def test_modes_of_a_loaded_beam_need_fewer():
-    """Of two links, the second rigid: one mode with its load is nearer to many without."""
-    table = DHTable(antecedent=[0, 1], sigma=[0, 2], d=[0, 1.0])
-    body = InertialParameters.from_com(
-        [0, 2.0], np.zeros((2, 3)), np.stack([np.zeros((3, 3)), np.eye(3)])
-    )
-    model = RobotModel.from_table(table, body)
-
-    def first(**options):
-        link = flexible.beam(1.0, EI=(INF, 1.0), **options)
-        return flexible.natural_frequencies(flexible.FlexibleRobot(model, {1: link}), [0.0])[0]
-
-    loaded, bare, many = first(modes=1, carried=(2.0, 1.0)), first(modes=1), first(modes=20)
-    assert loaded <= many < bare
-    assert loaded == pytest.approx(flexible.beam(1.0, (INF, 1.0), tip=(2.0, 1.0)).frequencies[0])
-
-
 def test_zeros_of_the_hub_are_the_clamped_frequencies():
     found = flexible.linearize(ONE, [0.3])
     w = ONE.links[1].frequencies

@@ -86,6 +86,8 @@ class Value(Rebuilt):
 
 def _shown(value: object) -> str:
     """A field in one line: arrays of more than seven numbers by their shape."""
+    if type(value) is tuple:
+        return f"({', '.join(map(_shown, value))})"
     if isinstance(value, np.ndarray) and value.size > 7:
         return f"<{value.shape} array>"
     return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())

@@ -46,7 +46,6 @@ def beam(
     stiffening: bool = False,
     *,
     gyration: float | None = None,
-    carried: Any = None,
     pose: ArrayLike | None = None,
 ) -> FlexibleLink:
     """Flexible link from a uniform Euler-Bernoulli beam along the x axis of its frame.
@@ -63,10 +62,9 @@ def beam(
         Bending stiffness about y and z, or both, N m^2; infinite where the beam is rigid.
     GJ : float, optional
         Torsional stiffness, N m^2; default rigid.
-    tip, carried : float, (mass, inertia) or (mass, com, inertia), optional
+    tip : float, (mass, inertia) or (mass, com, inertia), optional
         Body fixed to the tip: kg; centre of mass (3,) from the tip, m; inertia about it, kg m^2, a
-        number, shape (3,) or (3, 3). What the next links and their load are there, for the shapes
-        of the modes alone: fewer modes suffice.
+        number, shape (3,) or (3, 3).
     hub : float, optional
         Rotary inertia about z at the root, kg m^2; default 0.
     modes : int
@@ -117,13 +115,11 @@ def beam(
     own, planes = _tip_body(tip), (float(stiff[0]), float(stiff[1]))
     kinds = list[Mode]()
     for axis, value in ((1, planes[0]), (2, planes[1]), (0, float(torsion))):
-        loads, across = [], 3 - axis
-        for m, c, J in (own, _tip_body(carried)):
-            if axis:
-                spin = (J[axis, axis] + m * c[across] ** 2) / L**2
-                loads += [(m, 1.0, c[0] / L), (spin, 0.0, 1.0)]
-            else:
-                loads.append((J[0, 0] + m * float(c[1:] @ c[1:]), 1.0, 0.0))
+        m, c, J = own
+        loads = [(J[0, 0] + m * float(c[1:] @ c[1:]), 1.0, 0.0)]
+        if axis:
+            spin = (J[axis, axis] + m * c[3 - axis] ** 2) / L**2
+            loads = [(m, 1.0, c[0] / L), (spin, 0.0, 1.0)]
         if np.isfinite(value):
             free = h / L**2 if ends == "pinned-hub" and axis == 2 else None
             mass = rho * L * (1.0 if axis else k * k)

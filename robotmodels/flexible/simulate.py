@@ -77,7 +77,7 @@ class FlexibleMotionStatus(Outcome):
     BENT = 4, SpinStatus.BENT.sentence
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FlexibleMotion(Result):
     """Simulated motion of a flexible arm at times ``t`` (N,), which may end early.
 
@@ -120,10 +120,6 @@ class FlexibleMotion(Result):
         """Largest error of the momentum balance, relative to the largest momentum and impulse."""
         error = self.momentum - self.momentum[0] - self.impulse
         return _relative(error, self.momentum, self.impulse)
-
-    def __repr__(self) -> str:
-        span, drift = self.t[-1] - self.t[0], self.energy_drift
-        return f"<FlexibleMotion: {span:.6g} s, {len(self.t)} samples, energy drift {drift:.1g}>"
 
 
 def simulate(

@@ -244,7 +244,7 @@ def pose_at(twist: Array) -> Array:
 
 
 class PlatformResult(Result):
-    """Base of results of batches: printed by shapes."""
+    """Base of results of batches."""
 
     __slots__ = ()
 
@@ -252,8 +252,3 @@ class PlatformResult(Result):
     def count(self) -> NDArray[np.int64]:
         """Number of solutions of each row, shape (...)."""
         return self.valid.sum(axis=-1)  # type: ignore[attr-defined]
-
-    def __repr__(self) -> str:
-        named = zip((f.name for f in fields(self)), self._values, strict=True)  # type: ignore[arg-type]
-        shapes = [f"{name} {x.shape}" for name, x in named if isinstance(x, np.ndarray)]
-        return f"<{type(self).__name__}: {', '.join(shapes)}>"

@@ -97,9 +97,6 @@ class Singularity(Result):
         words = f"Legs {names} (from 1), class {self.form}: {_WORDS[self.form]}."
         return f"{self.kind.sentence} {words}"
 
-    def __repr__(self) -> str:
-        return f"<Singularity {self.kind.name}: {self.reason()}>"
-
 
 def classify_singularity(
     robot: Robot, T: ArrayLike, mode: Mode = None, tolerance: float = 1e-8

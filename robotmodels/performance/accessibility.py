@@ -76,9 +76,6 @@ class Accessibility(Result):
     count: Ints
     level: str
 
-    def __repr__(self) -> str:
-        return f"<Accessibility of {self.level}, {self.status.shape}: {self.counted}>"
-
 
 def accessibility(
     arm: RobotModel,
@@ -123,13 +120,10 @@ def posture_counts(
 
 def _counts(space: JointSpace, mask: Flags | None, poses: Array) -> tuple[NDArray[Any], ...]:
     q, valid, oriented = postures_of(space.model, poses, mask)
-    reached = valid.any(axis=1)
     q, inside = space.within(q)
-    valid &= inside
-    allowed = valid.any(axis=1)
-    valid = free_of(space, q, valid)
+    free = free_of(space, q, valid & inside)
     status = np.select(
-        [valid.any(axis=1), allowed, reached, oriented],
+        [free.any(axis=1), (valid & inside).any(axis=1), valid.any(axis=1), oriented],
         [
             AccessStatus.ACCESSIBLE,
             AccessStatus.ONLY_IN_COLLISION,
@@ -138,7 +132,7 @@ def _counts(space: JointSpace, mask: Flags | None, poses: Array) -> tuple[NDArra
         ],
         AccessStatus.OUT_OF_REACH,
     )
-    return status.astype(np.int8), valid.sum(axis=1)
+    return status.astype(np.int8), free.sum(axis=1)
 
 
 def allowed_postures(space: JointSpace, poses: Array, mask: Flags | None) -> tuple[Array, Flags]:

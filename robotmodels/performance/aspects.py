@@ -33,6 +33,7 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -217,20 +218,17 @@ def _apart(
     columns: tuple[int, ...], factors: Factors, together: bool
 ) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Groups of joints that share no factor, with the factors of each."""
-    groups: list[tuple[set[int], set[int]]] = []
-    if together:
-        groups = [(set(columns), set())]
-    for k, joints in enumerate(factors.joints):
-        own, members = set(joints), {k}
-        for group in [g for g in groups if g[0] & own]:
-            groups.remove(group)
-            own |= group[0]
-            members |= group[1]
-        groups.append((own, members))
+    shared = [*factors.joints, columns] if together else factors.joints
+    pairs = [pair for own in shared for pair in pairwise(own)]
+    part = linked(*np.reshape(np.array(pairs, np.int64), (-1, 2)).T, 1 + max(columns))
+    groups: dict[int, list[int]] = {}
     for column in columns:
-        if not any(column in joints for joints, _ in groups):
-            groups.append(({column}, set()))
-    return [(tuple(sorted(j)), tuple(sorted(m))) for j, m in groups]
+        groups.setdefault(int(part[column]), []).append(column)
+    of = [int(part[own[0]]) for own in factors.joints]
+    return [
+        (tuple(sorted(own)), tuple(i for i, k in enumerate(of) if k == g))
+        for g, own in groups.items()
+    ]
 
 
 def _group(

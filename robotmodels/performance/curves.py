@@ -28,8 +28,8 @@ Examples
 >>> curves = singular_curves(load("planar_2r"), limits=False)
 >>> [kind.value for kind in curves.kind], curves.joint[0].shape[1]
 (['boundary', 'internal'], 2)
->>> cusps(load("planar_2r"))
-<SpecialPoints: 0 in the section; All curves were found.>
+>>> len(cusps(load("planar_2r")))
+0
 """
 
 from __future__ import annotations
@@ -86,11 +86,6 @@ class SingularCurves(Result):
     kind: tuple[CurveKind, ...]
     status: SectionStatus
 
-    def __repr__(self) -> str:
-        kinds = [kind.value for kind in self.kind]
-        text = ", ".join(f"{kinds.count(k.value)} {k.value}" for k in CurveKind)
-        return f"<SingularCurves: {text}; {self.reason()}>"
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SpecialPoints(Result):
@@ -107,9 +102,6 @@ class SpecialPoints(Result):
 
     def __len__(self) -> int:
         return len(self.section)
-
-    def __repr__(self) -> str:
-        return f"<SpecialPoints: {len(self)} in the section; {self.reason()}>"
 
 
 def singular_curves(arm: RobotModel, limits: bool = True) -> SingularCurves:

@@ -107,9 +107,6 @@ class Cuspidality(Result):
         more = f" Pairs of postures tried: {self.tried}." if self.status == 2 else ""
         return self.status.sentence + more
 
-    def __repr__(self) -> str:
-        return f"<Cuspidality: {self.status.name}, margin {self.margin:.3g}; {self.reason()}>"
-
 
 def cuspidality(
     arm: RobotModel,

@@ -80,11 +80,6 @@ class DexterityMap(Frozen, Value):
         """The best and the mean, to be unpacked."""
         return iter((self.best, self.mean))
 
-    def __repr__(self) -> str:
-        known = self.best[~np.isnan(self.best)]
-        text = f"best {known.min():.4g} to {known.max():.4g}" if known.size else "none"
-        return f"<DexterityMap of {self.best.size} cells, {known.size} reached: {text}>"
-
 
 class GlobalIndex(float):
     """Mean of an index, a float with its ``spread``."""

@@ -91,25 +91,13 @@ class FeasiblePath(Result):
 
     def reason(self) -> str:
         """The status as a sentence, with where the path breaks."""
-        if not len(self.q):
-            return "The path has no poses: there is nothing to follow."
         if self.status is not PathStatus.BROKEN:
             return self.status.sentence
         if not len(self.breaks):
             return f"{self.status.sentence} The first pose has no posture."
         last, count = int(self.breaks.max()), len(self.breaks)
-        if last == 0:
-            return f"{self.status.sentence} All {count} start outside the limits."
-        text = f"Of {count} the best breaks before pose {last}"
-        there = not np.isnan(self.postures[last]).all()
-        why = "its posture ends at a singular position or a limit" if there else "it has none"
-        return f"{self.status.sentence} {text}: {why}."
-
-    def __repr__(self) -> str:
-        return (
-            f"<FeasiblePath of {len(self.q)} poses: {self.status.name}, followed from "
-            f"{int(self.reached.sum())} of {len(self.reached)} postures; {self.reason()}>"
-        )
+        where = f"the best breaks before pose {last}" if last else "all start outside the limits"
+        return f"{self.status.sentence} Of {count} {where}."
 
 
 def feasible_path(

@@ -74,13 +74,6 @@ class Polytope(Result):
     radius: float
     status: PolytopeStatus
 
-    def __repr__(self) -> str:
-        V, m = self.vertices.shape
-        return (
-            f"<Polytope in {m} dimensions: {V} vertices, {len(self.faces)} faces, radius "
-            f"{self.radius:.4g}; {self.reason()}>"
-        )
-
 
 def polytope(
     arm: RobotModel,

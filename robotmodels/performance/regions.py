@@ -91,11 +91,6 @@ class Regions(Result):
         """Number of regions."""
         return len(self.cells)
 
-    def __repr__(self) -> str:
-        unit = "m^2" if self.over.coordinates == "plane" else "m^3"
-        sizes = ", ".join(f"{v:.4g}" for v in self.measure[:6]) or "none"
-        return f"<Regions ({self.connectivity}): {self.count}, {sizes} {unit}; {self.reason()}>"
-
 
 def regions(
     arm: RobotModel,
