@@ -220,7 +220,8 @@ def _apart(
     """Groups of joints that share no factor, with the factors of each."""
     shared = [*factors.joints, columns] if together else factors.joints
     pairs = [pair for own in shared for pair in pairwise(own)]
-    part = linked(*np.reshape(np.array(pairs, np.int64), (-1, 2)).T, 1 + max(columns))
+    a, b = np.reshape(np.array(pairs, np.int64), (-1, 2)).T
+    part = linked(a, b, 1 + max(columns))
     groups: dict[int, list[int]] = {}
     for column in columns:
         groups.setdefault(int(part[column]), []).append(column)
