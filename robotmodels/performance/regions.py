@@ -55,8 +55,8 @@ from .accessibility import allowed_postures
 from .arms import Flags, Ints, JointSpace, joint_space, section_arm, task_rows
 from .aspects import Aspects, free_components, linked
 from .cells import neighbours
-from .continuation import Continuation
 from .dexterity import workspace_of
+from .paths import Continuation
 from .workspace import Workspace, WorkspaceStatus, postures_in, workspace
 
 _RESOLUTION = {2: 100, 3: 20}
