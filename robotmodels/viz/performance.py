@@ -130,7 +130,8 @@ def plot_aspects(a: Aspects, **look: Unpack[Look]) -> Figure:
             panel.plot(*points.T, ".", color="#e8e8e8", label="_all", **dot)
             panel.plot(*inside.T, ".", color=colors[k], alpha=0.12, label=f"_{k}", **dot)
             panel.set(xlabel=text[0], ylabel="" if k else text[1], aspect="equal")
-            panel.set_title(f"aspect with {100.0 * group.volumes[k] / group.volumes.sum():.0f} %")
+            share = 100.0 * group.volumes[k] / group.volumes.sum()
+            panel.set_title(f"aspect {k + 1}: {share:.0f} %", fontsize="small")
     else:
         right[0].bar(np.arange(1, a.count + 1), a.volume, color=INK, alpha=0.6)
         right[0].set(xlabel="aspect", ylabel="volume of joint space")
