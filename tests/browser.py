@@ -41,9 +41,9 @@ def chromium() -> str:
     return found
 
 
-def document(page: Path, folder: Path, fragment: str = "", milliseconds: int = 1500) -> str:
+def document(page: Path, folder: Path, milliseconds: int = 1500) -> str:
     """The page's document after its scripts have run for so long, as HTML."""
-    return _run(page.as_uri() + fragment, folder, milliseconds, "--dump-dom")
+    return _run(page.as_uri(), folder, milliseconds, "--dump-dom")
 
 
 def picture(page: Path, folder: Path, size: tuple[int, int], milliseconds: int = 1500):

@@ -147,7 +147,6 @@ def test_speeds_bound_the_duration_too_and_weak_motors_are_named():
     assert "joint 1" in weak.reason()
     for result in (weak, by_torque):
         assert pickle.loads(pickle.dumps(result)) == result
-        assert len(repr(result).splitlines()) <= 6
     for arguments, error in (
         ((move, arm, np.inf), InvalidValueError),
         ((move, arm, -1.0), InvalidValueError),
@@ -301,7 +300,6 @@ def test_ends_that_are_not_allowed_have_a_status():
     assert "q1" in hit.reason()
     for plan in (weak, hit):
         assert pickle.loads(pickle.dumps(plan)) == plan
-        assert len(repr(plan).splitlines()) <= 6
 
 
 @pytest.mark.parametrize(

@@ -215,17 +215,6 @@ def test_the_panel_moves_the_robot_and_shows_its_poses(panels, name):
     assert reset == at_first
 
 
-def test_the_address_holds_a_posture(tmp_path):
-    model = rm.load("stanford_arm")
-    page = rm.viz.jog(model).save(tmp_path / "arm.html")
-    q = np.array([0.3, -0.5, 0.4, 1.0, -0.6, 2.0])
-    words = ",".join(map(repr, (q * units(model)).round(6).tolist()))
-    assert f'href="#q={words}"' in document(page, tmp_path, f"#q={words}")
-    text = document(page, tmp_path, "#q=1%2C2,%nonsense")
-    assert "does not hold 6 numbers in the order of the sliders: #q=1%2C2,%nonsense<" in text
-    assert 'href="#q=0,0,0,0,0,0"' in text
-
-
 def test_executed_notebooks_show_arms(tmp_path):
     """Of a folder with executed notebooks, as the run in CI leaves them."""
     folder = os.environ.get("ROBOTMODELS_NOTEBOOKS")

@@ -1,6 +1,7 @@
 """Time-optimal motion along a path: other programs, closed forms, identities, refused input."""
 
 import dataclasses
+import itertools
 import json
 import pickle
 from pathlib import Path
@@ -52,7 +53,6 @@ def test_torques_are_held_between_the_points_with_limits_at_both_ends(seed):
         greatest = used(model, alone.trajectory, torque).max()
         assert ("times its limit" in alone.reason()) == (greatest > 1.02)
         assert pickle.loads(pickle.dumps(timed)) == timed != alone
-        assert len(repr(timed).splitlines()) <= 6
 
 
 def spline(rng, n, points=5):
@@ -207,12 +207,11 @@ def test_dry_friction_acts_on_joints_however_slow():
 def test_rates_at_the_ends():
     limits = MotionLimits(velocity=2.0, acceleration=3.0)
     timed = time_optimal(line([0.0], [1.0]), limits, start_rate=0.8, end_rate=0.5)
-    assert timed.rate[[0, -1]] == pytest.approx([0.8, 0.5])
     assert timed.trajectory.v([0.0, timed.duration])[:, 0] == pytest.approx([0.8, 0.5])
-    slow = time_optimal(line([0.0], [1.0]), limits, start_rate=3.0)
-    assert slow.status is TimingStatus.NOT_CONTROLLABLE
-    assert "start_rate 3" in slow.reason()
-    assert "2" in time_optimal(line([0.0], [1.0]), limits, end_rate=3.0).reason()
+    for end in ("start_rate", "end_rate"):
+        slow = time_optimal(line([0.0], [1.0]), limits, **{end: 3.0})
+        assert slow.status is TimingStatus.NOT_CONTROLLABLE
+        assert f"{end} 3 " in slow.reason()
 
 
 def test_limits_of_jerk_and_of_the_rates_of_torques():
@@ -307,8 +306,6 @@ def test_a_path_of_poses_needs_the_robot():
         ({"model": planar(), "torque": [1.0, 1.0, 1.0]}, ShapeError, "torque"),
         ({"model": rm.load("rx90")}, ShapeError, "6 joints"),
         ({"model": planar(), "torque": 9e2, "torque_rate": 0.0}, InvalidValueError, "above zero"),
-        ({"torque_rate": 5.0}, InvalidValueError, "torque_rate"),
-        ({"points": 2.5}, InvalidValueError, "points"),
         ({"start_rate": -1.0}, InvalidValueError, "start_rate"),
         ({"friction": "dry", "model": planar(), "torque": 9e2}, InvalidValueError, "friction"),
     ],
@@ -348,14 +345,10 @@ def test_a_path_moved_along_by_a_law_has_the_derivatives_of_both():
     motion, h = timed.trajectory, 1e-6
     breaks = motion.motion.law.breaks[0]
     t = 0.5 * (breaks[:-1] + breaks[1:])
-    for order in ("q", "v", "a"):
-        value, slope = (
-            getattr(motion, order),
-            getattr(motion, {"q": "v", "v": "a", "a": "jerk"}[order]),
-        )
+    parts = (motion.q, motion.v, motion.a, motion.jerk)
+    for value, slope in itertools.pairwise(parts):
         measured = (value(t + h) - value(t - h)) / (2 * h)
-        scale = np.abs(measured).max()
-        assert slope(t) == pytest.approx(measured, abs=1e-6 * scale)
+        assert slope(t) == pytest.approx(measured, abs=1e-6 * np.abs(measured).max())
     low, high = motion.motion.extremes(1)
     v = motion.v(np.linspace(0, motion.duration, 20_001))
     assert low == pytest.approx(v.min(axis=0), rel=1e-3, abs=1e-9)

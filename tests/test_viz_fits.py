@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from test_viz_figures import data, labels, legend, lines, overlaps
+from test_viz_figures import data, labels, legend, lines
 
 import robotmodels as rm
 from robotmodels import calibration as cal
@@ -20,9 +20,6 @@ from robotmodels.minimal_parameters import uniform_bodies
 RX90 = rm.load("rx90").with_tool(se3.translation(0.05, 0.03, 0.1))
 DT = 0.002
 DEGREES = 180.0 / np.pi
-CALIBRATION = (viz.plot_calibration_residuals, viz.plot_calibration_in_space,
-               viz.plot_calibration_parameters, viz.plot_calibration_correlations,
-               viz.plot_calibration_normality)  # fmt: skip
 
 
 def poses(count, gross=()):
@@ -53,17 +50,6 @@ def calibrated():
         "many": cal.fit(RX90, cal.Pose(*poses(200, (3, 77))), loss="huber", **more),
         "sockets": cal.fit(sockets.model, touched, base=False, **more),
     }
-
-
-@pytest.mark.nightly
-def test_texts_and_panels_do_not_cover_each_other(calibrated, found):
-    for result in calibrated.values():
-        for plot in CALIBRATION:
-            assert overlaps(plot(result, title="A robot")) == [], plot.__name__
-    for word in ("torques", "residuals", "parameters", "standard_errors", "correlations"):
-        plot = getattr(viz, f"plot_identification_{word}")
-        assert overlaps(plot(found, title="A robot")) == [], word
-    assert overlaps(viz.plot_processing(found, title="A robot")) == []
 
 
 def test_residuals_are_those_of_the_result(calibrated):
@@ -310,7 +296,6 @@ def test_excitation_shows_its_motion_and_its_search():
     )
     random = lines(baseline, "_values")[0].get_ydata()
     np.testing.assert_allclose(random, [one.of(drawn.criterion) for one in drawn.baseline])
-    assert overlaps(figure) == []
 
 
 # ---------------------------------------------------------------- reports and mistakes
@@ -342,15 +327,10 @@ def test_mistakes_are_named(found, calibrated):
         (lambda: viz.plot_calibration_residuals("few"), "result: expected a CalibrationResult"),
         (lambda: viz.plot_calibration_in_space(calibrated["few"], magnification=0.0), "magnif"),
         (lambda: viz.plot_calibration_parameters(calibrated["few"], 1.5), "level"),
-        (lambda: viz.plot_selection(calibrated), "selected: expected a SelectedConfigurations"),
-        (lambda: viz.plot_identification_torques("few"), "expected an IdentificationResult"),
-        (lambda: viz.plot_identification_residuals(found, 3), "test: expected a Log"),
         (lambda: viz.plot_identification_torques(found, two), "test: .* 3 joints, got 2"),
         (lambda: viz.plot_processing(log), "processing: expected a Processing"),
-        (lambda: viz.plot_processing("log"), "log: expected a Log or an IdentificationResult"),
         (lambda: viz.plot_processing(found, chosen), "the result contains them"),
         (lambda: viz.plot_processing(two, chosen), "processing: expected one of 2 joints, got 3"),
-        (lambda: viz.plot_excitation(log), "found: expected an ExcitingTrajectory"),
     ):
         with pytest.raises(RobotModelsError, match=message):
             wrong()

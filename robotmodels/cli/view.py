@@ -22,8 +22,7 @@ examples:
   robotmodels view erd:ur5 --q 0 -90 90 0 90 0 --degrees --out ur5.html
   robotmodels view arm.urdf --package-dir packages --no-open
 
-The page needs neither a network nor this program any more. Its address may hold a posture, in the
-order and the units of the sliders: ur5.html#q=0,-90,90,0,90,0"""
+The page needs neither a network nor this program any more."""
 DESCRIPTION = """\
 Draw a robot with a slider for each joint and the pose of its tool, write it as one HTML file and
 open it in the browser."""

@@ -34,10 +34,11 @@ from .. import se3
 from .._arrays import Array, as_exact, as_number
 from .._choices import as_instance, chosen
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics.singular.task import whole_number
 from ..se3.orientation import rotation_vectors_of
 from .blends import PARABOLA, QUARTIC, full_speed, joined, rates_of, schedule
 from .laws import LineLimits, TimeLaw, law_of_limits
-from .limits import MotionLimits, limits_along, ranges_of, sample_count, slowed
+from .limits import MotionLimits, limits_along, ranges_of, slowed
 from .motions import PiecewisePolynomial
 from .point_to_point import along_line
 from .pose_trajectory import (
@@ -81,7 +82,7 @@ def cartesian_trajectory(
     ((50, 4, 4), True)
     """
     first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
-    law, N = chosen(TimeLaw, law, "law"), sample_count(N)
+    law, N = chosen(TimeLaw, law, "law"), whole_number(N, "N", 0)
     try:
         batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
     except ValueError:

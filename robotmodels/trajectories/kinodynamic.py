@@ -24,18 +24,17 @@ from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm import igm
-from ..kinematics.singular.task import generator_of
+from ..kinematics.singular.task import generator_of, whole_number
 from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
 from ..obstacles.shapes import Obstacle
 from .candidates import Candidates, Cost, shares, spread
-from .limits import MotionLimits, checked_limits, sample_count
+from .limits import MotionLimits, checked_limits
 from .path_limits import PathLimits
 from .plan_search import RESTARTS, PlanMethod, Search, best_motion, restart
 from .trajectory import TimingResult, Trajectory
 
-_MOST = 200  # nodes
 _NO_TIME = 1e-50  # s: shorter motions are not limited by anything
 _QUICKEST = Cost()
 
@@ -176,7 +175,7 @@ def kinodynamic(
     timing, method = chosen(Timing, timing, "timing"), chosen(PlanMethod, method, "method")
     as_instance(cost, Cost, "cost")
     wanted = as_number(clearance, "clearance", least=0.0)
-    count, bodies = sample_count(nodes, "nodes", 0, _MOST), checked_obstacles(obstacles)
+    count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
     seconds = as_number(seconds, "seconds", above=0.0)
     if cost.torque and not problem.loaded.size:

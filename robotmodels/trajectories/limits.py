@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Value, as_floats, as_number, as_reals, read_only
 from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from ..table_text import joints_text
 from .laws import LineLimits
@@ -199,14 +198,6 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], bool]:
     return dict(zip(arrays, rows, strict=True)), all(array.ndim == 0 for array in arrays.values())
 
 
-def sample_count(N: Any, name: str = "N", least: int = 0, most: int = 10**9) -> int:
-    """A number of samples, not more than can be held."""
-    count = whole_number(N, name, least)
-    if count > most:
-        raise InvalidValueError(f"{name}: expected a whole number of at most {most}, got {count}.")
-    return count
-
-
 def refuse_jointless(n: int, name: str) -> None:
     """Refuse motions of no joints, which have no duration of their own."""
     if n == 0:
@@ -226,13 +217,8 @@ def limits_along(limits: MotionLimits, u: Array, names: tuple[str, ...] = ()) ->
     zero[1] = False
     if zero.any():
         i, j = (int(k) for k in np.argwhere(zero)[0])
-        what, other = f"joint {j + 1}", "leave the joint where it is"
-        if names:
-            what, other = names[j], f"take poses without {names[j]}"
-        raise InvalidValueError(
-            f"limits: the limit of {RATES[i // 2]} of {what} is 0, but it has to move; any other "
-            f"limit will do, or {other}."
-        )
+        what = names[j] if names else f"joint {j + 1}"
+        raise InvalidValueError(f"limits: that of {RATES[i // 2]} of {what}, which moves, is 0.")
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         bounds = np.where(u != 0.0, bounds / np.abs(u), np.inf)
     V, back, A, B, J, K = bounds.min(axis=-1).tolist()

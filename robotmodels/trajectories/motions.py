@@ -35,9 +35,22 @@ class Motion(Value, ABC):
         """Derivatives (N, n) of the orders at times (N,) within the duration."""
 
     def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value (n,) of a derivative, here of samples."""
-        (values,) = self.derivatives(np.linspace(0.0, self.duration, _SAMPLES), (order,))
+        """Least and greatest value (n,) of a derivative; infinite where the one below jumps."""
+        low, high = self.ends_of(order)
+        if order:
+            down, up = self.jumps(order - 1)
+            low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
+        return low, high
+
+    def ends_of(self, order: int) -> tuple[Array, Array]:
+        """Least and greatest value (n,) of a derivative between jumps, here of samples."""
+        (values,) = self.derivatives(self.samples, (order,))
         return values.min(axis=0), values.max(axis=0)
+
+    @property
+    def samples(self) -> Array:
+        """Times (N,) at which extremes are sought."""
+        return np.linspace(0.0, self.duration, _SAMPLES)
 
     def jumps(self, order: int) -> tuple[Any, Any]:
         """Whether a derivative jumps down, and up, inside the motion, (n,); here smooth."""
@@ -82,7 +95,7 @@ class PiecewisePolynomial(Motion):
         piecewise_derivatives(*rows, np.asarray(orders, np.int64), out)
         return list(out[:, 0])
 
-    def extremes(self, order: int) -> tuple[Array, Array]:
+    def ends_of(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece."""
         live = self.lengths.T > 0.0
         low, high = ranges_of_pieces(self.coefficients, self.lengths.T, order)
@@ -91,9 +104,6 @@ class PiecewisePolynomial(Motion):
         # a motion without duration stays at its start
         still = self.coefficients[0, 0] if order == 0 else 0.0
         low, high = (np.where(live.any(axis=0), x, still) for x in (low, high))
-        if order > 0:
-            down, up = self.jumps(order - 1)
-            low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
         return low, high
 
     def jumps(self, order: int) -> tuple[Any, Any]:
@@ -210,26 +220,17 @@ class TimedMotion(Motion):
         found[3] = lambda: q[3] * r[0] ** 3 + 3.0 * q[2] * r[0] * r[1] + q[1] * r[2]
         return [found[order]() for order in orders]
 
-    def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value at samples of each piece; infinite where the one below jumps."""
-        (values,) = self.derivatives(self._inside.reshape(-1), (order,))
-        low, high = values.min(axis=0), values.max(axis=0)
-        if order:
-            down, up = self.jumps(order - 1)
-            low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
-        return low, high
-
     def jumps(self, order: int) -> tuple[Any, Any]:
         """Whether a derivative jumps down, and up, between the pieces of the law."""
-        (x,) = self.derivatives(self._inside.reshape(-1), (order,))
+        (x,) = self.derivatives(self.samples, (order,))
         ends = x.reshape(-1, _INSIDE.size, self.n)[:, [0, -1]]
         jump = np.append(ends[1:, 0] - ends[:-1, 1], np.zeros((1, self.n)), axis=0)
         size = _JUMP * np.abs(x).max()
         return jump.min(axis=0) < -size, jump.max(axis=0) > size
 
     @property
-    def _inside(self) -> Array:
-        """Times inside the pieces of the law, (K, 6)."""
+    def samples(self) -> Array:
+        """Times inside the pieces of the law, six each."""
         live = self.law.lengths[0] > 0.0
         begin, lengths = self.law.breaks[0, :-1][live], self.law.lengths[0, live]
-        return begin[:, None] + lengths[:, None] * _INSIDE
+        return (begin[:, None] + lengths[:, None] * _INSIDE).reshape(-1)

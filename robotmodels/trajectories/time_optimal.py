@@ -11,8 +11,9 @@ from .._arrays import Array, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..friction import Friction
+from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
-from .limits import MotionLimits, checked_limits, sample_count
+from .limits import MotionLimits, checked_limits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
 from .path_limits import Passes, PathLimits, Rows, path_of, toward_ends
 from .pose_trajectory import PoseTrajectory
@@ -24,7 +25,6 @@ _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
 _ROUNDS = 12
-_MOST = 10**6  # intervals
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
 
@@ -126,7 +126,7 @@ def time_optimal(
     >>> round(timed.duration, 6), str(timed.active[100])  # D / v + v / a
     (1.5, 'velocity of joint 1')
     """
-    points = sample_count(points, "points", 2, _MOST)
+    points = whole_number(points, "points", 2)
     first, last = (
         as_number(r, k, least=0.0, below=1e150)
         for r, k in ((start_rate, "start_rate"), (end_rate, "end_rate"))

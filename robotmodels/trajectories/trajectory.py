@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from .limits import RATES, LimitsReport, MotionLimits, checked_limits, greatest, sample_count
+from ..kinematics.singular.task import whole_number
+from .limits import RATES, LimitsReport, MotionLimits, checked_limits, greatest
 from .motions import FunctionMotion, Motion
 
 
@@ -161,7 +162,7 @@ class Trajectory(Value):
         """
         T = self.duration
         if samples is not None and period is None:
-            return np.linspace(0.0, T, sample_count(samples, "samples", 1))
+            return np.linspace(0.0, T, whole_number(samples, "samples", 1))
         if samples is not None or period is None:
             raise InvalidValueError("resample: give either samples or period.")
         step = as_number(period, "period", above=0.0)

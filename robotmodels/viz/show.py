@@ -62,6 +62,7 @@ from .._choices import as_instance, one_of
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import link_poses
 from ..kinematics.ellipsoid import Ellipsoid
+from ..kinematics.singular.task import whole_number
 from ..loops import LoopedRobot
 from ..model import RobotModel, check_model
 from ..trajectories.joint_path import JointPath
@@ -83,7 +84,7 @@ from .shapes import (
     workspace_box,
 )
 from .sliders import coupled_posture, coupling, slider_panel
-from .style import PALETTE, as_texts, as_whole
+from .style import PALETTE, as_texts
 
 Moving = ArrayLike | Trajectory | Samples | JointPath | ResolvedMotion
 
@@ -119,7 +120,7 @@ def show(
     if columns is not None:
         if len(drawn) > 1 or ellipsoids is not None:
             raise InvalidValueError("columns: expected one robot, without ellipsoids.")
-        drawn, extra = _side_by_side(drawn[0], postures[0], as_whole(columns, "columns"))
+        drawn, extra = _side_by_side(drawn[0], postures[0], whole_number(columns, "columns", 1))
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
         draw_robot(item, p, f"robots/{label}", given, c)

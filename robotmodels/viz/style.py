@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, MissingExtraError, ShapeError
+from ..kinematics.singular.task import whole_number
 from ..visual import Color
 
 if TYPE_CHECKING:
@@ -297,16 +298,9 @@ def as_named(given: Any, names: Any, name: str, of: str) -> dict[str, Any]:
     return named
 
 
-def as_whole(value: Any, name: str, least: int = 1) -> int:
-    """A number of things."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidValueError(f"{name}: expected how many, from {least}, got {value!r}.")
-    return int(value)
-
-
 def as_columns(columns: Any, count: int, default: int) -> int:
     """How many panels stand in a row."""
-    return min(count, default if columns is None else as_whole(columns, "columns"))
+    return min(count, default if columns is None else whole_number(columns, "columns", 1))
 
 
 def as_choice(values: Any, count: int, name: str, what: str) -> list[int]:

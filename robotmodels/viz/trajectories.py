@@ -49,6 +49,7 @@ from .. import se3
 from .._arrays import Array, as_exact, as_number
 from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
 from ..trajectories.limits import MotionLimits
@@ -58,7 +59,7 @@ from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Sampled, Unit
 from .space import across, fill_cells, space
-from .style import COLUMN, INK, PAGE, PALETTE, Axes, Figure, Look, as_whole
+from .style import COLUMN, INK, PAGE, PALETTE, Axes, Figure, Look
 
 _EVENTS: dict[PathEventKind, tuple[str, Any, str]] = {
     PathEventKind.OUT_OF_REACH: ("out of reach", PALETTE[4], "o"),
@@ -233,7 +234,7 @@ def plot_pose_path(
     length = over_time.as_unit(unit)
     if length not in (Unit.METRE, Unit.MILLIMETRE):
         raise InvalidValueError(f"unit: expected a length, 'm' or 'mm', got {length.value!r}.")
-    count = as_whole(frames, "frames", 0)
+    count = whole_number(frames, "frames", 0)
     if path is not None and len(path.q) != len(T):
         raise ShapeError(f"path: expected the joints of these {len(T)} poses, got {len(path.q)}.")
     k = length.factor
