@@ -36,19 +36,19 @@ class Motion(Value, ABC):
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value (n,) of a derivative; infinite where the one below jumps."""
-        low, high = self.ends_of(order)
+        low, high = self._ends(order)
         if order:
             down, up = self.jumps(order - 1)
             low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
         return low, high
 
-    def ends_of(self, order: int) -> tuple[Array, Array]:
+    def _ends(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value (n,) of a derivative between jumps, here of samples."""
-        (values,) = self.derivatives(self.samples, (order,))
+        (values,) = self.derivatives(self._samples, (order,))
         return values.min(axis=0), values.max(axis=0)
 
     @property
-    def samples(self) -> Array:
+    def _samples(self) -> Array:
         """Times (N,) at which extremes are sought."""
         return np.linspace(0.0, self.duration, _SAMPLES)
 
@@ -95,7 +95,7 @@ class PiecewisePolynomial(Motion):
         piecewise_derivatives(*rows, np.asarray(orders, np.int64), out)
         return list(out[:, 0])
 
-    def ends_of(self, order: int) -> tuple[Array, Array]:
+    def _ends(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece."""
         live = self.lengths.T > 0.0
         low, high = ranges_of_pieces(self.coefficients, self.lengths.T, order)
@@ -222,14 +222,14 @@ class TimedMotion(Motion):
 
     def jumps(self, order: int) -> tuple[Any, Any]:
         """Whether a derivative jumps down, and up, between the pieces of the law."""
-        (x,) = self.derivatives(self.samples, (order,))
+        (x,) = self.derivatives(self._samples, (order,))
         ends = x.reshape(-1, _INSIDE.size, self.n)[:, [0, -1]]
         jump = np.append(ends[1:, 0] - ends[:-1, 1], np.zeros((1, self.n)), axis=0)
         size = _JUMP * np.abs(x).max()
         return jump.min(axis=0) < -size, jump.max(axis=0) > size
 
     @property
-    def samples(self) -> Array:
+    def _samples(self) -> Array:
         """Times inside the pieces of the law, six each."""
         live = self.law.lengths[0] > 0.0
         begin, lengths = self.law.breaks[0, :-1][live], self.law.lengths[0, live]
