@@ -34,7 +34,7 @@ def test_statistics_are_the_textbook_ones():
     assert np.isclose(found.condition, np.linalg.cond(A / np.linalg.norm(A, axis=0)))
     assert np.allclose(confidence_intervals(fit)[:, 1] - fit.x, t.ppf(0.975, 236) * s)
     for level in (0.0, 1.0, 95):
-        with pytest.raises(InvalidValueError, match="between 0 and 1"):
+        with pytest.raises(InvalidValueError, match="above 0 and below 1"):
             confidence_intervals(fit, level)
 
 

@@ -168,7 +168,10 @@ def test_torques_are_moved_in_every_recording(delay):
     assert moved.v.shape == moved.q.shape
     assert with_delay(moved, delay).delay == 2.0 * delay
     assert with_delay(log, 0.0) is log
-    for bad, words in ((20.0, "no recording is longer"), ([0.1, 0.2], "one number")):
+    for bad, words in (
+        (20.0, "no recording is longer"),
+        ([0.1, 0.2], "delay: expected a finite number"),
+    ):
         with pytest.raises(InvalidValueError, match=words):
             with_delay(log, bad)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite, nan
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,6 +118,17 @@ def as_number(
             words = f" of at most {LARGEST:g} in size"
         raise InvalidValueError(f"{name}: expected a finite number{words}, got {value!r:.80}.")
     return number
+
+
+def as_count(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
+    """A whole number within bounds, such as a number of samples."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):
+        to = "" if most is None else f" to {most}"
+        raise InvalidValueError(
+            f"{name}: expected a whole number from {least}{to}, got {value!r:.60}."
+        )
+    return int(value)
 
 
 def as_mask(

@@ -20,8 +20,7 @@ NEGLIGIBLE = 1e-11
 _LEVELS = (1e-4, 1e-8)
 """Residual column norms, relative to the largest, below which a column is postponed."""
 _ROUNDING = 1e-14
-_TALL = 4
-"""Rows per column above which a triangular factor is computed first."""
+_TALL = 4  # rows per column above which a triangular factor is computed first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,19 +52,14 @@ class ColumnBasis(Frozen):
     @property
     def dependent(self) -> NDArray[np.int64]:
         """Numbers of the dependent columns that have an effect."""
-        others = np.ones(len(self.distance), dtype=bool)
-        others[self.kept] = others[self.empty] = False
-        return np.flatnonzero(others)
+        return np.setdiff1d(np.arange(len(self.distance)), [*self.kept, *self.empty])
 
     @property
     def gap(self) -> tuple[float, float]:
         """Smallest distance of a kept column and largest of one that is not (1, 0 without any)."""
-        others = np.ones(len(self.distance), dtype=bool)
-        others[self.kept] = False
-        return (
-            float(self.distance[self.kept].min(initial=1.0)),
-            float(self.distance[others].max(initial=0.0)),
-        )
+        others = np.delete(self.distance, self.kept)
+        least = self.distance[self.kept].min(initial=1.0)
+        return float(least), float(others.max(initial=0.0))
 
 
 def column_basis(

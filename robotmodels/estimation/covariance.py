@@ -18,26 +18,20 @@ from .factor import Rows, TriangularFactors
 from .linear import LEAST_FREEDOM
 
 _MOST_LAGS = 60
-_UNCORRELATED = 5
-"""Successive lags without correlation that end the window."""
+_UNCORRELATED = 5  # successive lags without correlation that end the window
 _LEAST = 0.1
 """Least ratio of the variance with lags to that without; below it the lags are not used."""
-_LARGEST_LEVERAGE = 0.5
-"""Largest leverage of a segment in the jackknife."""
+_LARGEST_LEVERAGE = 0.5  # largest leverage of a segment in the jackknife
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelatedCovariance(Frozen):
-    """Covariance (b, b) of estimates for correlated residuals. Read-only.
+    """Covariance of estimates for correlated residuals. Read-only.
 
     Parameters
     ----------
-    covariance : ndarray, shape (b, b)
-        Covariance of the estimates.
-    lags : int
-        Number of lags of the window.
-    correlation : ndarray, shape (m,)
-        Correlation of successive residuals of each group.
+    covariance, lags, correlation : ndarray (b, b), int, ndarray (m,)
+        Of the estimates; of the window; of successive residuals of each group.
     """
 
     covariance: Array

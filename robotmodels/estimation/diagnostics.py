@@ -16,8 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .._arrays import Array, Frozen
-from ..errors import InvalidValueError
+from .._arrays import Array, Frozen, as_number
 from .nonlinear import NonlinearFit
 from .outlying import blocks_by_size
 
@@ -28,13 +27,8 @@ _LEVEL = 0.01
 class ResidualTest:
     """A statistical test of the residuals.
 
-    Parameters
-    ----------
-    statistic, p : float
-        Test statistic, NaN where there are too few rows; probability of so extreme a one if the
-        assumption holds.
-    sentence : str
-        Conclusion.
+    Its statistic, the probability of so extreme a one if the assumption holds (NaN where there are
+    too few rows), and the conclusion.
     """
 
     statistic: float
@@ -53,21 +47,16 @@ class FitDiagnostics(Frozen):
 
     Parameters
     ----------
-    relative_standard_errors : ndarray, shape (P,)
-        Standard errors relative to the parameters; infinite for a parameter that is 0.
-    correlation : ndarray, shape (P, P)
-        Correlation of the estimates; NaN for parameters without a finite standard error.
+    relative_standard_errors, correlation : ndarray, shapes (P,), (P, P)
+        Infinite for a parameter that is 0; NaN for parameters without a finite standard error.
     condition : float
         Condition number of the weighted Jacobian with the prior, columns scaled to length 1.
     chi_squared, normality, independence : ResidualTest
         Size of the residuals relative to sigma, their distribution, correlation of successive ones.
-    leverage : ndarray, shape (B,)
-        Effective number of parameters that each measurement determines, ordered by its number;
-        their sum is `NonlinearFit.freedom`.
-    influence : ndarray, shape (B,)
-        Cook's distance: square of the change of the estimate without the measurement, relative to
-        its covariance and the number of parameters; infinite where something is determined by this
-        measurement alone.
+    leverage, influence : ndarray, shape (B,)
+        Effective number of parameters that each measurement determines, by its number. Cook's
+        distance: square of the change of the estimate without it, relative to its covariance and
+        the number of parameters; infinite where it alone determines something.
     """
 
     relative_standard_errors: Array
@@ -107,10 +96,6 @@ def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:
     return FitDiagnostics(relative, correlation, condition, *tests, *_influence(fit))
 
 
-def _untested(reason: str, statistic: float = np.nan) -> ResidualTest:
-    return ResidualTest(statistic, np.nan, reason)
-
-
 def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     """Confidence intervals of single parameters, at a level between 0 and 1.
 
@@ -130,9 +115,7 @@ def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     """
     from scipy.special import ndtri, stdtrit
 
-    if not 0 < level < 1:
-        raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level!r}.")
-    tail = (1 + level) / 2
+    tail = (1 + as_number(level, "level", above=0.0, below=1.0)) / 2
     wide = ndtri(tail) if fit.sigma_known else stdtrit(max(fit.freedom_left, 0.0), tail)
     return fit.x[:, None] + wide * fit.standard_errors[:, None] * np.array([-1.0, 1.0])
 
@@ -160,7 +143,7 @@ def _chi_squared(fit: NonlinearFit) -> ResidualTest:
 
     statistic, left = float(fit.whitened @ fit.whitened), fit.freedom_left
     if left <= 0:
-        return _untested("There are no degrees of freedom: nothing can be tested.", statistic)
+        return ResidualTest(statistic, np.nan, "There are no degrees of freedom for a test.")
     p = min(1.0, 2 * min(float(chdtr(left, statistic)), float(chdtrc(left, statistic))))
     text = f"Residuals are {np.sqrt(statistic / left):.3g} times as large as stated"
     if p < _LEVEL:
@@ -172,7 +155,7 @@ def _normality(fit: NonlinearFit) -> ResidualTest:
     """Test of D'Agostino and Pearson: whether residuals without outliers are Gaussian."""
     z = fit.whitened[~np.isin(fit.block, fit.outliers)]
     if len(z) < 20 or not z.std() > 0:
-        return _untested("Too few rows (20 are needed) to test the distribution.")
+        return ResidualTest(np.nan, np.nan, "Too few rows (20 are needed) for this test.")
     from scipy.stats import normaltest
 
     statistic, p = map(float, normaltest(z))
@@ -192,10 +175,10 @@ def _independence(fit: NonlinearFit) -> ResidualTest:
     pairs = [(a, b) for a, b in both if len(a) == len(b)]
     a, b = np.concatenate([np.zeros((2, 0)), *pairs], axis=1)
     if len(a) < 20:
-        return _untested("Too few rows (20 pairs are needed) to test independence.")
+        return ResidualTest(np.nan, np.nan, "Too few rows (20 pairs are needed) for this test.")
     scale = float(np.sqrt((a @ a) * (b @ b)))
     if not scale > 0:
-        return _untested("There are no residuals to test.")
+        return ResidualTest(np.nan, np.nan, "There are no residuals to test.")
     correlation = float(a @ b) / scale
     p = float(erfc(abs(correlation) * np.sqrt(len(a) / 2)))
     text = "Successive measurements are not correlated."

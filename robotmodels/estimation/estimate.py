@@ -17,10 +17,7 @@ class EstimateStatus(Outcome):
     """Outcome of an estimation."""
 
     SOLVED = 0, "The parameters minimise the weighted squares of the residuals."
-    NOT_CONVERGED = (
-        1,
-        "The iterations ended before the parameters converged; use them with care.",
-    )
+    NOT_CONVERGED = 1, "The iterations ended before the parameters converged; use them with care."
     UNSTABLE = (
         2,
         "The simulated robot diverged, so that there are no parameters. Give the robot's own "
@@ -90,22 +87,13 @@ class Estimate(NamedValues):
 
     Parameters
     ----------
-    names : tuple of str
-        The b parameters.
-    values : ndarray, shape (b,)
-        SI units; NaN, like all that follows from them, where a simulation diverged.
-    covariance : ndarray, shape (b, b)
-        Covariance of the estimates.
+    names, values, covariance : tuple of str, ndarrays of shapes (b,) and (b, b)
+        The parameters, SI units; NaN where a simulation diverged.
     sigma : ndarray, shape (m,)
         Standard deviation of the residuals of each group of equations.
-    status : EstimateStatus
-        Outcome.
-    iterations : int
-        Iterations of the method; 1 for direct methods.
-    notes : tuple of str
-        Remarks on the result.
-    details : object
-        Further results of the method; None for most.
+    status, iterations, notes, details
+        Outcome; iterations of the method, 1 for direct ones; remarks; further results of the
+        method, None for most.
     """
 
     names: tuple[str, ...]

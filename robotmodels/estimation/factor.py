@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,32 +17,13 @@ from .._arrays import Array, Frozen, read_only
 from ..errors import InvalidValueError
 
 
-class Block(Protocol):
-    """Equations ``W @ x = y`` of m groups at k instants.
+class Rows(Protocol):
+    """Equations ``W @ x = y`` of m groups, in blocks of k instants that can be recomputed.
 
-    Shapes: W (k, m, b), y (k, m), use (k, m) bool: mask of used equations.
+    Shapes of a block: W (k, m, b), y (k, m), use (k, m) bool: mask of used equations.
     """
 
-    @property
-    def W(self) -> Array:
-        """Regressor."""
-        ...
-
-    @property
-    def y(self) -> Array:
-        """Right side."""
-        ...
-
-    @property
-    def use(self) -> NDArray[np.bool_]:
-        """Mask of used equations."""
-        ...
-
-
-class Rows(Protocol):
-    """Equations in blocks that can be recomputed."""
-
-    def blocks(self) -> Iterable[Block]:
+    def blocks(self) -> Iterable[Any]:
         """The blocks, in order."""
         ...
 
@@ -99,9 +80,6 @@ class TriangularFactors(Frozen):
 
     def with_names(self, names: tuple[str, ...]) -> TriangularFactors:
         """The equations with the other parameters set to zero."""
-        missing = [name for name in names if name not in self.names]
-        if missing:
-            raise InvalidValueError(f"names: {', '.join(missing)} are not parameters here.")
         columns = [*(self.names.index(name) for name in names), len(self.names)]
         factors = tuple(R[:, columns] for R in self.factors)
         return TriangularFactors(tuple(names), factors, self.counts, self.left_out)
@@ -122,11 +100,7 @@ def factors_of(
 def merged(first: TriangularFactors, second: TriangularFactors) -> TriangularFactors:
     """Factors of the equations of both."""
     if first.names != second.names or len(first.factors) != len(second.factors):
-        raise InvalidValueError(
-            f"equations: expected the same parameters and groups, got {len(first.names)} "
-            f"parameters of {len(first.factors)} groups and {len(second.names)} of "
-            f"{len(second.factors)}; make all with the same base parameters and form."
-        )
+        raise InvalidValueError("equations: make all with the same base parameters and form.")
     both = zip(first.factors, second.factors, strict=True)
     return TriangularFactors(
         first.names,
@@ -146,7 +120,7 @@ def merged_all(parts: Iterable[TriangularFactors]) -> TriangularFactors:
     return total
 
 
-def reduced(names: tuple[str, ...], blocks: Iterable[Block]) -> TriangularFactors:
+def reduced(names: tuple[str, ...], blocks: Iterable[Any]) -> TriangularFactors:
     """Triangular factors of blocks of equations in named parameters."""
     return merged_all(factors_of(names, block.W, block.y, block.use) for block in blocks)
 

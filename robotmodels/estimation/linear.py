@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, as_exact, as_floats
+from .._arrays import Array, Frozen, as_exact, as_number
 from ..errors import InvalidValueError
 from .estimate import Estimate, EstimateStatus
 from .factor import TriangularFactors, merged_all
@@ -19,12 +19,9 @@ from .factor import TriangularFactors, merged_all
 _ITERATIONS = 100
 LEAST_FREEDOM = 5.0
 """Residual degrees of freedom of a group below which the pooled variance is used."""
-_STILL = 1e-8
-"""Convergence tolerance: change of the parameters in standard errors."""
-_ROUNDING = 1e-8
-"""Least standard deviation of residuals, relative to the right side."""
-_PER_DECADE = 8
-"""Candidate prior strengths per decade."""
+_STILL = 1e-8  # convergence tolerance: change of the parameters in standard errors
+_ROUNDING = 1e-8  # least standard deviation of residuals, relative to the right side
+_PER_DECADE = 8  # candidate prior strengths per decade
 
 
 def ordinary(factors: TriangularFactors) -> Estimate:
@@ -189,9 +186,7 @@ def ridge(
         if not (d > 0.0).all():
             raise InvalidValueError(f"prior_errors: expected positive numbers, got {d.min():g}.")
     if strength is not None:
-        factor = float(as_floats(strength, "strength"))
-        if not factor >= 0.0:
-            raise InvalidValueError(f"strength: expected a number from 0, got {strength!r:.60}.")
+        factor = as_number(strength, "strength", least=0.0)
     else:
         factor = 1.0 if errors is not None else _strength(folds, x0, d, weights, R)
     U, s, Vt = np.linalg.svd(R * d)

@@ -118,23 +118,22 @@ def inverse_factor(R: Array, threshold: float = SINGULAR) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linear:
-    """Weighted rows and prior at a point, in singular directions; a step is ``-(basis @ y)``."""
+    """Weighted rows and prior at a point, in singular directions; a step is ``-(basis @ y)``.
+
+    Shapes: columns (P,), lengths, 1 for a column without effect; s (P,), V (P, P), singular values
+    and right vectors of the scaled columns; g (rank,), residuals along the left ones; basis (P,
+    rank), which makes the weighted rows orthonormal; curvature (rank, rank) of the loss along it,
+    None for squares. Freedom: the rank, less the share of the prior.
+    """
 
     columns: Array
-    """Lengths of the columns, shape (P,); 1 for a column without effect."""
     s: Array
-    """Singular values of the scaled columns, shape (P,)."""
     V: Array
-    """Their right singular vectors, as rows, shape (P, P)."""
     rank: int
     g: Array
-    """Residuals along the first left singular vectors, shape (rank,)."""
     basis: Array
-    """Matrix that makes the weighted rows orthonormal, shape (P, rank)."""
     freedom: float
-    """Effective number of parameters: the rank, less the share of the prior."""
     curvature: Array | None
-    """Second derivative of the loss along the basis, shape (rank, rank); None for squares."""
 
     def step(self, damping: float) -> tuple[Array, float, float]:
         """Step, predicted decrease of the sum, and length in scaled parameters."""

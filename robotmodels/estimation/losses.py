@@ -29,6 +29,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
 class Loss(Enum):
     """Loss of a measurement as a function of the length of its residuals divided by their scale.
 
+    The influence of an outlier grows with its length (squares), is bounded (Huber: linear beyond
+    the constant), decreases (Cauchy: logarithms), or is zero (Tukey's biweight).
+
     Examples
     --------
     >>> [loss.name for loss in Loss]
@@ -36,13 +39,9 @@ class Loss(Enum):
     """
 
     SQUARES = "squares"
-    """Least squares."""
     HUBER = "Huber"
-    """Squares, linear beyond the constant: the influence of an outlier is bounded."""
     CAUCHY = "Cauchy"
-    """Logarithms: the influence of an outlier decreases with its length."""
     TUKEY = "Tukey"
-    """Biweight: an outlier beyond the constant has no influence at all."""
 
 
 def loss_terms(loss: Loss, u: Array, c: Array) -> tuple[Array, Array, Array]:
@@ -119,9 +118,8 @@ def _moments(loss: Loss, k: int, c: float) -> tuple[float, float]:
     log_density = (k - 1) * np.log(u) - u * u / 2 - (k / 2 - 1) * math.log(2) - math.lgamma(k / 2)
     share = _WEIGHTS * half * np.exp(log_density) / k
     _, weight, slope = loss_terms(loss, u, np.full_like(u, c))
-    return float((share * (slope + (k - 1) * weight)).sum()), float(
-        (share * (weight * u) ** 2).sum()
-    )
+    means = share * (slope + (k - 1) * weight), share * (weight * u) ** 2
+    return float(means[0].sum()), float(means[1].sum())
 
 
 @lru_cache(maxsize=256)

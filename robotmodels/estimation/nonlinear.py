@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, as_number
+from .._arrays import Array, Frozen, as_count, as_number
 from .._choices import chosen
 from .._outcomes import Outcome
-from ..errors import InvalidValueError
 from .linearised import (
     SINGULAR,
     Linear,
@@ -33,24 +32,15 @@ from .prior import Prior
 
 _INVISIBLE = 1e-13
 """Rounding tolerance of the sum, relative; below it steps are compared by their lengths."""
-_LEAST_SCALE = 1e-9
-"""Least scale relative to the longest residual."""
+_LEAST_SCALE = 1e-9  # least scale relative to the longest residual
 
 
 class FitStatus(Outcome):
     """Outcome of a fit."""
 
     CONVERGED = 0, "The fit has converged: further steps are rounding."
-    STALLED = (
-        1,
-        "The fit has stalled: no step decreases the sum at a nonzero gradient; the Jacobian may "
-        "be wrong, or the residuals not smooth.",
-    )
-    ITERATION_LIMIT = (
-        2,
-        "The fit has reached the limit of its iterations before its steps were small; start nearer "
-        "or allow more iterations.",
-    )
+    STALLED = 1, "No step decreases the sum: the Jacobian is wrong, or residuals are not smooth."
+    ITERATION_LIMIT = 2, "The iterations ended too early; start nearer or allow more of them."
     SINGULAR = (
         3,
         "The measurements do not determine all parameters: some combinations have no effect; "
@@ -67,13 +57,12 @@ class NonlinearFit(Frozen):
     x, covariance : ndarray, shapes (P,), (P, P)
         The estimate; its covariance is infinite for undetermined parameters, NaN where there are no
         more rows than parameters and the noise is to be estimated.
-    status : FitStatus
-        Outcome; ``status.sentence`` is the explanation.
-    scale : float
+    status, iterations : FitStatus, int
+        Outcome; ``status.sentence`` is the explanation. Number of steps.
+    scale, freedom : float
         Standard deviation of the residuals in units of the stated ones: from the sum of squares, or
-        from the median if the loss is robust.
-    freedom : float
-        Effective number of parameters: less than P with a prior or where directions were dropped.
+        from the median if the loss is robust. Effective number of parameters: less than P with a
+        prior or where directions were dropped.
     residuals, jacobian, sigma, block, weights : ndarray, shapes (M,), (M, P), (M,), (M,), (M,)
         Rows at ``x`` and their derivatives, in their units; stated standard deviations; measurement
         of each row; weights of the loss, from 0 to 1, equal for the rows of a measurement.
@@ -84,12 +73,9 @@ class NonlinearFit(Frozen):
         As given to `fit_nonlinear`.
     singular_values : ndarray, shape (P,)
         Singular values of the weighted Jacobian with the prior, scaled columns; largest first.
-    dropped : ndarray, shape (k, P)
+    dropped, basis : ndarray, shapes (k, P), (P, rank)
         Directions without effect (or under the truncation), as rows, in units of the parameters.
-    basis : ndarray, shape (P, rank)
         Product with which the weighted rows, with those of the prior, are orthonormal.
-    iterations : int
-        Number of steps.
     """
 
     x: Array
@@ -124,7 +110,7 @@ class NonlinearFit(Frozen):
     @property
     def rank(self) -> int:
         """Number of combinations of parameters that are determined."""
-        return len(self.x) - len(self.dropped)
+        return self.basis.shape[1]
 
     @property
     def whitened(self) -> Array:
@@ -211,8 +197,7 @@ def fit_nonlinear(
     threshold = SINGULAR
     if truncation is not None:
         threshold = as_number(truncation, "truncation", least=0.0, below=1.0)
-    if isinstance(iterations, bool) or int(iterations) != iterations or iterations < 1:
-        raise InvalidValueError(f"iterations: expected a number from 1, got {iterations!r}.")
+    iterations = as_count(iterations, "iterations")
     problem, point = checked_problem(linearise, x0, sigma, block, prior)
     terms, scale, point, linear, status, count = _minimised(
         problem, loss, point, threshold, tolerance, iterations, sigma_known

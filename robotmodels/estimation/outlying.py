@@ -20,8 +20,7 @@ FALSE_OUTLIERS = 0.05
 """Expected number of false outliers in a fit of Gaussian residuals."""
 _AS_BAD = 0.7
 """Measurements with deleted residuals above this share of the longest are deleted with it."""
-_ALONE = 1e-8
-"""Least 1 - leverage of a row with a deleted residual."""
+_ALONE = 1e-8  # least 1 - leverage of a row with a deleted residual
 
 
 def blocks_by_size(block: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:

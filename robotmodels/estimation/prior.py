@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_floats, as_reals, read_only
+from .._arrays import Array, Rebuilt, as_floats, as_number, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 
 
@@ -40,7 +40,8 @@ class Prior(Rebuilt):
     def __post_init__(self) -> None:
         object.__setattr__(self, "mean", read_only(as_floats(self.mean, "mean")))
         object.__setattr__(self, "sigma", read_only(as_reals(self.sigma, "sigma")))
-        object.__setattr__(self, "strength", float(self.strength))
+        strength = as_number(self.strength, "strength", least=0.0)
+        object.__setattr__(self, "strength", strength)
         if self.mean.ndim != 1 or self.sigma.shape != self.mean.shape:
             raise ShapeError(
                 f"Prior: expected mean and sigma of one shape (P,), got {self.mean.shape} and "
@@ -51,17 +52,11 @@ class Prior(Rebuilt):
                 "Prior: expected positive standard deviations (infinite for none), got "
                 f"{self.sigma.min()}; leave a parameter that is known exactly out of the fit."
             )
-        if not (np.isfinite(self.strength) and self.strength >= 0):
-            raise InvalidValueError(f"Prior: expected a strength from 0, got {self.strength!r}.")
 
     @classmethod
     def none(cls, parameters: int) -> Prior:
         """Prior without information on P parameters."""
         return cls(np.zeros(parameters), np.full(parameters, np.inf))
-
-    def with_strength(self, strength: float) -> Prior:
-        """The same with another factor on the information."""
-        return replace(self, strength=strength)
 
     def rows(self, x: ArrayLike) -> tuple[Array, Array]:
         """Values of the added rows at x (P,), and the diagonal of their Jacobian (P,)."""

@@ -13,30 +13,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Frozen, as_floats
 from .._outcomes import Outcome
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
 from .estimate import Estimate
 from .factor import TriangularFactors, triangle
 from .linear import check_count, first_weights, residual_std, weighted
 
 _SOLVABLE = 1e-8
 """Least component of the right side in the last singular vector; below it there is no solution."""
-_EQUAL = 0.999
-"""Largest ratio of the two smallest singular values for a determined solution."""
+_EQUAL = 0.999  # largest ratio of the two smallest singular values for a determined solution
 
 
 class TotalStatus(Outcome):
     """Outcome of total least squares."""
 
     UNIQUE = 0, "One combination of the columns explains the right side with the least noise."
-    ILL_POSED = (
-        1,
-        "Several combinations of the columns explain the right side equally well; the parameters "
-        "are one of them, and their standard errors are large.",
-    )
+    ILL_POSED = 1, "Several combinations explain it equally well; the parameters are one of them."
     NO_SOLUTION = (
         2,
-        "The combination with the least noise does not contain the right side, so that total least "
-        "squares has no solution; the parameters are those of weighted least squares.",
+        "The combination with the least noise does not contain the right side: there is no "
+        "solution; the parameters are those of weighted least squares.",
     )
 
 
@@ -100,18 +95,13 @@ def _noise_levels(
     exact: NDArray[np.bool_],
 ) -> tuple[Array, tuple[str, ...]]:
     """Standard deviations of the noise of columns and right side, in weighted equations."""
-    given = as_floats(noise, "noise")
+    given, b = as_floats(noise, "noise"), len(values)
     R, y, rest = system
-    b = len(values)
-    if given.shape not in ((), (b + 1,)):
-        raise ShapeError(
-            f"noise: expected one relative number, or the standard deviations of {b} columns and "
-            f"of the right side, shape ({b + 1},), got {given.shape}."
-        )
-    if (given < 0.0).any() or (given.ndim and not given[-1] > 0.0):
+    wrong = (given < 0.0).any() or (given.ndim and not given[-1] > 0.0)
+    if given.shape not in ((), (b + 1,)) or wrong:
         raise InvalidValueError(
-            "noise: expected standard deviations from 0, that of the right side positive, got "
-            f"{noise!r:.80}."
+            f"noise: expected one relative number, or the standard deviations of {b} columns (from "
+            f"0) and of the right side (above 0), shape ({b + 1},), got {noise!r:.80}."
         )
     if given.ndim:
         # mean of the group weights, by their share of the equations

@@ -36,49 +36,12 @@ from .result_file import write_result
 from .signals import Processing
 from .validation import Errors, Validation
 
-__all__ = [
-    "CenterOfMassBox",
-    "CenterOfMassEllipsoid",
-    "Controller",
-    "Didim",
-    "Errors",
-    "ExcitingTrajectory",
-    "IdentificationResult",
-    "Instrumental",
-    "Irls",
-    "KnownPayload",
-    "LoadedLog",
-    "Log",
-    "Ols",
-    "OutputError",
-    "Processing",
-    "Recursive",
-    "Ridge",
-    "Robust",
-    "Sequential",
-    "Total",
-    "Validation",
-    "Wls",
-    "check_log",
-    "choose_processing",
-    "compare_methods",
-    "consistent_robot",
-    "correlated_covariance",
-    "equations",
-    "exciting_trajectory",
-    "fit",
-    "fit_friction",
-    "hausman_test",
-    "identify_drive_gains",
-    "identify_payload",
-    "predicted_torque",
-    "read_log",
-    "reduce_equations",
-    "report",
-    "simulated_log",
-    "synchronisation",
-    "tuned_controller",
-    "validate",
-    "write_result",
-    "write_trajectory",
-]
+__all__ = ["CenterOfMassBox", "CenterOfMassEllipsoid", "Controller", "Didim", "Errors"]
+__all__ += ["ExcitingTrajectory", "IdentificationResult", "Instrumental", "Irls", "KnownPayload"]
+__all__ += ["LoadedLog", "Log", "Ols", "OutputError", "Processing", "Recursive", "Ridge", "Robust"]
+__all__ += ["Sequential", "Total", "Validation", "Wls", "check_log", "choose_processing"]
+__all__ += ["compare_methods", "consistent_robot", "correlated_covariance", "equations"]
+__all__ += ["exciting_trajectory", "fit", "fit_friction", "hausman_test", "identify_drive_gains"]
+__all__ += ["identify_payload", "predicted_torque", "read_log", "reduce_equations", "report"]
+__all__ += ["simulated_log", "synchronisation", "tuned_controller", "validate", "write_result"]
+__all__ += ["write_trajectory"]

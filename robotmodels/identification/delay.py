@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, as_floats
+from .._arrays import Array, Rebuilt, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
@@ -26,16 +26,8 @@ class SynchronisationStatus(Outcome):
     """Outcome of the delay estimation."""
 
     FOUND = 0, "The torques fit the positions best at one delay."
-    AT_THE_END = (
-        1,
-        "The torques fit best at an end of the delays tried; extend the range (within=), and check "
-        "whether positions and torques are of the same motion.",
-    )
-    FLAT = (
-        2,
-        "The torques fit equally well at every delay tried; the motion is too slow to "
-        "determine the delay.",
-    )
+    AT_THE_END = 1, "The torques fit best at an end of the delays tried; extend them (within=)."
+    FLAT = 2, "The torques fit equally well at every delay tried: the motion is too slow."
 
     @property
     def is_success(self) -> bool:
@@ -111,11 +103,8 @@ def synchronisation(
     """
     check_log_and_model(log, model)
     fc = default_cutoff(log) if cutoff is None else checked_cutoff(log, cutoff)
-    span = max(0.02, 5.0 * log.dt) if within is None else float(as_floats(within, "within"))
-    if not span >= log.dt:
-        raise InvalidValueError(
-            f"within: expected at least a sampling period ({log.dt:g} s), got {span:g}."
-        )
+    within = max(0.02, 5.0 * log.dt) if within is None else within
+    span = as_number(within, "within", least=log.dt)
     # filtered torques change little over a step, so that a spline interpolates their residuals
     step = 0.1 / fc / np.pi
     count = int(np.ceil(span / step))
@@ -157,13 +146,7 @@ def check_log_and_model(log: Log, model: RobotModel) -> None:
 
 def checked_cutoff(log: Log, cutoff: float) -> float:
     """User-given cutoff in Hz, below half the sampling rate."""
-    band = float(as_floats(cutoff, "cutoff"))
-    if not 0.0 < band < 0.5 / log.dt:
-        raise InvalidValueError(
-            "cutoff: expected a frequency between 0 and half the sampling rate "
-            f"({0.5 / log.dt:g} Hz), got {cutoff!r}."
-        )
-    return band
+    return as_number(cutoff, "cutoff", above=0.0, below=0.5 / log.dt)
 
 
 def default_cutoff(log: Log) -> float:

@@ -40,19 +40,14 @@ from .loads import (
 )
 from .signals import Processing
 
-_SIGNIFICANT = 3.0
-"""Least significant gain, in standard errors."""
+_SIGNIFICANT = 3.0  # least significant gain, in standard errors
 
 
 class GainStatus(Outcome):
     """Outcome of the identification of drive gains."""
 
     SOLVED = 0, "The gains are those that fit all logs best."
-    NOT_IDENTIFIABLE = (
-        1,
-        "Some gains do not differ from zero by three standard errors; use a motion that excites "
-        "the joints together, or longer logs.",
-    )
+    NOT_IDENTIFIABLE = 1, "Some gains are not significant; excite the joints together, or longer."
     LOAD_INSIGNIFICANT = (
         2,
         "The known load is not significant, so that the scale of the gains is undetermined; use a "

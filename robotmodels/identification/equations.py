@@ -21,17 +21,15 @@ from ..model import RobotModel
 from .forms import FORMS, Block, EquationForm, EquationSource
 from .signals import Piece, Processing, pieces, slice_with_margin
 
-_KEPT_BYTES = 2**26
-"""Largest size of the block cache, bytes; other blocks are recomputed."""
+_KEPT_BYTES = 2**26  # largest size of the block cache, bytes; other blocks are recomputed
 
 
 @dataclass(slots=True)
 class _Cache:
-    """Blocks of the first pieces of a log for the robot of a base, in columns ``names``."""
+    """Blocks of the first pieces of some equations, in all columns of these."""
 
-    base: BaseParameters
-    names: tuple[str, ...]
-    blocks: dict[tuple[Log, Processing, EquationForm, Piece], Block] = field(default_factory=dict)
+    whole: Equations
+    blocks: dict[Piece, Block] = field(default_factory=dict)
     size: int = 0
 
 
@@ -65,7 +63,7 @@ class Equations(EquationSource):
 
     def cached(self) -> Equations:
         """The same equations with a cache of blocks."""
-        return replace(self, cache=_Cache(self.base, self.names))
+        return replace(self, cache=_Cache(self.uncached()))
 
     def uncached(self) -> Equations:
         """The same equations without a cache."""
@@ -78,25 +76,25 @@ class Equations(EquationSource):
     def block(self, piece: Piece) -> Block:
         """Equations of a piece; read-only."""
         cache = self.cache
-        if cache is None or not self._has_columns_of(cache.base):
+        if cache is None or cache.whole._rows != self._rows:
             return FORMS[self.form](self, piece)
-        key = self.log, self.processing, self.form, piece
-        block = cache.blocks.get(key)
+        block = cache.blocks.get(piece)
         if block is None:
-            block = FORMS[self.form](replace(self, names=cache.names), piece)
+            block = FORMS[self.form](cache.whole, piece)
             size = sum(x.nbytes for x in (block.t, block.W, block.y, block.use, block.v))
             if cache.size + size <= _KEPT_BYTES:
                 cache.size += size
-                cache.blocks[key] = block
-        if self.names == cache.names:
+                cache.blocks[piece] = block
+        if self.names == cache.whole.names:
             return block
-        columns = [cache.names.index(name) for name in self.names]
+        columns = [cache.whole.names.index(name) for name in self.names]
         return replace(block, W=np.take(block.W, columns, axis=2))
 
-    def _has_columns_of(self, base: BaseParameters) -> bool:
-        """Whether a base has the same columns: robot, drives and friction, not the regrouping."""
-        same = self.base.model is base.model and self.base.friction is base.friction
-        return same and self.base.drive == base.drive
+    @property
+    def _rows(self) -> tuple[Any, ...]:
+        """All that the equations depend on: robot, drives and friction, not the regrouping."""
+        base = self.base
+        return base.model, base.friction, base.drive, self.log, self.processing, self.form
 
     def blocks(self) -> Iterator[Block]:
         """Equations of the whole log, piece by piece."""
@@ -162,7 +160,6 @@ def reduce_equations(
     system: Equations | Iterable[Equations],
     executor: Executor | None = None,
     progress: Progress = None,
-    window: int | None = None,
 ) -> TriangularFactors:
     """Reduce equations to one triangular factor for each group (joint).
 
@@ -176,8 +173,6 @@ def reduce_equations(
     executor, progress
         As for `fit`; also a cluster (``client.get_executor()`` of Dask). A task contains the
         samples of its piece and the margin of the filters, not the whole log.
-    window : int, optional
-        Largest number of pieces in work at a time, default twice the processors and 2.
 
     Returns
     -------
@@ -199,14 +194,11 @@ def reduce_equations(
     8
     """
     systems = (system,) if isinstance(system, Equations) else system
-    if window is not None and window < 1:
-        raise InvalidValueError(f"window: expected at least one piece at a time, got {window}.")
-
     work = Workers(executor, progress)
 
     def leaves() -> Iterator[TriangularFactors]:
         fraction = 0.0
-        for factors, fraction in results(_tasks(systems, executor is not None), executor, window):
+        for factors, fraction in results(_tasks(systems, executor is not None), executor):
             yield factors
             if fraction > 0.0:
                 work.done(fraction)

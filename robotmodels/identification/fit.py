@@ -35,8 +35,7 @@ from .signals import Processing
 from .uncertainty import with_uncertainty
 from .validation import Validation, friction_ramp, no_errors, poor_prediction, prediction_errors
 
-_NO_EFFECT = 1e-7
-"""Rank tolerance: residual column norm relative to the largest."""
+_NO_EFFECT = 1e-7  # rank tolerance: residual column norm relative to the largest
 _SPARE = 0.9
 _ONE_EQUATION = (
     "In equations of power or energy, noise of the velocities enters both sides: parameters may be "
@@ -187,29 +186,24 @@ def _equations(
 
     Where dead bands leave too few equations, the decimation is reduced.
     """
-    given = checked_processing(processing, log)
-    groups = log.n if form.by_joint else 1
 
-    def made(decimation: int | None) -> Equations:
-        if isinstance(given, Processing):
-            choice = given
-        else:
-            options = given | {"decimation": decimation}
-            choice = processing_for(base, log, **options, groups=groups)
+    def made(choice: Processing, progress: Progress) -> tuple[Equations, TriangularFactors]:
         if not form.by_joint:
             choice = replace(choice, notes=(*choice.notes, _ONE_EQUATION))
-        return equations(base, log, choice, form).cached()
+        system = equations(base, log, choice, form).cached()
+        return system, reduced(system, executor, progress)
 
-    fixed = isinstance(given, Processing)
-    decimation = None if fixed else given["decimation"]
-    system = made(decimation)
-    factors = reduced(system, executor, progress)
+    given = checked_processing(processing, log)
+    if isinstance(given, Processing):
+        return made(given, progress)
+    groups = log.n if form.by_joint else 1
+    system, factors = made(processing_for(base, log, **given, groups=groups), progress)
     share = factors.rows / (LEAST_EQUATIONS * len(base))
     step = system.processing.decimation
-    if not fixed and decimation is None and share < 1.0 < step:
+    if given["decimation"] is None and share < 1.0 < step:
         # with a margin, since the excluded samples depend on the cutoff
-        system = made(max(1, int(_SPARE * share * step)))
-        factors = reduced(system, executor)
+        given = given | {"decimation": max(1, int(_SPARE * share * step))}
+        return made(processing_for(base, log, **given, groups=groups), None)
     return system, factors
 
 

@@ -32,12 +32,9 @@ from .signals import Piece, Processing, Signals, decimation_window, piece_signal
 Mask = NDArray[np.bool_]
 Grid = tuple[int, int, int]
 """Decimation, first of the decimated samples, and their number."""
-_CHUNK, _MOMENTUM_CHUNK = 1024, 128
-"""Largest number of samples in a regressor chunk."""
-_LEAST_WEIGHT = 0.5
-"""Share of the decimation window that must lie outside the dead band."""
-_DERIVATIVE = (3 / 4, -3 / 20, 1 / 60)
-"""Weights of central differences of order six."""
+_CHUNK, _MOMENTUM_CHUNK = 1024, 128  # largest number of samples in a regressor chunk
+_LEAST_WEIGHT = 0.5  # share of the decimation window that must lie outside the dead band
+_DERIVATIVE = (3 / 4, -3 / 20, 1 / 60)  # weights of central differences of order six
 _INTEGRAL = np.array([11.0, -93.0, 802.0, 802.0, -93.0, 11.0]) / 1440.0
 """Weights of the integral between the two middle ones of six samples (interpolating polynomial)."""
 SHORT = 3

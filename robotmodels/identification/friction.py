@@ -41,11 +41,9 @@ from .signals import Processing
 _Curve = Callable[[Array, Array, Array, Array], tuple[Array, Array, Array]]
 """From W (k, n, b), velocities, b parameters and curve parameters (n, c): W with the slopes of the
 torque, columns of the curve parameters (k, n, c), torque of the curve (k, n)."""
-_GRID = 16
-"""Stribeck velocities that are tried first, for each joint and exponent."""
+_GRID = 16  # Stribeck velocities that are tried first, for each joint and exponent
 _SOLVER: dict[str, Any] = {"x_scale": "jac", "xtol": 1e-9, "ftol": 1e-11, "gtol": None}
-_SIGNIFICANT = 1e-3
-"""Significance level of a friction curve."""
+_SIGNIFICANT = 1e-3  # significance level of a friction curve
 
 
 class FrictionStatus(Outcome):

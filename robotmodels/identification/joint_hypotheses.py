@@ -23,13 +23,10 @@ from .delay import SMOOTH_DRIVE, motor_speeds
 _LIKELY, _CERTAIN = np.log(2.0), np.log(3.0)
 """Least mean log ratio of residual variances of a doubtful and of a certain hypothesis; smaller
 ratios are explained by errors of the model."""
-_SIGNIFICANT = 4.0
-"""Least mean difference of log-likelihoods, in standard errors."""
-_REVERSALS = 6
-"""Least number of reversals of a joint for a certain hypothesis."""
+_SIGNIFICANT = 4.0  # least mean difference of log-likelihoods, in standard errors
+_REVERSALS = 6  # least number of reversals of a joint for a certain hypothesis
 _ITERATIONS = 4
-_FLOOR = 1e-6
-"""Least residual variance relative to the torque; smaller ones are equal."""
+_FLOOR = 1e-6  # least residual variance relative to the torque; smaller ones are equal
 ADVICE = {
     FindingKind.WRONG_SIGN: "Use signs= of read_log to reverse position and torque together, or "
     "negative drive_gains= to reverse the torque alone.",

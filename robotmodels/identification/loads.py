@@ -32,8 +32,7 @@ from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
-_DEPENDENT = 1e-10
-"""Rank tolerance: singular value relative to the largest."""
+_DEPENDENT = 1e-10  # rank tolerance: singular value relative to the largest
 
 
 def equations_of(

@@ -15,8 +15,7 @@ from .methods.recursive import Recursive
 from .methods.robust import Robust
 from .methods.sequential import Sequential
 
-_OBJECTS = ("prior", "controller")
-"""Options that are objects and have no text form."""
+_OBJECTS = ("prior", "controller")  # options that are objects and have no text form
 _WORDS = {"true": "True", "false": "False", "none": "None"}
 
 _OF_MEASURED_MOTION = (Ols, Wls, Irls, Robust, Total, Ridge, Sequential, Recursive)

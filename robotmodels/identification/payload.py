@@ -34,8 +34,7 @@ from .methods.base import check_solved
 from .result import IdentificationResult
 from .signals import Processing
 
-_SIGNIFICANT = 3.0
-"""Least significant value of a parameter, in standard errors."""
+_SIGNIFICANT = 3.0  # least significant value of a parameter, in standard errors
 
 
 class PayloadStatus(Outcome):
@@ -43,15 +42,8 @@ class PayloadStatus(Outcome):
 
     COMPLETE = 0, "All ten parameters are identified."
     PARTIAL = 1, "Only some of the ten parameters, or combinations, are identifiable."
-    INSIGNIFICANT = (
-        2,
-        "No parameter differs from zero by three standard errors: no load is visible.",
-    )
-    NO_FEASIBLE_BODY = (
-        3,
-        "The solver found no physically consistent body; the parameters are those of least squares "
-        "without this condition.",
-    )
+    INSIGNIFICANT = 2, "No parameter differs from zero by three standard errors: there is no load."
+    NO_FEASIBLE_BODY = 3, "No physically consistent body was found; these are least squares alone."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -20,8 +20,7 @@ from .forms import moving_joints
 from .signals import central_differences, zero_phase
 from .weak_prior import plausible_sizes
 
-_ROWS, _PER_CUTOFF = 4000, 2.5
-"""Largest number of rows, and rows per period of the cutoff."""
+_ROWS, _PER_CUTOFF = 4000, 2.5  # largest number of rows, and rows per period of the cutoff
 
 
 @dataclass(frozen=True, slots=True, eq=False)

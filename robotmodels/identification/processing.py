@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_count, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
@@ -24,8 +24,7 @@ MOST_BIAS = 0.1
 """Largest predicted bias by noise in the regressor, in standard errors."""
 _OF_MOTION, _EQUATIONS_OF_MOTION = 10.0, 2.5
 """Cutoff of the positions and least cutoff of the equations, relative to the motion frequency."""
-_NYQUIST = 0.4
-"""Highest cutoff of the positions, relative to the sampling rate."""
+_NYQUIST = 0.4  # highest cutoff of the positions, relative to the sampling rate
 _HIGHEST, _STEP, _WIDTH = 15.0, 1.3, 2.5
 """Highest cutoff of the equations in Hz (joints are flexible above); ratio of the cutoffs that are
 tried; cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
@@ -222,10 +221,7 @@ def _edges(log: Log, edges: float | None, band: float | None, notes: list[str]) 
     if edges is None:
         cut = 0 if band is None else int(np.ceil(2.0 / (band * log.dt)))
     else:
-        seconds = float(as_floats(edges, "edges"))
-        if not seconds >= 0.0:
-            raise InvalidValueError(f"edges: expected seconds from 0, got {edges!r}.")
-        cut = round(seconds / log.dt)
+        cut = round(as_number(edges, "edges", least=0.0) / log.dt)
     if 2 * cut >= _longest(log):
         raise InvalidValueError(
             f"edges: {cut} samples are cut at both ends, but the longest recording has "
@@ -245,13 +241,7 @@ def _edges(log: Log, edges: float | None, band: float | None, notes: list[str]) 
 
 def _checked_decimation(log: Log, step: int) -> int:
     """A decimation within the longest recording."""
-    longest = _longest(log)
-    if not isinstance(step, (int, np.integer)) or not 1 <= step <= longest:
-        raise InvalidValueError(
-            f"decimation: expected a whole number from 1 to {longest} (samples of the longest "
-            f"recording), got {step!r}."
-        )
-    return int(step)
+    return as_count(step, "decimation", most=_longest(log))
 
 
 def _filtered(band: float) -> str:

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from ..minimal_parameters import StandardParameters
 
 _PAIRS = 12
-_WORSE = 1.5
-"""Ratio of held-out to in-sample errors above which joints are named."""
+_WORSE = 1.5  # ratio of held-out to in-sample errors above which joints are named
 _GOOD_CONDITION = 100.0
 
 

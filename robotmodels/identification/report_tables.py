@@ -71,8 +71,7 @@ def weak_parameters(estimate: Estimate) -> tuple[str, ...]:
 
 
 _NORMAL = 1.959964
-_WIDTH = 29
-"""Columns of text for the standard parameters of a base parameter."""
+_WIDTH = 29  # columns of text for the standard parameters of a base parameter
 _ROUNDING = 1e-9
 
 

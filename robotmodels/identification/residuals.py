@@ -18,8 +18,7 @@ from .equations import Equations
 _LAGS = 40
 SIGNIFICANCE = 0.01
 """Significance level of the residual tests."""
-_FEW = 20
-"""Least number of equations for the residual tests."""
+_FEW = 20  # least number of equations for the residual tests
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +14,6 @@ from ..estimation.estimate import Estimate, EstimateStatus, NamedValues
 from ..estimation.factor import TriangularFactors
 from ..logs import Log
 from ..logs.log import check_is_log
-from ..minimal_parameters import BaseParameters
-from ..model import RobotModel
 from .equations import Equations
 from .methods.base import Method, check_solved
 from .validation import Errors, Validation, parameter_torque, prediction_errors
@@ -59,35 +58,12 @@ class IdentificationResult(NamedValues):
     details: FitDetails
     notes: tuple[str, ...]
 
-    @property
-    def model(self) -> RobotModel:
-        """The given robot."""
-        return self.equations.model
-
-    @property
-    def base(self) -> BaseParameters:
-        """Base parameters, with the unidentifiable ones regrouped."""
-        return self.equations.base
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The b identified parameters."""
-        return self.estimate.names
-
-    @property
-    def values(self) -> Array:
-        """Their values, SI units, shape (b,)."""
-        return self.estimate.values
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the values, corrected for correlated residuals, shape (b, b)."""
-        return self.estimate.covariance
-
-    @property
-    def status(self) -> EstimateStatus:
-        """Outcome of the identification."""
-        return self.estimate.status
+    model = property(attrgetter("equations.model"), doc="The given robot.")
+    base = property(attrgetter("equations.base"), doc="Base parameters, unidentifiable regrouped.")
+    names = property(attrgetter("estimate.names"), doc="The b identified parameters.")  # type: ignore[assignment]
+    values = property(attrgetter("estimate.values"), doc="SI units, shape (b,).")  # type: ignore[assignment]
+    covariance = property(attrgetter("estimate.covariance"), doc="Shape (b, b).")  # type: ignore[assignment]
+    status = property(attrgetter("estimate.status"), doc="`EstimateStatus`.")  # type: ignore[assignment]
 
     @property
     def base_values(self) -> Array:

@@ -11,22 +11,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Rebuilt, as_count, read_only
 from ..errors import InvalidValueError
 from ..logs import Log
 
 PIECE = 16384
 """Samples per piece; fixed, so that results do not depend on the number of workers."""
-_INSTANTS = 4096
-"""Largest number of equation instants in a piece, which bounds memory."""
-_BESIDE = 16
-"""Samples beyond the decimation window that some equation forms use."""
-_SETTLED = 1e-13
-"""Relative filter transient after the settling time."""
+_INSTANTS = 4096  # largest number of equation instants in a piece, which bounds memory
+_BESIDE = 16  # samples beyond the decimation window that some equation forms use
+_SETTLED = 1e-13  # relative filter transient after the settling time
 _DIFFERENCES = {4: (2 / 3, -1 / 12), 6: (3 / 4, -3 / 20, 1 / 60)}
 """Weights of the central differences of orders 4 and 6."""
-_HALF_WINDOW = 5
-"""Half length of the decimation's window, in samples after decimation."""
+_HALF_WINDOW = 5  # half length of the decimation's window, in samples after decimation
 HALF = 0.4
 """Frequency at which the gain of the decimation's window is 1/2, in sampling rates after it."""
 _SMEAR = 0.3
@@ -70,8 +66,7 @@ class Processing(Rebuilt):
     notes: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        if not isinstance(self.order, (int, np.integer)) or self.order < 1:
-            raise InvalidValueError(f"order: expected a whole number from 1, got {self.order!r}.")
+        as_count(self.order, "order")
         if self.accuracy not in (2, *_DIFFERENCES):
             raise InvalidValueError(f"accuracy: expected 2, 4 or 6, got {self.accuracy!r}.")
         object.__setattr__(self, "dead_band", read_only(self.dead_band))

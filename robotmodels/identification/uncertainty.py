@@ -24,8 +24,7 @@ from .signals import signals
 from .weak_prior import plausible_sizes, shrunk
 
 _SEGMENTS = 25
-_NOTED = 1.5
-"""Least jackknife inflation factor for a note."""
+_NOTED = 1.5  # least jackknife inflation factor for a note
 
 
 def with_uncertainty(

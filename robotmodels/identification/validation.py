@@ -120,8 +120,7 @@ def _rounded_sign(v: Array, width: Array) -> Array:
 
 POOR = 0.3
 """Unexplained share of the torque (root mean square) above which a prediction is poor."""
-_NOISE = 2.0
-"""Allowance for coloured noise: factor on the white-noise power."""
+_NOISE = 2.0  # allowance for coloured noise: factor on the white-noise power
 
 
 @dataclass(frozen=True, slots=True, eq=False)

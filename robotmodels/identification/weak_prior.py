@@ -27,8 +27,7 @@ _ALIKE = (("M", "MX", "MY", "MZ"), ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia", "I
 _SCALES = np.logspace(-2.5, 1.5, 17)
 _ROUNDS = 3
 _SAMPLES = 200
-_LEAST = 0.01
-"""Least torque of a considered joint, relative to the largest of the same unit."""
+_LEAST = 0.01  # least torque of a considered joint, relative to the largest of the same unit
 
 
 def plausible_sizes(

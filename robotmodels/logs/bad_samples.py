@@ -29,8 +29,7 @@ _SLOW, _LEAP, _MOVES = 0.3, 5.0, 0.1
 joint with frozen torque."""
 _LEAST, _PART, _PARTS = 9, 20_000, 5
 """Least samples of a recording; length and number of parts for the typical roughness."""
-_APART = 1e7
-"""Periods between recordings, above any interpolated gap."""
+_APART = 1e7  # periods between recordings, above any interpolated gap
 
 
 class BadSamples(NamedTuple):

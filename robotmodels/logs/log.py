@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats, read_only
+from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 
 ARRAYS = ("q", "tau", "v", "a", "q_ref", "v_ref")
@@ -245,16 +245,13 @@ def join_logs(logs: Iterable[Log]) -> Log:
                 f"first every {first.dt:.9g} s ({first.delay:g} s); read them with the same dt=, "
                 "and use with_delay on all."
             )
-    arrays: dict[str, Array] = {}
-    for name in ARRAYS:
-        parts = [getattr(log, name) for log in each]
-        if all(part is not None for part in parts):
-            arrays[name] = np.concatenate(parts)
+    parts = {name: [getattr(log, name) for log in each] for name in ARRAYS}
+    missing = {name for name, all_parts in parts.items() if any(x is None for x in all_parts)}
     lengths = [len(log) for log in each]
     offsets = np.cumsum([0, *lengths[:-1]])
     return Log(
         float(np.average([log.dt for log in each], weights=lengths)),
-        **arrays,
+        **{name: np.concatenate(parts[name]) for name in parts if name not in missing},
         starts=np.concatenate([log.starts + o for log, o in zip(each, offsets, strict=True)]),
         names=first.names,
         delay=first.delay,
@@ -296,22 +293,21 @@ def with_delay(log: Log, delay: float) -> Log:
     from scipy.interpolate import CubicSpline
 
     check_is_log(log)
-    if as_floats(delay, "delay").ndim:
-        raise InvalidValueError(f"delay: expected one number of seconds, got {delay!r:.60}.")
-    seconds = float(delay)
+    seconds = as_number(delay, "delay")
     if seconds == 0.0:
         return log
     shift = seconds / log.dt
     whole = abs(shift - round(shift)) < _WHOLE
     shift = float(round(shift)) if whole else shift
     cut = int(np.ceil(abs(shift)))
-    kept, torques, dropped = [], [], []
+    kept, torques, refused = [], [], log.refused
     for rows in log.recordings():
         N = rows.stop - rows.start
-        if cut + 2 > N:
-            dropped += range(rows.start, rows.stop)
-            continue
         places = np.arange(N - cut) + (cut if shift < 0.0 else 0)
+        if len(places) < 2:
+            lost, reason = tuple(range(rows.start, rows.stop)), "a recording shorter than the delay"
+            refused = (*refused, RefusedRows("log", lost, reason))
+            continue
         kept.append(rows.start + places)
         if whole:
             torques.append(log.tau[rows][places + int(shift)])
@@ -321,9 +317,6 @@ def with_delay(log: Log, delay: float) -> Log:
         raise InvalidValueError(
             f"delay: {seconds:g} s are {abs(shift):g} samples, no recording is longer."
         )
-    refused, reason = log.refused, "its recording is shorter than the delay"
-    if dropped:
-        refused = (*refused, RefusedRows("log", tuple(dropped), reason))
     note = f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples)."
     starts = np.cumsum([0, *map(len, kept[:-1])])
     changes = {"tau": np.concatenate(torques), "delay": log.delay + seconds, "refused": refused}

@@ -24,8 +24,7 @@ from .tables import Choice, LogTable, open_log_table, table_of
 from .time_base import regular_rows
 
 Source = str | Path | Mapping[str, Any]
-_SHORTEST, _LONGEST = 1e-6, 10.0
-"""Sampling periods of files, s."""
+_SHORTEST, _LONGEST = 1e-6, 10.0  # sampling periods of files, s
 
 
 def read_log(

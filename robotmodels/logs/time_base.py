@@ -16,10 +16,8 @@ _ROUNDING, _COARSER, _FINER = 0.01, 1.5, 100.0
 _GAP, _JITTER, _BRIDGED, _MOST = 1.5, 0.25, 10, 1e6
 """In periods: least gap; largest 90 % jitter at which missing samples are counted; longest gap
 bridged linearly for the spectrum of the motion; most missing samples."""
-_SHARE = 0.1
-"""Longest interpolated gap relative to the shortest period of the motion."""
-_LEAST, _SECONDS = 32, 16.0
-"""Least number of samples for a spectrum, and length of its windows, s."""
+_SHARE = 0.1  # longest interpolated gap relative to the shortest period of the motion
+_LEAST, _SECONDS = 32, 16.0  # least number of samples for a spectrum, and length of its windows, s
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, Frozen
+from ..._arrays import Array, Frozen, as_number
 from ...errors import InvalidValueError
 from ...estimation.covariance import correlated_covariance
 from ...estimation.estimate import Estimate
@@ -19,8 +19,7 @@ from .method import GivenBlocks, instrument_step
 from .methods import instrument_pairs
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
-_EFFECT = 0.5
-"""Least relevant bias, in standard errors of least squares."""
+_EFFECT = 0.5  # least relevant bias, in standard errors of least squares
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,8 +112,7 @@ def hausman_test(
     """
     from scipy.stats import norm
 
-    if not 0.0 < level < 1.0:
-        raise InvalidValueError(f"level: expected a number between 0 and 1, got {level!r}.")
+    level = as_number(level, "level", above=0.0, below=1.0)
     if estimate.names != system.names or not hasattr(estimate.details, "loop"):
         raise InvalidValueError(
             "estimate: expected instrumental variables on the parameters of these equations, as "

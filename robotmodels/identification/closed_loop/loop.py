@@ -13,17 +13,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, Frozen, Rebuilt, as_exact, as_floats, as_reals, read_only
+from ..._arrays import (
+    Array,
+    Frozen,
+    Rebuilt,
+    as_count,
+    as_exact,
+    as_floats,
+    as_number,
+    as_reals,
+    read_only,
+)
 from ...drive import DriveParameters, Transmission, drive_kinds
 from ...dynamics import base_model, mass_matrix
 from ...errors import InertiaError, InvalidValueError, ShapeError
 from ...model import RobotModel
 from ..equations import EquationForm, Equations
 
-_SAMPLED = 0.25
-"""Largest velocity loop rate relative to the sampling rate."""
-_POSTURES = 200
-"""Largest number of postures for mass matrices."""
+_SAMPLED = 0.25  # largest velocity loop rate relative to the sampling rate
+_POSTURES = 200  # largest number of postures for mass matrices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +86,7 @@ class Controller(Rebuilt):
         for name, array in gains.items():
             object.__setattr__(self, name, read_only(np.broadcast_to(array, shape)))
         if self.period is not None:
-            object.__setattr__(self, "period", _positive(self.period, "period"))
+            object.__setattr__(self, "period", as_number(self.period, "period", above=0.0))
 
     @property
     def n(self) -> int:
@@ -124,7 +132,9 @@ def tuned_controller(
     >>> tuned_controller(load("rx90"), [[0.0] * 6], bandwidth=8.0).n
     6
     """
-    w, damping = 2.0 * np.pi * _positive(bandwidth, "bandwidth"), _positive(damping, "damping")
+    w = 2.0 * np.pi * as_number(bandwidth, "bandwidth", above=0.0)
+    damping = as_number(damping, "damping", above=0.0)
+    period = as_number(period, "period", above=0.0)
     inverse = inverse_masses(robot, as_floats(q, "q"))
     if inverse is None:
         raise InertiaError(
@@ -134,14 +144,8 @@ def tuned_controller(
     J = 1.0 / np.diagonal(inverse, axis1=1, axis2=2).max(axis=0)
     # largest coupled velocity loop rate, per unit of 2 damping w
     fastest = float(np.abs(np.linalg.eigvals(inverse * J)).max())
-    w = min(w, _SAMPLED / (damping * fastest * _positive(period, "period")))
+    w = min(w, _SAMPLED / (damping * fastest * period))
     return Controller(J * w**2, 2.0 * damping * w * J, feed_forward=robot if feed_forward else None)
-
-
-def _positive(value: float, name: str) -> float:
-    if not float(as_floats(value, name)) > 0.0:
-        raise InvalidValueError(f"{name}: expected a number above 0, got {value!r:.60}.")
-    return float(value)
 
 
 def inverse_masses(robot: RobotModel, q: Array) -> Array | None:
@@ -157,12 +161,9 @@ def inverse_masses(robot: RobotModel, q: Array) -> Array | None:
     return np.linalg.inv(M / scale) / scale
 
 
-_FASTER = 10.0
-"""Bandwidth of an assumed controller relative to the motion frequency."""
-_NEAR = 0.5
-"""Least tracking limit, rad or m."""
-_SLOW = 0.05
-"""Target friction regularisation velocity relative to a joint's fast velocities."""
+_FASTER = 10.0  # bandwidth of an assumed controller relative to the motion frequency
+_NEAR = 0.5  # least tracking limit, rad or m
+_SLOW = 0.05  # target friction regularisation velocity relative to a joint's fast velocities
 _STEP, _STABLE = 1.5, 2.78
 """Integration step in time constants of friction: target, and stability bound of RK4. Regularised
 dry friction adds 1."""
@@ -312,14 +313,13 @@ def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
 
 def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int]:
     """Numbers of integration steps per sample and per controller period."""
-    if not isinstance(substeps, (int, np.integer)) or substeps < 1:
-        raise InvalidValueError(f"substeps: expected a whole number from 1, got {substeps!r}.")
+    substeps = as_count(substeps, "substeps")
     period = dt if controller.period is None else controller.period
     samples, parts = period / dt, dt / period
     if abs(samples - round(samples)) <= 1e-6 * samples:
-        return int(substeps), int(substeps) * round(samples)
+        return substeps, substeps * round(samples)
     if abs(parts - round(parts)) <= 1e-6 * parts:
-        whole = -(-int(substeps) // round(parts)) * round(parts)
+        whole = -(-substeps // round(parts)) * round(parts)
         return whole, whole // round(parts)
     raise InvalidValueError(
         f"period: expected a multiple or a whole part of that of the log ({dt:g} s), got "

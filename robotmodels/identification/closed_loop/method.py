@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, Frozen, as_exact
+from ..._arrays import Array, Frozen, as_count, as_exact
 from ...errors import InvalidValueError
 from ...estimation.covariance import CorrelatedCovariance, correlated_covariance
 from ...estimation.estimate import Estimate, EstimateStatus
@@ -26,17 +26,13 @@ from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _STILL, _ROUNDING = 1e-3, 1e-11
 """Convergence tolerances of a parameter: in standard errors, relative to its torque size."""
-_RESIDUAL = 1e-10
-"""Rounding tolerance: residuals relative to the right side."""
-_SLACK = 1e-9
-"""Rounding tolerance: relative increase of the weighted squares of residuals."""
+_RESIDUAL = 1e-10  # rounding tolerance: residuals relative to the right side
+_SLACK = 1e-9  # rounding tolerance: relative increase of the weighted squares of residuals
 _HALVINGS, _WEIGHTINGS = 8, 3
-_SAME_WEIGHTS = 0.02
-"""Convergence tolerance: relative change of the weights."""
+_SAME_WEIGHTS = 0.02  # convergence tolerance: relative change of the weights
 _SINGULAR = 1e10
 """Condition number above which the simulated motion does not determine the parameters."""
-_WEAK = 0.3
-"""Least correlation of instruments and regressor; below it instruments are weak."""
+_WEAK = 0.3  # least correlation of instruments and regressor; below it instruments are weak
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +86,10 @@ class SimulatingMethod(Method):
     _advice: ClassVar[tuple[str, ...]] = ()  # where the iteration does not converge
 
     def __post_init__(self) -> None:
-        n, controller = self.iterations, self.controller
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
-            raise InvalidValueError(f"iterations: expected a whole number from 1, got {n!r:.60}.")
-        if not isinstance(controller, Controller | None):
+        as_count(self.iterations, "iterations")
+        if not isinstance(self.controller, Controller | None):
             raise InvalidValueError(
-                f"controller: expected a Controller or None, got {type(controller).__name__}."
+                f"controller: expected a Controller or None, got {self.controller!r:.60}."
             )
 
     @abstractmethod

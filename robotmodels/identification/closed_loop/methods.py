@@ -49,10 +49,8 @@ from .loop import ClosedLoop, closed_loop
 from .method import Pairs, SimulatingMethod
 from .simulation import ClosedLoopSimulator
 
-_PARTS = 8
-"""Holding periods of an assumed controller's torques per sample."""
-_DIFFERENCE = 1e-5
-"""Finite-difference step of a parameter, relative to its torque size."""
+_PARTS = 8  # holding periods of an assumed controller's torques per sample
+_DIFFERENCE = 1e-5  # finite-difference step of a parameter, relative to its torque size
 _OUTPUTS = ("torque", "position", "both")
 
 

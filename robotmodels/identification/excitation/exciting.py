@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_floats
+from ..._arrays import Array, as_count, as_floats, as_number
 from ..._arrays.tasks import Progress, Workers
+from ..._choices import one_of
 from ...drive import Drives
 from ...errors import InvalidValueError, ShapeError
 from ...minimal_parameters import BaseParameters, base_parameters
@@ -25,8 +26,7 @@ from .motions import KINDS, MotionBasis
 from .objective import CRITERIA, Distances, ExcitationProblem
 from .result import ExcitationStart, ExcitationStatus, ExcitingTrajectory
 
-_DENSE = 5
-"""Samples for the final quality, times those of the search."""
+_DENSE = 5  # samples for the final quality, times those of the search
 
 
 def exciting_trajectory(
@@ -128,37 +128,37 @@ def exciting_trajectory(
     (True, True)
     """
     check_model(model)
-    kind, criterion = _word(kind, KINDS, "kind"), _word(criterion, CRITERIA, "criterion")
+    one_of(kind, tuple(KINDS), "kind")
+    criterion = one_of(str(criterion).replace("-", "_"), CRITERIA, "criterion")
     if kind == "fourier" and points is not None:
         raise InvalidValueError("points: a Fourier series has none; use harmonics=.")
-    order = _whole(harmonics, "harmonics") if points is None else _whole(points, "points")
+    order = as_count(*((harmonics, "harmonics") if points is None else (points, "points")))
     if kind == "spline" and points is None:
         order *= 2
-    basis = MotionBasis(kind, float(_sizes(duration, 1, "duration")[0]), order, bool(rest))
+    basis = MotionBasis(kind, as_number(duration, "duration", above=0.0), order, bool(rest))
     base = _checked_base(model, base, drive)
     bounds, notes = excitation_limits(model, limits)
     torques, torque_notes = excitation_torques(model, torque_limits)
     default = max((20 if kind == "fourier" else 10) * order, 60)
-    samples = default if samples is None else _whole(samples, "samples")
+    samples = default if samples is None else as_count(samples, "samples")
     if samples * model.n < len(base) or samples < 2 * order + 1:
         raise InvalidValueError(
             f"samples: {samples} times are too few for {len(base)} base parameters and {order} "
             "harmonics or points; take more."
         )
-    if not 0.0 <= margin < 0.5:
-        raise InvalidValueError(f"margin: expected a part from 0 to below 0.5, got {margin!r:.40}.")
+    margin = as_number(margin, "margin", least=0.0, below=0.5)
     scale = _sizes(1.0 if scale is None else scale, len(base), "scale")
     weight = scale / _sizes(1.0 if sigma is None else sigma, model.n, "sigma")[:, None]
     distances = _distances(model, workspace, obstacles, frames)
     problem = ExcitationProblem(
-        model, basis, base, criterion, bounds, torques, distances, samples, weight, float(margin)
+        model, basis, base, criterion, bounds, torques, distances, samples, weight, margin
     )
     count, evaluations, pool = search.shared_budget(problem)
-    count = count if starts is None else _whole(starts, "starts")
-    pool = pool if baseline is None else _whole(baseline, "baseline")
+    count = count if starts is None else as_count(starts, "starts")
+    pool = pool if baseline is None else as_count(baseline, "baseline")
     budget: tuple[int, float] = (search.ITERATIONS, evaluations)
     if iterations is not None:
-        budget = (_whole(iterations, "iterations"), np.inf)
+        budget = (as_count(iterations, "iterations"), np.inf)
     work, stages, total = Workers(progress=progress), len(search.STAGES), count * len(search.STAGES)
     generator = np.random.default_rng(rng)
     times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)
@@ -233,15 +233,6 @@ def _distances(model: RobotModel, workspace: Any, obstacles: Any, frames: Any) -
     return distances if frames and (workspace is not None or bodies) else None
 
 
-def _word(value: Any, words: Any, name: str) -> str:
-    """Check of an option name; case and - or _ are ignored."""
-    word = value.strip().lower().replace("-", "_") if isinstance(value, str) else value
-    if not isinstance(word, str) or word not in words:
-        known = ", ".join(map(repr, words))
-        raise InvalidValueError(f"{name}: expected one of {known}, got {value!r:.80}.")
-    return word
-
-
 def _sizes(value: ArrayLike, n: int, name: str) -> Array:
     """Positive numbers (n,)."""
     given = as_floats(value, name)
@@ -250,10 +241,3 @@ def _sizes(value: ArrayLike, n: int, name: str) -> Array:
     if not (given > 0.0).all():
         raise InvalidValueError(f"{name}: expected positive numbers, got {given}.")
     return np.full(n, given)
-
-
-def _whole(value: Any, name: str) -> int:
-    """A whole number from 1."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
-    return int(value)

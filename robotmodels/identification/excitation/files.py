@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._arrays import Array, as_floats
+from ..._arrays import Array, as_number
 from ..._json_data import json_data
 from ...errors import InvalidValueError, ShapeError
 from ...geometry import REVOLUTE
@@ -76,9 +76,7 @@ def write_trajectory(
         motion = trajectory
         if ending == ".json":
             raise InvalidValueError(f"{path.name}: .json is for exciting trajectories; take .csv.")
-    hertz = as_floats(rate, "rate")
-    if hertz.ndim or hertz <= 0.0:
-        raise InvalidValueError(f"rate: expected a positive number of hertz, got {rate!r:.40}.")
+    hertz = as_number(rate, "rate", above=0.0)
     n = motion.n
     names = names or [f"joint_{j + 1}" for j in range(n)]
     turns = [True] * n if turns is None else turns
@@ -86,7 +84,7 @@ def write_trajectory(
         raise ShapeError(
             f"names, turns: expected one for each of {n} joints, got {len(names)} and {len(turns)}."
         )
-    t = np.arange(int(np.floor(motion.duration * float(hertz) * (1.0 + 1e-12))) + 1) / float(hertz)
+    t = np.arange(int(np.floor(motion.duration * hertz * (1.0 + 1e-12))) + 1) / hertz
     t = np.minimum(t, motion.duration)
     q, v, a = motion.motion.derivatives(t, (0, 1, 2))
     if ending == ".yaml":

@@ -17,8 +17,7 @@ from ...obstacles.clearance import Frame, origins
 from ...obstacles.shapes import Obstacle
 from ...trajectories import MotionLimits
 
-_RISE = 0.25
-"""Default time from rest to full velocity, s."""
+_RISE = 0.25  # default time from rest to full velocity, s
 
 
 def excitation_limits(

@@ -20,14 +20,10 @@ from ...trajectories import MotionLimits
 from .motions import MotionBasis
 
 CRITERIA = ("condition", "log_det")
-_LEAST = 1e-12
-"""Least diagonal entry of the factor, relative to the column norm."""
-_BLOCK = 2**18
-"""Largest number of multiplications that OpenBLAS runs in one thread."""
-_SIGN = 0.02
-"""Regularisation velocity of dry friction, relative to the velocity limit."""
-_LENGTH = 0.25
-"""Penalty scale of distances from the workspace's limits and obstacles, m."""
+_LEAST = 1e-12  # least diagonal entry of the factor, relative to the column norm
+_BLOCK = 2**18  # largest number of multiplications that OpenBLAS runs in one thread
+_SIGN = 0.02  # regularisation velocity of dry friction, relative to the velocity limit
+_LENGTH = 0.25  # penalty scale of distances from the workspace's limits and obstacles, m
 
 Distances = Callable[[Array], tuple[Array, Array]]
 """From q (N, n): distances (N, p) that must not be negative, and their gradients (N, p, n)."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
-from ..._arrays import Array, Rebuilt, read_only
+from ..._arrays import Array, Frozen
 from ..._outcomes import Outcome
 from ...minimal_parameters import BaseParameters
 from ...model import RobotModel
@@ -18,11 +19,7 @@ class ExcitationStatus(Outcome):
     """Outcome of a search."""
 
     CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
-    LIMIT_OF_ITERATIONS = (
-        1,
-        "The limit on iterations or evaluations was reached before the criterion converged; "
-        "more iterations (iterations=) would lower it further.",
-    )
+    LIMIT_OF_ITERATIONS = 1, "The iterations ended before the criterion converged (iterations=)."
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
 
@@ -45,7 +42,7 @@ class ExcitationQuality:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExcitationLimits(Rebuilt):
+class ExcitationLimits(Frozen):
     """Extremes of a motion and limits: joints, torques (n,), least distance in m (inf if none).
 
     Those of torques and distances have an allowance for extremes between samples.
@@ -55,10 +52,6 @@ class ExcitationLimits(Rebuilt):
     torque_limits: Array
     torque: Array
     clearance: float
-
-    def __post_init__(self) -> None:
-        for name in ("torque_limits", "torque"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def kept(self) -> bool:
@@ -80,7 +73,7 @@ class ExcitationLimits(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExcitationStart(Rebuilt):
+class ExcitationStart(Frozen):
     """One start: its random motion and the improved one, and the smooth criterion (K,) in between.
 
     ``stages`` are the iterations of each stage; between them the criterion may jump.
@@ -92,17 +85,13 @@ class ExcitationStart(Rebuilt):
     stages: Array
     status: ExcitationStatus
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "history", read_only(self.history))
-        object.__setattr__(self, "stages", read_only(self.stages, np.int64))
-
     def rank(self, criterion: str) -> tuple[bool, float]:
         """Sort key; the best start has the smallest."""
         return self.status is ExcitationStatus.INFEASIBLE, self.after.of(criterion)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExcitingTrajectory(Rebuilt):
+class ExcitingTrajectory(Frozen):
     """Exciting trajectory for the identification of base parameters, with its quality and limits.
 
     Parameters
@@ -131,38 +120,16 @@ class ExcitingTrajectory(Rebuilt):
     coefficients: Array
     notes: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", read_only(self.coefficients))
-
     @property
     def best(self) -> ExcitationStart:
         """The start that became the trajectory."""
         return min(self.starts, key=lambda start: start.rank(self.criterion))
 
-    @property
-    def status(self) -> ExcitationStatus:
-        """Outcome of the best start: ``CONVERGED``, ``LIMIT_OF_ITERATIONS`` or ``INFEASIBLE``."""
-        return self.best.status
-
-    @property
-    def quality(self) -> ExcitationQuality:
-        """Condition numbers and log det of the trajectory."""
-        return self.best.after
-
-    @property
-    def condition(self) -> float:
-        """Condition number of the base regressor, columns in SI units."""
-        return self.quality.condition
-
-    @property
-    def scaled_condition(self) -> float:
-        """The same with columns of unit length."""
-        return self.quality.scaled_condition
-
-    @property
-    def log_det(self) -> float:
-        """Logarithm of the determinant of the mean information of a sample."""
-        return self.quality.log_det
+    status = property(attrgetter("best.status"), doc="Outcome of the best start.")
+    quality = property(attrgetter("best.after"), doc="Condition numbers and log det.")
+    condition = property(attrgetter("best.after.condition"), doc="Condition number, SI units.")
+    scaled_condition = property(attrgetter("best.after.scaled_condition"), doc="Of unit columns.")
+    log_det = property(attrgetter("best.after.log_det"), doc="Of the mean information of a sample.")
 
     @property
     def baseline_conditions(self) -> Array:

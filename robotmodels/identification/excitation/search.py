@@ -21,12 +21,9 @@ BUDGET = 3e10
 """Multiplications of a search: about ten seconds of a processor of 2020."""
 STARTS, RANDOM, ITERATIONS = 8, 100, 200
 """Largest default numbers of starts, random motions, and iterations of a stage."""
-_FEWEST = 250
-"""Least number of evaluations of a start."""
-_WINDOW, _DECREASE = 25, 0.01
-"""Convergence: decrease below 1 % over 25 iterations."""
-_DENSE = 8
-"""Samples for the limits, times those of the search."""
+_FEWEST = 250  # least number of evaluations of a start
+_WINDOW, _DECREASE = 25, 0.01  # convergence: decrease below 1 % over 25 iterations
+_DENSE = 8  # samples for the limits, times those of the search
 _POSTURES = 400, 300
 """Numbers of random postures, from which a feasible mean is chosen: all, far from the middle."""
 _FACTORS = (1.0, 0.9998, 0.9995, 0.999, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8, 0.65, 0.5, 0.35)

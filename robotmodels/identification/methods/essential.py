@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._arrays import Array, as_floats
+from ..._arrays import Array, as_number
 from ...errors import InvalidValueError
 from ...estimation.estimate import Estimate
 from ...estimation.factor import TriangularFactors, triangle
 from ...estimation.linear import inverse_std, inverse_triangle
 
 RULES = ("ratio", "f_test", "aic")
-_RATIO = 30.0
-"""Default ratio of the largest to the smallest relative standard error."""
-_GROWTH = 0.1
-"""Largest relative increase of the residuals."""
-_LEVEL = 0.05
-"""Significance level of the F test."""
+_RATIO = 30.0  # default ratio of the largest to the smallest relative standard error
+_GROWTH = 0.1  # largest relative increase of the residuals
+_LEVEL = 0.05  # significance level of the F test
 
 
 def essential(
@@ -61,10 +58,7 @@ def _rule(choice: bool | float | str) -> tuple[str, float]:
                 f"essential: expected True, a ratio or one of {', '.join(RULES)}, got {choice!r}."
             )
         return choice.lower(), _RATIO
-    ratio = _RATIO if choice is True else float(as_floats(choice, "essential"))
-    if not ratio >= 1.0:
-        raise InvalidValueError(f"essential: expected a ratio from 1, got {choice!r:.60}.")
-    return "ratio", ratio
+    return "ratio", _RATIO if choice is True else as_number(choice, "essential", least=1.0)
 
 
 def _relative_errors(R: Array, y: Array, rest: float, rows: int) -> tuple[Array, int, float]:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..._arrays import Array, Frozen, as_floats
+from ..._arrays import Array, Frozen, as_number
 from ...errors import InvalidValueError
 from ...estimation.estimate import Estimate
 from ...estimation.factor import TriangularFactors, triangle
@@ -15,10 +15,8 @@ from ...estimation.linear import check_count, first_weights, inverse_triangle, r
 from ..equations import Equations
 from .base import Method
 
-_POINTS = 200
-"""Number of points of the history."""
-_DETERMINED = 1e-9
-"""Least diagonal entry of the scaled factor for a determined parameter."""
+_POINTS = 200  # number of points of the history
+_DETERMINED = 1e-9  # least diagonal entry of the scaled factor for a determined parameter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,11 +59,9 @@ class Recursive(Method):
 
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters."""
-        forgetting = float(as_floats(self.forgetting, "forgetting"))
-        if not 0.0 < forgetting <= 1.0:
-            raise InvalidValueError(
-                f"forgetting: expected a number above 0 and at most 1, got {self.forgetting!r:.60}."
-            )
+        forgetting = as_number(self.forgetting, "forgetting", above=0.0)
+        if forgetting > 1.0:
+            raise InvalidValueError(f"forgetting: expected at most 1, got {forgetting:g}.")
         check_count(factors)
         b, weights = len(factors.names), first_weights(factors)
         stride = max(1, int((factors.counts + factors.left_out).max()) // _POINTS)

@@ -27,15 +27,12 @@ from .base import Method
 _MOST = 100
 _STILL, _STEADY = 1e-4, 1e-3
 """Convergence tolerances: change of a parameter in standard errors, relative change of a scale."""
-_SCALES = 20
-"""Largest number of passes that change the residual scales: medians may alternate."""
-_ROUNDING = 1e-12
-"""Rounding tolerance: change of a parameter relative to its torque size."""
+_SCALES = 20  # largest number of passes that change the residual scales: medians may alternate
+_ROUNDING = 1e-12  # rounding tolerance: change of a parameter relative to its torque size
 _FAR = 4.0
 """Least residual of an outlier, in standard deviations (probability 6e-5 for normal noise)."""
 _LISTED = 1000
-_NORMAL_MEDIAN = 0.6744897501960817
-"""Median length of standard normal residuals."""
+_NORMAL_MEDIAN = 0.6744897501960817  # median length of standard normal residuals
 _ONE = np.ones(1, dtype=np.int64)
 
 

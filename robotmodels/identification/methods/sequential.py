@@ -14,10 +14,8 @@ from ...estimation.linear import check_count, residual_noise, residual_std
 from ..equations import Equations
 from .base import Method
 
-_ZERO = 1e-12
-"""Rank tolerance: norm of a column in a joint's equations relative to all equations."""
-_RANK = 1e-7
-"""Rank tolerance: singular value of the scaled columns relative to the largest."""
+_ZERO = 1e-12  # rank tolerance: norm of a column in a joint's equations relative to all equations
+_RANK = 1e-7  # rank tolerance: singular value of the scaled columns relative to the largest
 
 
 @dataclass(frozen=True, slots=True)
