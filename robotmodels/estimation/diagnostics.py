@@ -115,7 +115,8 @@ def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     """
     from scipy.special import ndtri, stdtrit
 
-    tail = (1 + as_number(level, "level", above=0.0, below=1.0)) / 2
+    level = as_number(level, "level", above=0.0, below=1.0)
+    tail = (1 + level) / 2
     wide = ndtri(tail) if fit.sigma_known else stdtrit(max(fit.freedom_left, 0.0), tail)
     return fit.x[:, None] + wide * fit.standard_errors[:, None] * np.array([-1.0, 1.0])
 
