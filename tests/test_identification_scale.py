@@ -80,7 +80,7 @@ def test_the_number_of_workers_and_their_order_change_no_bit(pool):
     whole = system()
     with ExitStack() as stack:
         executor = pool(stack)
-        found = reduce_equations(whole, executor)
+        found = reduce_equations(whole, executor, window=6)
         executor.shutdown()
     assert bits(found) == bits(reduce_equations(whole))
 

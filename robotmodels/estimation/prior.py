@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,6 +57,10 @@ class Prior(Rebuilt):
     def none(cls, parameters: int) -> Prior:
         """Prior without information on P parameters."""
         return cls(np.zeros(parameters), np.full(parameters, np.inf))
+
+    def with_strength(self, strength: float) -> Prior:
+        """The same with another factor on the information."""
+        return replace(self, strength=strength)
 
     def rows(self, x: ArrayLike) -> tuple[Array, Array]:
         """Values of the added rows at x (P,), and the diagonal of their Jacobian (P,)."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import as_count
 from .._arrays.tasks import Progress, Task, Workers, results
 from ..drive import Drives
 from ..errors import InvalidValueError
@@ -160,6 +161,7 @@ def reduce_equations(
     system: Equations | Iterable[Equations],
     executor: Executor | None = None,
     progress: Progress = None,
+    window: int | None = None,
 ) -> TriangularFactors:
     """Reduce equations to one triangular factor for each group (joint).
 
@@ -173,6 +175,9 @@ def reduce_equations(
     executor, progress
         As for `fit`; also a cluster (``client.get_executor()`` of Dask). A task contains the
         samples of its piece and the margin of the filters, not the whole log.
+
+    window : int, optional
+        Largest number of pieces in work at a time, default twice the processors and 2.
 
     Returns
     -------
@@ -194,11 +199,12 @@ def reduce_equations(
     8
     """
     systems = (system,) if isinstance(system, Equations) else system
+    window = None if window is None else as_count(window, "window")
     work = Workers(executor, progress)
 
     def leaves() -> Iterator[TriangularFactors]:
         fraction = 0.0
-        for factors, fraction in results(_tasks(systems, executor is not None), executor):
+        for factors, fraction in results(_tasks(systems, executor is not None), executor, window):
             yield factors
             if fraction > 0.0:
                 work.done(fraction)
