@@ -118,22 +118,16 @@ def inverse_factor(R: Array, threshold: float = SINGULAR) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linear:
-    """Weighted rows and prior at a point, in singular directions; a step is ``-(basis @ y)``.
+    """Weighted rows and prior at a point, in singular directions; a step is ``-(basis @ y)``."""
 
-    Shapes: columns (P,), lengths, 1 for a column without effect; s (P,), V (P, P), singular values
-    and right vectors of the scaled columns; g (rank,), residuals along the left ones; basis (P,
-    rank), which makes the weighted rows orthonormal; curvature (rank, rank) of the loss along it,
-    None for squares. Freedom: the rank, less the share of the prior.
-    """
-
-    columns: Array
-    s: Array
-    V: Array
+    columns: Array  # lengths (P,) of the columns; 1 for one without effect
+    s: Array  # singular values (P,) of the scaled columns
+    V: Array  # their right singular vectors, as rows (P, P)
     rank: int
-    g: Array
-    basis: Array
-    freedom: float
-    curvature: Array | None
+    g: Array  # residuals (rank,) along the first left singular vectors
+    basis: Array  # (P, rank): makes the weighted rows orthonormal
+    freedom: float  # effective number of parameters: the rank, less the share of the prior
+    curvature: Array | None  # of the loss along the basis, (rank, rank); None for squares
 
     def step(self, damping: float) -> tuple[Array, float, float]:
         """Step, predicted decrease of the sum, and length in scaled parameters."""
