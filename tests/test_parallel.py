@@ -157,6 +157,9 @@ def test_limits_and_reach_are_statuses():
     assert far.count.tolist() == [8, 0]
     assert far.reason(1) == pr.LegStatus.OUT_OF_REACH.sentence
     assert np.isnan(far.q[1]).all()
+    modes = pr.assembly_modes(ROBOTS["SSM"], [[1, 1, 1, 1, 1, 9.0], [1.0] * 6])
+    assert (modes.count > 0).tolist() == [False, True]
+    assert "do not meet" in modes.reason(0)
     # angles count modulo whole turns
     turned = pr.five_bar([[-0.2, 0], [0.2, 0]], 0.4, 0.6, lower=np.pi, upper=4 * np.pi)
     assert pr.igm(turned, turned.home).within_limits.all()
@@ -231,19 +234,6 @@ def test_lists_of_random_platforms_are_complete(kind, bound):
         assert pr.assembly_modes(symmetric, q).complex_count == bound
 
 
-def test_real_lists_equal_a_search_by_newton():
-    robot = random_gough(np.random.default_rng(11))
-    q = pr.igm(robot, robot.home).q[0]
-    modes = pr.assembly_modes(robot, q)
-    rng = np.random.default_rng(0)
-    starts = moved(np.tile(np.eye(4), (3000, 1, 1)), rng.uniform(-3, 3, (3000, 6)))
-    found = pr.dgm(robot, q, starts)
-    T = found.T[found.status != pr.PoseStatus.NOT_CONVERGED]
-    away = np.abs(T[:, None] - modes.T).max(axis=(-1, -2))
-    assert away.min(axis=1).max() < 1e-8  # nothing beside the list
-    assert set(away.argmin(axis=1)) == set(range(int(modes.count)))
-
-
 def test_postures_that_nearly_coincide_are_both_listed():
     robot = random_gough(np.random.default_rng(5))
     height = np.linspace(-4, 4, 200)
@@ -296,15 +286,6 @@ def test_robots_that_move_with_locked_legs_are_degenerate():
     q = pr.igm(octahedron, np.eye(4)).q[0]
     assert pr.assembly_modes(octahedron, q).status == pr.AssemblyStatus.DEGENERATE
     assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
-
-
-def test_legs_that_do_not_meet_give_no_mode_and_a_sentence():
-    robot = ROBOTS["SSM"]
-    modes = pr.assembly_modes(robot, [[1, 1, 1, 1, 1, 9.0], [1.0] * 6])
-    assert modes.count[0] == 0
-    assert modes.count[1] > 0
-    assert "do not meet" in modes.reason(0)
-    assert modes.reason(1) == pr.AssemblyStatus.ALL.sentence
 
 
 INNOCENTI = (17.04, 16.54, 20.84)
@@ -476,6 +457,11 @@ GOOD = ROBOTS["SSM"]
         (lambda: pr.inverse_jacobian(ROBOTS["delta"], ROBOTS["delta"].pose([9, 0, 0])),
          InvalidValueError, "out of reach"),
         (lambda: GOOD.with_masses(5.0), ShapeError, "two parts"),
+        (lambda: pr.workspace(GOOD, kind="round"), InvalidValueError, "orientation, dexterous"),
+        (lambda: pr.workspace(GOOD, limits=False), InvalidValueError, "unlimited"),
+        (lambda: pr.workspace(GOOD, limits=(0.5, 1.2), resolution=1.5), InvalidValueError,
+         "resolution: expected"),
+        (lambda: pr.workspace(GOOD, orientation=np.eye(2)), ShapeError, "orientation"),
     ],
 )  # fmt: skip
 def test_mistakes_say_what_to_do(call, error, words):

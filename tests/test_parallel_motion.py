@@ -288,20 +288,6 @@ def test_robots_with_cranks_count_working_modes():
     np.testing.assert_array_equal(space.count > 0, pr.igm(delta, space.poses).count > 0)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"kind": "round"}, "orientation, dexterous"),
-        ({"limits": False}, "unlimited"),
-        ({"resolution": 1.5}, "resolution: expected"),
-        ({"orientation": np.eye(2)}, "orientation"),
-    ],
-)
-def test_mistakes_in_workspaces(options, words):
-    with pytest.raises((InvalidValueError, ShapeError), match=words):
-        pr.workspace(pr.gough_symmetric(1.0, lower=0.5, upper=1.2), **options)
-
-
 # --- dynamics ------------------------------------------------------------------------------------
 
 
