@@ -169,7 +169,7 @@ def simulate(
     if kind == Integrator.DOP853 and wrench is None and not callable(control):
         torque = np.concatenate([law(0.0, *start), np.zeros(m)])[None]  # type: ignore[reportCallIssue]
         steps = partial(_compiled_steps, arm, torque)
-    times, Y, status, count = _followed(rate, y0, t, *options, spun, largest, steps)
+    times, Y, status, count = _followed(rate, y0, t, options, spun, largest, steps)
     q, e, v, ev, work, load, first, pull = np.split(Y, np.cumsum([n, m, n, m, 1, 6, 3]), axis=1)
     tau = np.array([law(*row) for row in zip(times, q, e, v, ev, strict=True)])
     kinetic, potential, momentum = states(arm, Y[:, :k].copy(), Y[:, k : 2 * k].copy())
@@ -201,11 +201,7 @@ def _followed(
     rate: Callable[[float, Array], Array],
     y: Array,
     t: ArrayLike,
-    method: Integrator,
-    rtol: float,
-    atol: float,
-    budget: int | None,
-    progress: Progress,
+    options: tuple[Integrator, float, float, int | None, Progress],
     spun: list[float],
     largest: ArrayLike = np.inf,
     steps: Any = None,
@@ -216,7 +212,7 @@ def _followed(
     """
     import scipy.integrate
 
-    start, end, wanted = times_of(t)
+    (start, end, wanted), (method, rtol, atol, budget, progress) = times_of(t), options
     rtol, atol = as_number(rtol, "rtol", above=0.0), as_number(atol, "atol", above=0.0)
     most = _PER_SECOND * (1.0 + end - start) if budget is None else budget
     most = as_number(most, "max_evaluations", least=1.0)
@@ -384,7 +380,7 @@ def free_body(
 
     y0 = np.concatenate([*start, [0.0, 0.0, 0.0, 1.0], np.zeros(3)])
     options = Integrator.DOP853, rtol, atol, max_evaluations, None
-    times, Y, status, _ = _followed(rate, y0, t, *options, spun)
+    times, Y, status, _ = _followed(rate, y0, t, options, spun)
     e, ev, twist, quaternion, place = (x.copy() for x in np.split(Y, cuts, axis=1))
     pose = np.tile(np.eye(4), (len(times), 1, 1))
     pose[:, :3, :3], pose[:, :3, 3] = Rotation.from_quat(quaternion).as_matrix(), place

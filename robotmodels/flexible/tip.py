@@ -30,7 +30,7 @@ S. Devasia, D. Chen, B. Paden, IEEE Trans. Automatic Control 41 (1996).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -78,37 +78,29 @@ class TipTracking(Result):
     zeros: NDArray[np.complex128]
     preview: float
     status: TipStatus
-    _spline: Any = field(init=False)
-
-    def __post_init__(self) -> None:
-        from scipy.interpolate import CubicSpline
-
-        values = np.hstack([self.tau, self.q, self.v])
-        spline = CubicSpline(self.t, values) if len(self.t) else None
-        object.__setattr__(self, "_spline", spline)
-
-    @property
-    def _values(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     def torque(self, t: ArrayLike) -> Array:
         """Torques (..., n) at times (...), constant outside the motion."""
-        return self._at(t)[0]
+        return self._motion()(as_floats(t, "t"))[0]
 
     def control(self, kp: float, kd: float) -> Any:
         """Law (t, q, v): the torques, with gains kp and kd on the errors of the motors."""
+        at = self._motion()
 
         def law(t: float, q: Array, v: Array) -> Array:
-            tau, q_t, v_t = self._at(t)
+            tau, q_t, v_t = at(t)
             return tau + kp * (q_t - q) + kd * (v_t - v)
 
         return law
 
-    def _at(self, t: ArrayLike) -> list[Array]:
-        if self._spline is None:
+    def _motion(self) -> Any:
+        """Function of time: torques, positions and velocities of the motors."""
+        from scipy.interpolate import CubicSpline
+
+        if not len(self.t):
             raise InvalidValueError(f"There are no torques. {self.reason()}")
-        times = np.clip(as_floats(t, "t"), self.t[0], self.t[-1])
-        return np.split(self._spline(times), 3, axis=-1)
+        spline = CubicSpline(self.t, np.hstack([self.tau, self.q, self.v]))
+        return lambda t: np.split(spline(np.clip(t, self.t[0], self.t[-1])), 3, axis=-1)
 
 
 def tip_tracking(

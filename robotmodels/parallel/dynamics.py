@@ -62,14 +62,6 @@ from .velocities import SINGULAR, ikm, rates_of_rows, scales, states
 _TOO_NEAR = 1e-6  # determinant and speeds of knees at the end, relative to the start
 Load = ArrayLike | None
 Law = Callable[[float, Array, Array], ArrayLike]
-_POSE = (
-    "T: the pose of row {} is singular: no bounded forces of the legs balance every load; see "
-    "classify_singularity and leg_forces."
-)
-_MASS = (
-    "robot: the mass matrix of the platform is singular at row {}; give the platform mass and "
-    "inertia by with_masses."
-)
 
 
 def idm(
@@ -83,7 +75,7 @@ def idm(
     columns, unit = list(robot.columns), scales(robot, robot.length)
     B = np.swapaxes(legs.jacobian[..., columns] * unit, -1, -2)
     total = (_wrench(robot, T, legs, V, A) + W)[:, columns]
-    return _solved(B, total * unit, _POSE).reshape(*batch, robot.m)
+    return _solved(B, total * unit).reshape(*batch, robot.m)
 
 
 def ddm(
@@ -98,7 +90,7 @@ def ddm(
     M, h = _mass_matrix(robot, T, legs, V)
     rest = (np.einsum("nij,ni->nj", legs.jacobian, force) - h - W)[:, columns]
     out = np.zeros((len(T), 6))
-    out[:, columns] = _solved(M * unit * unit[:, None], rest * unit, _MASS) * unit
+    out[:, columns] = _solved(M * unit * unit[:, None], rest * unit) * unit
     return out.reshape(*batch, 6)
 
 
@@ -199,11 +191,14 @@ def _crank_forces(
     return s2 / rod * force + couple, torque + (turning * at_knee).sum(axis=-1)
 
 
-def _solved(B: Array, x: Array, words: str) -> Array:
+def _solved(B: Array, x: Array) -> Array:
     """Solutions of B y = x; raises for singular matrices. Shapes: (N, m, m), (N, m) -> (N, m)."""
     s = np.linalg.svd(B, compute_uv=False)
     for n in np.flatnonzero(~(s[:, -1] > SINGULAR * s[:, 0]))[:1]:
-        raise InvalidValueError(words.format(n))
+        raise InvalidValueError(
+            f"T: the pose of row {n} is singular (see classify_singularity), or the mass matrix of "
+            "the platform is (see with_masses)."
+        )
     y: Array = np.linalg.solve(B, x[..., None])[..., 0]  # type: ignore[assignment]
     return y
 

@@ -102,11 +102,6 @@ class Cuspidality(Result):
     margin: float
     tried: int
 
-    def reason(self) -> str:
-        """The status as a sentence."""
-        more = f" Pairs of postures tried: {self.tried}." if self.status == 2 else ""
-        return self.status.sentence + more
-
 
 def cuspidality(
     arm: RobotModel,
