@@ -26,39 +26,12 @@ from .polytope import Polytope, PolytopeStatus, polytope
 from .regions import Regions, RegionStatus, regions
 from .workspace import Workspace, WorkspaceStatus, workspace
 
-__all__ = [
-    "AccessStatus",
-    "Accessibility",
-    "AspectStatus",
-    "Aspects",
-    "CurveKind",
-    "Cuspidality",
-    "CuspidalityStatus",
-    "DexterityMap",
-    "FeasiblePath",
-    "GlobalIndex",
-    "PathStatus",
-    "Polytope",
-    "PolytopeStatus",
-    "RegionStatus",
-    "Regions",
-    "SectionStatus",
-    "SingularCurves",
-    "SpecialPoints",
-    "Workspace",
-    "WorkspaceStatus",
-    "accessibility",
-    "aspects",
-    "cuspidality",
-    "cusps",
-    "dexterity_map",
-    "feasible_path",
-    "free_components",
-    "global_index",
-    "isotropy_index",
-    "nodes",
-    "polytope",
-    "regions",
-    "singular_curves",
-    "workspace",
-]
+__all__ = ["AccessStatus", "Accessibility", "accessibility"]
+__all__ += ["AspectStatus", "Aspects", "aspects", "free_components"]
+__all__ += ["CurveKind", "SectionStatus", "SingularCurves", "SpecialPoints"]
+__all__ += ["cusps", "nodes", "singular_curves"]
+__all__ += ["Cuspidality", "CuspidalityStatus", "cuspidality"]
+__all__ += ["DexterityMap", "GlobalIndex", "dexterity_map", "global_index", "isotropy_index"]
+__all__ += ["FeasiblePath", "PathStatus", "feasible_path"]
+__all__ += ["Polytope", "PolytopeStatus", "polytope", "RegionStatus", "Regions", "regions"]
+__all__ += ["Workspace", "WorkspaceStatus", "workspace"]
