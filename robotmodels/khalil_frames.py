@@ -2,6 +2,16 @@
 
 Seed book section 1.2.1: z_j along the axis of joint j, x_j along the common perpendicular of z_j
 and the next axis, and the free choices made so that as many parameters as possible are zero.
+
+Parameters
+----------
+joints : sequence of JointAxis
+    Antecedents come first; joint number j is the j-th, from 1.
+
+Returns
+-------
+KhalilFrames
+    Columns of the table, base and link poses.
 """
 
 from __future__ import annotations
@@ -27,17 +37,9 @@ _TIE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class JointAxis:
-    """One joint of a tree, as its source describes it.
+    """A joint: the link it stands on (0 the root, else an earlier joint's number) and its kind.
 
-    Parameters
-    ----------
-    antecedent, sigma : int
-        Number of the link it stands on, 0 the root, else an earlier joint's; 0 revolute, 1
-        prismatic.
-    origin : ndarray, shape (4, 4)
-        Pose of the joint (and, at ``q = 0``, of the link it moves) in the antecedent's link frame.
-    axis : ndarray, shape (3,)
-        Unit vector in the joint's frame; its sense is the sense of ``q``.
+    Its pose at ``q = 0`` in that link's frame, shape (4, 4); unit vector of q in its own, (3,).
     """
 
     antecedent: int
@@ -48,14 +50,9 @@ class JointAxis:
 
 @dataclass(frozen=True, slots=True)
 class KhalilFrames:
-    """Where the frames went.
+    """Columns (f,) of the table, pose (4, 4) of R_0 in the root link, and poses (f, 4, 4).
 
-    Parameters
-    ----------
-    gamma, b, beta, alpha, d, theta, r : ndarray, shape (f,)
-        Columns of the table.
-    base, link_poses : ndarray, shapes (4, 4), (f, 4, 4)
-        Pose of R_0 in the root link; constant pose of each source link's frame in its R_j.
+    The latter are the constant poses of each source link's frame in its R_j.
     """
 
     gamma: Array
@@ -79,22 +76,6 @@ def khalil_frames(joints: Sequence[JointAxis]) -> KhalilFrames:
     axes less than `NEARLY_PARALLEL` apart get beta, so that no length exceeds the robot's size by
     more than the inverse of that angle.
 
-    Parameters
-    ----------
-    joints : sequence of JointAxis
-        In an order in which antecedents come first; number j is the j-th, from 1.
-
-    Returns
-    -------
-    KhalilFrames
-        Table columns, base and link poses.
-
-    Examples
-    --------
-    >>> z = np.array([0.0, 0.0, 1.0])
-    >>> elbow = JointAxis(1, 0, se3.translation(0.4, 0, 0), z)
-    >>> float(khalil_frames([JointAxis(0, 0, np.eye(4), z), elbow]).d[1])
-    0.4
     """
     f = len(joints)
     columns = np.zeros((7, f))

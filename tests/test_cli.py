@@ -195,7 +195,7 @@ def test_seven_joints_by_arm_angle_or_a_locked_joint(run):
         (["rx90", "--matrix", *(np.eye(4) * [1, 1, -1, 1]).ravel()], "det R = -1"),
         (["rx90", "--q", 1, 2], "expected 6 numbers, or the name of a configuration"),
         (["rx90", "--q", "zero", "--lock", "0=1"], "number from 1 to 6"),
-        (["rx90", "--q", "zero", "--lock", "1=0", "--lock", "joint_1=0"], "given twice"),
+        (["rx90", "--q", "zero", "--lock", "1=0", "--lock", "joint_1=0"], "each joint once"),
         (["rx90", "--mask-axes", "joint"], "--mask-axes: invalid choice"),
     ],
 )
@@ -337,7 +337,7 @@ def test_wrong_arguments_of_calibrate(run, tracker):
         ([*right, "--columns", "x", "y", "w"], "no column 'w'"),
         ([*right, "--parameters", "d9"], "'d9' is not a parameter"),
         ([*right, "--sigma", "-1"], "--sigma: expected positive"),
-        ([*right, "--prior", "1"], "--prior: expected two positive"),
+        ([*right, "--prior", "1"], "--prior: expected 2 finite"),
         (["--measurements", "missing.csv"], "missing.csv"),
     ):
         refused(run, message, *tracker[0], *words)
@@ -499,4 +499,4 @@ def test_velocities_that_are_wrong_are_left_out_and_late_torques_refused(run, mo
         values.append([one["value"] for one in json.loads(out)["parameters"]])
     np.testing.assert_allclose(values[0], values[1], rtol=1e-9)
     late = [*identify(folder, "q", "late"), "--delay", "auto"]
-    refused(run, "--delay auto: the torques fit best at an end of the delays", *late)
+    refused(run, "--delay auto: The torques fit best at an end of the delays", *late)

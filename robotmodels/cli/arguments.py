@@ -15,7 +15,6 @@ from ..errors import InvalidValueError, nearest_names
 from ..geometry import REVOLUTE
 from ..model import RobotModel
 from ..robots import load
-from ..symoro import read_par
 
 SHARED = {
     "robot": """
@@ -106,28 +105,17 @@ def _settings(metavar: str | None, traits: str) -> dict[str, Any]:
 
 def robot_of(arguments: argparse.Namespace) -> RobotModel:
     """Load the robot of the command line."""
-    name = arguments.robot
-    suffix = Path(name).suffix.lower()
-    if suffix != ".par" and Path(name).is_dir():
-        raise InvalidValueError(f"{name!r} is a folder; give a robot's name or file.")
-    if suffix == ".par":
-        return read_par(name)
-    if suffix in (".urdf", ".xml", ".xacro"):
-        return RobotModel.from_urdf(
-            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir,
-            mimic=arguments.mimic,
-        )  # fmt: skip
-    if arguments.base_link or arguments.tip_link or arguments.package_dir or arguments.mimic:
+    name, options = arguments.robot, ("base_link", "tip_link", "package_dir", "mimic")
+    if not any(getattr(arguments, option) for option in options):
+        return load(name)
+    if Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
         raise InvalidValueError(
-            f"--base-link, --tip-link, --package-dir and --mimic are for URDF files; {name!r} is a "
-            "name of the catalogue."
+            f"--base-link, --tip-link, --package-dir and --mimic are for URDF files, got {name!r}."
         )
-    if suffix and Path(name).exists():
-        raise InvalidValueError(
-            f"{name!r}: robots are read from files named .urdf, .xml, .xacro or .par; to see the "
-            "names of the catalogue run robotmodels robots."
-        )
-    return load(name)
+    return RobotModel.from_urdf(
+        name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir,
+        mimic=arguments.mimic,
+    )  # fmt: skip
 
 
 def joined(argv: Sequence[str], options: Collection[str]) -> list[str]:
@@ -142,7 +130,7 @@ def joined(argv: Sequence[str], options: Collection[str]) -> list[str]:
     return words
 
 
-def numbers(text: str, count: int | Sequence[int], option: str, positive: bool = False) -> Array:
+def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
     """Numbers of an option. Shapes: -> (count,)."""
     counts = (count,) if isinstance(count, int) else tuple(count)
     try:
@@ -153,18 +141,14 @@ def numbers(text: str, count: int | Sequence[int], option: str, positive: bool =
         wanted = " or ".join(map(str, counts))
         what = "finite number" + "s" * (counts != (1,))
         raise InvalidValueError(f"{option}: expected {wanted} {what}, got {text!r}.")
-    if positive and not (values > 0.0).all():
-        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
     return values
 
 
-def joint_numbers(
-    text: str | None, n: int | Sequence[int], option: str, positive: bool = False
-) -> Array | float | None:
+def joint_numbers(text: str | None, n: int | Sequence[int], option: str) -> Array | float | None:
     """One number for all joints, or one for each (or another count of numbers)."""
     if text is None:
         return None
-    values = numbers(text, sorted({1, n}) if isinstance(n, int) else n, option, positive)
+    values = numbers(text, sorted({1, n}) if isinstance(n, int) else n, option)
     return float(values[0]) if len(values) == 1 else values
 
 
@@ -221,7 +205,4 @@ def columns(words: list[str] | None) -> list[int | str] | None:
 
 
 def _character(text: str) -> str:
-    text = text.replace(r"\t", "\t")
-    if len(text) != 1:
-        raise argparse.ArgumentTypeError(f"expected one character, got {text!r}")
-    return text
+    return text.replace(r"\t", "\t")

@@ -142,7 +142,7 @@ def read(
         joints=columns(arguments.joints), columns=columns(arguments.columns),
         other_joints=columns(arguments.other_joints),
         label=None if arguments.label is None else column(arguments.label),
-        sigma=joint_numbers(arguments.sigma, range(1, 7), "--sigma", True), name=name,
+        sigma=joint_numbers(arguments.sigma, range(1, 7), "--sigma"), name=name,
         **given(arguments, "lengths", "angles", "joint_angles", "orientation", "pattern",
                 "delimiter", "frame"),
     )  # fmt: skip
@@ -159,10 +159,5 @@ def _prior(text: str) -> ParameterPrior | None:
 
     if text.strip().lower() == "none":
         return None
-    try:
-        length, angle = numbers(text, 2, "--prior", positive=True)
-    except InvalidValueError:
-        raise InvalidValueError(
-            f"--prior: expected two positive numbers (m, rad) or none, got {text!r}."
-        ) from None
+    length, angle = numbers(text, 2, "--prior")
     return ParameterPrior(length=float(length), angle=float(angle))

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import textwrap
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
 from .igm import as_json, as_text
-from .info import pose_text
+from .info import narrow, pose_text
 from .output import check_output, progress
 
 if TYPE_CHECKING:
@@ -31,8 +29,6 @@ examples:
   robotmodels demo
   robotmodels demo --real --out tx40/
   robotmodels demo --chapter 3"""
-_TERMINAL = 80  # columns
-_BATCH = 100_000
 _INVERSE_BATCH = 10_000
 # stated configurations, away from singular positions
 _RX90_POSTURE = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
@@ -103,15 +99,9 @@ def _show_base(model: RobotModel) -> None:
     # links and rotors, as in the book's table; friction is each joint's own
     rules = base_parameters(model, drive=("Ia",))
     numbers = base_parameters(model, "numeric", drive=("Ia",))
-    print(_narrow(rules.text))
+    print(narrow(rules.text))
     same = "the same parameters" if rules.names == numbers.names else "other parameters"
     print(f"By the columns of the regressor: {same}.")
-
-
-def _narrow(text: str) -> str:
-    """A printed table whose long lines are wrapped anew for a narrow terminal."""
-    shape = {"width": _TERMINAL, "subsequent_indent": " " * 4, "break_on_hyphens": False}
-    return "\n".join(textwrap.fill(line, **shape) for line in text.splitlines())
 
 
 def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
@@ -132,10 +122,6 @@ def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
     print(f"inverse dynamics, torque (N m):    {_row(tau)}")
     back = ddm(model, q, v, tau)
     print(f"direct dynamics of it (rad/s^2):   {_row(back)}")
-    Q = np.random.default_rng(1).uniform(-np.pi, np.pi, (_BATCH, model.n))
-    dgm(model, Q[:2])  # compiled where it never was
-    seconds, _ = _timed(lambda: dgm(model, Q), 5)
-    print(f"Poses in batch: {1e6 * seconds / _BATCH:.2f} us each (median of 5 runs)")
 
 
 def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
@@ -150,22 +136,11 @@ def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
     print(f"Offline scene of the {found.count} postures: {path.resolve()}")
     Q = np.random.default_rng(2).uniform(-np.pi, np.pi, (_INVERSE_BATCH, model.n))
     T = dgm(model, Q)
-    seconds, found = _timed(lambda: igm(model, T), 3)
+    found = igm(model, T)
     off = np.abs(np.angle(np.exp(1j * (found.nearest(Q) - Q)))).max()
-    print(f"{_INVERSE_BATCH} random poses: {found.valid.sum()} postures, "
-          f"{1e6 * seconds / _INVERSE_BATCH:.1f} us a pose (median of 3 runs),\n  largest "
-          f"residual {np.nanmax(found.residual):.1e}; the joint variables that made each pose are\n"
-          f"  among its postures to {off:.1e} rad")  # fmt: skip
-
-
-def _timed(call: Callable[[], Any], runs: int = 1) -> tuple[float, Any]:
-    """Median time of some calls, and what the last one returns."""
-    times, result = [], None
-    for _ in range(runs):
-        started = time.perf_counter()
-        result = call()
-        times.append(time.perf_counter() - started)
-    return float(np.median(times)), result
+    print(f"{_INVERSE_BATCH} random poses: {found.valid.sum()} postures, largest residual "
+          f"{np.nanmax(found.residual):.1e};\n  the joint variables that made each pose are among "
+          f"its postures to {off:.1e} rad")  # fmt: skip
 
 
 def _row(values: Array) -> str:
@@ -187,12 +162,12 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     data = load_tx40()
     model, log = data.model, data.log
     print(log)
-    print(_narrow(f"{data.source}; {data.licence}"))
+    print(narrow(f"{data.source}; {data.licence}"))
     print("Checking it (compiles the first time on this machine only) ...", flush=True)
     started = time.perf_counter()
     findings = (*check_log(log, model), *check_joints(log, model))
-    print(_narrow("\n".join(map(str, findings)) or "The checks of the log found nothing."))
-    print(_narrow(str(synchronisation(log, model))))
+    print(narrow("\n".join(map(str, findings)) or "The checks of the log found nothing."))
+    print(narrow(str(synchronisation(log, model))))
     with progress(arguments, "the whole log") as bar:
         whole = fit(model, log, progress=bar)
     print(f"  identified after {time.perf_counter() - started:.1f} s\n")
@@ -200,10 +175,10 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     first = log.rows(data.training.start, data.training.stop)
     last = log.rows(data.held_out.start, data.held_out.stop)
     with progress(arguments, "without the rows that test") as bar:
-        seconds, trained = _timed(lambda: fit(model, first, test=last, progress=bar))
-    print(f"\nFitted on samples {data.training.start} to {data.training.stop} ({seconds:.1f} s, "
-          f"with all checks); torques of samples {data.held_out.start}\nto {data.held_out.stop} as "
-          "predicted, root mean square error in N m, unfiltered:")  # fmt: skip
+        trained = fit(model, first, test=last, progress=bar)
+    print(f"\nFitted on samples {data.training.start} to {data.training.stop}; torques of samples "
+          f"{data.held_out.start}\nto {data.held_out.stop} as predicted, root mean square error in "
+          "N m, unfiltered:")  # fmt: skip
     for word, row in (
         ("here", trained.validation.held_out.rmse), ("published, best", _PUBLISHED_RMSE)
     ):  # fmt: skip

@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import Array
+from .._arrays import Array, as_number
 from ..errors import InvalidValueError
 from .arguments import given, joint_numbers, robot_of
 from .output import Report, check_output, progress, with_extra
 
 if TYPE_CHECKING:
     from ..obstacles import Box
-
-_RATE = 1000.0
-"""Default sampling rate of a file, Hz."""
 
 EXAMPLES = """\
 examples:
@@ -79,7 +76,7 @@ def run(arguments: argparse.Namespace) -> Report:
     n = model.n
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
-    _check_file(arguments)
+    rate = 1000.0 if arguments.rate is None else as_number(arguments.rate, "--rate", above=0.0)
     boxes, workspace = _boxes(arguments.box, "--box"), None
     if boxes:  # what is inside of all
         lower = np.max([box.lower for box in boxes], axis=0)
@@ -108,7 +105,6 @@ def run(arguments: argparse.Namespace) -> Report:
         from ..viz import plot_excitation
 
         names = [f"trajectory.{arguments.format or 'csv'}", "trajectory.json", "summary.txt"]
-        rate = _RATE if arguments.rate is None else arguments.rate
         write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
         write_trajectory(found, folder / "trajectory.json")
         (folder / "summary.txt").write_text(f"{found}\n", encoding="utf-8")
@@ -119,22 +115,9 @@ def run(arguments: argparse.Namespace) -> Report:
     return Report(str(found), lambda: excitation_data(found), is_feasible, str(found), write)
 
 
-def _check_file(arguments: argparse.Namespace) -> None:
-    """Raise for options that the sample file does not support."""
-    for option in ("rate", "format", "degrees"):
-        if arguments.out is None and getattr(arguments, option) not in (None, False):
-            raise InvalidValueError(
-                f"--{option}: describes the file of --out; give --out, or leave it out."
-            )
-    if arguments.degrees and arguments.format == "yaml":
-        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
-    if arguments.rate is not None and not 0.0 < arguments.rate < np.inf:
-        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
-
-
 def _each(text: str | None, n: int, option: str) -> Array | None:
-    """Positive numbers, one for each joint."""
-    values = joint_numbers(text, n, option, positive=True)
+    """One for each joint."""
+    values = joint_numbers(text, n, option)
     return None if values is None else np.full(n, values)
 
 

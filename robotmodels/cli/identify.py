@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from ..identification import IdentificationResult, Log
-    from ..identification.delay import Synchronisation
     from ..identification.methods.base import Method
     from ..inertia import InertialParameters
     from ..minimal_parameters import StandardParameters
@@ -125,9 +124,6 @@ def run(arguments: argparse.Namespace) -> Report | ExitStatus:
     return report(result, test, robot)
 
 
-_MOST = 64
-
-
 def prior(arguments: argparse.Namespace, model: RobotModel) -> InertialParameters | None:
     """Prior inertial parameters of ``--prior``: another robot's, or uniform bodies."""
     if arguments.prior is None:
@@ -178,13 +174,11 @@ def method_of_options(arguments: argparse.Namespace, model: RobotModel) -> Metho
 
 def workers(count: int) -> AbstractContextManager[Executor | None]:
     """Worker processes."""
-    if not 1 <= count <= _MOST:
-        raise InvalidValueError(f"--workers: expected 1 to {_MOST}, got {count}.")
-    if count == 1:
-        return nullcontext()
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(count)
+    if count < 1:
+        raise InvalidValueError(f"--workers: expected 1 or more, got {count}.")
+    return nullcontext() if count == 1 else ProcessPoolExecutor(count)
 
 
 def report(
@@ -256,7 +250,10 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
         other = _read(arguments, model, arguments.test, arguments.test_torques_from)
     if arguments.delay is not None:
         if arguments.delay == "auto":
-            delay = _estimated_delay(synchronisation(whole, model))
+            found = synchronisation(whole, model)
+            if not found.status.is_success:
+                raise InvalidValueError(f"--delay auto: {found} Or give it in seconds.")
+            delay = float(found.delay)
         else:
             delay = float(numbers(arguments.delay, 1, "--delay")[0])
         whole = with_delay(whole, delay)
@@ -292,24 +289,6 @@ def _range(rows: list[int], N: int, option: str) -> tuple[int, int]:
             f"log, got {rows[0]} {rows[1]}."
         )
     return start, stop
-
-
-def _estimated_delay(estimate: Synchronisation) -> float:
-    """Estimated delay, if it is determined."""
-    from ..identification.delay import SynchronisationStatus
-
-    if estimate.status is SynchronisationStatus.AT_THE_END:
-        raise InvalidValueError(
-            "--delay auto: the torques fit best at an end of the delays tried "
-            f"({1e3 * estimate.delays[0]:.0f} to {1e3 * estimate.delays[-1]:.0f} ms); "
-            "check whether positions and torques belong to the same motion, and give the delay "
-            "in seconds."
-        )
-    if not estimate.status.is_success:
-        raise InvalidValueError(
-            f"--delay auto: {estimate.status.sentence} Give the delay in seconds, or leave it out."
-        )
-    return float(estimate.delay)
 
 
 def _read(

@@ -118,25 +118,20 @@ def locks_of(
     words: Sequence[str], model: RobotModel, degrees: bool
 ) -> dict[int | str, float] | None:
     """Joints that keep a value."""
-    names = list(model.table.joint_names)
-    locks: dict[int | str, float] = {}
+    names, locks = list(model.table.joint_names), dict[int | str, float]()
     for word in words:
         joint, equals, text = word.partition("=")
-        known = joint in names or (joint.isdecimal() and 1 <= int(joint) <= model.n)
-        if not equals or not known:
+        column = names.index(joint) if joint in names else -1
+        if joint.isdecimal():
+            column = int(joint) - 1
+        if not (equals and 0 <= column < model.n) or column in locks:
             raise InvalidValueError(
-                f"--lock: expected JOINT=VALUE with a joint by its number from 1 to {model.n} or "
-                f"by its name ({', '.join(names)}), got {word!r}."
+                f"--lock: expected JOINT=VALUE, each joint once, by its number from 1 to {model.n} "
+                f"or by its name ({', '.join(names)}), got {word!r}."
             )
-        column = names.index(joint) if joint in names else int(joint) - 1
-        if column in locks:
-            raise InvalidValueError(f"--lock: joint {joint} is given twice.")
         value = float(numbers(text, 1, f"--lock {joint}")[0])
         locks[column] = np.deg2rad(value).item() if degrees and revolute(model)[column] else value
     return locks or None
-
-
-_COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
@@ -182,7 +177,7 @@ def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
         f"pose of the tool (m):\n{pose_text(np.array(data['pose']))}",
     ]
     if not all(data["mask"]):
-        asked = " ".join(c for c, m in zip(_COMPONENTS, data["mask"], strict=True) if m)
+        asked = " ".join(np.array(["x", "y", "z", "rx", "ry", "rz"])[np.array(data["mask"]) > 0])
         lines.append(f"asked for: {asked} in {mask_axes} axes")
     if rows:
         columns = [

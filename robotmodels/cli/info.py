@@ -15,7 +15,7 @@ from ..table_text import boxed, length_text
 from .arguments import robot_of
 from .output import print_json
 
-_WIDTH = 88  # columns
+_WIDTH = 80  # columns
 _LIMITS, _DRIVES = ("lower", "upper", "velocity", "effort"), ("Ia", "Fv", "Fc", "offset")
 EXAMPLES = """\
 examples:
@@ -58,9 +58,9 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         print("\nNo inertial parameters are known: the dynamic models see massless links.")
     for label, names in (("Frames", model.frame_names), ("Configurations", model.configurations)):
-        print(_narrow(f"{label}: {', '.join(names)}"))
+        print(narrow(f"{label}: {', '.join(names)}"))
     for note in model.notes:
-        print(_narrow(f"Note: {note}"))
+        print(narrow(f"Note: {note}"))
 
 
 def as_json(model: RobotModel) -> dict[str, Any]:
@@ -128,5 +128,7 @@ def _units(model: RobotModel) -> list[str]:
     return ["m" if s == PRISMATIC else "rad" for s in table.sigma[table.joint_rows]]
 
 
-def _narrow(text: str) -> str:
-    return textwrap.fill(text, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+def narrow(text: str) -> str:
+    """A text with its lines wrapped for a narrow terminal."""
+    shape = {"width": _WIDTH, "subsequent_indent": " " * 4, "break_on_hyphens": False}
+    return "\n".join(textwrap.fill(line, **shape) for line in text.splitlines())

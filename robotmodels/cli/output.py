@@ -72,20 +72,7 @@ def print_json(data: Any) -> None:
     """Print data as JSON that any reader takes."""
     # a terminal without Unicode gets escapes, which mean the same
     unicode = str(getattr(sys.stdout, "encoding", "") or "").lower().startswith("utf")
-    print(_json(json_data(data), json.JSONEncoder(ensure_ascii=not unicode, allow_nan=False)))
-
-
-def _json(data: Any, encoder: json.JSONEncoder, indent: str = "\n") -> str:
-    """JSON with an entry a line, but rows of numbers and words in one line."""
-    inner = indent + "  "
-    if isinstance(data, dict) and data:
-        entries = (
-            f"{encoder.encode(key)}: {_json(value, encoder, inner)}" for key, value in data.items()
-        )
-        return "{" + inner + f",{inner}".join(entries) + indent + "}"
-    if isinstance(data, list) and any(isinstance(value, (dict, list)) for value in data):
-        return "[" + inner + f",{inner}".join(_json(v, encoder, inner) for v in data) + indent + "]"
-    return encoder.encode(data)
+    print(json.dumps(json_data(data), ensure_ascii=not unicode, allow_nan=False, indent=2))
 
 
 _CELLS = 30

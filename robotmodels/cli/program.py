@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import shutil
 import sys
 import textwrap
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .. import __version__, show_versions
@@ -17,7 +16,7 @@ from ..errors import RobotModelsError, nearest_names
 from .arguments import add_options, joined
 from .option_words import in_options
 from .output import Report, hand_over
-from .terminal import ExitStatus, ending, give_up_output, noticed, prepared, say, statuses
+from .terminal import ExitStatus, ending, give_up_output, prepared, say, statuses
 
 _WIDEST = 100  # columns
 
@@ -94,9 +93,9 @@ examples:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command."""
     words = list(sys.argv[1:] if argv is None else argv)
-    with prepared(), noticed() as interrupted:
+    with prepared():
         try:
-            return int(_run(words, interrupted))
+            return int(_run(words))
         except SystemExit as stop:  # of argparse: help, version, or a wrong argument
             return int(stop.code) if isinstance(stop.code, int) else 2
 
@@ -108,8 +107,7 @@ def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
         description="Kinematics, dynamics, calibration and identification of robot manipulators "
         "from their Khalil-Kleinfinger table or their URDF. SI units and radians, unless an option "
         "says otherwise.",
-        epilog=f"{_EXAMPLES}\n\n{statuses()}\n\n"
-        "ROBOTMODELS_TRACEBACK=1 in the environment does what --traceback does.",
+        epilog=f"{_EXAMPLES}\n\n{statuses()}",
     )
     parser.add_argument("--version", action="version", version=f"robotmodels {__version__}",
                         help="show the version and exit; --version -v (or --verbose) shows those "
@@ -140,9 +138,8 @@ def _add_traceback(parser: argparse.ArgumentParser) -> None:
                         help="after an error, show where it came from")  # fmt: skip
 
 
-def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
+def _run(words: list[str]) -> int:
     command = next((word for word in words if not word.startswith("-")), None)
-    traced = "--traceback" in words or os.environ.get("ROBOTMODELS_TRACEBACK", "0") not in ("", "0")
     options: list[str] = []
     code: int | None = ExitStatus.DONE
     try:
@@ -172,11 +169,8 @@ def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
         say("interrupted.")
         return ExitStatus.INTERRUPTED
     except Exception as error:  # noqa: BLE001  # nobody asked for a traceback at a terminal
-        if traced:
+        if "--traceback" in words:
             traceback.print_exc()
-        if interrupted():
-            say("interrupted.")
-            return ExitStatus.INTERRUPTED
         said, status = _outcome(error, options)
         say(said)
         return status

@@ -9,7 +9,7 @@ import os
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from enum import IntEnum
 from typing import Any
 
@@ -105,23 +105,3 @@ def give_up_output() -> None:
     """Nothing more can be written: keep Python from complaining about it at exit."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextlib.contextmanager
-def noticed() -> Iterator[Callable[[], bool]]:
-    """Context that raises interrupts which Python would only print."""
-    lost = False
-    before = sys.unraisablehook
-
-    def hook(unraisable: Any) -> None:
-        nonlocal lost
-        if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            lost = True
-        else:
-            before(unraisable)
-
-    sys.unraisablehook = hook
-    try:
-        yield lambda: lost
-    finally:
-        sys.unraisablehook = before

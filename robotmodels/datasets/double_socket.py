@@ -115,11 +115,7 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     places = {}
     found = [entry for entry in (data / robot).iterdir() if entry.is_dir()]
     for place in sorted(found, key=lambda entry: entry.name):
-        sockets = [_readings(numbers(place / f"hole_{hole}.csv")) for hole in (0, 1)]
+        sockets = [numbers(place / f"hole_{hole}.csv")[:, :7] for hole in (0, 1)]
         places[place.name] = (sockets[0], sockets[1])
     urdf = (data / "panda.urdf").read_text(encoding="utf-8")
     return DoubleSocket(robot, urdf, places, _DISTANCE, _SOURCE, "MIT")
-
-
-def _readings(rows: Array) -> Array:
-    return np.ascontiguousarray(rows[:, :7])

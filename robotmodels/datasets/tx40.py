@@ -24,14 +24,8 @@ _SOURCE = (
     f"({_POSITIONS}, {_TORQUES}, TX40_bp_5.csv, TX40_ep_5.csv)"
 )
 _OURS = {
-    "fv": "Fv",
-    "fs": "Fc",
-    "off": "offset",
-    "Ia": "Ia",
-    "Iam": "Iam",
-    "fvm": "Fvm",
-    "fsm": "Fcm",
-}
+    "fv": "Fv", "fs": "Fc", "off": "offset", "Ia": "Ia", "Iam": "Iam", "fvm": "Fvm", "fsm": "Fcm",
+}  # fmt: skip
 """Drive parameters: the source's words and ours."""
 
 

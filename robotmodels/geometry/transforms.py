@@ -1,6 +1,16 @@
-"""The transforms a table stands for: what each row multiplies, plainly, for one q or many.
+"""The transforms of a table, for one q or many. Seed book section 1.2.1, eq. [1.2] and [1.3].
 
-Seed book section 1.2.1, eq. [1.2] and [1.3].
+Parameters
+----------
+table : DHTable
+    The geometric parameters, f frames.
+q : array_like, shape (..., n)
+    Joint variables in table order, radians or metres.
+
+Returns
+-------
+ndarray, shape (..., f, 4, 4)
+    One factor per row; their product along a branch is the pose of its last frame in R_0.
 """
 
 from __future__ import annotations
@@ -16,17 +26,7 @@ from .table import DHTable
 
 
 def constant_factors(table: DHTable) -> Array:
-    """The constant part ``C_j`` of each factor: ``T(a(j), j) = C_j Motion(q_j)``.
-
-    Parameters
-    ----------
-    table : DHTable
-        The table.
-
-    Returns
-    -------
-    ndarray, shape (f, 4, 4)
-        ``T(a(j), j)`` at ``q = 0``.
+    """The constant part ``C_j`` of each factor ``T(a(j), j) = C_j Motion(q_j)``, at ``q = 0``.
 
     Examples
     --------
@@ -51,18 +51,6 @@ def link_transforms(table: DHTable, q: ArrayLike) -> Array:
     """The factors ``T(a(j), j)`` of the direct geometric model, straight from the table.
 
     Plain NumPy, no Pinocchio and no compiled code: the oracle that the fast paths are held to.
-
-    Parameters
-    ----------
-    table : DHTable
-        The geometric parameters.
-    q : array_like, shape (..., n)
-        Joint variables in table order, radians or metres.
-
-    Returns
-    -------
-    ndarray, shape (..., f, 4, 4)
-        One factor per row; their product along a branch is the pose of its last frame in R_0.
 
     Examples
     --------

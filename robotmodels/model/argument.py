@@ -1,4 +1,17 @@
-"""The first arguments of every model: a robot, and its joint positions."""
+"""The first arguments of every model, checked: a robot, and its joint positions.
+
+Parameters
+----------
+model : RobotModel
+    The robot.
+q : array_like, shape (..., n)
+    Joint positions, rad or m.
+
+Returns
+-------
+ndarray, shape (..., n)
+    Joint positions as floats.
+"""
 
 from __future__ import annotations
 
@@ -18,25 +31,10 @@ _TWO_TURNS = 4.0 * np.pi
 
 
 def as_positions(model: RobotModel, q: ArrayLike) -> Array:
-    """Check joint positions; angles that may be degrees warn, once for a robot.
+    """Check joint positions (..., n).
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : array_like, shape (..., n)
-        Joint positions, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        The same as floats.
-
-    Warns
-    -----
-    RobotModelsWarning
-        A revolute joint is more than two turns away from zero, and beyond its limits, in one of
-        the first hundred calls.
+    A RobotModelsWarning, once for a robot, where one of the first hundred calls has a revolute
+    joint more than two turns away from zero and beyond its limits: angles may be degrees.
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
@@ -65,13 +63,7 @@ def _warn_of_degrees(model: RobotModel, q: Array) -> None:
 
 
 def check_model(model: object) -> None:
-    """Refuse what is not a model, with a hint for what it is.
-
-    Parameters
-    ----------
-    model : object
-        First argument of a public function.
-    """
+    """Refuse what is not a model, with a hint for what it is."""
     if isinstance(model, RobotModel):
         return
     hint = "build one with RobotModel.from_table(...), RobotModel.from_urdf(...) or load(...)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -238,13 +238,8 @@ class RobotModel:
         ('turn',)
         """
         parts = read_urdf(path_or_text, base_link, tip_link, package_dirs, dynamics, mimic)
-        return cls(
-            name=parts.name, table=parts.table, inertia=parts.inertia, drive=parts.drive,
-            base=parts.base, tool=parts.tool, tip=parts.tip,
-            gravity=gravity,  # type: ignore[arg-type]
-            transmission=parts.transmission, frames=parts.frames, visuals=parts.visuals,
-            notes=parts.notes, source=parts.source,
-        )  # fmt: skip
+        own: dict[str, Any] = {part.name: getattr(parts, part.name) for part in fields(parts)}
+        return cls(**own, gravity=gravity)  # type: ignore[arg-type]
 
     if not TYPE_CHECKING:  # otherwise every name would be accepted by type checkers
 
@@ -390,12 +385,7 @@ class RobotModel:
     @property
     def parts(self) -> RobotParts:
         """What a URDF is written from."""
-        return RobotParts(
-            name=self.name, table=self.table, base=self.base, tool=self.tool, tip=self.tip,
-            inertia=self.inertia, drive=self.drive, transmission=self.transmission,
-            frames=self.frames, visuals=self.visuals, notes=self.notes,
-            source=self.source,
-        )  # fmt: skip
+        return RobotParts(**{part.name: getattr(self, part.name) for part in fields(RobotParts)})
 
     def __repr__(self) -> str:
         return f"<RobotModel {self.name!r}: {self.n} joints, {self.f} frames>"

@@ -4,6 +4,11 @@ Parameters
 ----------
 name : str
     One of `robots`; another is a `RobotNotFoundError` with the nearest names.
+
+Returns
+-------
+str or tuple of str
+    Words, or names.
 """
 
 from __future__ import annotations
@@ -46,12 +51,7 @@ Rows = list[dict[str, Any]]
 
 
 def robots() -> tuple[str, ...]:
-    """Names that `load` accepts.
-
-    Returns
-    -------
-    tuple of str
-        The catalogue's own, then ``erd:<name>`` for the arms of example-robot-data.
+    """Names that `load` accepts: the catalogue's own, then those of example-robot-data.
 
     Examples
     --------
@@ -63,11 +63,6 @@ def robots() -> tuple[str, ...]:
 
 def title(name: str) -> str:
     """One-line description of a robot.
-
-    Returns
-    -------
-    str
-        A sentence.
 
     Examples
     --------
@@ -82,12 +77,7 @@ def title(name: str) -> str:
 
 
 def source(name: str) -> str:
-    """Origin of every number of a robot of the catalogue.
-
-    Returns
-    -------
-    str
-        Title, conventions, source of geometry, limits, inertia and drives, references.
+    """Title, conventions, source of every number and references of a robot of the catalogue.
 
     Examples
     --------

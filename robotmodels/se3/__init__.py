@@ -5,8 +5,7 @@ Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) a
 
 from .checks import ROTATION_TOLERANCE, as_pose, as_single_pose, nearest_pose
 from .matlab import poses_from_matlab, poses_to_matlab
-from .motions import inverse, rotation, skew, translation
-from .roll_pitch_yaw import from_rpy, to_rpy
+from .motions import from_rpy, inverse, rotation, skew, to_rpy, translation
 
 __all__ = [
     "ROTATION_TOLERANCE",

@@ -1,4 +1,26 @@
-"""Whether a matrix is a pose: the border for poses, which rounds off what is nearly a rotation."""
+"""Whether a matrix is a pose: the border for poses, which rounds off what is nearly a rotation.
+
+Parameters
+----------
+T : array_like, shape (..., 4, 4)
+    Poses, last row 0 0 0 1.
+name : str
+    Used in error messages.
+
+Returns
+-------
+ndarray, shape (..., 4, 4)
+    Checked poses.
+
+Raises
+------
+ShapeError
+    Not (..., 4, 4).
+InvalidValueError
+    NaN or infinity.
+NotARotationError
+    The last row or the rotation is off by more than the tolerance, or it mirrors.
+"""
 
 from __future__ import annotations
 
@@ -21,27 +43,6 @@ def as_pose(T: Any, name: str = "T") -> Array:
     Anything with a ``homogeneous`` attribute (``pinocchio.SE3``) is accepted. A rotation that
     is off by more than rounding, but less than `ROTATION_TOLERANCE`, is replaced by the nearest
     rotation (polar decomposition); rotations exact to rounding are left untouched.
-
-    Parameters
-    ----------
-    T : array_like, shape (..., 4, 4)
-        Poses, last row 0 0 0 1.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        Checked poses.
-
-    Raises
-    ------
-    ShapeError
-        Not (..., 4, 4).
-    InvalidValueError
-        NaN or infinity.
-    NotARotationError
-        The last row or the rotation is off by more than the tolerance, or it mirrors.
 
     Examples
     --------
@@ -89,21 +90,8 @@ def as_pose(T: Any, name: str = "T") -> Array:
 def nearest_pose(T: Any) -> Array:
     """The poses nearest to matrices with rounded rotations: typed, read from a file, averaged.
 
-    Parameters
-    ----------
-    T : array_like, shape (..., 4, 4)
-        Matrices whose 3x3 blocks are rotations to 0.1 (entries of ``R R^T - 1``), last row
-        0 0 0 1 to `ROTATION_TOLERANCE`.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        Poses with the nearest rotation (polar decomposition); positions are unchanged.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        No matrices, or too far from a rotation to be a rounded one.
+    The 3x3 blocks of the matrices (..., 4, 4) are rotations to 0.1 (entries of ``R R^T - 1``); they
+    become the nearest rotations (polar decomposition), positions are unchanged.
 
     Examples
     --------
@@ -124,30 +112,7 @@ def nearest_pose(T: Any) -> Array:
 
 
 def as_single_pose(T: Any, name: str) -> Array:
-    """One checked pose; None is the identity.
-
-    Parameters
-    ----------
-    T : array_like, shape (4, 4), or None
-        The pose.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        Checked pose.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        As `as_pose`.
-
-    Examples
-    --------
-    >>> bool((as_single_pose(None, "tool") == np.eye(4)).all())
-    True
-    """
+    """One checked pose, shape (4, 4); None is the identity."""
     if T is None:
         return np.eye(4)
     T = as_pose(T, name)

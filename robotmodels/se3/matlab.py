@@ -1,4 +1,28 @@
-"""Stacks of poses in MATLAB's order, and back."""
+"""Stacks of poses in MATLAB's order, (4, 4, N), and back. Only the axes move, no number changes.
+
+Parameters
+----------
+T : array_like
+    Pages of poses, shape (4, 4, N), as ``ctraj`` of the Robotics Toolbox for MATLAB gives them and
+    ``scipy.io.loadmat`` reads them; or poses of shape (N, 4, 4). One pose, (4, 4), is N = 1.
+
+Returns
+-------
+ndarray
+    The poses, (N, 4, 4) in C order, or pages, (4, 4, N) in Fortran's order, which is MATLAB's.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Another shape, such as the one that needs no conversion; NaN or infinity.
+NotARotationError
+    A pose whose last row is not 0 0 0 1, so that it is no pose, or the order is another one: that
+    (4, 4, 4) is in MATLAB's order is not guessed, the name of the function says so.
+
+References
+----------
+The exercise, section 4.3: "an array of 4 x 4 x N".
+"""
 
 from __future__ import annotations
 
@@ -15,84 +39,29 @@ from .checks import ROTATION_TOLERANCE
 def poses_from_matlab(T: ArrayLike) -> Array:
     """Poses from MATLAB's order: ``(4, 4, N)``, page by page, to ``(N, 4, 4)``.
 
-    Only the axes move, no number changes. That ``(4, 4, 4)`` is in MATLAB's order is not guessed:
-    the name of this function says so, and the last row of each pose is looked at.
-
-    Parameters
-    ----------
-    T : array_like, shape (4, 4, N) or (4, 4)
-        Pages of poses, as ``ctraj`` of the Robotics Toolbox for MATLAB gives them and
-        ``scipy.io.loadmat`` reads them. MATLAB has no last axis of length 1: ``(4, 4)`` is N = 1.
-
-    Returns
-    -------
-    ndarray, shape (N, 4, 4)
-        The poses, C-ordered.
-
-    Raises
-    ------
-    ShapeError
-        Another shape, such as ``(N, 4, 4)``, which needs no conversion.
-    InvalidValueError
-        NaN or infinity.
-    NotARotationError
-        A page whose last row is not 0 0 0 1, so that it is no pose, or the order is another one.
-
-    References
-    ----------
-    The exercise, section 4.3: "an array of 4 x 4 x N".
-
     Examples
     --------
     >>> from robotmodels.se3 import translation
     >>> pages = np.stack([translation(0, 0, z) for z in (0.1, 0.2, 0.3)], axis=-1)
-    >>> pages.shape, poses_from_matlab(pages).shape
-    ((4, 4, 3), (3, 4, 4))
-    >>> poses_from_matlab(pages)[:, 2, 3]
-    array([0.1, 0.2, 0.3])
+    >>> pages.shape, poses_from_matlab(pages)[:, 2, 3]
+    ((4, 4, 3), array([0.1, 0.2, 0.3]))
     """
     pages = as_floats(T, "T")
     if pages.shape == (4, 4):
         pages = pages[:, :, None]
     if pages.ndim != 3 or pages.shape[:2] != (4, 4):
-        advice = (
-            " This is (N, 4, 4) already: use it as it is."
-            if pages.ndim == 3 and pages.shape[1:] == (4, 4)
-            else " Give the pages of poses, one behind the other along the last axis."
+        already = pages.ndim == 3 and pages.shape[1:] == (4, 4)
+        raise ShapeError(
+            f"T: expected MATLAB's order (4, 4, N), got shape {pages.shape}."
+            + (" This is (N, 4, 4) already: use it as it is." if already else "")
         )
-        raise ShapeError(f"T: expected MATLAB's order (4, 4, N), got shape {pages.shape}.{advice}")
-    off = np.abs(pages[3] - np.array([[0.0], [0.0], [0.0], [1.0]])).max(axis=0)
-    if (off > ROTATION_TOLERANCE).any():
-        k = int((off > ROTATION_TOLERANCE).argmax())
-        raise NotARotationError(
-            f"T: the last row of page {k}, T[3, :, {k}], must be 0 0 0 1, got "
-            f"{pages[3, :, k].tolist()}. If T is (N, 4, 4) already, use it as it is."
-        )
-    return np.array(np.moveaxis(pages, -1, 0), order="C")
+    poses = np.array(np.moveaxis(pages, -1, 0), order="C")
+    _check_rows(poses, "T[3, :, {}]", "If T is (N, 4, 4) already, use it as it is.")
+    return poses
 
 
 def poses_to_matlab(T: Any) -> Array:
     """Poses in MATLAB's order: ``(N, 4, 4)`` to ``(4, 4, N)``, page by page.
-
-    Parameters
-    ----------
-    T : array_like, shape (N, 4, 4) or (4, 4)
-        Poses; one pose gives one page.
-
-    Returns
-    -------
-    ndarray, shape (4, 4, N)
-        Pages of poses, as ``ikine`` of the Robotics Toolbox for MATLAB takes them, in Fortran's
-        order, which is MATLAB's in memory.
-
-    Raises
-    ------
-    ShapeError
-        Another shape; several batch axes have no place in MATLAB's order.
-    InvalidValueError
-        NaN or infinity.
-    NotARotationError
-        A pose whose last row is not 0 0 0 1, so that it is none, or the order is another one.
 
     Examples
     --------
@@ -107,11 +76,15 @@ def poses_to_matlab(T: Any) -> Array:
             "first, T.reshape(-1, 4, 4)."
         )
     poses = poses.reshape(-1, 4, 4)
-    off = np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
-    if (off > ROTATION_TOLERANCE).any():
-        k = int((off > ROTATION_TOLERANCE).argmax())
-        raise NotARotationError(
-            f"T: the last row of pose {k}, T[{k}, 3], must be 0 0 0 1, got "
-            f"{poses[k, 3].tolist()}. If T is (4, 4, N) already, it is in MATLAB's order."
-        )
+    _check_rows(poses, "T[{}, 3]", "If T is (4, 4, N) already, it is in MATLAB's order.")
     return np.array(np.moveaxis(poses, 0, -1), order="F")
+
+
+def _check_rows(poses: Array, place: str, hint: str) -> None:
+    """Refuse poses (N, 4, 4) whose last row is not 0 0 0 1."""
+    off = np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
+    for k in np.flatnonzero(off > ROTATION_TOLERANCE)[:1]:
+        raise NotARotationError(
+            f"T: the last row of pose {k}, {place.format(k)}, must be 0 0 0 1, got "
+            f"{poses[k, 3].tolist()}. {hint}"
+        )

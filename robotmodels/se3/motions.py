@@ -1,31 +1,36 @@
-"""Elementary motions, their inverse, and the matrix of the vector product.
+"""Elementary motions, their inverse, roll, pitch and yaw, and the matrix of the vector product.
 
 Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
+
+Parameters
+----------
+axis : {"x", "y", "z"}
+    A coordinate axis.
+angle, x, y, z : float
+    Radians; metres.
+T, R, p : ndarray, shapes (..., 4, 4), (3, 3), (..., 3)
+    Poses, a rotation, vectors.
+rpy, xyz : array_like, shape (3,)
+    Roll, pitch and yaw in radians, as a URDF has them; metres.
+
+Returns
+-------
+ndarray
+    A pose of shape (4, 4), if no other shape is named.
 """
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._arrays import Array
 
 
 def rotation(axis: str, angle: float) -> Array:
     """Pose of a rotation about one coordinate axis, ``Rot(axis, angle)``.
-
-    Parameters
-    ----------
-    axis : {"x", "y", "z"}
-        Which axis.
-    angle : float
-        Radians.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        The pose.
 
     Examples
     --------
@@ -43,16 +48,6 @@ def rotation(axis: str, angle: float) -> Array:
 def translation(x: float, y: float, z: float) -> Array:
     """Pose of a pure translation.
 
-    Parameters
-    ----------
-    x, y, z : float
-        Metres.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        The pose.
-
     Examples
     --------
     >>> translation(0, 0, 0.5)[2, 3]
@@ -64,17 +59,7 @@ def translation(x: float, y: float, z: float) -> Array:
 
 
 def inverse(T: Array) -> Array:
-    """Inverse of rigid poses.
-
-    Parameters
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        Poses.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        ``T^-1`` by transposition.
+    """Inverse of rigid poses by transposition, shape (..., 4, 4).
 
     Examples
     --------
@@ -89,18 +74,40 @@ def inverse(T: Array) -> Array:
     return Ti
 
 
+def from_rpy(rpy: ArrayLike, xyz: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """Pose of a URDF ``<origin>``: ``Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)``.
+
+    Examples
+    --------
+    >>> from_rpy([0, 0, 0], [1, 2, 3])[:3, 3]
+    array([1., 2., 3.])
+    """
+    roll, pitch, yaw = (float(v) for v in np.asarray(rpy))
+    T = rotation("z", yaw) @ rotation("y", pitch) @ rotation("x", roll)
+    T[:3, 3] = xyz
+    return T
+
+
+def to_rpy(R: Array) -> tuple[float, float, float]:
+    """Roll, pitch in [-pi/2, pi/2] and yaw of a rotation, rad, exact also at gimbal lock.
+
+    Roll is found by back-substitution of yaw, not from its own quotient: where pitch is +-90
+    degrees yaw is arbitrary, and any value of it then still gives back the same matrix.
+
+    Examples
+    --------
+    >>> [round(v, 12) for v in to_rpy(from_rpy([0.1, 0.2, 0.3])[:3, :3])]
+    [0.1, 0.2, 0.3]
+    """
+    yaw = atan2(R[1, 0], R[0, 0])
+    pitch = atan2(-R[2, 0], hypot(R[0, 0], R[1, 0]))
+    c, s = cos(yaw), sin(yaw)
+    roll = atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return roll + 0.0, pitch + 0.0, yaw + 0.0
+
+
 def skew(p: Array) -> Array:
-    """Matrices of the vector product, ``skew(p) @ u = p x u``.
-
-    Parameters
-    ----------
-    p : ndarray, shape (..., 3)
-        Vectors.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Skew-symmetric matrices.
+    """Matrices of the vector product, ``skew(p) @ u = p x u``, shape (..., 3, 3).
 
     Examples
     --------

@@ -75,6 +75,3 @@ class RobotParts:
     visuals: tuple[Visual, ...] = ()
     notes: tuple[str, ...] = ()
     source: UrdfSource | None = None
-
-    def __repr__(self) -> str:
-        return f"<RobotParts of {self.name}: {self.table.n} joints, {self.table.f} frames>"

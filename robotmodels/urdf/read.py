@@ -7,13 +7,11 @@ The frames are placed by `robotmodels.khalil_frames`; everything that was given 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from .. import se3
-from .._arrays import Array
 from ..drive import DriveParameters, Transmission
 from ..errors import FrameNotFoundError, InvalidValueError, UrdfError
 from ..geometry import DHTable
@@ -51,62 +49,12 @@ def read_urdf(
     for link in (base_link, tip_link):
         if link is not None and (not isinstance(link, str) or link not in tree.links):
             raise FrameNotFoundError("link", link, tree.links)
-    return _parts(tree, text, base_link, tip_link, dynamics, mimic)
-
-
-def _text_of(source: str | Path) -> tuple[str, Path | None]:
-    if isinstance(source, str) and not source.strip():
-        raise UrdfError("expected a path or the text of a URDF, got an empty text.")
-    if isinstance(source, str) and "<" in source:
-        return source, None
-    if not isinstance(source, (str, Path)):
-        raise UrdfError(f"expected a path or the text of a URDF, got {type(source).__name__}.")
-    path = Path(source)
-    if path.name.endswith(".xacro"):
-        raise UrdfError(
-            f"{path.name} is a xacro file. Expand it first: `xacro {path.name} > robot.urdf` "
-            "(Python packages xacro or xacrodoc)."
-        )
-    try:
-        return path.read_text(encoding="utf-8-sig"), path.resolve().parent
-    except UnicodeDecodeError as error:
-        raise UrdfError(f"{path}: not UTF-8 text ({error.reason}).") from None
-    except OSError as error:
-        raise UrdfError(
-            f"cannot read {str(source)!r}: {error.strerror}. Give the path of a .urdf file, or the "
-            "text of one."
-        ) from None
-    except ValueError:
-        raise UrdfError(
-            f"{str(source)!r:.80} cannot be a path (it holds a zero character). Give the path of a "
-            ".urdf file, or the text of one."
-        ) from None
-
-
-@dataclass(frozen=True, slots=True)
-class _Placed:
-    """A link of the source, fixed to the link that joint number ``owner`` moves (0: the base)."""
-
-    name: str
-    owner: int
-    pose: Array
-    merged: bool
-
-
-def _parts(
-    tree: UrdfTree,
-    text: str,
-    base_link: str | None,
-    tip_link: str | None,
-    dynamics: bool,
-    mimic: bool,
-) -> RobotParts:
     world = base_link or tree.root
     kept = None if tip_link is None else _chain(tree, world, tip_link)
     joints: list[UrdfJoint] = []
     axes: list[JointAxis] = []
     notes: list[str] = []
-    placed = [_Placed(world, 0, np.eye(4), False)]
+    placed = [NamedFrame(world, 0, np.eye(4), False)]
     _walk(tree, placed[0], kept, joints, axes, placed, notes)
     if not joints:
         raise UrdfError(
@@ -130,7 +78,7 @@ def _parts(
     )  # fmt: skip
     # pose of the link moved by joint j (or of the base link) in R_j (or R_0)
     links = np.concatenate((se3.inverse(frames.base)[None], frames.link_poses))
-    named = tuple(NamedFrame(p.name, p.owner, links[p.owner] @ p.pose, p.merged) for p in placed)
+    named = tuple(NamedFrame(p.name, p.parent, links[p.parent] @ p.pose, p.merged) for p in placed)
     visuals = tuple(
         Visual(frame.parent, frame.pose @ v.pose, v.shape, v.color)
         for frame in named
@@ -174,6 +122,35 @@ def _parts(
     )
 
 
+def _text_of(source: str | Path) -> tuple[str, Path | None]:
+    if isinstance(source, str) and not source.strip():
+        raise UrdfError("expected a path or the text of a URDF, got an empty text.")
+    if isinstance(source, str) and "<" in source:
+        return source, None
+    if not isinstance(source, (str, Path)):
+        raise UrdfError(f"expected a path or the text of a URDF, got {type(source).__name__}.")
+    path = Path(source)
+    if path.name.endswith(".xacro"):
+        raise UrdfError(
+            f"{path.name} is a xacro file. Expand it first: `xacro {path.name} > robot.urdf` "
+            "(Python packages xacro or xacrodoc)."
+        )
+    try:
+        return path.read_text(encoding="utf-8-sig"), path.resolve().parent
+    except UnicodeDecodeError as error:
+        raise UrdfError(f"{path}: not UTF-8 text ({error.reason}).") from None
+    except OSError as error:
+        raise UrdfError(
+            f"cannot read {str(source)!r}: {error.strerror}. Give the path of a .urdf file, or the "
+            "text of one."
+        ) from None
+    except ValueError:
+        raise UrdfError(
+            f"{str(source)!r:.80} cannot be a path (it holds a zero character). Give the path of a "
+            ".urdf file, or the text of one."
+        ) from None
+
+
 def _chain(tree: UrdfTree, base_link: str, tip_link: str) -> set[str]:
     """Names of the joints between two links."""
     chain: set[str] = set()
@@ -194,14 +171,14 @@ def _chain(tree: UrdfTree, base_link: str, tip_link: str) -> set[str]:
 
 def _walk(
     tree: UrdfTree,
-    start: _Placed,
+    start: NamedFrame,
     kept: set[str] | None,
     joints: list[UrdfJoint],
     axes: list[JointAxis],
-    placed: list[_Placed],
+    placed: list[NamedFrame],
     notes: list[str],
 ) -> None:
-    """Number the moving joints depth first, in the order of the file, and place every link."""
+    """Number the moving joints depth first, and place every link in the link that moves it."""
     stack = [(joint, start) for joint in reversed(tree.children(start.name))]
     while stack:
         joint, parent = stack.pop()
@@ -216,13 +193,13 @@ def _walk(
         moves = joint.kind in MOVING_TYPES and not left_out
         if moves:
             sigma = 1 if joint.kind == "prismatic" else 0
-            axes.append(JointAxis(parent.owner, sigma, pose, joint.axis))
+            axes.append(JointAxis(parent.parent, sigma, pose, joint.axis))
             joints.append(joint)
-            link = _Placed(joint.child, len(joints), np.eye(4), False)
+            link = NamedFrame(joint.child, len(joints), np.eye(4), False)
         else:
-            link = _Placed(joint.child, parent.owner, pose, True)
+            link = NamedFrame(joint.child, parent.parent, pose, True)
             how = "fixed" if joint.kind == "fixed" else "locked at zero"
-            owner = joints[parent.owner - 1].name if parent.owner else "the base"
+            owner = joints[parent.parent - 1].name if parent.parent else "the base"
             notes.append(
                 f"link {joint.child!r} ({how} by joint {joint.name!r}) is merged into the link "
                 f"of {owner}."

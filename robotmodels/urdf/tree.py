@@ -8,7 +8,7 @@ only located here; whoever draws opens them.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from xml.parsers import expat
 
 import numpy as np
@@ -70,23 +70,14 @@ class UrdfTree:
     links: dict[str, UrdfLink]
     joints: dict[str, UrdfJoint]
     root: str
-    _below: dict[str, list[UrdfJoint]] = field(init=False, repr=False, compare=False)
-    _above: dict[str, UrdfJoint] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        below: dict[str, list[UrdfJoint]] = {}
-        for joint in self.joints.values():
-            below.setdefault(joint.parent, []).append(joint)
-        object.__setattr__(self, "_below", below)
-        object.__setattr__(self, "_above", {j.child: j for j in self.joints.values()})
 
     def children(self, link: str) -> list[UrdfJoint]:
         """Joints whose parent is a link, in the order of the file."""
-        return self._below.get(link, [])
+        return [joint for joint in self.joints.values() if joint.parent == link]
 
     def parent_joint(self, link: str) -> UrdfJoint | None:
         """The joint that carries a link; None for the root."""
-        return self._above.get(link)
+        return next((joint for joint in self.joints.values() if joint.child == link), None)
 
 
 def parse_urdf(text: str, meshes: MeshFinder) -> UrdfTree:

@@ -1349,7 +1349,7 @@ MUTATIONS = [
         "np.deg2rad(rpy) if arguments.degrees else rpy", "rpy", f"{COMMANDS} -k three_ways"),
     Mutation("cli: igm", "joints that are locked are counted from 0",
         "def locks_of(\n    words",
-        "else int(joint) - 1", "else int(joint) % model.n", f"{COMMANDS} -k seven_joints"),
+        "int(joint) - 1", "int(joint) % model.n", f"{COMMANDS} -k seven_joints"),
     Mutation("cli: igm", "a pose that is not reached ends as done",
         "return Report(as_text(data, arguments.mask_axes)", "bool(found.count)",
         "True", f"{COMMANDS} -k pose_that_is_not_reached"),
