@@ -30,13 +30,13 @@ ShapeError
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact
-from ..drive import DriveKind, DriveParameters, Drives, Transmission, drive_kinds
+from ..drive import DriveKind, DriveParameters, Transmission, drive_kinds
 from ..errors import InvalidValueError
 from ..friction import Friction, check_linear
 from ..friction.protocols import basis_at
@@ -44,28 +44,8 @@ from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from .inverse import idm
 
-
-class Base(Protocol):
-    """Interface of base parameters, see `BaseParameters`."""
-
-    @property
-    def drive(self) -> Drives:
-        """Kinds of drive parameters among them."""
-        ...
-
-    @property
-    def kept(self) -> NDArray[np.int64]:
-        """Numbers of the kept ones among the standard parameters."""
-        ...
-
-    @property
-    def friction(self) -> Friction | None:
-        """The friction model whose parameters are among them, after those of the drives."""
-        ...
-
-    def check(self, model: RobotModel) -> None:
-        """Raise for a robot of another structure."""
-        ...
+Base = Any
+"""`BaseParameters`, which are on a higher floor."""
 
 
 def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:

@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,14 +42,15 @@ from ..errors import InvalidValueError, ShapeError
 from .protocols import FrictionSum, breakaway_torques, together
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class JointFriction(Value, ABC):
     """Base: parameters of shape (n,) that the fields name; a subclass defines `basis`."""
 
     kinds: ClassVar[tuple[str, ...]] = ()
 
-    def _set(self, **given: ArrayLike) -> None:
-        values = {name: as_floats(value, name) for name, value in given.items()}
+    def __post_init__(self) -> None:
+        names = [field.name for field in fields(self)]
+        values = {name: as_floats(getattr(self, name), name) for name in names}
         shape = next(iter(values.values())).shape
         if len(shape) != 1 or any(array.shape != shape for array in values.values()):
             shapes = ", ".join(f"{name} {array.shape}" for name, array in values.items())
@@ -87,7 +88,7 @@ class JointFriction(Value, ABC):
         return together(other, self)
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class ViscousFriction(JointFriction):
     """Viscous friction, ``tau = Fv v``.
 
@@ -98,17 +99,14 @@ class ViscousFriction(JointFriction):
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fv",)
-    Fv: Array
-
-    def __init__(self, Fv: ArrayLike) -> None:
-        self._set(Fv=Fv)
+    Fv: Any
 
     def basis(self, v: ArrayLike) -> Array:
         """Velocities, shape (..., 1, n)."""
         return np.stack((as_vector(v, self.n, "v"),), axis=-2)
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class CoulombFriction(JointFriction):
     """Coulomb (dry) friction, ``tau = Fc sign(v)``.
 
@@ -119,17 +117,14 @@ class CoulombFriction(JointFriction):
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fc",)
-    Fc: Array
-
-    def __init__(self, Fc: ArrayLike) -> None:
-        self._set(Fc=Fc)
+    Fc: Any
 
     def basis(self, v: ArrayLike) -> Array:
         """Signs of the velocities, shape (..., 1, n)."""
         return np.sign(as_vector(v, self.n, "v"))[..., None, :]
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class TorqueOffset(JointFriction):
     """Constant torque, as of friction that differs by direction or of an amplifier.
 
@@ -140,17 +135,14 @@ class TorqueOffset(JointFriction):
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("offset",)
-    offset: Array
-
-    def __init__(self, offset: ArrayLike) -> None:
-        self._set(offset=offset)
+    offset: Any
 
     def basis(self, v: ArrayLike) -> Array:
         """Ones, shape (..., 1, n)."""
         return np.ones_like(as_vector(v, self.n, "v"))[..., None, :]
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class AsymmetricFriction(JointFriction):
     """Coulomb and viscous friction that differ by direction.
 
@@ -165,13 +157,10 @@ class AsymmetricFriction(JointFriction):
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fvp", "Fcp", "Fvn", "Fcn")
-    Fvp: Array
-    Fcp: Array
-    Fvn: Array
-    Fcn: Array
-
-    def __init__(self, Fvp: ArrayLike, Fcp: ArrayLike, Fvn: ArrayLike, Fcn: ArrayLike) -> None:
-        self._set(Fvp=Fvp, Fcp=Fcp, Fvn=Fvn, Fcn=Fcn)
+    Fvp: Any
+    Fcp: Any
+    Fvn: Any
+    Fcn: Any
 
     def basis(self, v: ArrayLike) -> Array:
         """Velocity and its sign in each direction, shape (..., 4, n)."""
@@ -180,7 +169,7 @@ class AsymmetricFriction(JointFriction):
         return np.stack((forth, np.sign(forth), back, np.sign(back)), axis=-2)
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class StribeckFriction(JointFriction):
     """Stribeck friction: decreases from the static value with the velocity.
 
@@ -204,22 +193,16 @@ class StribeckFriction(JointFriction):
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fv", "Fc", "Fs")
-    Fv: Array
-    Fc: Array
-    Fs: Array
-    vs: Array
-    exponent: Array
+    Fv: Any
+    Fc: Any
+    Fs: Any
+    vs: Any
+    exponent: Any = None
 
-    def __init__(
-        self,
-        Fv: ArrayLike,
-        Fc: ArrayLike,
-        Fs: ArrayLike,
-        vs: ArrayLike,
-        exponent: ArrayLike | None = None,
-    ) -> None:
-        power = np.full(np.shape(vs), 2.0) if exponent is None else exponent
-        self._set(Fv=Fv, Fc=Fc, Fs=Fs, vs=vs, exponent=power)
+    def __post_init__(self) -> None:
+        if self.exponent is None:
+            object.__setattr__(self, "exponent", np.full(np.shape(self.vs), 2.0))
+        JointFriction.__post_init__(self)
         for name in ("vs", "exponent"):
             if ((values := getattr(self, name)) <= 0.0).any():
                 raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")

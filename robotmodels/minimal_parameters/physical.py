@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._arrays import Array
+from .._arrays import Array, read_only
 from .._outcomes import Outcome
 from ..errors import MissingExtraError
 from ..inertia.consistency import pseudo_inertia
@@ -290,7 +290,9 @@ class PhysicalProblem:
             ending = f"The solver stopped: {stopped.status} after {stopped.iterations} iterations."
         total = squares.least if status is PhysicalStatus.EXACT else squares.sum(z)
         distance = float(np.linalg.norm(z))
-        return PhysicalFit(x, status, distance, total, squares.least, gap, tuple(active), ending)
+        return PhysicalFit(
+            read_only(x), status, distance, total, squares.least, gap, tuple(active), ending
+        )
 
 
 def _rms(z: Array) -> float:

@@ -21,9 +21,9 @@ from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from .alignment import aligned_robot
-from .formulas import Formula, constants_of, formulas, symbolic_texts
+from .formulas import Constant, Formula, constants_of, formulas, symbolic_texts
 from .rules import reach
-from .tables import BaseTable, BaseValues, KeptNames, base_values
+from .tables import BaseValues, KeptNames, base_latex, base_text, base_values
 
 _SAME = 1e-9
 """Tolerance of the same constants, relative to 1 (directions) or to the robot's size."""
@@ -221,52 +221,21 @@ class BaseParameters:
         return formulas(self.parameter_names, self.kept, self.matrix, {})
 
     @property
+    def constants(self) -> tuple[Constant, ...]:
+        """Symbols of the formulas and their values; none with numbers as coefficients."""
+        if self.method is BaseMethod.NUMERIC:
+            return ()
+        return constants_of(aligned_robot(self.model, self.angle).model, self.tolerance)
+
+    @property
     def text(self) -> str:
         """The table of the book, as text."""
-        return self._table.text
+        return base_text(self)
 
     @property
     def latex(self) -> str:
         """The same in LaTeX."""
-        return self._table.latex
-
-    @cached_property
-    def _table(self) -> BaseTable:
-        """Content of the table of the book."""
-        constants, rank, neglected = (), "", max(self.tolerance, self.angle)
-        if self.method is BaseMethod.SYMBOLIC:
-            model = aligned_robot(self.model, self.angle).model
-            constants = constants_of(model, self.tolerance)
-        if self.gap is not None:
-            rank = (
-                f"Rank {len(self)}: of the longest column, the least kept one has {self.gap[0]:.1e}"
-                f" beyond the others, what is not kept at most {self.gap[1]:.1e}."
-            )
-        return BaseTable(
-            f"{self.model.name}: {len(self)} base parameters of {len(self.parameter_names)} "
-            f"standard ones ({self.method.value})",
-            self.notes,
-            tuple(zip(self.formulas, self.numbers, strict=True)),
-            constants,
-            (
-                ("Alone, as they are", self.alone),
-                ("Without effect", self.no_effect),
-                (f"Neglected, about {neglected:.0e} of the largest torque or less", self.neglected),
-            ),
-            self._units(),
-            rank,
-        )
-
-    def _units(self) -> str:
-        """Units of the parameters."""
-        units = "XX to ZZ kg m^2, MX to MZ kg m, M kg"
-        if self.drive:
-            slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
-            if not slides.all():
-                units += "; Ia kg m^2, Fv N m s/rad, Fc and offset N m"
-            if slides.any():
-                units += "; of prismatic joints Ia kg, Fv N s/m, Fc and offset N"
-        return units
+        return base_latex(self)
 
     def _repr_markdown_(self) -> str:
         return markdown(self.latex)

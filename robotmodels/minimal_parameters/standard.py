@@ -8,7 +8,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen, read_only
 from ..drive import DriveParameters
 from ..dynamics import base_model
 from ..errors import InvalidValueError
@@ -23,7 +23,7 @@ _ZERO = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class StandardParameters(Rebuilt):
+class StandardParameters(Frozen):
     """A full set of standard parameters of physical bodies and drives. Read-only.
 
     Parameters
@@ -62,11 +62,6 @@ class StandardParameters(Rebuilt):
     drive_prior: DriveParameters
     fit: PhysicalFit
     rows: int | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("requested", "prior"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-        object.__setattr__(self, "fit", self.fit._replace(x=read_only(self.fit.x)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -142,7 +137,11 @@ class StandardParameters(Rebuilt):
     @property
     def optimality(self) -> str:
         """Sentence on the gap."""
-        return f"The sum of squares is within {100.0 * self.fit.gap:.1g} % of the optimum."
+        early = (
+            self.status is PhysicalStatus.INACCURATE
+        )  # the dual value bounds only at its optimum
+        word = "estimated to be within" if early else "within"
+        return f"The sum of squares is {word} {100.0 * self.fit.gap:.1g} % of the optimum."
 
     @property
     def residual_increase(self) -> float:
@@ -192,17 +191,13 @@ class StandardParameters(Rebuilt):
     def _columns(self) -> list[tuple[str, list[str]]]:
         """Columns of the table: parameter, prior, value and difference."""
         sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
-        small = (_ZERO * largest_of_kind(self.names, sizes)).tolist()
+        small = _ZERO * largest_of_kind(self.names, sizes)
         columns = [("parameter", list(self.names))]
-        for title, numbers, form in (
-            ("prior", self.prior, ".6g"),
-            ("value", self.values, ".6g"),
-            ("difference", self.values - self.prior, "+.3g"),
-        ):
-            pairs = zip(numbers.tolist(), small, strict=True)
-            texts = ["0" if abs(x) <= least else f"{x:{form}}" for x, least in pairs]
-            columns.append((title, texts))
-        return columns
+        for title, numbers in (("prior", self.prior), ("value", self.values)):
+            columns.append((title, [f"{x:.6g}" for x in np.where(sizes > small, numbers, 0.0)]))
+        change = self.values - self.prior
+        changes = [f"{x:+.3g}" if x else "0" for x in np.where(np.abs(change) > small, change, 0.0)]
+        return [*columns, ("difference", changes)]
 
     def __repr__(self) -> str:
         return (

@@ -6,7 +6,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,77 +28,83 @@ _TURNING = {"Ia": "kg m^2", "Fv": "N m s/rad"}
 _SLIDING = {"Ia": "kg", "Fv": "N s/m"}
 
 
-class BaseTable(NamedTuple):
-    """Content of the table of the book: sentences, formulas, symbols, and lists of names.
+def base_text(base: Any) -> str:
+    """The table of the book: base parameters, values of the symbols, and the other parameters."""
+    rows, used, lists = _content(base)
+    lines = [_heading(base), *(_filled(note, 2) for note in base.notes)]
+    if rows:
+        lines.append("Regrouped (R: in place of the sum, whose terms are not identifiable alone):")
+    width = max((len(formula.name) for formula, _ in rows), default=0) + 1
+    for formula, numbers in rows:
+        symbolic = any(c.isalpha() for term in formula.terms for c in term.text)
+        for name, one in ((formula.name + "R", formula), ("", numbers)):
+            if name or (formula != numbers and symbolic):
+                label = f"  {name:<{width}} = "
+                lines.append(_filled(label + _sum(one), len(label) + 2))
+    if used:
+        values = ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used)
+        lines.append(_filled(f"  with {values}", 7))
+    parts = [(label, ", ".join(names)) for label, names in lists if names]
+    parts.append(("Units", _units(base)))
+    if base.gap is not None:
+        parts.append((
+            f"Rank {len(base)}",
+            f"of the longest column, the least kept one has {base.gap[0]:.1e} beyond the others, "
+            f"what is not kept at most {base.gap[1]:.1e}.",
+        ))  # fmt: skip
+    lines += [_filled(f"{label}: {words}", min(len(label) + 2, 10)) for label, words in parts]
+    return "\n".join(lines)
 
-    A formula is a pair, with symbols and with numbers.
-    """
 
-    heading: str
-    notes: tuple[str, ...]
-    formulas: tuple[tuple[Formula, Formula], ...]
-    constants: tuple[Constant, ...]
-    lists: tuple[tuple[str, tuple[str, ...]], ...]
-    units: str
-    rank: str
+def base_latex(base: Any) -> str:
+    """The same in LaTeX: an ``align*`` of the formulas and lines of words."""
+    rows, used, lists = _content(base)
+    out = [rf"\textbf{{{escaped(_heading(base))}}}", *(escaped(note) for note in base.notes)]
+    sums = [f"{_symbol(f.name, 'R')} &= {_sum(f, True)}" for f, _ in rows]
+    if sums:
+        out.append("\\begin{align*}\n" + " \\\\\n".join(sums) + "\n\\end{align*}")
+    if used:
+        values = (rf"${c.latex} = {powers(f'{c.value:.6g}')}\,\mathrm{{{c.unit}}}$" for c in used)
+        out.append("with " + ", ".join(values))
+    for label, names in lists:
+        if names:
+            out.append(f"{label}: " + ", ".join(f"${_symbol(name)}$" for name in names))
+    out.append("Units: " + re.sub(r"\^(\d)", r"$^\1$", _units(base)))
+    return "\n\n".join(out)
 
-    @property
-    def text(self) -> str:
-        """The base parameters, the values of the symbols, and the other parameters."""
-        lines = [self.heading, *(_filled(note, 2) for note in self.notes)]
-        rows = self._shown()
-        if rows:
-            lines.append(
-                "Regrouped (R: in place of the sum, whose terms are not identifiable alone):"
-            )
-        width = max((len(formula.name) for formula, _ in rows), default=0) + 1
-        for formula, numbers in rows:
-            symbolic = any(c.isalpha() for term in formula.terms for c in term.text)
-            for name, one in ((formula.name + "R", formula), ("", numbers)):
-                if name or (formula != numbers and symbolic):
-                    label = f"  {name:<{width}} = "
-                    lines.append(_filled(label + _sum(one), len(label) + 2))
-        if used := self._used():
-            values = ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used)
-            lines.append(_filled(f"  with {values}", 7))
-        parts = [(label, ", ".join(names)) for label, names in self.lists if names]
-        parts.append(("Units", self.units))
-        lines += [_filled(f"{label}: {words}", min(len(label) + 2, 10)) for label, words in parts]
-        if self.rank:
-            lines.append(_filled(self.rank, self.rank.index(":") + 2))
-        return "\n".join(lines)
 
-    @property
-    def latex(self) -> str:
-        """The same in LaTeX: an ``align*`` of the formulas and lines of words."""
-        out = [rf"\textbf{{{escaped(self.heading)}}}", *(escaped(note) for note in self.notes)]
-        rows = [f"{_symbol(f.name, 'R')} &= {_sum(f, True)}" for f, _ in self._shown()]
-        if rows:
-            out.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
-        if used := self._used():
-            values = (
-                rf"${c.latex} = {powers(f'{c.value:.6g}')}\,\mathrm{{{c.unit}}}$" for c in used
-            )
-            out.append("with " + ", ".join(values))
-        for label, names in self.lists:
-            if names:
-                out.append(f"{label}: " + ", ".join(f"${_symbol(name)}$" for name in names))
-        out.append("Units: " + re.sub(r"\^(\d)", r"$^\1$", self.units))
-        return "\n\n".join(out)
+def _heading(base: Any) -> str:
+    counts = f"{len(base)} base parameters of {len(base.parameter_names)} standard ones"
+    return f"{base.model.name}: {counts} ({base.method.value})"
 
-    def _shown(self) -> list[tuple[Formula, Formula]]:
-        """Regrouped parameters: symbolic (numeric where too long), and numeric."""
-        return [
-            (numbers if len(_sum(formula)) > _LONGEST else formula, numbers)
-            for formula, numbers in self.formulas
-            if formula.is_regrouped
-        ]
 
-    def _used(self) -> list[Constant]:
-        """The constants that occur in the formulas."""
-        texts = " ".join(term.text for formula, _ in self._shown() for term in formula.terms)
-        words = set(re.findall(r"[A-Z]+\d*", texts))
-        return [constant for constant in self.constants if constant.text in words]
+def _content(base: Any) -> tuple[list[tuple[Formula, Formula]], list[Constant], list[Any]]:
+    """Regrouped parameters: symbolic (numeric where too long), and numeric; symbols; lists."""
+    rows = [
+        (numbers if len(_sum(formula)) > _LONGEST else formula, numbers)
+        for formula, numbers in zip(base.formulas, base.numbers, strict=True)
+        if formula.is_regrouped
+    ]
+    texts = " ".join(term.text for formula, _ in rows for term in formula.terms)
+    words, neglected = set(re.findall(r"[A-Z]+\d*", texts)), max(base.tolerance, base.angle)
+    lists = [
+        ("Alone, as they are", base.alone),
+        ("Without effect", base.no_effect),
+        (f"Neglected, about {neglected:.0e} of the largest torque or less", base.neglected),
+    ]
+    return rows, [constant for constant in base.constants if constant.text in words], lists
+
+
+def _units(base: Any) -> str:
+    """Units of the parameters."""
+    units = "XX to ZZ kg m^2, MX to MZ kg m, M kg"
+    if base.drive:
+        slides = base.model.table.sigma[base.model.table.joint_rows] == PRISMATIC
+        if not slides.all():
+            units += "; Ia kg m^2, Fv N m s/rad, Fc and offset N m"
+        if slides.any():
+            units += "; of prismatic joints Ia kg, Fv N s/m, Fc and offset N"
+    return units
 
 
 def _filled(line: str, indent: int) -> str:

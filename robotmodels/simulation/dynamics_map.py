@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, as_floats, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats
 from ..dynamics import gravity_torque, mass_matrix
 from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
@@ -16,7 +16,7 @@ from ..model import RobotModel, check_model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DynamicsMap(Rebuilt):
+class DynamicsMap(Frozen):
     """Mass matrix and gravity torques over a grid of configurations. Read-only.
 
     Parameters
@@ -35,11 +35,6 @@ class DynamicsMap(Rebuilt):
     q: Array
     mass: Array
     gravity: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges", tuple(read_only(values) for values in self.ranges))
-        for name in ("q", "mass", "gravity"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def coupling(self) -> Array:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_vector, batch_shape, read_only
+from .._arrays import Array, Frozen, as_vector, batch_shape
 from ..drive import check_all_or_none
 from ..dynamics import gravity_torque
 from ..dynamics.inverse import motion_torques
@@ -19,7 +19,7 @@ from .result import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TorqueParts(Rebuilt):
+class TorqueParts(Frozen):
     """Parts of the joint torques of a motion; their sum is the torque of `idm`. Read-only.
 
     Parameters
@@ -34,10 +34,6 @@ class TorqueParts(Rebuilt):
     gravity: Array
     friction: Array
     wrench: Array
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
     @property
     def total(self) -> Array:

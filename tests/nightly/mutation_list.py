@@ -472,7 +472,7 @@ MUTATIONS = [
         "def _solid(ends", "0.5 * mass * radius**2 * along", "mass * radius**2 * along",
         "tests/test_standard_parameters.py -k uniform_bodies"),
     Mutation("minimal parameters: printing", "units of slides are those of turning joints",
-        "def _units(self) -> str", "joints Ia kg, Fv N s/m", "joints Ia kg m^2, Fv N m s/rad",
+        "def _units(base: Any) -> str", "joints Ia kg, Fv N s/m", "joints Ia kg m^2, Fv N m s/rad",
         "tests/test_base_parameters.py -k values_have_names_and_units"),
     Mutation("minimal parameters: standard parameters", "a deviation has the other sign",
         "class StandardParameters(", "self.base_values - self.requested",
