@@ -21,7 +21,7 @@ from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from .alignment import aligned_robot
-from .formulas import Constant, Formula, constants_of, formulas, symbolic_texts
+from .formulas import Formula, formulas, symbolic_texts
 from .rules import reach
 from .tables import BaseValues, KeptNames, base_latex, base_text, base_values
 
@@ -219,13 +219,6 @@ class BaseParameters:
     def numbers(self) -> tuple[Formula, ...]:
         """The formulas with numbers as coefficients."""
         return formulas(self.parameter_names, self.kept, self.matrix, {})
-
-    @property
-    def constants(self) -> tuple[Constant, ...]:
-        """Symbols of the formulas and their values; none with numbers as coefficients."""
-        if self.method is BaseMethod.NUMERIC:
-            return ()
-        return constants_of(aligned_robot(self.model, self.angle).model, self.tolerance)
 
     @property
     def text(self) -> str:

@@ -17,7 +17,8 @@ from ..geometry import PRISMATIC
 from ..latex_text import escaped, powers
 from ..regressors.columns import plain_name
 from ..table_text import boxed
-from .formulas import Constant, Formula
+from .alignment import aligned_robot
+from .formulas import Constant, Formula, constants_of
 
 _WIDTH = 100
 _LONGEST = 180
@@ -92,7 +93,10 @@ def _content(base: Any) -> tuple[list[tuple[Formula, Formula]], list[Constant], 
         ("Without effect", base.no_effect),
         (f"Neglected, about {neglected:.0e} of the largest torque or less", base.neglected),
     ]
-    return rows, [constant for constant in base.constants if constant.text in words], lists
+    if base.method.value == "numeric":
+        return rows, [], lists
+    constants = constants_of(aligned_robot(base.model, base.angle).model, base.tolerance)
+    return rows, [constant for constant in constants if constant.text in words], lists
 
 
 def _units(base: Any) -> str:
