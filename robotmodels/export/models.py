@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from .. import __version__
 from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
@@ -240,7 +240,7 @@ def _finished(
     counts = ", ".join(f"{k} {word}" for word, k in operations.count()._asdict().items())
     notes = [
         f"{name}: {row.title} of {comment(model.name)}",
-        f"Written by robotmodels {__version__}. {counts}.",
+        f"Written by robotmodels {import_module('robotmodels').__version__}. {counts}.",
         "SI units and radians, matrices row by row, frames of Khalil and Kleinfinger.",
     ]
     for port, names, values in zip(draft.inputs, draft.elements, draft.values, strict=True):
