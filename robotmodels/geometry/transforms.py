@@ -50,6 +50,7 @@ def constant_factors(table: DHTable) -> Array:
 def link_transforms(table: DHTable, q: ArrayLike) -> Array:
     """The factors ``T(a(j), j)`` of the direct geometric model, straight from the table.
 
+    Shapes: q (..., n) -> (..., f, 4, 4).
     Plain NumPy, no Pinocchio and no compiled code: the oracle that the fast paths are held to.
 
     Examples
