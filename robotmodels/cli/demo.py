@@ -179,9 +179,8 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     print(f"\nFitted on samples {data.training.start} to {data.training.stop}; torques of samples "
           f"{data.held_out.start}\nto {data.held_out.stop} as predicted, root mean square error in "
           "N m, unfiltered:")  # fmt: skip
-    for word, row in (
-        ("here", trained.validation.held_out.rmse), ("published, best", _PUBLISHED_RMSE)
-    ):  # fmt: skip
+    ours = trained.validation.held_out.rmse  # type: ignore[union-attr]
+    for word, row in (("here", ours), ("published, best", _PUBLISHED_RMSE)):
         print(f"  {word:16s}" + "".join(f"{error:8.2f}" for error in row))
     print(f"\n{report_sections(trained)[0].text()}\n")
     robot = real_bodies(trained, None, asked=False)
