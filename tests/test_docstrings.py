@@ -1,6 +1,7 @@
 """Docstrings: the full NumPy form for names that a room exports, at most three lines for others."""
 
 import ast
+import enum
 import functools
 import importlib
 import inspect
@@ -63,20 +64,35 @@ def definitions(node, path=""):
             yield from definitions(child, path)
 
 
-def missing_sections(node, have):
-    """Sections that the docstring of an exported function must have and does not."""
+def explained(docstring):
+    """Names of the parameters that a docstring explains."""
+    parts = SECTION.split(docstring)
+    pairs = zip(parts[1::2], parts[2::2], strict=True)
+    lists = [text for name, text in pairs if name == "Parameters"]
+    heads = re.findall(r"^(\w[\w, ]*)(?= :|$)", "\n".join(lists), re.MULTILINE)
+    return {name for head in heads for name in head.split(", ")}
+
+
+def missing_sections(node, have, known, classes):
+    """Sections that the docstring of an exported function must have and does not.
+
+    Parameters may be explained at the head of the file or the room, results with their class.
+    """
     returns = ast.unparse(node.returns) if node.returns else "None"
-    if node.args.args + node.args.kwonlyargs and "Parameters" not in have:
+    arguments = {argument.arg for argument in node.args.args + node.args.kwonlyargs}
+    if arguments - known and "Parameters" not in have:
         yield "Parameters"
-    if returns != "None" and not have & {"Returns", "Yields"}:
+    if returns not in {"None", *classes} and not have & {"Returns", "Yields"}:
         yield "Returns"
 
 
-def faults(module, text, names, members):
-    """Sentences about the docstrings of one file."""
+def faults(module, text, names, members, room=""):
+    """Sentences about the docstrings of one file of a room, whose own docstring is given."""
     tree = ast.parse(text)
     # Members of one family may share a docstring at the head of their file.
-    shared = set(SECTION.findall(ast.get_docstring(tree) or ""))
+    head = ast.get_docstring(tree) or ""
+    shared, known = set(SECTION.findall(head)), explained(head) | explained(room)
+    classes = {name for _, name in names if name[0].isupper()}
     for name, node in definitions(tree):
         docstring = ast.get_docstring(node) or ""
         have = set(SECTION.findall(docstring))
@@ -84,7 +100,7 @@ def faults(module, text, names, members):
         if (module, name) in names:
             if isinstance(node, ast.ClassDef):
                 continue  # see test_exported_classes_have_sections
-            for section in missing_sections(node, have | shared):
+            for section in missing_sections(node, have | shared, known, classes):
                 yield f"{module}.{name}: exported, without the section {section}"
         elif (module, name) in members:
             continue
@@ -92,6 +108,12 @@ def faults(module, text, names, members):
             yield f"{module}.{name}: not exported, with the section {min(have)}"
         elif lines > LONGEST:
             yield f"{module}.{name}: not exported, {lines} lines instead of at most {LONGEST}"
+
+
+def room_of(path):
+    """Docstring of the room of a file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts[:2]
+    return inspect.getdoc(importlib.import_module(".".join(parts).removesuffix(".__init__"))) or ""
 
 
 def module_of(path):
@@ -104,17 +126,19 @@ def test_only_exported_names_have_long_docstrings():
     found = [
         fault
         for path in FILES
-        for fault in faults(module_of(path), path.read_text(encoding="utf-8"), names, members)
+        for fault in faults(
+            module_of(path), path.read_text(encoding="utf-8"), names, members, room_of(path)
+        )
     ]
     assert "\n".join(found) == ""
 
 
 def test_exported_classes_have_sections():
-    """Or their base class, or the head of their file; a status and an exception need a line."""
+    """Or their base class, or the head of their file; enums and exceptions need a line."""
     without = []
     for module, name in sorted(exported()[0]):
         kind = functools.reduce(getattr, name.split("."), importlib.import_module(module))
-        if not inspect.isclass(kind) or issubclass(kind, int | str | BaseException):
+        if not inspect.isclass(kind) or issubclass(kind, enum.Enum | str | BaseException):
             continue
         texts = [vars(c).get("__doc__") for c in kind.__mro__] + [inspect.getmodule(kind).__doc__]
         head = "\n".join(inspect.cleandoc(text or "") for text in texts)
@@ -181,3 +205,11 @@ def test_a_family_may_share_the_docstring_of_its_file():
     text = f'"""Family.\n\nParameters\n----------\nq : ndarray\n"""\n{SOURCE}'
     found = "".join(faults("robotmodels.room", text, {("robotmodels.room", "public")}, set()))
     assert "public" not in found
+
+
+def test_parameters_may_be_explained_at_the_head_of_the_room():
+    text = "def public(q, kind): ...\n"
+    names = {("robotmodels.room", "public")}
+    known, unknown = (f"Room.\n\nParameters\n----------\nq, {x} : ndarray" for x in ("kind", "v"))
+    assert list(faults("robotmodels.room", text, names, set(), known)) == []
+    assert len(list(faults("robotmodels.room", text, names, set(), unknown))) == 1

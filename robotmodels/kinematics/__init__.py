@@ -2,8 +2,8 @@
 
 Seed book sections 1.2.2 and 1.3.
 
-Arguments that many functions have
-----------------------------------
+Parameters
+----------
 model : RobotModel
     The robot, n joints and f frames.
 q, v, a : array_like, shape (..., n)

@@ -2,15 +2,6 @@
 
 The six-dimensional ellipsoids as numbers; `velocity_ellipsoid` and `force_ellipsoid` are their
 three-dimensional halves, which can be drawn.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

@@ -3,10 +3,6 @@
 With the joints in the ball ``sum_i (v_i / s_i)^2 <= 1`` the velocities ``J v`` fill an ellipsoid
 whose axes are the left singular vectors of ``J S`` and whose radii are its singular values. The
 forces that torques of a ball balance fill the dual one: same axes, reciprocal radii.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

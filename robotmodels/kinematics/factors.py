@@ -2,15 +2,6 @@
 
 Seed book section 1.3.1.3, after M. Renaud, "Contribution à la modélisation et à la commande
 dynamique des robots manipulateurs", 1980.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

@@ -2,11 +2,6 @@
 
 Seed book section 1.2.2. One configuration goes through Pinocchio, a batch through the compiled
 recursions in table order; tests hold both equal.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
 """
 
 from __future__ import annotations

@@ -3,10 +3,6 @@
 A wrench ``[f; m]`` is exerted by the tool on the environment, as in `idm`; by the principle of
 virtual work ``tau = J^T w`` (Khalil and Dombre, Modeling, identification and control of robots,
 section 5.9).
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

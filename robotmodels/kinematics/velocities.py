@@ -1,11 +1,6 @@
 """Direct kinematic model: the twist that joint velocities give, and its time derivative.
 
 Seed book section 1.3.1.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The direct geometric model as formulas, derived step by step as in the book.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
-"""
+"""The direct geometric model as formulas, derived step by step as in the book."""
 
 from __future__ import annotations
 

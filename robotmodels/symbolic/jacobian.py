@@ -1,9 +1,4 @@
-"""The Jacobian as formulas: three matrices, the third as simple as frames can make it.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
-"""
+"""The Jacobian as formulas: three matrices, the third as simple as frames can make it."""
 
 from __future__ import annotations
 

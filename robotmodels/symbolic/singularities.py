@@ -1,9 +1,4 @@
-"""The singular positions of a robot in closed form: factors of the determinant of its Jacobian.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
-"""
+"""The singular positions of a robot in closed form: factors of the determinant of its Jacobian."""
 
 from __future__ import annotations
 

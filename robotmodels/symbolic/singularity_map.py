@@ -1,9 +1,4 @@
-"""A singular factor, or the determinant, over two joint ranges: data for a picture.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
-"""
+"""A singular factor, or the determinant, over two joint ranges: data for a picture."""
 
 from __future__ import annotations
 

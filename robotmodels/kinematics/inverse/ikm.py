@@ -2,10 +2,6 @@
 
 Seed book section 1.3.2. Everything about one row happens in one compiled pass: Jacobian from the
 chain, its singular values, the inverse by them, and the part of the twist that is missing.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

@@ -1,15 +1,6 @@
 """Search of singular configurations near a given one.
 
 Seed book section 1.3.2.3: the solution near singular positions needs to know where they are.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

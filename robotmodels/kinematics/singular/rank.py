@@ -2,15 +2,6 @@
 
 Seed book section 1.3.1.4. The number of degrees of freedom of the tool is the rank of its
 Jacobian: the local one at a configuration, the global one M at almost all of them.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations

@@ -3,15 +3,6 @@
 Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
 surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators, ASME J.
 Mechanisms 110, 1988, for the second-order test of a boundary.
-
-Parameters
-----------
-model, q, v, a, frame, reference, mask, length
-    See `robotmodels.kinematics`.
-
-Returns
--------
-The result that the signature names; its fields are described with its class.
 """
 
 from __future__ import annotations
