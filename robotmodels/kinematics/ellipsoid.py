@@ -60,12 +60,6 @@ class Ellipsoid(Rebuilt):
         any force, so that the force radius there is infinite.
     rank : ndarray of int64, shape (...)
         Number of directions that move: of velocity radii above 0, of force radii that are finite.
-
-    Examples
-    --------
-    >>> disc = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), [20.0, 10.0, 0.0], 2)
-    >>> disc.radius_along([0.0, 3.0, 0.0]), disc.radius_along([0.0, 0.0, 1.0])
-    (array(10.), array(0.))
     """
 
     quantity: EllipsoidQuantity

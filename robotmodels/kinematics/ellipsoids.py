@@ -125,15 +125,6 @@ def force_ellipsoid(
         Default 1 N m and 1 N; ``model.table.effort`` are the limits.
     other : OtherPart
         Whether the other half of the wrench is zero or may be anything.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.se3 import translation
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]),
-    ...                             tool=translation(0.2, 0, 0))
-    >>> force_ellipsoid(arm, [0.0, np.pi / 2]).radii.round(4)
-    array([   inf, 6.351 , 2.6242])
     """
     check_model(model)
     part, other = chosen(TwistPart, part, "part"), chosen(OtherPart, other, "other")

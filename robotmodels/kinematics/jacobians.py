@@ -88,13 +88,6 @@ def jacobian_rate(
     -------
     ndarray, shape (..., 6, n)
         ``dJ/dt``; the acceleration of the frame is ``J a + dJ/dt v`` for ``"world_aligned"``.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> jacobian_rate(arm, [0.0, 0.0], [1.0, 0.0])[0]
-    array([-0.3,  0. ])
     """
     check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")

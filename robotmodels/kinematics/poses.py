@@ -61,13 +61,6 @@ def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., f, 4, 4)
         Poses, positions in metres.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> link_poses(arm, [0.0, 0.0])[:, 0, 3]
-    array([0. , 0.3])
     """
     check_model(model)
     q = as_positions(model, q)

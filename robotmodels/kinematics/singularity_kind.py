@@ -15,11 +15,6 @@ class SingularityKind(Enum):
     middle are aligned); WRIST where two of the last three axes are aligned or parallel. Where
     nothing of that happens, a factor in the variables of the last three (first three) of six or
     more joints alone is WRIST (SHOULDER), any other is OTHER.
-
-    Examples
-    --------
-    >>> SingularityKind("elbow")
-    <SingularityKind.ELBOW: 'elbow'>
     """
 
     SHOULDER = "shoulder"

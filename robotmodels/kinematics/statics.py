@@ -129,12 +129,6 @@ def transported_wrench(wrench: ArrayLike, T: Any) -> Array:
     -------
     ndarray, shape (..., 6)
         Force and moment about the origin of the other frame, in its axes.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import translation
-    >>> transported_wrench([0.0, 10.0, 0.0, 0.0, 0.0, 0.0], translation(0.3, 0.0, 0.0))
-    array([ 0., 10.,  0.,  0.,  0.,  3.])
     """
     w, T = as_vector(wrench, 6, "wrench"), as_pose(T)
     batch_shape((w, T[..., 0, :]), ("wrench", "T"))

@@ -68,13 +68,6 @@ def dkm_second_order(
     -------
     ndarray, shape (..., 6)
         Linear then angular part, m/s^2 and rad/s^2, without gravity.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> dkm_second_order(arm, [0.0, 0.0], [2.0, 0.0], [1.0, 0.0])
-    array([-1.2,  0.3,  0. ,  0. ,  0. ,  1. ])
     """
     check_model(model)
     q, v, a = (as_vector(x, model.n, name) for x, name in ((q, "q"), (v, "v"), (a, "a")))

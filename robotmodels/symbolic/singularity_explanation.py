@@ -17,13 +17,7 @@ from .factor import SingularityFactor
 
 
 class FormulaStatus(Enum):
-    """How far the formulas go; the value is a sentence.
-
-    Examples
-    --------
-    >>> FormulaStatus.FACTORED.value
-    'The determinant is the product of the factors.'
-    """
+    """How far the formulas go; the value is a sentence."""
 
     FACTORED = "The determinant is the product of the factors."
     NOT_FACTORED = "The determinant does not factor: it is given as the polynomial it is."

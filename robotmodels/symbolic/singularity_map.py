@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import index
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
-from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..kinematics import SingularityKind
+from ..kinematics.inverse.tasks import joint_columns
+from ..kinematics.singular.task import whole_number
 from ..model import RobotModel, check_model
 from .factor import SingularityFactor
 from .singularities import explain_singularities
@@ -105,7 +106,11 @@ def singularity_map(
     q = np.zeros(model.n) if at is None else as_vector(at, model.n, "at")
     if q.ndim != 1:
         raise ShapeError(f"at: expected one configuration ({model.n},), got shape {q.shape}.")
-    counts = _counts(samples)
+    if np.shape(samples) != (2,):
+        raise InvalidValueError(
+            f"samples: expected two numbers, such as (121, 121), got {samples!r}."
+        )
+    counts = [whole_number(count, "samples", 1) for count in samples]
     limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
     for low, high in limits:
         if low >= high:
@@ -147,44 +152,11 @@ def singularity_map(
 
 
 def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
-    names = [str(model.table.names[row]) for row in model.table.joint_rows]
     if not isinstance(joints, (list, tuple, np.ndarray)) or len(joints) != 2:
         raise InvalidValueError(
             f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
         )
-    known: dict[int | str, int] = {k: k for k in range(model.n)}
-    known |= {name: k for k, name in enumerate(names)}
-    columns = []
-    for joint in joints:
-        if isinstance(joint, str) and joint not in names:
-            near = nearest_names(joint, names) or names
-            raise InvalidValueError(
-                f"joints: no joint is called {joint!r}; there is {', '.join(near)}."
-            )
-        if (
-            isinstance(joint, bool)
-            or not isinstance(joint, (int, np.integer, str))
-            or (joint not in known)
-        ):
-            raise InvalidValueError(
-                f"joints: expected names or columns of q from 0 to {model.n - 1}, got {joint!r}."
-            )
-        columns.append(known[joint])
-    if columns[0] == columns[1]:
-        raise InvalidValueError(f"joints: expected two different joints, got {joints!r}.")
-    return columns
-
-
-def _counts(samples: tuple[int, int]) -> tuple[int, int]:
-    try:
-        first, second = map(index, samples)
-    except (TypeError, ValueError):
-        first, second = 0, 0
-    if min(first, second) < 1:
-        raise InvalidValueError(
-            f"samples: expected two whole numbers of at least 1, as (121, 121), got {samples!r}."
-        )
-    return first, second
+    return joint_columns(model, joints)
 
 
 def _limits(model: RobotModel, columns: list[int]) -> Array:

@@ -88,11 +88,6 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     ndarray, shape (..., 4, 4)
         Poses. A quaternion, direction cosines or two axes that are off by no more than 1e-6 are
         brought onto the nearest rotation.
-
-    Examples
-    --------
-    >>> pose_from_coordinates([0, 0, 0.5, 0, 0, 1, 0], "quaternion").diagonal()
-    array([-1.,  1., -1.,  1.])
     """
     kind = orientation_kind(kind)
     x = as_coordinates(x, kind, "x")
@@ -141,13 +136,6 @@ def continuous_coordinates(
     ndarray, shape (N, ..., m)
         The coordinates. Where a motion passes a singularity of the representation at a small
         distance, its angles turn quickly.
-
-    Examples
-    --------
-    >>> from robotmodels.se3 import rotation
-    >>> T = np.array([rotation("z", angle) for angle in (3.0, 3.1, 3.2, 3.3)])
-    >>> continuous_coordinates(T, "rpy")[:, 3]
-    array([3. , 3.1, 3.2, 3.3])
     """
     kind = orientation_kind(kind)
     T = as_pose(T)

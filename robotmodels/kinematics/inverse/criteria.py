@@ -17,6 +17,17 @@ Raises
 ShapeError, InvalidValueError
     Arrays of the wrong shape or NaN, numbers that are not positive; what does not fit the robot is
     refused when it is known.
+
+Examples
+--------
+>>> from robotmodels.obstacles import Sphere
+>>> from robotmodels.robots import load
+>>> arm, q = load("planar_2r"), [0.0, 0.0]
+>>> criterion = ObstacleCriterion([Sphere([0.5, 0.3, 0.0], 0.1)], influence=0.4)
+>>> criterion.clearance(arm, q), criterion.gradient(arm, q).round(6) + 0.0
+(array(0.2), array([-0.625,  0.   ]))
+>>> PostureCriterion([0.0, 1.0], gain=2.0).gradient(arm, [0.5, 1.0]) + 0.0
+array([-1.,  0.])
 """
 
 from __future__ import annotations
@@ -58,13 +69,7 @@ _CHUNK = 512
 
 @runtime_checkable
 class Criterion(Protocol):
-    """Anything with a value and a gradient.
-
-    Examples
-    --------
-    >>> isinstance(PostureCriterion([0.0, 0.0]), Criterion)
-    True
-    """
+    """Anything with a value and a gradient."""
 
     def value(self, model: RobotModel, q: ArrayLike) -> Array:
         """Value at each configuration: q (..., n) -> (...)."""
@@ -75,19 +80,36 @@ class Criterion(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointLimitCriterion(Rebuilt):
-    """``sum(((q - middle) / (upper - lower))^2)`` over joints that have limits; small is good.
+class _Squares(Rebuilt):
+    """Weighted sum of squares of depths h (..., p) with slopes ``dh/dq`` (..., p, n)."""
 
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> criterion = JointLimitCriterion(lower=[-1.0, -2.0], upper=[1.0, 2.0])
-    >>> criterion.value(load("planar_2r"), [1.0, 0.0])
-    array(0.25)
-    >>> criterion.gradient(load("planar_2r"), [1.0, 1.0])
-    array([-0.5  , -0.125])
-    """
+    __slots__ = ()
+    gain: float
+
+    def value(self, model: RobotModel, q: ArrayLike) -> Array:
+        """Weighted sum of the squared depths (...)."""
+        h, _ = self._checked(model, q)
+        return np.asarray((self._factor() * h**2).sum(axis=-1))
+
+    def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
+        """Velocities (..., n) that make the depths smaller, rad/s or m/s."""
+        h, slope = self._checked(model, q)
+        return -2.0 * self.gain * ((self._factor() * h)[..., None, :] @ slope)[..., 0, :]
+
+    def _factor(self) -> Array | float:
+        return 0.5
+
+    def _checked(self, model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
+        check_model(model)
+        return self._depths(model, as_vector(q, model.n, "q"))
+
+    def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointLimitCriterion(_Squares):
+    """``sum(((q - middle) / (upper - lower))^2)`` over joints that have limits; small is good."""
 
     gain: float = 1.0
     lower: Array | None = None
@@ -97,31 +119,21 @@ class JointLimitCriterion(Rebuilt):
         _set_numbers(self, "gain")
         _set_limits(self)
 
-    def value(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Sum of squared relative distances from the middle."""
-        x, _ = _places(model, q, self.lower, self.upper)
-        return np.asarray(0.25 * (x**2).sum(axis=-1))
-
-    def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Velocities towards the middle."""
+    def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
         x, inverse = _places(model, q, self.lower, self.upper)
-        return -self.gain * inverse * x
+        return 0.5 * x, np.diag(inverse)
+
+    def _factor(self) -> float:
+        return 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NearLimitCriterion(Rebuilt):
+class NearLimitCriterion(_Squares):
     """Half the sum of squares of the depths of joints in the margins of their ranges.
 
     ``h = (|x| - 1 + margin) / margin`` where positive, with x = -1 and 1 at the limits: 0 at the
     edge of the margin, 1 at the limit, more beyond. ``margin``, in (0, 1], is a part of half the
     range. Small is good.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> criterion = NearLimitCriterion(margin=0.5, lower=-1.0, upper=1.0)
-    >>> criterion.gradient(load("planar_2r"), [0.4, 1.0])
-    array([-0., -2.])
     """
 
     margin: float = 0.3
@@ -135,35 +147,18 @@ class NearLimitCriterion(Rebuilt):
             raise InvalidValueError(f"margin: expected at most 1, got {self.margin!r}.")
         _set_limits(self)
 
-    def value(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Half the sum of the squared depths."""
-        x, _ = _places(model, q, self.lower, self.upper)
-        return np.asarray(0.5 * (self._depths(x) ** 2).sum(axis=-1))
-
-    def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Velocities away from near limits."""
+    def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
         x, inverse = _places(model, q, self.lower, self.upper)
-        return -self.gain * self._depths(x) * np.sign(x) * (2.0 * inverse / self.margin)
-
-    def _depths(self, x: Array) -> Array:
-        return np.maximum(0.0, (np.abs(x) - 1.0 + self.margin) / self.margin)
+        depth = np.maximum(0.0, (np.abs(x) - 1.0 + self.margin) / self.margin)
+        return depth * np.sign(x), np.diag(2.0 * inverse / self.margin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PostureCriterion(Rebuilt):
+class PostureCriterion(_Squares):
     """Weighted distance from a posture, ``sum(weights (q - q_ref)^2) / 2``; small is good.
 
     ``q_ref (n,)`` in rad or m, ``weights (n,)`` not negative (default 1). The gain is the rate in
     1/s at which a joint of weight 1 returns. Whole turns are not removed from the difference.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> posture = PostureCriterion([0.0, 1.0], gain=2.0)
-    >>> posture.value(load("planar_2r"), [0.5, 1.0])
-    array(0.125)
-    >>> posture.gradient(load("planar_2r"), [0.5, 1.0])
-    array([-1., -0.])
     """
 
     q_ref: Array
@@ -183,23 +178,11 @@ class PostureCriterion(Rebuilt):
         object.__setattr__(self, "weights", read_only(weights))
         _set_numbers(self, "gain")
 
-    def value(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Half the weighted squared distance."""
-        away = self._away(model, q)
-        return np.asarray(0.5 * (np.asarray(self.weights) * away**2).sum(axis=-1))
+    def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
+        return q - for_joints(model, self.q_ref, "q_ref"), np.eye(model.n)
 
-    def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Velocities towards the posture."""
-        return -self.gain * np.asarray(self.weights) * self._away(model, q)
-
-    def _away(self, model: RobotModel, q: ArrayLike) -> Array:
-        check_model(model)
-        if self.q_ref.shape != (model.n,):
-            raise ShapeError(
-                f"q_ref: expected shape ({model.n},), one value for each joint of the robot, got "
-                f"{self.q_ref.shape}."
-            )
-        return as_vector(q, model.n, "q") - self.q_ref
+    def _factor(self) -> Array:
+        return 0.5 * np.asarray(self.weights)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,15 +193,6 @@ class ManipulabilityCriterion(Rebuilt):
     cases. The gradient is exact and finite at singular positions too, where it points to one of
     the two sides. ``frame``, ``reference`` and ``mask`` as in `ikm`; ``length`` in metres is a
     constant factor of the value, unless there are fewer joints than rows.
-
-    Examples
-    --------
-    A planar arm with links of 1 m, ``w = |sin q2|``:
-
-    >>> from robotmodels.robots import load
-    >>> criterion = ManipulabilityCriterion(mask=[1, 1, 0, 0, 0, 0])
-    >>> criterion.value(load("planar_2r"), [0.3, np.pi / 6])
-    array(0.5)
     """
 
     gain: float = 1.0
@@ -264,7 +238,7 @@ class ManipulabilityCriterion(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ObstacleCriterion(Rebuilt):
+class ObstacleCriterion(_Squares):
     """Half the sum of squares of the depths of links in the neighbourhood of obstacles.
 
     For a distance d between a link and an obstacle ``h = (influence - d) / influence`` where
@@ -285,16 +259,6 @@ class ObstacleCriterion(Rebuilt):
     segments : sequence of pairs of frames, optional
         Names or numbers of frames (None is the tool) whose origins the segments join; twice the
         same frame is a point. Default every frame with its antecedent, and the tip with the tool.
-
-    Examples
-    --------
-    >>> from robotmodels.obstacles import Sphere
-    >>> from robotmodels.robots import load
-    >>> criterion = ObstacleCriterion([Sphere([0.5, 0.3, 0.0], 0.1)], influence=0.4)
-    >>> criterion.clearance(load("planar_2r"), [0.0, 0.0])
-    array(0.2)
-    >>> criterion.gradient(load("planar_2r"), [0.0, 0.0]).round(6)
-    array([-0.625,  0.   ])
     """
 
     obstacles: Sequence[Obstacle]
@@ -312,39 +276,26 @@ class ObstacleCriterion(Rebuilt):
         object.__setattr__(self, "segments", checked_segments(self.segments))
         _set_numbers(self, "influence", "gain")
 
-    def value(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Half the sum of the squared depths."""
-        check_model(model)
-        q = as_vector(q, model.n, "q")
-        depth, _ = self._depths(model, q)
-        return np.asarray(0.5 * (depth**2).sum(axis=-1)).reshape(q.shape[:-1])
-
-    def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Velocities away from obstacles that are near."""
-        check_model(model)
-        q = as_vector(q, model.n, "q")
-        depth, slope = self._depths(model, q)
-        push = depth * (self.gain / self.influence)
-        return np.einsum("kp,kpj->kj", push, slope).reshape(q.shape)
-
     def clearance(self, model: RobotModel, q: ArrayLike) -> Array:
         """Least distance between links and obstacles, m: `obstacles.clearance`."""
         return clearance(model, q, self.obstacles, self.radius, segments=self.segments)
 
     def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
-        """Depths in the neighbourhood and gradients of the distances, of points for planes."""
-        q = np.ascontiguousarray(q).reshape(int(np.prod(q.shape[:-1])), model.n)
+        """Depths in the neighbourhood; planes act on the ends of links, bodies on the links."""
+        rows = np.ascontiguousarray(q).reshape(int(np.prod(q.shape[:-1])), model.n)
         segments = links(model) if self.segments is None else self.segments
         points = [(frame, frame) for frame in dict.fromkeys(f for pair in segments for f in pair)]
         planes = [body for body in self.obstacles if isinstance(body, Plane)]
         bodies = [body for body in self.obstacles if not isinstance(body, Plane)]
         found = [
-            link_distances(model, q, part, self.radius, pairs)
+            link_distances(model, rows, part, self.radius, pairs)
             for part, pairs in ((planes, points), (bodies, segments))
             if part
         ]
-        distance, slope = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
-        return np.maximum(0.0, (self.influence - distance) / self.influence), slope
+        parts = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        distance, slope = (part.reshape(*q.shape[:-1], *part.shape[1:]) for part in parts)
+        depth = np.maximum(0.0, (self.influence - distance) / self.influence)
+        return depth, -slope / self.influence
 
 
 def _set_numbers(criterion: object, *names: str) -> None:
@@ -361,10 +312,9 @@ def _set_limits(criterion: object) -> None:
 
 
 def _places(
-    model: RobotModel, q: ArrayLike, lower: Array | None, upper: Array | None
+    model: RobotModel, q: Array, lower: Array | None, upper: Array | None
 ) -> tuple[Array, Array]:
     """Places in the ranges, -1 to 1, and the inverses of the widths, both 0 without a range."""
-    check_model(model)
     low = for_joints(model, model.lower if lower is None else lower, "lower")
     high = for_joints(model, model.upper if upper is None else upper, "upper")
     check_order(model, low, high, low > high)
@@ -372,4 +322,4 @@ def _places(
     middle, inverse = np.zeros(model.n), np.zeros(model.n)
     middle[counts] = 0.5 * (low[counts] + high[counts])
     inverse[counts] = 1.0 / (high[counts] - low[counts])
-    return 2.0 * inverse * (as_vector(q, model.n, "q") - middle), inverse
+    return 2.0 * inverse * (q - middle), inverse

@@ -126,15 +126,6 @@ def ikm_second_order(
     acceleration : array_like, shape (..., 6)
         Time derivative of the frame's twist, entry by entry [m/s^2, rad/s^2], as
         `dkm_second_order` gives it.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.kinematics import dkm_second_order
-    >>> arm, q, v = load("rx90"), [0.1, 0.2, 1.3, 0.4, 0.5, 0.6], [1.0, 0.5, -0.3, 0.1, 0.7, -1.0]
-    >>> found = ikm_second_order(arm, q, v, [0.1, 0.0, -0.2, 0.0, 0.0, 0.3])
-    >>> dkm_second_order(arm, q, v, found.a).round(12) + 0.0
-    array([ 0.1,  0. , -0.2,  0. ,  0. ,  0.3])
     """
     check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
