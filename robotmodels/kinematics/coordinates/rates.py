@@ -133,7 +133,7 @@ def coordinate_jacobian(
     frame: str | int | None = None,
     near: ArrayLike | None = None,
 ) -> Array:
-    """Jacobian (..., m, n) of the operational coordinates, ``dX/dt = J(q) dq/dt``.
+    """Jacobian, shape (..., m, n), of the operational coordinates: ``dX/dt = J(q) dq/dt``.
 
     Also called the analytic Jacobian; in m and rad per unit of the joints, in table order. Seed
     book eq. [1.5] and section 1.3.1.1.
