@@ -133,10 +133,10 @@ def coordinate_jacobian(
     frame: str | int | None = None,
     near: ArrayLike | None = None,
 ) -> Array:
-    """Jacobian, shape (..., m, n), of the operational coordinates: ``dX/dt = J(q) dq/dt``.
+    """Jacobian of the operational coordinates, the analytic Jacobian: ``dX/dt = J(q) dq/dt``.
 
-    Also called the analytic Jacobian; in m and rad per unit of the joints, in table order. Seed
-    book eq. [1.5] and section 1.3.1.1.
+    Shape (..., m, n), in m and rad per unit of the joints, in table order. Seed book eq. [1.5] and
+    section 1.3.1.1.
     """
     check_model(model)
     return coordinate_rates(dgm(model, q, frame), kind, near) @ jacobian(model, q, frame)
