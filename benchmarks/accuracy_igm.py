@@ -1,11 +1,12 @@
-"""Completeness and accuracy of the inverse geometric models, beside EAIK where it serves the arm.
+"""Completeness and accuracy of the inverse geometric models.
 
     python -m benchmarks.accuracy_igm [--poses 100000] [--only ARM ...] [--out benchmarks/results]
 
 For each arm, the poses of random postures, 3 of 100 of them singular or nearly so (wrist aligned,
 elbow stretched or folded, shoulder on the axis, all combinations; exactly, or 1e-12 ... 1e-3 rad
 beside it), are given to `rm.igm` with the posture they were made of as reference. What it returns
-is judged by the direct model alone. See the notes that are printed below the table.
+is judged by the direct model alone. See the notes that are printed below the table; postures of
+other programs are compared by ``python -m benchmarks --only igm``.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +23,9 @@ import robotmodels as rm
 from benchmarks.igm_checks import CLOSE, given_back, newton_search, residual
 from benchmarks.igm_postures import Kind, sample
 from benchmarks.machine import head, machine
-from benchmarks.peers.igm import eaik
 from benchmarks.works import OURS, RESULTS, Row, keep, table
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Solve = Callable[[Array, Array], tuple[Array, Flags, Flags]]
-"""Poses and the postures that made them, to postures, which there are, and which are exact."""
 
 ARMS = ("rx90", "puma560", "irb6640", "kr6_r900", "stanford_arm", "ur5", "ur5e", "crx10ia", "xarm6")
 SINGULAR = 0.03
@@ -38,71 +34,37 @@ CHUNK = 10_000
 GOAL = 1e-12
 
 
-def ours(model: rm.RobotModel) -> Solve:
-    """`rm.igm`, with the posture as reference."""
-
-    def solve(T: Array, q: Array) -> tuple[Array, Flags, Flags]:
-        found = rm.igm(model, T, q_ref=q)
-        return found.q, found.valid, found.valid
-
-    return solve
-
-
-def theirs(model: rm.RobotModel) -> Solve | None:
-    """EAIK, None where it does not serve the arm or is not installed."""
-    peer = next(eaik(model), None)
-    if peer is None or peer.batch is None:
-        return None
-    batch = peer.batch
-
-    def solve(T: Array, _: Array) -> tuple[Array, Flags, Flags]:
-        answers = batch(T)
-        most = max(len(a.Q) for a in answers)
-        q: Array = np.full((len(answers), most, model.n), np.nan)
-        claimed = np.zeros((len(answers), most), np.bool_)
-        for i, a in enumerate(answers):
-            q[i, : len(a.Q)] = np.reshape(a.Q, (-1, model.n))
-            claimed[i, : len(a.Q)] = ~np.asarray(a.is_LS, np.bool_)
-        there: Flags = np.asarray(np.isfinite(q).all(axis=2), np.bool_)
-        return q, there, claimed & there
-
-    return solve
-
-
-def judged(name: str, solver: str, solve: Solve, count: int) -> Row:
-    """How many of the postures that made the poses a solver gives back, and how exact it is."""
+def judged(name: str, count: int) -> Row:
+    """How many of the postures that made the poses are given back, and how exact they are."""
     model, rng = rm.load(name), np.random.default_rng(0)
     made = sample(model, name in ("crx10ia", "xarm6"), count, SINGULAR, rng)
     order = rng.permutation(count)
     q, kind = made.q[order], made.kind[order]
     first = q[kind > 0][:50]  # kernels of singular poses are compiled before the time is taken
-    solve(rm.dgm(model, first), first)
+    rm.igm(model, rm.dgm(model, first), q_ref=first)
     counts, kinds = Counter[str](), Counter[str]()
     worst = seconds = 0.0
     for start in range(0, count, CHUNK):
         part = slice(start, start + CHUNK)
         T, singular = rm.dgm(model, q[part]), kind[part] > 0
         began = time.process_time()
-        rows, there, claimed = solve(T, q[part])
+        found = rm.igm(model, T, q_ref=q[part])
         seconds += time.process_time() - began
-        i, s = np.nonzero(there)
-        error = np.full(there.shape, np.inf)
-        error[i, s] = residual(model, T[i], rows[i, s])
-        # whatever meets the pose counts, also what is called least squares
-        back = given_back(model, T, q[part], rows, error < CLOSE, families=solver != OURS)
-        promised = np.where(claimed, error, 0.0).max(axis=1, initial=0.0)
+        i, s = np.nonzero(found.valid)
+        error = np.full(found.valid.shape, np.inf)
+        error[i, s] = residual(model, T[i], found.q[i, s])
+        back = given_back(model, T, q[part], found.q, error < CLOSE)
+        promised = np.where(found.valid, error, 0.0).max(axis=1, initial=0.0)
         worst = max(worst, float(promised.max(initial=0.0)))
         kinds.update(tuple(Kind)[k].value for k in kind[part][~back])
         counts["lost"] += int((~back & ~singular).sum())
         counts["lost_singular"] += int((~back & singular).sum())
         counts["above_goal"] += int((promised > GOAL).sum())
-    row = {"arm": name, "solver": solver, "poses": count, "singular": int((kind > 0).sum())}
+    row = {"arm": name, "solver": OURS, "poses": count, "singular": int((kind > 0).sum())}
     row |= {word: counts[word] for word in ("lost", "lost_singular", "above_goal")}
     row |= {"residual": worst, "microseconds": seconds / count * 1e6, "lost_by_kind": dict(kinds)}
-    if solver == OURS:
-        unknown, checked = beside_search(model, q[kind == 0][:SEARCHED])
-        row |= {"unknown": unknown, "checked_by_search": checked}
-    return row
+    unknown, checked = beside_search(model, q[kind == 0][:SEARCHED])
+    return row | {"unknown": unknown, "checked_by_search": checked}
 
 
 def beside_search(model: rm.RobotModel, q: Array) -> tuple[int, int]:
@@ -119,14 +81,13 @@ def beside_search(model: rm.RobotModel, q: Array) -> tuple[int, int]:
 NOTES = """
 - lost: postures that made a pose of which no row is within 1e-6 of them in every joint, and none
   is joined to them by a path on which the pose is kept to 1e-12 (the pose does not tell those
-  apart). For EAIK, which takes no reference, also members of the same infinite family count.
+  apart).
 - residual: the largest one of any row returned [m or rad]; above: poses with a row above 1e-12.
-  For EAIK, of the rows that it does not call least squares.
 - unknown: postures that damped Newton steps from {starts} random starts find for {searched} regular
   poses and the model does not, of how many they find.
 """
 COLUMNS = (
-    "arm", "solver", "poses", "singular", "lost", "lost_singular", "residual", "above_goal",
+    "arm", "poses", "singular", "lost", "lost_singular", "residual", "above_goal",
     "unknown", "checked_by_search", "microseconds",
 )  # fmt: skip
 
@@ -137,12 +98,12 @@ def report(rows: list[Row], about: dict[str, str]) -> str:
     shown = {"residual": "{:.1e}", "microseconds": "{:.1f}"}
     lines += table(
         [word.replace("_", " ") for word in COLUMNS],
-        [[shown.get(w, "{}").format(r[w]) if w in r else "" for w in COLUMNS] for r in rows],
+        [[shown.get(w, "{}").format(r[w]) for w in COLUMNS] for r in rows],
     )
     lines.append(NOTES.format(starts=STARTS, searched=SEARCHED).rstrip())
     for r in (r for r in rows if r["lost_by_kind"]):
         kinds = ", ".join(f"{kind} {number}" for kind, number in r["lost_by_kind"].items())
-        lines.append(f"- lost, {r['arm']}, {r['solver']}, by what is singular: {kinds}")
+        lines.append(f"- lost, {r['arm']}, by what is singular: {kinds}")
     return "\n".join(lines) + "\n"
 
 
@@ -155,12 +116,9 @@ def main() -> None:
     given = parser.parse_args()
     rows: list[Row] = []
     for name in given.only:
-        model = rm.load(name)
-        for solver, solve in ((OURS, ours(model)), ("EAIK", theirs(model))):
-            if solve is not None:
-                rows.append(judged(name, solver, solve, given.poses))
-                print({word: rows[-1][word] for word in COLUMNS if word in rows[-1]}, flush=True)
-    about = machine(["eaik"])
+        rows.append(judged(name, given.poses))
+        print({word: rows[-1][word] for word in COLUMNS}, flush=True)
+    about = machine()
     text = report(rows, about)
     print(text)
     keep(given.out, "accuracy_igm", text, {"machine": about, "rows": rows})

@@ -14,8 +14,6 @@ Flags = NDArray[np.bool_]
 
 CLOSE = 1e-6  # postures as near as this in every joint are the same [rad, m]
 ON_PATH = 1e-12  # what may be missing of the pose on the way between two that are the same [m, rad]
-FLAT = 1e-7  # smallest singular value of the Jacobian on an infinite family
-ON_FAMILY = 1e-9  # the same on the way along an infinite family
 DAMPING = (1e-5, 1e-5, 1e-7, 1e-7, 1e-9, 1e-9, 1e-11, 1e-11)
 """Of the steps that keep a pose: singular directions are used where the others do not suffice."""
 
@@ -45,12 +43,11 @@ def gaps(model: rm.RobotModel, rows: Array, valid: Flags, q: Array) -> Array:
     return np.where(valid, d, np.inf)
 
 
-def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, most: float, steps: int) -> Flags:
+def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, steps: int = 24) -> Flags:
     """Whether postures ``a`` and ``b (N, n)`` of one pose are joined by a path that keeps it.
 
-    The straight way from one to the other is walked in steps, each brought home by damped Newton
-    steps. Isolated postures hold the walker back, who then has to jump; ``most`` is what may be
-    missing of the pose on the way.
+    The straight way from one to the other is divided into steps, each corrected by damped Newton
+    steps. Between isolated postures the corrections go back, and the last step has to jump.
     """
     length = np.linalg.norm(difference(model, b, a), axis=1)
     alive = np.ones(len(a), np.bool_)
@@ -63,13 +60,13 @@ def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, most: float, step
         for damping in DAMPING:
             step, e = newton_step(model, T[rows], trial, damping)
             # what meets the pose stays: a step out of rounding errors would go far
-            off = np.linalg.norm(e, axis=1) > 0.5 * most
+            off = np.linalg.norm(e, axis=1) > 0.5 * ON_PATH
             if not off.any():
                 break
             trial[off] += step[off]
         step = np.linalg.norm(difference(model, trial, at[rows]), axis=1)
         at[rows] = trial
-        alive[rows] = residual(model, T[rows], trial) <= most
+        alive[rows] = residual(model, T[rows], trial) <= ON_PATH
         # from one isolated posture to another is one whole jump
         alive[rows] &= step <= length[rows] / 3.0
         if k == steps // 8:
@@ -88,24 +85,14 @@ def newton_step(model: rm.RobotModel, T: Array, q: Array, damping: float) -> tup
     return (np.swapaxes(right, 1, 2) @ along[..., None])[..., 0], e
 
 
-def given_back(
-    model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags, families: bool = False
-) -> Flags:
-    """Whether ``q`` is among the rows, or a posture that its pose to 1e-12 cannot tell from it.
-
-    With families also another member of its infinite family.
-    """
+def given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
+    """Whether ``q`` is among the rows, or a posture that its pose to 1e-12 cannot tell from it."""
     there = gaps(model, rows, valid, q).min(axis=1, initial=np.inf) < CLOSE
-    # families have a direction in which the tool stays at rest
-    flat = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] < FLAT
-    ways = [(np.ones_like(flat), ON_PATH, 24), (flat & families, ON_FAMILY, 80)]
-    for some, most, steps in ways:
-        pose, row = np.nonzero(valid & (some & ~there)[:, None])
-        if pose.size:
-            a, b = q[pose], rows[pose, row]
-            found = joined(model, T[pose], a, b, most, steps)
-            found |= joined(model, T[pose], b, a, most, steps)
-            there[pose[found]] = True
+    pose, row = np.nonzero(valid & ~there[:, None])
+    if pose.size:
+        a, b = q[pose], rows[pose, row]
+        found = joined(model, T[pose], a, b) | joined(model, T[pose], b, a)
+        there[pose[found]] = True
     return there
 
 

@@ -121,7 +121,7 @@ def jog_parallel(
         middle = home[k] if k < 3 else 0.0
         slider = {"name": name, "path": platform[2 * k + 1].path, "prismatic": k < 3}
         slider |= {"lower": -1e9, "upper": 1e9, "ends": [middle - reach, middle + reach]}
-        sliders.append(slider | {"leads": k in kept, "note": "" if k in kept else "constant"})
+        sliders.append(slider | {"leads": k in kept, "note": "" if k in kept else ", constant"})
     matrix = np.eye(6)[:, kept]
     panel = SliderPanel(
         independent=np.array(kept),

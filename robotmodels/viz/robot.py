@@ -37,6 +37,7 @@ from .meshes import mesh_parts, with_stand_ins
 from .shapes import Drawable, Label, Node, apply, extent
 
 MESH_COLOR: Color = (0.72, 0.74, 0.78, 1.0)
+_LINK = "shape:"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,11 +57,9 @@ class Options:
     dark: bool = False
 
     def __post_init__(self) -> None:
-        """Check two of them; what draws with the others checks them."""
+        """Check one of them; what draws with the others checks them."""
         if as_number(self.opacity, "opacity", least=0.0) > 1.0:
             raise InvalidValueError(f"opacity: expected at most 1, got {self.opacity}.")
-        if not isinstance(self.dark, (bool, np.bool_)):
-            raise InvalidValueError(f"dark: expected True or False, got {self.dark!r:.80}.")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,16 +73,8 @@ class RobotDrawing:
     frames: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Piece:
-    """A shape that moves with a frame; its name is unique among the pieces of that frame."""
-
-    frame: int
-    name: str
-    pose: Array
-    shape: Drawable
-    color: Color
-    is_link: bool
+_Pieces = list[tuple[int, Node]]
+"""Shapes with the frames they move with; the paths are names, unique for each frame."""
 
 
 def draw_robot(
@@ -116,7 +107,7 @@ def draw_robot(
     one = len(q) == 1
     nodes = [Node(root, model.base)]
     # several configurations share what stands still: it keeps its own colour
-    nodes += _shapes([p for p in pieces if p.frame == 0], root, colors[0] if one else None, options)
+    nodes += _shapes(pieces, 0, root, colors[0] if one else None, options)
     paths: list[list[str]] = []
     for k, configuration in enumerate(q):
         top = root if one else f"{root}/posture_{k + 1}"
@@ -125,7 +116,7 @@ def draw_robot(
         nodes += frames
         paths.append(hung)
         for j in range(1, model.f + 1):
-            nodes += _shapes([p for p in pieces if p.frame == j], hung[j], colors[k], options)
+            nodes += _shapes(pieces, j, hung[j], colors[k], options)
     joints = tuple(paths[0][row + 1] for row in model.table.joint_rows)
     return RobotDrawing(tuple(nodes), _extent(model, seen, pieces), joints, size, tuple(paths[0]))
 
@@ -139,23 +130,23 @@ def with_strokes(table: DHTable, q: Array) -> DHTable:
     )
 
 
-def _pieces(model: RobotModel, table: DHTable, options: Options, size: float) -> list[_Piece]:
+def _pieces(model: RobotModel, table: DHTable, options: Options, size: float) -> _Pieces:
     """Links, axes of frames, and names."""
     visuals = model.visuals if options.meshes else ()
-    pieces = []
+    pieces = _Pieces()
     for i, visual in enumerate(visuals or skeleton(table, model.tool, model.tip, axes=False)):
         for k, (shape, color) in enumerate(_solids(visual)):
-            name = f"shape:{i + 1}.{k + 1}"
-            pieces.append(_Piece(visual.frame, name, visual.pose, shape, color, True))
+            node = Node(f"{_LINK}{i + 1}.{k + 1}", visual.pose, shape, color)
+            pieces.append((visual.frame, node))
     triads = [(j, np.eye(4), f"R{j}", 0.11) for j in range(1, model.f + 1) if options.frames]
     triads += [(model.tip, model.tool, "tool", 0.12)] if options.tool else []
     for j, pose, name, part in triads:
         for axis, visual in zip("xyz", triad(j, pose, part * size), strict=True):
             shape, color = _solids(visual)[0]
-            pieces.append(_Piece(j, f"{name}:{axis}", visual.pose, shape, color, False))
+            pieces.append((j, Node(f"{name}:{axis}", visual.pose, shape, color)))
     for j, name in enumerate(table.names if options.names else (), start=1):
         at = se3.translation(0.0, 0.0, 0.125 * size)
-        pieces.append(_Piece(j, f"label:{j}", at, Label(name), (0.1, 0.1, 0.1, 1.0), False))
+        pieces.append((j, Node(f"label:{j}", at, Label(name))))
     return pieces
 
 
@@ -186,24 +177,27 @@ def _frames(model: RobotModel, q: Array, top: str) -> tuple[list[Node], list[str
     return nodes, paths
 
 
-def _shapes(pieces: list[_Piece], path: str, color: Color | None, options: Options) -> list[Node]:
-    """Nodes of pieces below a path."""
+def _shapes(
+    pieces: _Pieces, frame: int, path: str, color: Color | None, options: Options
+) -> list[Node]:
+    """Nodes of the pieces of a frame, below a path; links in a colour, or in their own."""
     nodes = []
-    for piece in pieces:
-        r, g, b, a = piece.color if color is None or not piece.is_link else color
-        rgba = (r, g, b, a * options.opacity if piece.is_link else a)
-        nodes.append(Node(f"{path}/{piece.name}", piece.pose, piece.shape, rgba))
+    for node in (node for where, node in pieces if where == frame):
+        is_link = node.path.startswith(_LINK)
+        r, g, b, a = color if color and is_link else node.color
+        rgba = (r, g, b, a * options.opacity if is_link else a)
+        nodes.append(replace(node, path=f"{path}/{node.path}", color=rgba))
     return nodes
 
 
-def _extent(model: RobotModel, q: Array, pieces: list[_Piece]) -> Array:
+def _extent(model: RobotModel, q: Array, pieces: _Pieces) -> Array:
     """Corners of all shapes in the world, in all configurations."""
     R0 = np.broadcast_to(model.base, (len(q), 1, 4, 4))
     poses = np.concatenate((R0, link_poses(model, q)), axis=1)
     points = [poses[:, 0, :3, 3]]
-    for piece in pieces:
-        corners = apply(piece.pose, extent(piece.shape))
-        points.append(apply(poses[:, piece.frame], corners).reshape(-1, 3))
+    for frame, node in pieces:
+        corners = apply(node.pose, extent(node.shape))
+        points.append(apply(poses[:, frame], corners).reshape(-1, 3))
     return np.concatenate(points)
 
 

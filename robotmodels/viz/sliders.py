@@ -125,13 +125,11 @@ def _joint(
         lower if np.isfinite(lower) else min(-half, upper - 2.0 * half),
         upper if np.isfinite(upper) else max(half, lower + 2.0 * half),
     )
-    passive = not table.mu[table.joint_rows[i]]
-    note = _limits(lower, upper, ends, prismatic) + (", passive" if passive else "")
+    note = "" if table.mu[table.joint_rows[i]] else ", passive"
     leads = bool(i in independent)
     if not leads:
-        pairs = zip(independent, matrix[i], strict=True)
-        leaders = ", ".join(names[k] for k, c in pairs if c)
-        note = f"{f'follows {leaders}' if leaders else 'does not move'}; {note}"
+        leaders = ", ".join(names[k] for k, c in zip(independent, matrix[i], strict=True) if c)
+        note += f", follows {leaders}" if leaders else ", does not move"
     return {
         "name": names[i],
         "path": path,
@@ -142,12 +140,3 @@ def _joint(
         "leads": leads,
         "note": note,
     }
-
-
-def _limits(lower: float, upper: float, ends: tuple[float, float], prismatic: bool) -> str:
-    """The range of a slider, and which limits of the joint it is not."""
-    unit, factor = ("m", 1.0) if prismatic else ("deg", 180.0 / np.pi)
-    low, high = (f"{end * factor:.5g}" for end in ends)
-    missing = [w for w, x in (("lower", lower), ("upper", upper)) if not np.isfinite(x)]
-    none = {0: "", 1: f", no {missing[0]} limit" if missing else "", 2: ", no limits"}
-    return f"{low} to {high} {unit}{none[len(missing)]}"
