@@ -113,7 +113,7 @@ def along_bars(start: Array, end: Array) -> Array:
     return np.column_stack([start, np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)])
 
 
-def extent(shape: Drawable) -> Array:
+def extent(shape: Drawable | None) -> Array:
     """Points that enclose a shape: the corners of its bounding box. Shapes: -> (8, 3)."""
     match shape:
         case Box(size):
@@ -125,7 +125,7 @@ def extent(shape: Drawable) -> Array:
             low, high = np.full(3, -radius), np.full(3, radius)
         case Triangles(points, _) | Segments(points):
             low, high = points.min(axis=0), points.max(axis=0)
-        case Label():
+        case _:  # texts, and nodes without a shape
             low = high = np.zeros(3)
     return np.where(np.indices((2, 2, 2)).reshape(3, -1).T, high, low).astype(np.float64)
 
