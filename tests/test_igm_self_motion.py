@@ -11,6 +11,7 @@ from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.igm.motion import jacobians
 from robotmodels.igm.motion import tool_poses as poses
 from robotmodels.igm.postures import no_postures
+from robotmodels.igm.self_motions import SelfMotions
 from robotmodels.igm.singular import complete
 from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.robots import load
@@ -151,6 +152,19 @@ def test_a_wrist_at_the_base_frees_the_first_joint(name, rng):
     assert out.family.any(axis=1).all()
     assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
     assert agrees_with_search(chain, U, out, 0.3, rng) >= 4
+
+
+def test_a_closed_curve_ends_where_it_began(rng):
+    chain, _ = arm("ur5e", backwards=True)
+    q = draw(chain, 1, rng)
+    q[:, 1] = 0.0
+    motions = SelfMotions(chain.sigma, chain.D, poses(chain, q)[0], np.full(6, 0.3))
+    motions.at_reference(q[0], 1e-12)
+    # one piece each, whole turns not taken off; 4000 points are the most
+    for _, points, _ in motions.curves:
+        assert len(points) < 300
+        gap = (points[-1] - points[0]) / (2 * np.pi)
+        np.testing.assert_allclose(gap, gap.round(), rtol=0, atol=1e-9)
 
 
 def shoulder_singular(chain, N, rng):

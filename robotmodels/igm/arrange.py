@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
+from .by_plan import ByPlan
 from .known import KnownArm
 from .paul.layout import WITHIN_LIMITS
 from .postures import Postures
@@ -52,6 +53,12 @@ class PlanRows(NamedTuple):
     most: int
     mode: int
 
+    @property
+    def plan(self) -> ByPlan:
+        """Solver of the arm."""
+        assert self.arm.plan is not None
+        return self.arm.plan
+
     def rows(self) -> Rows:
         """The same as any other method has it: nothing is double, free or in a family."""
         S, most = self.q.shape[1], self.most
@@ -64,7 +71,7 @@ class PlanRows(NamedTuple):
             inside=self.marks[:, 2 + S : 2 + S + most] > 0,
             code=code.astype(np.int16),
             status=self.marks[:, 1].astype(np.int8),
-            labels=self.arm.labels,
+            labels=self.plan.labels,
             double=np.zeros(code.shape, np.bool_),
             free=free,
             family=family,
@@ -74,7 +81,7 @@ class PlanRows(NamedTuple):
         """Fields of an `IGMSolutions`."""
         arm = self.arm
         periodic = arm.never if self.mode & WITHIN_LIMITS else arm.turns
-        return result_fields(self.batch, self.rows(), arm.method, periodic, (True,) * 6)
+        return result_fields(self.batch, self.rows(), self.plan.method, periodic, (True,) * 6)
 
 
 def result_fields(
@@ -170,32 +177,24 @@ def turned_inside(x: Array, lower: Array, upper: Array, goal: Array) -> Array:
     return np.where(lowest <= highest, nearest, np.nan)
 
 
-_NOTHING = {"q": np.nan, "residual": np.nan, "code": -1}
-
-
 def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
-    """Rows with those of some poses replaced, in place where they fit; labels of both."""
-    labels, shorter = sorted((rows.labels, part.labels), key=len, reverse=True)
-    if labels[: len(shorter)] != shorter:
-        # the two solvers use different branch labels
-        labels = rows.labels + part.labels
-        part = part._replace(code=np.where(part.valid, part.code + len(rows.labels), -1))
-    N, most = len(rows.q), max(rows.q.shape[1], part.q.shape[1])
-    wide: dict[str, Any] = {"labels": labels}
-    for name in ("q", "valid", "residual", "inside", "code", "double", "free", "family"):
-        old, new = getattr(rows, name), getattr(part, name)
-        values = old
-        if most > old.shape[1] or not old.flags.writeable:
-            values = np.full((N, most, *old.shape[2:]), _NOTHING.get(name, 0), old.dtype)
-            values[:, : old.shape[1]] = old
-        values[at] = _NOTHING.get(name, 0)
-        values[at, : new.shape[1]] = new
-        wide[name] = values
-    wide["status"] = rows.status.copy()
-    wide["status"][at] = part.status
-    for name in ("closest", "missing"):
-        new = getattr(part, name)
-        if new is not None:
-            wide[name] = np.full((N, new.shape[1]), np.nan)
-            wide[name][at] = new
-    return rows._replace(**wide)
+    """Rows of a plan with those of some poses replaced by another solver's, of the same labels."""
+    S, new_S = rows.q.shape[1], part.q.shape[1]
+
+    def merged(old: NDArray[Any], new: NDArray[Any], nothing: float) -> NDArray[Any]:
+        values = np.full((len(old), max(S, new_S), *old.shape[2:]), nothing, old.dtype)
+        values[:, :S] = old
+        values[at] = nothing
+        values[at, :new_S] = new
+        return values
+
+    nothing = (np.nan, False, np.nan, False, -1)
+    fields = [merged(*values) for values in zip(rows[:5], part[:5], nothing, strict=True)]
+    marks = [merged(old, new, False) for old, new in zip(rows[7:10], part[7:10], strict=True)]
+    rows.status[at] = part.status
+    found = Rows(*fields, rows.status, max(rows.labels, part.labels, key=len), *marks)
+    if part.closest is None or part.missing is None:
+        return found
+    closest, missing = (np.full((len(rows.q), size), np.nan) for size in (rows.q.shape[2], 6))
+    closest[at], missing[at] = part.closest, part.missing
+    return found._replace(closest=closest, missing=missing)

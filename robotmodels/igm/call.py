@@ -15,7 +15,6 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
 from .chain import far_along_rails
-from .check import checked
 from .constraints import Components, constraints
 from .families import may_miss_solutions
 from .known import KnownArm, known_arm, solver_for
@@ -28,7 +27,7 @@ from .singular import complete
 from .solutions import IGMSolutions, later, of_fields
 from .solver import Solver, Tolerances, postures
 from .status import IGMStatus
-from .unreachable import Diagnosis, diagnose
+from .unreachable import diagnose
 
 NO_SOLVER = "numeric search for one posture: no family of closed forms serves this arm"
 """Method of a result where only the search serves the arm."""
@@ -180,12 +179,10 @@ def _by_plan(request: Request, poses: Array, references: Array, quick: PlanRows 
         quick = _plan_rows(request.arm, (), poses, references, mode)
     if quick.most >= 0:
         return quick.rows()
-    if quick.most == NEEDS_CHECK:
-        return _by_solver(request, poses, references)
     doubtful = np.flatnonzero(quick.marks[:, 1] == IGMStatus.NOT_CONVERGED)
+    if quick.most == NEEDS_CHECK or doubtful.size == len(poses):
+        return _by_solver(request, poses, references)
     part = _by_solver(request, poses[doubtful], references[doubtful])
-    if doubtful.size == len(poses):
-        return part
     return put(quick._replace(most=-1 - quick.most).rows(), doubtful, part)
 
 
@@ -194,7 +191,7 @@ def _by_solver(request: Request, poses: Array, references: Array, psi: Array | N
 
     Shapes: poses (N, 4, 4), references (N, n), psi (N,).
     """
-    model, arm, task = request.model, request.arm, request.task
+    arm, task, solver, limits = request.arm, request.task, request.solver, request.limits
     U = np.ascontiguousarray(arm.to_base @ poses)
     # locked joints are not solved for: like joints off the path they keep their reference
     locked = [column for column, _ in task.locks]
@@ -202,78 +199,46 @@ def _by_solver(request: Request, poses: Array, references: Array, psi: Array | N
         references = references.copy()
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
-    found = _solved_chain(request, U, psi, np.ascontiguousarray(references[:, columns]))
-    rows = _laid_out(request, found, references, columns)
-    thorough = np.full(len(U), request.solver is None)
-    if request.solver is not None:
-        missing = may_miss_solutions(request.solver, U, found, references[:, columns])
-        rows.status[missing & (rows.status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
-        rows.status[missing & (rows.status == IGMStatus.OUTSIDE_LIMITS)] = IGMStatus.NOT_CONVERGED
-        # others of a family, or those that were missed, may lie within the limits
-        thorough = np.asarray(found.valid.any(axis=1))
-    reasons = diagnose(
-        model, task, thorough, poses, references, request.limits, request.tolerances, rows.status
-    )
-    if reasons is None:
+    own = np.ascontiguousarray(references[:, columns])
+
+    def laid_out(found: Postures) -> Rows:
+        code, labels = branches(solver, found)
+        return arranged(found, code, labels, columns, references, request.given, arm.joints, limits)
+
+    found = _solved_chain(request, U, psi, own)
+    rows, solved = laid_out(found), found.valid.any(axis=1)
+    status = rows.status
+    if solver is not None:
+        missing = may_miss_solutions(solver, U, found, own)
+        status[missing & (status <= IGMStatus.REACHED_FAMILY)] = IGMStatus.INCOMPLETE
+        status[missing & (status == IGMStatus.OUTSIDE_LIMITS)] = IGMStatus.NOT_CONVERGED
+    at = np.flatnonzero(status == IGMStatus.NOT_CONVERGED)
+    if at.size == 0:
         return rows
-    whole = request.solver is not None and task == Task(locks=task.locks)
-    members = reasons.met & reasons.family.any(axis=1)
-    if whole and psi is None and not request.limits and members.any():
-        # members of self-motions that the search found are completed like others
-        at = reasons.rows[members]
-        part = _completed_members(
-            request, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
-        )
-        rows = _laid_out(request, found.put(at, part), references, columns)
-    lost = ~rows.valid[reasons.rows].any(axis=1)
-    if request.solver is not None:
-        # the solver found no solution of a pose that is reached: it misses solutions
-        unproven = reasons.met & ~found.valid[reasons.rows].any(axis=1)
-        unproven &= reasons.status == IGMStatus.REACHED
-        reasons.status[unproven] = IGMStatus.INCOMPLETE
-    rows.status[reasons.rows[lost]] = reasons.status[lost]
-    # poses that only the search solved
-    chosen = reasons.met & lost
-    if chosen.any():
-        rows = put(rows, reasons.rows[chosen], _alone(rows, reasons, chosen, model))
-    return rows._replace(closest=reasons.closest, missing=reasons.missing)
-
-
-def _alone(rows: Rows, found: Diagnosis, chosen: NDArray[np.bool_], model: RobotModel) -> Rows:
-    """Solutions of the search, one for each pose."""
-    q = found.closest[found.rows[chosen]]
-    there = np.ones((len(q), 1), np.bool_)
-    none = np.zeros((len(q), 1, q.shape[1]), np.bool_)
-    return Rows(
-        q=q[:, None],
-        valid=there,
-        residual=found.residual[chosen, None],
-        inside=np.all((model.lower <= q) & (q <= model.upper), axis=1)[:, None],
-        code=np.zeros(there.shape, np.int16),
-        status=found.status[chosen],
-        labels=rows.labels,
-        double=~there,
-        free=none,
-        family=found.family[chosen, None],
+    # others of a family, or those that were missed, may lie within the limits
+    thorough = solved[at] | (solver is None)
+    search = diagnose(
+        request.model, task, thorough, U[at], references[at], limits, request.tolerances
     )
-
-
-def _laid_out(
-    request: Request, found: Postures, references: Array, columns: NDArray[np.int64]
-) -> Rows:
-    """Solutions of a chain as rows of a result, in the columns of the model."""
-    code, labels = branches(request.solver, found)
-    joints, limits = request.arm.joints, request.limits
-    return arranged(found, code, labels, columns, references, request.given, joints, limits)
-
-
-def _completed_members(request: Request, U: Array, q: Array, references: Array) -> Postures:
-    """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
-    assert request.solver is not None
-    chain, there = request.solver.chain, np.ones((len(U), 1), np.bool_)
-    found = checked(chain, U, q[:, None], there, request.tolerances)
-    found.family[...] = found.valid
-    return complete(chain, U, found, references, request.tolerances)
+    status[at] = search.status
+    met = np.flatnonzero(search.valid)
+    if met.size:
+        # postures that only the search found
+        n = at[met]
+        part = no_postures(met.size, 1, columns.size)
+        part.q[:, 0], part.residual[:, 0] = search.q[np.ix_(met, columns)], search.residual[met]
+        part.valid[...], part.moving[:, 0] = True, search.family[np.ix_(met, columns)]
+        part.family[...] = part.moving.any(axis=-1)
+        if solver is not None and not limits and psi is None and task == Task(locks=task.locks):
+            part = complete(solver.chain, U[n], part, own[n], request.tolerances)
+        rows = laid_out(found.put(n, part))
+        if solver is not None:
+            # the solver found no solution of a pose that is reached: it misses solutions
+            unproven = ~solved[n] & (status[n] == IGMStatus.REACHED)
+            status[n[unproven]] = IGMStatus.INCOMPLETE
+    closest, lacking = np.full(references.shape, np.nan), np.full((len(U), 6), np.nan)
+    closest[at], lacking[at] = search.q, search.error
+    return rows._replace(status=status, closest=closest, missing=lacking)
 
 
 def _solved_chain(request: Request, U: Array, psi: Array | None, references: Array) -> Postures:
@@ -300,15 +265,10 @@ def _completed(request: Request, U: Array, psi: Array | None, references: Array)
         found = no_postures(len(U), 1, references.shape[1])
     elif psi is not None:
         if not isinstance(solver, ArmAngle):
-            if request.task.locks or request.task.mask != WHOLE_POSE:
-                raise InvalidValueError(
-                    "arm_angle: not together with a locked joint or a mask; each of them already "
-                    "selects one member of the self-motion."
-                )
             raise InvalidValueError(
-                "arm_angle: this arm has no arm angle. It needs seven revolute joints, the first "
-                "three axes meeting in a shoulder and the last three in a wrist. For other arms "
-                f"with seven joints lock a joint. Solver of this arm: {solver.method}."
+                "arm_angle: needs seven revolute joints, the first three axes meeting in a "
+                "shoulder and the last three in a wrist, and no locked joint or mask beside it. "
+                f"For other arms with seven joints lock a joint. Solver: {solver.method}."
             )
         found = arm_angle_postures(solver, U, psi, references, tolerances)
         # the angle is given, so that only joints that took a reference are free

@@ -15,6 +15,8 @@ from .loop import JointChain
 
 NO_COLUMN = -1
 """`JointChain.columns` of a virtual joint."""
+
+
 BESIDE = 4.0
 """Distance along rails, in lengths of the arm, up to which a pose is solved where it is."""
 
@@ -56,6 +58,13 @@ def locked_chain(chain: JointChain, locks: Mapping[int, float]) -> JointChain:
         D=read_only(np.array([*D, constant])),
         base=chain.base,
     )
+
+
+def without_locked(chain: JointChain, locks: Sequence[tuple[int, float]]) -> JointChain:
+    """Chain with joints locked that are given by their columns of the model."""
+    values = dict(locks)
+    places = {j: values[int(c)] for j, c in enumerate(chain.columns) if int(c) in values}
+    return locked_chain(chain, places) if places else chain
 
 
 def without_end(chain: JointChain, joint: int, values: Array, U: Array) -> tuple[JointChain, Array]:

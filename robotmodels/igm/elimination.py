@@ -2,8 +2,8 @@
 
 The method needs no special axes, and is the worse the more special they are: with a spherical
 wrist or three parallel axes its equations become dependent. Pieper's and Paul's methods serve
-those arms; a self-test tells whether this one may. Near singular poses
-solutions may be missing: the partner of a fold is predicted, self-motions are not followed.
+those arms; a self-test tells whether this one may. Where two solutions are one within rounding
+all forms are tried; self-motions are not followed.
 
 References
 ----------
@@ -71,8 +71,7 @@ def prepare_elimination(chain: JointChain) -> EliminationArm | None:
     away = found.q - many[:, None]
     away -= 2.0 * np.pi * np.where(chain.sigma == 0, np.rint(away / (2.0 * np.pi)), 0.0)
     nearest = np.min(np.where(found.present, np.abs(away).max(axis=2), np.inf), axis=1)
-    odd = (found.count + np.sum(found.double, axis=1)) % 2 == 1
-    return replace(arm, missed=int(np.sum((nearest > 1e-5) | odd)))
+    return replace(arm, missed=int(np.sum((nearest > 1e-5) | (found.count % 2 == 1))))
 
 
 def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
@@ -82,28 +81,22 @@ def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
     return EliminationArm(chain, scaled, unit, forms)
 
 
-def elimination_solutions(
-    arm: EliminationArm, U: ArrayLike
-) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-    """All solutions of poses. Shapes: U (N, 4, 4) -> q (N, 16, 6); valid, double (N, 16)."""
+def elimination_solutions(arm: EliminationArm, U: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """All solutions of poses. Shapes: U (N, 4, 4) -> q (N, 16, 6), valid (N, 16)."""
     poses = np.array(U, dtype=np.float64, order="C")
     poses[:, :3, 3] /= arm.unit
-    N = poses.shape[0]
-    q = np.full((N, MOST, 6), np.nan)
-    valid, double = np.zeros((N, MOST), np.bool_), np.zeros((N, MOST), np.bool_)
-    for first in range(0, N, CHUNK):
+    q, valid = np.full((len(poses), MOST, 6), np.nan), np.zeros((len(poses), MOST), np.bool_)
+    for first in range(0, len(poses), CHUNK):
         rows = slice(first, first + CHUNK)
         found = _solved(arm, poses[rows])
         for n in np.flatnonzero(found.count > MOST):
             # the most singular solutions are dropped first
             s = np.linalg.svd(jacobians(arm.scaled, found.q[n, : found.count[n]]))[1][:, -1]
-            best = np.sort(np.argsort(-s, kind="stable")[:MOST])
-            found.q[n, :MOST], found.double[n, :MOST] = found.q[n, best], found.double[n, best]
-        present = found.present[:, :MOST]
-        valid[rows], double[rows] = present, found.double[:, :MOST] & present
-        q[rows][present] = found.q[:, :MOST][present]
+            found.q[n, :MOST] = found.q[n, np.sort(np.argsort(-s, kind="stable")[:MOST])]
+        valid[rows] = found.present[:, :MOST]
+        q[rows][valid[rows]] = found.q[:, :MOST][valid[rows]]
     q[:, :, arm.chain.sigma == 1] *= arm.unit
-    return q, valid, double
+    return q, valid
 
 
 @prepare_alike.register
@@ -113,8 +106,8 @@ def _(known: EliminationArm, chain: JointChain, prepare: Prepare) -> Solver | No
 
 @postures.register
 def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
-    q, valid, double = elimination_solutions(solver, U)
-    return checked(solver.chain, U, q, valid, tolerances, double=double)
+    q, valid = elimination_solutions(solver, U)
+    return checked(solver.chain, U, q, valid, tolerances, double=np.zeros_like(valid))
 
 
 def _solved(arm: EliminationArm, poses: Array) -> Roots:
@@ -126,8 +119,7 @@ def _solved(arm: EliminationArm, poses: Array) -> Roots:
         if rows.size == 0:
             break
         part = Roots(0)
-        part.q, part.count, part.double = found.q[rows], found.count[rows], found.double[rows]
+        part.q, part.count = found.q[rows], found.count[rows]
         doubtful[rows] = solve_form(arm.scaled, arm.unit, form, poses[rows], part)[0]
-        found.q[rows], found.count[rows], found.double[rows] = part.q, part.count, part.double
-    found.double &= found.present
+        found.q[rows], found.count[rows] = part.q, part.count
     return found

@@ -34,12 +34,11 @@ class Form:
 
 
 class Roots:
-    """Solutions of N poses while they are gathered: q (N, 48, 6), count (N,), double (N, 48)."""
+    """Solutions of N poses while they are gathered: q (N, 48, 6), count (N,)."""
 
     def __init__(self, N: int) -> None:
         self.q = np.zeros((N, ROOM, 6))
         self.count = np.zeros(N, np.int64)
-        self.double = np.zeros((N, ROOM), np.bool_)
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -108,11 +107,9 @@ def solve_form(
         angle,
         found.q,
         found.count,
-        found.double,
         report,
     )
-    total = found.count + np.sum(found.double & found.present, axis=1)
-    missing = (total % 2 == 1) | (total != report[:, 0]) | (quality < POOR) | failed
+    missing = (found.count != report[:, 0]) | (quality < POOR) | failed
     return missing | (report[:, 1] > ROUGH), report[:, 1]
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from .arm_angle import prepare_arm_angle
-from .chain import locked_chain
+from .chain import without_locked
 from .closed_form import prepare_closed_form
 from .constraints import WHOLE, Components, Constraints, constraints
 from .elimination import prepare_elimination
@@ -25,10 +25,7 @@ from .solver import Solver
 
 def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     """Choose and prepare the solver of a task: locked joints, then the mask, then the arm."""
-    places = {int(column): place for place, column in enumerate(chain.columns)}
-    locks = {places[column]: value for column, value in task.locks if column in places}
-    if locks:
-        chain = locked_chain(chain, locks)
+    chain = without_locked(chain, task.locks)
     if task.relations:
         A = np.array([row for row, _ in task.relations])[:, chain.columns]
         b = np.array([right for _, right in task.relations])

@@ -39,9 +39,7 @@ class KnownArm:
     numbers: Array | None
     kernel: Callable[..., int] | None
     instructions: NDArray[np.uint32] | None
-    labels: tuple[str, ...]
     most: int
-    method: str
     zero: Array
     solvers: dict[Task, Solver | None] = field(default_factory=dict)
 
@@ -92,9 +90,7 @@ def _prepared(model: RobotModel, for_whole_poses: bool) -> KnownArm:
         numbers=numbers,
         kernel=None if plan is None else plan.program.kernel,
         instructions=None if plan is None else plan.program.plan,
-        labels=() if plan is None else plan.labels,
         most=0 if plan is None else plan.most,
-        method="" if plan is None else plan.method,
         zero=read_only(np.zeros((1, model.n))),
         solvers={whole: family if plan is None else plan} if for_whole_poses else {},
     )

@@ -50,12 +50,16 @@ class SearchSpace(NamedTuple):
 
 
 class SearchTask(NamedTuple):
-    """Components and tolerances asked for, and the effort."""
+    """Components and tolerances asked for, and the effort.
+
+    ``proven``: no configuration meets the poses, so that the closest position is looked for alone.
+    """
 
     components: Components
     tolerances: Tolerances
     restarts: int
     iterations: int
+    proven: bool = False
 
 
 class Outcome(NamedTuple):
@@ -141,6 +145,8 @@ class _Search:
             rows = np.flatnonzero((status == IGMStatus.NOT_CONVERGED) & ~beyond)
             if rows.size == 0 or (found is IGMStatus.OUTSIDE_LIMITS and not limited):
                 continue
+            if task.proven and any(asked[:3]):
+                break
             starts = self._starts(rows, whole, task.restarts)
             if given:
                 starts = np.concatenate([self.first[rows, None], starts], axis=1)

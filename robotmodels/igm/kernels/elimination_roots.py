@@ -30,13 +30,10 @@ from .elimination import LINKS, ORDERS, at_angle, factor, move_line, solve, turn
 
 FLOAT = types.float64
 COMPLEX = types.Array(types.complex128, 2, "C")
-COUNTS, FLAGS = types.Array(types.int64, 1, "C"), types.Array(types.boolean, 2, "C")
+COUNTS = types.Array(types.int64, 1, "C")
 NEARLY_REAL = 2e-2  # imaginary part of an angle up to which its real part is tried [rad]
 MERGED = 1e-3  # imaginary part up to which a pair counts as a double root that rounding split [rad]
 MERGE = 1e-6  # solutions closer than this in every joint are the same [rad, or arm lengths]
-SMALL = 0.1  # smallest singular value of the Jacobian above which a solution is at no fold
-FLAT = 1e-6  # curvature along the null direction below which a solution is not at a fold
-CLOSE = 0.3  # partners predicted farther away than this are left to the eigenvalues [rad]
 
 
 @compiled()
@@ -198,59 +195,6 @@ def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
     return count
 
 
-@compiled()
-def fold_at(sigma: Ints, D: Floats, root: Floats, v: Floats) -> tuple[float, float]:
-    """Smallest singular value of the Jacobian at a solution, and the curvature along its v (6,).
-
-    The curvature is ``h = u . d(J v) / ds`` on the line root + s v.
-    """
-    T, lines, J = np.empty((3, 4)), np.empty((6, 6)), np.empty((6, 6))
-    pivots, q, u = np.empty(6, np.int64), np.empty(6), np.empty(6)
-    small, h = 0.0, 0.0
-    for step in (0.0, 1e-4, -1e-4):
-        for i in range(6):
-            q[i] = root[i] if step == 0.0 else root[i] + step * v[i]
-        forward(sigma, D, q, T, lines)
-        jacobian(sigma, T, lines, J)
-        if step == 0.0:
-            factor(J, pivots)
-            small = smallest_vectors(J, pivots, u, v)
-            if small > SMALL:
-                break
-            continue
-        for i in range(6):
-            for j in range(6):
-                h += u[i] * J[i, j] * v[j] / (2.0 * step)
-    return small, h
-
-
-@compiled()
-def mark_double_roots(
-    sigma: Ints, D: Floats, tolerance: Floats, found: Floats, count: int, double: NDArray[np.bool_]
-) -> None:
-    """Mark roots whose partner is not told apart from them, or not found beside them.
-
-    Along the null direction v the error is ``s sigma + s^2 h / 2``, sigma the smallest singular
-    value (left vector u), h = u . d(J v)/ds, so the partner is at ``s = -2 sigma / h``.
-    """
-    v, partner = np.empty(6), np.empty(6)
-    for k in range(count):
-        small, h = fold_at(sigma, D, found[k], v)
-        double[k] = False
-        # without curvature there is no fold: an infinite family, or a root of higher order
-        if small > SMALL or abs(h) < FLAT or abs(h) * CLOSE < 2.0 * small:
-            continue
-        for i in range(6):
-            partner[i] = found[k, i] - 2.0 * small / h * v[i]
-        apart = distance(sigma, found[k], partner)
-        # where all between the two meets the pose as well, one may be all there is to find
-        double[k] = apart <= MERGE or small * small < 2.0 * abs(h) * min(tolerance[0], tolerance[1])
-        if apart > MERGE:
-            for j in range(count):
-                near = distance(sigma, found[j], partner) < 1.5 * apart
-                double[k] = double[k] and (j == k or not near)
-
-
 @compiled(
     NOTHING(
         INTS,
@@ -269,7 +213,6 @@ def mark_double_roots(
         OUT1,
         OUT3,
         COUNTS,
-        FLAGS,
         OUT2,
     )
 )
@@ -290,7 +233,6 @@ def solutions_of_eigenvalues(
     angle: Floats,
     found: Floats,
     count: Ints,
-    double: NDArray[np.bool_],
     report: Floats,
 ) -> None:
     """Follow eigenvalues back to configurations, polish them and keep those not found before.
@@ -342,5 +284,4 @@ def solutions_of_eigenvalues(
                 count[n] = keep(sigma, q, found[n], count[n])
             elif t.imag == 0.0:
                 moved = np.inf
-        mark_double_roots(sigma, D, tolerance, found[n], count[n], double[n])
         report[n, 0], report[n, 1] = real, moved

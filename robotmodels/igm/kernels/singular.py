@@ -75,19 +75,16 @@ def fold(
     i = decomposed(sigma, D, q, held, rows, s) - spare - 1
     if not 0 <= i < 6 or not 1e-300 < s[i] < 1e-4:
         return (1.0 if not 0 <= i < 6 or s[i] > 1e-300 else 0.0), 0.0
-    slope = 0.0
     for m in range(k):
         out[m] = rows[i, 6 + m]
-    for side in range(2):
-        step = 1e-4 if side == 0 else -1e-4
+        trial[m] = q[m] + 1e-4 * out[m]
+    forward(sigma, D, trial, P, axes)
+    jacobian(sigma, P, axes, J)
+    ahead = 0.0
+    for r in range(6):
         for m in range(k):
-            trial[m] = q[m] + step * out[m]
-        forward(sigma, D, trial, P, axes)
-        jacobian(sigma, P, axes, J)
-        for r in range(6):
-            for m in range(k):
-                slope += rows[i, r] / s[i] * J[r, m] * out[m] / (2.0 * step)
-    return float(s[i]), slope
+            ahead += rows[i, r] / s[i] * J[r, m] * out[m]
+    return float(s[i]), (ahead - float(s[i])) / 1e-4
 
 
 @compiled(types.void(INTS, STACK, MATRIX, OUT1, INT, INT))
