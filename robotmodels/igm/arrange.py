@@ -188,11 +188,11 @@ def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
         values[at, :new_S] = new
         return values
 
-    nothing = (np.nan, False, np.nan, False, -1)
-    fields = [merged(*values) for values in zip(rows[:5], part[:5], nothing, strict=True)]
-    marks = [merged(old, new, False) for old, new in zip(rows[7:10], part[7:10], strict=True)]
+    nothing = {"q": np.nan, "residual": np.nan, "code": -1}
+    names = ("q", "valid", "residual", "inside", "code", "double", "free", "family")
+    fields = {n: merged(getattr(rows, n), getattr(part, n), nothing.get(n, False)) for n in names}
     rows.status[at] = part.status
-    found = Rows(*fields, rows.status, max(rows.labels, part.labels, key=len), *marks)
+    found = rows._replace(labels=max(rows.labels, part.labels, key=len), **fields)
     if part.closest is None or part.missing is None:
         return found
     closest, missing = (np.full((len(rows.q), size), np.nan) for size in (rows.q.shape[2], 6))

@@ -206,7 +206,7 @@ def _by_solver(request: Request, poses: Array, references: Array, psi: Array | N
         return arranged(found, code, labels, columns, references, request.given, arm.joints, limits)
 
     found = _solved_chain(request, U, psi, own)
-    rows, solved = laid_out(found), found.valid.any(axis=1)
+    rows, solved = laid_out(found), np.asarray(found.valid.any(axis=1))
     status = rows.status
     if solver is not None:
         missing = may_miss_solutions(solver, U, found, own)

@@ -49,33 +49,17 @@ def igm_numeric(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    T : array_like, shape (..., 4, 4)
-        World poses of the tool, metres. A rotation that is off by less than 1e-6 is rounded to
-        the nearest one.
+    model, T, mask, mask_axes, position_tolerance, orientation_tolerance
+        As in `igm`.
     q0 : array_like, shape (..., n), optional
         Where to start, rad or m; broadcasts with the poses. The solution found from it is usually
         near it. Joints that do not move the tool keep its value. Without it nothing is
         preferred, and such joints stay at 0 (with ``limits`` at the nearest value inside them).
-    mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
-        Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
-        default all. Rotations are the components of ``log(R_desired R^T)``.
-    mask_axes : {"world", "tool"}
-        Axes of the components: the world's, or those of the tool at the desired pose. Pointing
-        the tool's z axis is ``[1, 1, 1, 1, 1, 0]`` in tool axes.
-    position_tolerance : float
-        Metres, on the length of the asked-for translation that is missing.
-    orientation_tolerance : float
-        Radians, on the asked-for rotation that is missing. For poses given with few digits take
-        wider tolerances.
     rng : numpy.random.Generator or int, optional
         Generator or seed of the spread starts; default a fixed seed. The starts are the same for
         all poses of a call, so that a batch gives what its poses give one by one.
     limits : bool
-        Whether solutions must lie within the joint limits. Angles are then shifted by whole turns
-        to be nearest to ``q0`` (else to mid-range) inside the limits; otherwise they are in
-        (-pi, pi].
+        As in `igm`, with ``q0`` for ``q_ref``.
     restarts : int
         How many starts to try beside ``q0``; 0 needs a ``q0``.
     iterations : int

@@ -17,7 +17,6 @@ from .. import se3
 from .._arrays import Array
 from .chain import VirtualJoint
 from .loop import JointChain
-from .structure import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 
 TRIES = 3
 """Random placements of each kind."""
@@ -56,7 +55,10 @@ def loose_placements(k: int) -> Iterator[Placement]:
 def virtual_joints(
     chain: JointChain, length: float, placement: Placement
 ) -> tuple[VirtualJoint, ...] | None:
-    """Virtual joints that make six of a chain; None if its real joints do not suit."""
+    """Virtual joints that make six of a chain; None if its real joints do not suit.
+
+    Whether the axes of a run meet or are parallel is left to the closed form that is to serve.
+    """
     parallel, first, real, behind, seed, structured = placement
     rng = np.random.default_rng((seed, first, real, behind))
     missing, run = 6 - chain.k, slice(first, first + real)
@@ -68,18 +70,17 @@ def virtual_joints(
     # frame of a real joint of the run, in the frame of the joint before the gap
     lean = np.eye(4) if behind or real == 0 else np.array(chain.D[first])
     if parallel:
-        if not _are_parallel(chain.D[first + 1 : first + real]):
-            return None
         beside = se3.rotation("z", rng.uniform(-np.pi, np.pi)) @ se3.translation(length, 0.0, 0.0)
         frames = [lean @ beside]
     else:
-        centre = _meeting_point(chain.D[first + 1 : first + real], real, length, rng)
-        if centre is None:
-            return None
-        if behind:
-            for D in chain.D[first + 1 : first + real]:
-                centre = (se3.inverse(D) @ np.append(centre, 1.0))[:3]
-        lean = lean @ se3.translation(*centre) @ se3.rotation("z", rng.uniform(-np.pi, np.pi))
+        # a point of the axis next to the block: that of two axes is where they come closest
+        height = length * rng.uniform(-1.0, 1.0)
+        if real == 2:
+            D = se3.inverse(chain.D[first + 1]) if behind else chain.D[first + 1]
+            across = np.maximum(np.hypot(D[0, 2], D[1, 2]) ** 2, 1e-12)
+            height = D[2, 3] - D[2, 2] * (D[:2, 3] @ D[:2, 2]) / across
+        turned = se3.rotation("z", rng.uniform(-np.pi, np.pi))
+        lean = lean @ se3.translation(0.0, 0.0, height) @ turned
         lean = _anywhere(length, rng) if real == 0 else lean
         frames = [lean @ turn for turn in (_ONTO_X, _ONTO_Y, np.eye(4))]
     block = [VirtualJoint(gap, frame, 0) for frame in frames[: 3 - real]]
@@ -93,38 +94,6 @@ def virtual_joints(
         is_before = joint.gap < gap or (joint.gap == gap and not behind)
         (before if is_before else after).append(joint)
     return (*before, *block, *after)
-
-
-def _meeting_point(
-    constants: Array, real: int, length: float, rng: np.random.Generator
-) -> Array | None:
-    """Point of all axes of a run, in the frame of its first joint; None if they do not meet."""
-    if real < 2:
-        return np.array([0.0, 0.0, length * rng.uniform(-1.0, 1.0)])
-    point = _crossing(constants[0])
-    if point is None or real == 2:
-        return point
-    second = _crossing(constants[1])
-    onward = (se3.inverse(constants[0]) @ np.append(point, 1.0))[:3]
-    meets = second is not None and np.linalg.norm(onward - second) <= LENGTH_TOLERANCE
-    return point if meets else None
-
-
-def _crossing(D: Array) -> Array | None:
-    """Point in which the z axis and that of the frame D meet, shape (3,)."""
-    direction, origin = D[:3, 2], D[:3, 3]
-    across = float(np.hypot(direction[0], direction[1]))
-    if across < 1e-6:
-        return None
-    point = origin - (origin[:2] @ direction[:2]) / across**2 * direction
-    return None if np.hypot(point[0], point[1]) > LENGTH_TOLERANCE else np.array([0, 0, point[2]])
-
-
-def _are_parallel(constants: Array) -> bool:
-    """Whether the axes of a run are parallel, neighbours at a distance."""
-    apart = np.hypot(constants[:, 0, 3], constants[:, 1, 3]) >= LENGTH_TOLERANCE
-    tilt = np.hypot(constants[:, 0, 2], constants[:, 1, 2])
-    return bool(np.all(apart & (tilt <= ANGLE_TOLERANCE)))
 
 
 def _anywhere(length: float, rng: np.random.Generator) -> Array:
