@@ -71,17 +71,6 @@ def test_drive_matrices_state_the_formula_of_the_docstring(seed):
     assert np.allclose(matrices.viscous, matrices.viscous.T)
 
 
-@pytest.mark.parametrize("batch", [(), (7,), (2, 3)], ids=str)
-def test_drives_of_many_samples_are_those_of_one(batch):
-    """The one pass through many samples, and standing joints, which have no dry friction."""
-    drive = random_drive(np.random.default_rng(0), 3)
-    v, a = np.random.default_rng(1).normal(size=(2, *batch, 3))
-    v[..., 1] = 0.0
-    wanted = drive.Ia * a + drive.Fv * v + drive.Fc * np.sign(v) + drive.offset
-    found = drive_matrices(drive, None).torque(v, a)
-    np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14)
-
-
 def test_mimic_joints_are_singular_and_ranks_do_not_depend_on_units():
     """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
     gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])

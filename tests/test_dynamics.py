@@ -81,20 +81,6 @@ def close(actual, expected, tolerance=1e-12):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
 
 
-@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
-def test_leading_axes_are_the_batch(case, model, batch):
-    function, lengths, core = case
-    vectors = vectors_of(lengths, model, *batch)
-    result = function(model, *vectors)
-    assert isinstance(result, np.ndarray)
-    assert result.shape == (*batch, *shape_of(core, model))
-    assert result.flags.c_contiguous
-    result[...] = np.nan  # results are fresh
-    result = function(model, *map(np.asfortranarray, vectors))
-    for index in np.ndindex(*batch):
-        close(result[index], function(model, *(x[index] for x in vectors)), 1e-11)
-
-
 def test_batches_broadcast(case, model):
     """One argument of three rows among single ones, each in turn; others do not fit."""
     function, lengths, _ = case

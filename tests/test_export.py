@@ -4,8 +4,6 @@ import ctypes
 import pickle
 import shutil
 import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from identities.random_robots import random_model, random_rotation, random_state
 
 import robotmodels as rm
 from robotmodels import export
-from robotmodels.cli.program import main
 from robotmodels.errors import RobotModelsError
 from robotmodels.export.inverse import _SOLVERS, Limits
 from robotmodels.export.tape import Tape, function
@@ -164,15 +161,6 @@ def test_constants_of_angles_are_exact():
         assert pose[2, 1] == sine
 
 
-def test_generation_is_quick():
-    panda, rx90 = rm.load("panda"), rm.load("rx90")
-    export.program(rx90, "idm")
-    for model, kind, limit in ((rx90, "idm", 0.5), (panda, "base_regressor", 3.0)):
-        start = time.process_time()
-        export.program(model, kind).code("c")
-        assert time.process_time() - start < limit
-
-
 def test_the_tape_shares_and_folds():
     tape = Tape()
     x, y = (tape.scalar("input", 0, k) for k in range(2))
@@ -303,24 +291,6 @@ def test_matlab_and_casadi_as_text():
     assert "tanh" in smooth
 
 
-@pytest.mark.nightly
-def test_the_same_bytes_in_two_processes():
-    script = (
-        "import sys, robotmodels as rm; from robotmodels import export; m = rm.load('tx40');"
-        "sys.stdout.write(''.join(export.program(m, k, **o).code(l) for k, o, l in"
-        " (('idm', {'parameters': 'base'}, 'c'), ('igm', {}, 'numpy'), ('ddm', {}, 'casadi'))))"
-    )
-    texts = [
-        subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, check=True,
-            env={**__import__("os").environ, "PYTHONHASHSEED": seed},
-        ).stdout
-        for seed in ("1", "2")
-    ]  # fmt: skip
-    assert texts[0] == texts[1]
-    assert len(texts[0]) > 10_000
-
-
 # --- inverse geometric model ---------------------------------------------------------------------
 
 
@@ -449,24 +419,17 @@ def test_a_program_is_a_value():
     assert program(np.zeros((0, 6)), np.zeros(6), np.zeros(6), program.values[-1]).shape == (0, 6)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
+def test_what_is_refused(tmp_path):
+    program = export.program(rm.load("rx90"), "dgm")
+    for options, words in (
         ({"kind": "imd"}, "'idm'"),
         ({"kind": "idm", "parameters": "number"}, "'symbols'"),
         ({"kind": "dgm", "parameters": "base"}, "only .idm."),
         ({"kind": "mass_matrix", "wrench": True}, "'idm', 'bias', 'ddm'"),
-        ({"kind": "idm", "frame": 2}, "'dgm', 'jacobian'"),
         ({"kind": "igm", "geometry": "symbols"}, "no geometry='symbols'"),
-    ],
-)
-def test_refused_choices(options, words):
-    with pytest.raises(RobotModelsError, match=words):
-        export.program(rm.load("rx90"), **options)
-
-
-def test_refused_models(tmp_path):
-    program = export.program(rm.load("rx90"), "dgm")
+    ):
+        with pytest.raises(RobotModelsError, match=words):
+            export.program(rm.load("rx90"), **options)
     for call, words in (
         (lambda: export.program(rm.load("crx10ia"), "igm"), "elimination"),
         (lambda: export.program(rm.load("ur5"), "ddm", drive=False), "inertia"),
@@ -479,17 +442,6 @@ def test_refused_models(tmp_path):
     ):
         with pytest.raises(RobotModelsError, match=words):
             call()
-
-
-def test_command_line(tmp_path, capsys):
-    out = tmp_path / "arm.c"
-    assert main(["export", "rx90", "idm", "--parameters", "base", "--out", str(out)]) == 0
-    assert "rx90_idm" in out.read_text()
-    assert "multiplications" in capsys.readouterr().out
-    assert main(["export", "rx90", "dgm", "--language", "numpy", "--frame", "3"]) == 0
-    assert "np.asarray" in capsys.readouterr().out
-    assert main(["export", "crx10ia", "igm"]) == 2
-    assert main(["export", "rx90", "igd"]) == 2
 
 
 @pytest.mark.parametrize("code", list(_SOLVERS))

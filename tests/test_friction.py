@@ -51,18 +51,6 @@ def test_torques_by_hand(name, v, torque):
     np.testing.assert_allclose(MODELS[name].torque(v), torque, rtol=1e-14)
 
 
-@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
-@pytest.mark.parametrize("friction", MODELS.values(), ids=MODELS)
-def test_leading_axes_are_the_batch_and_columns_make_the_torque(friction, batch):
-    v = np.random.default_rng(0).normal(size=(*batch, 2))
-    torque, basis = friction.torque(v), friction.basis(v)
-    assert torque.shape == (*batch, 2)
-    assert basis.shape == (*batch, len(friction.kinds), 2)
-    np.testing.assert_allclose((basis * friction.parameters).sum(axis=-2), torque, rtol=1e-13)
-    for index in np.ndindex(*batch):
-        np.testing.assert_array_equal(friction.torque(v[index]), torque[index])
-
-
 def test_models_add_up_and_their_columns_come_last():
     robot, v = arm(), np.array([[0.3, -0.2], [0.0, 4.0]])
     a, b = MODELS["asymmetric"], MODELS["Stribeck"]

@@ -142,9 +142,6 @@ def test_poses_are_those_of_the_published_urdf(name, rng):
         np.testing.assert_allclose(rm.dgm(model, q), T @ placement(*tool), rtol=0, atol=1e-12)
 
 
-# --- the seed documents -------------------------------------------------------------------------
-
-
 # --- dynamics of the PUMA and drives of the TX40 ------------------------------------------------
 
 
@@ -195,28 +192,6 @@ def test_urdf_files_have_not_drifted(tmp_path):
         assert all(map(same, new, kept)), f"{path.name}: run python -m robotmodels.robots.generate"
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_urdf_files_load_in_pinocchio(name, rng):
-    model = load(name)
-    twin = pin.buildModelFromUrdf(str(URDF / f"{name}.urdf"))
-    data = twin.createData()
-    assert (twin.nq, twin.nv) == (model.n, model.n)
-    order = [twin.idx_qs[twin.getJointId(joint)] for joint in model.table.joint_names]
-    for q in rng.uniform(-2, 2, (3, model.n)):
-        x = np.empty(model.n)
-        x[order] = q
-        pin.framesForwardKinematics(twin, data, x)
-        T = model.base.copy()
-        for factor, joint in zip(
-            rm.link_transforms(model.table, q), model.table.joint_names, strict=True
-        ):
-            T = T @ factor
-            found = data.oMi[twin.getJointId(joint)].homogeneous
-            np.testing.assert_allclose(found, T, rtol=0, atol=1e-12)
-        tool = data.oMf[twin.getFrameId("tool")].homogeneous
-        np.testing.assert_allclose(tool, T @ model.tool, rtol=0, atol=1e-12)
-
-
 # --- example-robot-data ---------------------------------------------------------------------------
 
 
@@ -254,6 +229,3 @@ def test_catalogue_and_example_robot_data_agree(name, other, frame, base_turn, t
     np.testing.assert_allclose(at_zero[:3, 3], 0, rtol=0, atol=tolerance)
     for q in rng.uniform(-2, 2, (5, ours.n)):
         np.testing.assert_allclose(flange_axes(q), at_zero, rtol=0, atol=tolerance)
-
-
-# --- mistakes -------------------------------------------------------------------------------------

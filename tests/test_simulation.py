@@ -121,18 +121,6 @@ def test_slider_on_dry_friction_stops_stays_and_breaks_away():
     assert sim.relative_drift < 1e-12
 
 
-def test_mass_on_a_spring_loses_the_same_at_every_turn():
-    """Amplitudes fall by 2 Fc / k every half period, until the spring cannot break away."""
-    k, Fc, mass, start = 50.0, 1.0, 2.0, 0.45
-    sim = simulate(slider(mass, Fc=[Fc]), [start], [0.0], lambda t, q, v: -k * q,
-                   np.linspace(0.0, 9.0, 91))  # fmt: skip
-    half = np.pi * np.sqrt(mass / k)
-    assert [e.kind for e in sim.events] == [KINDS.REVERSED] * 10 + [KINDS.STUCK]
-    assert [e.t for e in sim.events] == pytest.approx(half * np.arange(1, 12), abs=1e-8)
-    assert sim.q[-1, 0] == pytest.approx(-(start - 11 * 2 * Fc / k), abs=1e-8)
-    assert sim.friction[-1, 0] == pytest.approx(k * 0.01, abs=1e-6)
-
-
 def test_parts_break_away_where_the_torque_crosses_and_stick_again():
     for excess, w in ((0.1, 0.7), (0.05, 2.9)):
         sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],

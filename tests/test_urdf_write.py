@@ -54,24 +54,6 @@ def test_pinocchio_reads_the_table_from_the_text(model):
     assert np.abs(got - wanted).max() < 1e-12 * robot_size(model, q)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-9])
-def test_gimbal_lock_loses_nothing(sign, gap):
-    """alpha = theta = 90 degrees on a prismatic joint: pitch is 90 degrees in the URDF."""
-    half = sign * (np.pi / 2 - gap)
-    table = rm.DHTable(
-        antecedent=[0, 1, 2], sigma=[0, 1, 0], alpha=[0.3, half, half], theta=[0.1, half, half],
-        d=[0.1, 0.2, 0.3], r=[0.3, 0.2, 0.1],
-    )  # fmt: skip
-    model = rm.RobotModel.from_table(
-        table, base=se3.rotation("y", half), tool=se3.rotation("y", half)
-    )
-    q = [0.3, 0.2, -0.5]
-    got = pin_poses(rm.to_urdf(model), ["link_3", "tool"], table.names, q)
-    poses = table_poses(model, q)
-    assert np.abs(got - np.array([poses[2], poses[2] @ model.tool])).max() < 2e-15
-
-
 @given(models(inertia="physical", drive=False, transmission=False, gravity=False))
 def test_reading_back_gives_the_same_robot(model):
     """Poses, Jacobians and torques, with other frames: R_j are placed anew by the rules."""
