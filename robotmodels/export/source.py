@@ -126,10 +126,6 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
     >>> with TemporaryDirectory() as folder:
     ...     write(program(load("planar_2r"), "dgm"), Path(folder) / "planar.c")
     """
-    for value, kinds, name in ((program, (Program,), "program"), (path, (str, Path), "path")):
-        if not isinstance(value, kinds):
-            wanted = " or ".join(kind.__name__ for kind in kinds)
-            raise InvalidValueError(f"{name}: expected a {wanted}, got {type(value).__name__}.")
     path = Path(path)
     suffixes = {kind.suffix: name for name, kind in reversed(LANGUAGES.items())} | {".py": "python"}
     if language is None and path.suffix.lower() not in suffixes:
