@@ -24,7 +24,6 @@ Seed book section 4.3.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -46,6 +45,7 @@ from .pose_trajectory import (
     FixedAxisPath,
     PoseTrajectory,
     arc,
+    axis_and_angle,
     rotation_about,
 )
 from .trajectory import Trajectory
@@ -90,12 +90,17 @@ def cartesian_trajectory(
             f"The leading (batch) axes do not broadcast: T0 {first.shape}, T1 {last.shape}."
         ) from None
     s = along_line(law, 0.0, 1.0, 1.0, None).q(np.linspace(0.0, 1.0, N))  # part of the way
-    rows = (np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4) for T in (first, last))
-    T = np.empty((*batch, N, 4, 4))
-    for row, ends in zip(
-        T.reshape(math.prod(batch), N, 4, 4), zip(*rows, strict=True), strict=True
-    ):
-        row[:] = arc(*ends).poses(s)
+    first, last = (np.broadcast_to(T, (*batch, 4, 4))[..., None, :, :] for T in (first, last))
+    R0 = first[..., :3, :3]
+    # the turn seen in the world's axes
+    axis, angle = axis_and_angle(rotation_vectors_of(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
+    T = np.zeros((*batch, N, 4, 4))
+    T[..., :3, :3] = rotation_about(axis, angle * s) @ R0
+    T[..., :3, 3] = first[..., :3, 3] + s[:, None] * (last[..., :3, 3] - first[..., :3, 3])
+    T[..., 3, 3] = 1.0
+    if N:
+        T[..., -1:, :, :] = last
+        T[..., :1, :, :] = first
     return T
 
 
@@ -232,7 +237,7 @@ def blended_poses(
     times, tb = slowed(times, tb, duration, True)
     each = np.eye(len(step))  # a coordinate for each line
     progress = joined(np.tri(len(T), len(step), -1), each, times, tb, smooth)
-    path = BlendedPoses(T[0], T[-1], step, progress)
+    path = BlendedPoses(T, step, progress)
     end = path.end
     clock = PiecewisePolynomial(np.array([[0.0, end]]), np.array([[[0.0], [end]]]))
     # the path's parameter is the time itself, and the tool rests outside of it

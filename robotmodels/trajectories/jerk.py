@@ -95,6 +95,8 @@ def jerk_limited(
         breaks, c, lengths = _of_joints(states, bounds, T, how is Synchronisation.INDEPENDENT)
     c[:, 0] += given["q0"]
     motion = PiecewisePolynomial(breaks, c, lengths)
+    if np.isinf([bounds.lower, bounds.upper]).all():
+        return Trajectory(motion, scalar)
     low, high = motion.extremes(0)
     outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
     if outside.any():

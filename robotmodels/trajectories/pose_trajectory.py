@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Value, as_floats
 from ..errors import ShapeError
@@ -157,11 +157,10 @@ class BlendedPoses(Value):
     """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
 
     ``progress`` has a coordinate for each line, from 0 to 1 over time; neighbours overlap in the
-    blends. Shapes: start, last (4, 4); steps (m - 1, 6), translations and rotation vectors.
+    blends. Shapes: poses_at (m, 4, 4); steps (m - 1, 6), translations and rotation vectors.
     """
 
-    start: Array
-    last: Array
+    poses_at: Array
     steps: Array
     progress: PiecewisePolynomial
 
@@ -172,28 +171,43 @@ class BlendedPoses(Value):
 
     def poses(self, s: Array) -> Array:
         """World poses. Shapes: s (N,) -> (N, 4, 4)."""
-        (g,) = self.progress.derivatives(s, (0,))
-        T = np.tile(self.start, (s.size, 1, 1))
-        T[:, :3, 3] += g @ self.steps[:, :3]
-        for along, axis, angle in zip(g.T, *axis_and_angle(self.steps[:, 3:]), strict=True):
-            T[:, :3, :3] = rotation_about(axis, angle * along) @ T[:, :3, :3]
-        T[s <= 0.0], T[s >= self.end] = self.start, self.last
+        first, lines = self._lines(s)
+        T = self.poses_at[first]
+        for step, g, _, _ in lines:
+            T[:, :3, :3] = rotation_about(*_turned(step[:, 3:], g)) @ T[:, :3, :3]
+            T[:, :3, 3] += g[:, None] * step[:, :3]
+        T[s <= 0.0], T[s >= self.end] = self.poses_at[0], self.poses_at[-1]
         return T
 
     def rates(self, s: Array) -> tuple[Array, Array]:
         """Twist and its derivative with respect to s. Shapes: s (N,) -> twist, change (N, 6)."""
-        g, v, a = self.progress.derivatives(s, (0, 1, 2))
-        twist, change = v @ self.steps, a @ self.steps
-        w, alpha = np.zeros((2, s.size, 3))
-        for k, (axis, angle) in enumerate(zip(*axis_and_angle(self.steps[:, 3:]), strict=True)):
-            # a later line turns what the lines before it do
-            R = rotation_about(axis, angle * g[:, k])
-            w, alpha = (R @ np.stack((w, alpha), axis=-1)).transpose(2, 0, 1)
-            own = angle * axis
-            alpha = alpha + a[:, k, None] * own + np.cross(v[:, k, None] * own, w)
-            w = w + v[:, k, None] * own
-        twist[:, 3:], change[:, 3:] = w, alpha
+        twist, change = np.zeros((2, s.size, 6))
+        for step, g, v, a in self._lines(s)[1]:
+            # a later line turns what the line before it does
+            R = rotation_about(*_turned(step[:, 3:], g))
+            w, alpha = (R @ np.stack((twist, change), axis=-1)[:, 3:]).transpose(2, 0, 1)
+            twist[:, 3:], change[:, 3:] = w, alpha + np.cross(v[:, None] * step[:, 3:], w)
+            twist += v[:, None] * step
+            change += a[:, None] * step
         return twist, change
+
+    def _lines(self, s: Array) -> tuple[NDArray[np.intp], list[tuple[Array, ...]]]:
+        """The first line that is under way (N,); steps, progress and its rates of it and the next.
+
+        The lines before it are complete, those behind these two have not begun.
+        """
+        L, rows = len(self.steps), np.arange(s.size)
+        parts = np.zeros((3, s.size, L + 1))
+        parts[..., :L] = self.progress.derivatives(s, (0, 1, 2))
+        first = np.minimum((parts[0] >= 1.0).sum(axis=1), L - 1)
+        steps = np.vstack((self.steps, np.zeros((1, 6))))
+        return first, [(steps[first + k], *parts[:, rows, first + k]) for k in range(2)]
+
+
+def _turned(vectors: Array, part: Array) -> tuple[Array, Array]:
+    """Axes and angles of parts of rotation vectors. Shapes: vectors (N, 3), part (N,)."""
+    axis, angle = axis_and_angle(vectors)
+    return axis, angle * part
 
 
 PosePath = FixedAxisPath | BlendedPoses
