@@ -99,7 +99,7 @@ def test_rx90_is_excited_far_better_than_by_chance(rx90):
     assert sum(rx90.starts[0].stages) == len(rx90.starts[0].history)
     keeps_limits(rx90)
     assert "joint 1, 2, 3, 4, 5, 6" in rx90.notes[0]
-    assert "The 2 starts ended at condition numbers from" in rx90.notes[-1]
+    assert "Of 2 starts 2 ended within the limits, at condition numbers from" in rx90.notes[-1]
     # its numbers are those of the base regressor
     t = np.arange(500) * 0.02
     motion = [f(t) for f in (rx90.trajectory.q, rx90.trajectory.v, rx90.trajectory.a)]

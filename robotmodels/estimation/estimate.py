@@ -25,8 +25,7 @@ class EstimateStatus(Outcome):
     )
     POOR_PREDICTION = (
         3,
-        "The parameters minimise the squares of the residuals, but the torques that they predict "
-        "are far from the measured ones. Do not use the parameters until the cause is known.",
+        "Torques are predicted poorly. Do not use the parameters before you know why.",
     )
 
 

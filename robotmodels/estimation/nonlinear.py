@@ -41,11 +41,7 @@ class FitStatus(Outcome):
     CONVERGED = 0, "The fit has converged: further steps are rounding."
     STALLED = 1, "No step decreases the sum: the Jacobian is wrong, or residuals are not smooth."
     ITERATION_LIMIT = 2, "The iterations ended too early; start nearer or allow more of them."
-    SINGULAR = (
-        3,
-        "The measurements do not determine all parameters: some combinations have no effect; "
-        "leave parameters out, add a prior, or measure where they have an effect.",
-    )
+    SINGULAR = 3, "Some combinations of parameters have no effect; leave some out, or add a prior."
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from .losses import length_quantile, median_length
 
-FALSE_OUTLIERS = 0.05
-"""Expected number of false outliers in a fit of Gaussian residuals."""
+FALSE_OUTLIERS = 0.05  # expected number of false outliers in a fit of Gaussian residuals
 _AS_BAD = 0.7
 """Measurements with deleted residuals above this share of the longest are deleted with it."""
 _ALONE = 1e-8  # least 1 - leverage of a row with a deleted residual

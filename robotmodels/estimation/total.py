@@ -28,11 +28,7 @@ class TotalStatus(Outcome):
 
     UNIQUE = 0, "One combination of the columns explains the right side with the least noise."
     ILL_POSED = 1, "Several combinations explain it equally well; the parameters are one of them."
-    NO_SOLUTION = (
-        2,
-        "The combination with the least noise does not contain the right side: there is no "
-        "solution; the parameters are those of weighted least squares.",
-    )
+    NO_SOLUTION = 2, "There is no solution; the parameters are those of weighted least squares."
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from .._arrays import Array
 from .._outcomes import Outcome
 from ..drive import Drives
 from ..errors import InvalidValueError
-from ..estimation import column_basis
+from ..estimation import column_basis, fit_nonlinear
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
 from ..estimation.linear import residual_noise
@@ -30,6 +29,7 @@ from ..model import RobotModel, check_model
 from .equations import Block, parameters_of
 from .forms import FormedRows
 from .loads import (
+    DEPENDENT,
     UNIDENTIFIABLE,
     CommonEquations,
     LoadedLog,
@@ -216,28 +216,22 @@ def _solved(factors: TriangularFactors, noise: Array) -> tuple[Array, Array]:
 
     Shapes: -> x and u (c + n,), inverse information.
     """
-    from scipy.optimize import least_squares
-
     n, c = len(noise), len(factors.names) - 1
     rows = np.vstack([F / sigma for F, sigma in zip(factors.factors, noise, strict=True)])
     E, known, currents = rows[:, :c], rows[:, c], rows[:, -1]
     motors = np.repeat(np.eye(n), [len(F) for F in factors.factors], axis=0)
 
-    def residuals(z: Array) -> Array:
-        return currents - (motors @ z[c:]) * (E @ z[:c] + known)
-
-    def slopes(z: Array) -> Array:
-        torque = E @ z[:c] + known
-        return -np.hstack(((motors @ z[c:])[:, None] * E, torque[:, None] * motors))
+    def linearise(z: Array) -> tuple[Array, Array]:
+        torque, u = E @ z[:c] + known, motors @ z[c:]
+        return u * torque - currents, np.hstack((u[:, None] * E, torque[:, None] * motors))
 
     # start: least squares of E x + known - currents gains, linear in x and the gains
     A = np.hstack((E, -currents[:, None] * motors))
     start = scaled_inverse(A) @ -known
     start[c:] = 1.0 / np.where(start[c:] == 0.0, np.inf, start[c:])
-    options: dict[str, Any] = {"jac": slopes, "x_scale": "jac", "xtol": 1e-12, "ftol": 1e-14}
-    solution = least_squares(residuals, start, **options)
-    half = scaled_inverse(slopes(solution.x))
-    return solution.x, half @ half.T
+    z = fit_nonlinear(linearise, start, truncation=DEPENDENT).x
+    half = scaled_inverse(linearise(z)[1])
+    return z, half @ half.T
 
 
 @dataclass(frozen=True, slots=True, eq=False)

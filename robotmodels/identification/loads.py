@@ -32,7 +32,7 @@ from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
-_DEPENDENT = 1e-10  # rank tolerance: singular value relative to the largest
+DEPENDENT = 1e-10  # rank tolerance: singular value relative to the largest
 
 
 def equations_of(
@@ -106,7 +106,7 @@ def column_lengths(R: Array) -> Array:
 def scaled_inverse(R: Array) -> Array:
     """Pseudo-inverse of a matrix, its rank decided for columns of unit length."""
     lengths = column_lengths(R)
-    return np.linalg.pinv(R / lengths, rcond=_DEPENDENT) / lengths[:, None]
+    return np.linalg.pinv(R / lengths, rcond=DEPENDENT) / lengths[:, None]
 
 
 class NamedEstimate(NamedValues):

@@ -154,19 +154,18 @@ def _whiteness(result: IdentificationResult, diagnostics: ResidualDiagnostics) -
 
 
 def _diagnostics(result: IdentificationResult, diagnostics: ResidualDiagnostics) -> ReportSection:
-    rows = [
-        (
-            name,
-            str(int(diagnostics.counts[j])),
-            f"{number_text(diagnostics.std[j], 3)} {unit}",
-            _signed(diagnostics.autocorrelation[j, 1]),
-            _probability(diagnostics.white_p[j]),
-            _signed(diagnostics.skewness[j]),
-            _signed(diagnostics.kurtosis[j]),
-            _probability(diagnostics.normal_p[j]),
-        )
-        for j, (name, unit) in enumerate(zip(group_names(result), group_units(result), strict=True))
+    stds = zip(diagnostics.std, group_units(result), strict=True)
+    columns = [
+        group_names(result),
+        [str(count) for count in diagnostics.counts.tolist()],
+        [f"{number_text(std, 3)} {unit}" for std, unit in stds],
+        map(_signed, diagnostics.autocorrelation[:, 1]),
+        map(_probability, diagnostics.white_p),
+        map(_signed, diagnostics.skewness),
+        map(_signed, diagnostics.kurtosis),
+        map(_probability, diagnostics.normal_p),
     ]
+    rows = list(zip(*columns, strict=True))
     headings = ("residuals", "number", "std", "lag 1", "white: p", "skewness", "kurtosis")
     low, high = result.details.rank_gap
     body: list[str | ReportTable] = [

@@ -127,9 +127,8 @@ def data_section(result: IdentificationResult) -> ReportSection:
         rows = [(source.name, str(source.rows), source.sha256[:16]) for source in log.sources]
         body.append(table_of(("source", "samples", "SHA-256 begins"), rows))
     parts = [
-        f"{part.source}: {len(part.rows)} (rows {part.rows[0]} to {part.rows[-1]}), "
-        f"{part.reason.rstrip('.')}"
-        for part in log.refused
+        f"{x.source}: {len(x.rows)} (rows {x.rows[0]} to {x.rows[-1]}), {x.reason}"
+        for x in log.refused
     ]
     total = sum(len(part.rows) for part in log.refused)
     body.append(f"{total} rows were refused. {'; '.join(parts)}".strip())
@@ -190,22 +189,17 @@ def errors_section(result: IdentificationResult) -> ReportSection:
 
 
 def _error_table(result: IdentificationResult, errors: Errors, name: str) -> ReportTable:
-    rows = [
-        (
-            joint,
-            unit,
-            number_text(errors.rmse[j], 3),
-            percent_text(errors.relative[j]),
-            number_text(errors.bias[j], 2),
-            number_text(errors.filtered_rmse[j], 3),
-            percent_text(errors.filtered_relative[j]),
-        )
-        for j, (joint, unit) in enumerate(
-            zip(result.model.table.joint_names, effort_units(result.model), strict=True)
-        )
+    columns = [
+        result.model.table.joint_names,
+        effort_units(result.model),
+        [number_text(x, 3) for x in errors.rmse],
+        map(percent_text, errors.relative),
+        [number_text(x, 2) for x in errors.bias],
+        [number_text(x, 3) for x in errors.filtered_rmse],
+        map(percent_text, errors.filtered_relative),
     ]
-    sides = (errors.relative, errors.filtered_relative)
-    whole = [x[np.isfinite(x)] for x in sides]
+    rows = list(zip(*columns, strict=True))
+    whole = [x[np.isfinite(x)] for x in (errors.relative, errors.filtered_relative)]
     one, two = (percent_text(np.sqrt(np.mean(x**2))) if x.size else "-" for x in whole)
     rows.append(("all", "", "", one, "", "", two))
     return table_of((name, "unit", "RMSE", "relative", "mean", "filtered", "relative"), rows)

@@ -76,17 +76,12 @@ def shrunk(
     shrunk_values = ridge(factors, None, _likely_sizes(R, y, sizes, groups), correlated**2)
     order = weak[np.argsort(-(standard_errors / sizes)[weak])]
     names = ", ".join(factors.names[k] for k in order[:_NAMED])
-    more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
-    few = (
-        f"{len(weak)} of {len(factors.names)} parameters ({names}{more}) are poorly determined "
-        "by the log (standard errors above 15 % of their plausible sizes)"
-        if weak.size
-        else "there are few equations for each parameter, or it was requested"
-    )
+    poor = f"{len(weak)} of {len(factors.names)} parameters are poorly determined ({names})"
     note = (
-        f"Shrinkage: {few}. All parameters were estimated with a weak prior around zero, which "
-        "hardly changes well-determined ones; the standard errors assume this prior. "
-        "Wls(shrinkage=False) switches it off; a more exciting motion makes it unnecessary."
+        f"Shrinkage: {poor if weak.size else 'equations are few, or it was requested'}. All were "
+        "estimated with a weak prior around zero, which hardly changes well-determined ones; the "
+        "standard errors assume this prior. Wls(shrinkage=False) switches it off; a more exciting "
+        "motion makes it unnecessary."
     )
     return replace(shrunk_values, status=estimate.status, notes=(*estimate.notes, note))
 

@@ -270,9 +270,8 @@ def closed_loop(
         joint = int(np.argmax(rest / np.where(goal > 0.0, goal, np.inf))) if stable else rates.joint
         notes.append(
             f"{robot.table.joint_names[joint]} is stiff: friction stops it too fast for {parts} "
-            f"integration steps of a sample of {log.dt:.3g} s, so that dry friction is linear up "
-            f"to {rest[joint]:.2g} rad/s or m/s{'' if stable else ' and the simulation unstable'}; "
-            "give the method more substeps=, or use least squares."
+            f"steps of a sample, so that dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
+            f"{'' if stable else ' and the simulation unstable'}; give the method more substeps=."
         )
     if given is None:
         given = np.where(rest > 0.0, np.maximum(processing.dead_band, rest), 0.0)

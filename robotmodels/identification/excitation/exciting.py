@@ -196,13 +196,11 @@ def _advice(done: Sequence[ExcitationStart], criterion: str) -> str:
             "Widen the limits that are named as broken, give the motion more time (duration), or "
             "more starts; a robot that cannot carry its weight needs larger torque_limits."
         )
-    if len(kept) == 1:
-        return "Only one start ended within the limits; more of them (starts=) may end lower."
-    ends = sorted(quality.of(criterion) for quality in kept)
+    ends = [quality.of(criterion) for quality in kept]
     name = "condition numbers" if criterion == "condition" else "minus log det"
     return (
-        f"The {len(ends)} starts ended at {name} from {ends[0]:.4g} to {ends[-1]:.4g}; where they "
-        "differ, more starts (starts=) may end lower."
+        f"Of {len(done)} starts {len(ends)} ended within the limits, at {name} from "
+        f"{min(ends):.4g} to {max(ends):.4g}; more of them (starts=) may end lower."
     )
 
 
