@@ -270,7 +270,7 @@ def closed_loop(
         joint = int(np.argmax(rest / np.where(goal > 0.0, goal, np.inf))) if stable else rates.joint
         notes.append(
             f"{robot.table.joint_names[joint]} is stiff: friction stops it too fast for {parts} "
-            f"steps of a sample, so that dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
+            f"steps, so that dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
             f"{'' if stable else ' and the simulation unstable'}; give the method more substeps=."
         )
     if given is None:
