@@ -232,14 +232,12 @@ def only_freedoms(robot: ParallelRobot, V: Array) -> Array:
 
 def pose_at(twist: Array) -> Array:
     """Poses of position and rotation vector. Shapes: (..., 6) -> (..., 4, 4)."""
-    T = np.zeros((*twist.shape[:-1], 4, 4))
-    w = twist[..., 3:]
-    angle = np.linalg.norm(w, axis=-1)[..., None, None]
-    S = np.cross(np.eye(3), w[..., None, :])
-    half = np.sinc(angle / (2.0 * np.pi))
-    T[..., :3, :3] = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
+    from scipy.spatial.transform import Rotation
+
+    T = np.tile(np.eye(4), (*twist.shape[:-1], 1, 1))
     T[..., :3, 3] = twist[..., :3]
-    T[..., 3, 3] = 1.0
+    R = Rotation.from_rotvec(twist[..., 3:].reshape(-1, 3)).as_matrix()
+    T[..., :3, :3] = R.reshape(T[..., :3, :3].shape)
     return T
 
 
