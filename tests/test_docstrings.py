@@ -133,6 +133,18 @@ def test_only_exported_names_have_long_docstrings():
     assert "\n".join(found) == ""
 
 
+def test_the_help_of_a_function_names_all_its_arguments():
+    """With what stands at the head of its file, which its room adds."""
+    without = []
+    for room in rooms().values():
+        for thing in (getattr(room, name) for name in public_names(room)):
+            if inspect.isfunction(thing) and thing.__module__ != "robotmodels.cli":
+                words = set(re.findall(r"\w+", inspect.getdoc(thing) or ""))
+                missing = set(inspect.signature(thing).parameters) - words
+                without += [f"{place(thing)}: {name}" for name in sorted(missing)]
+    assert without == []
+
+
 def test_exported_classes_have_sections():
     """Or their base class, or the head of their file; enums and exceptions need a line."""
     without = []

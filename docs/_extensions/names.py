@@ -1,7 +1,8 @@
 """Public names: a directive that documents those of a room, and links from the pages to them.
 
-``.. names:: robotmodels.kinematics`` is followed by one name a line, and gives a table of them,
-then every entry in full. A name is documented under its shortest public path: ``robotmodels.dgm``
+``.. about:: robotmodels.kinematics`` gives what the room says of all of its functions, and
+``.. names:: robotmodels.kinematics``, followed by one name a line, a table of them, then every
+entry in full. A name is documented under its shortest public path: ``robotmodels.dgm``
 where the door has it. In the Markdown pages code such as ``rm.dgm`` becomes a link to its entry.
 """
 
@@ -118,6 +119,19 @@ class Names(SphinxDirective):
         return self.parse_text_to_nodes(StringList([*table, "", *entries], source=source))
 
 
+class About(SphinxDirective):
+    """The docstring of a room after its first line: arguments that many of its functions have."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Titles become paragraphs in bold, because the page has sections of its own."""
+        text = inspect.getdoc(importlib.import_module(self.arguments[0])) or ""
+        text = re.sub(r"^(.+)\n-{3,}$", r"**\1**\n", text.partition("\n")[2], flags=re.MULTILINE)
+        source = self.get_source_info()[0]
+        return self.parse_text_to_nodes(StringList(text.splitlines(), source=source))
+
+
 def link(app: Sphinx, document: nodes.document) -> None:
     """Make code that is a public name of the package a link to its entry."""
     if app.env.doc2path(app.env.docname).suffix != ".md":
@@ -138,6 +152,7 @@ def link(app: Sphinx, document: nodes.document) -> None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register both."""
+    app.add_directive("about", About)
     app.add_directive("names", Names)
     app.connect("doctree-read", link)
     return {"parallel_read_safe": True}

@@ -15,6 +15,7 @@ Arguments that come back in this room:
   is called with the fraction done; True writes it to the log of Python.
 """
 
+from .. import _docs
 from ..obstacles import Box, Sphere
 from .candidates import candidate_parameters
 from .combined_arms import combine_arms
@@ -95,3 +96,5 @@ __all__ = [
     "select_configurations",
     "write_result",
 ]
+
+_docs.document(__name__)

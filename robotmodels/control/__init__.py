@@ -13,6 +13,7 @@ Gains that are not positive, references for another number of joints and argumen
 shape raise InvalidValueError or ShapeError.
 """
 
+from .. import _docs
 from .force import (
     ConstrainedDecoupling,
     ExternalForceLoop,
@@ -38,3 +39,5 @@ __all__ += ["ControlStatus", "ControlledMotion", "DecentralizedPID", "ExternalFo
 __all__ += ["ForceTracking", "Impedance", "PDGravity", "PIDGains", "ParallelHybrid", "Passivity"]
 __all__ += ["SlidingMode", "SpringWall", "SuperTwisting", "first_order", "pid_gains", "run"]
 __all__ += ["slotine_li_regressor"]
+
+_docs.document(__name__)

@@ -5,6 +5,7 @@ in table order; so does every model that Pinocchio does not support (first momen
 negative mass, as in sets of base parameters).
 """
 
+from .. import _docs
 from .direct import ddm
 from .from_base import base_model, idm_from_base
 from .inverse import idm
@@ -32,3 +33,5 @@ __all__ = [
     "with_payload",
     "without_payload",
 ]
+
+_docs.document(__name__)

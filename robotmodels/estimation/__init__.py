@@ -1,5 +1,6 @@
 """Estimation: linear and nonlinear least squares, independent of robots."""
 
+from .. import _docs
 from .columns import ColumnBasis, column_basis
 from .covariance import CorrelatedCovariance, correlated_covariance
 from .diagnostics import FitDiagnostics, ResidualTest, confidence_intervals, fit_diagnostics
@@ -27,3 +28,5 @@ __all__ = [
     "fit_diagnostics",
     "fit_nonlinear",
 ]
+
+_docs.document(__name__)

@@ -9,6 +9,7 @@ raise ShapeError or InvalidValueError; a coordinate that moves no inertia, such 
 without rotor inertia, SingularMassMatrixError.
 """
 
+from .. import _docs
 from .beams import beam
 from .control import (
     RestStatus,
@@ -54,3 +55,5 @@ __all__ += ["static_deflection", "Elastica", "elastica", "lumped"]
 __all__ += ["FlexibleMotion", "FlexibleMotionStatus", "FreeBodyMotion", "free_body", "simulate"]
 __all__ += ["RestStatus", "RestToRest", "joint_tracking", "regulator", "rest_to_rest"]
 __all__ += ["Shaper", "input_shaper", "TipStatus", "TipTracking", "tip_tracking"]
+
+_docs.document(__name__)

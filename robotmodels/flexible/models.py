@@ -9,8 +9,8 @@ drive : bool
 
 Returns
 -------
-ndarray, shape (..., *core)
-    Or a pair of them; each function states its core.
+ndarray, shape (..., core)
+    Or a pair of them; each function states the shape of its core.
 
 References
 ----------

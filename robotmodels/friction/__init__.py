@@ -5,6 +5,7 @@ the parameters, ``.basis(v)`` gives the columns that multiply them, for identifi
 compensators have the same interface; their torque depends on positions, ``.torque(v, q)``.
 """
 
+from .. import _docs
 from .compensator import GravityCompensator
 from .models import (
     AsymmetricFriction,
@@ -30,3 +31,5 @@ __all__ = [
     "TorqueOffset",
     "ViscousFriction",
 ]
+
+_docs.document(__name__)

@@ -1,5 +1,6 @@
 """The geometric description: the Khalil-Kleinfinger table and the transforms it stands for."""
 
+from .. import _docs
 from .joint_kinds import FIXED, PRISMATIC, REVOLUTE
 from .names import NOT_XML, constant_names
 from .table import DHTable
@@ -15,3 +16,5 @@ __all__ = [
     "constant_names",
     "link_transforms",
 ]
+
+_docs.document(__name__)

@@ -3,6 +3,7 @@
 Seed book section 1.6.
 """
 
+from .. import _docs
 from ..estimation.covariance import correlated_covariance
 from ..logs import Log, check_log, read_log
 from ..minimal_parameters import CenterOfMassBox, CenterOfMassEllipsoid
@@ -45,3 +46,5 @@ __all__ += ["exciting_trajectory", "fit", "fit_friction", "hausman_test", "ident
 __all__ += ["identify_payload", "predicted_torque", "read_log", "reduce_equations", "report"]
 __all__ += ["simulated_log", "synchronisation", "tuned_controller", "validate", "write_result"]
 __all__ += ["write_trajectory"]
+
+_docs.document(__name__)

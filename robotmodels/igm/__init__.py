@@ -10,9 +10,12 @@ are completed at the reference (`singular`), and the solutions are labelled (`br
 held in `solutions`; `unreachable` says why a pose has none. `numeric` is the iterative inverse.
 """
 
+from .. import _docs
 from .inverse import igm
 from .numeric import igm_numeric
 from .solutions import IGMSolutions
 from .status import IGMStatus
 
 __all__ = ["IGMSolutions", "IGMStatus", "igm", "igm_numeric"]
+
+_docs.document(__name__)

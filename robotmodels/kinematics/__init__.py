@@ -32,6 +32,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from .. import _docs
 from .jacobians import Reference, jacobian, jacobian_rate
 from .poses import dgm, link_poses
 from .velocities import dkm, dkm_second_order
@@ -110,6 +111,8 @@ __all__ = [
     *_ROOM_OF,  # pyright: ignore[reportUnsupportedDunderAll]
 ]
 
+_docs.document(__name__)
+
 
 def __dir__() -> list[str]:
     """Names that are imported on first use included."""
@@ -120,6 +123,6 @@ def __getattr__(name: str) -> Any:
     """Import a room when one of its names is first used."""
     if name not in _ROOM_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+    value = _docs.documented(getattr(importlib.import_module(_ROOM_OF[name], __name__), name))
     globals()[name] = value
     return value

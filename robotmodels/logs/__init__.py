@@ -3,6 +3,7 @@
 Seed book sections 1.6.2.4 and 1.6.2.5.
 """
 
+from .. import _docs
 from .checks import FindingKind, LogFinding, Severity, check_log
 from .log import Log, join_logs, with_delay
 from .read import read_log
@@ -17,3 +18,5 @@ __all__ = [
     "read_log",
     "with_delay",
 ]
+
+_docs.document(__name__)

@@ -8,6 +8,7 @@ joints, N m or N. Arguments of the wrong shape or with NaN raise ShapeError or I
 open loops, and actuated joints that do not determine the others, LoopError.
 """
 
+from .. import _docs
 from ..errors import LoopError
 from .closing import ClosedPostures, ClosingStatus, close
 from .constraints import Mobility, closure_jacobian, mobility, velocity_map, velocity_map_rate
@@ -22,3 +23,5 @@ __all__ = ["Closure", "LoopedRobot", "LoopError", "read_par", "read_mjcf", "clos
 __all__ += ["ClosedPostures", "ClosingStatus", "mobility", "Mobility", "closure_jacobian"]
 __all__ += ["velocity_map", "velocity_map_rate", "idm", "ddm", "closure_forces", "simulate"]
 __all__ += ["torque_regressor", "base_parameters"]
+
+_docs.document(__name__)

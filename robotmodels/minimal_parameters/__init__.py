@@ -3,6 +3,7 @@
 Seed book section 1.5.3.
 """
 
+from .. import _docs
 from .bodies import uniform_bodies
 from .consistent import fit_consistent, standard_parameters
 from .constraints import CenterOfMassBox, CenterOfMassEllipsoid
@@ -25,3 +26,5 @@ __all__ = [
     "standard_parameters",
     "uniform_bodies",
 ]
+
+_docs.document(__name__)

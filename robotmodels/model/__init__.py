@@ -1,5 +1,6 @@
 """The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
 
+from .. import _docs
 from .argument import as_positions, check_model
 from .robot_model import GRAVITY, RobotModel
 from .twin import FrameOfInterest, PinocchioTwin
@@ -15,3 +16,5 @@ __all__ = [
     "to_urdf",
     "write_urdf",
 ]
+
+_docs.document(__name__)

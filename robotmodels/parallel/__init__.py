@@ -8,6 +8,7 @@ wrenches act on the environment. Arrays of the wrong shape, NaN, and poses that 
 have or the legs do not reach raise ShapeError, InvalidValueError or NotARotationError.
 """
 
+from .. import _docs
 from .direct import AssemblyModes, AssemblyStatus, PlatformPoses, PoseStatus, assembly_modes, dgm
 from .dynamics import MotionStatus, ParallelMotion, ddm, energies, idm, simulate
 from .families import delta, five_bar, gough, gough_symmetric, planar_3rpr, planar_3rrr
@@ -42,3 +43,5 @@ __all__ += ["leg_forces", "LegForces", "ForceStatus", "stiffness", "maneuverabil
 __all__ += ["classify_singularity", "Singularity", "SingularityKind", "workspace"]
 __all__ += ["PlatformWorkspace"]
 __all__ += ["idm", "ddm", "energies", "simulate", "ParallelMotion", "MotionStatus"]
+
+_docs.document(__name__)

@@ -8,6 +8,7 @@ the fraction done, or True for the log of Python. Wrong input raises `ShapeError
 `InvalidValueError`, also slides without limits and resolutions that need more than 1 GB.
 """
 
+from .. import _docs
 from .accessibility import Accessibility, AccessStatus, accessibility
 from .aspects import Aspects, AspectStatus, aspects, free_components
 from .curves import (
@@ -35,3 +36,5 @@ __all__ += ["DexterityMap", "GlobalIndex", "dexterity_map", "global_index", "iso
 __all__ += ["FeasiblePath", "PathStatus", "feasible_path"]
 __all__ += ["Polytope", "PolytopeStatus", "polytope", "RegionStatus", "Regions", "regions"]
 __all__ += ["Workspace", "WorkspaceStatus", "workspace"]
+
+_docs.document(__name__)

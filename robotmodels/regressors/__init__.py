@@ -6,6 +6,7 @@ and drive parameters. Torque, power, momentum and filtered forms have the column
 pieces of bounded size. The arguments of all are those of `torque_regressor`.
 """
 
+from .. import _docs
 from .chunks import chunked
 from .columns import Columns
 from .energy import (
@@ -40,3 +41,5 @@ __all__ = [
     "torque_regressor",
     "torque_regressor_chunks",
 ]
+
+_docs.document(__name__)

@@ -132,7 +132,7 @@ def filtered_regressor(
 
 
 def filtered_torque(tau: ArrayLike, low_pass: ArrayLike) -> Array:
-    """Measured torques through the filter of `filtered_regressor`.
+    """Measured torques ``tau`` through the filter of `filtered_regressor`.
 
     Returns
     -------

@@ -3,6 +3,9 @@
 `robotmodels.load` and `robotmodels.robots` open it.
 """
 
+from .. import _docs
 from .catalogue import CATALOGUE, load, robots, source, title
 
 __all__ = ["CATALOGUE", "load", "robots", "source", "title"]
+
+_docs.document(__name__)

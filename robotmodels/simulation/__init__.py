@@ -5,6 +5,7 @@ adaptive integrators; dry friction sticks and slips at events. Nothing of SciPy 
 the first call.
 """
 
+from .. import _docs
 from .dynamics_map import DynamicsMap, dynamics_map
 from .feedback import StatefulControl
 from .result import (
@@ -31,3 +32,5 @@ __all__ = [
     "simulated_torque_parts",
     "torque_parts",
 ]
+
+_docs.document(__name__)

@@ -3,6 +3,7 @@
 Seed book sections 1.2.1 and 1.3.1.3.
 """
 
+from .. import _docs
 from .dgm import DirectModelExplanation, SymbolicTransform, explain_dgm
 from .factor import SingularityFactor
 from .jacobian import JacobianExplanation, explain_jacobian
@@ -24,3 +25,5 @@ __all__ = [
     "explain_singularities",
     "singularity_map",
 ]
+
+_docs.document(__name__)

@@ -11,6 +11,7 @@ numbers or their seed, by default a fixed one; ``law`` and ``synchronisation``, 
 and `Synchronisation` or their names; ``duration``, seconds, by default the least.
 """
 
+from .. import _docs
 from .blends import blended_lines
 from .candidates import Cost, ProfileLaw, random_profile
 from .cartesian import blended_poses, cartesian_trajectory, circle, circular_arc, straight_line
@@ -91,3 +92,5 @@ __all__ = [
     "time_scaled",
     "trapezoidal",
 ]
+
+_docs.document(__name__)

@@ -6,6 +6,7 @@ Arguments of the wrong shape, with NaN or out of range, matrices that are not po
 or behind the plane of the camera raise ShapeError, InvalidValueError or NotARotationError.
 """
 
+from .. import _docs
 from .camera import Camera
 from .features import Circle, Cylinder, Feature, Lines, Points, Segments, Sphere
 from .features_3d import Plane3D, Point3D, PointAndRotation, PoseError
@@ -37,3 +38,5 @@ __all__ += ["homography", "interaction_ellipse", "interaction_line", "interactio
 __all__ += ["interaction_plane_3d", "interaction_point", "interaction_point_3d"]
 __all__ += ["interaction_segment", "interaction_theta_u", "p3p", "pnp", "refine_pose", "servo"]
 __all__ += ["task_2_1_2d", "task_3d", "virtual_link"]
+
+_docs.document(__name__)

@@ -16,6 +16,7 @@ elevation from which a scene or axes in space are seen, rad, shape (2,); ``heigh
 scene in a notebook; ``dark``, whether its background is dark.
 """
 
+from .. import _docs
 from .calibration import (
     plot_calibration_correlations,
     plot_calibration_in_space,
@@ -102,3 +103,5 @@ __all__ = [
     "show_servo",
     "show_workspace",
 ]
+
+_docs.document(__name__)

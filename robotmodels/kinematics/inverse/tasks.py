@@ -11,6 +11,8 @@ rate : array_like, shape (..., m)
     leading axes broadcast with those of the configurations.
 frame, first, second : str or int, optional
     Names or numbers of frames; default the tool.
+reference : {"world_aligned", "local", "world"}
+    Point and axes of the twist, as of `jacobian`.
 mask : array_like, optional
     Ones for the components that are requested; default all.
 length : float, optional
