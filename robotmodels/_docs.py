@@ -11,7 +11,7 @@ from typing import Any
 from ._outcomes import Result
 
 _TITLE = re.compile(r"\n([A-Z]\w+(?: \w+)?)\n-{3,}\n")
-_ENTRY = re.compile(r"^(\w[\w, ]*)( :.*|)$((?:\n(?:    .*|(?=\n    )))*)", re.MULTILINE)
+_ENTRY = re.compile(r"^([\w*][\w*, ]*)( :.*|)$((?:\n(?:    .*|(?=\n    )))*)", re.MULTILINE)
 _ORDER = [
     "Parameters",
     "Attributes",
@@ -73,9 +73,14 @@ def _parameters(thing: Any, texts: list[str]) -> str:
     for text in texts:
         found = _ENTRY.findall(text.strip())
         for names, kind, rest in found if text is not texts[0] else ():
-            here = [name for name in missing if name in names.split(", ")]
+            here = [name for name in missing if name in _split(names)]
             if here:  # without a type: arguments of several functions
                 entries.append((names + kind if kind else ", ".join(here)) + rest.rstrip())
-        known = {name for names, _, _ in found for name in names.split(", ")}
+        known = {name for names, _, _ in found for name in _split(names)}
         missing = [name for name in missing if name not in known]
     return "\n".join(entries).strip()
+
+
+def _split(names: str) -> list[str]:
+    """Names of arguments, without the stars of those that hold several."""
+    return names.replace("*", "").split(", ")

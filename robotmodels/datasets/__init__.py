@@ -1,5 +1,6 @@
 """Small real data sets that the package ships, each with its source, and a simulated example."""
 
+from .. import _docs
 from .camera import CameraCalibration, CameraPoses, ur10_camera
 from .double_socket import DoubleSocket, panda_double_socket
 from .example import example_log
@@ -16,3 +17,5 @@ __all__ = [
     "panda_double_socket",
     "ur10_camera",
 ]
+
+_docs.document(__name__)

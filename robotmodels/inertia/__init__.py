@@ -1,5 +1,6 @@
 """Inertial parameters of the links, and their physical consistency."""
 
+from .. import _docs
 from .consistency import ConsistencyReport, InertiaWarning, LinkFinding
 from .parameters import PARAMETERS, InertialParameters
 
@@ -10,3 +11,5 @@ __all__ = [
     "LinkFinding",
     "PARAMETERS",
 ]
+
+_docs.document(__name__)

@@ -3,6 +3,7 @@
 Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
 """
 
+from .. import _docs
 from .checks import ROTATION_TOLERANCE, as_pose, as_single_pose, nearest_pose
 from .matlab import poses_from_matlab, poses_to_matlab
 from .motions import from_rpy, inverse, rotation, skew, to_rpy, translation
@@ -21,3 +22,5 @@ __all__ = [
     "to_rpy",
     "translation",
 ]
+
+_docs.document(__name__)

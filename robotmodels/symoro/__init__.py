@@ -9,6 +9,9 @@ Mukhanov, P. Lemoine and G. Ecorchard, "OpenSYMORO: an open-source software pack
 modelling of robots", IEEE/ASME AIM 2014.
 """
 
+from .. import _docs
 from .read import read_par
 
 __all__ = ["read_par"]
+
+_docs.document(__name__)

@@ -6,14 +6,27 @@ first one is drawn. A figure is a `matplotlib.figure.Figure` that shows itself i
 ``.savefig("arm.pdf")`` writes it. Arguments that do not fit raise `InvalidValueError` or
 `ShapeError`, a package that is not installed `MissingExtraError`.
 
-Arguments of several of them: ``title``, a text over a figure, and ``size``, its width and height in
-inches, shape (2,); ``model``, the robot of n joints, whose names and units of joints are used;
-``names`` and ``units`` (``rad``, ``deg``, ``m``, ``mm``, or a `Unit`) in place of these, n each;
-``limits``, the MotionLimits drawn as dashed lines, in the colour of their joint or grey where all
-joints share them, with values beyond them underlaid in red; ``degrees``, whether angles are in
-degrees instead of radians; ``columns``, how many panels stand in a row; ``view``, azimuth and
-elevation from which a scene or axes in space are seen, rad, shape (2,); ``height``, pixels of a
-scene in a notebook; ``dark``, whether its background is dark.
+Parameters
+----------
+**look : title (str), size (array_like, shape (2,))
+    Of every figure: a text over it, its width and height in inches.
+model : RobotModel
+    The robot of n joints, whose names and units of joints are used.
+names, units : sequences of str, n each, optional
+    In place of these; a unit is ``rad``, ``deg``, ``m``, ``mm``, or a `Unit`.
+limits : MotionLimits, optional
+    Drawn as dashed lines, in the colour of their joint or grey where all joints share them, with
+    values beyond them underlaid in red.
+degrees : bool
+    Whether angles are in degrees instead of radians.
+columns : int, optional
+    How many panels stand in a row.
+view : array_like, shape (2,), optional
+    Azimuth and elevation from which a scene or axes in space are seen, rad.
+height : int
+    Pixels of a scene in a notebook.
+dark : bool
+    Whether the background of a scene is dark.
 """
 
 from .. import _docs
