@@ -126,24 +126,6 @@ def test_nearly_parallel_axes_never_run_away(tilt, flip, about, sigma):
         assert np.array_equal(frames.beta, np.zeros(4)), "the common perpendicular is at hand"
 
 
-def parallel_offset(sigma=0):
-    return [
-        JointAxis(0, 0, se3.translation(0, 0, 0.5), Z),
-        JointAxis(1, sigma, se3.translation(0.3, 0.4, 0.2), Z),
-        JointAxis(2, 0, se3.translation(0.2, 0.0, 0.1), Z),
-    ]
-
-
-def test_parallel_revolute_axes_share_a_plane_of_origins():
-    """x goes through the foot of the perpendicular, so r is zero between parallel axes."""
-    frames = assert_same_robot(parallel_offset())
-    assert np.allclose(frames.d, [0, 0.5, 0.2])
-    assert np.array_equal(frames.r, np.zeros(3))
-    assert np.array_equal(frames.alpha, np.zeros(3))
-    assert np.array_equal(frames.beta, np.zeros(3))
-    assert np.allclose(frames.base[:3, 3], [0, 0, 0.5]), "R_0 is R_1 at q = 0"
-
-
 # --- tables that already follow the rules come back -----------------------------------------------
 
 # alpha (degrees), d, r, theta (degrees), index of a prismatic joint

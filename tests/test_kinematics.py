@@ -152,23 +152,3 @@ def test_no_joint_at_all(case):
     batch = function(model, *[np.zeros((3, 0))] * count)
     assert batch.shape == (3, *single.shape)
     np.testing.assert_allclose(batch, np.broadcast_to(single, batch.shape), atol=1e-15)
-
-
-def test_a_planar_arm_by_hand():
-    """Two links of 0.3 and 0.2 m: position, axes and Jacobian as in any textbook."""
-    tool = np.eye(4)
-    tool[0, 3] = 0.2
-    arm = rm.RobotModel.from_table(
-        rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]), tool=tool
-    )
-    q1, q2 = 0.4, 0.7
-    c1, s1, c12, s12 = np.cos(q1), np.sin(q1), np.cos(q1 + q2), np.sin(q1 + q2)
-    x, y = 0.3 * c1 + 0.2 * c12, 0.3 * s1 + 0.2 * s12
-    expected = [[c12, -s12, 0, x], [s12, c12, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]]
-    J = [[-y, -0.2 * s12], [x, 0.2 * c12], [0, 0], [0, 0], [0, 0], [1, 1]]
-    local = [[0.3 * np.sin(q2), 0], [0.3 * np.cos(q2) + 0.2, 0.2], [0, 0], [0, 0], [0, 0], [1, 1]]
-    for q in ([q1, q2], [[q1, q2]]):
-        np.testing.assert_allclose(np.squeeze(rm.dgm(arm, q)), expected, atol=1e-15)
-        np.testing.assert_allclose(np.squeeze(rm.jacobian(arm, q)), J, atol=1e-15)
-        found = np.squeeze(rm.jacobian(arm, q, reference="local"))
-        np.testing.assert_allclose(found, local, atol=1e-15)

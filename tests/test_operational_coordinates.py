@@ -88,9 +88,6 @@ def same(x, y, tolerance):
     np.testing.assert_allclose(x, y, rtol=0, atol=tolerance)
 
 
-# --- kinds -------------------------------------------------------------------------------------
-
-
 # --- there and back ----------------------------------------------------------------------------
 
 
@@ -139,14 +136,6 @@ def test_quaternion_and_vector_are_those_of_scipy(rng):
     Q = R.as_quat(canonical=True, scalar_first=True)
     same(operational_coordinates(T, "quaternion")[:, 3:], Q, 1e-14)
     same(operational_coordinates(T, "angle axis")[:, 3:], R.as_rotvec(), 1e-13)
-
-
-def test_khalils_roll_is_about_z_and_urdfs_about_x(rng):
-    for T in random_poses(rng, 50):
-        khalil = operational_coordinates(T, "roll_pitch_yaw")[3:]
-        same(khalil[::-1], se3.to_rpy(T[:3, :3]), 8 * EPS)
-        same(operational_coordinates(T, "roll_pitch_yaw_urdf")[3:], se3.to_rpy(T[:3, :3]), 8 * EPS)
-    assert operational_coordinates(se3.rotation("z", 0.5), "rpy")[3] == pytest.approx(0.5)
 
 
 # --- the border --------------------------------------------------------------------------------
@@ -402,19 +391,3 @@ def test_coordinate_jacobian_is_the_difference_of_coordinates(kind, rng):
             lambda t, q=q, v=v, a=a: coordinates(q + t * v + t * t / 2 * a), 2e-3 / speed
         )
         same(J @ a + dJ @ v, second, 1e-4 * size * speed**2)
-
-
-def test_a_singular_representation_is_not_a_singular_robot():
-    """A planar arm has Euler angles at gimbal lock everywhere; its position is none the worse."""
-    arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    q, v = np.array([[0.0, 0.5], [0.3, -1.0]]), np.ones((2, 2))
-    for kind in EULER:
-        for J in (
-            coordinate_jacobian(arm, q, kind),
-            coordinate_jacobian_rate(arm, q, v, kind),
-        ):
-            assert np.isnan(J[:, 3:]).all()
-            assert np.isfinite(J[:, :3]).all()
-        same(coordinate_jacobian(arm, q, kind)[:, :3], rm.jacobian(arm, q)[:, :3], 1e-15)
-    J = coordinate_jacobian(arm, q, "rpy")
-    same(J[:, 3:], np.broadcast_to([[1.0, 1], [0, 0], [0, 0]], (2, 3, 2)), 1e-15)

@@ -103,14 +103,6 @@ def test_transport_is_that_of_pinocchio_and_composes(rng):
     assert transported_wrench(w[:, None], B).shape == (5, 5, 6)
 
 
-def test_a_lever_by_hand():
-    """10 N upwards at 0.5 m: the joint gives 5 N m; a slide across it gives 10 N."""
-    arm = planar(0.3, 0.2)
-    close(static_torque(arm, [0.0, 0.0], [0, 10.0, 0, 0, 0, 0]), [5.0, 2.0], 1e-15)
-    slide = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 1, "alpha": -H}]))
-    close(static_torque(slide, [0.7], [0, 10.0, 0, 1, 2, 3]), [10.0], 1e-14)
-
-
 # ---------------------------------------------------------------- the inverse
 
 
@@ -167,27 +159,18 @@ def test_equilibrium_and_what_is_left_open(model, seed):
 def test_mistakes_are_named():
     arm = planar(0.3, 0.2)
     q, w = [0.1, 0.2], np.zeros(6)
-    with pytest.raises(ShapeError, match="wrench"):
-        static_torque(arm, q, w[:5])
-    with pytest.raises(InvalidValueError, match="wrench"):
-        static_torque(arm, q, w + np.nan)
-    with pytest.raises(ShapeError, match="broadcast"):
-        static_torque(arm, np.zeros((2, 2)), np.zeros((3, 6)))
-    with pytest.raises(InvalidValueError, match="world_aligned"):
-        static_torque(arm, q, w, reference="base")
-    with pytest.raises(FrameNotFoundError):
-        static_torque(arm, q, w, "J9")
-    with pytest.raises(ShapeError, match="tau"):
-        static_wrench(arm, q, [1.0])
-    with pytest.raises(ShapeError, match="broadcast"):
-        static_wrench(arm, np.zeros((2, 2)), np.zeros((3, 2)))
-    for length in (0.0, -1.0, np.inf):
-        with pytest.raises(InvalidValueError, match="length"):
-            static_wrench(arm, q, q, length=length)
-    for tolerance in (0.0, 1.0, -1e-9):
-        with pytest.raises(InvalidValueError, match="tolerance"):
-            static_wrench(arm, q, q, tolerance=tolerance)
-    with pytest.raises(NotARotationError):
-        transported_wrench(w, np.ones((4, 4)))
-    with pytest.raises(ShapeError, match="broadcast"):
-        transported_wrench(np.zeros((3, 6)), np.tile(np.eye(4), (2, 1, 1)))
+    for call, error, words in (
+        (lambda: static_torque(arm, q, w[:5]), ShapeError, "wrench"),
+        (lambda: static_torque(arm, q, w + np.nan), InvalidValueError, "wrench"),
+        (lambda: static_torque(arm, np.zeros((2, 2)), np.zeros((3, 6))), ShapeError, "broadcast"),
+        (lambda: static_torque(arm, q, w, "J9"), FrameNotFoundError, "J9"),
+        (lambda: static_wrench(arm, q, [1.0]), ShapeError, "tau"),
+        (lambda: static_wrench(arm, np.zeros((2, 2)), np.zeros((3, 2))), ShapeError, "broadcast"),
+        (lambda: static_wrench(arm, q, q, length=0.0), InvalidValueError, "length"),
+        (lambda: static_wrench(arm, q, q, tolerance=1.0), InvalidValueError, "tolerance"),
+        (lambda: transported_wrench(w, np.ones((4, 4))), NotARotationError, "last row"),
+        (lambda: transported_wrench(np.zeros((3, 6)), np.tile(np.eye(4), (2, 1, 1))), ShapeError,
+         "broadcast"),
+    ):  # fmt: skip
+        with pytest.raises(error, match=words):
+            call()

@@ -2,7 +2,6 @@
 
 import math
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import robotmodels as rm
 from robotmodels.errors import InvalidValueError
 from robotmodels.se3 import from_rpy
 from robotmodels.symbolic import explain_dgm, explain_jacobian
-from robotmodels.symbolic.angles import wrapped
 
 RIGHT = np.pi / 2
 CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
@@ -235,13 +233,6 @@ def test_angles_are_exact_or_symbols(rng):
     check(model, explain_dgm(model), rng)
 
 
-@pytest.mark.parametrize(
-    ("turns", "expected"), [("3/2", "-1/2"), ("-3/2", "1/2"), ("-1", "1"), ("2", "0"), ("5", "1")]
-)
-def test_multiples_of_pi_are_wrapped(turns, expected):
-    assert wrapped(Fraction(turns)) == Fraction(expected)
-
-
 def test_long_results_are_cut_into_named_parts(rng):
     """An arm with every parameter oblique would otherwise print millions of terms."""
     keys = dict.fromkeys(("gamma", "beta", "alpha", "theta"), (0.1, 1.4))
@@ -261,42 +252,7 @@ def test_long_results_are_cut_into_named_parts(rng):
         assert max(len(str(entry)) for entry in J.reduced) < 4000
 
 
-# --- frames, base, tool --------------------------------------------------------------------------
-
-
-def test_base_and_tool_have_their_steps(rng):
-    model = rm.load("rx90").with_base(random_pose(rng)).with_tool(random_pose(rng))
-    pose = explain_dgm(model)
-    check(model, pose, rng)
-    for step in (pose.base, pose.tool):
-        assert step is not None
-        assert len(step.matrix.free_symbols) == 9
-    assert "Components of Z 0T6 E [1.10]" in pose.text
-    assert r"\mathbf{Z} \, {}^{0}\mathbf{T}_{6} \, \mathbf{E}" in pose.latex
-
-
 # --- the result as a value, LaTeX and names ------------------------------------------------------
-
-
-def test_latex_has_the_content_of_the_text():
-    tool = from_rpy([0.3, 0.0, 0.2], [0.1, 0, 0])
-    model = rm.load("cobra_s600").with_base(from_rpy([0, 0, 0], [0, 0, 1e-5])).with_tool(tool)
-    pose = explain_dgm(model)
-    for word in re.findall(r"\b[A-Z]?[a-z]{3,}\b", pose.text):
-        assert word in pose.latex, word
-    for part in (
-        r"3 & 1 & \pi & 0.275 & 0 & r_{3} \\",
-        r"D_{3} &= 0.275 \, \mathrm{m} \quad (d_{3})",
-        r"1 \cdot 10^{-5} \, \mathrm{m} \quad (z\text{ of the base})",
-        r"(\text{angle about }z\text{ of the tool})",
-        r"C_{1+2-4} &= \cos\left(\theta_{1} + \theta_{2} - \theta_{4}\right)",
-        r"$\mathbf{Z}$, the pose of $R_{0}$ in the world",
-    ):
-        assert part in pose.latex
-    words = re.sub(r"\\begin\{(\w+\*)\}.*?\\end\{\1\}", "", pose.latex, flags=re.DOTALL)
-    words = re.sub(r"\$[^$]*\$", "", words)
-    assert words.isascii()
-    assert not re.search(r"(?<!\\)[_^&#%$]", words), words
 
 
 @pytest.mark.parametrize(

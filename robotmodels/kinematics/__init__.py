@@ -20,6 +20,8 @@ length : float, optional
 mask : array_like, shape (6,), optional
     Ones for the components ``vx vy vz wx wy wz`` that count, or ``"position"``, ``"orientation"``;
     default all.
+mask_axes : {"world", "tool"}
+    Axes of the components of ``mask``: the world's, or the frame's own.
 tolerance : float
     Singular values below this fraction of the largest are zero.
 

@@ -63,8 +63,6 @@ def velocity_ellipsoid(
 
     Parameters
     ----------
-    model, q, frame
-        See `robotmodels.kinematics`; passive joints count as the others do.
     part : TwistPart
         Whether linear or angular velocities are shown.
     joint_velocity : array_like, shape (n,), optional
@@ -116,8 +114,6 @@ def force_ellipsoid(
 
     Parameters
     ----------
-    model, q, frame, length, tolerance
-        As in `velocity_ellipsoid`, of the velocities dual to the forces.
     part : TwistPart
         Whether forces or moments are shown.
     joint_torque : array_like, shape (n,), optional

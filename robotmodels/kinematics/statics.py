@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_number, as_vector, batch_rows, batch_shape, read_only
-from .._outcomes import Outcome
+from .._arrays import Array, as_number, as_vector, batch_rows, batch_shape
+from .._outcomes import Outcome, Result
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..se3 import as_pose
@@ -41,7 +41,7 @@ class StaticStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StaticWrench(Rebuilt):
+class StaticWrench(Result):
     """The wrench that joint torques balance. Read-only.
 
     Parameters
@@ -65,10 +65,7 @@ class StaticWrench(Rebuilt):
     undetermined: NDArray[np.int64]
     directions: Array
     residual: Array
-
-    def reason(self, index: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status of a row; ``()`` for a single one."""
-        return StaticStatus(int(self.status[index])).sentence
+    outcomes = StaticStatus
 
 
 def static_torque(
@@ -85,9 +82,6 @@ def static_torque(
 
     Parameters
     ----------
-    model, q, frame, reference
-        See `robotmodels.kinematics`; ``frame`` exerts the wrench, ``reference`` is its point and
-        its axes.
     wrench : array_like, shape (..., 6)
         Force and moment ``[f; m]`` (N, N m) that the frame exerts on the environment.
     gravity : bool
@@ -158,8 +152,6 @@ def static_wrench(
 
     Parameters
     ----------
-    model, q, frame, reference
-        As in `static_torque`.
     tau : array_like, shape (..., n)
         Torques (N m) or forces (N); the leading axes broadcast.
     gravity : bool
@@ -216,11 +208,7 @@ def static_wrench(
     unbalanced = np.linalg.norm(residual, axis=-1) > allowed * size
     status = (rank < 6).astype(np.int8) + 2 * unbalanced.astype(np.int8)
     return StaticWrench(
-        read_only(wrench),
-        read_only(status, np.int8),
-        read_only(6 - rank, np.int64),
-        read_only(np.swapaxes(carried, -1, -2) + 0.0),
-        read_only(residual / joints),
+        wrench, status, 6 - rank, np.swapaxes(carried, -1, -2) + 0.0, residual / joints
     )
 
 

@@ -1,11 +1,22 @@
 """Robots with kinematic loops: closures, reduced models, dynamics, base parameters.
 
 A robot with loops is the spanning tree that is left when each loop is cut, and the closures of
-the cuts. Throughout, ``robot`` is a `LoopedRobot` of n joints, n_a of them actuated, with c
-constraint rows; ``q, v, a`` (..., n) are variables of all joints of the tree, rad or m, which close
-the loops, their velocities and accelerations; ``tau`` (..., n_a) are torques of the actuated
-joints, N m or N. Arguments of the wrong shape or with NaN raise ShapeError or InvalidValueError;
-open loops, and actuated joints that do not determine the others, LoopError.
+the cuts. Arguments of the wrong shape or with NaN raise ShapeError or InvalidValueError; open
+loops, and actuated joints that do not determine the others, LoopError.
+
+Parameters
+----------
+robot : LoopedRobot
+    The robot: n joints, n_a of them actuated, c constraint rows.
+q, v, a : array_like, shape (..., n)
+    Variables of all joints of the tree, rad or m, which close the loops, their velocities and
+    accelerations.
+tau : array_like, shape (..., n_a)
+    Torques of the actuated joints, N m or N.
+wrench : array_like, shape (..., 6), optional
+    Wrench ``[f; m]`` of the tool of the tree on the environment, as for `robotmodels.idm`.
+drive : bool
+    Whether the drives of all joints take part.
 """
 
 from .. import _docs

@@ -1,10 +1,5 @@
 """Constraints of cut loops on velocities: Jacobians, mobility, and the map from actuated joints.
 
-Parameters
-----------
-robot, q, v
-    See `robotmodels.loops`.
-
 Returns
 -------
 ndarray or Mobility

@@ -6,15 +6,6 @@ joints; drives of passive joints, such as their friction, are among those of the
 accelerations keep them closed they raise LoopError, SingularMassMatrixError where free motions have
 no inertia.
 
-Parameters
-----------
-robot, q, v, a, tau
-    See `robotmodels.loops`.
-wrench : array_like, shape (..., 6), optional
-    Wrench ``[f; m]`` of the tool of the tree on the environment, as for `robotmodels.idm`.
-drive : bool
-    Whether the drives of all joints take part.
-
 Returns
 -------
 ndarray

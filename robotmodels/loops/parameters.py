@@ -2,8 +2,6 @@
 
 Parameters
 ----------
-robot, q, v, a
-    See `robotmodels.loops`.
 q_ref : array_like, shape (n,), optional
     Posture of all joints in the assembly that is meant; it is closed at its actuated joints.
     Default: the first posture that closes at random positions of the actuated joints.

@@ -1,6 +1,15 @@
 """Models as formulas: the direct geometric model, the Jacobian, and singular positions.
 
 Seed book sections 1.2.1 and 1.3.1.3.
+
+Parameters
+----------
+model : RobotModel
+    The robot, n joints.
+frame : str or int, optional
+    Name or number of the frame whose motion it is; default the tool.
+symbols : mapping of str to str, optional
+    Other names of symbols, such as ``{"RL1": "l1", "C1": "c1"}``.
 """
 
 from .. import _docs

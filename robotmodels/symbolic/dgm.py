@@ -144,17 +144,6 @@ def explain_dgm(
 
     Seed book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    symbols : mapping of str to str, optional
-        Other names for some of the symbols, such as ``{"RL1": "l1", "C1": "c1"}``.
-
-    Notes
-    -----
     Angles within 1e-13 rad of a multiple of 30 or 45 degrees are taken as exact, lengths below
     1e-13 m as zero.
 

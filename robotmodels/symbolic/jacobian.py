@@ -117,15 +117,9 @@ def explain_jacobian(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
     projection, intermediate : str or int, optional
         Frames i and j of the table; 0 is R_0. Whichever is not given is chosen so that the third
         matrix has the most zeros, then the shortest formulas, then lies in the middle of the arm.
-    frame : str or int, optional
-        Frame whose Jacobian it is; default the tool.
-    symbols : mapping of str to str, optional
-        Other names of symbols, as for `explain_dgm`.
 
     Examples
     --------

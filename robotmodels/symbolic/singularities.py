@@ -55,18 +55,6 @@ def explain_singularities(
 
     Seed book section 1.3.1.3.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of the frame whose motion it is; default the tool. Joints that do not move
-        it have no part.
-    symbols : mapping of str to str, optional
-        Other names of symbols, as for `explain_dgm`.
-
-    Notes
-    -----
     Constants are kept as symbols while factoring. Entries below 1e-11 in random configurations
     count as zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to
     1e-12 of their size are dropped. The last sixteen results are kept.

@@ -79,8 +79,6 @@ def singularity_map(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
     joints : pair of int or str
         Columns of q, from 0, or names of two different joints.
     at : array_like, shape (n,), optional

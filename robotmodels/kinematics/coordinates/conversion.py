@@ -1,6 +1,15 @@
 """Operational coordinates: a pose as a vector X, and back.
 
-Seed book section 1.2.2, eq. [1.5] to [1.9]. The kinds are those of `OrientationKind`.
+Seed book section 1.2.2, eq. [1.5] to [1.9].
+
+Parameters
+----------
+T : array_like, shape (..., 4, 4)
+    Poses, metres.
+kind : OrientationKind or str
+    Form of the orientation. **Khalil's roll is about z**; ``"rpy_urdf"`` is the order of URDF.
+x : array_like, shape (..., m)
+    Position in metres, then the orientation. Angles and rotation vectors may be any.
 """
 
 from __future__ import annotations
@@ -39,10 +48,6 @@ def operational_coordinates(
 
     Parameters
     ----------
-    T : array_like, shape (..., 4, 4)
-        Poses, metres.
-    kind : OrientationKind or str
-        Form of the orientation. **Khalil's roll is about z**; ``"rpy_urdf"`` is the order of URDF.
     near : array_like, shape (..., m), optional
         Coordinates of the same kind, such as those of the sample before; the leading axes
         broadcast. Of all coordinates of the same pose the nearest to these are taken: the other
@@ -75,13 +80,6 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     """Poses of operational coordinates, the inverse of `operational_coordinates`.
 
     Seed book eq. [1.8] and [1.9].
-
-    Parameters
-    ----------
-    x : array_like, shape (..., m)
-        Position in metres, then the orientation. Angles and rotation vectors may be any.
-    kind : OrientationKind or str
-        Form of the orientation.
 
     Returns
     -------
@@ -124,8 +122,6 @@ def continuous_coordinates(
     ----------
     T : array_like, shape (N, ..., 4, 4)
         Poses in their order along the first axis; further axes hold further sequences.
-    kind : OrientationKind or str
-        Form of the orientation.
     near : array_like, shape (..., m), optional
         Coordinates that the first sample is near to. Default: as `operational_coordinates` gives
         it; a sequence that begins at gimbal lock begins with the first angle that it has when it

@@ -8,9 +8,8 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, Rebuilt
-from ..._outcomes import Outcome
-from ...errors import InvalidValueError
+from ..._arrays import Array
+from ..._outcomes import Outcome, Result
 
 _SHOWN = 8
 
@@ -36,7 +35,7 @@ class IKMStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class IKMSolution(Rebuilt):
+class IKMSolution(Result):
     """Joint velocities of twists, or joint accelerations. Read-only, picklable.
 
     The leading axes are those of the call. Six-vectors are linear then angular; rows that were
@@ -83,27 +82,17 @@ class IKMSolution(Rebuilt):
     task_errors: tuple[Array, ...]
     task_scales: Array
     a: Array | None = None
+    outcomes = IKMStatus
+
+    def __post_init__(self) -> None:
+        """Arrays are read-only already."""
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status of row i (left out for a single one), with the twist missing.
-
-        Raises `InvalidValueError` where ``i`` does not name one row.
-        """
-        at = i if isinstance(i, tuple) else (i,)
-        try:
-            # a single row is also the first of one
-            code = self.status if self.status.ndim == 0 and at == (0,) else self.status[at]
-            code = np.asarray(code)
-        except (IndexError, TypeError):
-            code = self.status[None]
-        if code.ndim:
-            raise InvalidValueError(
-                f"i: expected the index of one row among {self.status.shape}, got {i!r}."
-            )
-        status = IKMStatus(int(code))
+        """Sentence of the status of row i (left out for a single one), with the twist missing."""
+        status = self.outcome(i)
         if status is IKMStatus.MET:
             return status.sentence
-        error = self.error[at if self.status.ndim else ()]
+        error = self.error[i if self.status.ndim else ()]
         per = "s" if self.a is None else "s^2"
         missing = [f"{hypot(*error[:3]):.4g} m/{per}"] * bool(self.mask[:3].any())
         missing += [f"{hypot(*error[3:]):.4g} rad/{per}"] * bool(self.mask[3:].any())

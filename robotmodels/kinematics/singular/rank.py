@@ -149,11 +149,6 @@ def jacobian_rank(
 ) -> JacobianRank:
     """Rank of the Jacobian at configurations: their local number of degrees of freedom.
 
-    Parameters
-    ----------
-    mask_axes : {"world", "tool"}
-        Axes of the components: the world's, or the frame's own.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -183,8 +178,6 @@ def operational_dimension(
 
     Parameters
     ----------
-    model, frame, length, tolerance, mask, mask_axes
-        As in `jacobian_rank`.
     q : array_like, shape (..., n), optional
         Configurations whose local number of degrees of freedom is wanted too, rad or m.
     samples : int

@@ -3,6 +3,18 @@
 Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
 surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators, ASME J.
 Mechanisms 110, 1988, for the second-order test of a boundary.
+
+Parameters
+----------
+tolerance : float
+    Singular values below this fraction of the largest are zero. A wider one classifies a
+    configuration near a singular one as if it were there: the components that are then small are
+    given as they are.
+near : float
+    Fraction below which a singular value that is not zero is called weak.
+mask : array_like, shape (6,), optional
+    Components that count. Default all; the position alone for a frame moved by at most three
+    joints whose position has as many freedoms as they are, as in `explain_singularities`.
 """
 
 from __future__ import annotations
@@ -13,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, Rebuilt, as_exact, as_floats, as_number, as_vector, read_only
-from ..._outcomes import Outcome
+from ..._outcomes import Outcome, Result
 from ...model import RobotModel
 from ...table_text import length_text
 from ..singularity_kind import SingularityKind
@@ -47,7 +59,7 @@ class SingularityStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SingularityFlags(Rebuilt):
+class SingularityFlags(Result):
     """Statuses of the configurations of one call. Read-only.
 
     Parameters
@@ -73,6 +85,7 @@ class SingularityFlags(Rebuilt):
     dimension: int
     mask: NDArray[np.bool_]
     frame: str
+    outcomes = SingularityStatus
 
     def __repr__(self) -> str:
         counts = ", ".join(
@@ -81,10 +94,6 @@ class SingularityFlags(Rebuilt):
         )
         what = "".join(f"; {line}" for line in counting_lines(self.mask, self.frame))
         return f"<SingularityFlags {self.status.shape}: {counts}; dimension {self.dimension}{what}>"
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """Sentence of the status of configuration i (left out for a single one)."""
-        return SingularityStatus(int(self.status[i])).sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,11 +198,6 @@ def singularity_flags(
 ) -> SingularityFlags:
     """Status of configurations in batch: regular, near singular, singular.
 
-    Parameters
-    ----------
-    model, q, frame, length, tolerance, near, mask, mask_axes
-        As in `classify_singularity`, with ``q (..., n)``.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -246,17 +250,6 @@ def classify_singularity(
     ----------
     q : array_like, shape (n,)
         One configuration, rad or m.
-    tolerance : float
-        Singular values below this fraction of the largest are zero. A wider one classifies a
-        configuration near a singular one as if it were there: the components that are then
-        small are given as they are.
-    near : float
-        Fraction below which a singular value that is not zero is called weak.
-    mask : array_like, shape (6,), optional
-        Components that count. Default all; the position alone for a frame moved by at most three
-        joints whose position has as many freedoms as they are, as in `explain_singularities`.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
     axes, point : int, optional
         Numbers of the frames in whose axes and at whose origin the lost directions are
         given, the projection and the intermediate frame of the book; 0 is R_0. Default: where

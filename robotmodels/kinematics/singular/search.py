@@ -21,6 +21,7 @@ _WEAK = 1e-3  # normals beside the strongest one below which they are none
 _ON_SET = 1e-13
 _STATIONARY = 1e-10
 _DIFFERENCE = 1e-5
+_TIGHT = 1e-9  # at a limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,12 +58,8 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
     good = on_set(space, x)[1] < 1e-9
     if good.any():
         x[good] = _polished(space, _descended(space, x[good], 30))
-    held = _held(space, x)
+    tangent, held = _tangent(space, x)
     _, weakest, G = on_set(space, x)
-    rest = np.where(held, 0.0, space.start - x)
-    normals, _ = normals_of(np.where(held[:, None], 0.0, G))
-    across = np.einsum("ari,ai->ar", normals, rest)
-    tangent = rest - np.einsum("ari,ar->ai", normals, across)
     every, codimension = normals_of(G)
     towards = space.start - x
     escape = np.einsum("ari,ar->ai", every, np.einsum("ari,ai->ar", every, towards))
@@ -141,7 +138,7 @@ def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
     for _ in range(steps):
         if not len(x):
             break
-        tangent = _tangent(space, x)
+        tangent, _ = _tangent(space, x)
         length = np.linalg.norm(tangent, axis=1)
         if (length * (pace > 1e-3) < 1e-7).all():
             break
@@ -153,50 +150,27 @@ def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
     return x
 
 
-def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
-    """Joints at a limit beyond which the set comes nearer to the start."""
-    tight = 1e-9
-    low, high = x <= space.lower + tight, x >= space.upper - tight
-    held = low | high
-    G = on_set(space, x)[2] if held.any() else np.zeros((len(x), 1, x.shape[1]))
-    for _ in range(x.shape[1]):
-        if not held.any():
-            break
-        # multipliers of the set from the joints that are free; then each limit must push inwards
-        normals = np.where(held[:, None], 0.0, G)
-        back = x - space.start
-        inverse = np.linalg.pinv(normals, rcond=_WEAK)
-        lam = -np.einsum("aie,ai->ae", inverse, np.where(held, 0.0, back))
-        push = back + np.einsum("aei,ae->ai", G, lam)
-        wrong = held & ((low & (push < -1e-9)) | (high & (push > 1e-9)))
-        if not wrong.any():
-            break
-        held &= ~wrong
-    return held
-
-
-def _tangent(space: SearchSpace, x: Array) -> Array:
-    """The difference to the start along the set and inside the limits."""
+def _tangent(space: SearchSpace, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The difference to the start along the set and inside the limits; joints held."""
     G = on_set(space, x)[2]
     held = np.zeros(x.shape, dtype=bool)
     tangent = np.zeros(x.shape)
+    low, high = x <= space.lower + _TIGHT, x >= space.upper - _TIGHT
     for _ in range(x.shape[1] + 1):
         normals, _ = normals_of(np.where(held[:, None], 0.0, G))
         back = np.where(held, 0.0, space.start - x)
         tangent = back - np.einsum("ari,ar->ai", normals, np.einsum("ari,ai->ar", normals, back))
-        leaves = ~held & (
-            ((x <= space.lower) & (tangent < 0.0)) | ((x >= space.upper) & (tangent > 0.0))
-        )
+        leaves = ~held & ((low & (tangent < -_TIGHT)) | (high & (tangent > _TIGHT)))
         if not leaves.any():
             break
         held |= leaves
-    return tangent
+    return tangent, held
 
 
 def _polished(space: SearchSpace, x: Array) -> Array:
     """Newton's iteration on both conditions at once: on the set, and nothing tangential."""
     n = x.shape[1]
-    held = _held(space, x)
+    _, held = _tangent(space, x)
     for _ in range(12):
         F = _conditions(space, x, held)
         size = np.linalg.norm(F, axis=1)
