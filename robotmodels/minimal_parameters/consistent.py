@@ -17,6 +17,12 @@ drive_prior : DriveParameters, optional
 margin : float
     Smallest eigenvalue of each pseudo-inertia, relative to the prior's.
 
+Returns
+-------
+StandardParameters
+    Inertia and drives with a status, the increase of the residuals, the active constraints and the
+    optimality gap; bounds that no physical robot satisfies give the status INFEASIBLE.
+
 Raises
 ------
 InertiaError
@@ -80,11 +86,6 @@ def standard_parameters(
     weights : array_like, shape (k, b), optional
         The norm of nearest base parameters is ``|weights @ (b - values)|``; the triangular
         factor of the regressor for the nearest torques. Default relative to the values.
-
-    Returns
-    -------
-    StandardParameters
-        Inertia and drives, with a status.
 
     Examples
     --------
@@ -151,12 +152,6 @@ def fit_consistent(
     tolerance : float
         Where ``gamma`` is 0 and the least squares are not reached: the nearest robot is taken of
         all whose squares exceed the least by at most this part.
-
-    Returns
-    -------
-    StandardParameters
-        The robot, the increase of its residuals, the active constraints and the optimality gap;
-        bounds that no physical robot satisfies give the status INFEASIBLE.
 
     Examples
     --------

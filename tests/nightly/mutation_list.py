@@ -57,7 +57,7 @@ LEVELS = (
     " tests/test_ikm_levels.py::test_each_level_is_met_as_well_as_the_higher_ones_let_it"
 )
 FIGURES, FITS, SCENES = (f"tests/test_viz_{name}.py" for name in ("figures", "fits", "scenes"))
-COMMANDS, ERRORS = "tests/test_cli.py", "tests/test_cli_errors.py"
+COMMANDS = "tests/test_cli.py"
 RAMPS = "tests/test_trajectories.py -k (closed_forms or derivatives)"
 
 # fmt: off
@@ -1359,27 +1359,27 @@ MUTATIONS = [
         '"""Solutions of one pose as JSON data."""',
         "180.0 / np.pi", "1.0", f"{COMMANDS} -k degrees_leave_slides"),
     Mutation("cli: options", "choices of an option are not taken", "def _settings(",
-        'settings["choices"] =', "_ =", f"{ERRORS} -k wrong_input_is_one_line"),
+        'settings["choices"] =', "_ =", f"{COMMANDS} -k wrong_input_is_one_line"),
     Mutation("cli: options", "a default of an option is its text", "def _settings(",
         "settings.get(\"type\", str)(default)", "default",
         f"{COMMANDS} -k default_of_an_option_has"),
     Mutation("cli: options", "options of several commands are left out", "def add_options(",
-        "SHARED[match[1]].strip()", '"--left-out [flag] nothing"', f"{ERRORS} -k json_of_robots"),
+        "SHARED[match[1]].strip()", '"--left-out [flag] nothing"', f"{COMMANDS} -k json_of_robots"),
     Mutation("cli: output", "a result that is not reached ends as done", "def hand_over(",
         "if report.is_reached", "if True", f"{COMMANDS} -k pose_that_is_not_reached"),
     Mutation("cli: program", "wrong input ends as a bug", "def _outcome(error",
-        "ExitStatus.WRONG_INPUT", "ExitStatus.BUG", f"{ERRORS} -k wrong_input_is_one_line"),
+        "ExitStatus.WRONG_INPUT", "ExitStatus.BUG", f"{COMMANDS} -k wrong_input_is_one_line"),
     Mutation("cli: program", "an option with a typing error has no suggestion",
         "def refuse(self",
-        "if near else", "if False else", f"{ERRORS} -k wrong_input_is_one_line"),
+        "if near else", "if False else", f"{COMMANDS} -k wrong_input_is_one_line"),
     Mutation("cli: messages", "messages keep the names of arguments", "def in_options(",
         "message = _ARGUMENT.sub(with_value, message)", "pass", f"{COMMANDS} -k messages_speak"),
     Mutation("cli: output", "JSON of a robot has another tip", "def as_json(model: RobotModel) ->",
-        '"tip": int(model.tip)', '"tip": 0', f"{ERRORS} -k json_of_robots"),
+        '"tip": int(model.tip)', '"tip": 0', f"{COMMANDS} -k json_of_robots"),
     Mutation("cli: view", "a page is opened where there is no display", "def _open(path",
         "return windows and webbrowser", "return webbrowser", f"{SCENES} -k command_opens"),
     Mutation("cli: terminal", "warnings of the package are dropped", "def prepared(",
-        'say(f"warning: {message}")', "pass", f"{ERRORS} -k warnings_of_the_package"),
+        'say(f"warning: {message}")', "pass", f"{COMMANDS} -k warnings_of_the_package"),
 ]
 
 sys.modules.setdefault("mutation_list", sys.modules[__name__])
