@@ -111,15 +111,6 @@ def bodies(rng, f):
 # --- protocols: measurements, and others of the same kind at new places --------------------------
 
 
-def points(arm):
-    """4 to 10 points, each held in 8 to 25 postures; the distance of two is known."""
-    places, count = int(arm.rng.integers(4, 11)), int(arm.rng.integers(8, 26))
-    contacts, p = arm.touches(places, count)
-    length = float(np.linalg.norm(p[0, 0] - p[1, 0]))
-    known = KnownDistance("point:0:0", "point:1:0", length, sigma=1e-4)
-    return [*contacts, known], arm.touches(FRESH, count, name="new")[0]
-
-
 def sockets(arm, places=None):
     """3 to 8 places with two sockets each, whose distance of 50 mm is known."""
     places = places or int(arm.rng.integers(3, 9))

@@ -176,31 +176,6 @@ def test_limits_are_those_of_the_readings(rng):
     assert (found.count < every.count).any()
 
 
-@pytest.mark.parametrize(("name", "wrist"), [("rx90", 5), ("erd:ur10", 4)])
-def test_at_and_beyond_the_edge_of_reach(name, wrist, rng):
-    """Targets pulled out of the calibrated robot's reach: solutions are true ones or none."""
-    robot = off(rm.load(name), rng, gains=True)
-    # the elbow that takes the wrist farthest from the shoulder
-    elbow = np.linspace(-np.pi, np.pi, 200001)
-    postures = np.tile([0.2, 0.3, 0.0, 0.4, 0.5, 0.6], (len(elbow), 1))
-    postures[:, 2] = elbow
-    shoulder = rm.dgm(robot.model, postures[0], 2)[:3, 3]
-    arm = rm.dgm(robot.model, robot.joint_errors.actual(postures), wrist)[:, :3, 3] - shoulder
-    straight = np.linalg.norm(arm, axis=1).argmax()
-    T = np.repeat(calibrated_pose(robot, postures[straight])[None], 7, axis=0)
-    pull = np.array([-1e-2, -1e-4, 0.0, 1e-4, 1e-2, 0.1, 1.0])
-    T[:, :3, 3] += pull[:, None] * arm[straight] / np.linalg.norm(arm[straight])
-    found = corrected_igm(robot, T)
-    assert_reached(robot, found, T)
-    assert found.count[0] >= 2
-    assert found.count[2] >= 1
-    assert found.count[-1] == 0
-    assert found.status[-1] == rm.IGMStatus.TOO_FAR
-    assert found.reason(6).startswith("The position is out of reach")
-    reached = np.isin(found.status, (rm.IGMStatus.REACHED, rm.IGMStatus.REACHED_FAMILY))
-    np.testing.assert_array_equal(reached, found.count > 0)
-
-
 def test_a_batch_is_its_poses_one_by_one_also_at_singular_wrists(rng):
     model = rm.load("puma560")
     robot = off(model, rng, gains=True)

@@ -84,8 +84,8 @@ def test_columns_by_argument_and_by_number(tmp_path):
         ((180.0 / np.pi, 1.0), {}, "look like degrees. Use angles='deg'"),
         ((1.0, 1.0), {"angles": "deg"}, "look like radians. Use angles='rad'"),
         ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Use joint_angles='rad'"),
-        ((1.0, 1e3), {}, "look like millimetres. Use lengths='mm'"),
-        ((1.0, 1.0), {"lengths": "mm"}, "look like metres. Use lengths='m'"),
+        ((1.0, 1e3), {}, "look like millimetres.*lengths="),
+        ((1.0, 1.0), {"lengths": "mm"}, "as if metres had been converted as millimetres"),
         ((1.0, 1.0), {"label": "x"}, "label: position does not use it"),
     ],
 )
@@ -170,26 +170,6 @@ def test_distances_and_relative_poses(tmp_path):
 
 
 # --- mistakes in a file ---------------------------------------------------------------------------
-
-HEADER = ",".join(NAMES)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            f"# a comment\n{HEADER}\n\n1,1,nan,1,1,1",
-            r"line 4: column 2 \(joint_3\) is 'nan'. A row",
-        ),
-        (f"{HEADER}\n1,1,n/a,1,1,1", r"line 2: column 2 \(joint_3\) is 'n/a', not a number"),
-        (f"{HEADER}\n1,1,1,1,1,1\n1,2,3", "line 3: expected 6 columns as in the first"),
-        ("# nothing\n\n", "the file is empty"),
-    ],
-)
-def test_mistakes_in_a_file_are_named_with_their_line(tmp_path, text, message):
-    (tmp_path / "a.csv").write_bytes(text.encode("latin-1"))
-    with pytest.raises(InvalidValueError, match=message):
-        read_measurements(tmp_path / "a.csv", "point_contact", RX90)
 
 
 # --- results --------------------------------------------------------------------------------------

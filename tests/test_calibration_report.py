@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robotmodels import se3
-from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
+from robotmodels.calibration import Pose, fit
 from robotmodels.calibration.candidates import candidate_parameters
 from robotmodels.calibration.differential import differential_model
-from robotmodels.calibration.problem import linearised
-from robotmodels.calibration.report import measured_residuals, report_sections
+from robotmodels.calibration.report import report_sections
 from robotmodels.estimation.estimate import correlated_pairs
-from robotmodels.kinematics import dgm
 from robotmodels.robots import load
 from robotmodels.table_text import ReportTable, in_unit
 
@@ -32,20 +29,6 @@ def poses():
     T[:, :3, :3] = turns.as_matrix() @ T[:, :3, :3]
     T[OUTLIERS, :3, 3] += 0.02
     return fit(UR10, Pose(q, T, name="tracker"), loss="tukey")
-
-
-@pytest.fixture(scope="module")
-def contacts():
-    """A point in two postures only and many of another, with a known distance."""
-    rng = np.random.default_rng(2)
-    arm = load("rx90")
-    arm = arm.with_tool(se3.translation(0.05, 0.03, 0.1))
-    q = rng.uniform(-1.8, 1.8, (40, 6))
-    p = dgm(arm, q)[:, :3, 3] + 1e-4 * rng.normal(size=(40, 3))
-    touched = PointContact(q[:2], [0, 1], name="ball")
-    far = float(np.linalg.norm(p[0] - p[1]))
-    return fit(arm, [Position(q, p, sigma=1e-4), touched, KnownDistance("ball:0", "ball:1", far)],
-               known=["d3"], folds=0, held_out=0.0)  # fmt: skip
 
 
 def tables(result, title):
@@ -90,16 +73,6 @@ def test_every_parameter_is_in_the_tables_once(poses):
         assert low <= float(rows[name][1]) <= high
 
 
-def test_outliers_are_listed_with_their_rows(poses):
-    (table,) = tables(poses, "Outliers")
-    rows = cells(table)
-    assert {int(number) - 1 for number in rows} == set(OUTLIERS)
-    name, row, size, _, weight = rows[str(OUTLIERS[0] + 1)]
-    assert (name, row) == ("tracker", str(OUTLIERS[0] + 1))
-    assert float(size) > 20.0
-    assert float(weight) == 0.0
-
-
 def test_correlations_are_sorted_and_from_the_result(poses):
     pairs = correlated_pairs(poses.correlation, poses.names, 0.3)
     sizes = [abs(c) for *_, c in pairs]
@@ -110,20 +83,3 @@ def test_correlations_are_sorted_and_from_the_result(poses):
     assert i < j
     assert c == poses.correlation[i, j]
     assert abs(c) == np.abs(off).max()
-
-
-def test_residuals_row_by_row(poses, contacts):
-    (part,) = measured_residuals(poses)
-    problem = poses.solution.problem
-    (wanted,) = linearised(problem, poses.solution.corrections, poses.solution.fixtures)
-    np.testing.assert_array_equal(part.after, wanted.residual)
-    after = np.linalg.norm(part.after[:, :3], axis=1)
-    np.testing.assert_allclose(after, poses.validation.in_sample.position)
-    np.testing.assert_allclose(
-        np.linalg.norm(part.before[:, :3], axis=1), poses.validation.nominal.position, rtol=1e-5
-    )
-    np.testing.assert_allclose(part.whitened.ravel(), poses.solution.fit.whitened)
-    assert np.flatnonzero(part.outlier).tolist() == OUTLIERS
-    parts = measured_residuals(contacts)
-    assert [part.blocks.tolist() for part in parts] == [list(range(40)), [40, 41], [42]]
-    assert np.isnan(parts[2].p).all()

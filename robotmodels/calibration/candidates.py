@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -109,6 +110,21 @@ def candidate_parameters(
             )
         entries.append(GeometricParameter(j, moving[j], ErrorLaw.GAIN, i))
     return GeometricParameters(table, tuple(entries))
+
+
+def chosen_candidates(
+    parameters: GeometricParameters | Iterable[str] | None,
+    model: RobotModel,
+    frames: Sequence[Frame],
+    **options: Any,
+) -> GeometricParameters:
+    """Given candidates, or those of a robot, all or the named ones."""
+    if isinstance(parameters, GeometricParameters):
+        if parameters.model is not model and parameters.model != model:
+            raise InvalidValueError("parameters: they were made for another robot.")
+        return parameters
+    candidates = candidate_parameters(model, frames, **options)
+    return candidates if parameters is None else candidates.subset(parameters)
 
 
 def _bending(

@@ -44,11 +44,6 @@ _SLIPS = {
     if {unit, taken} != {"centimetres", "inches"}
 }
 """Ratio of stated to true lengths, by their unit and the unit that was assumed."""
-_TENFOLD = {
-    ("millimetres", "centimetres"): "ten times too long: a misplaced decimal point, or mm for cm",
-    ("centimetres", "millimetres"): "ten times too short: a misplaced decimal point, or cm for mm",
-}
-"""Sentences on a known distance that is ten times too long or too short."""
 _NEAR = 0.15  # relative tolerance of a unit factor
 _ALIKE = 0.3  # largest relative residual of measured against scaled nominal lengths
 _FAR = 3.0
@@ -170,10 +165,11 @@ class UnitError(NamedTuple):
     taken: str
     ratio: float
 
-    def sentence(self, stated: str = "metres") -> str:
+    @property
+    def sentence(self) -> str:
         """Text of the message."""
         text = f"{self.ratio:.4g} times what the robot's nominal geometry gives"
-        if self.taken == stated:
+        if self.taken == "metres":
             return f"{text}; these look like {self.unit}"
         return f"{text}, as if {self.unit} had been converted as {self.taken}"
 
@@ -190,14 +186,6 @@ def _unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
     pair = min(_SLIPS, key=lambda key: abs(log(ratio / _SLIPS[key])))
     close = abs(log(ratio / _SLIPS[pair])) < log(1.0 + near)
     return UnitError(*pair, ratio) if close else None
-
-
-def unit_error_of_positions(
-    model: RobotModel, frame: Frame, nominal: Array, measured: Array
-) -> UnitError | None:
-    """Unit error of positions by a similarity, else by their spread: nominal, measured (N, 3)."""
-    spread = float(np.linalg.norm(np.ptp(measured, axis=0)))
-    return _unit_error(model, frame, [_aligned(nominal, measured)], spread)
 
 
 def _unit_error(
@@ -243,7 +231,7 @@ def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
         quantity, error = _error_of(model, m)
         if error is not None:
             raise InvalidValueError(
-                f"measurements[{k}] ({m.name}): {quantity} are {error.sentence()}. Pass metres: "
+                f"measurements[{k}] ({m.name}): {quantity} are {error.sentence}. Pass metres: "
                 f"multiply by {error.factor:.4g}."
             )
         if isinstance(m, PointContact):
@@ -274,7 +262,8 @@ def _error_of(model: RobotModel, m: Measurement) -> tuple[str, UnitError | None]
         return "", None
     if isinstance(m, Position | Pose):
         measured = m.p if isinstance(m, Position) else m.T[:, :3, 3]
-        return "positions", unit_error_of_positions(model, m.frame, p, measured)
+        spread = float(np.linalg.norm(np.ptp(measured, axis=0)))
+        return "positions", _unit_error(model, m.frame, [_aligned(p, measured)], spread)
     if isinstance(m, RelativePose):
         moved = se3.inverse(T) @ dgm(model, m.q_other, m.frame)
         pairs = [(moved[:, :3, 3], m.T[:, :3, 3])]
@@ -296,7 +285,6 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
     error = _unit_error_of(m.length / max(apart, 1e-12), near)
     if error is not None:
         raise InvalidValueError(
-            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is "
-            f"{_TENFOLD.get((error.unit, error.taken)) or error.sentence()}. The nominal robot "
-            f"gives {apart:.4g} m. Pass metres: {error.factor * m.length:.5g}."
+            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is {error.sentence}. The nominal "
+            f"robot gives {apart:.4g} m. Pass metres: {error.factor * m.length:.5g}."
         )

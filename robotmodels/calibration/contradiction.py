@@ -13,21 +13,18 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..estimation import Loss
-from ..estimation.outlying import outlying
 from .identifiable import needs_a_length
 from .measurements import KnownDistance
 from .prior import ParameterPrior
-from .problem import Problem, problem_of, satisfying, stacked
+from .problem import Problem, satisfying, stacked
 from .solve import Solution, refitted
 from .validation import errors_of
 
 _CONTRADICTED = 3.0  # difference from which a distance is reported, standard errors
 _COMMON = 0.5  # part of the residuals that is systematic: averaging postures does not reduce it
-_REFITS = 2  # largest number of fits without the outliers
 
 
 class Contradiction(NamedTuple):
@@ -163,58 +160,12 @@ def _named(m: Any) -> str:
 # --- outliers -------------------------------------------------------------------------------------
 
 
-def with_outliers(
-    solution: Solution, contradicted: list[Contradiction], given: ParameterPrior | None
-) -> Solution:
+def with_outliers(solution: Solution, contradicted: list[Contradiction]) -> Solution:
     """The fit with its outliers; a known distance is one only if it is contradicted."""
-    # Contacts leave the scale open, so that they shrink to zero size in a fit without the distance
-    # that alone gives it. An outlier distorts the noise, the widths of the prior and the weights of
-    # a fit, so that all are judged again by a fit without those listed.
-    problem, fit = solution.problem, solution.fit
+    fit, measurements = solution.fit, solution.problem.measurements
     if fit.loss is not Loss.SQUARES:
         return solution
-    counts = [m.blocks for m in problem.measurements]
-    trusted = np.repeat([not m.views for m in problem.measurements], counts)
     wrong = np.array([b for c in contradicted for b in c.blocks], dtype=np.int64)
-    outliers = wrong
-    if not len(wrong):
-        rows = fit.orthonormal_rows
-        outliers = outlying(rows, fit.whitened, fit.block, fit.freedom, trusted)
-    for _ in range(_REFITS):
-        rest = _rows_without(solution, outliers, given) if len(outliers) else None
-        if rest is None:
-            break
-        rows, residual, freedom = rest
-        before, outliers = outliers, outlying(rows, residual, fit.block, freedom, trusted, outliers)
-        outliers = np.concatenate([wrong, outliers[~np.isin(outliers, wrong)]])
-        if set(outliers) == set(before):
-            break
+    trusted = np.repeat([not m.views for m in measurements], [m.blocks for m in measurements])
+    outliers = np.concatenate([wrong, fit.outliers[~trusted[fit.outliers]]])
     return replace(solution, fit=replace(fit, outliers=outliers))
-
-
-def _rows_without(
-    solution: Solution, outliers: NDArray[np.int64], given: ParameterPrior | None
-) -> tuple[Array, Array, float] | None:
-    """Orthonormal rows and residuals of all blocks by a fit without some; degrees of freedom.
-
-    None where too little is left.
-    """
-    problem, scales = solution.problem, list(solution.scales)
-    parts = np.split(np.arange(problem.blocks), np.cumsum([m.blocks for m in problem.measurements]))
-    kept = [np.flatnonzero(~np.isin(part, outliers)) for part in parts]
-    numbers = [k for k in range(len(scales)) if len(kept[k])]
-    measurements = [problem.measurements[k].subset(kept[k]) for k in numbers]
-    rest = problem_of(problem.parameters, measurements)
-    if len(rest.fixtures) < problem.F or rest.rows <= problem.P + problem.F:
-        return None
-    values = solution.fixture_values
-    start = np.array([*solution.corrections, *(values[f.name] for f in rest.fixtures)])
-    found = refitted(solution, rest, start, tuple(scales[k] for k in numbers), given)
-    for k, scale in zip(numbers, found.scales, strict=True):
-        scales[k] = scale
-    values = found.fixture_values
-    x = np.array([*found.corrections, *(values[f.name] for f in problem.fixtures)])
-    residual, jacobian = stacked(problem, x, tuple(scales))
-    place = {f.name: problem.P + k for k, f in enumerate(problem.fixtures)}
-    order = [*range(problem.P), *(place[f.name] for f in rest.fixtures)]
-    return jacobian[:, order] @ found.fit.basis, residual, found.fit.freedom

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..estimation import Loss
 from ..estimation.linearised import inverse_factor
 from ..model import RobotModel, check_model
 from .alignment import align_base_and_tool
-from .candidates import candidate_parameters
+from .candidates import chosen_candidates
 from .checks import notes_before
 from .contradiction import contradictions, with_outliers
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
@@ -77,11 +78,10 @@ def fit(
 ) -> CalibrationResult:
     """Estimate the geometric parameters of a robot, also called kinematic calibration.
 
-    Parameters that the measurements do not determine stay nominal or are regrouped into others;
-    the result lists them. All measurements take part in the estimate; the errors on held-out
-    data come from further fits without them. Where the residuals depend on the posture in a way
-    that no parameter explains, a note says so and, with folds, names the term to try next (joint
-    compliance, gear eccentricity, gains) and what it gains on held-out data.
+    Parameters that the measurements do not determine stay nominal or are regrouped into others.
+    All measurements take part; the errors on held-out data come from further fits. Where the
+    residuals depend on the posture in a way that no parameter explains, a note says so and, with
+    folds, names the term to try next and what it gains on held-out data.
 
     Parameters
     ----------
@@ -95,18 +95,15 @@ def fit(
     loss : Loss or str, optional
         ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
-        How large the corrections are expected to be, so that the estimate is the maximum a
-        posteriori. Corrections that contradict it widen it, with a note. None for none:
-        parameters that noise hides still stay nominal.
+        Expected sizes of the corrections; corrections that contradict it widen it, with a note.
+        None for none: parameters that noise hides still stay nominal.
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int
         Largest number of folds of the cross-validation; 0 for none. A fold leaves out whole
-        places (three or more that are touched), else a run of successive postures with all that
-        is measured there.
+        places (three or more that are touched), else a run of successive postures.
     held_out : float, or Measurement or sequence of them
-        Share of the places or postures that one more fit is tested on (0 for none), or
-        measurements for that, which never take part.
+        Share that one more fit is tested on (0 for none), or measurements that never take part.
     rng : numpy.random.Generator or int, optional
         For the folds; default a fixed seed.
 
@@ -143,22 +140,16 @@ def fit(
     loss = Loss.SQUARES if loss is None else chosen(Loss, loss, "loss")
     rng = np.random.default_rng(_SEED if rng is None else rng)
     known, known_lengths = as_names(known), as_names(known_lengths)
-    make_candidates = partial(
-        candidate_parameters,
-        frames=measured_frames((*measured, *test)),
-        base=base,
-        tool=tool,
-        gains=gains,
-        couplings=tuple(couplings),
-        compliance=compliance,
-        eccentricity=eccentricity,
-    )
-    if isinstance(parameters, GeometricParameters):
-        candidates = parameters
-    else:
-        names = None if parameters is None else as_names(parameters)
-        candidates = make_candidates(model)
-        candidates = candidates if names is None else candidates.subset(names)
+    options: dict[str, Any] = {
+        "frames": measured_frames((*measured, *test)),
+        "base": base,
+        "tool": tool,
+        "gains": gains,
+        "couplings": tuple(couplings),
+        "compliance": compliance,
+        "eccentricity": eccentricity,
+    }
+    candidates = chosen_candidates(parameters, model, **options)
     if prior is not None:
         candidates.index(prior.named, "prior")
     as_given = problem_of(candidates, measured)
@@ -169,7 +160,7 @@ def fit(
         aligned = align_base_and_tool(candidates, measured, fixed)
         if aligned is not None:
             aligned_model, nominal = aligned
-            candidates = make_candidates(aligned_model).subset(candidates.names)
+            candidates = chosen_candidates(candidates.names, aligned_model, **options)
     if prior is not None:
         prior = sized(prior, candidates.table.size)
     given_prior = prior
@@ -178,7 +169,7 @@ def fit(
     )
     expected = given_prior and replace(given_prior, strength=solution.fit.prior.strength)
     contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
-    solution = with_outliers(solution, contradicted, expected)
+    solution = with_outliers(solution, contradicted)
     structure = None if implausible(solution) else structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts = partition(model, measured, folds if blocks >= 2 * folds else 0, rng)

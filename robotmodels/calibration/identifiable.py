@@ -16,7 +16,7 @@ from ..estimation import column_basis
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..table_text import boxed
-from .candidates import candidate_parameters
+from .candidates import chosen_candidates
 from .extended_table import Frame
 from .measurements import Measurement, scale_is_observable
 from .measurements.kinds import Kind, as_kind, drawn_groups, measurement_of
@@ -175,23 +175,20 @@ def identifiable_parameters(
 ) -> IdentifiableParameters:
     """Identifiable parameters of a calibration (base parameters of the geometry).
 
-    With kinds of measurement the result is structural: for random configurations within the joint
-    ranges. Contacts are drawn at configurations that satisfy them exactly (several postures of
-    each of several contacts), without joint limits. With measured data the result is that of
-    these data. The base stays as it is if no measurement depends on it.
+    With kinds of measurement the result is structural, for random configurations within the joint
+    ranges, of contacts without these; with measured data it is that of these data. The base stays
+    as it is if no measurement depends on it.
 
     Parameters
     ----------
     model, frame, known_lengths, known, base, tool, gains, couplings, compliance, eccentricity, rng
         See `robotmodels.calibration`; measured data have their own frames. The seed is fixed.
     measurements : kinds or data, one or more
-        Classes (`Pose`, `Position`, `PointContact`) or their names (``"pose"``), or measured
-        data; kinds and data together as well.
+        Classes (`Pose`, `PointContact`) or their names (``"pose"``), or measured data, or both.
     parameters : GeometricParameters or names, optional
         Candidates, in the order of preference, or which of them; default all.
     corrections : array_like, shape (P,), or mapping of names to values, optional
-        Corrections of the candidates (m, rad) at which the rank is computed, as estimated by a
-        fit; default the nominal robot.
+        Corrections of the candidates (m, rad) at which the rank is computed; default none.
 
     Returns
     -------
@@ -216,16 +213,17 @@ def identifiable_parameters(
     frames = measured_frames(data) if data else ()
     if len(data) < len(given):
         frames = tuple(dict.fromkeys((*frames, frame)))
-    if isinstance(parameters, GeometricParameters):
-        if parameters.model is not model and parameters.model != model:
-            raise InvalidValueError("parameters: they were made for another robot.")
-        candidates = parameters
-    else:
-        candidates = candidate_parameters(
-            model, frames, base=base, tool=tool, gains=gains, couplings=couplings,
-            compliance=compliance, eccentricity=eccentricity,
-        )  # fmt: skip
-        candidates = candidates if parameters is None else candidates.subset(parameters)
+    candidates = chosen_candidates(
+        parameters,
+        model,
+        frames,
+        base=base,
+        tool=tool,
+        gains=gains,
+        couplings=couplings,
+        compliance=compliance,
+        eccentricity=eccentricity,
+    )
     xi = None if corrections is None else _all_corrections(candidates, corrections)
     rng = np.random.default_rng(_SEED) if rng is None else rng
     drawn = [

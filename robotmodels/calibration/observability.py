@@ -9,7 +9,6 @@ Source of the exchange algorithm: V. V. Fedorov, "Theory of optimal experiments"
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -20,8 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Frozen, as_exact, as_floats
 from .._arrays.tasks import Workers
 from ..errors import InvalidValueError, ShapeError
-from ..geometry import PRISMATIC
-from ..model import RobotModel
 from .identifiable import IdentifiableParameters
 
 _RANK_TOLERANCE = 1e-14  # a singular value below this part of the largest is zero
@@ -29,8 +26,6 @@ _RIDGE = 1e-12  # added to the information, relative, so that sets that are too 
 _GAIN = 1e-10
 _SWEEPS = 50
 _CHUNK = 4096
-_STEP = 1e-6  # of a configuration, for differences
-_MOVE_SWEEPS, _MOVE_ITERATIONS = 2, 15
 
 
 class Criterion(Enum):
@@ -47,16 +42,10 @@ class Criterion(Enum):
 class Observability(Frozen):
     """The five observability indices (`Criterion`), of m configurations; larger is better for all.
 
-    Parameters
-    ----------
-    o1, o2, o3, o4, o5 : float
-        Volume of the ellipsoid of the effects of errors; its inverse condition (its shape); its
-        shortest axis, the worst combination of parameters; noise amplification index; the harmonic
-        mean of the axes, divided by L.
-    singular_values : ndarray, shape (L,)
-        s_1 >= ... >= s_L, of the scaled matrix.
-    configurations : int
-        m.
+    ``o1`` is the volume of the ellipsoid of the effects of errors, ``o2`` its inverse condition,
+    ``o3`` its shortest axis (the worst combination of parameters), ``o4`` the noise amplification
+    index, ``o5`` the harmonic mean of the axes, divided by L. ``singular_values`` (L,) are those of
+    the scaled matrix, the largest first.
     """
 
     o1: float
@@ -90,20 +79,17 @@ def observability(
 ) -> Observability:
     """Observability indices O1 to O5 of an identification matrix (also: excitation indices).
 
-    O1 orders sets of configurations in the same way whatever the units of the parameters; the
-    others do not, so give comparable columns. Rows of different units should be divided by their
-    standard errors before.
+    Rows of different units should be divided by their standard errors before, and columns be
+    comparable: O1 alone orders sets of configurations in the same way in all units.
 
     Parameters
     ----------
     psi : array_like, shape (m, k, L) or (M, L), or IdentifiableParameters
-        Rows of m configurations, k each, or all rows together. For identifiable parameters: those
-        kept, fixtures eliminated.
+        Rows of m configurations, k each, or all rows; of identifiable parameters those kept.
     configurations : int, optional
-        m; default the first axis of ``psi`` (M rows count as M configurations).
+        m; default the first axis of ``psi``.
     scales : array_like, shape (L,), optional
-        Sizes of the parameters that count as equal (their expected errors, for instance), by which
-        columns are multiplied; default 1.
+        Sizes of the parameters that count as equal, such as expected errors; default 1.
 
     Returns
     -------
@@ -231,64 +217,6 @@ def exchanged(
         work.done(done / total)
     work.done()
     return members
-
-
-def nested(rows: Array, criterion: Criterion) -> NDArray[np.int64]:
-    """Order of a set whose leading subsets are good sets. Shapes: rows (c, k, p) -> (c,)."""
-    left, last = [*range(len(rows))], []
-    while len(left) > 1:
-        part = rows[left]
-        rest = _ridge(rows) + information(part) - part.swapaxes(-1, -2) @ part
-        last.append(left.pop(int(np.argmax(index_of(rest, criterion)))))
-    return np.array([*left, *last[::-1]], dtype=np.int64)
-
-
-def moved_configurations(
-    groups: Array,
-    rows: Array,
-    criterion: Criterion,
-    rows_of: Callable[[Array], Array],
-    is_allowed: Callable[[Array], NDArray[np.bool_]],
-    model: RobotModel,
-) -> Array:
-    """Move configurations one after another where the criterion improves.
-
-    Shapes: groups (count, m, n), rows (count, k, p) -> (count, m, n).
-    """
-    from scipy.optimize import minimize
-
-    groups, rows = groups.copy(), rows.copy()
-    count, m, n = groups.shape
-    lower, upper = np.tile(model.lower, m), np.tile(model.upper, m)
-    sigma = np.tile(model.table.sigma[model.table.joint_rows], m)
-    # without limits strokes would grow without bound, as longer levers are always better
-    endless = (sigma == PRISMATIC) & ~(np.isfinite(lower) & np.isfinite(upper))
-    value = float(index_of(information(rows), criterion))
-    for g in np.tile(np.arange(count), _MOVE_SWEEPS):
-        rest, x0 = information(rows[np.arange(count) != g]), groups[g].ravel()
-        base = rest + _ridge(rows)
-        low, high = np.where(endless, x0, lower), np.where(endless, x0, upper)
-
-        def cost(x: Array, base: Array = base, high: Array = high) -> Any:
-            # a step back from an upper limit, as rows beyond it mean nothing
-            h = np.where(x + _STEP > high, -_STEP, _STEP)
-            points = np.vstack([x, x + np.diag(h)]).reshape(-1, m, n)
-            index = added(base, rows_of(points), criterion)
-            return -float(index[0]), -(index[1:] - index[0]) / h
-
-        start, bounds = np.clip(x0, low, high), list(zip(low, high, strict=True))
-        options = {"maxiter": _MOVE_ITERATIONS}
-        x = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
-        for part in (1.0, 0.5, 0.25, 0.1):
-            trial = np.clip(x0 + part * (x - x0), lower, upper).reshape(1, m, n)
-            if not is_allowed(trial)[0]:
-                continue
-            new = rows_of(trial)
-            after = float(index_of(rest + information(new), criterion))
-            if after > value:
-                groups[g], rows[g], value = trial[0], new[0], after
-                break
-    return groups
 
 
 def information(rows: Array) -> Array:

@@ -16,12 +16,12 @@ from ..csv_table import Column, CsvTable, open_table
 from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
-from ..kinematics import OrientationKind, dgm, pose_from_coordinates
+from ..kinematics import OrientationKind, pose_from_coordinates
 from ..kinematics.coordinates.orientations import orientation_kind
 from ..model import RobotModel, check_model
-from .checks import beyond_limits, unit_error_of_positions
+from .checks import beyond_limits, check_units
 from .extended_table import Frame
-from .measurements import FileRow, Measurement, Pose
+from .measurements import FileRow, Measurement
 from .measurements.base import fields_of, required
 from .measurements.kinds import Kind, as_kind
 from .problem import expected_joints_text
@@ -52,33 +52,27 @@ def read_measurements(
 ) -> Measurement:
     r"""Read measurements of one kind from one or more text files (CSV), a row each.
 
-    Lines that begin with ``#`` are comments. A first line of words is a header with the names of
-    the columns. Without a header columns are given by number, from 0, unless the file holds the
-    readings of the joints and nothing else.
+    Lines that begin with ``#`` are comments; a first line of words is a header. Without one,
+    columns are given by number, from 0, unless the file holds the readings of the joints alone.
 
     Parameters
     ----------
     path : str, Path or iterable of them
-        A file, several, or a folder, whose files that fit ``pattern`` are read in the order of
-        their names.
+        A file, several, or a folder with files that fit ``pattern``, in the order of their names.
     kind : str or class
-        Such as ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``,
-        ``"point_contact"``, ``"relative_pose"``; or the class of a kind.
+        Such as ``"position"``, ``"pose"``, ``"distance"``, ``"point_contact"``; or its class.
     model, sigma, frame
         See `robotmodels.calibration`; the model gives names, number and types of the joints.
     joints, other_joints : sequence of str or int, length n, optional
-        Columns of the readings; default those named as the joints of the robot, or q1 to qn. Of
-        the other end of a distance (without them it is from a pivot) or of a relative pose.
+        Columns of the readings, default those named as the joints or q1 to qn; of the other end of
+        a distance (without them it is from a pivot) or of a relative pose.
     columns : sequence of str or int, optional
-        Columns of the measured coordinates: position, then orientation as ``orientation`` orders
-        it (a quaternion scalar first). Default x, y, z and the names of the orientation's
-        coordinates (for quaternions also qw, qx, qy, qz); ``distance``. Contacts have none.
+        Columns of position, then orientation (a quaternion scalar first); default x, y, z and the
+        names of the orientation's coordinates; ``distance``. Contacts have none.
     label : str or int, optional
-        Column of the label of the touched point, pose, plane or line, of the pivot of a distance,
-        of the board of a camera. Default: the names of the files without their suffix if there
-        are several; else all the same.
+        Column of the labels of targets; default the names of the files if there are several.
     lengths : ``"m"`` or ``"mm"``
-        Unit of positions, distances and the readings of prismatic joints in the file.
+        Unit of lengths in the file, also of the readings of prismatic joints.
     angles, joint_angles : ``"rad"`` or ``"deg"``
         Unit of the angles in the file; of the readings of revolute joints, if another.
     orientation : OrientationKind or str, optional
@@ -166,21 +160,18 @@ def read_measurements(
         values = np.concatenate([t.numbers(_columns(t, "columns", needs, columns)) for t in tables])
     given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
     for f in fields(kind):
-        content, p = f.metadata.get("content"), None
+        content = f.metadata.get("content")
         if content == "joints" and f.name != "q":
             if other_joints is not None or "joints" in required(kind):
                 given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
         elif content == "point":
-            given[f.name] = p = length.factor * values
+            given[f.name] = length.factor * values
         elif content == "length":
             given[f.name] = length.factor * values[:, 0]
         elif content == "pose" and written is not None:
-            given[f.name] = poses = _poses(written, values, length, angle, files[0])
-            p = poses[:, :3, 3] if issubclass(kind, Pose) and _pose_parts(kind)[0] else None
+            given[f.name] = _poses(written, values, length, angle, files[0])
         elif content == "label" and other_joints is None:
             given[f.name] = _labels(tables, label, parts)
-        if p is not None:
-            _check_lengths(p, q, model, length, files[0], frame)
     if rows is not None:
         given["rows"] = rows
     if name or folder is not None:
@@ -190,7 +181,14 @@ def read_measurements(
         for t, part in zip(tables, parts, strict=True)
         for k in range(len(part))
     ]
-    return kind(**given, origin=tuple(origin))
+    measurement = kind(**given, origin=tuple(origin))
+    try:
+        check_units(model, [measurement])
+    except InvalidValueError as error:
+        raise InvalidValueError(
+            f"{files[0]}: {error} The unit of a file is given by lengths=."
+        ) from None
+    return measurement
 
 
 def is_readable(kind: Kind) -> bool:
@@ -284,20 +282,17 @@ def _check_contents(
 ) -> None:
     """Refuse files whose columns are not joint readings. Shapes: readings (N, n)."""
     rows = set(model.twin.frame(frame).path.tolist())
-    other: dict[str, str] = {}
-    for t, q in zip(tables, readings, strict=True):
-        sentences, refused = beyond_limits(model, q, rows)
-        square = np.lib.stride_tricks.sliding_window_view(np.pad(q**2, ((0, 0), (0, 3))), 4, axis=1)
-        near = np.abs(square.sum(axis=-1) - 1.0) < 2.0 * _QUATERNION_TOLERANCE
-        if len(q) > 2 and near.all(axis=0).any():
-            other[t.path.name] = "four columns are unit quaternions: poses"
-        elif refused:
-            other[t.path.name] = f"beyond limits: {sentences[0]}"
+    checked = [
+        (t.path.name, *beyond_limits(model, q, rows)) for t, q in zip(tables, readings, strict=True)
+    ]
+    other = [
+        f"{name} (beyond limits: {sentences[0]})" for name, sentences, refused in checked if refused
+    ]
     if other and len(other) < len(tables):
-        listed = "; ".join(f"{name} ({why})" for name, why in other.items())
         raise InvalidValueError(
             f"path: among {', '.join(t.path.name for t in tables)}, these are not readings of the "
-            f"joints of {model.name}: {listed}. Select the files by pattern='*.csv', or name them."
+            f"joints of {model.name}: {'; '.join(other)}. Select the files by pattern='*.csv', or "
+            "name them."
         )
 
 
@@ -335,18 +330,3 @@ def _check_angles(values: Array, unit: AngleUnit, file: Path, argument: str) -> 
         )
     if look:
         raise InvalidValueError(f"{file}: {look}.")
-
-
-def _check_lengths(
-    p: Array, q: Array, model: RobotModel, unit: LengthUnit, file: Path, frame: Frame
-) -> None:
-    """Refuse positions in another unit. Shapes: p (N, 3), q (N, n)."""
-    # clipped so that squares of wrong columns do not overflow
-    nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
-    error = unit_error_of_positions(model, frame, nominal, p)
-    if error is not None:
-        stated = "metres" if unit is LengthUnit.METRE else "millimetres"
-        symbol = {"metres": "m", "millimetres": "mm"}.get(error.unit)
-        use_symbol = symbol is not None and error.taken == stated
-        advice = f"Use lengths={symbol!r}" if use_symbol else f"Multiply them by {error.factor:.4g}"
-        raise InvalidValueError(f"{file}: positions are {error.sentence(stated)}. {advice}.")

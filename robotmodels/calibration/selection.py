@@ -13,14 +13,15 @@ from .._arrays import Array, Frozen, as_floats
 from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
+from ..geometry import REVOLUTE
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
 from ..obstacles.clearance import checked_obstacles, clearance, links
 from ..obstacles.shapes import Obstacle
-from .candidates import candidate_parameters
+from .candidates import chosen_candidates
 from .extended_table import Frame
 from .identifiable import identifiable_on
-from .measurements import Measurement, whitened
+from .measurements import whitened
 from .measurements.fields import as_sigma
 from .measurements.kinds import Kind, as_kind, drawn_groups, groups_of, measurement_of
 from .observability import (
@@ -30,8 +31,6 @@ from .observability import (
     greedy,
     index_of,
     information,
-    moved_configurations,
-    nested,
     observability,
     whole_number,
 )
@@ -43,6 +42,8 @@ _RANKED = 150  # number of candidate configurations used for the rank test
 _DRAWS = 12
 _CONTACT_TOLERANCE = 1e-6  # m and rad up to which given postures of a contact count as meeting
 _CHUNK = 32
+_STEPS, _NEARBY = (0.3, 0.1, 0.03, 0.01), 20
+"""Sizes of random steps of a selected configuration, by the joint ranges, and their number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,31 +54,19 @@ class SelectedConfigurations(Frozen):
 
     Parameters
     ----------
-    kind : class
-        What shall be measured there.
+    kind, criterion, parameters
+        What shall be measured, the index that was maximised, p parameters that are identified.
     groups : ndarray, shape (count, m, n)
-        Postures of each selected configuration: one for measurements from outside, several for
-        contacts (rad, m).
+        Postures of each configuration: one, or several of a contact; rad, m.
     candidates : ndarray of int, shape (count,)
-        Number of each among the candidates; -1 for those that were moved afterwards.
-    parameters : GeometricParameters
-        p parameters that the candidates identify.
-    criterion : Criterion
-        The index that was maximised.
+        Number of each among the ``pool`` candidates; -1 for those that were moved afterwards.
     observability : Observability
-        Of the selected set. Columns are scaled by the root mean square of their lengths over all
-        candidates, rows by the standard errors of the measurement.
-    counts : ndarray of int, shape (C,)
-        Sizes of first parts that identify all parameters.
-    values : ndarray, shape (C,)
-        The criterion of each.
+        Of the set; columns of unit root mean square over all candidates, rows of unit noise.
+    counts, values, errors : ndarray, shape (C,)
+        Sizes of first parts that identify all parameters; their criterion, and root mean square of
+        the standard errors times the effects of the parameters, in those of the measurement.
     standard_errors : ndarray, shape (C, p)
         Expected standard errors of the parameters (their units) for each.
-    errors : ndarray, shape (C,)
-        Root mean square of the standard errors, each multiplied by the effect of its parameter: in
-        standard errors of the measurement.
-    pool : int
-        Number of candidates.
     left_out : tuple of str
         Candidates that were left out and why, in sentences.
     """
@@ -179,12 +168,9 @@ def select_configurations(
 
     An exchange algorithm takes the best set out of candidates: a greedy set and random ones are
     improved member by member until no single exchange makes them better, and the best is kept.
-    For contacts the candidates are groups of postures that meet exactly on the nominal robot, each
-    group with its own unknown point, pose or plane, and whole groups are exchanged.
-
-    Configurations stay within the joint limits. Obstacles are tested against straight links
-    between the origins of the frames (see `obstacles.clearance`), not against the robot's real
-    bodies, and paths between configurations are not tested.
+    Contacts are exchanged as whole groups of postures that meet on the nominal robot, each with its
+    own unknown target. Configurations stay within the joint limits and clear of obstacles, which
+    are tested against straight links (see `obstacles.clearance`); paths between are not tested.
 
     Parameters
     ----------
@@ -208,8 +194,8 @@ def select_configurations(
     obstacles, radius
         Sphere, Box, Plane, Capsule of `obstacles`; radius of the links, metres.
     optimise : bool
-        Whether the selected configurations are moved afterwards, within limits and clear of
-        obstacles, as long as that helps. Not for contacts.
+        Whether the selected configurations are then exchanged for random ones near them. Not for
+        contacts.
     starts : int
         Sets to start from: a greedy one, the others random.
 
@@ -239,9 +225,7 @@ def select_configurations(
         raise InvalidValueError(
             "optimise: the postures of a contact cannot be moved one by one; draw more candidates."
         )
-    if not isinstance(parameters, GeometricParameters):
-        names, parameters = parameters, candidate_parameters(model, (frame,))
-        parameters = parameters if names is None else parameters.subset(names)
+    parameters = chosen_candidates(parameters, model, (frame,))
     bodies = checked_obstacles(obstacles)
 
     def is_clear(q: Array) -> NDArray[np.bool_]:
@@ -300,18 +284,15 @@ def select_configurations(
         if after > value or not len(best):
             best, value = members, after
     groups, numbers, part = pool[best], numbers[best], scaled[best]
-    if optimise:
-
-        def is_allowed(q: Array) -> NDArray[np.bool_]:
-            return _within_limits(model, q) & is_clear(q)
-
-        def scaled_rows(q: Array) -> Array:
-            return group_rows(kept, kind, q, sigma, frame) / effect
-
-        groups = moved_configurations(groups, part, criterion, scaled_rows, is_allowed, model)
-        numbers = np.where((groups == pool[best]).all(axis=(1, 2)), numbers, -1)
-        part = scaled_rows(groups)
-    order = nested(part, criterion)
+    for size in _STEPS if optimise else ():
+        step = size * _ranges(model) * rng.normal(size=(_NEARBY, *groups.shape))
+        near = np.clip(groups + step, model.lower, model.upper).reshape(-1, *groups.shape[1:])
+        near = near[is_clear(near)]
+        rows = np.concatenate([part, group_rows(kept, kind, near, sigma, frame) / effect])
+        members = exchanged(rows, np.arange(count), criterion, Workers())
+        groups, part = np.concatenate([groups, near])[members], rows[members]
+        numbers = np.where(members < count, numbers[members % count], -1)
+    order = greedy(part, count, criterion)  # so that first parts are good sets, too
     part = part[order]
     counts, values, errors = _curve(part, criterion)
     return SelectedConfigurations(
@@ -348,7 +329,12 @@ def group_rows(
         G = len(part)
         measurement = measurement_of(parameters, kind, groups_of(part), frame=frame)
         problem = problem_of(parameters, [measurement])
-        scale = _noise(measurement, sigma, parameters, frame)
+        units = measurement.units
+        if sigma is None:
+            turn = _LENGTH_NOISE / characteristic_length(parameters.model, frame)
+            scale = np.array([_LENGTH_NOISE if unit == "m" else turn for unit in units])
+        else:
+            scale = as_sigma(sigma, 1, len(units))[0]
         (rows,) = linearised(problem, xi, guessed_fixtures(problem, xi))
         A = whitened(measurement, rows.by_parameters, scale).reshape(G, -1, len(parameters))
         if problem.F:
@@ -360,21 +346,17 @@ def group_rows(
     return np.concatenate(parts)
 
 
-def _noise(
-    measurement: Measurement, sigma: ArrayLike | None, parameters: GeometricParameters, frame: Frame
-) -> Array:
-    """Standard errors of the rows of a block."""
-    units = measurement.units
-    if sigma is None:
-        turn = _LENGTH_NOISE / characteristic_length(parameters.model, frame)
-        return np.array([_LENGTH_NOISE if unit == "m" else turn for unit in units])
-    return as_sigma(sigma, 1, len(units))[0]
-
-
 def _within_limits(model: RobotModel, q: Array) -> NDArray[np.bool_]:
     """Groups (G, m, n) within the joint limits."""
     within = (q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)
     return np.asarray(within.all(axis=(1, 2)))
+
+
+def _ranges(model: RobotModel) -> Array:
+    """Widths of the joint ranges (n,); 0 for endless strokes: longer levers are always better."""
+    width = model.upper - model.lower
+    turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    return np.where(np.isfinite(width), width, 2.0 * np.pi * turns)
 
 
 def _drawn(

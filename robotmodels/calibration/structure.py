@@ -16,7 +16,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import PRISMATIC
@@ -29,7 +28,7 @@ from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import ROUGH, Solution, refitted
-from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of
+from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of, postures_of
 
 _SIGNIFICANCE = 0.01  # level of all tests together
 _INDICATED = 0.05  # significance level at which a family is tried
@@ -62,24 +61,24 @@ class Structure(NamedTuple):
     """Residuals that depend on the posture, and the families of terms that they resemble.
 
     ``p``: p-value of all tests together; ``parameters``: those of the fit, the others of the table
-    and all families; ``is_complete``: whether no parameter of the table is missing among them.
+    and all families.
     """
 
     p: float
     parameters: GeometricParameters
     indicated: tuple[TermFamily, ...]
-    is_complete: bool
 
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
     """Test the residuals of a fit; None without structure, for exact data and few postures."""
-    whole, is_complete = _all_parameters(solution, found)
+    whole = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
     corrections = np.zeros(problem.P)
     corrections[whole.index(solution.problem.parameters.names)] = solution.corrections
     largest = errors_of(problem, corrections, solution.fixture_values).max
     sizes = {"m": whole.table.size, "rad": 1.0}
-    posture = _posture_of_rows(problem)
+    rows = [len(m.axes) for m in problem.measurements for _ in range(m.blocks)]
+    posture = np.repeat(postures_of(problem.measurements), rows)
     count = int(posture.max()) + 1
     if count < _FEWEST or all(e < _ROUNDING * sizes[unit] for unit, e in largest.items()):
         return None
@@ -124,13 +123,11 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
         return None
     best = sorted(p_values, key=lambda family: p_values[family])
     indicated = tuple(family for family in best if p_values[family] < _INDICATED)
-    return Structure(p, whole, indicated, is_complete)
+    return Structure(p, whole, indicated)
 
 
-def _all_parameters(
-    solution: Solution, found: IdentifiableParameters
-) -> tuple[GeometricParameters, bool]:
-    """Parameters of the fit, the others of the table and all families; whether none is missing."""
+def _all_parameters(solution: Solution, found: IdentifiableParameters) -> GeometricParameters:
+    """Parameters of the fit, all families, and the others of the table unless they lack a scale."""
     table = found.candidates.table
     has_masses = bool(table.model.inertia.values.any())
     everything = candidate_parameters(
@@ -144,22 +141,11 @@ def _all_parameters(
     others = {e.name: e for e in everything.entries if e.name not in entries}
     missing = {name for name, e in others.items() if e.law is ErrorLaw.CONSTANT}
     if not needs_a_length(problem_of(everything, solution.problem.measurements)):
-        return GeometricParameters(table, tuple((entries | others).values())), True
+        return GeometricParameters(table, tuple((entries | others).values()))
     # with all lengths free the robot shrinks until nothing is left of a residual
     left_out = missing.union(*(found.of_reason(why) for why in (Reason.KNOWN, Reason.GAUGE)))
     kept = (e for name, e in (entries | others).items() if name not in left_out)
-    return GeometricParameters(table, tuple(kept)), not missing
-
-
-def _posture_of_rows(problem: Problem) -> NDArray[np.int64]:
-    """Number of the posture of each row, shape (M,): blocks with the same readings share it."""
-    numbers: dict[object, int] = {}
-    found = []
-    for k, m in enumerate(problem.measurements):
-        for b in range(m.blocks):
-            key = b"".join(view.q[b].tobytes() for view in m.views) or (k, b)
-            found += [numbers.setdefault(key, len(numbers))] * len(m.axes)
-    return np.array(found, dtype=np.int64)
+    return GeometricParameters(table, tuple(kept))
 
 
 def _unit_columns(columns: Array) -> Array:
@@ -223,7 +209,6 @@ class Trial(NamedTuple):
     errors: Errors
     gain: float
     helps: bool
-    explains_all: bool = False  # its residuals show no structure
 
 
 def trials_of(
@@ -241,7 +226,7 @@ def trials_of(
     ``identify`` gives the identifiable ones of some candidates; ``validation`` are the errors of
     the parts without the family.
     """
-    old, trials, fits = solution.problem.parameters, [], {}
+    old, trials = solution.problem.parameters, []
     for family in structure.indicated:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
         identifiable = identify(replace(candidates, entries=(*candidates.entries, *new)))
@@ -256,13 +241,7 @@ def trials_of(
         done()
         errors = cross_validated(found, parts, nominal, done)
         trials.append(Trial(family, errors, *_gain(validation, errors)))
-        fits[family] = found, identifiable
-    trials.sort(key=lambda trial: -trial.gain)
-    for k, trial in enumerate(trials):
-        if trial.helps:  # the best one alone
-            trials[k] = trial._replace(explains_all=structure_of(*fits[trial.family]) is None)
-            break
-    return trials
+    return sorted(trials, key=lambda trial: -trial.gain)
 
 
 def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
@@ -281,16 +260,11 @@ def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
 def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Errors | None) -> str:
     """Note on residual structure and the recommended term."""
     p = f"p {'<=' if structure.p <= _LEAST_P else '='} {structure.p:.2g}"
-    text = f"The residuals depend on the posture ({p}), and no "
-    text += (
-        "geometric parameter explains it."
-        if structure.is_complete
-        else "estimated parameter explains it; parameters of the table that were left out may be "
-        "the cause."
+    text = (
+        f"The residuals depend on the posture ({p}), and no geometric parameter of the fit explains"
+        " it. Standard errors assume independent residuals and are too small."
     )
-    text += " Standard errors assume independent residuals and are too small."
     helpful = [trial for trial in trials if trial.helps]
-    is_explained = bool(helpful) and helpful[0].explains_all
     if without is None and structure.indicated:
         terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
         text += f" A fit with folds shows whether {terms} explains it."
@@ -300,11 +274,9 @@ def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Er
             for t in helpful
         )
         text += f" Try {helpful[0].family.word} next. Rms error on held-out data: {found}."
-        if not is_explained:
-            text += f" With {helpful[0].family.word} the residuals still depend on the posture."
     if not structure.parameters.model.inertia.values.any():
         text += " Give the model masses (with_inertia) to try joint compliance."
-    if (trials or not structure.indicated) and not is_explained:
+    if not helpful and (trials or not structure.indicated):
         text += (
             " Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."

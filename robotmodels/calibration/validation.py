@@ -246,7 +246,7 @@ def partition(
     seen = [m for m in measurements if m.views]
     if not seen or not folds:
         return Partition((), "", "")
-    posture, names = _postures(seen), [name for m in seen for name in _labels(m)]
+    posture, names = postures_of(seen), [name for m in seen for name in _labels(m)]
     number = {name: k for k, name in enumerate(dict.fromkeys(names))}
     label = np.array([number[name] for name in names])
     fold = np.full(len(posture), -1, dtype=np.int64)
@@ -295,14 +295,14 @@ def partition(
     return Partition(tuple(splits), "; elsewhere ".join(parts), note)
 
 
-def _postures(seen: Sequence[Measurement]) -> Numbers:
-    """Posture index of each block; equal readings have the same index."""
-    found: dict[bytes, int] = {}
+def postures_of(measurements: Sequence[Measurement]) -> Numbers:
+    """Posture of each block, shape (B,): blocks with equal readings have the same number."""
+    found: dict[object, int] = {}
     numbers = []
-    for m in seen:
-        for rows in zip(*(view.q for view in m.views), strict=True):
-            distinct = dict.fromkeys(row.tobytes() for row in rows)
-            numbers.append(found.setdefault(b"".join(distinct), len(found)))
+    for k, m in enumerate(measurements):
+        for b in range(m.blocks):
+            distinct = dict.fromkeys(view.q[b].tobytes() for view in m.views)
+            numbers.append(found.setdefault(b"".join(distinct) or (k, b), len(found)))
     return np.array(numbers, dtype=np.int64)
 
 
