@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calibration_arms import ALONE
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -17,8 +18,6 @@ from robotmodels.calibration import (
 )
 from robotmodels.calibration.alignment import best_motion
 from robotmodels.calibration.other_tool import other_tool_error
-
-ALONE = {"folds": 0, "held_out": 0}
 
 
 def apart(model, real, q, read=None):

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from calibration_arms import ALONE, erroneous
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -26,20 +27,7 @@ from robotmodels.calibration import (
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import FitStatus, confidence_intervals
 
-ALONE = {"folds": 0, "held_out": 0}
-"""A fit without its fits on part of the data."""
 EXACT = 1e-9
-
-
-def erroneous(model, rng, length=1e-3, angle=2e-3, keep=()):
-    """A robot with errors everywhere in its table."""
-    table, f = model.table, model.f
-    parallel = np.abs(np.sin(table.alpha)) < 1e-6
-    sizes = {"alpha": angle, "beta": angle * parallel, "d": length, "theta": angle, "r": length}
-    columns = {x: getattr(table, x) + size * rng.normal(size=f) for x, size in sizes.items()}
-    for name, row in keep:
-        columns[name][row - 1] = getattr(table, name)[row - 1]
-    return model.with_table(dataclasses.replace(table, **columns))
 
 
 def readings(model, rng, count):

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from calibration_arms import ALONE
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -21,9 +22,6 @@ from robotmodels.calibration.measurements import CameraPose, Distance, RelativeP
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError
 from robotmodels.geometry import DHTable
-
-ALONE = {"folds": 0, "held_out": 0}
-"""A fit without its fits on part of the data."""
 
 
 class Arm:

@@ -33,10 +33,9 @@ def candidate_parameters(
 ) -> GeometricParameters:
     """All parameters that a calibration of this robot may estimate, by the book's rules.
 
-    Each frame of the table has alpha, d, theta and r; where its axis is parallel to the one
-    before, or nearly so, beta replaces r (Hayati), because the common perpendicular may be
-    anywhere. The first row has theta and r alone, as the base has the other parameters. Branches
-    have gamma and b as well. Base and tools have the book's six.
+    Each frame of the table has alpha, d, theta and r; where its axis is nearly parallel to the one
+    before, beta replaces r (Hayati). The first row has theta and r alone. Branches have gamma and b
+    as well. Base and tools have the book's six.
 
     Parameters
     ----------

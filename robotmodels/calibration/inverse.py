@@ -40,10 +40,9 @@ def corrected_igm(
 ) -> IGMSolutions:
     """Inverse geometric model of a calibrated robot: the readings of its joints.
 
-    `igm` of the calibrated table gives the solutions. Gains, eccentricity and compliance of the
-    joints are inverted; Newton's method with the Jacobian of the table takes account of links that
-    bend, and of the readings of locked joints. At the edge of its reach a robot that bends may have
-    solutions that its rigid table does not lead to.
+    `igm` of the calibrated table gives the solutions; the laws of the readings are inverted, and
+    Newton's method takes account of links that bend and of locked joints. At the edge of its reach
+    a robot that bends may have solutions that its rigid table does not lead to.
 
     Parameters
     ----------
@@ -52,8 +51,7 @@ def corrected_igm(
     T : array_like, shape (..., 4, 4)
         World poses of the tool, metres.
     q_ref : array_like, shape (..., n), optional
-        Reference readings, rad or m: order of the solutions, and the choice of redundant arms,
-        whose free joints keep them.
+        Reference readings, rad or m: order of the solutions, and free joints of redundant arms.
     limits : bool
         Whether readings must lie within the joint limits, whole turns of the joints added.
     tolerance : float

@@ -27,10 +27,7 @@ from .parameters import ErrorLaw, GeometricParameters
 _STEPS = 200
 _ROUNDING, _WRONG = 1e-15, 1e-12  # of joint variables, relative to the largest plus 1
 
-_LAW_WORDS = {
-    ErrorLaw.GAIN: "Gains and couplings of the readings are",
-    ErrorLaw.COMPLIANCE: "Compliance of the joints is",
-}
+_LAW_WORDS = {ErrorLaw.GAIN: "Gains", ErrorLaw.COMPLIANCE: "Compliance"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,8 +155,8 @@ class CalibratedRobot(Frozen):
     def notes(self) -> tuple[str, ...]:
         """Errors that ``model`` alone, or a URDF of it, does not hold, in sentences."""
         table, bent, present = self.parameters.table, self.bent_rows, self.joint_errors.laws.entries
-        words = {_LAW_WORDS.get(e.law, "Eccentricity of the encoders is") for e in present}
-        notes = [f"{what} in joint_errors, not in model." for what in sorted(words, reverse=True)]
+        words = sorted({_LAW_WORDS.get(e.law, "Eccentricity") for e in present}, reverse=True)
+        notes = [f"{what} of the joints: in joint_errors, not in model." for what in words]
         if bent:
             places = ["tilt of the mount"] if bent[0] == 0 else []
             links = ", ".join(table.row_name(row) for row in bent if row)

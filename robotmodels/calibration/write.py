@@ -28,9 +28,8 @@ _COLUMNS = (
 def write_result(result: CalibrationResult, path: str | Path) -> None:
     """Write a calibration to a file whose suffix gives its format.
 
-    ``.json`` and ``.yaml`` hold the same (SI units, stated beside each parameter; null for numbers
-    that are not finite), what other programs need; ``.urdf`` is that of `calibrated_urdf`. YAML
-    needs PyYAML. To keep everything and go on with it in Python, pickle the result.
+    ``.json`` and ``.yaml`` (needs PyYAML) hold the same: SI units, null for numbers that are not
+    finite; ``.urdf`` is that of `calibrated_urdf`. To go on in Python, pickle the result.
 
     Parameters
     ----------
@@ -160,16 +159,13 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     """URDF text of the calibrated robot: its own URDF, calibrated in place.
 
     Of a robot read by `RobotModel.from_urdf` only the ``<origin>`` elements of joints between the
-    base and the measured ends change. The link that is its tool (``tip_link``) and measured
-    links are the calibrated ones. All links, joints, meshes, masses, limits and comments stay;
-    what is fixed to a link moves with it. A robot without such a source is written by `to_urdf`.
+    base and the measured ends change; the link that is its tool (``tip_link``) and measured links
+    are the calibrated ones. A robot without such a source is written by `to_urdf`.
 
-    - Base: the first joint of the chain, if it is fixed, takes the new origin. Without a fixed
-      first joint, a new root link ``world`` is added; if ``base_link`` was given, the origin of
-      the first moving joint changes instead.
-    - Tool: a tool without a link (`RobotModel.with_tool`) becomes a new link ``tool``; the tip
-      link is unchanged. If the tool link is the child of a moving joint whose axis changes
-      relative to it, a new link is inserted between them, and its meshes move with it.
+    The base is in the first joint if that is fixed; else a root link ``world`` is added, or, if
+    ``base_link`` was given, the first moving joint changes. A tool without a link becomes a new
+    link ``tool``. Where the axis of a moving joint changes relative to its link that is measured, a
+    new link is inserted between them.
 
     Parameters
     ----------
@@ -179,9 +175,8 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     Returns
     -------
     str
-        Text that `RobotModel.from_urdf` reads back to the same poses of the tool and the measured
-        links, with the same ``base_link`` and ``tip_link`` (``tip_link="tool"`` if that is new).
-        Its joint variables are the positions of the joints, not their readings.
+        Text that `RobotModel.from_urdf` reads back to the same poses with the same ``base_link``
+        and ``tip_link``. Its joint variables are positions of the joints, not readings.
 
     Raises
     ------
