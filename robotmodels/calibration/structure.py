@@ -28,7 +28,14 @@ from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import ROUGH, Solution, refitted
-from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of, postures_of
+from .validation import (
+    Errors,
+    HeldOutErrors,
+    Partition,
+    cross_validated,
+    errors_of,
+    posture_numbers,
+)
 
 _SIGNIFICANCE = 0.01  # level of all tests together
 _INDICATED = 0.05  # significance level at which a family is tried
@@ -78,7 +85,7 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
     largest = errors_of(problem, corrections, solution.fixture_values).max
     sizes = {"m": whole.table.size, "rad": 1.0}
     rows = [len(m.axes) for m in problem.measurements for _ in range(m.blocks)]
-    posture = np.repeat(postures_of(problem.measurements), rows)
+    posture = np.repeat(posture_numbers(problem.measurements), rows)
     count = int(posture.max()) + 1
     if count < _FEWEST or all(e < _ROUNDING * sizes[unit] for unit, e in largest.items()):
         return None

@@ -246,7 +246,7 @@ def partition(
     seen = [m for m in measurements if m.views]
     if not seen or not folds:
         return Partition((), "", "")
-    posture, names = postures_of(seen), [name for m in seen for name in _labels(m)]
+    posture, names = posture_numbers(seen), [name for m in seen for name in _labels(m)]
     number = {name: k for k, name in enumerate(dict.fromkeys(names))}
     label = np.array([number[name] for name in names])
     fold = np.full(len(posture), -1, dtype=np.int64)
@@ -295,7 +295,7 @@ def partition(
     return Partition(tuple(splits), "; elsewhere ".join(parts), note)
 
 
-def postures_of(measurements: Sequence[Measurement]) -> Numbers:
+def posture_numbers(measurements: Sequence[Measurement]) -> Numbers:
     """Posture of each block, shape (B,): blocks with equal readings have the same number."""
     found: dict[object, int] = {}
     numbers = []
