@@ -131,11 +131,7 @@ def _part(
     """The problem with some measurements alone, or without them, and their noise."""
     problem = solution.problem
     chosen = [k for k in range(len(problem.measurements)) if (k in numbers) is kept]
-    part = replace(
-        problem,
-        measurements=tuple(problem.measurements[k] for k in chosen),
-        factors=tuple(problem.factors[k] for k in chosen),
-    )
+    part = replace(problem, measurements=tuple(problem.measurements[k] for k in chosen))
     return part, tuple(solution.scales[k] for k in chosen)
 
 

@@ -42,10 +42,14 @@ class Criterion(Enum):
 class Observability(Frozen):
     """The five observability indices (`Criterion`), of m configurations; larger is better for all.
 
-    ``o1`` is the volume of the ellipsoid of the effects of errors, ``o2`` its inverse condition,
-    ``o3`` its shortest axis (the worst combination of parameters), ``o4`` the noise amplification
-    index, ``o5`` the harmonic mean of the axes, divided by L. ``singular_values`` (L,) are those of
-    the scaled matrix, the largest first.
+    Parameters
+    ----------
+    o1, o2, o3, o4, o5 : float
+        Volume of the ellipsoid of the effects of errors; its inverse condition; its shortest axis,
+        the worst combination of parameters; noise amplification index; harmonic mean of the axes
+        divided by L.
+    singular_values, configurations : ndarray, shape (L,), and int
+        Of the scaled matrix, the largest first; m.
     """
 
     o1: float

@@ -6,7 +6,7 @@ Source: Seed book section 1.4.5.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -31,7 +31,13 @@ class Problem(Rebuilt):
     parameters: GeometricParameters
     measurements: tuple[Measurement, ...]
     fixtures: tuple[Fixture, ...]
-    factors: tuple[tuple[Array, ...], ...]
+    factors: tuple[tuple[Array, ...], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        factors = (
+            tuple(self.parameters.factors(view.q) for view in m.views) for m in self.measurements
+        )
+        object.__setattr__(self, "factors", tuple(factors))
 
     @property
     def P(self) -> int:
@@ -92,16 +98,7 @@ def problem_of(
                 )
         for fixture in m.fixtures:
             fixtures.setdefault(fixture.name, fixture)
-    return _problem(parameters, measurements, tuple(fixtures.values()))
-
-
-def _problem(
-    parameters: GeometricParameters,
-    measurements: tuple[Measurement, ...],
-    fixtures: tuple[Fixture, ...],
-) -> Problem:
-    factors = tuple(tuple(parameters.factors(view.q) for view in m.views) for m in measurements)
-    return Problem(parameters, measurements, fixtures, factors)
+    return Problem(parameters, measurements, tuple(fixtures.values()))
 
 
 def expected_joints_text(model: RobotModel) -> str:
@@ -209,4 +206,4 @@ def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
         for m in problem.measurements
     ]
     measurements = tuple(m for m in moved if m is not None)
-    return _problem(problem.parameters, measurements, problem.fixtures)
+    return replace(problem, measurements=measurements)

@@ -132,7 +132,7 @@ def _measurements(result: CalibrationResult) -> Section:
 
 def files_sentence(measurement: Measurement) -> str:
     """Files that a measurement was read from; empty if it was not."""
-    files = ", ".join(str(file) for file in measurement.files)
+    files = ", ".join(f"{name} ({rows} rows)" for name, rows in measurement.files)
     return f"Read for {measurement.name}: {files}." if files else ""
 
 

@@ -100,7 +100,7 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
                 "rows": m.axes,
                 "units": m.units,
                 "noise": None if states_noise(m) else scale,
-                "files": [{"name": file.name, "rows": file.rows} for file in m.files],
+                "files": [{"name": name, "rows": rows} for name, rows in m.files],
             }
             for m, scale in measurements
         ],

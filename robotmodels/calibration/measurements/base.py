@@ -22,7 +22,7 @@ from ..._arrays import Array
 from ...errors import InvalidValueError
 from ..differential import DifferentialModel as Evaluation
 from ..extended_table import Frame
-from .fields import NOISE, FileRow, FileRows, Given, as_covariance, as_sigma
+from .fields import NOISE, FileRow, Given, as_covariance, as_sigma
 
 Row = tuple[str, str]
 """Label and unit, ``"m"`` or ``"rad"``, of a row of residuals or of an unknown coordinate."""
@@ -137,9 +137,9 @@ class Measurement(_Declared):
         return _rebuilt, (type(self), plain)
 
     @property
-    def files(self) -> tuple[FileRows, ...]:
+    def files(self) -> tuple[tuple[str, int], ...]:
         """Files that it was read from, with their numbers of rows; none if it was not."""
-        return tuple(FileRows(*item) for item in Counter(row.name for row in self.origin).items())
+        return tuple(Counter(row.name for row in self.origin).items())
 
     @property
     def blocks(self) -> int:

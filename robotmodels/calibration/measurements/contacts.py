@@ -39,6 +39,24 @@ from .poses import mean_poses, target_poses
 from .positions import target_points
 
 
+def _as_plane(value: Any, name: str) -> Array:
+    plane = as_exact(value, (4,), name)
+    length = float(np.linalg.norm(plane[:3]))
+    if abs(length - 1.0) > 1e-6:
+        raise InvalidValueError(
+            f"{name}: expected a normal of length 1 and an offset in metres, got a normal of "
+            f"length {length:.6g}. Divide all four numbers by it."
+        )
+    return read_only(np.append(unit_vector(plane[:3]), plane[3]))
+
+
+def _as_line(value: Any, name: str) -> Array:
+    line = as_exact(value, (2, 3), name)
+    if not line[1].any():
+        raise InvalidValueError(f"{name}: expected a direction in the second row, got zeros.")
+    return read_only(np.array([line[0], unit_vector(line[1])]))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PointContact(Contact):
     """Touches of points by the end's origin: a ball in a socket, a tip in a centre hole."""
@@ -124,9 +142,7 @@ class PlaneContact(Contact):
 
     q: Array = field(metadata=fields.READINGS)
     plane: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(
-        default=None, metadata=fields.targets(lambda value, name: _as_plane(value, name))
-    )
+    known: Given = field(default=None, metadata=fields.targets(_as_plane))
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
     frame: Frame = None
@@ -170,17 +186,6 @@ class PlaneContact(Contact):
         return np.append(normal, normal @ T[:3, 3])
 
 
-def _as_plane(value: Any, name: str) -> Array:
-    plane = as_exact(value, (4,), name)
-    length = float(np.linalg.norm(plane[:3]))
-    if abs(length - 1.0) > 1e-6:
-        raise InvalidValueError(
-            f"{name}: expected a normal of length 1 and an offset in metres, got a normal of "
-            f"length {length:.6g}. Divide all four numbers by it."
-        )
-    return read_only(np.append(unit_vector(plane[:3]), plane[3]))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class LaserLine(Contact):
     """The end's origin on straight lines: a reflector in a laser beam, a tip on a stretched wire.
@@ -195,9 +200,7 @@ class LaserLine(Contact):
 
     q: Array = field(metadata=fields.READINGS)
     line: Given = field(default=None, metadata=fields.LABELS)
-    known: Given = field(
-        default=None, metadata=fields.targets(lambda value, name: _as_line(value, name))
-    )
+    known: Given = field(default=None, metadata=fields.targets(_as_line))
     sigma: Given = field(default=None, metadata=fields.NOISE)
     covariance: Given = field(default=None, metadata=fields.NOISE)
     frame: Frame = None
@@ -237,13 +240,6 @@ class LaserLine(Contact):
     def target_at(T: Array, rng: np.random.Generator) -> Array:
         """A line with a random direction through the end's origin."""
         return np.array([T[:3, 3], rng.normal(size=3)])
-
-
-def _as_line(value: Any, name: str) -> Array:
-    line = as_exact(value, (2, 3), name)
-    if not line[1].any():
-        raise InvalidValueError(f"{name}: expected a direction in the second row, got zeros.")
-    return read_only(np.array([line[0], unit_vector(line[1])]))
 
 
 def _coordinates(line: Array) -> Array:

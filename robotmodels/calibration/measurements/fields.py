@@ -22,16 +22,6 @@ Given = Any
 Metadata = dict[str, Any]
 
 
-class FileRows(NamedTuple):
-    """Name and number of rows of a file."""
-
-    name: str
-    rows: int
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.rows} rows)"
-
-
 class FileRow(NamedTuple):
     """Row of a file, counted from 1 without the header."""
 
