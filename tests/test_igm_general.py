@@ -4,12 +4,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from identities.chain_search import apart, draw, missing, searched
 from scipy.optimize import brentq
 
 import robotmodels as rm
 from robotmodels.igm.elimination import elimination_solutions, prepare_elimination
 from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.motion import jacobians, tool_poses
+from robotmodels.igm.motion import jacobians
+from robotmodels.igm.motion import tool_poses as poses
 from robotmodels.igm.singular import complete
 from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.robots import load
@@ -45,68 +47,34 @@ def solver_of(chain):
     return prepare_elimination(chain)
 
 
-def poses(chain, q):
-    return tool_poses(chain, q)
-
-
 def residuals(U, T):
-    """Position [m] and angle [rad] missing, the larger one, and twice the sine times the axis."""
-    E = U[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
-    sine = np.stack([E[..., j, i] - E[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
-    angle = np.arctan2(np.linalg.norm(sine, axis=-1), np.trace(E, axis1=-2, axis2=-1) - 1.0)
-    return np.maximum(np.linalg.norm(U[..., :3, 3] - T[..., :3, 3], axis=-1), angle), sine
-
-
-def apart(sigma, a, b):
-    d = np.abs(a - b)
-    return np.max(np.where(sigma == 0, np.minimum(d, 2 * np.pi - d), d), axis=-1)
-
-
-def draw(chain, N, rng):
-    return np.where(
-        chain.sigma == 1, rng.uniform(-0.7, 0.7, (N, 6)), rng.uniform(-np.pi, np.pi, (N, 6))
-    )
-
-
-def searched(chain, U, rng, starts=3000):
-    """Postures found by Newton's method from many random starts."""
-    q = draw(chain, starts, rng)
-    for _ in range(40):
-        T, J = poses(chain, q), jacobians(chain, q)
-        sine = residuals(U, T)[1]
-        e = np.concatenate([U[:3, 3] - T[:, :3, 3], 0.5 * sine], axis=1)
-        step = (np.linalg.pinv(J, rcond=1e-12) @ e[..., None])[..., 0]
-        largest = np.maximum(np.max(np.abs(step), axis=1), 1e-9)
-        q = q + step * np.minimum(1.0, 0.5 / largest)[:, None]
-    q = q[residuals(U, poses(chain, q))[0] < 1e-10]
-    q = np.where(chain.sigma == 0, np.remainder(q + np.pi, 2 * np.pi) - np.pi, q)
-    found = []
-    for one in q:
-        if all(apart(chain.sigma, one, other) > 1e-5 for other in found):
-            found.append(one)
-    return np.array(found)
+    """The larger of the position [m] and the angle [rad] that are missing."""
+    e, both = missing(U, T), U[..., :3, :3] * T[..., :3, :3]
+    cosine = 0.5 * (both.sum(axis=(-1, -2)) - 1.0)
+    angle = np.arctan2(np.linalg.norm(e[..., 3:], axis=-1), cosine)
+    return np.maximum(np.linalg.norm(e[..., :3], axis=-1), angle)
 
 
 def check(chain, U, q, valid, within=2e-13):
     """Every valid row meets its pose and is there once; the others are NaN."""
     assert np.all(np.isfinite(q) == valid[..., None])
-    assert np.all(valid == (np.arange(16) < valid.sum(axis=1)[:, None]))
+    assert np.all(valid == (np.arange(valid.shape[1]) < valid.sum(axis=1)[:, None]))
     i, k = np.nonzero(valid)
     if i.size == 0:
         return
     rows = q[i, k]
-    assert residuals(U[i], poses(chain, rows))[0].max() < within
+    assert residuals(U[i], poses(chain, rows)).max() < within
     angles = rows[:, chain.sigma == 0]
     assert np.all((angles > -np.pi) & (angles <= np.pi))
     for n in range(U.shape[0]):
         found = q[n][valid[n]]
-        d = apart(chain.sigma, found[:, None], found[None]) + 10.0 * np.eye(len(found))
+        d = apart(chain, found[:, None], found[None]) + 10.0 * np.eye(len(found))
         assert found.size == 0 or d.min() > 1e-7
 
 
 def lost(chain, wanted, q, valid, within=1e-6):
     """How many of ``wanted (N, 6)`` are not among the postures."""
-    d = np.where(valid, apart(chain.sigma, np.nan_to_num(q), wanted[:, None]), np.inf)
+    d = np.where(valid, apart(chain, np.nan_to_num(q), wanted[:, None]), np.inf)
     return int(np.sum(d.min(axis=1) > within))
 
 
@@ -149,13 +117,8 @@ def manocha_canny():
     table, tool = rm.DHTable.from_standard(
         [
             {"theta": 0.0, "d": d, "a": a, "alpha": np.deg2rad(alpha)}
-            for a, d, alpha in (
-                (0.3, 0.0, 90.0),
-                (1.0, 0.0, 1.0),
-                (0.0, 0.2, 90.0),
-                (1.5, 0.0, 1.0),
-                (0.0, 0.0, 90.0),
-                (0.0, 0.0, 1.0),
+            for a, d, alpha in zip(
+                (0.3, 1.0, 0.0, 1.5, 0, 0), (0, 0, 0.2, 0, 0, 0), (90, 1) * 3, strict=True
             )
         ]
     )
@@ -174,7 +137,7 @@ def test_the_sixteen_postures_of_manocha_and_canny():
     q, valid = elimination_solutions(solver_of(chain), U[None])
     assert valid.all()
     check(chain, U[None], q, valid)
-    d = apart(chain.sigma, q[0][:, None], printed[None])
+    d = apart(chain, q[0][:, None], printed[None])
     match = np.argmin(d, axis=1)
     assert sorted(match) == list(range(16))
     # degrees: the printed decimals, and their rounding seen through the Jacobian
@@ -197,7 +160,7 @@ def test_random_arms_give_back_every_configuration(slide):
     assert np.all(valid.sum(axis=1) % 2 == 0)
     one, alone = elimination_solutions(solver, U[200:201])
     assert alone.sum() == valid[200].sum()
-    assert all(apart(chain.sigma, row, q[200][valid[200]]).min() < 1e-9 for row in one[0][alone[0]])
+    assert all(apart(chain, row, q[200][valid[200]]).min() < 1e-9 for row in one[0][alone[0]])
 
 
 @pytest.mark.parametrize(("seed", "sigma"), [(0, REVOLUTE), (1, REVOLUTE), (2, (0, 1, 0, 0, 0, 0))])
@@ -207,9 +170,9 @@ def test_the_count_is_that_of_an_independent_search(seed, sigma, rng):
     U = poses(chain, draw(chain, 2, np.random.default_rng(seed + 50)))
     q, valid = elimination_solutions(solver_of(chain), U)
     for n in range(2):
-        others = searched(chain, U[n], rng)
+        others = searched(chain, U[n], rng, 3000)
         assert len(others) == valid[n].sum()
-        nearest = [apart(chain.sigma, one, q[n][valid[n]]).min() for one in others]
+        nearest = [apart(chain, one, q[n][valid[n]]).min() for one in others]
         assert max(nearest) < 1e-6
 
 
@@ -275,18 +238,13 @@ def test_near_singular_poses(chain, eps):
     none = np.zeros(q0.shape)
     found = postures(solver_of(chain), U, none, Tolerances())
     found = complete(chain, U, found, none, Tolerances())
-    q, valid, double = (
-        np.full((40, 16, *np.shape(a)[2:]), blank, a.dtype)
-        for a, blank in ((found.q, np.nan), (found.valid, False), (found.double, False))
-    )
-    for whole, part in ((q, found.q), (valid, found.valid), (double, found.double)):
-        whole[:, : part.shape[1]] = part
+    q, valid, double = found.q, found.valid, found.double
     check(chain, U, q, valid)
     reach = left_open(chain, q0)
     assert lost(chain, q0, q, valid, within=reach) == 0
     if eps == 0.0:
         # one that is double, or where rounding splits the fold two that are as near as that
-        away = apart(chain.sigma, np.nan_to_num(q), q0[:, None])
+        away = apart(chain, np.nan_to_num(q), q0[:, None])
         near = valid & (away < 2.0 * reach[:, None])
         assert ((near & double).any(axis=1) | (near.sum(axis=1) >= 2)).all()
         assert np.count_nonzero(double.any(axis=1)) >= 38

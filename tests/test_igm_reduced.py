@@ -222,31 +222,6 @@ def test_poses_with_few_digits(word):
     assert not rm.igm(model, T).valid.any()
 
 
-def test_the_exercise():
-    model = arm("lab_trr")
-    B = np.array([[[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1.0]]])
-    # pose A has four digits
-    A = rm.dgm(model, [-0.3, -np.pi / 4, -np.pi / 4]).round(4)
-    found = rm.igm(model, A, position_tolerance=1e-4, orientation_tolerance=1e-4)
-    np.testing.assert_allclose(found.q, [[-0.3, -np.pi / 4, -np.pi / 4]], atol=1e-4)
-    assert 1e-6 < found.residual[0] <= 1e-4
-    # the position of pose B is a double root at the end of the arm's reach
-    found = solved(model, B, POINT, "tool")
-    np.testing.assert_allclose(found.q, [[[0.2, 0.0, 0.0]]], atol=1e-9)
-    assert found.double.all()
-    assert not found.family_joints.any()
-    start = rm.dgm(model, [-0.3, -np.pi / 4, -np.pi / 4])
-    path = np.tile(start, (50, 1, 1))
-    path[:, :3, 3] = np.linspace(start[:3, 3], B[0, :3, 3], 50)
-    assert solved(model, path, POINT).count.tolist() == [*[2] * 49, 1]
-    # a little beyond: no solution, unless the tolerance admits it
-    B[0, 0, 3] += 2e-5
-    assert rm.igm(model, B, mask=flags(POINT)).count == 0
-    near = rm.igm(model, B, mask=flags(POINT), position_tolerance=1e-4)
-    assert near.count == 1
-    np.testing.assert_allclose(near.residual, 2e-5, rtol=1e-3)
-
-
 def test_double_roots_and_self_motions():
     scara = arm("cobra_s600")
     for elbow, double in ((0.0, True), (0.4, False)):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError, ShapeError
 
 ARMS = (
     "panda", "erd:xarm7", "erd:talos_left_arm", "erd:tiago_arm", "erd:z1", "erd:baxter_left_arm",
@@ -112,18 +111,6 @@ def test_random_arms_answer_within_their_budget(k, poses):
     assert not rm.igm(model, T).valid.any()
 
 
-def test_a_point_for_an_arm_of_six_joints():
-    """Three joints are free, and a reference that does not reach the point is approached."""
-    model = rm.load("ur5")
-    q = drawn(model, 3, seed=12)
-    T = rm.dgm(model, q)
-    found = rm.igm(model, T, mask=[1, 1, 1, 0, 0, 0])
-    assert np.all(found.count > 0)
-    n, s = np.nonzero(found.valid)
-    assert np.abs(rm.dgm(model, found.q[n, s])[:, :3, 3] - T[n, :3, 3]).max() < 1e-9
-    assert np.all(found.free_joints[n, s].sum(axis=1) == 3)
-
-
 # --- relations ------------------------------------------------------------------------------------
 
 RELATIONS = [
@@ -190,13 +177,6 @@ def test_two_relations_of_eight_joints():
             moved = np.abs(delta(model, found.q[0], q[0]))[:, arm].max(axis=-1)
             assert np.nanmin(moved) < 1e-6
         A[0, arm[2]] = -1.0
-
-
-def test_relations_that_are_none():
-    model = rm.load("panda")
-    for A, b in (([[1, 0, 0]], [0.0]), ([[0] * 7], [0.0]), ([[np.nan] * 7], [0.0]), ([[1] * 7], 0)):
-        with pytest.raises((ShapeError, InvalidValueError), match="relations"):
-            rm.igm(model, np.eye(4), relations=(A, b))
 
 
 # --- slides ---------------------------------------------------------------------------------------
@@ -302,9 +282,3 @@ def test_solutions_by_search_are_incomplete_behind_a_mask():
     found = rm.igm(model, rm.dgm(model, [0.2, 0.5, 0.3, 0.7]), mask=[1, 0, 1, 1, 1, 1])
     assert "Newton" in found.method
     assert found.status == rm.IGMStatus.INCOMPLETE
-
-
-def test_a_bool_is_no_value_of_a_locked_joint():
-    model = rm.load("iiwa14")
-    with pytest.raises(InvalidValueError, match="finite number for joint 1, got True"):
-        rm.igm(model, np.eye(4), lock={1: True})

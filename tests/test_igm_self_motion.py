@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from identities.chain_search import apart, draw, missing, searched
 
 from robotmodels.igm.families import prepare
 from robotmodels.igm.kernels.singular import curve
@@ -34,46 +35,6 @@ def arm(name, backwards=False):
     return chain, prepare(chain)
 
 
-def missing(U, T):
-    """Position [m] and the sine of the angle missing, (..., 6)."""
-    E = U[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
-    turn = [
-        E[..., 2, 1] - E[..., 1, 2],
-        E[..., 0, 2] - E[..., 2, 0],
-        E[..., 1, 0] - E[..., 0, 1],
-    ]
-    return np.concatenate([U[..., :3, 3] - T[..., :3, 3], 0.5 * np.stack(turn, -1)], axis=-1)
-
-
-def apart(chain, a, b):
-    d = np.abs(a - b)
-    return np.where(chain.sigma == 0, np.minimum(d, 2 * np.pi - d), d).max(axis=-1)
-
-
-def draw(chain, N, rng):
-    q = rng.uniform(-np.pi, np.pi, (N, chain.k))
-    return np.where(chain.sigma == 0, q, 0.2 * q)
-
-
-def searched(chain, U, free, values, rng, starts=400):
-    """Postures with some joints at given values, by Gauss-Newton from many random starts."""
-    q, rest = draw(chain, starts, rng), ~free
-    q[:, free] = values
-    for _ in range(50):
-        T, J = poses(chain, q), jacobians(chain, q)
-        step = (np.linalg.pinv(J[:, :, rest], rcond=1e-9) @ missing(U, T)[..., None])[..., 0]
-        largest = np.abs(step).max(axis=1)[:, None]
-        q[:, rest] += step * np.minimum(1.0, 0.5 / np.maximum(largest, 1e-9))
-    T = poses(chain, q)
-    met = (np.abs(missing(U, T)).max(axis=1) < 1e-9) & (np.einsum("ij,nij->n", U, T) > 3.0)
-    q = np.where(chain.sigma == 0, np.remainder(q + np.pi, 2 * np.pi) - np.pi, q)
-    found = []
-    for one in q[met]:
-        if all(apart(chain, one, other) > 1e-4 for other in found):
-            found.append(one)
-    return found
-
-
 def settled(chain, solver, q, reference):
     """Postures of the poses of q; each meets its pose and is there once, packed."""
     U = poses(chain, q)
@@ -100,7 +61,7 @@ def agrees_with_search(chain, U, out, reference, rng):
     for n in range(len(U)):
         members = out.q[n][out.family[n]]
         for free in np.unique(out.free[n][out.family[n]], axis=0):
-            others = searched(chain, U[n], free, reference, rng)
+            others = searched(chain, U[n], rng, free=free, values=reference)
             for one in others:
                 assert apart(chain, one, out.q[n][out.valid[n]]).min() < 1e-5
             rows = members[(out.free[n][out.family[n]] == free).all(axis=1)]
@@ -240,7 +201,7 @@ def test_the_nearest_value_where_the_reference_is_out_of_reach(rng):
             np.remainder(2.5 - out.q[n, r, 0] + np.pi, 2 * np.pi) - np.pi
         )
         free = np.arange(6) == 0
-        for one in searched(chain, U[n], free, closer, rng, 200):
+        for one in searched(chain, U[n], rng, 200, free, closer):
             assert apart(chain, one, out.q[n, r]) > 0.05
 
 
