@@ -20,7 +20,7 @@ Q = np.zeros((4, 2))
 @pytest.mark.parametrize(
     ("given", "error", "words"),
     [
-        ({"dt": 0.0}, InvalidValueError, "dt: expected the sampling period in seconds"),
+        ({"dt": 0.0}, InvalidValueError, "dt: expected a finite number"),
         ({"q": np.zeros(4)}, ShapeError, r"q: expected samples of shape \(N, n\)"),
         ({"tau": np.zeros((3, 2))}, ShapeError, r"tau: expected shape \(4, 2\) as q has it"),
         ({"names": ("one",)}, ShapeError, "names: expected 2 names of joints, got 1"),

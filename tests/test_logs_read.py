@@ -346,7 +346,7 @@ def test_the_tx40_is_read_from_two_files_by_row(tmp_path):
         ({"positions": [1, 2]}, "3 columns.*for 2 columns of positions"),
         ({"signs": [1, 2, 1]}, "expected 1 or -1"),
         ({"gears": [1.0, 0.0, 1.0]}, "other than zero"),
-        ({"dt": -1.0}, "dt: expected the sampling period"),
+        ({"dt": -1.0}, "dt: expected a finite number"),
         ({"joints": ["a"]}, "3 columns.*but 1 joints"),
         ({"time": False}, "no column of times"),
     ],

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats, as_number, read_only
+from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
 
 ARRAYS = ("q", "tau", "v", "a", "q_ref", "v_ref")
@@ -95,13 +95,8 @@ class Log(Rebuilt):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        period = as_floats(self.dt, "dt")
-        if period.ndim != 0 or not period > 0.0:
-            raise InvalidValueError(
-                f"dt: expected the sampling period in seconds, got {self.dt!r:.60}."
-            )
-        as_bounded(period, "dt", _LONGEST, 1.0 / _LONGEST)
-        values: dict[str, Any] = {"dt": float(period), "q": _samples(self.q, "q", None)}
+        dt = as_number(self.dt, "dt", least=1.0 / _LONGEST, below=_LONGEST)
+        values: dict[str, Any] = {"dt": dt, "q": _samples(self.q, "q", None)}
         N, n = values["q"].shape
         for name in ARRAYS[1:]:
             if (given := getattr(self, name)) is not None or name == "tau":

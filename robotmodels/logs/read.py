@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats
+from .._arrays import Array, as_exact, as_floats, as_number
 from ..csv_table import Column
 from ..drive import Transmission
 from ..errors import InvalidValueError
@@ -146,8 +146,7 @@ def read_log(
             f"torques_from: expected a file for each of the {len(files)} of path, got "
             f"{len(others)}."
         )
-    if dt is not None and (as_floats(dt, "dt").ndim or not dt > 0.0):
-        raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.60}.")
+    dt = None if dt is None else as_number(dt, "dt", above=0.0)
     angle = as_file_unit(AngleUnit, angles, "angles")
     length = as_file_unit(LengthUnit, lengths, "lengths")
     unit = None if times is None else as_file_unit(TimeUnit, times, "times")
