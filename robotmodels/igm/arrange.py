@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 from .._arrays import Array, read_only
 from .by_plan import ByPlan
 from .known import KnownArm
-from .paul.layout import WITHIN_LIMITS
+from .paul.layout import AT_LIMIT, GIVEN, WITHIN_LIMITS
 from .postures import Postures
-from .solutions import posture_distance
-from .status import IGMStatus
 
 Flags = NDArray[np.bool_]
 
-AT_LIMIT = 1e-9
-"""What rounding may carry a solution over its limits [rad, m]."""
 _UNLIMITED = 1e9
 
 
@@ -116,53 +112,39 @@ def arranged(
 ) -> Rows:
     """Rows of a result; joints without a column do not move the tool and keep their reference.
 
-    Shapes: code (N, S), columns (k,), references (N, n); joints (3, n): lower and upper limits,
-    1 for revolute.
+    Solutions of one branch get codes of their own, in the order of their joints. Shapes: code
+    (N, S), columns (k,), references (N, n); joints (3, n): lower and upper limits, 1 for revolute.
     """
-    goal = references[:, None]
-    lower, upper, revolute = joints[0], joints[1], joints[2] != 0.0
-    q = np.repeat(goal, found.q.shape[1], axis=1)
-    q[..., columns] = found.q
-    if limits:
-        both = (lower > -_UNLIMITED) & (upper < _UNLIMITED)
-        middle = 0.5 * (np.where(both, lower, 0.0) + np.where(both, upper, 0.0))
-        turned = turned_inside(q, lower, upper, goal if given else middle)
-        q = np.where(revolute, turned, q)
-    inside = found.valid & np.all((lower - AT_LIMIT <= q) & (q <= upper + AT_LIMIT), axis=-1)
-    kept = inside if limits else found.valid
-    distance = np.zeros(kept.shape)
-    if given:
-        distance = posture_distance(q, goal, revolute & (not limits))
-    order = np.lexsort((code, np.where(kept, distance, np.inf)), axis=-1)
-    count = kept.sum(axis=1)
-    order = order[:, : count.max(initial=0)]
-    valid = np.arange(order.shape[1]) < count[:, None]
+    from .kernels.order import arranged_rows
 
-    def sorted_rows(values: NDArray[Any], nothing: float) -> NDArray[Any]:
-        """Values in the new order."""
-        at = order.reshape(*order.shape, *(1,) * (values.ndim - 2))
-        there = valid.reshape(at.shape)
-        return np.where(there, np.take_along_axis(values, at, axis=1), values.dtype.type(nothing))
-
-    free, family = np.zeros(q.shape, np.bool_), np.zeros(q.shape, np.bool_)
-    free[..., columns] = found.free
-    family[..., columns] = found.moving & ~found.free
-    moving = np.any(found.moving | found.free, axis=-1)
-    status = np.where(np.any(kept & moving, axis=1), IGMStatus.REACHED_FAMILY, IGMStatus.REACHED)
-    # another member of a family may lie within the limits: left to a search
-    dropped = np.any(found.valid, axis=1) & ~np.any(found.valid & moving, axis=1)
-    nothing = np.where(dropped, IGMStatus.OUTSIDE_LIMITS, IGMStatus.NOT_CONVERGED)
+    (N, S, _), n = found.q.shape, joints.shape[1]
+    arrays = found.q, found.residual, found.double, found.free, found.moving
+    q, residual = np.full((N, S, n), np.nan), np.full((N, S), np.nan)
+    inside, double = np.zeros((2, N, S), np.bool_)
+    free, family = np.zeros((2, N, S, n), np.bool_)
+    codes, status = np.where(found.valid, code, -1).astype(np.int64), np.zeros(N, np.int64)
+    most = arranged_rows(
+        tuple(map(np.ascontiguousarray, arrays)), columns, references, joints.ravel(), len(labels),
+        GIVEN * given | WITHIN_LIMITS * limits, codes, status,
+        (q, residual, inside, double, free, family),
+    )  # fmt: skip
+    codes = codes[:, :most].astype(np.int16)
+    last = int(codes.max(initial=0)) // len(labels)
+    if labels == ("",):
+        labels = tuple(str(rank + 1) for rank in range(last + 1))
+    else:
+        labels += tuple(f"{name} ({r + 1})" for r in range(1, last + 1) for name in labels)
     return Rows(
-        q=sorted_rows(q, np.nan),
-        valid=valid,
-        residual=sorted_rows(found.residual, np.nan),
-        inside=sorted_rows(inside, False),
-        code=sorted_rows(code, -1),
-        status=np.where(count > 0, status, nothing).astype(np.int8),
+        q=q[:, :most],
+        valid=codes >= 0,
+        residual=residual[:, :most],
+        inside=inside[:, :most],
+        code=codes,
+        status=status.astype(np.int8),
         labels=labels,
-        double=sorted_rows(found.double, False),
-        free=sorted_rows(free, False),
-        family=sorted_rows(family, False),
+        double=double[:, :most],
+        free=free[:, :most],
+        family=family[:, :most],
     )
 
 

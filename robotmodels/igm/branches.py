@@ -28,13 +28,11 @@ SIDES = tuple(
 )
 """Labels of six-joint arms with a closed form; the signs are those of three geometric products."""
 
-_POSES_AT_A_TIME = 1024
-
 
 @singledispatch
 def branches(solver: Solver, found: Postures) -> tuple[Codes, tuple[str, ...]]:
-    """Number the solutions of each pose and name the numbers. Shapes: -> code (N, S)."""
-    return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
+    """Branches of the solutions of each pose, and the names of all. Shapes: -> code (N, S)."""
+    return np.zeros(found.valid.shape, np.int16), ("",)
 
 
 @branches.register
@@ -42,14 +40,14 @@ def _(solver: ClosedForm, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     plan = solver.plan
     parallel = plan.family is Family.PARALLEL
     signs = sides(solver.chain, [int(j) for j in plan.order], parallel, found.q[found.valid])
-    return ranked(_numbered(found, signs), SIDES, found)
+    return _numbered(found, signs), SIDES
 
 
 @branches.register
 def _(solver: FewerJoints, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     way = solver.ways[0]
     if not isinstance(way.solver, ClosedForm):
-        return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
+        return np.zeros(found.valid.shape, np.int16), ("",)
     # the virtual joints are at zero
     longer = np.zeros((*found.q.shape[:2], way.solver.chain.k))
     longer[..., way.places] = found.q
@@ -59,7 +57,7 @@ def _(solver: FewerJoints, found: Postures) -> tuple[Codes, tuple[str, ...]]:
 @branches.register
 def _(solver: ArmAngle, found: Postures) -> tuple[Codes, tuple[str, ...]]:
     signs = arm_angle_sides(solver.chain, found.q[found.valid])
-    return ranked(_numbered(found, signs), SIDES, found)
+    return _numbered(found, signs), SIDES
 
 
 def sides(chain: JointChain, order: list[int], parallel: bool, q: Array) -> tuple[Array, ...]:
@@ -136,31 +134,3 @@ def _numbered(found: Postures, products: tuple[Array, ...]) -> Codes:
     shoulder, elbow, wrist = (product < 0.0 for product in products)
     code[found.valid] = 4 * shoulder + 2 * elbow + wrist
     return code
-
-
-def ranked(code: Codes, labels: tuple[str, ...], found: Postures) -> tuple[Codes, tuple[str, ...]]:
-    """Unique branch codes: solutions of one code are ranked by their joints within each pose.
-
-    Shapes: code (N, S).
-    """
-    N, S = code.shape
-    rank = np.zeros(N * S, np.int64)
-    # without joints there is one posture at most
-    for start in range(0, N if found.q.shape[2] else 0, _POSES_AT_A_TIME):
-        rows = slice(start, start + _POSES_AT_A_TIME)
-        there, q = found.valid[rows], found.q[rows]
-        same = there[:, :, None] & there[:, None] & (code[rows, :, None] == code[rows, None])
-        p, i, j = np.nonzero(same & ~np.eye(S, dtype=np.bool_))
-        # the first joint in which two solutions differ decides
-        delta = q[p, j] - q[p, i]
-        differs = np.abs(delta) > 1e-9
-        first = np.take_along_axis(delta, differs.argmax(axis=1)[:, None], axis=1)[:, 0]
-        lower = differs.any(axis=1) & (first < 0.0)
-        rank += np.bincount(((start + p) * S + i)[lower], minlength=N * S)
-    rank = rank.reshape(N, S)
-    most = int(rank.max(initial=0))
-    if labels == ("",):
-        named = tuple(str(r + 1) for r in range(most + 1))
-    else:
-        named = (*labels, *(f"{s} ({r + 1})" for r in range(1, most + 1) for s in labels))
-    return np.where(found.valid, code + len(labels) * rank, -1).astype(np.int16), named

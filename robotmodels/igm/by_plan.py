@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
-from .branches import SIDES, branches, ranked
+from .branches import branches
 from .closed_form import ClosedForm
 from .loop import JointChain
 from .motion import lever, random_postures, tool_poses
@@ -81,7 +81,9 @@ def prepare_by_plan(chain: JointChain, family: Solver) -> ByPlan | None:
     ways, codes = marks[:, 2 + S :][there], code[there]
     table = np.full(int(ways.max(initial=0)) + 1, -1, np.int16)
     table[ways] = codes
-    if not np.array_equal(table[ways], codes) or len(labels) > len(SIDES):
+    apart = np.sort(np.where(there, code, np.arange(-1, -1 - S, -1)), axis=1)
+    if not np.array_equal(table[ways], codes) or np.any(np.diff(apart, axis=1) == 0):
+        # the sides of the family are not those of the plan: ranks serve both
         table, labels = np.empty(0, np.int16), tuple(str(i + 1) for i in range(S))
     return ByPlan(plan, family, labels, read_only(table, np.int16))
 
@@ -134,6 +136,5 @@ def free_joints(
 @branches.register
 def _(solver: ByPlan, found: Postures) -> tuple[NDArray[np.int16], tuple[str, ...]]:
     if solver.branch_of_way.size == 0:
-        # the sides of the family are not those of the plan: ranks serve both
-        return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
+        return np.zeros(found.valid.shape, np.int16), ("",)
     return branches(solver.family, found)

@@ -34,8 +34,10 @@ def axes_of(chain: JointChain, q: Array) -> tuple[Array, Array]:
 
 def cross(a: Array, b: Array) -> Array:
     """Vector products (..., 3): for small arrays several times as fast as `numpy.cross`."""
-    i, j = [1, 2, 0], [2, 0, 1]
-    return a[..., i] * b[..., j] - a[..., j] * b[..., i]
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
 
 
 def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
@@ -85,16 +87,16 @@ def singular_rows(J: Array, relative: float) -> tuple[NDArray[np.int64], Array]:
 
 def _joint_frames(chain: JointChain, q: Array) -> tuple[Array, Array, Array]:
     """Poses of the tool (N, 4, 4), and directions and origins of the axes, each (k, N, 3)."""
-    T = np.broadcast_to(chain.D[0], (len(q), 4, 4))
-    joints = np.empty((chain.k, len(q), 4, 4))
-    for m in range(chain.k):
+    N, k = q.shape
+    c, s = np.cos(q.T), np.sin(q.T)
+    motions, joints, turns = np.zeros((k, N, 4, 4)), np.empty((k, N, 4, 4)), chain.sigma == 0
+    motions[:, :, range(4), range(4)] = 1.0
+    motions[turns, :, 0, 0] = motions[turns, :, 1, 1] = c[turns]
+    motions[turns, :, 0, 1], motions[turns, :, 1, 0] = -s[turns], s[turns]
+    motions[~turns, :, 2, 3] = q.T[~turns]
+    motions = motions @ chain.D[1:, None]
+    T = np.broadcast_to(chain.D[0], (N, 4, 4))
+    for m in range(k):
         joints[m] = T
-        M = np.zeros((len(q), 4, 4))
-        M[:] = np.eye(4)
-        if chain.sigma[m] == 0:
-            c, s = np.cos(q[:, m]), np.sin(q[:, m])
-            M[:, 0, 0], M[:, 0, 1], M[:, 1, 0], M[:, 1, 1] = c, -s, s, c
-        else:
-            M[:, 2, 3] = q[:, m]
-        T = T @ M @ chain.D[m + 1]
+        T = T @ motions[m]
     return np.ascontiguousarray(T), joints[..., :3, 2], joints[..., :3, 3]

@@ -9,15 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from .loop import JointChain
 from .motion import jacobians, random_postures
-from .postures import Postures, no_postures
+from .postures import Postures
 from .solver import Tolerances, postures
 
 POSITION = (True, True, True, False, False, False)
 MOST = 4  # solutions of one position
+DOUBLE = 8  # mark of a double root
 INDEPENDENT = 1e-6  # singular values of a Jacobian beside the largest that count as zero
 
 
@@ -46,24 +48,31 @@ def prepare_position(chain: JointChain) -> PositionArm | None:
 
 @postures.register
 def _(solver: PositionArm, U: Array, references: Array, tolerances: Tolerances) -> Postures:
-    from .kernels.pieper import position_solutions, scratch
+    chain, size = solver.chain, solver.size
+    q, residual, marks = solved_positions(
+        chain.sigma, chain.D, U[:, :3, 3], references, size,
+        max(1e-12, tolerances.position / size), tolerances.position,
+    )  # fmt: skip
+    free = (marks[..., None] >> np.arange(3)) & 1 == 1
+    valid = marks >= 0
+    free &= valid[..., None]
+    return Postures(q, valid, residual, valid & (marks >= DOUBLE), free, free.any(axis=-1))
 
-    chain = solver.chain
-    found = no_postures(len(U), MOST, 3)
-    position_solutions(
-        chain.sigma,
-        chain.D,
-        np.ascontiguousarray(U[:, :3, 3]),
-        np.ascontiguousarray(references),
-        solver.size,
-        max(1e-12, tolerances.position / solver.size),
-        tolerances.position,
-        scratch(),
-        found.q,
-        found.valid,
-        found.residual,
-        found.double,
-        found.free,
-    )
-    found.family[...] = found.free.any(axis=-1)
-    return found
+
+def solved_positions(
+    kinds: NDArray[np.int64],
+    D: Array,
+    points: Array,
+    references: Array,
+    *limits: float,
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Configurations of points ``(N, 3)`` of R_0; see `kernels.pieper.position_solutions`."""
+    from .kernels import pieper
+
+    slides = bool(np.any(kinds == 1))
+    solve = pieper.position_solutions_with_slides if slides else pieper.position_solutions
+    N = len(points)
+    out = np.full((N, MOST, 3), np.nan), np.full((N, MOST), np.nan), np.full((N, MOST), -1)
+    rows = np.ascontiguousarray(points), np.ascontiguousarray(references)
+    solve(kinds, D, *rows, np.array(limits), pieper.scratch(), out)
+    return out

@@ -164,7 +164,7 @@ def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Arra
             plane, origin = section.frame[:3, :2], section.frame[:3, 3]
             inverse = np.linalg.inv(plane[mask[:3]])
             positions = origin + (positions - origin)[:, mask[:3]] @ inverse.T @ plane.T
-        q, valid = section.postures(positions)
+        q, valid, _ = section.postures(positions)
         return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
     known = known_arm(arm, mask is None)
     task = Task() if mask is None else Task(mask=tuple(mask.tolist()))

@@ -17,7 +17,7 @@ from .._arrays import Array, as_mask
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
 from ..igm.loop import joint_chain
-from ..igm.position import prepare_position
+from ..igm.position import prepare_position, solved_positions
 from ..kinematics import dgm, jacobian
 from ..kinematics.lengths import characteristic_length, spread_configurations
 from ..model import RobotModel, check_model
@@ -164,21 +164,16 @@ class SectionArm:
         """World positions of points (N, 2) of the section."""
         return np.asarray(section @ self.frame[:3, :2].T + self.frame[:3, 3])
 
-    def postures(self, positions: Array) -> tuple[Array, Flags]:
-        """All postures of world positions (N, 3): q (N, 4, 3), valid (N, 4)."""
-        from ..igm.kernels.pieper import position_solutions, scratch
-
-        N = len(positions)
-        local = np.ascontiguousarray(positions)
-        q, valid = np.full((N, 4, 3), np.nan), np.zeros((N, 4), np.bool_)
-        double, free = np.zeros((N, 4), np.bool_), np.zeros((N, 4, 3), np.bool_)
-        position_solutions(
-            self.kinds, self.D, local, np.zeros((N, 3)), self.size, 1e-12, 1e-9 * self.size,
-            scratch(), q, valid, np.zeros((N, 4)), double, free,
+    def postures(self, positions: Array) -> tuple[Array, Flags, Flags]:
+        """All postures of world positions (N, 3): q (N, 4, 3), valid, not singular (N, 4)."""
+        q, _, marks = solved_positions(
+            self.kinds, self.D, positions, np.zeros((len(positions), 3)), self.size, 1e-12,
+            1e-9 * self.size,
         )  # fmt: skip
+        valid = marks >= 0
         if self.columns[0] < 0:
             valid &= np.abs(q[..., 0]) <= 1e-7 * self.size
-        return q, valid
+        return q, valid, valid & (marks == 0)
 
     def model_postures(self, model: RobotModel, q: Array) -> Array:
         """Postures (..., 3) in the columns of the model (..., n), other joints at zero."""

@@ -101,7 +101,7 @@ def count_postures(space: JointSpace, arm: SectionArm, points: Array) -> Ints:
     """Number of postures of points (N, 2) of the section within the limits; 0 beyond the axis."""
     counts = np.empty(len(points), np.int64)
     for k in range(0, len(points), _CHUNK):
-        q, valid = arm.postures(arm.world(points[k : k + _CHUNK]))
+        q, valid, _ = arm.postures(arm.world(points[k : k + _CHUNK]))
         if space.limits:
             valid = valid & space.within(arm.model_postures(space.model, q))[1]
         counts[k : k + _CHUNK] = valid.sum(axis=1)

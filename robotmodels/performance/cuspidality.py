@@ -54,7 +54,7 @@ from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
 from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
-from .arms import PLACE, Flags, SectionArm, section_arm, turning, wrapped
+from .arms import Flags, SectionArm, section_arm, turning, wrapped
 from .arrangement import counted_cut, cut, lines_of
 from .aspects import aspects
 from .curves import cusps_of
@@ -174,7 +174,7 @@ def _closed(arm: RobotModel, section: SectionArm, x: Array) -> list[Array]:
         turn = np.diff(np.arctan2(ends[:, 2], ends[:, 0]))[0]
         turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
         q[:, column] = np.linspace(0.0, turn if section.local[0, 2, 2] > 0.0 else -turn, len(q))
-    solved, valid = section.postures(first[None])
+    solved, valid, _ = section.postures(first[None])
     moved = wrapped(section.model_postures(arm, solved[valid]) - q[-1], turning(arm))
     if not len(moved):
         return []
@@ -192,7 +192,7 @@ def _all_apart(arm: RobotModel, section: SectionArm) -> bool:
     if not divided.is_complete:
         return False
     for k in range(0, len(middle), _CHUNK):
-        q, valid = section.postures(section.world(middle[k : k + _CHUNK]))
+        q, valid, _ = section.postures(section.world(middle[k : k + _CHUNK]))
         rows = np.where(valid[..., None], section.model_postures(arm, q), 0.0)
         label = np.where(valid, divided.of(rows), -1 - np.arange(valid.shape[1]))
         doubtful = (valid & (label < 0)).any(axis=1)
@@ -223,17 +223,22 @@ def _by_search(
     mask = None if factors.rows.sum() == 6 else factors.rows
     # pose by pose, for which nothing is compiled
     T = np.array([dgm(arm, q) for q in spread_configurations(arm, poses, rng)])
-    found = igm(arm, T, mask=mask if section_arm(arm) is None else PLACE)
-    several = found.valid & ~found.double & ~found.free_joints.any(axis=-1)
-    several &= _within_strokes(arm, found.q)
-    codes = np.full(found.valid.shape, -1)
-    codes[several] = factors.codes(found.q[several])
+    section = section_arm(arm)
+    if section is None:
+        found = igm(arm, T, mask=mask)
+        q, several = found.q, found.valid & ~found.double & ~found.free_joints.any(axis=-1)
+    else:
+        q, _, several = section.postures(T[:, :3, 3])
+        q = section.model_postures(arm, q)
+    several &= _within_strokes(arm, q)
+    codes = np.full(several.shape, -1)
+    codes[several] = factors.codes(q[several])
     apart = all(np.unique(c[c >= 0]).size == np.sum(c >= 0) for c in codes)
-    if apart and _signs_are_labels(factors, found.q[several], found.branch[several]):
+    if apart and section is None and _signs_are_labels(factors, q[several], found.branch[several]):
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL)
     pairs = np.array([
         (rows[s], wrapped(rows[r] - rows[s], turning(arm)))
-        for code, rows in zip(codes, found.q, strict=True)
+        for code, rows in zip(codes, q, strict=True)
         for s, r in combinations(range(len(code)), 2)
         if code[s] == code[r] >= 0
     ]).reshape(-1, 2, arm.n)  # fmt: skip

@@ -10,20 +10,10 @@ from math import sqrt
 
 import numpy as np
 
-from ..igm.kernels.pieper import advance
+from ..igm.kernels.pieper import advance, triple
 from ..kernels._compile import INTS, MATRIX, NOTHING, OUT2, STACK, Floats, Ints, compiled
 
 VALUES = 9  # of a point of the section, see `section_values`
-
-
-@compiled(counted=False)
-def triple(A: Floats, i: int, B: Floats, j: int, C: Floats, k: int) -> float:
-    """Determinant of the columns i of A, j of B, k of C (each with three rows)."""
-    return (
-        A[0, i] * (B[1, j] * C[2, k] - B[2, j] * C[1, k])
-        + A[1, i] * (B[2, j] * C[0, k] - B[0, j] * C[2, k])
-        + A[2, i] * (B[0, j] * C[1, k] - B[1, j] * C[0, k])
-    )
 
 
 @compiled(counted=False)

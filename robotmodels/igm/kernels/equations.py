@@ -11,6 +11,7 @@ from math import atan, atan2, cos, hypot, pi, sin, sqrt
 from ...kernels._compile import Floats, compiled
 
 NONE, DOUBLE, TWO, ANY = 0, 1, 2, 3
+CLOSE = 1e-8  # step of Newton's method beside the root after which no other is needed
 ROUNDING = 1e-13  # value beside the terms of a polynomial that rounding leaves at a root
 
 
@@ -52,32 +53,28 @@ def quadratic_roots(a: float, b: float, c: float, roots: Floats) -> int:
 
 
 @compiled(counted=False)
-def value_at(c: Floats, degree: int, x: float) -> tuple[float, float]:
-    """Value and derivative of a polynomial at x."""
-    value, slope = c[degree], 0.0
-    for i in range(degree - 1, -1, -1):
-        slope = slope * x + value
-        value = value * x + c[i]
-    return value, slope
+def value_at(c: Floats, x: float) -> tuple[float, float]:
+    """Value and derivative at x of a polynomial with five coefficients."""
+    xx = x * x
+    value = (c[0] + c[1] * x) + xx * ((c[2] + c[3] * x) + c[4] * xx)
+    return value, (c[1] + 2.0 * c[2] * x) + xx * (3.0 * c[3] + 4.0 * c[4] * x)
 
 
 @compiled(counted=False)
-def root_between(c: Floats, degree: int, a: float, b: float, rises: bool) -> float:
-    """Root of a polynomial between a and b, where it has opposite signs: Newton and bisection."""
-    x = 0.5 * (a + b)
+def root_between(c: Floats, a: float, b: float, x: float, rises: bool) -> float:
+    """Root between a and b, where it has opposite signs: Newton from x, and bisection."""
     for _ in range(100):
-        value, slope = value_at(c, degree, x)
+        if not a < x < b:
+            x = 0.5 * (a + b)
+        value, slope = value_at(c, x)
         if (value > 0.0) == rises:
             b = x
         else:
             a = x
-        step = x - value / slope
-        if not a < step < b:
-            step = 0.5 * (a + b)
-        moved = abs(step - x)
-        x = step
-        if moved <= 1e-14 * abs(x):
-            break
+        step = value / slope
+        if abs(step) <= CLOSE * abs(x):
+            return x - step  # as exact as rounding allows, since steps converge quadratically
+        x -= step
     return x
 
 
@@ -103,25 +100,23 @@ def real_roots(c: Floats, degree: int, slack: float, roots: Floats, work: Floats
         )
         if count == 2 and roots[0] > roots[1]:
             roots[0], roots[1] = roots[1], roots[0]
-    # derivatives of rising degree n, the last one the polynomial itself
+    # the derivative of degree 3, then the polynomial itself
     for n in range(3 if degree > 2 else 1, degree + 1):
-        for i in range(n + 1):
-            d[i] = c[i + degree - n]
-            for m in range(degree - n):
-                d[i] *= i + degree - n - m
+        for i in range(5):
+            d[i] = c[i + degree - n] * (i + 1 if n < degree else 1) if i <= n else 0.0
         for i in range(count):
             ends[1 + i] = roots[i]
         ends[0], ends[count + 1] = -bound, bound
         last, count = count + 1, 0
-        before = value_at(d, n, ends[0])[0]
+        before = value_at(d, ends[0])[0]
         for i in range(1, last + 1):
             x = ends[i]
-            value = value_at(d, n, x)[0]
+            value = value_at(d, x)[0]
             if n == degree and i < last:
                 size = 0.0
                 for m in range(n, -1, -1):
                     size = size * abs(x) + abs(d[m])
-                following = value_at(d, n, ends[i + 1])[0]
+                following = value_at(d, ends[i + 1])[0]
                 touches = abs(value) <= max(
                     slack * (1.0 + x * x) ** (0.5 * degree), ROUNDING * size
                 )
@@ -134,7 +129,13 @@ def real_roots(c: Floats, degree: int, slack: float, roots: Floats, work: Floats
                     before = following
                     continue
             if (value > 0.0) != (before > 0.0):
-                roots[count] = root_between(d, n, ends[i - 1], x, value > 0.0)
+                # between extrema by the chord, beyond them by the parabola that touches there
+                a, start = ends[i - 1], ends[i - 1] + (x - ends[i - 1]) * before / (before - value)
+                if last > 1 and (i == 1 or i == last):
+                    at, height = (x, value) if i == 1 else (a, before)
+                    bend = 2.0 * d[2] + at * (6.0 * d[3] + 12.0 * d[4] * at)
+                    start = at + (1.0 if i == last else -1.0) * sqrt(-2.0 * height / bend)
+                roots[count] = root_between(d, a, x, start, value > 0.0)
                 count += 1
             before = value
     return count

@@ -13,15 +13,13 @@ from math import atan2, cos, hypot, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numpy.typing import NDArray
+from numba import typeof, types
 
 from ...kernels._compile import (
     INT,
     INTS,
     MATRIX,
     NOTHING,
-    OUT1,
     OUT2,
     OUT3,
     STACK,
@@ -49,38 +47,27 @@ class Scratch(NamedTuple):
     f: Floats  # (3, 3): coordinates of the point, functions of the last joint
     length: Floats  # (5,): their squared length
     row: Floats  # (2, 3): two equations free of the first joint
-    k: Floats  # (2,): their right sides
-    b: Floats  # (2, 3): what is left of them, functions of the last joint
-    h: Floats  # (3, 3): other functions of the last joint
+    b: Floats  # (2, 3): their right sides, functions of the last joint
+    h: Floats  # (3, 4): other functions of the last joint
     g: Floats  # (5,): a product of two
     roots: Floats  # (8,)
     lengths: Floats  # (4,): roots for the joint in the middle
     work: Floats  # (3, 6): of the roots of a polynomial
     found: Floats  # (8, 2): values of the last joint and of the one in the middle
-    marks: Ints  # (8,): 2 and 4 where these are free
     x: Floats  # (8, 3): the three joints
-    free: Ints  # (8,): bits 1, 2, 4 for those that took their reference
-    T: Floats  # (4, 3, 4): poses of the links
-    error: Floats  # (3,): of the point
-    trial: Floats  # (3,): the next joints
+    w: Floats  # (3,): the point behind the last joint
+    p: Floats  # (3,): where it is to be
+    marks: Ints  # (8,): 2 and 4 where the last joint and the one in the middle are free
+    free: Ints  # (8,): bits 1, 2, 4 for joints that took their reference
 
 
 def scratch() -> Scratch:
     """Room to work in, for `position_solutions` and its like."""
-    shapes = (3, 3), 5, (2, 3), 2, (2, 3), (3, 3), 5, 8, 4, (3, 6), (8, 2)
-    marks = np.zeros((2, 8), np.int64)
-    last = np.zeros((4, 3, 4)), np.zeros(3), np.zeros(3)
-    rooms = *map(np.zeros, shapes), marks[0], np.zeros((8, 3)), marks[1], *last
-    return Scratch(*rooms)  # type: ignore[call-arg]
+    shapes = (3, 3), 5, (2, 3), (2, 3), (3, 4), 5, 8, 4, (3, 6), (8, 2), (8, 3), 3, 3
+    return Scratch(*map(np.zeros, shapes), *np.zeros((2, 8), np.int64))  # type: ignore[call-arg]
 
 
-SCRATCH = types.NamedTuple(
-    (
-        *(OUT2, OUT1, OUT2, OUT1, OUT2, OUT2, OUT1, OUT1, OUT1, OUT2, OUT2, COUNTS),
-        *(OUT2, COUNTS, OUT3, OUT1, OUT1),
-    ),
-    Scratch,
-)
+SCRATCH = typeof(scratch())
 
 
 @compiled(counted=False)
@@ -117,19 +104,26 @@ def add_product(
 
 
 @compiled(counted=False)
-def value(a: Floats, i: int, turning: bool, x: float) -> float:
-    """Value at x of row i, a function of the last joint."""
-    if turning:
-        return a[i, 0] + a[i, 1] * cos(x) + a[i, 2] * sin(x)
-    return a[i, 0] + x * (a[i, 1] + x * a[i, 2])
+def basis(turning: bool, x: float) -> tuple[float, float]:
+    """What the coefficients of a function of the last joint stand over, but for 1."""
+    return (cos(x), sin(x)) if turning else (x, x * x)
 
 
 @compiled(counted=False)
-def roots_of_product(work: Scratch, turning: bool, slack: float) -> int:
+def value(a: Floats, i: int, u: float, v: float) -> float:
+    """Value of row i, a function of the last joint, where its basis is u, v."""
+    return a[i, 0] + u * a[i, 1] + v * a[i, 2]
+
+
+@compiled(counted=False, inlined=True)
+def roots_of_product(work: Scratch, turning: bool, slack: float, slides: None) -> int:
     """Roots of ``work.g``, a product of two functions of the last joint."""
-    if turning:
+    if slides is None:
         return trigonometric_roots(work.g, work.roots, work.work, slack)
-    return polynomial_roots(work.g, work.roots, work.work)
+    else:
+        if turning:
+            return trigonometric_roots(work.g, work.roots, work.work, slack)
+        return polynomial_roots(work.g, work.roots, work.work)
 
 
 @compiled(counted=False)
@@ -148,26 +142,27 @@ def roots_of_linear(
     return -1 if abs(a[i, 0]) <= slack else 0
 
 
-@compiled(counted=False)
+@compiled(counted=False, inlined=True)
 def point_solutions(
     kinds: Ints,
     E1: Floats,
     E2: Floats,
     w: Floats,
     p: Floats,
-    size: float,
-    slack: float,
+    limits: tuple[float, float],
     reference: Floats,
     work: Scratch,
+    slides: None,
 ) -> int:
     """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``, in ``work``. Returns how many.
 
-    ``size``: length of the arm; ``slack``: relative overshoot of a double root; ``free[i]`` gets a
-    bit (1, 2, 4) for each joint whose value was taken from ``reference``.
+    ``limits``: length of the arm, and relative overshoot of a double root; ``free[i]`` gets a bit
+    (1, 2, 4) for each joint whose value was taken from ``reference``. ``slides`` is None where all
+    three turn: what only slides need is then not compiled.
     """
     last, middle, first = kinds[2] == 0, kinds[1] == 0, kinds[0] == 0
-    zero = 1e-11 * size
-    f, length, row, k, b, x = work.f, work.length, work.row, work.k, work.b, work.x
+    size, zero = limits[0], 1e-11 * limits[0]
+    f, length, row, b, x = work.f, work.length, work.row, work.b, work.x
     # f = E_2 M_c w and its squared length, functions of the last joint
     for i in range(5):
         length[i] = 0.0
@@ -182,28 +177,33 @@ def point_solutions(
         add_product(f, i, f, i, last, 1.0, length)
     # two equations row.y + lam |y|^2 = k in y = M_b f, free of the first joint
     lam = 1.0 / (2.0 * size) if first else 0.0
-    k[0], k[1] = p[2] - E1[2, 3] if first else p[0] - E1[0, 3], 0.0 if first else p[1] - E1[1, 3]
+    k0, k1 = p[2] - E1[2, 3] if first else p[0] - E1[0, 3], 0.0 if first else p[1] - E1[1, 3]
     for i in range(3):
         row[0, i], row[1, i] = E1[2, i] if first else E1[0, i], 0.0 if first else E1[1, i]
         if first:
-            k[1] += (p[i] * p[i] - E1[i, 3] * E1[i, 3]) * lam
+            k1 += (p[i] * p[i] - E1[i, 3] * E1[i, 3]) * lam
             for j in range(3):
                 row[1, i] += E1[j, i] * E1[j, 3] / size
-    # what is left of k without the parts that the middle joint does not change
-    for i in range(2):
-        for m in range(3):
-            b[i, m] = (k[i] if m == 0 else 0.0) - row[i, 2] * f[2, m]
-            if i == 1:
-                b[i, m] -= lam * length[m]
+    # b: what is left of k without the parts that the middle joint does not change
+    for m in range(3):
+        b[0, m], b[1, m] = (k0, k1) if m == 0 else (0.0, 0.0)
+        b[1, m] -= lam * length[m]
+        for i in range(2):
+            b[i, m] -= row[i, 2] * f[2, m]
             if not middle:
                 b[i, m] -= row[i, 0] * f[0, m] + row[i, 1] * f[1, m]
-    if middle:
-        count = turning_pair(last, size, slack, zero, reference, work)
+    if slides is None:
+        count = turning_pair(last, limits, zero, reference, work, slides)
     else:
-        count = sliding_pair(lam, last, size, slack, zero, reference, work)
+        if middle:
+            count = turning_pair(last, limits, zero, reference, work, slides)
+        else:
+            count = sliding_pair(lam, last, limits, zero, reference, work, slides)
+    on_axis = first and hypot(p[0], p[1]) <= zero
     for i in range(count):
         xc, xb = work.found[i, 0], work.found[i, 1]
-        y0, y1, y2 = value(f, 0, last, xc), value(f, 1, last, xc), value(f, 2, last, xc)
+        u, v = basis(last, xc)
+        y0, y1, y2 = value(f, 0, u, v), value(f, 1, u, v), value(f, 2, u, v)
         if middle:
             c, s = cos(xb), sin(xb)
             y0, y1 = c * y0 - s * y1, s * y0 + c * y1
@@ -212,20 +212,31 @@ def point_solutions(
         x[i, 1], x[i, 2], work.free[i] = xb, xc, work.marks[i]
         if not first:
             x[i, 0] = p[2] - (E1[2, 0] * y0 + E1[2, 1] * y1 + E1[2, 2] * y2 + E1[2, 3])
-        elif hypot(p[0], p[1]) <= zero:
+        elif on_axis:
             # asked of the goal: there two solutions merge, and joints are good to half the digits
             x[i, 0] = reference[0]
             work.free[i] |= 1
         else:
             h0 = E1[0, 0] * y0 + E1[0, 1] * y1 + E1[0, 2] * y2 + E1[0, 3]
             h1 = E1[1, 0] * y0 + E1[1, 1] * y1 + E1[1, 2] * y2 + E1[1, 3]
-            x[i, 0] = atan2(p[1], p[0]) - atan2(h1, h0)
+            x[i, 0] = angle_between(h0, h1, p[0], p[1])
     return count
 
 
 @compiled(counted=False)
+def angle_between(a0: float, a1: float, b0: float, b1: float) -> float:
+    """The turn that brings the direction a to b, in (-pi, pi]."""
+    return atan2(a0 * b1 - a1 * b0, a0 * b0 + a1 * b1)
+
+
+@compiled(counted=False)
 def turning_pair(
-    last: bool, size: float, slack: float, zero: float, reference: Floats, work: Scratch
+    last: bool,
+    limits: tuple[float, float],
+    zero: float,
+    reference: Floats,
+    work: Scratch,
+    slides: None,
 ) -> int:
     """Two equations in two joints, ``row_i . Rot(x_b) (f_x, f_y) = b_i``: eliminate the turn x_b.
 
@@ -234,9 +245,10 @@ def turning_pair(
     """
     f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
     roots, found, marks = work.roots, work.found, work.marks
+    size, slack = limits
     n0, n1 = hypot(row[0, 0], row[0, 1]), hypot(row[1, 0], row[1, 1])
     det = row[0, 0] * row[1, 1] - row[0, 1] * row[1, 0]
-    count = 0
+    count, mark = 0, 0
     if abs(det) > RANK * max(n0, n1):
         # |B b|^2 = f_x^2 + f_y^2 with B the inverse of the two rows: Pieper's quartic
         for m in range(3):
@@ -247,15 +259,16 @@ def turning_pair(
         for i in range(2):
             add_product(h, i, h, i, last, 1.0, g)
             add_product(f, i, f, i, last, -1.0, g)
-        for i in range(roots_of_product(work, last, slack * size * size)):
-            xc = roots[i]
-            fx, fy = value(f, 0, last, xc), value(f, 1, last, xc)
-            found[count, 0], found[count, 1], marks[count] = xc, reference[1], 2
+        count = roots_of_product(work, last, slack * size * size, slides)
+        for i in range(count):
+            u, v = basis(last, roots[i])
+            fx, fy = value(f, 0, u, v), value(f, 1, u, v)
+            found[i, 0], found[i, 1], marks[i] = roots[i], reference[1], 2
             if hypot(fx, fy) > zero:
-                found[count, 1] = atan2(value(h, 1, last, xc), value(h, 0, last, xc))
-                found[count, 1] -= atan2(fy, fx)
-                marks[count] = 0
-            count += 1
+                found[i, 1], marks[i] = (
+                    angle_between(fx, fy, value(h, 0, u, v), value(h, 1, u, v)),
+                    0,
+                )
         return count
     # the rows are parallel (axes that meet, or are parallel): one combination of the equations
     # is free of the second joint
@@ -267,18 +280,18 @@ def turning_pair(
     ratio = (row[other, 0] * row[main, 0] + row[other, 1] * row[main, 1]) / amplitude**2
     for m in range(3):
         h[0, m] = b[other, m] - ratio * b[main, m]
-    outer, mark = roots_of_linear(h, 0, last, roots, slack * size, zero), 0
+    outer = roots_of_linear(h, 0, last, roots, slack * size, zero)
     if outer < 0:
         roots[0], outer, mark = reference[2], 1, 4
     for i in range(outer):
-        xc = roots[i]
-        fx, fy = value(f, 0, last, xc), value(f, 1, last, xc)
+        u, v = basis(last, roots[i])
+        fx, fy = value(f, 0, u, v), value(f, 1, u, v)
         # row . (c f_x - s f_y, s f_x + c f_y) = b
         X = row[main, 1] * fx - row[main, 0] * fy
         Y = row[main, 0] * fx + row[main, 1] * fy
-        kind, t0, t1 = type_2(X, Y, value(b, main, last, xc), slack * size, zero)
+        kind, t0, t1 = type_2(X, Y, value(b, main, u, v), slack * size, zero)
         for j in range(1 if kind == ANY else kind):
-            found[count, 0], found[count, 1], marks[count] = xc, t0 if j == 0 else t1, mark
+            found[count, 0], found[count, 1], marks[count] = roots[i], t0 if j == 0 else t1, mark
             if kind == ANY:
                 found[count, 1], marks[count] = reference[1], mark | 2
             count += 1
@@ -287,7 +300,13 @@ def turning_pair(
 
 @compiled(counted=False)
 def sliding_pair(
-    lam: float, last: bool, size: float, slack: float, zero: float, reference: Floats, work: Scratch
+    lam: float,
+    last: bool,
+    limits: tuple[float, float],
+    zero: float,
+    reference: Floats,
+    work: Scratch,
+    slides: None,
 ) -> int:
     """The same with a sliding joint x_b: ``row_i z x_b + lam_i (2 f_z x_b + x_b^2) = b_i``.
 
@@ -295,6 +314,7 @@ def sliding_pair(
     """
     f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
     roots, lengths, found, marks = work.roots, work.lengths, work.found, work.marks
+    size, slack = limits
     count, mark = 0, 0
     main = 0 if lam > 0.0 or abs(row[0, 2]) >= abs(row[1, 2]) else 1
     other = 1 - main
@@ -310,13 +330,14 @@ def sliding_pair(
             for m in range(5):
                 g[m] = -b[other, m] if m < 3 else 0.0
             add_product(h, 1, h, 0, last, 1.0, g)
-            outer = roots_of_product(work, last, slack * size)
+            outer = roots_of_product(work, last, slack * size, slides)
         else:
             outer = roots_of_linear(h, 1, last, roots, slack * size, zero)
         if outer < 0:
             roots[0], outer, mark = reference[2], 1, 4
         for i in range(outer):
-            found[i, 0], found[i, 1], marks[i] = roots[i], value(h, 0, last, roots[i]), mark
+            u, v = basis(last, roots[i])
+            found[i, 0], found[i, 1], marks[i] = roots[i], value(h, 0, u, v), mark
         return outer
     if lam == 0.0:
         return 0  # both joints slide along the same line: redundant
@@ -325,10 +346,10 @@ def sliding_pair(
     if outer < 0:
         roots[0], outer, mark = reference[2], 1, 4
     for i in range(outer):
-        xc = roots[i]
-        linear = row[other, 2] + 2.0 * lam * value(f, 2, last, xc)
-        for j in range(quadratic_roots(lam, linear, -value(b, other, last, xc), lengths)):
-            found[count, 0], found[count, 1], marks[count] = xc, lengths[j], mark
+        u, v = basis(last, roots[i])
+        linear = row[other, 2] + 2.0 * lam * value(f, 2, u, v)
+        for j in range(quadratic_roots(lam, linear, -value(b, other, u, v), lengths)):
+            found[count, 0], found[count, 1], marks[count] = roots[i], lengths[j], mark
             count += 1
     return count
 
@@ -394,11 +415,10 @@ def concurrent_postures(
     Shapes: links (N, 6, 4, 4); ``meeting`` holds the height of the point on axis 3 and on axis 5.
     ``backwards`` solves the first three joints from the other end, with the links ``pair``.
     """
-    x, marks = work.x, work.free
+    x, marks, w, p = work.x, work.free, work.w, work.p
     y, wrist_marks = np.zeros((2, 3)), np.zeros(2, np.int64)
     order, reference = np.zeros(3, np.int64), np.zeros(3)
-    w, p = np.zeros(3), np.zeros(3)
-    unit = np.zeros((3, 4))
+    unit, limits = np.zeros((3, 4)), (size, slack)
     P, Q, M = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 3))
     for i in range(3):
         unit[i, i] = 1.0
@@ -412,10 +432,8 @@ def concurrent_postures(
         for i in range(3):
             order[i] = kinds[2 - i if backwards else i]
             reference[i] = -references[n, 2 - i] if backwards else references[n, i]
-        if backwards:
-            m = point_solutions(order, pair[0], pair[1], p, w, size, slack, reference, work)
-        else:
-            m = point_solutions(order, E[0], E[1], w, p, size, slack, reference, work)
+        three, start, end = (pair, p, w) if backwards else (E, w, p)
+        m = point_solutions(order, three[0], three[1], start, end, limits, reference, work, 0)
         count = 0
         for i in range(m):
             if backwards:
@@ -440,76 +458,81 @@ def concurrent_postures(
 
 @compiled(counted=False)
 def improved_point(
-    D: Floats, kinds: Ints, p: Floats, size: float, n: int, work: Scratch
+    kinds: Ints, E1: Floats, p: Floats, size: float, n: int, work: Scratch
 ) -> tuple[float, float]:
     """Newton steps on solution n, in place: error, and determinant of the Jacobian."""
-    T, trial, J, e, x = work.T, work.trial, work.h, work.error, work.x[n]
+    f, J, x = work.f, work.h, work.x[n]
+    a, b, c = x[0], x[1], x[2]
     least, least_det = np.inf, 0.0
-    for i in range(3):
-        trial[i] = x[i]
-        for j in range(4):
-            T[0, i, j] = D[0, i, j]
     for _ in range(STEPS):
-        error, det = 0.0, 0.0
-        for k in range(3):
-            advance(T[k], kinds[k] == 0, trial[k], D[k + 1], T[k + 1])
+        u, v = basis(kinds[2] == 0, c)
+        du, dv = (-v, u) if kinds[2] == 0 else (1.0, 0.0)
+        # f, its derivative by the last joint, and the one of M_b f by the joint in the middle
+        y0, y1, y2 = value(f, 0, u, v), value(f, 1, u, v), value(f, 2, u, v)
+        d0, d1 = du * f[0, 1] + dv * f[0, 2], du * f[1, 1] + dv * f[1, 2]
+        d2 = du * f[2, 1] + dv * f[2, 2]
+        t0, t1, t2 = 0.0, 0.0, 1.0
+        if kinds[1] == 0:
+            cb, sb = cos(b), sin(b)
+            y0, y1, d0, d1 = (
+                cb * y0 - sb * y1,
+                sb * y0 + cb * y1,
+                cb * d0 - sb * d1,
+                sb * d0 + cb * d1,
+            )
+            t0, t1, t2 = -y1, y0, 0.0
+        else:
+            y2 += b
+        # the Jacobian and what is missing, seen from the first joint after its motion
         for i in range(3):
-            e[i] = p[i] - T[3, i, 3]
-            error += e[i] * e[i]
-        error = sqrt(error)
+            J[i, 0] = 0.0
+            J[i, 1] = E1[i, 0] * t0 + E1[i, 1] * t1 + E1[i, 2] * t2
+            J[i, 2] = E1[i, 0] * d0 + E1[i, 1] * d1 + E1[i, 2] * d2
+            J[i, 3] = E1[i, 0] * y0 + E1[i, 1] * y1 + E1[i, 2] * y2 + E1[i, 3]
+        if kinds[0] == 0:
+            ca, sa = cos(a), sin(a)
+            J[0, 0], J[1, 0] = -J[1, 3], J[0, 3]
+            J[0, 3], J[1, 3] = ca * p[0] + sa * p[1] - J[0, 3], ca * p[1] - sa * p[0] - J[1, 3]
+            J[2, 3] = p[2] - J[2, 3]
+        else:
+            J[2, 0] = 1.0
+            J[0, 3], J[1, 3], J[2, 3] = p[0] - J[0, 3], p[1] - J[1, 3], p[2] - a - J[2, 3]
+        error, det = sqrt(J[0, 3] ** 2 + J[1, 3] ** 2 + J[2, 3] ** 2), triple(J, 0, J, 1, J, 2)
         if not error < least:
             break
-        for k in range(3):
-            x[k], trial[k] = trial[k], 0.0
-            # column k: z x (P - O), or z
-            for i in range(3):
-                j, m = (i + 1) % 3, (i + 2) % 3
-                J[i, k] = T[k, i, 2]
-                if kinds[k] == 0:
-                    J[i, k] = T[k, j, 2] * (T[3, m, 3] - T[k, m, 3])
-                    J[i, k] -= T[k, m, 2] * (T[3, j, 3] - T[k, j, 3])
-        # Cramer's rule
-        for k in range(3):
-            j, m = (k + 1) % 3, (k + 2) % 3
-            for i in range(3):
-                r, s = (i + 1) % 3, (i + 2) % 3
-                cofactor = J[r, j] * J[s, m] - J[s, j] * J[r, m]
-                trial[k] += cofactor * e[i]
-                det += cofactor * J[i, k] / 3.0
-        least, least_det = error, det
+        x[0], x[1], x[2], least, least_det = a, b, c, error, det
         if error <= EXACT * size or abs(det) <= 1e-12:
             break
-        for k in range(3):
-            trial[k] = x[k] + trial[k] / det
+        a += triple(J, 3, J, 1, J, 2) / det
+        b += triple(J, 0, J, 3, J, 2) / det
+        c += triple(J, 0, J, 1, J, 3) / det
     return least, least_det
 
 
-@compiled(
-    NOTHING(
-        *[INTS, STACK, MATRIX, MATRIX, FLOAT, FLOAT, FLOAT, SCRATCH],
-        *[OUT3, FLAGS, OUT2, FLAGS, JOINT_FLAGS],
+@compiled(counted=False)
+def triple(A: Floats, i: int, B: Floats, j: int, C: Floats, k: int) -> float:
+    """Determinant of the columns i of A, j of B, k of C (each with three rows)."""
+    return (
+        A[0, i] * (B[1, j] * C[2, k] - B[2, j] * C[1, k])
+        + A[1, i] * (B[2, j] * C[0, k] - B[0, j] * C[2, k])
+        + A[2, i] * (B[0, j] * C[1, k] - B[1, j] * C[0, k])
     )
-)
-def position_solutions(
+
+
+@compiled(counted=False)
+def positions(
     kinds: Ints,
     D: Floats,
     points: Floats,
     references: Floats,
-    size: float,
-    slack: float,
-    tolerance: float,
+    limits: Floats,
     work: Scratch,
-    q: Floats,
-    valid: NDArray[np.bool_],
-    residual: Floats,
-    double: NDArray[np.bool_],
-    free: NDArray[np.bool_],
+    out: tuple[Floats, Floats, Ints],
+    slides: None,
 ) -> None:
-    """Configurations of three joints that bring the tool's origin to points ``(N, 3)`` of R_0.
-
-    Shapes: D (4, 4, 4), references (N, 3) -> q, free (N, 4, 3); valid, residual, double (N, 4).
-    """
-    x, marks, w, p, turning = work.x, work.free, np.zeros(3), np.zeros(3), 0
+    """See `position_solutions`; ``slides`` as in `point_solutions`."""
+    x, free, w, p, turning = work.x, work.free, work.w, work.p, 0
+    (q, residual, marks), size, pair = out, limits[0], (limits[0], limits[1])
     for i in range(3):
         w[i] = D[3, i, 3]
         turning += 1 - kinds[i]
@@ -519,10 +542,10 @@ def position_solutions(
             for j in range(3):
                 p[i] += D[0, j, i] * (points[n, j] - D[0, j, 3])
         count = 0
-        found = point_solutions(kinds, D[1], D[2], w, p, size, slack, references[n], work)
+        found = point_solutions(kinds, D[1], D[2], w, p, pair, references[n], work, slides)
         for i in range(found):
-            error, det = improved_point(D, kinds, points[n], size, i, work)
-            if not error <= tolerance:
+            error, det = improved_point(kinds, D[1], p, size, i, work)
+            if not error <= limits[2]:
                 continue
             same = -1
             for k in range(3):
@@ -535,12 +558,49 @@ def position_solutions(
                 if gap < MERGE:
                     same = r
             if same >= 0:
-                double[n, same] = True
+                marks[n, same] |= 8
             elif count < 4:
                 for k in range(3):
                     q[n, count, k] = x[i, k]
-                    free[n, count, k] = (marks[i] >> k & 1) == 1
-                residual[n, count], valid[n, count] = error, True
+                residual[n, count], marks[n, count] = error, free[i]
                 # two solutions in one: an isolated singular configuration
-                double[n, count] = marks[i] == 0 and abs(det) <= MERGE * size**turning
+                if free[i] == 0 and abs(det) <= MERGE * size**turning:
+                    marks[n, count] = 8
                 count += 1
+
+
+_POSITIONS = NOTHING(INTS, STACK, MATRIX, MATRIX, VECTOR, SCRATCH, types.Tuple((OUT3, OUT2, MARKS)))
+
+
+@compiled(_POSITIONS)
+def position_solutions(
+    kinds: Ints,
+    D: Floats,
+    points: Floats,
+    references: Floats,
+    limits: Floats,
+    work: Scratch,
+    out: tuple[Floats, Floats, Ints],
+) -> None:
+    """Configurations of three joints that bring the tool's origin to points ``(N, 3)`` of R_0.
+
+    Shapes: D (4, 4, 4), references (N, 3); ``limits``: length of the arm, relative overshoot of a
+    double root, largest error. ``out``: q (N, 4, 3), residual (N, 4) and marks (N, 4), which stay
+    negative in rows without a solution, have the bits 1, 2, 4 for joints at their reference and 8
+    for a double root. All joints turn.
+    """
+    positions(kinds, D, points, references, limits, work, out, None)
+
+
+@compiled(_POSITIONS)
+def position_solutions_with_slides(
+    kinds: Ints,
+    D: Floats,
+    points: Floats,
+    references: Floats,
+    limits: Floats,
+    work: Scratch,
+    out: tuple[Floats, Floats, Ints],
+) -> None:
+    """The same for joints of any kind."""
+    positions(kinds, D, points, references, limits, work, out, 0)

@@ -8,22 +8,21 @@ variables, errors.
 
 from __future__ import annotations
 
-from math import floor, inf, nan, pi, sqrt
+from math import nan, pi, sqrt
 
 import numpy as np
 from numba import types
 
 from ...kernels._compile import INT, MATRIX, OUT2, OUT3, STACK, VECTOR, Floats, Ints, compiled
 from ...kernels.poses import improper_pose
+from ..kernels.order import NOT_CONVERGED, OUTSIDE_LIMITS, REACHED, inside, ordered
 from ..request import FARTHEST, FARTHEST_POSITION
-from ..status import IGMStatus
 from . import layout
 from ._types import atan2, solve, solve_rare
 
 LANES = 16
 FALSE = 1e-2  # errors above this are of false candidates, not of rough ones
 EXACT = 5e-13  # errors above this are refined by Newton's method
-AT_LIMIT = 1e-9  # what rounding may carry a posture over its limits [rad, m]
 
 Task = tuple[Ints, Floats, Floats, Floats]
 """Instructions, numbers, poses (N, 4, 4) and references (N, k)."""
@@ -32,8 +31,6 @@ Out = tuple[Floats, Floats, Ints]
 
 _PLAN = types.Array(types.uint32, 1, "C", readonly=True)
 _MARKS = types.Array(types.int64, 2, "C")
-_REACHED, _OUTSIDE = int(IGMStatus.REACHED), int(IGMStatus.OUTSIDE_LIMITS)
-_NOTHING = int(IGMStatus.NOT_CONVERGED)
 
 
 @compiled()
@@ -261,36 +258,6 @@ def run_plan(task: Task, out: Out, rare: None) -> None:
 
 
 @compiled()
-def turned_inside(x: float, lower: float, upper: float, goal: float) -> float:
-    """``x`` plus whole turns, inside the limits and nearest to ``goal`` there; NaN if none is."""
-    turn = 2.0 * pi
-    lowest = x - turn * floor((x - lower + AT_LIMIT) / turn) if lower > -1e9 else -inf
-    highest = x + turn * floor((upper + AT_LIMIT - x) / turn) if upper < 1e9 else inf
-    if lowest > highest:
-        return nan
-    nearest = x + turn * floor((goal - x) / turn + 0.5)
-    return lowest if nearest < lowest else (highest if nearest > highest else nearest)
-
-
-@compiled()
-def lower_joints(rows: Floats, i: int, j: int, n: int) -> bool:
-    """Whether row i has the lower value in the first joint where two rows differ."""
-    for m in range(n):
-        if abs(rows[i, m] - rows[j, m]) > 1e-9:
-            return rows[i, m] < rows[j, m]
-    return False
-
-
-@compiled()
-def before(rows: Floats, i: int, j: int, n: int) -> bool:
-    """Order of two rows: by distance (column n), then by branch, then by the joints."""
-    for m in range(n, n + 2):
-        if rows[i, m] != rows[j, m]:
-            return rows[i, m] < rows[j, m]
-    return lower_joints(rows, i, j, n)
-
-
-@compiled()
 def ordered_rows(task: Task, mode: int, out: Out) -> int:
     """Order the postures of each pose; returns the most of any, or -1 - most.
 
@@ -300,64 +267,31 @@ def ordered_rows(task: Task, mode: int, out: Out) -> int:
     (plan, numbers, _, references), (q, residual, marks) = task, out
     N, S, n = q.shape
     limits, labels = int(plan[layout.LIMITS]), int(plan[layout.LABELS])
-    given, boxed, named = mode & layout.GIVEN, mode & layout.WITHIN_LIMITS, labels < numbers.size
-    # joint variables, distance, branch, error
-    rows, order = np.empty((S, n + 3)), np.empty(S, np.int64)
+    joints, named = numbers[limits : limits + 3 * n], labels < numbers.size
+    # joint variables, distance, error
+    rows, order, codes = np.empty((S, n + 2)), np.empty(S, np.int64), np.empty(S, np.int64)
     most, unreliable = 0, 0
     for p in range(N):
-        found, status, count = marks[p, 0], _REACHED, 0
+        found, status = marks[p, 0], REACHED
         if marks[p, 1] != 0 or found == 0:
-            found, status = 0, _NOTHING
+            found, status = 0, NOT_CONVERGED
             unreliable += 1
-        for i in range(found):
-            fits, total = True, 0.0
-            for m in range(n):
-                value, goal = q[p, i, m], references[p, m]
-                lower, upper = numbers[limits + m], numbers[limits + n + m]
-                revolute = numbers[limits + 2 * n + m] != 0.0
-                delta = value - goal
-                if boxed:
-                    if not given:
-                        middle = 0.5 * (lower + upper)
-                        goal = middle if abs(middle) < 1e9 else 0.0
-                    if revolute:
-                        value = turned_inside(value, lower, upper, goal)
-                    fits = fits and lower - AT_LIMIT <= value <= upper + AT_LIMIT
-                    delta = value - goal
-                elif revolute:
-                    delta -= 2.0 * pi * floor(delta / (2.0 * pi) + 0.5)
-                rows[i, m] = value
-                total += delta * delta
-            if not fits:
-                continue
-            rows[i, n], rows[i, n + 1], rows[i, n + 2] = 0.0, 0.0, residual[p, i]
-            if given:
-                rows[i, n] = sqrt(total)
-            if named:
-                rows[i, n + 1] = numbers[labels + marks[p, 2 + S + i]]
-            at = count
-            while at > 0 and before(rows, i, order[at - 1], n):
-                order[at] = order[at - 1]
-                at -= 1
-            order[at] = i
-            count += 1
-        if not named:
-            # a branch has no name but its rank in ascending joint variables
-            for a in range(count):
-                for b in range(count):
-                    rows[order[a], n + 1] += int(lower_joints(rows, order[b], order[a], n))
+        for i in range(S):
+            codes[i] = -1
+            if i < found:
+                codes[i] = int(numbers[labels + marks[p, 2 + S + i]]) if named else 0
+                rows[i, n + 1] = residual[p, i]
+        step = 0 if named else 1
+        count = ordered(q[p], codes, step, references[p], joints, mode, rows, order)
         for at in range(S):
             i = order[at] if at < count else 0
-            inside = at < count
             for m in range(n):
                 q[p, at, m] = rows[i, m] if at < count else nan
-                lower, upper = numbers[limits + m], numbers[limits + n + m]
-                inside = inside and lower - AT_LIMIT <= rows[i, m] <= upper + AT_LIMIT
-            residual[p, at] = rows[i, n + 2] if at < count else nan
-            marks[p, 2 + at] = int(rows[i, n + 1]) if at < count else -1
-            marks[p, 2 + S + at] = int(inside)
+            residual[p, at] = rows[i, n + 1] if at < count else nan
+            marks[p, 2 + at] = codes[i] if at < count else -1
+            marks[p, 2 + S + at] = int(at < count and inside(rows, i, joints))
         if found > 0 and count == 0:
-            status = _OUTSIDE
+            status = OUTSIDE_LIMITS
         marks[p, 0], marks[p, 1] = count, status
         most = max(most, count)
     return most if unreliable == 0 else -1 - most

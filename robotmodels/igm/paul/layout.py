@@ -25,3 +25,5 @@ DOUBLE, FREE_1, FREE_2, SMALL, ROUGH = 1, 2, 4, 8, 16
 GIVEN, WITHIN_LIMITS, UNORDERED = 1, 2, 4
 NEEDS_CHECK = -1000
 """Result of the kernel for a pose or reference that the checks in Python must look at."""
+AT_LIMIT = 1e-9
+"""What rounding may carry a solution over its limits [rad, m]."""
