@@ -651,7 +651,7 @@ MUTATIONS = [
         "- row[0, 1] * b[1, m]", "+ row[0, 1] * b[1, m]",
         "tests/test_igm_cases.py -k wrists_behind"),
     Mutation("igm: position", "the first joint turns the other way", "def point_solutions(",
-        "atan2(p[1], p[0]) - atan2(h1, h0)", "atan2(p[1], p[0]) + atan2(h1, h0)",
+        "angle_between(h0, h1, p[0], p[1])", "angle_between(p[0], p[1], h0, h1)",
         "tests/test_igm_position.py -k general"),
     Mutation("igm: position", "a double root is counted once, as a simple one",
         "def positions(", "free[i] == 0 and abs(det)", "free[i] == 9 and abs(det)",
