@@ -59,11 +59,10 @@ def ordered(
 ) -> int:
     """Order of the solutions of a pose by distance and branch; returns how many are kept.
 
-    Solutions q (S, n) with a branch ``codes (S,)`` of at least 0; those of one branch are numbered
-    apart by their rank in ascending joint variables, in steps of ``labels``. The first columns of
-    ``rows (S, more than n)`` get the joint variables, with limits those inside. ``joints (3 n,)``:
-    lower and upper limits, 1 for revolute.
+    Shapes: q (S, n); codes, order (S,), codes from 0 on; rows (S, more than n); joints (3 n,).
     """
+    # solutions of one branch are numbered apart by their rank in ascending joint variables, in
+    # steps of ``labels``; rows get the joint variables, with limits those inside
     S, n = q.shape
     given, boxed, count = mode & GIVEN, mode & WITHIN_LIMITS, 0
     for i in range(S if labels > 0 else 0):
@@ -131,11 +130,11 @@ def arranged_rows(
 ) -> int:
     """Solutions of a chain in the columns of the model, ordered; returns the most of any pose.
 
-    ``found``: q (N, S, k), residual, double (N, S), free, moving (N, S, k); ``codes (N, S)``: their
-    branches, -1 for none, in the new order at the end. ``out``: q (N, S, n), residual, within the
-    limits, double (N, S), free, family (N, S, n), cleared before. Joints without a column keep
-    their reference.
+    Shapes: columns (k,), references (N, n), joints (3 n,), codes (N, S), status (N,).
     """
+    # found: q (N, S, k), residual, double (N, S), free, moving (N, S, k); codes: their branches, -1
+    # for none, in the new order at the end. out: q (N, S, n), residual, within the limits, double
+    # (N, S), free, family (N, S, n), cleared before. Joints without a column keep their reference
     q, residual, double, free, moving = found
     N, S, k = q.shape
     n, most = references.shape[1], 0

@@ -156,10 +156,10 @@ def point_solutions(
 ) -> int:
     """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``, in ``work``. Returns how many.
 
-    ``limits``: length of the arm, and relative overshoot of a double root; ``free[i]`` gets a bit
-    (1, 2, 4) for each joint whose value was taken from ``reference``. ``slides`` is None where all
-    three turn: what only slides need is then not compiled.
+    ``limits``: length of the arm, and relative overshoot of a double root.
     """
+    # free[i] gets a bit (1, 2, 4) for each joint whose value was taken from the reference; slides
+    # is None where all three turn: what only slides need is then not compiled
     last, middle, first = kinds[2] == 0, kinds[1] == 0, kinds[0] == 0
     size, zero = limits[0], 1e-11 * limits[0]
     f, length, row, b, x = work.f, work.length, work.row, work.b, work.x
@@ -582,13 +582,12 @@ def position_solutions(
     work: Scratch,
     out: tuple[Floats, Floats, Ints],
 ) -> None:
-    """Configurations of three joints that bring the tool's origin to points ``(N, 3)`` of R_0.
+    """Configurations of three revolute joints that bring the tool's origin to points of R_0.
 
-    Shapes: D (4, 4, 4), references (N, 3); ``limits``: length of the arm, relative overshoot of a
-    double root, largest error. ``out``: q (N, 4, 3), residual (N, 4) and marks (N, 4), which stay
-    negative in rows without a solution, have the bits 1, 2, 4 for joints at their reference and 8
-    for a double root. All joints turn.
+    Shapes: D (4, 4, 4); points, references (N, 3) -> q (N, 4, 3); residual, marks (N, 4).
     """
+    # limits: length of the arm, relative overshoot of a double root, largest error. marks stay
+    # negative in rows without a solution; bits 1, 2, 4: joints at their reference, 8: double root
     positions(kinds, D, points, references, limits, work, out, None)
 
 
