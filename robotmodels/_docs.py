@@ -13,15 +13,8 @@ from ._outcomes import Result
 _TITLE = re.compile(r"\n([A-Z]\w+(?: \w+)?)\n-{3,}\n")
 _ENTRY = re.compile(r"^([\w*][\w*, ]*)( :.*|)$((?:\n(?:    .*|(?=\n    )))*)", re.MULTILINE)
 _ORDER = [
-    "Parameters",
-    "Attributes",
-    "Returns",
-    "Yields",
-    "Raises",
-    "Notes",
-    "References",
-    "Examples",
-]
+    "Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "References", "Examples",
+]  # fmt: skip
 
 
 def documented(thing: Any) -> Any:

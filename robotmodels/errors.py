@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import difflib
 from collections.abc import Iterable
 
@@ -96,7 +97,7 @@ class _NameNotFoundError(RobotModelsError, KeyError):
         return str(self.args[0])
 
     def __reduce__(self) -> tuple[object, ...]:  # the message is built from other arguments
-        return (_rebuilt, (type(self), self.args[0], self.name, self.known, self.nearest))
+        return copyreg.__newobj__, (type(self), self.args[0]), self.__dict__  # type: ignore[attr-defined]
 
 
 class FrameNotFoundError(_NameNotFoundError):
@@ -123,16 +124,3 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(repr(n) for n in names) or "none"
-
-
-def _rebuilt(
-    cls: type[_NameNotFoundError],
-    message: str,
-    name: object,
-    known: tuple[str, ...],
-    nearest: tuple[str, ...],
-) -> _NameNotFoundError:
-    error = cls.__new__(cls)
-    KeyError.__init__(error, message)
-    error.name, error.known, error.nearest = name, known, nearest
-    return error

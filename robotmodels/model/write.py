@@ -66,14 +66,6 @@ def write_urdf(model: RobotModel, path: str | Path) -> None:
         The robot.
     path : str or Path
         The file; its folder must exist.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_urdf(arm, Path(folder) / "arm.urdf")
     """
     text = to_urdf(model)
     try:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -52,31 +51,22 @@ def load_erd(name: str) -> RobotModel:
             "For another file of the package use RobotModel.from_urdf(path, base_link, tip_link).",
         )  # fmt: skip
     folder = erd_folder()
-    path = folder / arm.urdf
-    if not path.is_file():
-        raise RobotNotFoundError(
-            "robot in the installed example-robot-data", name,
-            [other for other, a in ERD_ARMS.items() if (folder / a.urdf).is_file()],
-            f"Its file would be {arm.urdf}; update with: pip install -U example-robot-data",
-        )  # fmt: skip
-    model = RobotModel.from_urdf(path, base_link=arm.base_link, tip_link=arm.tip_link)
+    model = RobotModel.from_urdf(folder / arm.urdf, base_link=arm.base_link, tip_link=arm.tip_link)
     if arm.tool is not None:
         point = model.twin.frame(arm.tool)
         tool = np.eye(4)
         tool[:3, :3], tool[:3, 3] = point.rotation, point.position
-        model = replace(model.with_tool(tool, tip=point.parent), notes=_without_branches(model))
+        notes = tuple(note for note in model.notes if "the tool is link" not in note)  # void here
+        model = replace(model.with_tool(tool, tip=point.parent), notes=notes)
     postures = _postures(folder / arm.srdf, model) if arm.srdf else {}
     return model.with_configurations(postures) if postures else model
 
 
-def _without_branches(model: RobotModel) -> tuple[str, ...]:
-    """Notes of a model whose tool has been chosen: the one about the choice is void."""
-    return tuple(note for note in model.notes if "the tool is link" not in note)
-
-
 def erd_folder() -> Path:
     """Folder of the robots of the installed example-robot-data."""
-    for prefix in _prefixes():
+    # wheels built with cmeel keep their files in a prefix inside site-packages
+    inside = (Path(entry, "cmeel.prefix") for entry in sys.path if entry)
+    for prefix in (*inside, Path(sys.prefix), Path(sys.base_prefix)):
         folder = prefix / _FOLDER
         if folder.is_dir():
             return folder
@@ -84,12 +74,6 @@ def erd_folder() -> Path:
         "Robots named erd:... are read from the package example-robot-data, which is not "
         "installed. Run: pip install example-robot-data"
     )
-
-
-def _prefixes() -> Iterator[Path]:
-    # wheels built with cmeel keep their files in a prefix inside site-packages
-    yield from (Path(entry, "cmeel.prefix") for entry in sys.path if entry)
-    yield from (Path(entry) for entry in dict.fromkeys((sys.prefix, sys.base_prefix)))
 
 
 def _postures(srdf: Path, model: RobotModel) -> dict[str, Array]:

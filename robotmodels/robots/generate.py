@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import UrdfWarning
@@ -28,15 +26,5 @@ def generate(folder: str | Path) -> list[Path]:
     return paths
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog="python -m robotmodels.robots.generate", description="Write the catalogue as URDF."
-    )
-    parser.add_argument("folder", nargs="?", default="urdf", help="where to (default: urdf)")
-    generate(parser.parse_args(arguments).folder)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    generate(*sys.argv[1:2] or ["urdf"])

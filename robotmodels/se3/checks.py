@@ -14,12 +14,9 @@ ndarray, shape (..., 4, 4)
 
 Raises
 ------
-ShapeError
-    Not (..., 4, 4).
-InvalidValueError
-    NaN or infinity.
-NotARotationError
-    The last row or the rotation is off by more than the tolerance, or it mirrors.
+ShapeError, InvalidValueError, NotARotationError
+    Not (..., 4, 4); NaN or infinity; the last row or the rotation is off by more than the
+    tolerance, or it mirrors.
 """
 
 from __future__ import annotations

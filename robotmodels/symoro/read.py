@@ -62,27 +62,12 @@ def read_par(
     Examples
     --------
     >>> import tempfile
-    >>> text = '''(* Robotname = 'elbow' *)
-    ... NL = 2
-    ... NJ = 2
-    ... NF = 2
-    ... Type = 0 (* Simple *)
-    ... Ant = {0, 1}
-    ... Sigma = {0, 0}
-    ... B = {0, 0}
-    ... d = {0, D2}
-    ... R = {0.3, 0}
-    ... gamma = {0, 0}
-    ... Alpha = {0, Pi/2}
-    ... Mu = {1, 1}
-    ... Theta = {t1, t2 + Pi/2}
-    ... '''
+    >>> lists = "NL=1; NJ=1; ant={0}; sigma={0}; alpha={Pi/2}; d={D1}; theta={t1}; r={0}"
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "elbow.par"
-    ...     _ = path.write_text(text)
-    ...     model = read_par(path, values={"D2": 0.4})
-    >>> model.name, model.table.d, model.table.theta
-    ('elbow', array([0. , 0.4]), array([0. , 1.57079633]))
+    ...     path = Path(folder) / "arm.par"
+    ...     _ = path.write_text(lists.replace(";", chr(10)))
+    ...     read_par(path, values={"D1": 0.4}).table.d
+    array([0.4])
     """
     return read_tree(path, values, gravity)[0]
 

@@ -139,15 +139,11 @@ def _text_of(source: str | Path) -> tuple[str, Path | None]:
         return path.read_text(encoding="utf-8-sig"), path.resolve().parent
     except UnicodeDecodeError as error:
         raise UrdfError(f"{path}: not UTF-8 text ({error.reason}).") from None
-    except OSError as error:
+    except (OSError, ValueError) as error:  # the latter for a zero character in the path
+        reason = getattr(error, "strerror", None) or error
         raise UrdfError(
-            f"cannot read {str(source)!r}: {error.strerror}. Give the path of a .urdf file, or the "
+            f"cannot read {str(source)!r:.80}: {reason}. Give the path of a .urdf file, or the "
             "text of one."
-        ) from None
-    except ValueError:
-        raise UrdfError(
-            f"{str(source)!r:.80} cannot be a path (it holds a zero character). Give the path of a "
-            ".urdf file, or the text of one."
         ) from None
 
 
