@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from calibration_arms import ALONE
+from calibration_arms import ALONE, NOISE, Arm
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -21,36 +21,6 @@ from robotmodels.calibration import (
 from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError
-from robotmodels.geometry import DHTable
-
-
-class Arm:
-    """A random arm of six joints, the same with small errors of its table, and readings."""
-
-    def __init__(self, seed, joints=6):
-        self.rng = rng = np.random.default_rng(seed)
-        there = rng.random((2, joints)) < 0.6
-        rows = []
-        for j in range(joints):
-            row = {"sigma": 0, "alpha": rng.choice([0.0, np.pi / 2, -np.pi / 2]) if j else 0.0}
-            row["d"] = rng.uniform(0.1, 0.5) * there[0, j] if j else 0.0
-            row |= {"theta": rng.uniform(-1.0, 1.0), "r": rng.uniform(0.1, 0.5) * there[1, j]}
-            rows.append(row)
-        tool = rm.se3.translation(*rng.uniform(0.05, 0.2, 3))
-        table = DHTable.from_rows(rows)
-        self.nominal = rm.RobotModel.from_table(table, tool=tool)
-        errors = {
-            name: getattr(table, name) + size * rng.normal(size=joints)
-            for name, size in (("alpha", 2e-3), ("d", 1e-3), ("theta", 2e-3), ("r", 1e-3))
-        }
-        self.real = self.nominal.with_table(table.replace(**errors))
-
-    def readings(self, count):
-        return self.rng.uniform(-2.0, 2.0, (count, self.nominal.n))
-
-    def positions(self, q, noise=1e-4):
-        return rm.dgm(self.real, q)[:, :3, 3] + noise * self.rng.normal(size=(len(q), 3))
-
 
 # --- outliers under squares -----------------------------------------------------------------------
 
@@ -62,7 +32,7 @@ def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
     found = []
     for arm in map(Arm, range(6)):
         q = arm.readings(int(arm.rng.integers(30, 61)))
-        p = arm.positions(q)
+        p = arm.positions(q).p.copy()
         wrong = arm.rng.choice(len(q), bad, replace=False)
         way = arm.rng.normal(size=(bad, 3))
         p[wrong] += 0.02 * way / np.linalg.norm(way, axis=1, keepdims=True)
@@ -76,16 +46,14 @@ def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
 # --- known distances ------------------------------------------------------------------------------
 
 
-def touching(arm, places, count=20, noise=1e-4):
+def touching(arm, places, count=20):
     """Readings at which the real tool is at each of some places, and their labels."""
     q, labels = [], []
     for label, place in enumerate(places):
         T = np.tile(np.eye(4), (4 * count, 1, 1))
-        T[:, :3, 3] = place + noise * arm.rng.normal(size=(len(T), 3))
-        found = rm.igm_numeric(
-            arm.real, T, q0=arm.rng.uniform(-2.0, 2.0, (len(T), arm.nominal.n)),
-            mask=[1, 1, 1, 0, 0, 0], rng=arm.rng,
-        )  # fmt: skip
+        T[:, :3, 3] = place + NOISE * arm.rng.normal(size=(len(T), 3))
+        start = arm.readings(len(T))
+        found = rm.igm_numeric(arm.real, T, q0=start, mask="position", rng=arm.rng)
         q.append(found.q[found.valid[:, 0], 0][:count])
         labels += [label] * len(q[-1])
     return np.concatenate(q), labels
@@ -251,7 +219,7 @@ LOWER, UPPER = np.array([-2, -2, -3, -3, -2, -0.1]), np.array([2, 2, 3, -0.1, 2,
 def test_columns_beyond_the_limits_are_refused_before_any_fit(mistake):
     arm = Arm(0)
     q = arm.rng.uniform(LOWER, UPPER, (40, 6))
-    p = arm.positions(q)
+    p = arm.positions(q).p.copy()
     model = arm.nominal.with_table(arm.nominal.table.replace(lower=LOWER, upper=UPPER))
     order, signs = [0, 1, 2, 5, 4, 3], [1, 1, 1, -1, 1, 1]
     wrong = {"order": q[:, order], "sign": q * signs, "degrees": np.rad2deg(0.1 * q)}[mistake]
@@ -269,7 +237,7 @@ def test_columns_beyond_the_limits_are_refused_before_any_fit(mistake):
 def test_implausible_residuals_are_the_first_note_and_end_the_search_for_their_cause():
     arm = Arm(0)
     q = arm.readings(40)
-    p = arm.positions(q)
+    p = arm.positions(q).p.copy()
     wrong, right = fit(arm.nominal, Position(q, p[::-1])), fit(arm.nominal, Position(q, p))
     assert re.match(r"position: the residuals are \d+ % of the robot's size", wrong.notes[0])
     assert not any("depend on the posture" in note for note in wrong.notes)
