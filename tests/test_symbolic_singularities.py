@@ -240,7 +240,6 @@ def test_map_of_the_determinant_and_of_a_factor():
     assert grid.values.shape == (7, 9)
     assert grid.names == ("joint_2", "joint_3")
     assert grid.joints.tolist() == [1, 2]
-    assert "joint_2 and joint_3, 7 by 9: determinant" in repr(grid)
     np.testing.assert_allclose(grid.first[[0, -1]], [-np.pi, np.pi])
     limited = rm.load("irb120")
     axis = singularity_map(limited, (1, 2), samples=(2, 2)).second

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_core, as_mask, as_number, as_vector, batch_shape, read_only
+from .._arrays import Array, Frozen, Value, as_core, as_mask, as_number, as_vector, batch_shape
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
-from .ellipsoid import in_range
 from .ellipsoids import joint_scale
 from .jacobians import COMPONENTS, Reference, jacobian
 from .lengths import length_of
@@ -22,8 +21,8 @@ from .lengths import length_of
 _ON = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Manipulability(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Manipulability(Frozen, Value):
     """How well joints move m components of the twist. Read-only.
 
     Parameters
@@ -70,13 +69,6 @@ class Manipulability(Rebuilt):
     def _possible(self) -> Array:
         """The singular values that are not zero only because joints are fewer than components."""
         return self.singular_values[..., : min(self.jacobian.shape[-2:])]
-
-    def __repr__(self) -> str:
-        return (
-            f"<Manipulability {self.rank.shape}: {self.weights.size} components, "
-            f"{self.jacobian.shape[-1]} joints; measure {in_range(self.measure)}, "
-            f"condition {in_range(self.condition)}, rank {in_range(self.rank)}>"
-        )
 
     def velocity_transmission(self, twist: ArrayLike) -> Array:
         """Largest multiple (...) of a twist (..., m) that joint velocities of the ball give.
@@ -173,9 +165,7 @@ def manipulability(
     J, weights = J[..., rows, :], weights[rows]
     _, s = _left_vectors(weights[:, None] * J)
     s = np.where(s > relative * unit * size[..., None], s, 0.0)
-    return Manipulability(
-        read_only(s), read_only((s > 0).sum(axis=-1), np.int64), read_only(J), read_only(weights)
-    )
+    return Manipulability(s, (s > 0).sum(axis=-1), J, weights)
 
 
 def _left_vectors(J: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_core, batch_shape, read_only
+from .._arrays import Array, Value, as_core, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 
 # sine of an angle that is rounding: a direction so near an axis or a plane lies on it
@@ -40,8 +40,8 @@ class EllipsoidQuantity(Enum):
         return quantity
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ellipsoid(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Ellipsoid(Value):
     """Velocities or forces that joints of one size give: ``sum_i (u_i . x / r_i)^2 <= 1``.
 
     Read-only; leading axes are those of the configurations.
@@ -81,20 +81,6 @@ class Ellipsoid(Rebuilt):
             if array.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
             object.__setattr__(self, name, array)
-
-    def __repr__(self) -> str:
-        unit, r = self.quantity.unit, self.radii
-        if r.ndim == 1:
-            radii, centre = (", ".join(f"{x:.4g}" for x in v) for v in (r, self.centre))
-            return (
-                f"<Ellipsoid of {self.quantity.value}: radii {radii} {unit}, rank {self.rank}, "
-                f"centre ({centre}) m>"
-            )
-        ranges = ", ".join(f"r{k + 1} {in_range(r[..., k])}" for k in range(3))
-        return (
-            f"<Ellipsoid of {self.quantity.value}, batch {r.shape[:-1]}: {ranges} {unit}, "
-            f"rank {in_range(self.rank)}>"
-        )
 
     @property
     def volume(self) -> Array:
@@ -176,11 +162,3 @@ class Ellipsoid(Rebuilt):
         d = d / np.linalg.norm(d, axis=-1, keepdims=True)
         c = np.einsum("...ji,...j->...i", self.axes, d)
         return np.where((np.abs(c) <= _ON) & (self.rank < 3)[..., None], 0.0, c)
-
-
-def in_range(values: Array | NDArray[np.int64]) -> str:
-    """Range of numbers as text."""
-    if not values.size:
-        return "none"
-    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
-    return low if low == high else f"{low} to {high}"

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_vector, read_only
+from .._arrays import Array, Frozen, Value, as_vector
 from ..geometry import PRISMATIC
 from ..model import FrameOfInterest, RobotModel, check_model
 from .poses import link_poses
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JacobianFactors(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class JacobianFactors(Frozen, Value):
     """The three matrices of the book: ``J = rotation transport reduced``.
 
     The first two are invertible at every configuration, so that rank, singular positions and (for
@@ -45,14 +45,6 @@ class JacobianFactors(Rebuilt):
     reduced: Array
     projection: str
     intermediate: str
-
-    def __repr__(self) -> str:
-        *batch, _, n = self.reduced.shape
-        where = f", batch {tuple(batch)}" if batch else ""
-        return (
-            f"<JacobianFactors{where}: rotation (6, 6), transport (6, 6), reduced (6, {n}); "
-            f"projection {self.projection!r}, intermediate {self.intermediate!r}>"
-        )
 
     @property
     def jacobian(self) -> Array:
@@ -138,9 +130,9 @@ def jacobian_factors(
     )
     names = (model.twin.names.frames[0], *map(str, model.table.names))
     return JacobianFactors(
-        rotation=read_only(rotation),
-        transport=read_only(transport),
-        reduced=read_only(reduced),
+        rotation=rotation,
+        transport=transport,
+        reduced=reduced,
         projection=_name(middle_i if projection is None else projection, names),
         intermediate=_name(middle_j if intermediate is None else intermediate, names),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import as_vector, read_only
+from .._arrays import as_vector
 from ..errors import InvalidValueError
 from ..kinematics.factors import JacobianFactors, middle_frames
 from ..model import FrameOfInterest, RobotModel, check_model
@@ -85,9 +85,9 @@ class JacobianExplanation(Explanation):
         transport[..., range(6), range(6)] = 1.0
         transport[..., :3, 3:] = -se3.skew(self.numbers.matrix(self.lever, q)[..., 0])
         return JacobianFactors(
-            rotation=read_only(rotation),
-            transport=read_only(transport),
-            reduced=read_only(self.numbers.matrix(self.reduced, q)),
+            rotation=rotation,
+            transport=transport,
+            reduced=self.numbers.matrix(self.reduced, q),
             projection=self.projection,
             intermediate=self.intermediate,
         )

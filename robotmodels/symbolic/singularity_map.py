@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
+from .._arrays import Array, Frozen, Value, as_exact, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..kinematics import SingularityKind
@@ -19,8 +19,8 @@ from .factor import SingularityFactor
 from .singularities import explain_singularities
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SingularityMap(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SingularityMap(Frozen, Value):
     """Values of a singular factor or of the determinant over two joints; drawn by ``viz``.
 
     The robot is singular where the value is zero.
@@ -52,17 +52,6 @@ class SingularityMap(Rebuilt):
     values: Array
     label: str
     units: tuple[str, str, str]
-
-    def __repr__(self) -> str:
-        unit = "" if self.units[2] == "1" else f" {self.units[2]}"
-        text = "no values"
-        if self.values.size:
-            text = f"{self.values.min():.4g} to {self.values.max():.4g}{unit}"
-        size = " by ".join(map(str, self.values.shape))
-        return (
-            f"<SingularityMap of {self.model_name} over {' and '.join(self.names)}, {size}: "
-            f"{self.label:.60} from {text}>"
-        )
 
 
 def singularity_map(
@@ -139,11 +128,11 @@ def singularity_map(
     names = [str(model.table.names[row]) for row in rows]
     return SingularityMap(
         model_name=model.name,
-        joints=read_only(columns, np.int64),
+        joints=np.array(columns),
         names=(names[0], names[1]),
-        first=read_only(axes[0]),
-        second=read_only(axes[1]),
-        values=read_only(values),
+        first=axes[0],
+        second=axes[1],
+        values=values,
         label=label,
         units=(own[0], own[1], unit),
     )

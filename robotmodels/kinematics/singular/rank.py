@@ -13,7 +13,7 @@ from math import comb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_floats, as_number, as_vector, read_only
+from ..._arrays import Array, Frozen, Value, as_floats, as_number, as_vector
 from ...model import RobotModel
 from ..jacobians import COMPONENTS, jacobian
 from ..lengths import spread_configurations
@@ -32,8 +32,8 @@ TOLERANCE = 1e-9
 _MOST_CHOICES = 2000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JacobianRank(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class JacobianRank(Frozen, Value):
     """Ranks of the Jacobians of one call. Read-only.
 
     Parameters
@@ -58,8 +58,8 @@ class JacobianRank(Rebuilt):
     tolerance: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OperationalDimension(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class OperationalDimension(Frozen, Value):
     """Number of independent motions of a frame of a robot. Read-only.
 
     Parameters
@@ -213,10 +213,10 @@ def operational_dimension(
         orientation_dimension=_greatest_rank(J[:, linear:], tolerance),
         joints=joints,
         redundancy=joints - M,
-        singular_values=read_only(largest),
+        singular_values=largest,
         gap=float(_gap(largest, np.array(M))),
-        missing_in_world=read_only(_never(task, spread, False, tolerance)),
-        missing_in_frame=read_only(_never(task, spread, True, tolerance)),
+        missing_in_world=_never(task, spread, False, tolerance),
+        missing_in_frame=_never(task, spread, True, tolerance),
         length=task.length,
         local=None if q is None else task_rank(task, as_vector(q, model.n, "q"), tolerance),
     )
@@ -227,9 +227,9 @@ def task_rank(task: SingularTask, q: Array, tolerance: float) -> JacobianRank:
     sigma = as_floats(np.linalg.svd(task_jacobians(task, q), compute_uv=False), "sigma")
     rank = (sigma > tolerance * sigma[..., :1]).sum(axis=-1)
     return JacobianRank(
-        rank=read_only(rank, np.int64),
-        singular_values=read_only(sigma),
-        gap=read_only(_gap(sigma, np.asarray(rank))),
+        rank=rank,
+        singular_values=sigma,
+        gap=_gap(sigma, np.asarray(rank)),
         length=task.length,
         tolerance=tolerance,
     )
