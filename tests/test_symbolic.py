@@ -2,6 +2,7 @@
 
 import math
 import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import robotmodels as rm
 from robotmodels.errors import InvalidValueError
 from robotmodels.se3 import from_rpy
 from robotmodels.symbolic import explain_dgm, explain_jacobian
+from robotmodels.symbolic.angles import wrapped
 
 RIGHT = np.pi / 2
 CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
@@ -231,6 +233,13 @@ def test_angles_are_exact_or_symbols(rng):
     model = arm({"theta": 0.75 * np.pi}, {"theta": 0.75 * np.pi, "d": 0.4})
     assert "3π/2" not in explain_dgm(model).text
     check(model, explain_dgm(model), rng)
+
+
+@pytest.mark.parametrize(
+    ("turns", "expected"), [("3/2", "-1/2"), ("-3/2", "1/2"), ("-1", "1"), ("2", "0"), ("5", "1")]
+)
+def test_multiples_of_pi_are_wrapped(turns, expected):
+    assert wrapped(Fraction(turns)) == Fraction(expected)
 
 
 def test_long_results_are_cut_into_named_parts(rng):

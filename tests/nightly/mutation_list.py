@@ -483,7 +483,7 @@ MUTATIONS = [
         "replace(t, sign=-t.sign)", "replace(t, sign=t.sign)",
         "tests/test_symbolic.py -k (rx90 or opposite or lab_rr)"),
     Mutation("symbolic", "whole turns are not taken off", "def wrapped(turns: Fraction)",
-        "1 - (1 - turns) % 2", "turns", "tests/test_symbolic.py -k exact_or_symbols"),
+        "1 - (1 - turns) % 2", "turns", "tests/test_symbolic.py -k multiples_of_pi"),
     Mutation("symbolic", "the sine of a negative angle is positive",
         "def cos_sin(self, angle: Angle)", "return C, sign * S", "return C, S",
         "tests/test_symbolic.py -k (rx90 or opposite)"),
