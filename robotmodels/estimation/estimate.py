@@ -23,10 +23,7 @@ class EstimateStatus(Outcome):
         "The simulated robot diverged, so that there are no parameters. Give the robot's own "
         "controller= and references, or start= near the true parameters, or use method 'wls'.",
     )
-    POOR_PREDICTION = (
-        3,
-        "Torques are predicted poorly. Do not use the parameters before you know why.",
-    )
+    POOR_PREDICTION = 3, "Torques are predicted poorly: find the cause before using the parameters."
 
 
 class NamedValues(Frozen):
