@@ -219,13 +219,7 @@ class DHTable:
         return bool((self.antecedent == np.arange(self.f)).all())
 
     def path(self, frame: int) -> list[int]:
-        """Numbers of the frames from the base to one frame, 1..f (0: none), ascending.
-
-        Examples
-        --------
-        >>> DHTable(antecedent=[0, 1, 1], sigma=[0, 0, 0]).path(3)
-        [1, 3]
-        """
+        """Numbers of the frames from the base to one frame, 1..f (0: none), ascending."""
         path = []
         while frame > 0:
             path.append(frame)
@@ -233,13 +227,7 @@ class DHTable:
         return path[::-1]
 
     def replace(self, **columns: ArrayLike | Sequence[str]) -> Self:
-        """The same table with some columns changed, named and shaped as in the constructor.
-
-        Examples
-        --------
-        >>> DHTable(antecedent=[0], sigma=[0]).replace(r=[0.2]).r
-        array([0.2])
-        """
+        """The same table with some columns changed, named and shaped as in the constructor."""
         known = [field.name for field in fields(self)]
         for column in columns:
             if column not in known:

@@ -26,13 +26,7 @@ from .table import DHTable
 
 
 def constant_factors(table: DHTable) -> Array:
-    """The constant part ``C_j`` of each factor ``T(a(j), j) = C_j Motion(q_j)``, at ``q = 0``.
-
-    Examples
-    --------
-    >>> constant_factors(DHTable(antecedent=[0], sigma=[0], r=[0.2]))[0, 2, 3]
-    np.float64(0.2)
-    """
+    """The constant part ``C_j`` of each factor ``T(a(j), j) = C_j Motion(q_j)``, at ``q = 0``."""
     C = np.empty((table.f, 4, 4))
     for j in range(table.f):
         C[j] = (

@@ -62,13 +62,7 @@ def robots() -> tuple[str, ...]:
 
 
 def title(name: str) -> str:
-    """One-line description of a robot.
-
-    Examples
-    --------
-    >>> title("rx90")
-    'Staubli RX-90, the running example of the seed book.'
-    """
+    """One-line description of a robot."""
     if isinstance(name, str) and name.removeprefix(ERD_PREFIX) in ERD_ARMS and ":" in name:
         arm = ERD_ARMS[name.removeprefix(ERD_PREFIX)]
         part = f", from {arm.base_link} to {arm.tip_link}" if arm.base_link else ""

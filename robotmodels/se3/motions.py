@@ -46,26 +46,14 @@ def rotation(axis: str, angle: float) -> Array:
 
 
 def translation(x: float, y: float, z: float) -> Array:
-    """Pose of a pure translation.
-
-    Examples
-    --------
-    >>> translation(0, 0, 0.5)[2, 3]
-    np.float64(0.5)
-    """
+    """Pose of a pure translation."""
     T = np.eye(4)
     T[:3, 3] = x, y, z
     return T
 
 
 def inverse(T: Array) -> Array:
-    """Inverse of rigid poses by transposition, shape (..., 4, 4).
-
-    Examples
-    --------
-    >>> inverse(translation(0, 0, 0.5))[2, 3]
-    np.float64(-0.5)
-    """
+    """Inverse of rigid poses by transposition, shape (..., 4, 4)."""
     Ti = np.zeros(T.shape)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     Ti[..., :3, :3] = Rt
@@ -107,13 +95,7 @@ def to_rpy(R: Array) -> tuple[float, float, float]:
 
 
 def skew(p: Array) -> Array:
-    """Matrices of the vector product, ``skew(p) @ u = p x u``, shape (..., 3, 3).
-
-    Examples
-    --------
-    >>> skew(np.array([1.0, 0.0, 0.0]))[2, 1]
-    np.float64(1.0)
-    """
+    """Matrices of the vector product, ``skew(p) @ u = p x u``, shape (..., 3, 3)."""
     S = np.zeros((*p.shape[:-1], 3, 3), np.result_type(p, float))
     S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -p[..., 2], p[..., 1], -p[..., 0]
     S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = p[..., 2], -p[..., 1], p[..., 0]
