@@ -127,7 +127,8 @@ class About(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Titles become paragraphs in bold, because the page has sections of its own."""
         text = inspect.getdoc(importlib.import_module(self.arguments[0])) or ""
-        text = re.sub(r"^(.+)\n-{3,}$", r"**\1**\n", text.partition("\n")[2], flags=re.MULTILINE)
+        text = re.sub(r"^\*\*(?=\w)", r"\\*\\*", text.partition("\n")[2], flags=re.MULTILINE)
+        text = re.sub(r"^(.+)\n-{3,}$", r"**\1**\n", text, flags=re.MULTILINE)
         source = self.get_source_info()[0]
         return self.parse_text_to_nodes(StringList(text.splitlines(), source=source))
 
