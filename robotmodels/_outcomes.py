@@ -51,6 +51,12 @@ class Result(Frozen, Value):
         """Outcome of row i as a sentence; i is left out for a single row."""
         return self.outcome(i).sentence
 
+    def __repr__(self) -> str:
+        """The sentence of a single row or the count of the outcomes of several, then the fields."""
+        one = np.ndim(self.status) == 0  # type: ignore[attr-defined]
+        said = self.reason() if one else f"{self.counted}."
+        return f"<{type(self).__name__}: {said} {self._texts(Outcome, Value)}>"
+
     @property
     def counted(self) -> str:
         """How many rows have which outcome, in words."""

@@ -431,6 +431,7 @@ MISTAKES = (
     (lambda: viz.plot_trajectory(MOVE, orders=(0, 4)), "orders: .* from 0 to 3, each once"),
     (lambda: viz.plot_trajectory(MOVE, tr.MotionLimits([1.0, 2.0])), "limits of 3 joints"),
     (lambda: viz.plot_trajectory(MOVE, size=(0.0, 1.0)), "size: expected positive inches"),
+    (lambda: viz.plot_trajectory(MOVE, units="rad", model=SCARA), "joint 3 is prismatic"),
     (lambda: viz.plot_trajectory(MOVE, units="grad"), "expected one of 'rad', 'deg'"),
     (lambda: viz.plot_trajectory(MOVE, names=["a"]), "names: .* each of the 3 joints, got 1"),
     (lambda: viz.plot_trajectory(MOVE, model=RX90), "got 'rx90' of 6"),

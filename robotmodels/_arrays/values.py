@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from enum import Enum
 from functools import cache
 from typing import Any
 
@@ -75,9 +76,13 @@ class Value(Rebuilt):
         return value_hash(type(self).__name__, *self._values)
 
     def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._texts()})"
+
+    def _texts(self, *hidden: type) -> str:
+        """The fields given, but for those of some types, each in a line."""
         given = ((f.name, getattr(self, f.name)) for f in fields(self) if f.init)  # type: ignore[arg-type]
-        texts = [f"{name}={_shown(value)}" for name, value in given if value is not None]
-        return f"{type(self).__name__}({', '.join(texts)})"
+        shown = ((name, value) for name, value in given if not isinstance(value, hidden))
+        return ", ".join(f"{name}={_shown(value)}" for name, value in shown if value is not None)
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -85,10 +90,12 @@ class Value(Rebuilt):
 
 
 def _shown(value: object) -> str:
-    """A field in one line: arrays of more than seven numbers by their shape."""
+    """A field in one line: arrays of more than eight numbers by their shape."""
     if type(value) is tuple:
         return f"({', '.join(map(_shown, value))})"
-    if isinstance(value, np.ndarray) and value.size > 7:
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, np.ndarray) and value.size > 8:
         return f"<{value.shape} array>"
     return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
 

@@ -99,8 +99,11 @@ class FeasiblePath(Result):
         if not len(self.breaks):
             return f"{self.status.sentence} The first pose has no posture."
         last, count = int(self.breaks.max()), len(self.breaks)
-        where = f"the best breaks before pose {last}" if last else "all start outside the limits"
-        return f"{self.status.sentence} Of {count} {where}."
+        if last == 0:
+            return f"{self.status.sentence} All {count} start outside the limits."
+        there = not np.isnan(self.postures[last]).all()
+        why = "its posture ends at a singular position or a limit" if there else "it has none"
+        return f"{self.status.sentence} Of {count} the best breaks before pose {last}: {why}."
 
 
 def feasible_path(

@@ -83,7 +83,13 @@ def joint_units(
     given = [units] * n if isinstance(units, (Unit, str)) else list(units)
     if len(given) != n:
         raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
-    return [as_unit(unit) for unit in given]
+    kinds = [as_unit(unit) for unit in given]
+    wrong = {True: (Unit.RADIAN, Unit.DEGREE), False: (Unit.METRE, Unit.MILLIMETRE), None: ()}
+    for j, (unit, long) in enumerate(zip(kinds, lengths, strict=True)):
+        if unit in wrong[long]:
+            kind = "prismatic" if long else "revolute"
+            raise InvalidValueError(f"units: joint {j + 1} is {kind}, got {unit.value!r}.")
+    return kinds
 
 
 def joints_of(
