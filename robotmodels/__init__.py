@@ -2,7 +2,9 @@
 
 A table of Khalil-Kleinfinger (modified Denavit-Hartenberg) parameters becomes URDF, is loaded into
 Pinocchio, and gives the direct models; everything takes a `RobotModel` first. Only NumPy and
-Pinocchio are imported here, the rest where it is used.
+Pinocchio are imported here, the rest where it is used. "Book" and "[1.16]" in docstrings are
+E. Dombre and W. Khalil (eds.), *Modeling, Performance Analysis and Control of Robot Manipulators*,
+ISTE 2007, and its equation 1.16.
 """
 
 from __future__ import annotations

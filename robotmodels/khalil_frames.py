@@ -1,6 +1,6 @@
 """Khalil-Kleinfinger frames for a tree of joint axes given any other way (a URDF, say).
 
-Seed book section 1.2.1: z_j along the axis of joint j, x_j along the common perpendicular of z_j
+Book section 1.2.1: z_j along the axis of joint j, x_j along the common perpendicular of z_j
 and the next axis, and the free choices made so that as many parameters as possible are zero.
 
 Parameters

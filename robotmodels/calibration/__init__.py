@@ -1,4 +1,4 @@
-"""Geometric calibration from measurements or contacts (seed book section 1.4).
+"""Geometric calibration from measurements or contacts (book section 1.4).
 
 Arguments that come back in this room:
 

@@ -60,7 +60,7 @@ def candidate_parameters(
 
     References
     ----------
-    Seed book section 1.4.2; S. Hayati, IEEE CDC 1983.
+    Book section 1.4.2; S. Hayati, IEEE CDC 1983.
 
     Examples
     --------

@@ -47,7 +47,7 @@ def differential_model(
 
     References
     ----------
-    Seed book section 1.4.3.
+    Book section 1.4.3.
 
     Examples
     --------

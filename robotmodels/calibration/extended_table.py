@@ -208,7 +208,7 @@ def gravity_loads(
 ) -> Array:
     """Gravity along elements (row, element, row that carries the load): moments and forces.
 
-    Shapes: q (N, n), K elements -> (N, K), N m or N. Seed book section 1.5.1.1.
+    Shapes: q (N, n), K elements -> (N, K), N m or N. Book section 1.5.1.1.
     """
     model = table.model
     T = link_poses(model, q)

@@ -119,7 +119,7 @@ def fit(
 
     References
     ----------
-    Seed book section 1.4.4.
+    Book section 1.4.4.
 
     Examples
     --------

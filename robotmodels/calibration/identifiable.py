@@ -71,7 +71,7 @@ class IdentifiableParameters(Frozen):
 
     References
     ----------
-    Seed book section 1.4.4.2; W. Khalil, M. Gautier, Ch. Enguehard, "Identifiable parameters and
+    Book section 1.4.4.2; W. Khalil, M. Gautier, Ch. Enguehard, "Identifiable parameters and
     optimum configurations for robots calibration", Robotica 9, 1991.
     """
 

@@ -104,7 +104,7 @@ def observability(
     ----------
     O1: J.-H. Borm, C.-H. Menq, Int. J. Robotics Research 10(1), 1991. O2: M. R. Driels, U. S.
     Pathre, J. Robotic Systems 7(2), 1990. O3, O4: A. Nahvi, J. M. Hollerbach, IEEE ICRA 1996. O5:
-    Y. Sun, J. M. Hollerbach, IEEE ICRA 2008. Seed book section 1.4.4.
+    Y. Sun, J. M. Hollerbach, IEEE ICRA 2008. Book section 1.4.4.
 
     Examples
     --------

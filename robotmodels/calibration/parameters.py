@@ -115,7 +115,7 @@ class GeometricParameters(Rebuilt):
     Parameters
     ----------
     table, entries
-        The extended table, and the parameters of it (seed book section 1.4.2).
+        The extended table, and the parameters of it (book section 1.4.2).
 
     Examples
     --------

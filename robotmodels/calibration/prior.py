@@ -48,7 +48,7 @@ class ParameterPrior(Rebuilt):
 
     References
     ----------
-    Seed book section 1.4.4.3.
+    Book section 1.4.4.3.
     """
 
     length: float | None = None

@@ -1,6 +1,6 @@
 """All measurements of a calibration: one vector of unknowns, one stack of rows.
 
-Source: Seed book section 1.4.5.
+Book section 1.4.5.
 """
 
 from __future__ import annotations

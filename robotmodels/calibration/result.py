@@ -44,7 +44,7 @@ class CalibrationResult(NamedValues):
 
     References
     ----------
-    Seed book section 1.4.
+    Book section 1.4.
     """
 
     nominal: RobotModel

@@ -130,7 +130,7 @@ class CalibratedRobot(Frozen):
 
     References
     ----------
-    Seed book section 1.4.6.
+    Book section 1.4.6.
     """
 
     parameters: GeometricParameters

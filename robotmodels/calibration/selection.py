@@ -206,7 +206,7 @@ def select_configurations(
 
     References
     ----------
-    Seed book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972.
+    Book section 1.4.4; V. V. Fedorov, "Theory of optimal experiments", 1972.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Fit of given parameters, with an estimate of the noise.
 
-Source: Seed book section 1.4.4.3.
+Book section 1.4.4.3.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _show_arms(folder: Path) -> None:
     """Every model of the RX-90 and the UR5."""
-    _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
+    _say("Staubli RX-90: from Table 1.1 of the book (Dombre and Khalil) to URDF to Pinocchio")
     rx90 = load("rx90")
     _show_models(rx90, _RX90_POSTURE, folder)
     _say("Base inertial parameters of the RX-90: the fewest that give its torques")
@@ -152,7 +152,7 @@ def _say(text: str) -> None:
 
 
 def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
-    """Identify the Staubli TX40 from its log (seed book sections 1.6.2 and 1.6.5)."""
+    """Identify the Staubli TX40 from its log (book sections 1.6.2 and 1.6.5)."""
     from ..datasets import load_tx40
     from ..identification import check_log, fit, synchronisation
     from ..identification.checks import check_joints

@@ -30,7 +30,7 @@ stiffness, gain : float or array_like
 
 References
 ----------
-Seed book sections 5.3.3 to 5.3.6; J. Craig, "Introduction to Robotics", section 11.4; M. Raibert
+Book sections 5.3.3 to 5.3.6; J. Craig, "Introduction to Robotics", section 11.4; M. Raibert
 and J. Craig, ASME J. Dyn. Syst. Meas. Control 103(2), 1981; O. Khatib, IEEE J. Robotics and
 Automation 3(1), 1987; C. An and J. Hollerbach, IEEE ICRA 1987; W. Fisher and M. Mujtaba, Int. J.
 Robotics Research 11(4), 1992; J. De Schutter and H. Van Brussel, ibid. 7(4), 1988.
@@ -300,7 +300,7 @@ class SpringWall(Value):
 
     References
     ----------
-    Seed book section 5.3.1.
+    Book section 5.3.1.
 
     Examples
     --------

@@ -32,7 +32,7 @@ PIDGains or ndarray, shape (..., n, p)
 
 References
 ----------
-Seed book sections 5.2.5 and 5.2.8; M. Takegaki and S. Arimoto, ASME J. Dyn. Syst. Meas. Control
+Book sections 5.2.5 and 5.2.8; M. Takegaki and S. Arimoto, ASME J. Dyn. Syst. Meas. Control
 103(2), 1981; B. Paden and R. Panja, Int. J. Control 47(6), 1988; J.-J. Slotine and W. Li, "On the
 adaptive control of robot manipulators", Int. J. Robotics Research 6(3), 1987.
 

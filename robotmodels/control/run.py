@@ -157,7 +157,7 @@ def run(
 
     References
     ----------
-    Seed book sections 5.2.1, 5.2.2, 5.3.1 and 5.3.6.
+    Book sections 5.2.1, 5.2.2, 5.3.1 and 5.3.6.
 
     Examples
     --------

@@ -31,7 +31,7 @@ ndarray, shape (N + 1, ...)
 
 References
 ----------
-Seed book sections 5.2.6 and 5.2.7; A. Levant, Int. J. Control 58(6), 1993 (super-twisting).
+Book sections 5.2.6 and 5.2.7; A. Levant, Int. J. Control 58(6), 1993 (super-twisting).
 
 Examples
 --------

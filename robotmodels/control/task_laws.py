@@ -14,7 +14,7 @@ frame : str or int, optional
 
 References
 ----------
-Seed book sections 5.2.3, 5.2.4 and 5.3.2; N. Hogan, "Impedance control", ASME J. Dyn. Syst. Meas.
+Book sections 5.2.3, 5.2.4 and 5.3.2; N. Hogan, "Impedance control", ASME J. Dyn. Syst. Meas.
 Control 107, 1985.
 
 Examples

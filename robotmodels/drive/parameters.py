@@ -1,6 +1,6 @@
 """Drive parameters of the joints and their kinds: rotor inertia, friction and offset.
 
-Seed book sections 1.5.1.4 (friction) and 1.5.1.5 (rotor inertia).
+Book sections 1.5.1.4 (friction) and 1.5.1.5 (rotor inertia).
 """
 
 from __future__ import annotations

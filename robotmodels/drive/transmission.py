@@ -1,6 +1,6 @@
 """The transmission between encoders (motors) and joints, with the coupling terms of the motors.
 
-Seed book sections 1.2.1 (q = K_c q_c + q_0) and 1.6.2.5 (joint torques from motor torques).
+Book sections 1.2.1 (q = K_c q_c + q_0) and 1.6.2.5 (joint torques from motor torques).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Transmission(Value):
 
     References
     ----------
-    Seed book section 1.2.1 (last note) and 1.6.2.5; A. Janot, P.-O. Vandanjon and M. Gautier,
+    Book section 1.2.1 (last note) and 1.6.2.5; A. Janot, P.-O. Vandanjon and M. Gautier,
     Control Engineering Practice 25, 2014, section 4 (TX40, Iam6, Fvm6, Fcm6).
 
     Examples

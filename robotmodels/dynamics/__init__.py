@@ -1,6 +1,6 @@
 """Inverse and direct dynamic models and their parts.
 
-Seed book section 1.5. One sample goes through Pinocchio, a batch through the compiled recursions
+Book section 1.5. One sample goes through Pinocchio, a batch through the compiled recursions
 in table order; so does every model that Pinocchio does not support (first moments without mass,
 negative mass, as in sets of base parameters).
 """

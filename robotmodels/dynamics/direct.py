@@ -2,7 +2,7 @@
 
 Where joints mimic others, ``q = K q_c + q_0`` with a singular K. With G the columns of K that are
 not zero, ``v = G v_c``, and the forces of the constraint do no work:
-``G^T (M G a_c + h - tau) = 0`` (seed book section 1.2.1, last note, and 1.5.1).
+``G^T (M G a_c + h - tau) = 0`` (book section 1.2.1, last note, and 1.5.1).
 """
 
 from __future__ import annotations

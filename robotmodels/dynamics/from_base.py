@@ -1,6 +1,6 @@
 """Robot model with base parameters as standard parameters, and its inverse dynamics.
 
-Seed book sections 1.5.2.2 and 1.5.3.
+Book sections 1.5.2.2 and 1.5.3.
 
 Parameters
 ----------

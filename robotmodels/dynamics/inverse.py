@@ -71,7 +71,7 @@ def idm(
 
     References
     ----------
-    Seed book sections 1.5.1 and 1.5.2.
+    Book sections 1.5.1 and 1.5.2.
 
     Examples
     --------

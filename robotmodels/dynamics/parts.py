@@ -21,7 +21,7 @@ ShapeError, InvalidValueError
 
 References
 ----------
-Seed book sections 1.5.1.1 to 1.5.1.3 and 1.5.1.5; S. Echeandia and P. M. Wensing, "Numerical
+Book sections 1.5.1.1 to 1.5.1.3 and 1.5.1.5; S. Echeandia and P. M. Wensing, "Numerical
 methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems", ASME JCND
 16(9), 2021.
 """

@@ -28,7 +28,7 @@ InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
 
 References
 ----------
-Seed book section 1.5.1; W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload
+Book section 1.5.1; W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload
 inertial parameters of industrial manipulators", IEEE ICRA 2007.
 """
 

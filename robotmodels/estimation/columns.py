@@ -89,7 +89,7 @@ def column_basis(
 
     References
     ----------
-    Seed book section 1.5.3; M. Gautier, "Numerical calculation of the base inertial parameters of
+    Book section 1.5.3; M. Gautier, "Numerical calculation of the base inertial parameters of
     robots", Journal of Robotic Systems 8(4), 1991.
 
     Examples

@@ -1,6 +1,6 @@
 """Diagnostics of a fit: correlations, condition, leverage, Cook's distance, residual tests.
 
-Seed book section 1.4.4.3; N. R. Draper, H. Smith, "Applied Regression Analysis", 1998; R. D. Cook,
+Book section 1.4.4.3; N. R. Draper, H. Smith, "Applied Regression Analysis", 1998; R. D. Cook,
 S. Weisberg, "Residuals and Influence in Regression", 1982, section 3.
 
 Parameters

@@ -1,6 +1,6 @@
 """Linear least squares on triangular factors: ordinary, weighted and ridge.
 
-Source: Seed book section 1.6.2.
+Book section 1.6.2.
 """
 
 from __future__ import annotations

@@ -175,7 +175,7 @@ def fit_nonlinear(
 
     References
     ----------
-    Seed book section 1.4.4.3; J. J. More, "The Levenberg-Marquardt algorithm", Lecture Notes in
+    Book section 1.4.4.3; J. J. More, "The Levenberg-Marquardt algorithm", Lecture Notes in
     Mathematics 630, 1978; R. A. Maronna et al., "Robust Statistics", 2nd ed., 2019, section 5.
 
     Examples

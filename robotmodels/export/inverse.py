@@ -7,7 +7,7 @@ coefficients of its type of equation and returns its solutions.
 
 References
 ----------
-Seed book section 1.2.3.2; W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*,
+Book section 1.2.3.2; W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*,
 section 4.4 and appendix 1, for the types of equations.
 """
 

@@ -124,7 +124,7 @@ def program(
 
     References
     ----------
-    Seed book sections 1.2.3.2, 1.5.2 and 1.5.3; W. Khalil and J.-F. Kleinfinger, IEEE Journal of
+    Book sections 1.2.3.2, 1.5.2 and 1.5.3; W. Khalil and J.-F. Kleinfinger, IEEE Journal of
     Robotics and Automation 3(6), 1987.
 
     Examples

@@ -7,7 +7,7 @@ unit parameter at a time) and mass matrices come from the same recursions.
 
 References
 ----------
-Seed book sections 1.2, 1.5.1 and 1.5.2; W. Khalil and J.-F. Kleinfinger, "Minimum operations and
+Book sections 1.2, 1.5.1 and 1.5.2; W. Khalil and J.-F. Kleinfinger, "Minimum operations and
 minimum parameters of the dynamic models of tree structure robots", IEEE Journal of Robotics and
 Automation 3(6), 1987.
 """

@@ -1,6 +1,6 @@
 """Friction models of the joints, in addition to the viscous and Coulomb terms of `DriveParameters`.
 
-Seed book section 1.5.1.4. A model is a value with ``.torque(v)``; where the torque is linear in
+Book section 1.5.1.4. A model is a value with ``.torque(v)``; where the torque is linear in
 the parameters, ``.basis(v)`` gives the columns that multiply them, for identification. Gravity
 compensators have the same interface; their torque depends on positions, ``.torque(v, q)``.
 """

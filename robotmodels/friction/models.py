@@ -23,7 +23,7 @@ ShapeError, InvalidValueError
 
 References
 ----------
-Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, "A survey of
+Book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, "A survey of
 models, analysis tools and compensation methods for the control of machines with friction",
 Automatica 30(7), 1994, section 2.
 """

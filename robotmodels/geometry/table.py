@@ -1,6 +1,6 @@
 """The table of geometric parameters of Khalil and Kleinfinger.
 
-Seed book section 1.2.1, eq. [1.2] and [1.3]; W. Khalil and J.-F. Kleinfinger, "A new geometric
+Book section 1.2.1, eq. [1.2] and [1.3]; W. Khalil and J.-F. Kleinfinger, "A new geometric
 notation for open and closed-loop robots", IEEE ICRA 1986, for trees (gamma, b); S. Hayati,
 "Robot arm geometric link parameter estimation", IEEE CDC 1983, for beta.
 """

@@ -1,4 +1,4 @@
-"""The transforms of a table, for one q or many. Seed book section 1.2.1, eq. [1.2] and [1.3].
+"""The transforms of a table, for one q or many. Book section 1.2.1, eq. [1.2] and [1.3].
 
 Parameters
 ----------

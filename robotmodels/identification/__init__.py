@@ -1,6 +1,6 @@
 """Dynamic identification: from a log to the parameters of a robot that predict its torques.
 
-Seed book section 1.6.
+Book section 1.6.
 """
 
 from .. import _docs

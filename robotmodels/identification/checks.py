@@ -1,6 +1,6 @@
 """Checks before a fit: signs, order and units of the joints, excitation, delay.
 
-Seed book sections 1.6.2.1 to 1.6.2.4.
+Book sections 1.6.2.1 to 1.6.2.4.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def consistent_robot(
 
     References
     ----------
-    Seed book section 1.6.3.
+    Book section 1.6.3.
 
     Examples
     --------

@@ -72,7 +72,7 @@ class Synchronisation(Rebuilt):
 def synchronisation(
     log: Log, model: RobotModel, *, cutoff: float | None = None, within: float | None = None
 ) -> Synchronisation:
-    """Estimate the delay of the torques of a log behind its positions (seed book 1.6.2.4).
+    """Estimate the delay of the torques of a log behind its positions (book section 1.6.2.4).
 
     For each delay the torques are shifted back, and the residual of the dynamic model with free
     parameters is computed; the minimum over the delays is interpolated. Long logs are represented

@@ -111,7 +111,7 @@ def equations(
     processing: Processing,
     form: EquationForm = EquationForm.TORQUE,
 ) -> Equations:
-    """Equations of a log for a robot (seed book section 1.6.2).
+    """Equations of a log for a robot (book section 1.6.2).
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ def fit(
 
     References
     ----------
-    Seed book section 1.6; M. Gautier and W. Khalil, "On the identification of the inertial
+    Book section 1.6; M. Gautier and W. Khalil, "On the identification of the inertial
     parameters of robots", IEEE CDC 1988.
 
     Examples

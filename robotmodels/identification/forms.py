@@ -1,6 +1,6 @@
 """Forms of the equations: joint torques, filtered momenta, power, and energy between instants.
 
-Source: Seed book section 1.6; J.-J. Slotine and W. Li, "On the adaptive control of robot
+Book section 1.6; J.-J. Slotine and W. Li, "On the adaptive control of robot
 manipulators", IJRR 6(3), 1987 (momenta); M. Gautier, "Dynamic identification of robots with power
 model", IEEE ICRA 1997; M. Gautier and W. Khalil, IEEE CDC 1988 (energy).
 """
@@ -106,7 +106,7 @@ RowForm = Callable[[Array, Array, Array, Mask], FormedRows]
 
 
 def torque_block(source: EquationSource, piece: Piece, form: RowForm | None = None) -> Block:
-    """Torque equations of a piece (seed book, section 1.6.2), combined or extended by a form."""
+    """Torque equations of a piece (book section 1.6.2), combined or extended by a form."""
     return signals_block(source, piece, source.signals(piece), form)
 
 
@@ -120,7 +120,7 @@ def signals_block(
 
 
 def filtered_block(source: EquationSource, piece: Piece) -> Block:
-    """Filtered momentum equations of a piece of the log (seed book, section 1.6.2)."""
+    """Filtered momentum equations of a piece of the log (book section 1.6.2)."""
     # low-pass, differences at its ends, and the offset of the first sample
     around = source.processing.reach + 2 * SHORT
     count = min(piece.stop, piece.high - 2 * SHORT) - piece.start
@@ -152,7 +152,7 @@ def _momentum_rates(chunks: Iterable[tuple[Array, Array]], dt: float) -> Iterato
 
 
 def power_block(source: EquationSource, piece: Piece) -> Block:
-    """Power equations of a piece of the log (seed book, section 1.6.3)."""
+    """Power equations of a piece of the log (book section 1.6.3)."""
     x = source.signals(piece)
     power = (x.tau * x.v).sum(axis=1, keepdims=True)
     chunks = (d[:, None] for d in source.chunks(power_regressor, x.q, x.v, x.a))
@@ -163,7 +163,7 @@ def power_block(source: EquationSource, piece: Piece) -> Block:
 
 
 def energy_block(source: EquationSource, piece: Piece) -> Block:
-    """Energy equations over intervals of a piece (seed book, sections 1.5.1.2 and 1.6.3)."""
+    """Energy equations over intervals of a piece (book sections 1.5.1.2 and 1.6.3)."""
     dt, base, around = source.log.dt, source.base, 2 * SHORT
     begin, end = piece.start + SHORT, min(piece.stop + SHORT, piece.high - 1 - SHORT)
     if end <= begin:

@@ -119,7 +119,7 @@ def fit_friction(
 
     References
     ----------
-    Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica
+    Book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica
     30(7), 1994, section 2; P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots
     with a dry friction model depending on load and velocity", IEEE/RSJ IROS 2010, section III.
 

@@ -74,7 +74,7 @@ def choose_processing(
 
     References
     ----------
-    Seed book sections 1.6.2.4 and 1.6.2.5; M. Gautier, "Dynamic identification of robots with power
+    Book sections 1.6.2.4 and 1.6.2.5; M. Gautier, "Dynamic identification of robots with power
     model", IEEE ICRA 1997 (filter frequencies from that of the motion).
 
     Examples

@@ -19,7 +19,7 @@ from .validation import Errors
 CORRELATED = 0.9
 """Least absolute correlation of a listed pair of estimates."""
 WEAK = 0.3
-"""Relative standard error above which a parameter is poorly determined (seed book 1.6.2.1)."""
+"""Relative standard error above which a parameter is poorly determined (book section 1.6.2.1)."""
 
 
 class NegativeParameter(NamedTuple):

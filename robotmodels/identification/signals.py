@@ -1,6 +1,6 @@
 """Signal processing of a log: zero-phase filter, central differences, decimation, fixed pieces.
 
-Seed book sections 1.6.2.4 and 1.6.2.5.
+Book sections 1.6.2.4 and 1.6.2.5.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Torques of identified parameters, and their errors on a log (seed book 1.5.1.4 and 1.6.5)."""
+"""Torques of identified parameters, and their errors on a log (book sections 1.5.1.4, 1.6.5)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Inertial parameters of the links, in Khalil's order and frames.
 
-Seed book section 1.5.2.1: the ten standard parameters of link j are the inertia tensor about the
+Book section 1.5.2.1: the ten standard parameters of link j are the inertia tensor about the
 origin O_j, the first moments and the mass, all in the axes of frame R_j.
 """
 

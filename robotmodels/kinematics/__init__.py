@@ -1,6 +1,6 @@
 """Kinematic models: poses, velocities, Jacobians, and their singular positions.
 
-Seed book sections 1.2.2 and 1.3.
+Book sections 1.2.2 and 1.3.
 
 Parameters
 ----------

@@ -1,6 +1,6 @@
 """The Jacobian as a product of three matrices, of which only the third can be singular.
 
-Seed book section 1.3.1.3, after M. Renaud, "Contribution à la modélisation et à la commande
+Book section 1.3.1.3, after M. Renaud, "Contribution à la modélisation et à la commande
 dynamique des robots manipulateurs", 1980.
 """
 

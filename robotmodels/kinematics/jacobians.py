@@ -1,6 +1,6 @@
 """Basic Jacobians and their time derivatives, from the screws of the joints.
 
-Seed book section 1.3.1.2. One configuration goes through Pinocchio, a batch through the compiled
+Book section 1.3.1.2. One configuration goes through Pinocchio, a batch through the compiled
 recursions in table order; tests hold both equal.
 """
 
@@ -35,7 +35,7 @@ def jacobian(
 ) -> Array:
     """Kinematic (basic, geometric) Jacobian: joint velocities to the twist of a frame.
 
-    Seed book sections 1.3.1.1 and 1.3.1.2.
+    Book sections 1.3.1.1 and 1.3.1.2.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Direct geometric model: poses of the tool and of every frame of the table.
 
-Seed book section 1.2.2. One configuration goes through Pinocchio, a batch through the compiled
+Book section 1.2.2. One configuration goes through Pinocchio, a batch through the compiled
 recursions in table order; tests hold both equal.
 """
 
@@ -19,7 +19,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     Also called forward kinematics, ``fkine``, forward geometry.
 
-    Seed book eq. [1.4] and [1.10].
+    Book eq. [1.4] and [1.10].
 
     Returns
     -------
@@ -55,7 +55,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     """World poses of all frames of the table, R_1 to R_f; the pose of the tool is `dgm`.
 
-    Seed book eq. [1.4].
+    Book eq. [1.4].
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Direct kinematic model: the twist that joint velocities give, and its time derivative.
 
-Seed book section 1.3.1.
+Book section 1.3.1.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def dkm(
 
     Also called forward velocity kinematics.
 
-    Seed book eq. [1.18].
+    Book eq. [1.18].
 
     Returns
     -------
@@ -62,7 +62,7 @@ def dkm_second_order(
     of the frame's origin and the angular acceleration; for the other references the derivatives of
     the twist's entries, as in `jacobian_rate`.
 
-    Seed book eq. [1.18], differentiated.
+    Book eq. [1.18], differentiated.
 
     Returns
     -------

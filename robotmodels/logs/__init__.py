@@ -1,6 +1,6 @@
 """Logs of robots: read from files, converted to SI on the joint side, and checked.
 
-Seed book sections 1.6.2.4 and 1.6.2.5.
+Book sections 1.6.2.4 and 1.6.2.5.
 """
 
 from .. import _docs

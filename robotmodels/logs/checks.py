@@ -103,7 +103,7 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
 
     References
     ----------
-    Seed book sections 1.6.2.3 to 1.6.2.5.
+    Book sections 1.6.2.3 to 1.6.2.5.
 
     Examples
     --------

@@ -71,7 +71,7 @@ class Log(Rebuilt):
 
     References
     ----------
-    Seed book sections 1.6.2.4 and 1.6.2.5.
+    Book sections 1.6.2.4 and 1.6.2.5.
 
     Examples
     --------
@@ -277,7 +277,7 @@ def with_delay(log: Log, delay: float) -> Log:
 
     References
     ----------
-    Seed book section 1.6.2.4.
+    Book section 1.6.2.4.
 
     Examples
     --------

@@ -126,7 +126,7 @@ def read_log(
 
     References
     ----------
-    Seed book section 1.6.2.5.
+    Book section 1.6.2.5.
 
     Examples
     --------

@@ -83,7 +83,7 @@ def close(
 
     References
     ----------
-    Seed book section 2.4 (iterative method).
+    Book section 2.4 (iterative method).
 
     Examples
     --------

@@ -7,7 +7,7 @@ ndarray or Mobility
 
 References
 ----------
-Seed book section 2.3; W. Khalil and E. Dombre, *Modeling, Identification and Control of
+Book section 2.3; W. Khalil and E. Dombre, *Modeling, Identification and Control of
 Robots*, section 7.7, for the reduction of tree models by ``v = G v_a``.
 
 Examples

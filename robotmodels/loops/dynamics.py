@@ -13,7 +13,7 @@ ndarray
 
 References
 ----------
-W. Khalil and E. Dombre, *Modeling, Identification and Control of Robots*, chapter 10; seed book
+W. Khalil and E. Dombre, *Modeling, Identification and Control of Robots*, chapter 10; book
 section 1.5; J. Carpentier, R. Budhiraja and N. Mansard, "Proximal and sparse resolution of
 constrained dynamic equations", RSS 2021, for the direct model.
 

@@ -20,7 +20,7 @@ ndarray, shape (..., n_a, p), or BaseParameters
 References
 ----------
 W. Khalil and F. Bennis, "Symbolic calculation of the base inertial parameters of closed-loop
-robots", IJRR 14(2), 1995. Seed book sections 1.5.2.1, 1.5.3 and 1.6.2.
+robots", IJRR 14(2), 1995. Book sections 1.5.2.1, 1.5.3 and 1.6.2.
 
 Examples
 --------

@@ -16,7 +16,7 @@ LoopedRobot
 References
 ----------
 W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robots", Robotica 15,
-1997. Seed book section 1.2.1.
+1997. Book section 1.2.1.
 
 Examples
 --------

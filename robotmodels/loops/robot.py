@@ -91,7 +91,7 @@ class LoopedRobot(Value):
     References
     ----------
     W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots",
-    ICRA 1986. Seed book sections 1.2.1 and 2.2.
+    ICRA 1986. Book sections 1.2.1 and 2.2.
 
     Examples
     --------

@@ -67,7 +67,7 @@ def simulate(
 
     References
     ----------
-    J. Baumgarte, "Stabilization of constraints", CMAME 1, 1972. Seed book section 1.5.
+    J. Baumgarte, "Stabilization of constraints", CMAME 1, 1972. Book section 1.5.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Base inertial parameters (the minimal set), by symbolic rules and numerically.
 
-Seed book section 1.5.3.
+Book section 1.5.3.
 """
 
 from .. import _docs

@@ -34,7 +34,7 @@ MissingExtraError
 
 References
 ----------
-Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018 (LMI);
+Book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018 (LMI);
 C. Sousa and R. Cortesao, IJRR 33(6), 2014; T. Lee, P. Wensing and F. Park, "Geometric robot dynamic
 identification", IEEE T-RO 36(2), 2020 (the distance).
 """

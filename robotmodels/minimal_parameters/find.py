@@ -86,7 +86,7 @@ def base_parameters(
 
     References
     ----------
-    Seed book section 1.5.3; M. Gautier and W. Khalil, "Direct calculation of minimum set of
+    Book section 1.5.3; M. Gautier and W. Khalil, "Direct calculation of minimum set of
     inertial parameters of serial robots", IEEE T-RA 6(3), 1990.
 
     Examples

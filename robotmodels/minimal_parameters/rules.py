@@ -1,6 +1,6 @@
 """Khalil's rules: standard parameters regrouped into the antecedent, or without effect.
 
-Seed book section 1.5.3. Each rule is an identity between the effects of parameters. From the last
+Book section 1.5.3. Each rule is an identity between the effects of parameters. From the last
 frame to the first, the parameters of a rule are added, with its coefficients, to those kept; later
 rules of that frame regroup them further.
 

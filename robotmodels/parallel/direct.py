@@ -24,7 +24,7 @@ PlatformPoses or AssemblyModes
 
 References
 ----------
-Seed book section 2.4; C. Wampler, Mechanism and Machine Theory 31 (1996) 331-337; J.-P. Merlet,
+Book section 2.4; C. Wampler, Mechanism and Machine Theory 31 (1996) 331-337; J.-P. Merlet,
 "Parallel Robots", 2nd ed., chapter 4.
 
 Examples

@@ -34,7 +34,7 @@ ParallelRobot
 
 References
 ----------
-Seed book sections 2.2.2 (planar robots) and 2.2.3 (robots in space).
+Book sections 2.2.2 (planar robots) and 2.2.3 (robots in space).
 
 Examples
 --------

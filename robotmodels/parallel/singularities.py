@@ -19,7 +19,7 @@ Singularity
 
 References
 ----------
-Seed book section 2.3.3.3; J.-P. Merlet, Int. J. of Robotics Research 8(5), 1989.
+Book section 2.3.3.3; J.-P. Merlet, Int. J. of Robotics Research 8(5), 1989.
 
 Examples
 --------

@@ -22,7 +22,7 @@ ndarray
 
 References
 ----------
-Seed book sections 2.3.2, 2.3.3.1 (statics) and 2.3.3.4 (maneuverability and condition number).
+Book sections 2.3.2, 2.3.3.1 (statics) and 2.3.3.4 (maneuverability and condition number).
 
 Examples
 --------

@@ -1,6 +1,6 @@
 """Regressors: the dynamic model as a matrix times the standard parameters.
 
-Seed book sections 1.5.1.2, 1.5.2.1, 1.5.3 and 1.6.2: the dynamic model is linear in the inertial
+Book sections 1.5.1.2, 1.5.2.1, 1.5.3 and 1.6.2: the dynamic model is linear in the inertial
 and drive parameters. Torque, power, momentum and filtered forms have the columns of
 `parameter_names`, the energy those of `energy_parameter_names`; `chunked` goes through long logs in
 pieces of bounded size. The arguments of all are those of `torque_regressor`.

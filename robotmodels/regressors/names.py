@@ -1,6 +1,6 @@
 """The standard parameters: their names in the order of the regressors' columns, their values.
 
-Seed book sections 1.5.1.2 and 1.5.2.1.
+Book sections 1.5.1.2 and 1.5.2.1.
 
 Parameters
 ----------

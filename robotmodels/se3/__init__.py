@@ -1,6 +1,6 @@
 """Poses as 4x4 matrices: elementary motions, inverse, checks, MATLAB's order, orientations.
 
-Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
+Book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
 """
 
 from .. import _docs

@@ -1,6 +1,6 @@
 """Elementary motions, their inverse, roll, pitch and yaw, and the matrix of the vector product.
 
-Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
+Book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
 
 Parameters
 ----------

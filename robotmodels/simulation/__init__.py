@@ -1,6 +1,6 @@
 """Simulation: the motion under given torques, and the parts of the torques of a motion.
 
-Seed book sections 1.5 and 1.5.1. `simulate` integrates the direct dynamic model with SciPy's
+Book sections 1.5 and 1.5.1. `simulate` integrates the direct dynamic model with SciPy's
 adaptive integrators; dry friction sticks and slips at events. Nothing of SciPy is imported before
 the first call.
 """

@@ -55,7 +55,7 @@ def dynamics_map(
     samples: int | Sequence[int] | None = None,
     drive: bool = True,
 ) -> DynamicsMap:
-    """Mass matrix and gravity torques over a range of one or two joints (seed book 1.5.1.3).
+    """Mass matrix and gravity torques over a range of one or two joints (book section 1.5.1.3).
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ def simulate(
 
     References
     ----------
-    Seed book section 1.5 (direct dynamic model) and 1.5.1.4 (friction); E. Hairer, S. Noersett and
+    Book section 1.5 (direct dynamic model) and 1.5.1.4 (friction); E. Hairer, S. Noersett and
     G. Wanner, "Solving ordinary differential equations I", 2nd ed., II.5 and II.6.
 
     Examples

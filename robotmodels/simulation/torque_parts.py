@@ -1,4 +1,4 @@
-"""Decomposition of the torques of a motion (seed book sections 1.5.1.1 to 1.5.1.5)."""
+"""Decomposition of the torques of a motion (book sections 1.5.1.1 to 1.5.1.5)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Models as formulas: the direct geometric model, the Jacobian, and singular positions.
 
-Seed book sections 1.2.1 and 1.3.1.3.
+Book sections 1.2.1 and 1.3.1.3.
 
 Parameters
 ----------

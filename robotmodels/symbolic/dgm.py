@@ -142,7 +142,7 @@ def explain_dgm(
     Rot(z, AZ0) Rot(y, AY0) Rot(x, AX0)``, the tool the same with E instead of 0. Partial results
     of more than 100 symbols (arms with many oblique axes) are named ``U1``, ``U2``, ...
 
-    Seed book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
+    Book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
 
     Angles within 1e-13 rad of a multiple of 30 or 45 degrees are taken as exact, lengths below
     1e-13 m as zero.

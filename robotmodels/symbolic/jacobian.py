@@ -113,7 +113,7 @@ def explain_jacobian(
     axes of R_i, with ``L_{k,j}`` from O_k to O_j. Notation as of `explain_dgm`: ``C23`` is
     ``cos(θ2 + θ3)``, ``D3`` and ``RL4`` are constants of the table.
 
-    Seed book section 1.3.1.3.
+    Book section 1.3.1.3.
 
     Parameters
     ----------

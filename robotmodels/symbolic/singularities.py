@@ -53,7 +53,7 @@ def explain_singularities(
     matrix loses rank where every minor has a factor that vanishes, and ``conditions`` are the
     smallest sets of such factors.
 
-    Seed book section 1.3.1.3.
+    Book section 1.3.1.3.
 
     Constants are kept as symbols while factoring. Entries below 1e-11 in random configurations
     count as zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to

@@ -64,7 +64,7 @@ def singularity_map(
 ) -> SingularityMap:
     """Values of a singular factor, or of the determinant, over the ranges of two joints.
 
-    Seed book section 1.3.1.3.
+    Book section 1.3.1.3.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def read_par(
     References
     ----------
     W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robots", Robotica
-    15, 1997. Seed book section 1.2.1, Table 1.1.
+    15, 1997. Book section 1.2.1, Table 1.1.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Trajectories: motion from poses and postures, by laws of time that keep limits.
 
-Seed book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; the plain
+Book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; the plain
 arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`. Requests
 that do not fit or that no motion keeps raise `ShapeError` or `InvalidValueError`, whose message has
 the least duration, limit or factor that would do.

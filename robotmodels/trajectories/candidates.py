@@ -2,7 +2,7 @@
 
 References
 ----------
-Seed book sections 4.4.2.2 and 4.4.3.
+Book sections 4.4.2.2 and 4.4.3.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ PoseTrajectory
 
 References
 ----------
-Seed book section 4.3.
+Book section 4.3.
 """
 
 from __future__ import annotations

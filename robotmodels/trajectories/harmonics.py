@@ -115,7 +115,7 @@ def fourier(
 
     References
     ----------
-    Seed book section 1.6.2.3. J. Swevers, C. Ganseman, D. Tukel, J. De Schutter, H. Van Brussel,
+    Book section 1.6.2.3. J. Swevers, C. Ganseman, D. Tukel, J. De Schutter, H. Van Brussel,
     Optimal robot excitation and identification, IEEE T-RA 13(5), 1997.
 
     Examples

@@ -115,7 +115,7 @@ def joint_path(
 
     References
     ----------
-    Seed book section 4.3; the exercise, problem 2.
+    Book section 4.3; the exercise, problem 2.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 References
 ----------
-Seed book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
+Book sections 4.4.1 to 4.4.3 and the appendix of chapter 4.
 """
 
 from __future__ import annotations

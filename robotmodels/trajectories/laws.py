@@ -1,6 +1,6 @@
 """Time laws from rest to rest along one coordinate, and their least durations.
 
-Seed book sections 4.2.1 (fifth-order polynomial), 4.2.2 (trapezoidal velocity) and 4.2.3 (smoothed
+Book sections 4.2.1 (fifth-order polynomial), 4.2.2 (trapezoidal velocity) and 4.2.3 (smoothed
 trapezoidal velocity). A law moves ``s`` from 0 to a distance; whatever follows it, joints on a
 straight line or a pose on a path, keeps its shape.
 

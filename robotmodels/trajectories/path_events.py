@@ -2,7 +2,7 @@
 
 References
 ----------
-Seed book section 4.3.
+Book section 4.3.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 With s' the rate of the path parameter and x = s'^2, joint velocities are ``q' s'``, accelerations
 ``q' s'' + q'' x``, and torques ``a s'' + b x + c`` with a, b, c from three calls of the inverse
-dynamic model (seed book section 4.4.1.1). Friction that depends on the speed is replaced by its
+dynamic model (book section 4.4.1.1). Friction that depends on the speed is replaced by its
 tangent at the rates of the solution before, until these do not change any more.
 """
 

@@ -2,7 +2,7 @@
 
 References
 ----------
-Seed book section 4.4.1 and the appendix of chapter 4.
+Book section 4.4.1 and the appendix of chapter 4.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ Trajectory
 
 References
 ----------
-Seed book section 4.2; Khalil and Dombre, Modeling, identification and control of robots, 13.3.
+Book section 4.2; Khalil and Dombre, Modeling, identification and control of robots, 13.3.
 """
 
 from __future__ import annotations

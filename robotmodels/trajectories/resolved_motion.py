@@ -92,7 +92,7 @@ def resolved_motion(
 
     References
     ----------
-    Seed book section 1.3.2; D. E. Whitney, "Resolved motion rate control of manipulators and human
+    Book section 1.3.2; D. E. Whitney, "Resolved motion rate control of manipulators and human
     prostheses", IEEE Trans. Man-Machine Systems 10(2), 1969.
 
     Examples

@@ -115,7 +115,7 @@ def time_optimal(
 
     References
     ----------
-    Seed book sections 4.4.1.1 and 4.5.1.2. H. Pham and Q.-C. Pham, A new approach to time-optimal
+    Book sections 4.4.1.1 and 4.5.1.2. H. Pham and Q.-C. Pham, A new approach to time-optimal
     path parameterization based on reachability analysis, IEEE T-RO 34, 2018.
 
     Examples

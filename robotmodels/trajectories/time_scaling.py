@@ -2,7 +2,7 @@
 
 Stretched evenly to the duration T, a profile asks for the torques ``A / T^2 + B / T + C``: A of
 inertia, Coriolis and centrifugal effects, B of viscous friction, C of gravity, offsets and dry
-friction (seed book section 4.4.2.3). Each limit forbids intervals of ``z = 1 / T``.
+friction (book section 4.4.2.3). Each limit forbids intervals of ``z = 1 / T``.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def time_scaled(
 
     References
     ----------
-    Seed book section 4.4.2.3.
+    Book section 4.4.2.3.
 
     Examples
     --------

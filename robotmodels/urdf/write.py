@@ -24,7 +24,7 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
 
     The root link is the world; a fixed joint places R_0 in it, each frame of the table is a link
     whose z axis is the joint's axis, the tool and the named frames are links without mass.
-    Numbers have all their digits. Seed book eq. [1.3]; wiki.ros.org/urdf/XML.
+    Numbers have all their digits. Book eq. [1.3]; wiki.ros.org/urdf/XML.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Feature(Checked):
 
     References
     ----------
-    Seed book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2; B. Espiau, F. Chaumette and P. Rives, "A new
+    Book sections 6.2.4.1, 6.2.4.2 and 6.2.5.2; B. Espiau, F. Chaumette and P. Rives, "A new
     approach to visual servoing in robotics", IEEE Trans. Robotics and Automation 8(3), 1992.
 
     Examples

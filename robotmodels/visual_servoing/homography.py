@@ -15,7 +15,7 @@ ndarray of shape (..., 3, 3), or PlaneMotions
 
 References
 ----------
-Seed book section 6.2.5.1; O. Faugeras and F. Lustman 1988; Y. Ma, S. Soatto, J. Kosecka and
+Book section 6.2.5.1; O. Faugeras and F. Lustman 1988; Y. Ma, S. Soatto, J. Kosecka and
 S. Sastry, "An invitation to 3-D vision", 5.3.
 
 Examples

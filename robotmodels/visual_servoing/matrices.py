@@ -33,7 +33,7 @@ ndarray, shape (..., k, 6)
 
 References
 ----------
-Seed book sections 6.2.4.1 to 6.2.4.4 and 6.2.5.2 to 6.2.5.4; F. Chaumette, "Image moments: a
+Book sections 6.2.4.1 to 6.2.4.4 and 6.2.5.2 to 6.2.5.4; F. Chaumette, "Image moments: a
 general and useful set of features for visual servoing", IEEE Trans. Robotics 20(4), 2004;
 M. Jagersand, O. Fuentes and R. Nelson, "Experimental evaluation of uncalibrated visual servoing",
 ICRA 1997.

@@ -48,7 +48,7 @@ class Moments(Feature):
 
     References
     ----------
-    Seed book section 6.2.4.3; F. Chaumette, "Image moments", IEEE Trans. Robotics 20(4), 2004;
+    Book section 6.2.4.3; F. Chaumette, "Image moments", IEEE Trans. Robotics 20(4), 2004;
     O. Tahri and F. Chaumette, "Point-based and region-based image moments for visual servoing of
     planar objects", IEEE Trans. Robotics 21(6), 2005.
 

@@ -24,7 +24,7 @@ PoseSolutions
 
 References
 ----------
-Seed book section 6.2.5.1; M. Fischler and R. Bolles, "Random sample consensus", Comm. ACM 24(6),
+Book section 6.2.5.1; M. Fischler and R. Bolles, "Random sample consensus", Comm. ACM 24(6),
 1981; M. Persson and K. Nordberg, "Lambda twist", ECCV 2018; G. Schweighofer and A. Pinz, "Robust
 pose estimation from a planar target", IEEE Trans. PAMI 28(12), 2006; E. Marchand and F. Chaumette,
 "Virtual visual servoing", 2002.

@@ -35,7 +35,7 @@ ServoMotion
 
 References
 ----------
-Seed book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
+Book sections 6.2.2, 6.2.3, 6.3.2 to 6.3.4.
 
 Examples
 --------

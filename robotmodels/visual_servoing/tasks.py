@@ -36,7 +36,7 @@ Task or TargetEstimate
 
 References
 ----------
-Seed book sections 6.3.1 to 6.3.3; F. Chaumette, "Potential problems of stability and convergence
+Book sections 6.3.1 to 6.3.3; F. Chaumette, "Potential problems of stability and convergence
 in image-based and position-based visual servoing", 1998; E. Malis, "Improving vision-based control
 using efficient second-order minimization techniques", ICRA 2004; C. Samson, M. Le Borgne and
 B. Espiau, "Robot control: the task function approach", 1991; P. Corke and M. Good, "Dynamic

@@ -18,7 +18,7 @@ ServoStep or VirtualLink
 
 References
 ----------
-Seed book sections 6.3.2 and 6.3.3.
+Book sections 6.3.2 and 6.3.3.
 
 Examples
 --------

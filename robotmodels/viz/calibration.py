@@ -23,7 +23,7 @@ matplotlib.figure.Figure
 
 References
 ----------
-Seed book sections 1.4.4 and 1.4.5.
+Book sections 1.4.4 and 1.4.5.
 
 Examples
 --------

@@ -19,7 +19,7 @@ matplotlib.figure.Figure or Scene
 
 References
 ----------
-Seed book sections 5.2.3 and 5.3.2.
+Book sections 5.2.3 and 5.3.2.
 
 Examples
 --------

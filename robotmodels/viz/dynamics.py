@@ -25,7 +25,7 @@ matplotlib.figure.Figure
 
 References
 ----------
-Seed book sections 1.5.1.1 to 1.5.1.5.
+Book sections 1.5.1.1 to 1.5.1.5.
 
 Examples
 --------

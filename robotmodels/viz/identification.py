@@ -15,7 +15,7 @@ matplotlib.figure.Figure
 
 References
 ----------
-Seed book sections 1.6.2 and 1.6.5.
+Book sections 1.6.2 and 1.6.5.
 
 Examples
 --------

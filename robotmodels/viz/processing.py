@@ -68,7 +68,7 @@ def plot_processing(
 
     References
     ----------
-    Seed book sections 1.6.2.4 and 1.6.2.5; W. Fuller, "Measurement Error Models", 1987, section
+    Book sections 1.6.2.4 and 1.6.2.5; W. Fuller, "Measurement Error Models", 1987, section
     1.1 (bias by noise in the regressor).
 
     Examples

@@ -13,7 +13,7 @@ robot : StandardParameters, optional
 
 References
 ----------
-Seed book sections 1.4 and 1.6.5.
+Book sections 1.4 and 1.6.5.
 """
 
 from __future__ import annotations

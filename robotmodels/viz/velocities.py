@@ -33,7 +33,7 @@ matplotlib.figure.Figure
 
 References
 ----------
-Seed book sections 1.3.1.3 and 1.3.2; Khalil and Dombre, section 5.8.2.
+Book sections 1.3.1.3 and 1.3.2; Khalil and Dombre, section 5.8.2.
 
 Examples
 --------

@@ -95,7 +95,7 @@ class Measurement(_Declared):
 
     References
     ----------
-    Seed book sections 1.4.4 and 1.4.5.
+    Book sections 1.4.4 and 1.4.5.
     """
 
     origin: tuple[FileRow, ...] = field(default=(), kw_only=True, repr=False, metadata=NOISE)

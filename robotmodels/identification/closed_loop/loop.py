@@ -55,7 +55,7 @@ class Controller(Rebuilt):
 
     References
     ----------
-    Seed book chapter 5 (position control).
+    Book chapter 5 (position control).
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Exciting trajectories: motions for the identification of base parameters.
 
-Seed book section 1.6.2.3.
+Book section 1.6.2.3.
 """
 
 from .exciting import exciting_trajectory

@@ -115,7 +115,7 @@ def exciting_trajectory(
 
     References
     ----------
-    Seed book section 1.6.2.3; M. Gautier and W. Khalil, "Exciting trajectories for the
+    Book section 1.6.2.3; M. Gautier and W. Khalil, "Exciting trajectories for the
     identification of base inertial parameters of robots", Int. J. Robotics Research 11(4), 1992;
     J. Swevers et al., "Optimal robot excitation and identification", IEEE T-RA 13(5), 1997.
 

@@ -9,7 +9,7 @@ essential : bool, float or str
 
 References
 ----------
-Seed book section 1.6.2.1; M. Gautier and P. Poignet, Control Engineering Practice 9, 2001
+Book section 1.6.2.1; M. Gautier and P. Poignet, Control Engineering Practice 9, 2001
 (weighted); A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, IEEE T-CST 22(5), 2014
 (re-weighted); G. Golub, M. Heath and G. Wahba, Technometrics 21(2), 1979 (ridge); M. Gautier, P.-O.
 Vandanjon and C. Presse, IEEE CDC 1994 (total).

@@ -49,7 +49,7 @@ class Recursive(Method):
 
     References
     ----------
-    Seed book section 1.6.4; G. Bierman, "Factorization Methods for Discrete Sequential Estimation",
+    Book section 1.6.4; G. Bierman, "Factorization Methods for Discrete Sequential Estimation",
     1977, chapter V (square-root information form).
     """
 

@@ -44,7 +44,7 @@ class Sequential(Method):
 
     References
     ----------
-    Seed book section 1.6.4.
+    Book section 1.6.4.
     """
 
     name: ClassVar[str] = "sequential"

@@ -94,7 +94,7 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
 
     References
     ----------
-    Seed book section 1.2.3.2, example 1.3 (its formula for S2 has a misprint that is put right
+    Book section 1.2.3.2, example 1.3 (its formula for S2 has a misprint that is put right
     here); the exercise, eq. (4.9) and (4.13), whose ``arctan(y/x)`` loses the quadrant: atan2 is
     used, and both solutions are kept.
 

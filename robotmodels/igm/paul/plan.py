@@ -1,6 +1,6 @@
 """The plan of an arm: which equation of which type gives which joint.
 
-Source: Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I to IX.
+Book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I to IX.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Operational coordinates: a pose as a vector X, and back.
 
-Seed book section 1.2.2, eq. [1.5] to [1.9].
+Book section 1.2.2, eq. [1.5] to [1.9].
 
 Parameters
 ----------
@@ -79,7 +79,7 @@ def operational_coordinates(
 def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     """Poses of operational coordinates, the inverse of `operational_coordinates`.
 
-    Seed book eq. [1.8] and [1.9].
+    Book eq. [1.8] and [1.9].
 
     Returns
     -------

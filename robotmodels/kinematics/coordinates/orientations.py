@@ -1,6 +1,6 @@
 """Orientations as numbers: three angles, quaternions, rotation vectors, columns of the rotation.
 
-Seed book eq. [1.8], [1.9]. Of three angles one column g of the rotation does not depend on the
+Book eq. [1.8], [1.9]. Of three angles one column g of the rotation does not depend on the
 third: ``g = s p + c z`` with the horizontal unit vector p, which the first angle turns, and (s, c)
 the sine and cosine of the angle between z and g. The second rotation is about ``e = z x p``. All
 sequences are this picture with other letters, so that one set of formulas serves them.

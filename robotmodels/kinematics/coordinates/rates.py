@@ -1,6 +1,6 @@
 """Rates of operational coordinates: between the twist of a frame and dX/dt, both ways.
 
-Seed book section 1.3.1.1; W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*,
+Book section 1.3.1.1; W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*,
 chapter 5. Rates are written in terms of the coordinates themselves, so that they belong to the
 solution that was chosen for these. For a rotation vector v with ``R = exp([v])``:
 ``w = (1 + a [v] + b [v]^2) dv/dt``, with functions of ``angle^2`` that are summed as series near 0.
@@ -135,7 +135,7 @@ def coordinate_jacobian(
 ) -> Array:
     """Jacobian of the operational coordinates, the analytic Jacobian: ``dX/dt = J(q) dq/dt``.
 
-    Shape (..., m, n), in m and rad per unit of the joints, in table order. Seed book eq. [1.5] and
+    Shape (..., m, n), in m and rad per unit of the joints, in table order. Book eq. [1.5] and
     section 1.3.1.1.
     """
     check_model(model)

@@ -1,6 +1,6 @@
 """Criteria for the freedom of a redundant robot: a value, and joint velocities that improve it.
 
-Seed book section 1.3.2.4; A. Liegeois 1977, A. Fournier 1980, T. Yoshikawa 1985, O. Khatib 1986,
+Book section 1.3.2.4; A. Liegeois 1977, A. Fournier 1980, T. Yoshikawa 1985, O. Khatib 1986,
 A. A. Maciejewski and C. A. Klein 1985. `ikm` takes a criterion as ``secondary``: its gradient is
 the z of ``v = J^+ x + (I - J^+ J) z``.
 

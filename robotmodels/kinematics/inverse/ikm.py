@@ -1,6 +1,6 @@
 """Inverse kinematic models: joint velocities of a twist, joint accelerations of its rate.
 
-Seed book section 1.3.2. Everything about one row happens in one compiled pass: Jacobian from the
+Book section 1.3.2. Everything about one row happens in one compiled pass: Jacobian from the
 chain, its singular values, the inverse by them, and the part of the twist that is missing.
 """
 
@@ -42,7 +42,7 @@ def ikm(
     components along nearly lost directions are reduced. The missing part of the twist is
     ``error``.
 
-    Seed book sections 1.3.2.1 (regular case), 1.3.2.2 and 1.3.2.3 (near singular positions),
+    Book sections 1.3.2.1 (regular case), 1.3.2.2 and 1.3.2.3 (near singular positions),
     1.3.2.4 (redundant robots).
 
     Parameters

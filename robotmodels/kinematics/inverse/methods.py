@@ -56,7 +56,7 @@ class PseudoInverse:
     """The regular solution: exact, of least weighted norm, unbounded near singular positions.
 
     Singular values up to ``tolerance``, relative to the largest, in [0, 1), count as zero: their
-    directions are left out. Seed book sections 1.3.2.1 and 1.3.2.4.
+    directions are left out. Book sections 1.3.2.1 and 1.3.2.4.
     """
 
     tolerance: float = 1e-10
@@ -80,7 +80,7 @@ class FilteredInverse:
     """Singular value filtering: the inverse of a small singular value fades out.
 
     ``1 / sigma`` above the threshold e, ``s (3 - 2 s) / e`` with ``s = sigma / e`` below: the same
-    value and slope at the threshold, 0 at a singular position. Seed book section 1.3.2.2;
+    value and slope at the threshold, 0 at a singular position. Book section 1.3.2.2;
     A. A. Maciejewski and C. A. Klein 1988.
     """
 
@@ -104,7 +104,7 @@ class FilteredInverse:
 class DampedInverse:
     """Damped least squares: ``sigma / (sigma^2 + lambda^2)`` in place of ``1 / sigma``.
 
-    Seed book section 1.3.2.2; Y. Nakamura and H. Hanafusa 1986 (manipulability), A. A. Maciejewski
+    Book section 1.3.2.2; Y. Nakamura and H. Hanafusa 1986 (manipulability), A. A. Maciejewski
     and C. A. Klein 1988 (weak directions), S. Chiaverini 1997 (smallest singular value), A. S. Deo
     and I. D. Walker 1993 (bounded speed).
 

@@ -1,6 +1,6 @@
 """Tasks of a redundant robot beside the twist: rows ``J v = rate`` of its joint velocities.
 
-Seed book section 1.3.2.4; J. Baillieul 1985 (functions of the configuration). Tasks are given to
+Book section 1.3.2.4; J. Baillieul 1985 (functions of the configuration). Tasks are given to
 `ikm` as ``augmented`` or ``tasks``. In `ikm_second_order` their rates are accelerations,
 ``J a + dJ/dt v = rate``.
 

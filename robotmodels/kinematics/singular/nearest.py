@@ -1,6 +1,6 @@
 """Search of singular configurations near a given one.
 
-Seed book section 1.3.2.3: the solution near singular positions needs to know where they are.
+Book section 1.3.2.3: the solution near singular positions needs to know where they are.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rank of the Jacobian and dimension of the operational space: what a robot can do at all.
 
-Seed book section 1.3.1.4. The number of degrees of freedom of the tool is the rank of its
+Book section 1.3.1.4. The number of degrees of freedom of the tool is the rank of its
 Jacobian: the local one at a configuration, the global one M at almost all of them.
 """
 

@@ -1,6 +1,6 @@
 """Singular configurations: lost directions, self-motions and names.
 
-Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
+Book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces, limit
 surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators, ASME J.
 Mechanisms 110, 1988, for the second-order test of a boundary.
 
@@ -244,7 +244,7 @@ def classify_singularity(
 ) -> SingularityReport:
     """Degrees of freedom lost and gained at a configuration, in numbers and in words.
 
-    Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3; Oblak and Kohli 1988.
+    Book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3; Oblak and Kohli 1988.
 
     Parameters
     ----------
