@@ -1,7 +1,8 @@
-"""Inputs of a program: joint variables, and parameters that stay symbols."""
+"""Inputs of a program: joint variables, and parameters that stay symbols under safe names."""
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,19 @@ from ..regressors import parameter_names, parameter_vector, torque_regressor
 from .recursion import COLUMNS, Constant
 from .tape import Number, Port, Scalar, Tape
 
+_RESERVED = """
+auto break case char const continue default do double else enum extern float for goto if inline int
+long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while asm main NULL NAN INFINITY end function elseif otherwise parfor persistent catch spmd
+classdef reshape acos asin atan atan2 ceil cos cosh erf exp fabs floor fma fmax fmin fmod gamma
+hypot j0 j1 jn log pow round sin sinh sqrt tan tanh tgamma y0 y1 yn abs sign pi inf nan np math
+casadi smooth batch select_ q v a tau T wrench geometry parameters J M h Q W valid status
+zeros a_out
+"""
+"""Words of the languages, names of their libraries and those that generated code uses."""
+_WORDS = {*keyword.kwlist, *_RESERVED.split()}
+_TAKEN = re.compile(r"[tCS]\d+|(FP|HUGE|MATH|M|math)_\w*|linux|unix")
+"""Names of lines, cosines and sines, and macros of C's mathematics."""
 _LETTERS: dict[str, str] = dict(zip(COLUMNS, ("G", "BL", "B", "A", "D", "TH", "RL"), strict=True))
 _EXACT, _STATES = 1e-13, 10
 
@@ -36,11 +50,18 @@ class Draft:
         self, name: str, shape: tuple[int, ...], given: Mapping[str, float] | None = None
     ) -> dict[str, Number]:
         """A further input; the elements of parameters, given with their values, by name."""
-        given = given or {}
+        taken, names, given = {x for row in self.elements for x in row}, [], given or {}
+        for old in given:
+            new = identifier(old)
+            while new in _WORDS or new in taken or _TAKEN.fullmatch(new):
+                new += "_"
+            taken.add(new)
+            names.append(new)
+            self.notes += [f"{comment(old)} is written {new}"] * (old != new)
         port, count = Port(name, shape), len(self.inputs)
         self.scalars[name] = [self.tape.scalar("input", count, k) for k in range(port.size)]
         self.inputs.append(port)
-        self.elements.append(tuple(given))
+        self.elements.append(tuple(names))
         self.values.append(tuple(map(float, given.values())))
         return dict(zip(given, self.scalars[name], strict=False))
 
@@ -93,6 +114,8 @@ def geometric_parameters(draft: Draft) -> Constant:
             # a formula, or one name of different numbers: the usual name
             same = {numbers[key] for key, name in table.symbols.items() if name == own}
             names[column, row] = own if own.isidentifier() and len(same) == 1 else usual
+            if names[column, row] != own:
+                draft.notes.append(f"{comment(own)} is written {names[column, row]}")
         elif column in ("b", "d", "r") and value != 0.0:
             names[column, row] = usual
     values = {name: numbers[key] for key, name in names.items()}

@@ -246,7 +246,7 @@ def _finished(
     for port, names, values in zip(draft.inputs, draft.elements, draft.values, strict=True):
         notes.append(f"Input {port.name} {port.shape}: {_UNITS[port.name]}")
         pairs = zip(names, values, strict=True)
-        notes += [f"  {k} {comment(name)} = {value!r}" for k, (name, value) in enumerate(pairs)]
+        notes += [f"  {k} {element} = {value!r}" for k, (element, value) in enumerate(pairs)]
     words = row.unit, "1 where the row is a posture, else 0", "see below"
     notes += [
         f"Output {port.name} {port.shape}: {word}"

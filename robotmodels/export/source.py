@@ -282,7 +282,7 @@ def _lines(program: Program, language: Language) -> tuple[list[str], list[list[s
         elif operation == "input":
             port, k = operands
             expression = language.element(program.inputs[port], k)
-            name = f"{program.inputs[port].name}_{k}" if program.elements[port] else ""
+            name = program.elements[port][k] if program.elements[port] else ""
             is_short = not name
         elif operation in _SIGN:
             a, b = operands
