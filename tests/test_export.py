@@ -4,6 +4,8 @@ import ctypes
 import pickle
 import shutil
 import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -382,6 +384,33 @@ def planar(symbols, names=("double", "for")):
         antecedent=[0, 1], sigma=[0, 0], d=[0.2, 0.3], r=[0.0, 0.1], names=names, symbols=symbols
     )
     return rm.RobotModel.from_table(table, name="int main() /* \u202e */")
+
+
+def test_generation_is_quick():
+    panda, rx90 = rm.load("panda"), rm.load("rx90")
+    export.program(rx90, "idm")
+    for model, kind, limit in ((rx90, "idm", 0.5), (panda, "base_regressor", 3.0)):
+        start = time.process_time()
+        export.program(model, kind).code("c")
+        assert time.process_time() - start < limit
+
+
+@pytest.mark.nightly
+def test_the_same_bytes_in_two_processes():
+    script = (
+        "import sys, robotmodels as rm; from robotmodels import export; m = rm.load('tx40');"
+        "sys.stdout.write(''.join(export.program(m, k, **o).code(l) for k, o, l in"
+        " (('idm', {'parameters': 'base'}, 'c'), ('igm', {}, 'numpy'), ('ddm', {}, 'casadi'))))"
+    )
+    texts = [
+        subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, check=True,
+            env={**__import__("os").environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in ("1", "2")
+    ]  # fmt: skip
+    assert texts[0] == texts[1]
+    assert len(texts[0]) > 10_000
 
 
 @needs_compiler

@@ -515,3 +515,39 @@ def test_robots_are_values(rng):
     table = robot.tree.table
     passive = robot.tree.with_table(table.replace(mu=[0, 1, 0, 0, 0]))
     assert loops.LoopedRobot(passive, robot.closures).actuated.tolist() == [1]
+
+
+def test_a_four_bar_follows_freudenstein(rng):
+    a, c, d = 0.3, 0.7, 1.0
+    robot = four_bar(rng, crank=a, coupler=0.9, rocker=c, ground=d)
+    q = loops.close(robot, rng.uniform(-3.0, 3.0, (50, 1)), [0.7, 1.2, -0.5]).q
+    crank, rocker = q[:, 0], q[:, 1]
+    K1, K2 = d / a, d / c
+    slope = (np.sin(crank - rocker) + K2 * np.sin(crank)) / (
+        np.sin(crank - rocker) + K1 * np.sin(rocker)
+    )
+    assert np.allclose(loops.velocity_map(robot, q)[:, 1, 0], slope, atol=1e-10)
+
+
+def test_a_parallelogram_has_its_reduced_model(rng):
+    length = 0.5
+    robot = parallelogram(rng, length=length)
+    pi = dict(
+        zip(
+            rm.parameter_names(robot.tree, drive=False),
+            robot.tree.inertia.values.ravel(),
+            strict=True,
+        )
+    )
+    M = pi["M3"] + pi["M4"]
+    # the rocker carries frame 5 at its end; the coupler does not turn
+    inertia = (
+        pi["ZZ1"] + pi["ZZ2"] + pi["ZZ5"] + 2 * length * pi["MX5"] + length**2 * (pi["M5"] + M)
+    )
+    X = pi["MX1"] + pi["MX2"] + pi["MX5"] + length * (pi["M5"] + M)
+    Y = pi["MY1"] + pi["MY2"] + pi["MY5"]
+    angle, rate, change = rng.uniform(0.2, 2.9, 20), *rng.normal(size=(2, 20))
+    signs = np.array([1.0, 1.0, -1.0])
+    q, v, a = (x[:, None] * signs for x in (angle, rate, change))
+    expected = inertia * change + 9.81 * (X * np.cos(angle) - Y * np.sin(angle))
+    assert np.allclose(loops.idm(robot, q, v, a)[:, 0], expected, rtol=1e-10, atol=1e-10)

@@ -76,6 +76,7 @@ def run(arguments: argparse.Namespace) -> Report:
     n = model.n
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
+    _check_file(arguments)
     rate = 1000.0 if arguments.rate is None else as_number(arguments.rate, "--rate", above=0.0)
     boxes, workspace = _boxes(arguments.box, "--box"), None
     if boxes:  # what is inside of all
@@ -113,6 +114,17 @@ def run(arguments: argparse.Namespace) -> Report:
 
     is_feasible = found.status.name != "INFEASIBLE"
     return Report(str(found), lambda: excitation_data(found), is_feasible, str(found), write)
+
+
+def _check_file(arguments: argparse.Namespace) -> None:
+    """Raise for options that the sample file does not support."""
+    for option in ("rate", "format", "degrees"):
+        if arguments.out is None and getattr(arguments, option) not in (None, False):
+            raise InvalidValueError(
+                f"--{option}: describes the file of --out; give --out, or leave it out."
+            )
+    if arguments.degrees and arguments.format == "yaml":
+        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
 
 
 def _each(text: str | None, n: int, option: str) -> Array | None:
