@@ -84,7 +84,7 @@ def test_columns_by_argument_and_by_number(tmp_path):
         ((180.0 / np.pi, 1.0), {}, "look like degrees. Use angles='deg'"),
         ((1.0, 1.0), {"angles": "deg"}, "look like radians. Use angles='rad'"),
         ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Use joint_angles='rad'"),
-        ((1.0, 1e3), {}, "look like millimetres.*lengths="),
+        ((1.0, 1e3), {}, "look like millimetres. Use lengths='mm'"),
         ((1.0, 1.0), {"lengths": "mm"}, "as if metres had been converted as millimetres"),
         ((1.0, 1.0), {"label": "x"}, "label: position does not use it"),
     ],

@@ -537,6 +537,7 @@ def failing(monkeypatch, error):
         (["igm", "rx90", "--q", "zeroo"], "Did you mean 'zero'?"),
         (["info", "missing.urdf"], "cannot read 'missing.urdf'"),
         (["excite", "--robot", "rx90", "--out", "taken.csv/new"], "is a file; give a folder"),
+        (["excite", "--robot", "rx90", "--rate", 500], "--rate: describes the file of --out"),
         (["excite", "--robot", "rx90", "--out", "new", "--rate", 0], "--rate: expected a finite"),
         (["excite", "--robot", "rx90", "--box", 1, 1, 1, 0, 0, 0], "--box: lower, upper"),
         (["identify", "--robot", "rx90", "--log", "taken.csv", "--delimiter", ""], "character"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -185,9 +186,12 @@ def read_measurements(
     try:
         check_units(model, [measurement])
     except InvalidValueError as error:
-        raise InvalidValueError(
-            f"{files[0]}: {error} The unit of a file is given by lengths=."
-        ) from None
+        text, other = str(error), LengthUnit.METRE
+        if length is LengthUnit.METRE:
+            other = LengthUnit.MILLIMETRE
+        if re.search(f"(look like|as if) {other.name.lower()}s", text):
+            text = f"{text.partition(' Pass metres')[0]} Use lengths={other.value!r}."
+        raise InvalidValueError(f"{files[0]}: {text}") from None
     return measurement
 
 

@@ -24,7 +24,7 @@ _WHOLE = (
     ("Choose configurations with select_configurations", "Measure other postures"),
     (" (named=...)", " (in Python: named=...)"),
     ("Give the model masses (with_inertia)", "Give the URDF of the robot masses (<inertial>)"),
-    ("Pass metres: ", "See --lengths; in metres: "),
+    ("Pass metres: multiply", "In metres: multiply"),
 )  # fmt: skip
 """Words of the package, and the option that says the same."""
 _OTHER_NAMES = {

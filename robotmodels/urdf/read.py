@@ -142,8 +142,7 @@ def _text_of(source: str | Path) -> tuple[str, Path | None]:
     except (OSError, ValueError) as error:  # the latter for a zero character in the path
         reason = getattr(error, "strerror", None) or error
         raise UrdfError(
-            f"cannot read {str(source)!r:.80}: {reason}. Give the path of a .urdf file, or the "
-            "text of one."
+            f"cannot read {path}: {reason}. Give the path of a .urdf file, or the text of one."
         ) from None
 
 

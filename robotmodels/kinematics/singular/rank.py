@@ -190,7 +190,7 @@ def operational_dimension(
     >>> from robotmodels.robots import load
     >>> found = operational_dimension(load("iiwa14"), q=np.zeros(7))
     >>> found.dimension, found.redundancy, found.local_dimension, found.singularity_order
-    (6, 1, array(3), array(3))
+    (6, 1, np.int64(3), array(3))
     """
     task = singular_task(model, frame, mask, mask_axes, length)
     tolerance = as_number(tolerance, "tolerance", above=0.0)
