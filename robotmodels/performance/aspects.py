@@ -153,7 +153,7 @@ class Aspects(Result):
     def __repr__(self) -> str:
         shares = ", ".join(f"{v:.4g}" for v in self.volume[:_FEW])
         more = ", ..." if self.count > _FEW else ""
-        kind = "aspects" if self.names else "components"
+        kind = ("aspect" if self.names else "component") + "s" * (self.count != 1)
         return (
             f"<Aspects of {self.model.name}: {self.count} {kind}, volumes {shares or 'none'}{more};"
             f"\n  {self.reason()}>"
