@@ -73,10 +73,13 @@ def run(arguments: argparse.Namespace) -> Report:
 
     check_output(arguments)
     model = robot_of(arguments)
-    n = model.n
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
-    _check_file(arguments)
+    stray = [name for name in ("rate", "format", "degrees") if getattr(arguments, name)]
+    if stray and arguments.out is None:
+        raise InvalidValueError(f"--{stray[0]}: describes the file of --out; give --out as well.")
+    if arguments.degrees and arguments.format == "yaml":
+        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
     rate = 1000.0 if arguments.rate is None else as_number(arguments.rate, "--rate", above=0.0)
     boxes, workspace = _boxes(arguments.box, "--box"), None
     if boxes:  # what is inside of all
@@ -87,14 +90,14 @@ def run(arguments: argparse.Namespace) -> Report:
         workspace = Box(lower, upper)
     limits = MotionLimits.of_model(model)
     for name in ("velocity", "acceleration"):
-        most = _each(getattr(arguments, name), n, f"--{name}")
+        most = _each(getattr(arguments, name), model.n, f"--{name}")
         if most is not None:
             limits = replace(limits, **{name: most, f"{name}_lower": -most})
     with progress(arguments, "searching") as bar:
         found = exciting_trajectory(
             model, drive=tuple(arguments.drive) or False, limits=limits,
-            torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
-            sigma=_each(arguments.sigma, n, "--sigma"), workspace=workspace,
+            torque_limits=_each(arguments.torque_limits, model.n, "--torque-limits"),
+            sigma=_each(arguments.sigma, model.n, "--sigma"), workspace=workspace,
             obstacles=_boxes(arguments.keep_out, "--keep-out"),
             baseline=arguments.random, rng=arguments.seed,
             progress=bar,
@@ -112,19 +115,8 @@ def run(arguments: argparse.Namespace) -> Report:
         picture = folder / "trajectory.png"
         return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
 
-    is_feasible = found.status.name != "INFEASIBLE"
-    return Report(str(found), lambda: excitation_data(found), is_feasible, str(found), write)
-
-
-def _check_file(arguments: argparse.Namespace) -> None:
-    """Raise for options that the sample file does not support."""
-    for option in ("rate", "format", "degrees"):
-        if arguments.out is None and getattr(arguments, option) not in (None, False):
-            raise InvalidValueError(
-                f"--{option}: describes the file of --out; give --out, or leave it out."
-            )
-    if arguments.degrees and arguments.format == "yaml":
-        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
+    is_reached = found.status.name != "INFEASIBLE"
+    return Report(str(found), lambda: excitation_data(found), is_reached, str(found), write)
 
 
 def _each(text: str | None, n: int, option: str) -> Array | None:

@@ -10,8 +10,6 @@ import textwrap
 from ..robots import robots, title
 from .output import print_json
 
-_ANY = 10_000  # columns
-_PREFIX = "example-robot-data: "  # which the names say
 EXAMPLES = """\
 examples:
   robotmodels robots
@@ -32,7 +30,7 @@ def run(arguments: argparse.Namespace) -> None:
         return
     width = max(map(len, names)) + 2
     # pipes get a line for each robot, terminals lines that fit
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else _ANY
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
     for name in names:
-        text = f"{name:<{width}}{title(name).removeprefix(_PREFIX)}"
+        text = f"{name:<{width}}{title(name).removeprefix('example-robot-data: ')}"
         print(textwrap.fill(text, columns, subsequent_indent=" " * width, break_on_hyphens=False))
