@@ -277,7 +277,7 @@ _OPENING = threading.RLock()
 
 
 def __getattr__(name: str) -> Any:
-    """Import rooms, pictures and derivations when they are first asked for."""
+    """Import subpackages, pictures and derivations at their first use."""
     with _OPENING:
         if name in _ROOM_OF:
             value = getattr(importlib.import_module(_ROOM_OF[name], __name__), name)

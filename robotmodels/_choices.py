@@ -1,4 +1,4 @@
-"""Members of enums and instances of types at the border."""
+"""Members of enums and instances of types in arguments."""
 
 from __future__ import annotations
 

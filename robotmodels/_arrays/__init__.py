@@ -1,4 +1,4 @@
-"""Arrays: array-likes in, checked float64 arrays out, one rule for batches, values nobody changes.
+"""Arrays: array-likes in, checked float64 arrays out, one rule for batches, immutable values.
 
 Leading axes are batch axes and broadcast against each other; the last axes are the core.
 """

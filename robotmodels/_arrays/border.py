@@ -1,4 +1,4 @@
-"""The border: array-likes in, checked float64 arrays of the right shape out."""
+"""Checks of arguments: array-likes in, checked float64 arrays of the right shape out."""
 
 from __future__ import annotations
 
@@ -156,10 +156,10 @@ def as_mask(
     if not np.isin(numbers, (0.0, 1.0)).all():
         raise InvalidValueError(
             f"{name}: expected zeros and ones for {words}, got {numbers.tolist()}; a component is "
-            "either asked for or not, it has no weight."
+            "either requested or not; it has no weight."
         )
     if not numbers.any():
-        raise InvalidValueError(f"{name}: all of {words} are 0, so nothing is asked for.")
+        raise InvalidValueError(f"{name}: all of {words} are 0, so nothing is requested.")
     return numbers == 1.0
 
 

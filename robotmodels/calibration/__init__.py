@@ -1,6 +1,6 @@
 """Geometric calibration from measurements or contacts (book section 1.4).
 
-Arguments that come back in this room:
+Common arguments:
 
 - ``model``: the nominal `RobotModel`, n joints; ``q (..., n)``: readings of its joints, rad or m.
 - ``frame``: the measured end, a name or a number of a frame; None is the tool.
@@ -12,7 +12,7 @@ Arguments that come back in this room:
 - ``sigma``: standard deviations of the rows of a measurement, m or rad.
 - ``robot``: a `CalibratedRobot`, or the `CalibrationResult` that holds it.
 - ``mask, mask_axes, lock``: as `igm`. ``rng``: a generator or a seed. ``progress``: a function that
-  is called with the fraction done; True writes it to the log of Python.
+  is called with the fraction done; True writes it to the log (`logging`).
 """
 
 from .. import _docs

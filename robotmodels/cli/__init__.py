@@ -1,4 +1,4 @@
-"""The command line: ``robotmodels COMMAND``, one file a command, each with ``--help``."""
+"""The command line: ``robotmodels COMMAND``, one file for each command, each with ``--help``."""
 
 from .program import main
 

@@ -3,7 +3,7 @@
 A law is a frozen value with ``command(t, q, v, x) -> tau``, its state ``state0``, and ``rate(t, q,
 v, x)``, the derivative of the state; laws that use forces take the measured ``wrench`` last.
 
-Throughout, ``model`` is the robot of n joints as the controller believes it to be. ``reference``
+Throughout, ``model`` is the model of the robot of n joints that the controller uses. ``reference``
 are positions (n,), or in task space a world pose (4, 4): a motion (`Trajectory`, `PoseTrajectory`),
 a constant, or a function of t that returns (q, v, a) or (T, twist, acceleration). Gains are one
 number, or one for each joint or component of the task (six are those of all components). Errors are

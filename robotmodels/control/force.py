@@ -4,7 +4,7 @@ Parameters
 ----------
 kp, kv, ke : float or array_like
     Gains of the force error, 1/s^2, and of its rate, 1/s, such as ``omega^2`` and ``2 zeta omega``;
-    stiffness of the environment as the controller believes it to be, N/m (N m/rad).
+    stiffness of the environment that the controller assumes, N/m (N m/rad).
 feedforward : {"desired", "measured"}
     The force that is fed forward.
 model, mask
@@ -25,7 +25,7 @@ inverse : {"consistent", "jacobian"}
     forces in its null space. ``"jacobian"``: joint servos of equal gains through ``J^-1 S``, the
     historical form; it is unstable in some postures of revolute arms (An and Hollerbach).
 stiffness, gain : float or array_like
-    Of the environment as the controller believes it to be, N/m (N m/rad); bandwidth of the external
+    Of the environment that the controller assumes, N/m (N m/rad); bandwidth of the external
     loop, 1/s.
 
 References
@@ -82,7 +82,7 @@ class ForceTracking(TaskLaw):
     """Force control of a mass against a spring, in the directions of the mask.
 
     ``x'' = (f_d'' + kv (f_d' - ke x') + kp (f_d - f)) / ke`` with the operational mass of the
-    believed model, and a force that is fed forward. A constant disturbance f_dist leaves the error
+    model of the law, and force feedforward. A constant disturbance f_dist leaves the error
     ``f_dist / (1 + m kp / ke)`` with the desired force, ``f_dist ke / (m kp)`` with the measured.
     """
 

@@ -89,7 +89,7 @@ class PIDGains(Value):
 
     @property
     def critical_ki(self) -> float:
-        """Integral gain at the border of stability (Routh): ``(kd + viscous) kp / inertia``."""
+        """Integral gain at the limit of stability (Routh): ``(kd + viscous) kp / inertia``."""
         inertia = as_number(self.inertia, "inertia", above=0.0)
         return (self.kd + self.viscous) * self.kp / inertia
 

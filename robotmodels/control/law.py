@@ -1,4 +1,4 @@
-"""Parts of all control laws: defaults, gains, references, and torques of the believed model."""
+"""Parts of all control laws: defaults, gains, references, and torques of the model of the law."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from ..simulation import Integrator, Simulation, SimulationStatus, simulate
 from .law import Law
 
 _SAMPLES = 1000
-_WINDOWS = 6  # parts of a run whose largest errors tell whether it diverges
+_WINDOWS = 6  # parts of a run whose largest errors show whether it diverges
 _GROWS = 2.0  # least ratio of the last of them to the first
 _STEADY = 1.05  # least ratio of successive ones
 _STAYS = 0.85  # least part of the ratio at first that remains at the end
@@ -129,7 +129,7 @@ def run(
     Parameters
     ----------
     model : RobotModel
-        The plant, n joints; the model that the law believes may differ.
+        The plant, n joints; the model that the law uses may differ.
     law : object
         A control law: ``command(t, q, v, x)`` (n,), ``state0`` (k,), ``rate(t, q, v, x)`` (k,).
     q0, v0 : array_like, shape (n,)
@@ -247,7 +247,7 @@ class Loop:
         if not self.walls:
             return np.zeros(6)
         key = t, q.tobytes(), v.tobytes()
-        if self._last[0] != key:  # the law and the plant ask for the same
+        if self._last[0] != key:  # the law and the plant need the same
             T, twist = dgm(self.model, q), jacobian(self.model, q) @ v
             name = "environment(t, T, twist)"
             parts = [as_exact(wall(t, T, twist), (6,), name) for wall in self.walls]
@@ -290,7 +290,7 @@ def _deviations(noise: Any, rng: Any, period: Any) -> tuple[float, ...] | None:
 def _growing(errors: Array) -> Array:
     """Peaks of the error in the windows of a run if they grow exponentially, empty if not.
 
-    Ratios of successive peaks stay then; those of a power of time fall.
+    Ratios of successive peaks stay then; those of a power of time decrease.
     """
     if len(errors) < 2 * _WINDOWS:
         return np.zeros(0)

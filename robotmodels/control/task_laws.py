@@ -170,7 +170,7 @@ def as_flags(mask: Any) -> Array | None:
 class ComputedTorque(TaskLaw):
     """Ideal dynamic control, also called computed torque or inverse dynamics control.
 
-    The torque is that of the believed model for the acceleration at which the error of the joints
+    The torque is that of the model of the law for the acceleration at which the error of the joints
     (``space="joint"``) or of the tool (``"task"``) obeys ``e'' + 2 zeta omega e' + omega^2 e = 0``.
     """
 

@@ -1,4 +1,4 @@
-"""Poses of a camera on the wrist of a UR10, measured by what it sees of a board."""
+"""Poses of a camera on the wrist of a UR10, measured with images of a board."""
 
 from __future__ import annotations
 

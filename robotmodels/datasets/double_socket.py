@@ -81,9 +81,9 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     """The double socket with a Panda: 182 readings at 3 places, or 559 at 9.
 
     A ball on the flange sits in one of two sockets that are 50 mm apart, printed as one part; the
-    hand is turned about it, and only the joints are read. No device measures anything. What looks
-    like two arms may be one on two days: what is identified of them agrees within its deviations.
-    At the place ``high`` of panda_2 the socket was moved in between.
+    hand is turned about it, and only the joints are read. No device measures anything. The two
+    arms may be the same one on two days: their identified parameters agree within standard errors.
+    At the place ``high`` of panda_2 the socket was moved during the recording.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ from ..model import RobotModel, check_model
 from .inverse import idm
 
 Base = Any
-"""`BaseParameters`, which are on a higher floor."""
+"""`BaseParameters`, which depend on this package."""
 
 
 def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:

@@ -38,7 +38,7 @@ _LEAST_SCALE = 1e-9  # least scale relative to the longest residual
 class FitStatus(Outcome):
     """Outcome of a fit."""
 
-    CONVERGED = 0, "The fit has converged: further steps are rounding."
+    CONVERGED = 0, "The fit has converged: further steps are rounding errors."
     STALLED = 1, "No step decreases the sum: the Jacobian is wrong, or residuals are not smooth."
     ITERATION_LIMIT = 2, "The iterations ended too early; start nearer or allow more of them."
     SINGULAR = 3, "Some combinations of parameters have no effect; leave some out, or add a prior."

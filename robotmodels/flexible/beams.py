@@ -201,7 +201,7 @@ def _tip_body(tip: Any) -> tuple[float, Array, Array]:
     J = as_exact(J * np.eye(3) if J.shape in ((), (3,)) else J, (3, 3), "tip inertia")
     least = np.linalg.eigvalsh(0.5 * np.trace(J) * np.eye(3) - J)[0]
     if not np.allclose(J, J.T) or least < -1e-9 * abs(np.trace(J)) or (mass == 0.0 and J.any()):
-        raise InertiaError(f"tip: mass {mass:g} and inertia {J.tolist()} belong to no body.")
+        raise InertiaError(f"tip: mass {mass:g}, inertia {J.tolist()}: not a physical body.")
     return mass, com, J
 
 

@@ -1,4 +1,4 @@
-"""The geometric description: the Khalil-Kleinfinger table and the transforms it stands for."""
+"""The geometric description: the Khalil-Kleinfinger table and its transforms."""
 
 from .. import _docs
 from .joint_kinds import FIXED, PRISMATIC, REVOLUTE

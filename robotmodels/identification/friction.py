@@ -51,7 +51,7 @@ class FrictionStatus(Outcome):
 
     SOLVED = 0, "The significant friction curves fit the log best."
     INSIGNIFICANT = 1, "No joint has significant friction beyond viscous and Coulomb friction."
-    NOT_CONVERGED = 2, "The iterations ended before the parameters settled; use them with care."
+    NOT_CONVERGED = 2, "The iterations ended before the parameters converged; use them with care."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -139,7 +139,7 @@ def fit_friction(
     base = parameters_of(model, base, True)
     if not any(name.rstrip("0123456789") == "Fc" for name in base.names):
         raise InvalidValueError(
-            "base: expected Fc among its parameters, to which the friction is added; ask for "
+            "base: expected Fc among its parameters, to which the friction is added; request "
             "base_parameters(model, drive=True)."
         )
     (system,) = equations_of(base, (log,), processing)

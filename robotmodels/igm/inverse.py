@@ -44,10 +44,10 @@ def igm(
         Reference postures [rad or m]; the leading axes broadcast with those of ``T``. Solutions
         are ordered by their distance to it, and joints that a pose leaves free take its value
         (0 without it; where no posture exists at that value, the nearest one where one does).
-        Joints that do not move the tool keep its value (0 without it, within limits if asked for);
+        Joints that do not move the tool keep its value (0 without it; with ``limits`` within them);
         they are no redundancy: the others are solved as if they were the whole arm.
     mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
-        Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
+        Ones for the components ``x y z rx ry rz`` that are requested, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.
     mask_axes : {"world", "tool"}
         Axes of the components: the world's, or those of the tool at the desired pose. Pointing
@@ -55,7 +55,7 @@ def igm(
     limits : bool
         Whether solutions must lie within the joint limits. Angles are then shifted by whole turns
         to be nearest to ``q_ref`` (else to mid-range) inside the limits, and postures that cannot
-        are dropped; otherwise angles are in (-pi, pi] and ``within_limits`` tells.
+        are dropped; otherwise angles are in (-pi, pi] and ``within_limits`` marks them.
     lock : mapping, optional
         Joints (column of q, from 0, or name) that keep a value [rad or m].
     arm_angle : array_like, shape (...), optional
@@ -81,7 +81,7 @@ def igm(
     ------
     ShapeError, InvalidValueError, NotARotationError
         ``T`` that are not poses, or beyond 1e100 m; arguments of the wrong length, with NaN or
-        infinity; a mask that leaves nothing or asks for what is no mask; locked joints that do
+        infinity; a mask that leaves nothing or is not a mask; locked joints that do
         not exist; an arm angle for an arm without one.
 
     Notes

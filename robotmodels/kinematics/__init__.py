@@ -26,7 +26,7 @@ tolerance : float
     Singular values below this fraction of the largest are zero.
 
 All functions raise `ShapeError` or `InvalidValueError` for arrays of the wrong length, NaN or
-infinity and numbers out of range, and `FrameNotFoundError` for a frame that the robot has not.
+infinity and numbers out of range, and `FrameNotFoundError` for an unknown frame.
 """
 
 from __future__ import annotations

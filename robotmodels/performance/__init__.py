@@ -1,11 +1,11 @@
 """Performance analysis (chapter 3): accessibility, workspaces, aspects, cusps, paths, dexterity.
 
-Parameters that come back: ``arm``, the robot; ``limits``, whether its joint limits count; ``free``,
+Common parameters: ``arm``, the robot; ``limits``, whether its joint limits count; ``free``,
 a function of q (N, n) that returns bool (N,), or obstacles that the links must not touch; ``mask``
-(6,), the components of the pose that are asked, see `igm`; ``executor``, threads or processes that
+(6,), the requested components of the pose, see `igm`; ``executor``, threads or processes that
 compute (the results do not depend on their number); ``progress``, a function that is called with
-the fraction done, or True for the log of Python. Wrong input raises `ShapeError` or
-`InvalidValueError`, also slides without limits and resolutions that need more than 1 GB.
+the fraction done, or True for the log (`logging`). Wrong input raises `ShapeError` or
+`InvalidValueError`, also prismatic joints without limits and resolutions that need more than 1 GB.
 """
 
 from .. import _docs

@@ -64,7 +64,7 @@ class AccessStatus(Outcome):
     OUT_OF_REACH = 1, "No posture reaches the position."
     ONLY_OUTSIDE_LIMITS = 2, "Only postures outside the joint limits reach it."
     ONLY_IN_COLLISION = 3, "Every posture within the limits that was found is in collision."
-    ORIENTATION_NOT_AVAILABLE = 4, "The position is reached, but not in every orientation asked."
+    ORIENTATION_NOT_AVAILABLE = 4, "The position is reached, but not in all requested orientations."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

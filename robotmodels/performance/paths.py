@@ -68,7 +68,7 @@ class PathStatus(Outcome):
     BROKEN = 1, "The path is followed to its end from no starting posture."
     NOT_DEFINED = (
         2, "The task leaves infinitely many postures, or no joint moves the tool: lock a joint, or "
-        "ask for more components.",
+        "request more components.",
     )  # fmt: skip
 
 

@@ -54,8 +54,8 @@ _MOST_GENERATORS = 16
 class PolytopeStatus(Outcome):
     """Outcome of `polytope`."""
 
-    BOUNDED = 0, "The polytope is bounded and has an inside."
-    FLAT = 1, "The polytope has no inside: some direction of the task cannot be reached."
+    BOUNDED = 0, "The polytope is bounded and has an interior."
+    FLAT = 1, "The polytope has no interior: some direction of the task cannot be reached."
     UNBOUNDED = 2, "The polytope is unbounded: the structure carries some wrenches alone."
 
 

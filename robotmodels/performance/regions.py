@@ -71,8 +71,8 @@ class RegionStatus(Outcome):
     FOUND = 0, "The workspace was divided."
     EMPTY = 1, "No cell is reached."
     NOT_DEFINED = (
-        2, "Infinitely many postures reach a point: which path can be followed is not a question "
-        "of regions.",
+        2, "Infinitely many postures reach a point: regions do not determine which path can be "
+        "followed.",
     )  # fmt: skip
 
 

@@ -69,11 +69,11 @@ class WorkspaceStatus(Outcome):
     REACHED_ONLY = (
         1, "Infinitely many postures reach a cell: the count is 1 where one was found.",
     )  # fmt: skip
-    SAMPLED = 2, "Of every orientation samples were tried; the count is the least of them."
+    SAMPLED = 2, "Orientations were sampled; the count is the least over the samples."
     EMPTY = 3, "No cell is reached."
     NOT_DEFINED = (
         4,
-        "The tool is still, or moves on a curve or a surface in space: there is nothing to fill.",
+        "The tool does not move, or only on a curve or a surface in space, without volume.",
     )
 
 

@@ -1,6 +1,6 @@
 """The catalogue: robots by name, one file of numbers with their sources for each.
 
-`robotmodels.load` and `robotmodels.robots` open it.
+`robotmodels.load` builds a robot of it, `robotmodels.robots` lists their names.
 """
 
 from .. import _docs

@@ -2,7 +2,7 @@
 
 Facts about the format: keywords stand before ``= {entry, entry, ...}``, comments between ``(*``
 and ``*)``. NL links and NJ joints make B = NJ - NL loops; the frames are NF = NL + 2 B, of which
-NL + 1 to NJ sit on the cut joints and the rest are their second, fixed frames. Geometric lists
+NL + 1 to NJ are on the cut joints and the rest are their second, fixed frames. Geometric lists
 have NF entries, dynamic ones NL, starting with row 1. ``G`` is the acceleration of gravity in
 frame 0, ``Z`` the pose of frame 0 row by row. W. Khalil, A. Vijayalingam, B. Khomutenko, I.
 Mukhanov, P. Lemoine and G. Ecorchard, "OpenSYMORO: an open-source software package for symbolic

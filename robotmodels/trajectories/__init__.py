@@ -1,12 +1,12 @@
-"""Trajectories: motion from poses and postures, by laws of time that keep limits.
+"""Trajectories: motion between poses or postures, with time laws within limits.
 
-Book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; the plain
-arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`. Requests
-that do not fit or that no motion keeps raise `ShapeError` or `InvalidValueError`, whose message has
-the least duration, limit or factor that would do.
+Book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`; but
+`cartesian_trajectory` and `joint_trajectory` return plain arrays, as ``ctraj`` and ``jtraj`` do.
+Inconsistent or infeasible requests raise `ShapeError` or `InvalidValueError`, whose message gives
+the least duration, limit or factor that is feasible.
 
-Parameters that come back: ``limits``, `MotionLimits` of the joints; ``torque`` (n,) or a number,
-greatest torques of both signs, N m or N, by default those of the model's table; ``rng``, random
+Common parameters: ``limits``, `MotionLimits` of the joints; ``torque`` (n,) or a number,
+largest torques in both directions, N m or N, by default those of the model's table; ``rng``, random
 numbers or their seed, by default a fixed one; ``law`` and ``synchronisation``, members of `TimeLaw`
 and `Synchronisation` or their names; ``duration``, seconds, by default the least.
 """

@@ -1,4 +1,4 @@
-"""URDF: parts of a robot to text, and text to parts. It knows no model and no Pinocchio."""
+"""URDF: parts of a robot to text, and text to parts. Independent of `RobotModel` and Pinocchio."""
 
 from .. import _docs
 from .parts import TOOL, NamedFrame, RobotParts

@@ -66,7 +66,7 @@ class ServoStatus(Outcome):
 
     CONVERGES = 0, "The law gives a velocity, or the error is zero."
     AT_MINIMUM = 1, "The error is not zero, yet no velocity of the law reduces it: a local minimum."
-    SINGULAR = 2, "The matrix of the law is singular here: parts of the error are not seen."
+    SINGULAR = 2, "The matrix of the law is singular here: parts of the error give no velocity."
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
     BEHIND = 4, "A part of the object is not in front of the camera, or is seen edge-on."
     LIMITED = 5, "The robot cannot follow: limits of joints, a singular posture, too few joints."

@@ -1,8 +1,8 @@
 """Pictures of robots: `show`, `animate` and `jog` give a `Scene`, `plot_*` a Matplotlib figure.
 
-A scene is a meshcat page that needs no network: it shows itself in a notebook, and
+A scene is a meshcat page that needs no network: a notebook displays it, and
 ``.save("arm.html")`` writes it. Figures need the extra ``plots``; Matplotlib is imported when the
-first one is drawn. A figure is a `matplotlib.figure.Figure` that shows itself in a notebook, and
+first one is drawn. A figure is a `matplotlib.figure.Figure` that a notebook displays, and
 ``.savefig("arm.pdf")`` writes it. Arguments that do not fit raise `InvalidValueError` or
 `ShapeError`, a package that is not installed `MissingExtraError`.
 
@@ -20,7 +20,7 @@ limits : MotionLimits, optional
 degrees : bool
     Whether angles are in degrees instead of radians.
 columns : int, optional
-    How many panels stand in a row.
+    Number of panels in a row.
 view : array_like, shape (2,), optional
     Azimuth and elevation from which a scene or axes in space are seen, rad.
 height : int

@@ -1,4 +1,4 @@
-"""Kinds of measurement, to be mixed freely in one fit (sections 1.4.4, 1.4.5)."""
+"""Kinds of measurement, which can be combined in one fit (sections 1.4.4, 1.4.5)."""
 
 from .base import (
     Contact,

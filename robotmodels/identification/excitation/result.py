@@ -18,7 +18,7 @@ from .motions import KINDS, MotionBasis
 class ExcitationStatus(Outcome):
     """Outcome of a search."""
 
-    CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
+    CONVERGED = 0, "The criterion decreased by less than 1 % in the last 25 iterations."
     LIMIT_OF_ITERATIONS = 1, "The iterations ended before the criterion converged (iterations=)."
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
