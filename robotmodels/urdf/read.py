@@ -142,8 +142,7 @@ def _text_of(source: str | Path) -> tuple[str, Path | None]:
     except (OSError, ValueError) as error:  # the latter for a zero character in the path
         reason = getattr(error, "strerror", None) or error
         raise UrdfError(
-            f"cannot read {str(path)!r}: {reason}. Give the path of a .urdf file, or the text of "
-            "one."
+            f"cannot read {str(path)!r}: {reason}. Give the path of a .urdf file, or its text."
         ) from None
 
 
