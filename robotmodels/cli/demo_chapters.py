@@ -60,7 +60,7 @@ def fastest_motion() -> Any:
 
 
 def computed_torque() -> Any:
-    """Computed torque on a PUMA 560 whose masses are 20 % larger than the controller believes."""
+    """Computed torque on a PUMA 560 whose masses are 20 % larger than in the controller."""
     from .. import control
     from ..viz import plot_control
 
@@ -74,7 +74,7 @@ def computed_torque() -> Any:
 
 
 def four_points() -> Any:
-    """A camera that moves to where it sees four points as desired."""
+    """A camera that moves to the pose of four desired image points."""
     from .. import visual_servoing as vs
     from ..viz import plot_servo
 

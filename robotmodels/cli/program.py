@@ -81,7 +81,7 @@ COMMANDS = {
     "export": "a model of a robot as C, Python, NumPy, CasADi or MATLAB code",
     "compile": "compile everything in advance, so that first calls are fast",
 }
-"""Each is the module of the same name, which is imported when it is asked for."""
+"""Each is the module of the same name, which is imported when it is used."""
 _EXAMPLES = """\
 examples:
   robotmodels robots

@@ -7,7 +7,7 @@ rest. ``basis(v)`` is the torque per unit of each parameter, in the order of ``k
 Parameters
 ----------
 Fv, Fc, ... : array_like, shape (n,)
-    Viscous friction in N m s/rad (N s/m for slides), dry friction and offsets in N m (N).
+    Viscous friction in N m s/rad (N s/m for prismatic joints), dry friction and offsets in N m (N).
 v : array_like, shape (..., n)
     Joint velocities, rad/s or m/s.
 

@@ -1,4 +1,4 @@
-"""Columns of a table, checked: whole numbers, a tree of antecedents, limits that leave room."""
+"""Columns of a table, checked: whole numbers, a tree of antecedents, limits that leave a range."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def checked_limits(given: Mapping[str, Any], n: int) -> dict[str, Array]:
         limits[key] = array
     if (limits["lower"] == np.inf).any() or (limits["upper"] == -np.inf).any():
         raise TableError(
-            "a lower limit of +infinity, or an upper one of -infinity, leaves no room."
+            "a lower limit of +infinity, or an upper one of -infinity, leaves no range."
         )
     wrong = np.flatnonzero(~(limits["lower"] <= limits["upper"]))
     if wrong.size:

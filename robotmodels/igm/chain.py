@@ -133,7 +133,7 @@ def canonical_frames(chain: JointChain) -> tuple[Array, float]:
 
 
 def far_along_rails(chain: JointChain, U: Array) -> tuple[Array, Array]:
-    """Values (N, k) of slides at the base that are run out far, and poses without them.
+    """Values (N, k) of prismatic joints at the base that are far extended, and poses without them.
 
     Closed forms square lengths: many lengths of the arm away, the squares leave few digits.
     """

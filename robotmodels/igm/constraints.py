@@ -1,4 +1,4 @@
-"""Constraints on the joints: asked components of a pose, and linear relations between joints."""
+"""Constraints on the joints: requested components of a pose, and linear relations of joints."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ PATH = (1e-10, 1e-10)
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Asked components ``x y z rx ry rz`` of the displacement from a pose to the desired one."""
+    """Requested components ``x y z rx ry rz`` of the displacement to the desired pose."""
 
     asked: tuple[bool, ...] = (True,) * 6
     in_tool_axes: bool = False
 
     @property
     def freed_translations(self) -> tuple[int, ...]:
-        """Axes along which the position is not asked for."""
+        """Axes along which the position is not requested."""
         return tuple(i for i in range(3) if not self.asked[i])
 
     @property
     def freed_rotations(self) -> tuple[int, ...]:
-        """Axes about which the rotation is not asked for."""
+        """Axes about which the rotation is not requested."""
         return tuple(i for i in range(3) if not self.asked[3 + i])
 
 
@@ -52,7 +52,7 @@ def mask_axes(chain: JointChain, U: Array, components: Components) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constraints:
-    """Asked components of a pose and relations ``A q = b``. Shapes: A (m, k), b (m,).
+    """Requested components of a pose and relations ``A q = b``. Shapes: A (m, k), b (m,).
 
     ``length`` is the unit of lengths in which errors are compared [m].
     """
@@ -65,7 +65,7 @@ class Constraints:
 
     @property
     def weight(self) -> Array:
-        """Weights (6 + m,) of the errors: of the asked components, 0 for the others; relations."""
+        """Weights (6 + m,) of the errors: of the components, 0 if not requested; of the relations."""
         pose = np.where(self.components.asked, [1.0 / self.length] * 3 + [1.0] * 3, 0.0)
         return np.concatenate([pose, np.ones(len(self.b))])
 
@@ -103,7 +103,7 @@ class Constraints:
         return q, e, J
 
     def jacobians(self, U: Array, q: Array) -> Array:
-        """Minus the derivative of the asked errors, lengths in units of the arm, (N, r, k)."""
+        """Minus the derivative of the requested errors, lengths in units of the arm, (N, r, k)."""
         J, weight = self.descents(U, q[:, None], 0, 1.0)[2], self.weight
         return (weight[:, None] * J)[:, weight > 0.0]
 

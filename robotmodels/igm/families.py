@@ -34,7 +34,7 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
 
 
 def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
-    """Choose and prepare the solver of a chain for the asked components of a pose."""
+    """Choose and prepare the solver of a chain for the requested components of a pose."""
     if chain.k == 0:
         return None
     whole = all(components.asked)

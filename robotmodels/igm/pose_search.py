@@ -50,7 +50,7 @@ class SearchSpace(NamedTuple):
 
 
 class SearchTask(NamedTuple):
-    """Components and tolerances asked for, and the effort.
+    """Requested components and tolerances, and the effort.
 
     ``proven``: no configuration meets the poses, so that the closest position is looked for alone.
     """
@@ -216,7 +216,7 @@ class _Search:
         return self.wanted.descents(self.U[rows], q[:, None], 0, 1.0)[1:]
 
     def _met(self, error: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Position and angle missing of what is asked for, and whether both are met."""
+        """Missing part of the requested position and angle, and whether both are met."""
         position, angle = self.wanted.sizes(error)
         limits = self.task.tolerances
         return position, angle, (position <= limits.position) & (angle <= limits.orientation)

@@ -94,7 +94,7 @@ class Masked:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OneAxis:
-    """Arm that turns its tool about the asked axis only: that rotation gives the orientation."""
+    """Arm that turns its tool about the requested axis only: its angle gives the orientation."""
 
     chain: JointChain
     components: Components
@@ -276,7 +276,7 @@ def _(solver: OneAxis, U: Array, references: Array, tolerances: Tolerances) -> P
 
 
 def is_aligned(solver: OneAxis, U: Array) -> NDArray[np.bool_]:
-    """Whether the asked axis of poses is that of the arm, (N,)."""
+    """Whether the requested axis of poses is that of the arm, (N,)."""
     index = int(np.flatnonzero(solver.components.asked[3:])[0])
     asked = mask_axes(solver.chain, U, solver.components)[:, :, index]
     return np.linalg.norm(np.cross(asked, solver.axis), axis=1) <= 1e-9

@@ -67,9 +67,9 @@ class IGMSolutions(_Later):
         The solver, in words.
     periodic : ndarray of bool, shape (n,)
         Joints whose values count modulo a whole turn in `nearest`: the revolute ones, unless
-        limits were asked for.
+        limits were requested.
     mask : array_like of bool, shape (6,)
-        Which components x y z rx ry rz were asked for.
+        Which components x y z rx ry rz were requested.
     error : ndarray, shape (..., S, 6), optional
         Translation (m) and rotation (rad) that are missing, ``x y z rx ry rz`` in the axes of the
         mask. From `igm_numeric` also where there is no solution: then of ``closest``.
@@ -175,7 +175,7 @@ class IGMSolutions(_Later):
         Returns
         -------
         str
-            The sentence of its status, with what is missing where the method knows it.
+            The sentence of its status, with the missing distance where it is known.
 
         Raises
         ------
@@ -221,7 +221,7 @@ class IGMSolutions(_Later):
         ndarray, shape (..., n)
             Solutions as they are in ``q``, NaN for poses without any. The distance is the square
             root of the summed squares; a revolute joint counts by its shorter way round unless
-            limits were asked for.
+            limits were requested.
 
         Raises
         ------
@@ -260,7 +260,7 @@ class IGMSolutions(_Later):
         ndarray, shape (N, n)
             The solution of each pose that is nearest to the one before, as in `nearest`. Revolute
             joints are given by the angle nearest to the one before, so that they make no jumps of
-            whole turns, unless limits were asked for.
+            whole turns, unless limits were requested.
 
         Raises
         ------

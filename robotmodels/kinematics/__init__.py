@@ -122,7 +122,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Import a room when one of its names is first used."""
+    """Import a subpackage when one of its names is first used."""
     if name not in _ROOM_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = _docs.documented(getattr(importlib.import_module(_ROOM_OF[name], __name__), name))

@@ -24,7 +24,7 @@ _SAMPLES = 64
 
 
 class ModelCache:
-    """Values that belong to a model, kept as long as it lives."""
+    """Values that belong to a model, kept for its lifetime."""
 
     def __init__(self) -> None:
         # by identity: a model's hash reads all of its numbers
@@ -53,7 +53,7 @@ def spread_configurations(model: RobotModel, count: int, rng: np.random.Generato
 
 
 def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
-    """Reach of a frame: its greatest distance from a revolute axis that moves it."""
+    """Reach of a frame: its largest distance from a revolute axis that moves it."""
     check_model(model)
     key = model.twin.frame(frame).pin_id
     return float(_LENGTHS(model, key, lambda: _reach(model, frame)))

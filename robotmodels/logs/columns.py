@@ -177,6 +177,6 @@ def check_units(
         elif _OTHER_POSITIONS.fullmatch(plain) or _ANGLES.get(plain, angle.value) != angle.value:
             raise InvalidValueError(
                 f"{table.path}: the column {name!r} is in {unit!r}, the argument is "
-                f"angles={angle.value!r}; expected 'rad' or 'deg' (m or mm for slides). Without "
+                f"angles={angle.value!r}; expected 'rad' or 'deg' (m, mm if prismatic). Without "
                 "the unit in the header, its factor may be given by gears=."
             )

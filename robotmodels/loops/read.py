@@ -10,7 +10,7 @@ values, gravity
 Returns
 -------
 LoopedRobot
-    Spanning tree, closures and actuated joints. ParFileError or LoopError tells what a file has
+    Spanning tree, closures and actuated joints. ParFileError or LoopError names what a file has
     that is not supported, by name.
 
 References

@@ -1,4 +1,4 @@
-"""The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
+"""The robot model: a value made of parts, with its Pinocchio model built from its URDF."""
 
 from __future__ import annotations
 

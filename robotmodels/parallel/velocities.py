@@ -155,7 +155,7 @@ def condition(robot: Robot, T: ArrayLike, length: float | None = None, mode: Mod
 def determinant(robot: ParallelRobot, T: ArrayLike, mode: Mode = None) -> Array:
     """Determinant of the unit lines of the legs, NaN out of reach, m for each rotation.
 
-    Zero at parallel singularities; its sign tells their sides apart, see `assembly_modes`.
+    Zero at parallel singularities; its sign distinguishes their sides, see `assembly_modes`.
     """
     if is_looped(robot, mode):
         raise InvalidValueError(

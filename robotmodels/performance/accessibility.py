@@ -3,12 +3,12 @@
 Parameters
 ----------
 arm, limits, free, mask, executor, progress
-    See the head of the room; of one component of the orientation 180 angles about its axis,
+    See `robotmodels.performance`; of one component of the orientation 180 angles about its axis,
     from the orientation of zero joints, stand for every one.
 T : array_like, shape (..., 4, 4)
     World poses of the tool.
 level : {"position", "pose", "every_orientation"}
-    What is asked: the position in any orientation, the pose, or the position in every
+    What is requested: the position in any orientation, the pose, or the position in every
     orientation, of which 96 stand for all (180 angles for an arm that moves in a plane).
 
 Returns
@@ -160,7 +160,7 @@ def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Arra
     ):
         positions = poses[:, :3, 3]
         if not mask[:3].all():
-            # in a plane what is not asked is that of the plane
+            # in a plane, the rest of the orientation is that of the plane
             plane, origin = section.frame[:3, :2], section.frame[:3, 3]
             inverse = np.linalg.inv(plane[mask[:3]])
             positions = origin + (positions - origin)[:, mask[:3]] @ inverse.T @ plane.T
@@ -173,7 +173,7 @@ def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Arra
         found = igm(arm, poses, mask=mask)
         oriented = found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
         return np.array(found.q), np.array(found.valid), oriented
-    # the solver alone: why a pose is not reached is not asked here
+    # the solver alone: reasons of poses that are not reached are not needed here
     U = np.ascontiguousarray(known.to_base @ poses)
     solved = postures(solver, U, np.zeros((len(U), solver.chain.k)), Tolerances())
     q = np.where(solved.valid[..., None], 0.0, np.nan) * np.ones(arm.n)
@@ -187,7 +187,7 @@ def _spans(frame: Array, mask: Flags) -> bool:
 
 
 def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:
-    """Orientations (K, 3, 3) that stand for all: about the axis asked, the normal, or any."""
+    """Orientations (K, 3, 3) that stand for all: about the requested axis, the normal, or any."""
     from scipy.spatial.transform import Rotation
 
     normal = arms.plane_normal(arm)
@@ -212,7 +212,7 @@ def in_every_orientation(
 ) -> tuple[NDArray[np.int8], Ints]:
     """Status of the first orientation that fails, and the least count, of positions (N, 3).
 
-    A mask without components of the orientation asks for all of them.
+    A mask without components of the orientation means all of them.
     """
     asked = mask if mask is not None and mask[3:].any() else None
     status = np.zeros(len(positions), np.int8)

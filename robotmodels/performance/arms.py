@@ -85,7 +85,7 @@ class JointSpace:
     def ranges(self, columns: ArrayLike | None = None) -> tuple[Array, Flags]:
         """Ranges (n, 2) of the joints, and which are whole circles (n,) that close in themselves.
 
-        A slide among the columns (default those that move the tool) needs limits.
+        A prismatic joint among the columns (default those that move the tool) needs limits.
         """
         model, turns = self.model, turning(self.model)
         bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (self.limits | ~turns)
@@ -270,7 +270,7 @@ def task_rows(model: RobotModel, mask: ArrayLike | str | None = None) -> Flags:
 
 
 def leaves_a_family(model: RobotModel, mask: Flags | None = None) -> bool:
-    """Whether the rows asked (default all six) leave infinitely many postures."""
+    """Whether the requested rows (default all six) leave infinitely many postures."""
     k = joint_chain(model).k
     if k == 0:
         return False

@@ -7,14 +7,14 @@ where no limit cuts it. Joints that no factor shares are apart: aspects are prod
 Parameters
 ----------
 arm, limits, free, executor, progress
-    See the head of the room; limits and obstacles cut the joint space.
+    See `robotmodels.performance`; limits and obstacles cut the joint space.
 resolution : int, optional
     Cells along each joint.
 
 Returns
 -------
 Aspects
-    The parts with ``volume`` (k,), rad^n (and m for slides) of the joints that move the tool,
+    The parts with ``volume`` (k,), rad^n (m for prismatic joints) of the joints that move the tool,
     largest first, and ``signs`` (k, factors) of the factors ``names`` of the determinant; none,
     with a status, for redundant arms. Of components of the free space ``signs`` is empty.
 

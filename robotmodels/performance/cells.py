@@ -207,7 +207,7 @@ def neighbours(flags: Flags) -> Flags:
 
 
 def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
-    """Which centres of cells (N,) some posture reaches: samples, then Newton at the border."""
+    """Which centres of cells (N,) some posture reaches: samples, then Newton at the boundary."""
     shape = cells.shape
     q_of = np.full((len(cells.points), joints.model.n), np.nan)
     q = joints.samples(SAMPLES)

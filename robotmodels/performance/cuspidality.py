@@ -8,7 +8,7 @@ joints level curves of the determinant too, which near a cusp meet two postures 
 Parameters
 ----------
 arm, executor, progress
-    See the head of the room.
+    See `robotmodels.performance`.
 rng : int or numpy.random.Generator, optional
     Chooses the poses; default the seed 0.
 poses : int
@@ -203,7 +203,7 @@ def _all_apart(arm: RobotModel, section: SectionArm) -> bool:
 
 
 def _within_strokes(arm: RobotModel, q: Array) -> Flags:
-    """Whether the slides of configurations (..., n) are within their limits, up to rounding."""
+    """Whether prismatic joints of configurations (..., n) are within limits, up to rounding."""
     slides = ~turning(arm)
     over = np.maximum(arm.lower - q, q - arm.upper)[..., slides]
     return np.asarray((over <= 1e-9 * (1.0 + np.abs(q[..., slides]))).all(axis=-1))

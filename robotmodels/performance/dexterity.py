@@ -3,7 +3,7 @@
 Parameters
 ----------
 arm, mask, executor, progress
-    See the head of the room; by default the components are those of the task of the arm.
+    See `robotmodels.performance`; by default the components are those of the task of the arm.
 q : array_like, shape (..., n)
     Configurations, rad or m.
 length : float, optional
@@ -201,7 +201,7 @@ def _index_values(
 
 
 def workspace_of(arm: RobotModel, over: Any) -> Workspace:
-    """The workspace that is asked about: that of the positions without one."""
+    """The given workspace: that of the positions without one."""
     if over is None:
         return workspace(arm)
     if not isinstance(over, Workspace):

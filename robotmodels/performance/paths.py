@@ -6,7 +6,7 @@ not by nearness, so that it never changes to another one unnoticed.
 Parameters
 ----------
 arm, limits, mask
-    See the head of the room; whole turns are added so that as much as possible of the path
+    See `robotmodels.performance`; whole turns are added so that as much as possible of the path
     lies within the limits, and three joints are asked for the position by default.
 poses : array_like, shape (N, 4, 4)
     World poses of the tool.

@@ -8,7 +8,7 @@ singular position may pass through them.
 Parameters
 ----------
 arm, limits, free, executor, progress
-    See the head of the room; limits and obstacles of ``over`` count where it is given.
+    See `robotmodels.performance`; limits and obstacles of ``over`` count where it is given.
 connectivity : {"n", "t"}
     Whether any two points of a region are joined by some motion, or every path in it can be
     followed without a change of posture at a singular position.
@@ -245,7 +245,7 @@ def _sections(members: Ints, sheet: Ints, S: int, a: Ints, b: Ints) -> list[Ints
 
 
 def _inner(w: Workspace, own: Ints, S: int, a: Ints, b: Ints) -> list[Flags]:
-    """Cells of a section without its border and without neighbours that are not joined."""
+    """Cells of a section without its boundary and without neighbours that are not joined."""
     from scipy import ndimage
 
     node = np.full(len(w.points), -1)

@@ -6,7 +6,7 @@ found by samples of the joints, and by Newton steps in the cells at the border.
 Parameters
 ----------
 arm, limits, free, executor, progress
-    See the head of the room.
+    See `robotmodels.performance`.
 kind : {"positions", "primary", "secondary", "orientation", "free"}
     Positions in any orientation; those in every orientation; those in some but not every
     one; those in the given orientation; those free of collisions with ``free``.
@@ -18,7 +18,7 @@ resolution : int, optional
 orientation : array_like, shape (3, 3), optional
     Rotation of the tool, for kind ``orientation``.
 mask : array_like, shape (6,), optional
-    Components that are asked; two positions make a planar workspace.
+    Requested components; two positions make a planar workspace.
 
 Returns
 -------
@@ -114,7 +114,7 @@ class Workspace(Result):
 
     @property
     def poses(self) -> Array:
-        """World poses (N, 4, 4) of the cells, in the orientation asked or that of zero joints."""
+        """World poses (N, 4, 4) of the cells, in the requested orientation or that of q = 0."""
         home = dgm(self.model, np.zeros(self.model.n))[:3, :3]
         return self.cells.poses(home if self.rotation is None else self.rotation)
 
@@ -154,7 +154,7 @@ class Workspace(Result):
 
     @property
     def grid_error(self) -> float:
-        """Bound of the relative error of sums of cells: half of each cell along the border."""
+        """Bound of the relative error of sums of cells: half of each cell along the boundary."""
         flags = (self.count > 0).reshape(self.shape)
         if not flags.any():
             return 0.0
@@ -303,7 +303,7 @@ def _workspace(
 
 
 def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | None:
-    """The orientation that was asked for, checked."""
+    """The requested orientation, checked."""
     if kind == "free" and free is None:
         raise InvalidValueError("free: expected obstacles or a function for kind='free', got None.")
     if (orientation is None) != (kind != "orientation"):

@@ -1,4 +1,4 @@
-"""Whether a matrix is a pose: the border for poses, which rounds off what is nearly a rotation.
+"""Whether a matrix is a pose: checks, which make what is nearly a rotation orthogonal.
 
 Parameters
 ----------

@@ -58,7 +58,7 @@ def jerk_limited(
         All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
         both ways.
     duration, synchronisation
-        See the head of the room.
+        See `robotmodels.trajectories`.
 
     Returns
     -------

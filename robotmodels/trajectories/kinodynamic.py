@@ -84,7 +84,7 @@ class Plan(TimingResult):
     history : ndarray, shape (N, 3)
         Number of the evaluation, cost of the candidate with penalties, least cost so far.
     torque_use : ndarray, shape (n,)
-        Greatest torque of each joint over its limit; 0 where it has none.
+        Largest torque of each joint over its limit; 0 where it has none.
     restarts, via_times : ndarray, shape (R,) and (k,)
         Least cost of each restart of the search; times at which the via points are met, s.
     """
@@ -138,7 +138,7 @@ def kinodynamic(
     Parameters
     ----------
     model, limits, torque, rng
-        The robot, n joints, with its drives; see the head of the room for the others.
+        The robot, n joints, with its drives; see `robotmodels.trajectories` for the others.
     q0, q1, via : array_like, shape (n,), or Pose; via a sequence of these
         The ends, rad or m, and configurations on the way, in this order. Of a pose the planner
         chooses the posture.
@@ -152,7 +152,7 @@ def kinodynamic(
         ``"anneal"`` or ``"descent"``; ``"optimal"`` times every path exactly, ``"profile"``
         stretches a profile over time, as `time_scaled`.
     seconds : float
-        Greatest duration of the search, of up to 500 evaluations for each second; results with one
+        Longest duration of the search, of up to 500 evaluations for each second; results with one
         seed differ only where the clock ends it.
     progress : bool or callable, optional
         A function is called with the fraction done; True writes it to the log of Python.

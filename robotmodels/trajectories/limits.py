@@ -1,4 +1,4 @@
-"""Limits of motions, and what is asked of a motion, checked once: vectors, durations, limits."""
+"""Limits of motions, and requests for them, checked once: vectors, durations, limits."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class MotionLimits(Value):
     Parameters
     ----------
     velocity, acceleration, jerk : array_like, shape () or (n,)
-        Greatest ones, rad or m, per s, s^2 and s^3. Infinity is no limit, as everywhere here.
+        Largest values, rad or m, per s, s^2 and s^3. Infinity is no limit, as everywhere here.
     velocity_lower, acceleration_lower, jerk_lower : array_like, shape () or (n,), optional
         The least ones, not above zero; default the greatest with the sign changed.
     lower, upper : array_like, shape () or (n,)

@@ -97,7 +97,7 @@ def time_optimal(
     limits : MotionLimits
         Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
     model, torque
-        The robot, for limits of torque; see the head of the room.
+        The robot, for limits of torque; see `robotmodels.trajectories`.
     torque_rate : array_like, shape () or (n,), optional
         Greatest rates of the torques, N m/s or N/s, without jumps of dry friction. The motion is
         then a local optimum that keeps them within 1 %.

@@ -65,7 +65,7 @@ def _assumed(
 def excitation_torques(
     model: RobotModel, torque_limits: ArrayLike | None
 ) -> tuple[Array, tuple[str, ...]]:
-    """Greatest torques (n,), infinite where there is no limit, and notes."""
+    """Largest torques (n,), infinite where there is no limit, and notes."""
     massive = bool(np.any(model.inertia.values))
     if torque_limits is None:
         effort = np.asarray(model.table.effort, dtype=float)

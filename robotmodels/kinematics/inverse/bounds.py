@@ -211,13 +211,13 @@ def check_order(model: RobotModel, low: Array, high: Array, wrong: NDArray[np.bo
     if wrong.any():
         j = int(wrong.argmax())
         raise InvalidValueError(
-            f"lower, upper: expected lower <= upper with room between them, got [{low[j]}, "
+            f"lower, upper: expected lower <= upper with a range between them, got [{low[j]}, "
             f"{high[j]}] for joint {j} ({model.table.joint_names[j]!r})."
         )
 
 
 def _fastest(room: Array, acceleration: Array, step: float | None, back: float) -> Array:
-    """Largest velocity with which a joint can stop within the room before its limit.
+    """Largest velocity with which a joint can stop before its limit.
 
     ``back`` is 2 where the velocity is reached linearly during the step, 1 where it is held: a
     joint beyond its limit is at it after one step with ``back * room / step``.
