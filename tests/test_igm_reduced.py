@@ -206,6 +206,20 @@ def test_right_angles_and_configurations_beside_them(word):
         assert lost(model, found, beside, 1e-5).size == 0
 
 
+@pytest.mark.parametrize("word", ["R+ P0 R- R- P0 R0", "R- R- R- R-", "P0 R- R- R+"])
+def test_poses_at_right_angles_are_never_out_of_reach(word):
+    # most are singular for a closed form; what it misses the search for a reason must find
+    rng, rows = np.random.default_rng(7), []
+    for kind, turned in word.split():
+        alpha, d = {"+": np.pi / 2, "-": -np.pi / 2, "0": 0.0}[turned], rng.choice([0.0, 0.4])
+        rows.append({"sigma": int(kind == "P"), "alpha": alpha, "d": d, "theta": 0.0,
+                     "r": rng.uniform(-0.5, 0.5)})  # fmt: skip
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    q = rng.integers(-1, 3, (200, model.n)) * np.pi / 2
+    q = np.where(turns(model), q, 0.0)
+    assert (rm.igm(model, rm.dgm(model, q)).count > 0).all()
+
+
 @pytest.mark.parametrize("word", ["lab_trr", "xarm5", "RRR", "PRR", "RRRRR/23"])
 def test_poses_with_few_digits(word):
     model, rng = arm(word), np.random.default_rng(3)

@@ -665,6 +665,12 @@ SLOW = MotionLimits(1.0, 2.0, 5.0)
             "moves from",
         ),
         (lambda: jerk_limited(0.0, 1.0, 0.5, SLOW, v0=0.5), "least"),
+        # cubes of these sizes are no floats: the motion would end anywhere
+        (
+            lambda: jerk_limited(0.0, 1.0, None, MotionLimits(1.0, 1.0, 1e-200), v0=0.5),
+            "jerk.*check the units",
+        ),
+        (lambda: quintic(0.0, 1.0, 1e-200), "duration.*check the units"),
         (lambda: cubic_spline([0.0, 1.0, 1.0], limits=UNIT), "same"),
         (lambda: cubic_spline([0.0, 1.0, 2.0], [0, 1, 2.0], v0=1.0, ends="natural"), "clamped"),
         (lambda: quintic_spline([0.0, 1.0, 2.0], limits=UNIT, v0=0.5), "times"),

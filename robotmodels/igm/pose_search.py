@@ -50,16 +50,12 @@ class SearchSpace(NamedTuple):
 
 
 class SearchTask(NamedTuple):
-    """Requested components and tolerances, and the effort.
-
-    ``proven``: no configuration meets the poses, so that the closest position is looked for alone.
-    """
+    """Requested components and tolerances, and the effort."""
 
     components: Components
     tolerances: Tolerances
     restarts: int
     iterations: int
-    proven: bool = False
 
 
 class Outcome(NamedTuple):
@@ -145,8 +141,6 @@ class _Search:
             rows = np.flatnonzero((status == IGMStatus.NOT_CONVERGED) & ~beyond)
             if rows.size == 0 or (found is IGMStatus.OUTSIDE_LIMITS and not limited):
                 continue
-            if task.proven and any(asked[:3]):
-                break
             starts = self._starts(rows, whole, task.restarts)
             if given:
                 starts = np.concatenate([self.first[rows, None], starts], axis=1)

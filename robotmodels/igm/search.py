@@ -219,33 +219,29 @@ def _singular_pose(
     tolerances: Tolerances,
 ) -> Postures:
     """Solutions of one pose, some of whose rows are singular."""
-    chain = wanted.chain
+    chain, members = wanted.chain, no_postures(1, 0, wanted.chain.k)
     order = rows[np.argsort(found.residual[0, rows], kind="stable")]
     for place, i in enumerate(order):
         for j in order[place + 1 :]:
             if found.valid[0, i] and found.valid[0, j]:
                 gap = difference(chain.sigma, found.q[0, j], found.q[0, i])
                 # what lies between two copies of one root meets the pose as well
-                between = wanted.met(U, (found.q[0, i] + 0.5 * gap)[None], tolerances)[1]
-                if np.abs(gap).max() < FOLD and between[0]:
+                between = (found.q[0, i] + 0.5 * gap)[None]
+                if np.abs(gap).max() < FOLD and wanted.met(U, between, tolerances)[1][0]:
                     found.valid[0, j], found.double[0, i] = False, True
-    extra, marks = [], []
     for i in rows[found.valid[0, rows]]:
         q, free = completed(wanted, U, found.q[0, i], reference)
         if free.any():
             found.valid[0, i] = False
-            extra += list(q)
-            marks += [free] * len(q)
+            part = no_postures(1, len(q), chain.k)
+            part.q[0], part.free[0], part.family[0] = in_half_open_turn(chain.sigma, q), free, True
+            part.residual[0] = wanted.met(np.repeat(U, len(q), axis=0), part.q[0], tolerances)[0]
+            part.valid[0] = part.residual[0] <= max(tolerances)
+            # most rows lead to members that are known: merged at once they stay few
+            members = side_by_side([members, part]).merge(chain.sigma)
         elif _is_flat(wanted, U, found.q[0, i]):
             found.double[0, i] = True
-    if not extra:
-        return found.merge(chain.sigma)
-    part = no_postures(1, len(extra), chain.k)
-    part.q[0], part.free[0] = in_half_open_turn(chain.sigma, np.array(extra)), np.array(marks)
-    part.valid[0], part.family[0] = True, True
-    part.residual[0] = wanted.met(np.repeat(U, len(extra), axis=0), part.q[0], tolerances)[0]
-    part.valid[0] &= part.residual[0] <= max(tolerances)
-    return side_by_side([part, found]).merge(chain.sigma)
+    return side_by_side([members, found]).merge(chain.sigma)
 
 
 def _is_flat(wanted: Constraints, U: Array, q: Array) -> bool:

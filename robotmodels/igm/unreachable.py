@@ -48,9 +48,8 @@ def diagnose(
         if rows.size:
             at = np.ix_(rows, columns)
             space = search_space(chain, lower, upper, limits, effort[0], SEED)
-            search = SearchTask(
-                Components(task.mask, task.in_tool_axes), tolerances, *effort, effort is REASON
-            )
+            # closed forms may miss a singular pose: the whole pose is searched before its position
+            search = SearchTask(Components(task.mask, task.in_tool_axes), tolerances, *effort)
             found = pose_search(space, search, U[rows], q[at], True)
             q[at], family[at], error[rows] = found.q, found.family, found.error
             residual[rows], met[rows], status[rows] = found.residual, found.valid, found.status

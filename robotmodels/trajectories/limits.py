@@ -19,6 +19,7 @@ from .laws import LineLimits
 RATES = ("velocity", "acceleration", "jerk")
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
+_EXTREME = 1e50  # largest size of rates and durations, and of their inverses: cubes are floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -278,6 +279,15 @@ def checked_request(
     if T is None and limits is None:
         raise InvalidValueError("Give duration, limits or both.")
     bounds = checked_limits(limits, states["q0"].size, states["q0"], states["q1"])
+    rates = {} if bounds is None else {f"limits: {name}": getattr(bounds, name) for name in RATES}
+    for name, values in (states | rates | {"duration": np.array(T or 0.0)}).items():
+        size = np.abs(values[np.isfinite(values) & (values != 0.0)])
+        least = 0.0 if name in ("q0", "q1") else 1.0 / _EXTREME
+        if size.max(initial=0.0) > _EXTREME or size.min(initial=1.0) < least:
+            raise InvalidValueError(
+                f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0); check "
+                "the units."
+            )
     return T, bounds
 
 
