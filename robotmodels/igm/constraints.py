@@ -65,7 +65,7 @@ class Constraints:
 
     @property
     def weight(self) -> Array:
-        """Weights (6 + m,) of the errors: of the components, 0 if not requested; of the relations."""
+        """Weights (6 + m,) of the errors: of requested components, else 0; of the relations."""
         pose = np.where(self.components.asked, [1.0 / self.length] * 3 + [1.0] * 3, 0.0)
         return np.concatenate([pose, np.ones(len(self.b))])
 

@@ -73,7 +73,7 @@ def close(
     q_actuated : array_like, shape (..., n_a)
         Positions of the actuated joints, rad or m.
     q_guess : array_like, shape (..., n) or (..., n - n_a), optional
-        Posture of all joints in the wanted assembly, or positions of the passive joints; default
+        Posture of all joints in the desired assembly, or positions of the passive joints; default
         passive joints at zero.
 
     Returns

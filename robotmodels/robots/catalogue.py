@@ -3,12 +3,12 @@
 Parameters
 ----------
 name : str
-    One of `robots`; another is a `RobotNotFoundError` with the nearest names.
+    One of `robots`; an unknown one raises `RobotNotFoundError` with similar names.
 
 Returns
 -------
 str or tuple of str
-    Words, or names.
+    A description, or names.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def source(name: str) -> str:
 
 
 def load(name: str | Path) -> RobotModel:
-    """Load a robot by its name, or from a file; also called robot factory elsewhere.
+    """Load a robot by its name, or from a file.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ Raises
 ------
 ShapeError, InvalidValueError, NotARotationError
     Not (..., 4, 4); NaN or infinity; the last row or the rotation is off by more than the
-    tolerance, or it mirrors.
+    tolerance, or it is a reflection.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def simulate(
         Evaluations of the model after which the simulation ends with a status. Default 100 000, and
         10 000 for each second and 200 for each break or row of ``control``.
     progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+        A function is called with the fraction done; True writes it to the log (`logging`).
     period, delay : float, optional
         Sampling period of the control, s: its torques are held between samples, its state advances
         by Euler steps (default: continuous); time from a sample to its torque, s, zero torque

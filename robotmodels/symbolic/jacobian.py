@@ -1,4 +1,4 @@
-"""The Jacobian as formulas: three matrices, the third as simple as frames can make it."""
+"""The Jacobian as formulas: three matrices, the third simplified by the choice of frames."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class JacobianExplanation(Explanation):
     numbers : FormulaNumbers
         Variables, abbreviations and the constants of this robot.
     text, latex : str
-        All of it for people.
+        The formulas in plain text and in LaTeX.
     """
 
     robot: str

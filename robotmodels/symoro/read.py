@@ -23,12 +23,12 @@ def read_par(
     values: Mapping[str, float] | None = None,
     gravity: ArrayLike | None = None,
 ) -> RobotModel:
-    """Read a SYMORO ``.par`` file; SYMORO+'s and OpenSYMORO's spelling are both understood.
+    """Read a SYMORO ``.par`` file in the syntax of SYMORO+ or OpenSYMORO.
 
     The symbol in a joint's own column (theta if revolute, r if prismatic) is its variable,
     whatever its name; what is added to it is the offset, so ``q`` is SYMORO's. All other symbols
     get numbers from ``values``. Dynamic parameters that only stand for themselves (``XX1``,
-    ``FV2``) and are not in ``values`` are 0; a warning and the model's ``notes`` say which.
+    ``FV2``) and are not in ``values`` are 0; a warning and the model's ``notes`` list them.
 
     Parameters
     ----------

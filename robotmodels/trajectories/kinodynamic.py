@@ -155,7 +155,7 @@ def kinodynamic(
         Longest duration of the search, of up to 500 evaluations for each second; results with one
         seed differ only where the clock ends it.
     progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+        A function is called with the fraction done; True writes it to the log (`logging`).
 
     Returns
     -------

@@ -20,7 +20,7 @@ from .pose_trajectory import PoseTrajectory
 from .rate_limits import rate_limited
 from .trajectory import TimingResult, Trajectory
 
-_BETWEEN = 1.02  # greatest share of a torque between points that goes without saying
+_BETWEEN = 1.02  # largest share of a torque between points that is not reported
 _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
@@ -49,7 +49,7 @@ class TimedPath(TimingResult):
         Path parameter s on the grid, and its rate, per s: the path's own, or its length in joint
         space where its own timing rests or jumps, or comes from functions.
     maximum_rate : ndarray, shape (N,)
-        Greatest rate that the limits allow at each point alone: the maximum velocity curve.
+        Largest rate that the limits allow at each point alone: the maximum velocity curve.
     active : ndarray of str, shape (N,)
         The limit that binds from each point on, such as ``"torque of joint 2"``; ``"rate"`` where
         a limit of jerk or of the rate of a torque does; empty at changes between limits.
@@ -86,7 +86,7 @@ def time_optimal(
 
     Also called TOPP, TOPP-RA: reachability analysis of a path whose own timing is dropped.
     Accelerations are limited at both ends of every interval of a grid, torques at its start
-    (collocation); `TimedPath.reason` says where torques between the points exceed their limits by
+    (collocation); `TimedPath.reason` reports where torques between the points exceed their limits by
     more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
     needed, between them to 1.001, but for moments where dry friction changes its sign.
 

@@ -105,7 +105,7 @@ def exciting_trajectory(
     rng : Generator or int, optional
         Random generator, or its seed; default a fresh one.
     progress : bool or callable, optional
-        A function is called with the fraction done; True writes it to the log of Python.
+        A function is called with the fraction done; True writes it to the log (`logging`).
 
     Returns
     -------

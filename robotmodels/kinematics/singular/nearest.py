@@ -1,6 +1,6 @@
 """Search of singular configurations near a given one.
 
-Book section 1.3.2.3: the solution near singular positions needs to know where they are.
+Book section 1.3.2.3: solutions near singular positions depend on their location.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class NearestSingularities(Rebuilt):
     """Singular configurations by their distance from a given one. Read-only; `print` it.
 
     S rows, the nearest first; none twice, also not by whole turns of a joint unless limits were
-    asked for.
+    requested.
 
     Parameters
     ----------
