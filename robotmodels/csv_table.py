@@ -154,10 +154,10 @@ def column_number(path: Path, names: Sequence[str], width: int, column: Column, 
             raise InvalidValueError(
                 f"{what}: {path} has several columns {column!r}; give their numbers, from 0."
             )
-        near = ", ".join(nearest_names(column, names)) or "none"
+        near = ", ".join(nearest_names(column, names))
+        near = f"; near it: {near}" if near else ""
         raise InvalidValueError(
-            f"{what}: {path} has no column {column!r}; near it: {near}. Its columns: "
-            f"{', '.join(names)}."
+            f"{what}: {path} has no column {column!r}{near}. Its columns: {', '.join(names)}."
         )
     if isinstance(column, bool) or not isinstance(column, int):
         raise InvalidValueError(

@@ -398,3 +398,14 @@ def test_a_new_kind_is_drawn_read_selected_and_fitted(tmp_path):
 def test_mistakes_are_named(error, match, call):
     with pytest.raises(error, match=match):
         call()
+
+
+def test_measurements_print_in_one_line():
+    q, p = np.zeros((20, 3)), np.zeros((20, 3))
+    text = repr(rm.calibration.Position(q, p, frame=2, name="tracker"))
+    assert text == "<Position 'tracker': 20 of x y z, frame 2>"
+
+
+def test_postures_in_place_of_a_kind_are_refused():
+    with pytest.raises(InvalidValueError, match="kind: expected one of"):
+        select_configurations(rm.load("planar_2r"), np.zeros((20, 2)), 5)

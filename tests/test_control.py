@@ -607,6 +607,11 @@ def test_singular_postures_and_those_beside_them_have_bounded_torques(name, join
             assert near == (bend < 5e-3) or 1e-4 < bend < 2e-2
 
 
+def test_a_mask_of_joints_is_refused():
+    with pytest.raises(InvalidValueError, match="space='joint' has no mask"):
+        control.ComputedTorque(Q0, model=arm(), mask=XY)
+
+
 class Own:
     """A law of a user: proportional with an integral, sampled or not."""
 

@@ -362,7 +362,7 @@ beam, Robot, modes = flexible.beam, flexible.FlexibleRobot, flexible.from_modes
         (lambda: beam(1.0, EI=(0.0, 1.0)), "positive stiffness"),
         (lambda: beam(1.0, EI=1.0, GJ=0.0), "positive stiffness"),
         (lambda: beam(1.0, EI=1.0, ends="free"), "ends"),
-        (lambda: beam(1.0, EI=1.0, tip=(1.0, (1.0, 0.1, 0.1))), "no body"),
+        (lambda: beam(1.0, EI=1.0, tip=(1.0, (1.0, 0.1, 0.1))), "not a physical body"),
         (lambda: beam(1.0, EI=(INF, 1.0), density=1e-12, tip=1.0, modes=2), "too light"),
         (lambda: Robot(SLIDE, {1: BEAM}), "sliding joint"),
         (lambda: Robot(PIVOT, {1: BEAM}, joint_stiffness=-1.0), "joint_stiffness"),

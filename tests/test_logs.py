@@ -236,6 +236,7 @@ ORDER = [0, 2, 1, 3, 4, 5]
         ("STUCK", "DOUBTFUL", "recorder is faster", lambda q, tau: {
             "q": np.repeat(q[:1800], 5, axis=0), "tau": np.repeat(tau[:1800], 5, axis=0)}),
         ("IMPLAUSIBLE_PERIOD", "USELESS", "milliseconds", lambda q, tau: {"dt": 1.0}),
+        ("IMPLAUSIBLE_PERIOD", "USELESS", "in seconds", lambda q, tau: {"dt": 2e-6}),
         ("WRONG_JOINT_ORDER", "USELESS", "model= to read_log", lambda q, tau: {
             "q": q[:, ORDER], "tau": tau[:, ORDER],
             "names": [f"joint_{j + 1}" for j in ORDER]}),

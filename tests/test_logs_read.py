@@ -275,6 +275,17 @@ def test_usual_names_are_found(tmp_path, position, torque, reference):
         assert same(read_log(path, time="Time [ms]", drive_gains=1.0, **stars), q, tau)
 
 
+@pytest.mark.parametrize(
+    ("name", "factor"), [("time_ms", 1e3), ("t_us", 1e6), ("Timestamp_ns", 1e9), ("elapsed_sec", 1)]
+)
+def test_a_unit_at_the_end_of_the_name_of_the_time_is_its_unit(tmp_path, name, factor):
+    t, q, tau = samples()
+    head = [f"{kind}{j}" for kind in ("q", "tau") for j in (1, 2, 3)]
+    path = write(tmp_path / "run.csv", [*head, name], q, tau, factor * t)
+    assert same(read_log(path), q, tau)
+    assert same(read_log(path, time=name), q, tau)
+
+
 def test_rows_that_lack_a_number_are_listed_and_split_the_log(tmp_path):
     lines = ["t,q1,tau1", *(f"{DT * i:.2f},{i},1" for i in range(20))]
     lines[6], lines[11], lines[12] = "0.05,nan,1", "0.10,10,", "0.11,11,inf"
@@ -342,7 +353,7 @@ def test_the_tx40_is_read_from_two_files_by_row(tmp_path):
     [
         ({"positions": "q*", "torques": "q*"}, "q1 of .* would be positions and torques at once"),
         ({"positions": ["t", "q1", "q2"]}, "t of .* would be time and positions at once"),
-        ({"positions": ["q1", "q2", "nope"]}, "no column 'nope'; near it"),
+        ({"positions": ["q1", "q2", "nope"]}, "no column 'nope'. Its columns: t"),
         ({"positions": [1, 2]}, "3 columns.*for 2 columns of positions"),
         ({"signs": [1, 2, 1]}, "expected 1 or -1"),
         ({"gears": [1.0, 0.0, 1.0]}, "other than zero"),

@@ -352,6 +352,8 @@ TASK = vs.Task(vs.Points(SQUARE), GOAL)
         (lambda: vs.servo(TASK, GOAL, step=0), InvalidValueError, "step"),
         (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
          "on a line"),
+        (lambda: vs.pnp(SQUARE, 300 + 900 * SQUARE[:, :2]), InvalidValueError, "normalise"),
+        (lambda: vs.p3p(SQUARE[:3], 300 + 900 * SQUARE[:3, :2]), InvalidValueError, "normalise"),
         (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),
         (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), InvalidValueError, "determine"),
         (lambda: vs.decompose_homography(np.ones((3, 3))), InvalidValueError, "regular"),

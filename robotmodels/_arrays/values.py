@@ -80,8 +80,10 @@ class Value(Rebuilt):
 
     def _texts(self, *hidden: type) -> str:
         """The fields given, but for those of some types, each in a line."""
-        given = ((f.name, getattr(self, f.name)) for f in fields(self) if f.init)  # type: ignore[arg-type]
-        shown = ((name, value) for name, value in given if not isinstance(value, hidden))
+        names = (f.name for f in fields(self) if f.init and not f.name.startswith("_"))  # type: ignore[arg-type]
+        shown = (
+            (name, value) for name in names if not isinstance(value := getattr(self, name), hidden)
+        )
         return ", ".join(f"{name}={_shown(value)}" for name, value in shown if value is not None)
 
     @property
@@ -97,7 +99,8 @@ def _shown(value: object) -> str:
         return value.name
     if isinstance(value, np.ndarray) and value.size > 8:
         return f"<{value.shape} array>"
-    return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
+    plain = value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+    return " ".join(repr(plain).split())
 
 
 def same_value(a: object, b: object) -> bool:

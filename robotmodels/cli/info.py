@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import textwrap
 from typing import Any
 
@@ -129,6 +130,7 @@ def _units(model: RobotModel) -> list[str]:
 
 
 def narrow(text: str) -> str:
-    """A text with its lines wrapped for a narrow terminal."""
+    """A text with its lines wrapped for a narrow terminal, those that go on another joined."""
+    text = re.sub(r"\n {7,}(?=[^\s=])", " ", text)
     shape = {"width": _WIDTH, "subsequent_indent": " " * 4, "break_on_hyphens": False}
     return "\n".join(textwrap.fill(line, **shape) for line in text.splitlines())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -99,7 +100,7 @@ class ControlledMotion(Frozen, Value):
         last = self.rms(float(self.t[0] + 0.9 * (self.t[-1] - self.t[0])))
         shown = np.array2string(last, precision=3, max_line_width=200, threshold=8)
         lines = (
-            f"<ControlledMotion: {self.law!r:.90}",
+            f"<ControlledMotion: {shorten(repr(self.law), 90, placeholder=' ...')}",
             f"  {self.t[-1] - self.t[0]:.6g} s, samples: {len(self.t)}",
             f"  root mean square error of the last tenth: {shown:.70}",
             f"  {self.reason():.200}>",

@@ -186,6 +186,8 @@ class ComputedTorque(TaskLaw):
         one_of(self.space, ("joint", "task"), "space")
         if self.space == "task":
             self._prepare(("omega", "zeta"))
+        elif self.mask is not None:
+            raise InvalidValueError("mask: space='joint' has no mask; give space='task' with it.")
         else:
             self._set(rows=np.arange(self._keep_reference(n=self.n)))
             self._keep_gains(("omega", "zeta"), self.n, rows=self.rows)

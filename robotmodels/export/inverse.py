@@ -67,7 +67,10 @@ class _Tree:
         solver = None if family is None else prepare_by_plan(chain, family)
         if solver is None:
             other = explain_igm(model).takes_over or "the numeric solver `igm_numeric`"
-            raise InvalidValueError(f"model: no plan solves it; in this package {other} does.")
+            raise InvalidValueError(
+                f"model: Paul's equations do not solve {model.name}, so its inverse model has no "
+                f"straight-line code; `igm` uses {other}."
+            )
         at = solver.program.adapted(se3.inverse(model.base), np.zeros((3, chain.k)))
         self.columns: list[int] = chain.columns.tolist()
         self.code: list[int] = solver.program.plan.tolist()

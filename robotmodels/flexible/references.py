@@ -72,7 +72,8 @@ def elastica(length: float, EI: float, force: float = 0.0, moment: float = 0.0) 
     M = as_number(moment, "moment") * L / stiff
     if not max(abs(F), abs(M)) <= _MOST:
         raise InvalidValueError(
-            f"force, moment: expected loads up to {_MOST:g} (see there), got {F:.4g}, {M:.4g}."
+            "force, moment: expected force length^2 / EI and moment length / EI up to "
+            f"{_MOST:g}, got {F:.4g} and {M:.4g}; check the units, EI in N m^2."
         )
 
     def bent(root: float, share: float, rtol: float = 1e-11, s: Array | None = None) -> Array:

@@ -26,6 +26,7 @@ from .log import Log, check_is_log
 from .stretches import moves, runs, spread, stretches
 
 _LONGEST_PERIOD = 0.5  # s, of a log that resolves the motion of a robot
+_SHORTEST_PERIOD = 2.1e-5  # s, shorter than that of the current loop of a drive
 _MARGIN, _UNIT = 0.05, 4.0  # of limits: tolerance relative to the range, ratio of a wrong unit
 _UNUSUAL, _IMPOSSIBLE = 30.0, 1000.0  # rad, angles of a joint without limits
 _LARGE, _TOO_LARGE = 1.1, 10.0  # ratios of torque to limit: excess, wrong unit
@@ -49,7 +50,7 @@ class FindingKind(Enum):
 
     WRONG_JOINT_COUNT = "log and model have different numbers of joints"
     WRONG_JOINT_ORDER = "its joints are the model's in another order"
-    IMPLAUSIBLE_PERIOD = "the sampling period is too long for a robot"
+    IMPLAUSIBLE_PERIOD = "the sampling period is too long or too short for a robot"
     POSITIONS_IN_DEGREES = "positions look like degrees"
     MOTOR_SIDE_POSITIONS = "positions look like those of motors"
     OUTSIDE_LIMITS = "positions are outside the limits"
@@ -123,6 +124,12 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
         words = (
             f"Its samples are {log.dt:.4g} s apart, too coarse for a robot motion; the times "
             "may be in milliseconds. See times= and dt= of read_log."
+        )
+        findings.append(LogFinding(FindingKind.IMPLAUSIBLE_PERIOD, Severity.USELESS, (), words))
+    if log.dt < _SHORTEST_PERIOD:
+        words = (
+            f"Its samples are {log.dt:.4g} s apart, closer than a robot is sampled; the times may "
+            "be in seconds, or in a larger unit than given. See times= and dt= of read_log."
         )
         findings.append(LogFinding(FindingKind.IMPLAUSIBLE_PERIOD, Severity.USELESS, (), words))
     findings += [*_channels(log), *_rates(log)]

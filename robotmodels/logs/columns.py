@@ -43,6 +43,7 @@ class Quantity(Enum):
 _ANGLES = {"rad": "rad", "deg": "deg", "°": "deg", "degree": "deg", "degrees": "deg"}
 _OTHER_POSITIONS = re.compile(r"grad|gon|mrad|(turn|rev|count|tick|step)s?|rpm|in|ft")
 _OTHER_TORQUES = re.compile(r"[mcku]nm|[kmc]n|n[cm]m|lbf?(ft|in)|m?a|arms|amps?|m?v|%|counts?")
+_TIME_UNIT = re.compile(r"(?<=[a-z])_(s|sec|ms|us|ns)$")
 _UNIT = re.compile(r"\s*[\[(]\s*([a-zA-Z°%·⋅/ ._*^-]+[0-9]?)\s*[\])]\s*$")
 _INDEX = re.compile(r"^(?P<stem>.*?)[ _./-]*[\[(]?(?P<index>\d+)[\])]?$")
 _SPLIT = re.compile(r"[./]")
@@ -62,8 +63,11 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def time_unit_of(name: str) -> TimeUnit | None:
-    """Unit of a header such as "time [ms]"; None without one."""
-    unit = {"sec": "s"}.get(split_unit(name)[1], split_unit(name)[1])
+    """Unit of a header such as "time [ms]" or "time_ms"; None without one."""
+    bare, unit = split_unit(name)
+    ending = _TIME_UNIT.search(bare.lower())
+    unit = ending[1] if ending and not unit else unit
+    unit = {"sec": "s"}.get(unit, unit)
     return TimeUnit(unit) if unit in ("s", "ms", "us", "ns") else None
 
 
@@ -76,12 +80,14 @@ def find_time(table: LogTable) -> tuple[tuple[int, ...], TimeUnit | None] | None
     # of ROS, the time of measurement rather than that of recording; last a column of a structure,
     # such as "log.t"
     last = [_SPLIT.split(name)[-1] for name in names]
-    for words, wanted in ((names, ("field.header.stamp", "%time", *_TIMES)), (last, _TIMES)):
+    ends = [_TIME_UNIT.sub("", name) for name in last]
+    ours = ((last, _TIMES), (ends, _TIMES))
+    for words, wanted in ((names, ("field.header.stamp", "%time", *_TIMES)), *ours):
         for name in wanted:
             if words.count(name) == 1:
                 i = words.index(name)
-                ours = name in _TIMES
-                return (i,), time_unit_of(table.names[i]) if ours else TimeUnit.NANOSECOND
+                usual = name in _TIMES
+                return (i,), time_unit_of(table.names[i]) if usual else TimeUnit.NANOSECOND
     return None
 
 

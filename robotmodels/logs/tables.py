@@ -98,7 +98,8 @@ def open_log_table(path: Path, delimiter: str | None = None) -> LogTable:
         )
     if not path.exists():
         near = nearest_names(path.name, [each.name for each in path.parent.glob("*")])
-        raise _NoFileError(f"{path}: there is no such file; near it: {', '.join(near) or 'none'}.")
+        words = f"; near it: {', '.join(near)}" if near else ""
+        raise _NoFileError(f"{path}: there is no such file{words}.")
     read = {".npz": _npz, ".parquet": _parquet, ".pq": _parquet, ".mat": _mat}
     suffix = path.suffix.lower()
     if suffix in read:

@@ -54,6 +54,7 @@ from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
 from .results import as_points, as_sized, packed, taken
 
+_FARTHEST = 100.0  # of normalised coordinates: 89.4 degrees off the optical axis
 _THIN = 1e-9  # sine of the angle of a triangle that is a line
 _FITS = 1e-10  # of the squared sides
 _SAME = 1e-6  # of the longest side
@@ -96,7 +97,7 @@ class PoseSolutions(Result):
 
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     """Poses of three points, at most four."""
-    P, m = as_sized(points, (3, 3), "points"), as_sized(image, (3, 2), "image")
+    P, m = as_sized(points, (3, 3), "points"), _as_image(image, 3)
     try:
         batch = np.broadcast_shapes(P.shape[:-2], m.shape[:-2])
     except ValueError:
@@ -298,10 +299,21 @@ def _refined(P: Array, m: Array, T: Array) -> tuple[Array, Array, NDArray[np.boo
     return T, cost, done
 
 
+def _as_image(image: Any, n: int) -> Array:
+    """Normalised image points (..., n, 2); pixels are refused, whose poses would be wrong."""
+    m = as_sized(image, (n, 2), "image")
+    if np.abs(m).max(initial=0.0) > _FARTHEST:
+        raise InvalidValueError(
+            f"image: expected normalised coordinates X / Z, got {float(np.abs(m).max()):.6g}; "
+            "if these are pixels, give camera.normalise(pixels)."
+        )
+    return m
+
+
 def _checked(points: Any, image: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Points (n, 3), images (N, n, 2) and the shape of their batch."""
     P = as_points(points, "points", 3)
-    m = as_sized(image, (len(P), 2), "image")
+    m = _as_image(image, len(P))
     sizes = np.linalg.svd(P - P.mean(axis=0), compute_uv=False)
     if sizes[1] <= _THIN * sizes[0]:
         raise InvalidValueError("points: expected points that are not all on one line.")

@@ -115,8 +115,12 @@ class ServoMotion(Result):
         return ServoStatus(int(self.codes[-1]))
 
     def reason(self) -> str:
-        """Sentence of the status, with the error at the end."""
-        return f"{self.status.sentence} Largest error {np.abs(self.error[-1]).max():.3g}."
+        """Sentence of the status, with the errors at both ends."""
+        followed = "The law was followed to the end: no proof of convergence."
+        outcome = self.status
+        sentence = followed if outcome is ServoStatus.CONVERGES else outcome.sentence
+        first, last = np.abs(self.error[[0, -1]]).max(axis=1)
+        return f"{sentence} Largest error {first:.3g} at the start, {last:.3g} at the end."
 
     def __repr__(self) -> str:
         return f"<ServoMotion: {len(self.t)} samples to {self.t[-1]:g} s. {self.reason()}>"

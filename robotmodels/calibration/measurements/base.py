@@ -66,7 +66,7 @@ class _Declared(ABC):
     name: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Measurement(_Declared):
     """Base of the kinds of measurement; each has B blocks of k rows of residuals.
 
@@ -130,6 +130,12 @@ class Measurement(_Declared):
 
     def _check(self) -> None:
         """Check fields against each other."""
+
+    def __repr__(self) -> str:
+        word = type(self).__name__
+        word = word if self.name == self.word else f"{word} {self.name!r}"
+        rows, frame = " ".join(self.axes), "" if self.frame is None else f", frame {self.frame!r}"
+        return f"<{word}: {self.blocks} of {rows}{frame}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = {f.name: getattr(self, f.name) for f in fields(self)}

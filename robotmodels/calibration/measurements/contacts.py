@@ -57,7 +57,7 @@ def _as_line(value: Any, name: str) -> Array:
     return read_only(np.array([line[0], unit_vector(line[1])]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PointContact(Contact):
     """Touches of points by the end's origin: a ball in a socket, a tip in a centre hole."""
 
@@ -89,7 +89,7 @@ class PointContact(Contact):
         return T[:3, 3]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrameContact(Contact):
     """The same pose in several postures of the arm: a key in a lock, a plug in a socket.
 
@@ -124,7 +124,7 @@ class FrameContact(Contact):
         return T
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlaneContact(Contact):
     """Touches of planes by the end's origin: a probe on a table, on the faces of a block.
 
@@ -186,7 +186,7 @@ class PlaneContact(Contact):
         return np.append(normal, normal @ T[:3, 3])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LaserLine(Contact):
     """The end's origin on straight lines: a reflector in a laser beam, a tip on a stretched wire.
 

@@ -36,7 +36,7 @@ def as_kind(value: Any, name: str = "kind", among: Any = None) -> Kind:
     if isinstance(word, str):
         word = word.strip().lower().replace("-", "_").replace(" ", "_")
     possible = {k: c for k, c in Measurement.kinds.items() if not isabstract(c) and among(c)}
-    if word not in possible:
+    if not isinstance(word, str) or word not in possible:
         words = ", ".join(repr(each) for each in sorted(possible))
         raise InvalidValueError(
             f"{name}: expected one of {words}, or the class of one, got {value!r:.80}."

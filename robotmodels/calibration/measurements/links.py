@@ -43,7 +43,7 @@ from .motions import difference, product, relative, widened
 from .poses import mean_poses, target_poses
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LinkedFrames(Labelled):
     """Two ends of a tree hold the same object: ``T(q) X = T_other(q)`` with a constant X.
 

@@ -46,7 +46,7 @@ from .fields import Given
 from .motions import difference, left_jacobians, relative, widened
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Pose(Measurement):
     """Measured poses of the end in the world, all six rows or some of them.
 
@@ -85,7 +85,7 @@ class Pose(Measurement):
         return self.split(*difference(end, self.T), end.psi.shape[-1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Orientation(Pose):
     """Measured orientations of the end: a `Pose` whose default rows are rx, ry, rz."""
 
@@ -93,7 +93,7 @@ class Orientation(Pose):
     name: str = "orientation"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RelativePose(Measurement):
     """Measured ``T(q)^-1 T(q_other)``, all six rows or some of them.
 
@@ -136,7 +136,7 @@ class RelativePose(Measurement):
         return self.split(*difference(moved, self.T), moved.psi.shape[-1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CameraPose(Labelled):
     """Poses of fixed boards in a camera on the arm (eye in hand), ``(Z T(q) E)^-1 B``.
 

@@ -54,7 +54,7 @@ from .fields import Given
 from .motions import tilt_of, tilted_axes, unit_vector
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Position(Measurement):
     """Measured positions of the end's origin: laser tracker, camera, measuring machine.
 
@@ -78,7 +78,7 @@ class Position(Measurement):
         return self.split(T[:, :3, 3] - self.p, psi[:, :3], psi.shape[-1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class AxisPosition(Measurement):
     """Readings ``axis . p - zero`` of a gauge with a fixed axis: dial gauge, linear encoder, laser.
 
@@ -180,7 +180,7 @@ def _as_pivots(m: Distance, name: str, value: Any) -> tuple[str, ...] | None:
     return None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Distance(Labelled):
     """Measured lengths between the end and a pivot, or between two positions of the end.
 
