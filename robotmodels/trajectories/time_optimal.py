@@ -86,7 +86,7 @@ def time_optimal(
 
     Also called TOPP, TOPP-RA: reachability analysis of a path whose own timing is dropped.
     Accelerations are limited at both ends of every interval of a grid, torques at its start
-    (collocation); `TimedPath.reason` reports where torques between the points exceed their limits by
+    (collocation); `TimedPath.reason` lists where torques between the points exceed their limits by
     more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
     needed, between them to 1.001, but for moments where dry friction changes its sign.
 
