@@ -326,6 +326,16 @@ def test_accessibility_says_why():
     assert pf.accessibility(arm, np.zeros((0, 4, 4))).count.shape == (0,)
 
 
+def test_redundant_arms_reach_what_they_reach_within_their_limits(rng):
+    lower, upper = [-0.5, 0.3, -1.5, 0.2], [1.5, 2.0, -0.2, 1.0]
+    arm = planar(0.5, 0.4, 0.4, 0.3, lower=lower, upper=upper)
+    T = rm.dgm(arm, rng.uniform(lower, upper, (60, 4)))
+    for mask in (PLANE, [1, 1, 0, 0, 0, 1]):
+        found = pf.accessibility(arm, T, mask=mask)
+        assert not found.status.any()
+        assert (found.count > 0).all()
+
+
 def test_accessible_poses_and_orientations():
     arm = rm.load("puma560")
     q = np.random.default_rng(2).uniform(-2, 2, (5, 6))

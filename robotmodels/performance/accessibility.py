@@ -121,6 +121,13 @@ def posture_counts(
 def _counts(space: JointSpace, mask: Flags | None, poses: Array) -> tuple[NDArray[Any], ...]:
     q, valid, oriented = postures_of(space.model, poses, mask)
     q, inside = space.within(q)
+    outside = np.flatnonzero(valid.any(axis=1) & ~(valid & inside).any(axis=1))
+    if outside.size and (mask is None or arms.section_arm(space.model) is None):
+        # other members of an infinite family may lie within the limits
+        found = igm(space.model, poses[outside], mask=mask, limits=True)
+        S = min(found.q.shape[1], q.shape[1])
+        n, s = np.nonzero(found.valid[:, :S])
+        q[outside[n], s], valid[outside[n], s], inside[outside[n], s] = found.q[n, s], True, True
     free = free_of(space, q, valid & inside)
     status = np.select(
         [free.any(axis=1), (valid & inside).any(axis=1), valid.any(axis=1), oriented],
