@@ -686,3 +686,9 @@ def test_json_has_no_token_that_readers_refuse(capsys):
     print_json({"a": [np.nan, 1e300], "b": {}, "θ": np.array([[1, 2]]), "e": ExitStatus.BUG})
     expected = {"a": [None, 1e300], "b": {}, "θ": [[1, 2]], "e": "BUG"}
     assert strict(capsys.readouterr().out) == expected
+
+
+def test_angles_that_look_like_degrees_are_warned_of(run):
+    pose = ("igm", "rx90", "--xyz", 0.3, 0.2, 0.5, "--rpy", 0, 90, 45)
+    assert "for degrees add --degrees" in run(*pose)[2]
+    assert run(*pose, "--degrees")[2] == ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from .. import se3
 from .._arrays import Array, as_mask
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, RobotModelsWarning
 from ..igm import IGMSolutions, IGMStatus
 from ..igm import igm as inverse_model
 from ..kinematics import dgm
@@ -111,6 +112,9 @@ def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None
             )
         return se3.translation(*xyz)
     rpy = numbers(arguments.rpy, 3, "--rpy")
+    if not arguments.degrees and np.abs(rpy).max() > 4.0 * np.pi:
+        words = f"--rpy: an angle of {np.abs(rpy).max():g} rad is more than two turns"
+        warnings.warn(f"{words}; for degrees add --degrees.", RobotModelsWarning, stacklevel=2)
     return se3.from_rpy(np.deg2rad(rpy) if arguments.degrees else rpy, xyz)
 
 
