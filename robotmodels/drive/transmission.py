@@ -76,7 +76,7 @@ class Transmission(Value):
             object.__setattr__(self, name, read_only(array))
         terms = (self.Iam != 0.0) | (self.Fvm != 0.0) | (self.Fcm != 0.0)
         for m in set(np.flatnonzero(terms) + 1) - set(self.coupled_motors if terms.any() else ()):
-            known = f"turns one joint only, or the rank of K, {self.rank}, is below {n}"
+            known = f"turns one joint only, or K is singular, rank {self.rank} of {n}"
             raise InertiaError(
                 f"Motor {m} {known}; its inertia and friction belong to DriveParameters (Ia, Fv, "
                 f"Fc). Coupling terms are for the motors {list(self.coupled_motors)}."
