@@ -19,7 +19,7 @@ from ..errors import InvalidValueError, MissingExtraError, nearest_names
 Choice = Column | Sequence[Column]
 
 
-class _NoFileError(InvalidValueError, FileNotFoundError):
+class NoFileError(InvalidValueError, FileNotFoundError):
     """A file that does not exist."""
 
 
@@ -99,7 +99,7 @@ def open_log_table(path: Path, delimiter: str | None = None) -> LogTable:
     if not path.exists():
         near = nearest_names(path.name, [each.name for each in path.parent.glob("*")])
         words = f"; near it: {', '.join(near)}" if near else ""
-        raise _NoFileError(f"{path}: there is no such file{words}.")
+        raise NoFileError(f"{path}: there is no such file{words}.")
     read = {".npz": _npz, ".parquet": _parquet, ".pq": _parquet, ".mat": _mat}
     suffix = path.suffix.lower()
     if suffix in read:

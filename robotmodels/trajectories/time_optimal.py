@@ -88,7 +88,9 @@ def time_optimal(
     Accelerations are limited at both ends of every interval of a grid, torques at its start
     (collocation); `TimedPath.reason` lists where torques between the points exceed their limits by
     more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
-    needed, between them to 1.001, but for moments where dry friction changes its sign.
+    needed, between them to 1.001, but for moments where dry friction changes its sign. On curved
+    paths velocities and accelerations may exceed their limits between the points by some parts in a
+    thousand, less with more points.
 
     Parameters
     ----------
@@ -134,6 +136,8 @@ def time_optimal(
     motion, scalar = path_of(path, model, points)
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
+    if both_ends and not problem.loaded.size:
+        raise InvalidValueError("both_ends: there are no limits of torque; give torque, or leave it.")
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
     own, rated = motion is getattr(path, "motion", None), bool(np.isfinite(problem.rates).any())
