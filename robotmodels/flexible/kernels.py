@@ -1,6 +1,6 @@
 """Generalised Newton-Euler recursion of a chain of elastic bodies.
 
-Seed book sections 7.2.2.12, 7.2.6 and 7.2.8 (F. Boyer and W. Khalil 1998), in the axes of the
+Book sections 7.2.2.12, 7.2.6 and 7.2.8 (F. Boyer and W. Khalil 1998), in the axes of the
 links. A body has a frame at its root and the displacement ``Phi_k e_k + Gamma_kl e_k e_l / 2`` of
 its points (sums over repeated indices); its tip section turns by the rotation vector ``Psi_k e_k``,
 and all that follows is fixed to that section. With u the acceleration of the root less gravity,

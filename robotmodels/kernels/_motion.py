@@ -1,6 +1,6 @@
 """Forward recursion along the chain (poses, velocities, accelerations), and wrenches of links.
 
-All is in link axes (seed book section 1.5.2.2; for
+All is in link axes (book section 1.5.2.2; for
 trees, W. Khalil and J.-F. Kleinfinger 1987). R, P are the rotation and position of frame j in its
 antecedent a; names that end in a belong to the antecedent.
 """

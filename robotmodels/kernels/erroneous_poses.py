@@ -1,6 +1,6 @@
 """Poses of a robot whose parameters are off, and their derivatives by every parameter.
 
-Each row of the table is seven elementary motions (seed book eq. [1.3], with gamma and b for
+Each row of the table is seven elementary motions (book eq. [1.3], with gamma and b for
 branches and Hayati's beta), ``Rot(z, gamma) Trans(z, b) Rot(y, beta) Rot(x, alpha) Trans(x, d)
 Rot(z, theta) Trans(z, r)``. A change of one is a screw along its axis (section 1.4.3):
 ``[axis x (p - origin); axis]`` for a rotation and ``[axis; 0]`` for a translation, times a factor

@@ -1,6 +1,6 @@
 """Poses of frames, their Jacobians, and velocities differentiated once more.
 
-Seed book section 1.2.2: T(0, j) = T(0, a(j)) T(a(j), j), here with the base's place in the world
+Book section 1.2.2: T(0, j) = T(0, a(j)) T(a(j), j), here with the base's place in the world
 in front and the tool behind. Section 1.3.1.2: a revolute joint with axis z through o moves the
 point p by z x (p - o) and turns it by z; a prismatic joint moves it by z. The three references of
 Jacobians are Pinocchio's: 0 LOCAL_WORLD_ALIGNED, 1 LOCAL, 2 WORLD (the point is the one at the

@@ -2,7 +2,7 @@
 
 A motion is given in link axes: t the velocity of the link's origin, z its angular velocity. All
 columns are linear in it, so the unit motion of a joint gives that joint's row, and the link's own
-velocity gives the power. Torques: seed book section 1.6.3 (C. Atkeson, C. An and J. Hollerbach
+velocity gives the power. Torques: book section 1.6.3 (C. Atkeson, C. An and J. Hollerbach
 1986); energy: M. Gautier and W. Khalil 1988. Momentum p = A v, with the rate tau + C^T v - Q, needs
 no acceleration: p_i is the product of the unit motion S_i with the momenta of the links outboard,
 and (C^T v)_i that of V x S_i, V the twist of the joint's link.

@@ -1,6 +1,6 @@
 """Joint torques by the recursive Newton-Euler algorithm, and energies.
 
-Seed book section 1.5.2 (J. Luh, M. Walker and R. Paul 1980, in link frames and linear in the
+Book section 1.5.2 (J. Luh, M. Walker and R. Paul 1980, in link frames and linear in the
 inertial parameters). Forward, velocities, accelerations and the wrench each link needs; backward,
 the wrenches that links pass on to their antecedents: a joint's torque is the component on its axis.
 Energies (section 1.5.1.2): E_j = (M v.v + 2 MS.(v x w) + w.J w) / 2 in link axes, and

@@ -137,7 +137,7 @@ def time_optimal(
     n = path.n if isinstance(path, Trajectory) else (0 if model is None else model.n)
     problem = PathLimits(n, model, limits, torque, friction, both_ends, torque_rate)
     if both_ends and not problem.loaded.size:
-        raise InvalidValueError("both_ends: there are no limits of torque; give torque, or leave it.")
+        raise InvalidValueError("both_ends: there are no limits of torque; give torque=.")
     if isinstance(motion, str):
         return _without(TimingStatus.PATH_NOT_SMOOTH, motion)
     own, rated = motion is getattr(path, "motion", None), bool(np.isfinite(problem.rates).any())
