@@ -535,7 +535,7 @@ def failing(monkeypatch, error):
         (["info", "rx90", "more"], "nothing takes 'more'"),
         (["igm", "rx90", "--deg", "--q", "zero"], "no option --deg. Did you mean --degrees"),
         (["igm", "rx90", "--q", "zeroo"], "Did you mean 'zero'?"),
-        (["info", "missing.urdf"], "cannot read missing.urdf"),
+        (["info", "missing.urdf"], "cannot read 'missing.urdf'"),
         (["excite", "--robot", "rx90", "--out", "taken.csv/new"], "is a file; give a folder"),
         (["excite", "--robot", "rx90", "--rate", 500], "--rate: describes the file of --out"),
         (["excite", "--robot", "rx90", "--out", "new", "--rate", 0], "--rate: expected a finite"),

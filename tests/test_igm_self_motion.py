@@ -234,3 +234,19 @@ def test_double_roots(rng):
     np.testing.assert_array_equal(out.double[1], out.valid[1])
     # a singular shoulder is a family, no double root
     assert not settled(chain, solver, shoulder_singular(chain, 2, rng), 0.0)[2].double.any()
+
+
+@pytest.mark.parametrize("name", ["rx90", "ur5e"])
+def test_whole_turns_of_the_reference_change_no_solution(name, rng):
+    model = rm.load(name)
+    for _ in range(20):
+        q = rng.uniform(-2.8, 2.8, 6)
+        q[3], q[4] = rng.choice([0.0, np.pi / 2, np.pi]), rng.choice([0.0, np.pi])
+        T, reference = rm.dgm(model, q), rng.uniform(-3.0, 3.0, 6)
+        turned = reference + 2 * np.pi * rng.integers(-1, 2, 6)
+        found, again = (rm.igm(model, T, q_ref=ref).q for ref in (reference, turned))
+        rows, others = (
+            sorted(np.mod(x + 1e-7, 2 * np.pi).round(5).tolist()) for x in (found, again)
+        )
+        assert np.shape(rows) == np.shape(others)
+        assert np.allclose(rows, others, atol=2e-5)

@@ -576,7 +576,7 @@ MUTATIONS = [
         SELF + "left_alone"),
     Mutation("igm: postures", "gaps of whole turns are not taken off",
         "def difference(sigma", "turns = np.where(sigma == 0,", "turns = np.where(sigma == 2,",
-        SELF + "nearest_value"),
+        SELF + "whole_turns"),
     Mutation("igm: general", "one of the fourteen functions loses a factor 2", "def fourteen(",
         "pp * x[3 + i] - 2.0 * pl * x[i]", "pp * x[3 + i] - pl * x[i]",
         "tests/test_igm_cases.py -k general"),
