@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from identities.chain_search import apart, draw, missing, searched
 
+import robotmodels as rm
 from robotmodels.igm.families import prepare
 from robotmodels.igm.kernels.singular import curve
 from robotmodels.igm.loop import JointChain, joint_chain
