@@ -270,15 +270,16 @@ def _compiled_steps(
     from .steps import follow, table
     from .work import workspace
 
-    parts, state, span = arm.parts, y.copy(), times[-1] - start
+    parts, state, span, k = arm.parts, y.copy(), times[-1] - start, len(torque[0])
     every = len(times) == 1
     clock, samples = np.array([start, 1e-3 * span, *np.zeros(5)]), [np.append(start, y)[None]]
     ends, bounds = times[times > start], np.append(bounds, every)
     given = address(), parts.chain, parts.free[2], parts.D, torque, table(), ends, bounds, largest
-    room = workspace(parts.chain, parts.free[2]), state, clock
-    found = np.empty((500, 1 + len(y)))
+    poses = np.zeros((1, len(parts.chain.pi) + 1, 3, 4))
+    scratch = np.zeros((4, max(k, 18))), poses, np.zeros((1, 10)), state, np.zeros((14, len(y)))
+    room, found = (workspace(parts.chain, parts.free[2]), *scratch), np.empty((500, 1 + len(y)))
     while clock[3] < len(ends) and not clock[4]:
-        samples.append(found[: follow(*given, *room, found)].copy())
+        samples.append(found[: follow(*given, *room, clock, found)].copy())
         report.done((clock[0] - start) / span)
     status = _ended(FlexibleMotionStatus(int(clock[4])), clock[5:].tolist())
     t, *states = np.vstack(samples).T

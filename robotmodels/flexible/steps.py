@@ -6,9 +6,10 @@ The recursion is called at its address: as an inner function it would be compile
 A state has k = n + m coordinates, their velocities, the work, and the integrals of the base's load
 (6) and of the arm's first moment (3). Shapes of `follow`: free and work as for `loads`, torques
 (1, k), damping (k, k), rows (15, 13) of coefficients; times (N,) at which steps end; bounds (4,):
-rtol, atol, evaluations, whether all steps are samples; largest, y (s,); clock (7,): time, next
-step, evaluations, times that are passed, code of `FlexibleMotionStatus`, codes 1 and 2 of
-`SpinStatus` once they occur -> found (., 1 + s): time and state of samples.
+rtol, atol, evaluations, whether all steps are samples; largest (s,); y (s,); slopes (14, s), the
+last the end of a step; clock (7,): time, next step, evaluations, times that are passed, code of
+`FlexibleMotionStatus`, codes 1 and 2 of `SpinStatus` once they occur -> found (., 1 + s): time and
+state of samples.
 """
 
 from math import sqrt
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernels._compile import INT, INTS, MATRIX, OUT1, OUT2, VECTOR, Floats, Ints, compiled
+from ..kernels._compile import INT, INTS, MATRIX, OUT1, OUT2, OUT4, VECTOR, Floats, Ints, compiled
 from .kernels import ARM, WORK, recursion
 from .robot import Arm
 from .work import Work, friction
@@ -37,17 +38,22 @@ def table() -> Any:
 
 
 @compiled(
-    INT(INT, ARM, INTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, WORK, OUT1, OUT1, OUT2)
+    INT(
+        *(INT, ARM, INTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, WORK, OUT2, OUT4, OUT2),
+        *(OUT1, OUT2, OUT1, OUT2),
+    )
 )
 def follow(
     place: int, arm: Arm, free: Ints, damping: Floats, tau: Floats, rows: Floats, times: Floats,
-    bounds: Floats, largest: Floats, work: Work, y: Floats, clock: Floats, found: Floats,
+    bounds: Floats, largest: Floats, work: Work, room: Floats, poses: Floats, base: Floats,
+    y: Floats, slopes: Floats, clock: Floats, found: Floats,
 ) -> int:  # fmt: skip
-    """Steps until the last time, the bounds or a fault; the number of samples."""
+    """Steps until the last time, the bounds or a fault; the number of samples.
+
+    Scratch: room (4, k or 18), whose last row is zero, poses (1, f + 1, 3, 4), base (1, 10).
+    """
     size, k, n, count, rejected = len(y), damping.shape[0], arm.deflection.shape[0], 0, False
-    z, q, v, a, first = np.zeros(size), np.zeros((1, k)), np.zeros((1, k)), np.zeros((1, k)), 0
-    slopes, poses = np.zeros((13, size)), np.zeros((1, arm.pi.shape[0] + 1, 3, 4))
-    base, outer = np.zeros((1, 10)), np.zeros((1, 18))
+    z, q, v, a = slopes[13], room[0:1], room[1:2], room[2:3]
     while clock[3] < len(times) and count < len(found) and clock[4] == 0.0:
         if clock[2] >= bounds[2]:
             clock[4] = NOT_CONVERGED
@@ -55,7 +61,7 @@ def follow(
         t, end = clock[0], times[int(clock[3])]
         h = min(clock[1], end - t)
         now, code = end if h == end - t else t + h, 0.0
-        for s in range(first, STAGES + 1):
+        for s in range(1 if clock[2] else 0, STAGES + 1):
             for c in range(size):
                 moved = 0.0
                 for r in range(s):
@@ -63,7 +69,7 @@ def follow(
                 z[c] = y[c] + h * moved
             for c in range(k):
                 q[0, c], v[0, c] = z[c], z[k + c]
-            given = arm, q, v, tau, outer, free, work, a, base, poses
+            given = arm, q, v, tau, room[3:4], free, work, a, base, poses
             recursion(place, given)  # type: ignore[call-arg]
             power = 0.0
             for c in range(k):
@@ -79,7 +85,6 @@ def follow(
             if code > 0.0:
                 clock[4 + int(code)] = code
             clock[2] += 1
-        first = 1
         third = fifth = 0.0  # errors of the step beside what is allowed
         for c in range(size):
             scale = bounds[1] + bounds[0] * max(abs(y[c]), abs(z[c]))
