@@ -1,4 +1,7 @@
-"""Docstrings of families: the head of a file is part of the help of what the file defines."""
+"""Help of functions and classes, completed from the docstrings of their file and package.
+
+Members of a family share one docstring at the head of their file; `help` shows it with each.
+"""
 
 from __future__ import annotations
 
@@ -12,62 +15,58 @@ from ._outcomes import Result
 
 _TITLE = re.compile(r"\n([A-Z]\w+(?: \w+)?)\n-{3,}\n")
 _ENTRY = re.compile(r"^([\w*][\w*, ]*)( :.*|)$((?:\n(?:    .*|(?=\n    )))*)", re.MULTILINE)
-_ORDER = [
-    "Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "References", "Examples",
-]  # fmt: skip
+_LAST = ("References", "Examples")
 
 
 def documented(thing: Any) -> Any:
-    """The function or class, with the sections of the head of its file that it has not itself.
+    """A function or class whose docstring has the sections of its file that it lacks itself.
 
-    Of the parameters, also those of its room, the ones that it has; of the examples those that call
-    it; nothing to a result.
+    Parameters come from the file and the package, but only those of its own arguments; examples
+    only if they call it. Classes of results are left as they are: their fields are their own.
     """
     module = getattr(thing, "__module__", None) or ""
-    room, head = (getattr(sys.modules.get(x), "__doc__", "") or "" for x in (_room(module), module))
+    package = ".".join(module.split(".")[:2])
+    head, common = (getattr(sys.modules.get(x), "__doc__", "") or "" for x in (module, package))
     is_class = inspect.isclass(thing)
     result = is_class and issubclass(thing, Result | Enum | Exception)
     if result or not (is_class or inspect.isfunction(thing)) or not thing.__doc__:
         return thing
-    own, shared, common = _sections(thing.__doc__), _sections(head), _sections(room)
+    own, shared = _sections(thing.__doc__), _sections(head)
     if f"{thing.__name__}(" not in shared.get("Examples", ""):
         shared.pop("Examples", None)
     if is_class:
         shared.pop("Returns", None)
-    texts = [sections.get("Parameters", "") for sections in (own, shared, common)]
+    texts = [x.get("Parameters", "") for x in (own, shared, _sections(common))]
     text = shared | own | {"Parameters": _parameters(thing, texts)}
-    titles = [title for title in _ORDER if text.get(title)]
+    between = [title for title in text if title not in ("", "Parameters", *_LAST)]
+    titles = [title for title in ("Parameters", *between, *_LAST) if text.get(title)]
     parts = [f"{title}\n{'-' * len(title)}\n{text[title].strip()}" for title in titles]
     thing.__doc__ = "\n\n".join((text[""].strip(), *parts)) + "\n"
     return thing
 
 
-def document(room: str) -> None:
-    """Complete the docstrings of the names that a package lists and has imported."""
-    names = vars(sys.modules[room])
+def document(package: str) -> None:
+    """Complete the docstrings of the names in ``__all__`` that the package has imported."""
+    names = vars(sys.modules[package])
     for name in names["__all__"]:
         if name in names:
             documented(names[name])
 
 
-def _room(module: str) -> str:
-    return ".".join(module.split(".")[:2])
-
-
 def _sections(text: str) -> dict[str, str]:
-    """Sections of a docstring by their titles; what is before the first of them by ""."""
+    """Sections of a docstring by title; the text before the first one has the title ""."""
     first, *rest = _TITLE.split("\n" + inspect.cleandoc(text))
     return {"": first, **dict(zip(rest[::2], rest[1::2], strict=True))}
 
 
 def _parameters(thing: Any, texts: list[str]) -> str:
-    """Entries of its arguments, each from the first of the texts that has one."""
+    """Entries of the arguments, each from the first text that has one."""
     entries, missing = [texts[0].strip()], list(inspect.signature(thing).parameters)
     for text in texts:
         found = _ENTRY.findall(text.strip())
         for names, kind, rest in found if text is not texts[0] else ():
             here = [name for name in missing if name in _split(names)]
-            if here:  # without a type: arguments of several functions
+            if here:  # an entry without a type lists arguments of several functions
                 entries.append((names + kind if kind else ", ".join(here)) + rest.rstrip())
         known = {name for names, _, _ in found for name in _split(names)}
         missing = [name for name in missing if name not in known]
@@ -75,5 +74,5 @@ def _parameters(thing: Any, texts: list[str]) -> str:
 
 
 def _split(names: str) -> list[str]:
-    """Names of arguments, without the stars of those that hold several."""
+    """Names of arguments, without the stars of ``*args`` and ``**kwargs``."""
     return names.replace("*", "").split(", ")

@@ -1,9 +1,9 @@
-"""Public names: a directive that documents those of a room, and links from the pages to them.
+"""Public names: a directive that documents those of a package, and links from the pages to them.
 
-``.. about:: robotmodels.kinematics`` gives what the room says of all of its functions, and
-``.. names:: robotmodels.kinematics``, followed by one name a line, a table of them, then every
-entry in full. A name is documented under its shortest public path: ``robotmodels.dgm``
-where the door has it. In the Markdown pages code such as ``rm.dgm`` becomes a link to its entry.
+``.. about:: robotmodels.kinematics`` gives what the docstring of a package says of all of its
+functions, and ``.. names:: robotmodels.kinematics``, followed by one name a line, a table of them,
+then every entry in full. A name is documented under its shortest public path: ``robotmodels.dgm``
+where the top package has it. In the Markdown pages code such as ``rm.dgm`` becomes a link to its entry.
 """
 
 import enum
@@ -120,7 +120,7 @@ class Names(SphinxDirective):
 
 
 class About(SphinxDirective):
-    """The docstring of a room after its first line: arguments that many of its functions have."""
+    """The docstring of a package after its first line: arguments that many functions have."""
 
     required_arguments = 1
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite, nan
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -122,13 +123,16 @@ def as_number(
 
 def as_count(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
     """A whole number within bounds, such as a number of samples."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or value < least or (most is not None and value > most):
+    try:
+        number = least - 1 if isinstance(value, (bool, np.bool_)) else index(value)
+    except TypeError:
+        number = least - 1
+    if number < least or (most is not None and number > most):
         to = "" if most is None else f" to {most}"
         raise InvalidValueError(
             f"{name}: expected a whole number from {least}{to}, got {value!r:.60}."
         )
-    return int(value)
+    return number
 
 
 def as_mask(

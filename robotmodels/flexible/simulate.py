@@ -18,7 +18,8 @@ control, wrench : callable or array_like of shape (n,) or (6,), optional
 t : array_like
     A duration, with samples at the steps of the integrator, or ascending times (N,), s.
 method, rtol, atol, progress
-    As for `robotmodels.simulate`; ``"Radau"`` for stiff links with modal damping.
+    As for `robotmodels.simulate`. The highest mode limits the step, at loose tolerances too: take
+    few modes, or ``"Radau"`` for stiff links with modal damping.
 max_evaluations : int, optional
     Default 60 000 for each second and as many more.
 

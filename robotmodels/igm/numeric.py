@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from operator import index
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import as_mask, as_vector, batch_rows
+from .._arrays import as_count, as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
@@ -117,8 +116,8 @@ def igm_numeric(
         above_zero(position_tolerance, "position_tolerance"),
         above_zero(orientation_tolerance, "orientation_tolerance"),
     )
-    restarts = _whole(restarts, "restarts", 0)
-    iterations = _whole(iterations, "iterations", 1)
+    restarts = as_count(restarts, "restarts", 0)
+    iterations = as_count(iterations, "iterations", 1)
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     if restarts == 0 and q0 is None:
@@ -173,21 +172,10 @@ def _search_space(model: RobotModel, limits: bool, restarts: int, rng: Any) -> S
         return entry[1]
     seed = _SEED if rng is None else rng
     if not isinstance(seed, np.random.Generator):
-        seed = np.random.default_rng(_whole(seed, "rng", 0))
+        seed = np.random.default_rng(as_count(seed, "rng", 0))
     chain = joint_chain(model)
     lower, upper = model.lower[chain.columns], model.upper[chain.columns]
     space = search_space(chain, lower, upper, limits, restarts, seed)
     if rng is None:
         _SPACES[key] = weakref.ref(model, lambda _: _SPACES.pop(key, None)), space
     return space
-
-
-def _whole(value: Any, name: str, least: int) -> int:
-    """A whole number, or an error that names the argument."""
-    try:
-        number = index(value)
-    except TypeError:
-        raise InvalidValueError(f"{name}: expected a whole number, got {value!r}.") from None
-    if isinstance(value, (bool, np.bool_)) or number < least:
-        raise InvalidValueError(f"{name}: expected a whole number >= {least}, got {value!r}.")
-    return number

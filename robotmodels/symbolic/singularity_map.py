@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_exact, as_vector
+from .._arrays import Array, Frozen, Value, as_count, as_exact, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..kinematics import SingularityKind
 from ..kinematics.inverse.tasks import joint_columns
-from ..kinematics.singular.task import whole_number
 from ..model import RobotModel, check_model
 from .factor import SingularityFactor
 from .singularities import explain_singularities
@@ -97,7 +96,7 @@ def singularity_map(
         raise InvalidValueError(
             f"samples: expected two numbers, such as (121, 121), got {samples!r}."
         )
-    counts = [whole_number(count, "samples", 1) for count in samples]
+    counts = [as_count(count, "samples", 1) for count in samples]
     limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
     for low, high in limits:
         if low >= high:

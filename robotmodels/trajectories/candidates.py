@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_number
+from .._arrays import Array, as_count, as_number
 from .._choices import chosen
 from ..errors import InvalidValueError
-from ..kinematics.singular.task import generator_of, whole_number
+from ..kinematics.singular.task import generator_of
 from ..obstacles.clearance import link_distances
 from ..obstacles.shapes import Obstacle
 from .blends import blended_lines
@@ -240,7 +240,7 @@ def random_profile(
     (1.0, [[0.0, 0.0], [1.0, 0.5]])
     """
     law = chosen(ProfileLaw, law, "law")
-    count, generator = whole_number(nodes, "nodes", 0), generator_of(rng)
+    count, generator = as_count(nodes, "nodes", 0), generator_of(rng)
     ends, scalar = joint_vectors(q0=q0, q1=q1)
     start, end = ends["q0"], ends["q1"]
     if not np.any(start != end):

@@ -30,10 +30,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_number
+from .._arrays import Array, as_count, as_exact, as_number
 from .._choices import as_instance, chosen
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.singular.task import whole_number
 from ..se3.orientation import rotation_vectors_of
 from .blends import PARABOLA, QUARTIC, full_speed, joined, rates_of, schedule
 from .laws import LineLimits, TimeLaw, law_of_limits
@@ -82,7 +81,7 @@ def cartesian_trajectory(
     ((50, 4, 4), True)
     """
     first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
-    law, N = chosen(TimeLaw, law, "law"), whole_number(N, "N", 0)
+    law, N = chosen(TimeLaw, law, "law"), as_count(N, "N", 0)
     try:
         batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
     except ValueError:

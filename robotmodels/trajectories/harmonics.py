@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, as_number, read_only
+from .._arrays import Array, as_count, as_floats, as_number, read_only
 from ..errors import ShapeError
-from ..kinematics.singular.task import whole_number
 from .motions import Motion
 from .trajectory import Trajectory
 
@@ -157,7 +156,7 @@ def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -
     t = as_floats(t, "t")
     if t.ndim != 1:
         raise ShapeError(f"t: expected shape (N,), got {t.shape}.")
-    H, order = whole_number(harmonics, "harmonics", 1), whole_number(order, "order", 0)
+    H, order = as_count(harmonics, "harmonics", 1), as_count(order, "order", 0)
     one = np.eye(2 * H + 1)  # a series for each parameter
     series = FourierSeries(period, one[1 : H + 1], one[H + 1 :], one[0])
     return series.derivatives(t, (order,))[0]

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, Value, as_exact, as_number, read_only
+from .._arrays import Array, Value, as_count, as_exact, as_number, read_only
 from .._arrays.tasks import Progress
 from .._choices import as_instance, chosen
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm import igm
-from ..kinematics.singular.task import generator_of, whole_number
+from ..kinematics.singular.task import generator_of
 from ..model import RobotModel, check_model
 from ..obstacles import clearance as clearance_of
 from ..obstacles.clearance import checked_obstacles
@@ -175,7 +175,7 @@ def kinodynamic(
     timing, method = chosen(Timing, timing, "timing"), chosen(PlanMethod, method, "method")
     as_instance(cost, Cost, "cost")
     wanted = as_number(clearance, "clearance", least=0.0)
-    count, bodies = whole_number(nodes, "nodes", 0), checked_obstacles(obstacles)
+    count, bodies = as_count(nodes, "nodes", 0), checked_obstacles(obstacles)
     problem = PathLimits(model.n, model, limits, torque, True, both_ends=True)
     seconds = as_number(seconds, "seconds", above=0.0)
     if cost.torque and not problem.loaded.size:

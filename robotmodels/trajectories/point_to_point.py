@@ -38,10 +38,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_count, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError
-from ..kinematics.singular.task import whole_number
 from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import (
     MotionLimits,
@@ -208,7 +207,7 @@ def joint_trajectory(
     (array([0.5, 0. ]), (5, 2))
     """
     if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
-        t = np.linspace(0.0, 1.0, whole_number(N, "N", 0))  # type: ignore[arg-type]
+        t = np.linspace(0.0, 1.0, as_count(N, "N", 0))  # type: ignore[arg-type]
     else:
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():

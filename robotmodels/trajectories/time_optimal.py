@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_number
+from .._arrays import Array, as_count, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
 from ..friction import Friction
-from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from .limits import MotionLimits, checked_limits
 from .motions import Motion, PiecewisePolynomial, TimedMotion
@@ -128,7 +127,7 @@ def time_optimal(
     >>> round(timed.duration, 6), str(timed.active[100])  # D / v + v / a
     (1.5, 'velocity of joint 1')
     """
-    points = whole_number(points, "points", 2)
+    points = as_count(points, "points", 2)
     first, last = (
         as_number(r, k, least=0.0, below=1e150)
         for r, k in ((start_rate, "start_rate"), (end_rate, "end_rate"))

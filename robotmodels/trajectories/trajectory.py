@@ -9,9 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_floats, as_number, read_only
+from .._arrays import Array, Frozen, Value, as_count, as_floats, as_number, read_only
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.singular.task import whole_number
 from .limits import RATES, LimitsReport, MotionLimits, checked_limits, greatest
 from .motions import FunctionMotion, Motion
 
@@ -162,7 +161,7 @@ class Trajectory(Value):
         """
         T = self.duration
         if samples is not None and period is None:
-            return np.linspace(0.0, T, whole_number(samples, "samples", 1))
+            return np.linspace(0.0, T, as_count(samples, "samples", 1))
         if samples is not None or period is None:
             raise InvalidValueError("resample: give either samples or period.")
         step = as_number(period, "period", above=0.0)

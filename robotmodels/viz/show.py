@@ -57,12 +57,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_vector
+from .._arrays import Array, as_count, as_exact, as_floats, as_vector
 from .._choices import as_instance, one_of
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import link_poses
 from ..kinematics.ellipsoid import Ellipsoid
-from ..kinematics.singular.task import whole_number
 from ..loops import LoopedRobot
 from ..model import RobotModel, check_model
 from ..trajectories.joint_path import JointPath
@@ -120,7 +119,7 @@ def show(
     if columns is not None:
         if len(drawn) > 1 or ellipsoids is not None:
             raise InvalidValueError("columns: expected one robot, without ellipsoids.")
-        drawn, extra = _side_by_side(drawn[0], postures[0], whole_number(columns, "columns", 1))
+        drawn, extra = _side_by_side(drawn[0], postures[0], as_count(columns, "columns", 1))
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
         draw_robot(item, p, f"robots/{label}", given, c)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypedDict, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact
+from .._arrays import Array, as_count, as_exact
 from ..errors import InvalidValueError, MissingExtraError, ShapeError
-from ..kinematics.singular.task import whole_number
 from ..visual import Color
 
 if TYPE_CHECKING:
@@ -300,7 +299,7 @@ def as_named(given: Any, names: Any, name: str, of: str) -> dict[str, Any]:
 
 def as_columns(columns: Any, count: int, default: int) -> int:
     """How many panels stand in a row."""
-    return min(count, default if columns is None else whole_number(columns, "columns", 1))
+    return min(count, default if columns is None else as_count(columns, "columns", 1))
 
 
 def as_choice(values: Any, count: int, name: str, what: str) -> list[int]:

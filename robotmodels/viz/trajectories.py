@@ -46,10 +46,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_number
+from .._arrays import Array, as_count, as_exact, as_number
 from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
-from ..kinematics.singular.task import whole_number
 from ..model import RobotModel
 from ..trajectories.joint_path import JointPath
 from ..trajectories.limits import MotionLimits
@@ -234,7 +233,7 @@ def plot_pose_path(
     length = over_time.as_unit(unit)
     if length not in (Unit.METRE, Unit.MILLIMETRE):
         raise InvalidValueError(f"unit: expected a length, 'm' or 'mm', got {length.value!r}.")
-    count = whole_number(frames, "frames", 0)
+    count = as_count(frames, "frames", 0)
     if path is not None and len(path.q) != len(T):
         raise ShapeError(f"path: expected the joints of these {len(T)} poses, got {len(path.q)}.")
     k = length.factor

@@ -32,6 +32,7 @@ array([-1.,  0.])
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -80,7 +81,7 @@ class Criterion(Protocol):
         ...
 
 
-class _Squares(Rebuilt):
+class _Squares(Rebuilt, ABC):
     """Weighted sum of squares of depths h (..., p) with slopes ``dh/dq`` (..., p, n)."""
 
     __slots__ = ()
@@ -103,8 +104,9 @@ class _Squares(Rebuilt):
         check_model(model)
         return self._depths(model, as_vector(q, model.n, "q"))
 
+    @abstractmethod
     def _depths(self, model: RobotModel, q: Array) -> tuple[Array, Array]:
-        raise NotImplementedError
+        """Depths and their slopes at checked configurations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_count, as_exact, read_only
 from ..._outcomes import Outcome
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
@@ -30,7 +30,6 @@ from .task import (
     deciding_mask,
     generator_of,
     singular_task,
-    whole_number,
 )
 
 _WIDTH = 100
@@ -212,7 +211,7 @@ def nearest_singularity(
     w = np.ones(model.n) if weights is None else as_exact(weights, (model.n,), "weights")
     if not (w > 0.0).all():
         raise InvalidValueError(f"weights: expected numbers above 0, got {w.tolist()}.")
-    count, most = whole_number(starts, "starts", 1), whole_number(most, "most", 1)
+    count, most = as_count(starts, "starts", 1), as_count(most, "most", 1)
     whole = operational_dimension(model, frame, None, task.length, mask=mask, mask_axes=mask_axes)
     unit = task.joint_scale / np.sqrt(w)
     free = np.full(model.n, np.inf)

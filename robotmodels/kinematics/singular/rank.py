@@ -13,7 +13,7 @@ from math import comb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Frozen, Value, as_floats, as_number, as_vector
+from ..._arrays import Array, Frozen, Value, as_count, as_floats, as_number, as_vector
 from ...model import RobotModel
 from ..jacobians import COMPONENTS, jacobian
 from ..lengths import spread_configurations
@@ -23,7 +23,6 @@ from .task import (
     generator_of,
     singular_task,
     task_jacobians,
-    whole_number,
 )
 
 TOLERANCE = 1e-9
@@ -194,7 +193,7 @@ def operational_dimension(
     """
     task = singular_task(model, frame, mask, mask_axes, length)
     tolerance = as_number(tolerance, "tolerance", above=0.0)
-    count = whole_number(samples, "samples", 1)
+    count = as_count(samples, "samples", 1)
     spread = spread_configurations(model, count, generator_of(rng))
     if q is not None:
         spread = np.vstack([spread, as_vector(q, model.n, "q").reshape(-1, model.n)])

@@ -8,13 +8,12 @@ characteristic length L, and a prismatic joint counts its stroke in units of L.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import index
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_mask, read_only
+from ..._arrays import Array, as_count, as_mask, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
@@ -141,21 +140,8 @@ def outside(space: Array, part: Array) -> Array:
     return U[:, sigma > 0.5]
 
 
-def whole_number(value: int, name: str, least: int) -> int:
-    """A whole number that is not too small, such as a count."""
-    try:
-        number = index(value)
-    except TypeError:
-        number = least - 1
-    if isinstance(value, (bool, np.bool_)) or number < least:
-        raise InvalidValueError(
-            f"{name}: expected a whole number of at least {least}, got {value!r}."
-        )
-    return number
-
-
 def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
     """A generator: itself, of a seed, or of a fixed seed."""
     if isinstance(rng, np.random.Generator):
         return rng
-    return np.random.default_rng(_SEED if rng is None else whole_number(rng, "rng", 0))
+    return np.random.default_rng(_SEED if rng is None else as_count(rng, "rng", 0))
