@@ -3,7 +3,8 @@
 ``.. about:: robotmodels.kinematics`` gives what the docstring of a package says of all of its
 functions, and ``.. names:: robotmodels.kinematics``, followed by one name a line, a table of them,
 then every entry in full. A name is documented under its shortest public path: ``robotmodels.dgm``
-where the top package has it. In the Markdown pages code such as ``rm.dgm`` becomes a link to its entry.
+where the top package has it. In the Markdown pages code such as ``rm.dgm`` becomes a link to its
+entry.
 """
 
 import enum
